@@ -1,0 +1,1 @@
+"""The shipped campaigns: one folder a published system."""

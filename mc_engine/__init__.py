@@ -1,0 +1,64 @@
+"""Monte Carlo dispersion campaigns for spacecraft guidance, navigation and control.
+
+The public names load what they need when they are first used: the command line starts without numba or pandas.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mc_engine.campaign import Campaign, list_campaigns, load_campaign
+    from mc_engine.cases import case_table
+    from mc_engine.errors import CampaignError, EngineError, ModelError, RunInterrupted, StoreError
+    from mc_engine.model import Event, Extremum, Field, FixedStep, Model, Parameter, Refusals, Setting
+    from mc_engine.runner import Replay, extend, replay, resume, run
+    from mc_engine.store import Store, open_store
+
+_HOME = {
+    "campaign": ("Campaign", "list_campaigns", "load_campaign"),
+    "cases": ("case_table",),
+    "errors": ("CampaignError", "EngineError", "ModelError", "RunInterrupted", "StoreError"),
+    "model": ("Event", "Extremum", "Field", "FixedStep", "Model", "Parameter", "Refusals", "Setting"),
+    "runner": ("Replay", "extend", "replay", "resume", "run"),
+    "store": ("Store", "open_store"),
+}
+_MODULE = {name: module for module, names in _HOME.items() for name in names}
+
+__all__ = [  # noqa: RUF022 - by module, as above
+    "Campaign",
+    "list_campaigns",
+    "load_campaign",
+    "case_table",
+    "CampaignError",
+    "EngineError",
+    "ModelError",
+    "RunInterrupted",
+    "StoreError",
+    "Event",
+    "Extremum",
+    "Field",
+    "FixedStep",
+    "Model",
+    "Parameter",
+    "Refusals",
+    "Setting",
+    "Replay",
+    "extend",
+    "replay",
+    "resume",
+    "run",
+    "Store",
+    "open_store",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])

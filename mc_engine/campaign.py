@@ -1,0 +1,308 @@
+"""A campaign: a model, how its inputs are dispersed, and what the results must meet, read from a TOML file.
+
+`load_campaign` reports every mistake of the file at once and imports neither numba nor scipy nor matplotlib
+by itself.  What the file may say is in `mc_engine.campaign_file`.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine.campaign_file import MOST_CASES, CampaignSection, schema
+from mc_engine.campaign_parts import (
+    Correlation,
+    Requirement,
+    Retention,
+    Worst,
+    check_correlations,
+    check_requirements,
+    check_retention,
+    check_room_for_correlations,
+    nominal_values,
+    refusal,
+)
+from mc_engine.campaign_problems import Findings, Sections, parse_toml, read_sections
+from mc_engine.campaign_search import SHIPPED, ShippedCampaign, campaign_name, find_campaign, list_campaigns
+from mc_engine.case_files import FileFault, resolve_beside
+from mc_engine.case_table_file import read_case_table, table_dispersions
+from mc_engine.designs import BY_LEVELS, RANDOM, level_count
+from mc_engine.dispersions import Dispersion, build_dispersion
+from mc_engine.distributions import Scalar
+from mc_engine.errors import CampaignError, ModelError, Problem
+from mc_engine.input_values import inputs_of
+from mc_engine.model import Model, load_model
+from mc_engine.sobol import MAX_DIMENSIONS
+from mc_engine.suggestions import hint
+
+__all__ = [
+    "SHIPPED",
+    "Campaign",
+    "Correlation",
+    "Dispersion",
+    "Requirement",
+    "Retention",
+    "ShippedCampaign",
+    "Worst",
+    "find_campaign",
+    "list_campaigns",
+    "load_campaign",
+    "schema",
+]
+
+_LARGEST_FILE = 5_000_000  # bytes
+_LARGEST_HYPERCUBE = 10_000_000  # cases; a Latin hypercube is held in memory as a whole
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign that can be flown.  Numbers are in the units that the model declares.
+
+    text : the file as read; `cases` and `seed` may have been changed on the command line since.
+    parameters : what [parameters] says.  nominal : every parameter and setting of the model.
+    table : the columns of the design "table", else empty.
+    digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
+        cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
+    """
+
+    name: str
+    title: str
+    text: str
+    directory: Path
+    model: Model
+    model_reference: str
+    cases: int
+    design: str
+    seed: int
+    parameters: Mapping[str, Scalar]
+    nominal: Mapping[str, Scalar]
+    dispersions: tuple[Dispersion, ...]
+    correlations: tuple[Correlation, ...]
+    requirements: tuple[Requirement, ...]
+    retention: Retention
+    digest: str
+    table_path: Path | None = None
+    table: Mapping[str, np.ndarray] = field(default_factory=dict, compare=False, repr=False)
+
+
+def load_campaign(
+    reference: str | Path,
+    *,
+    cases: int | None = None,
+    seed: int | None = None,
+    text: str | None = None,
+    directory: Path | None = None,
+) -> Campaign:
+    """The campaign of a shipped name or of a path; CampaignError lists all that is wrong with it.
+
+    cases, seed : in place of what the file says.
+    text, directory : the text of the file and the folder it counts as being in, where it is kept elsewhere;
+        `reference` is then only its name.
+    """
+    if text is None:
+        path = find_campaign(reference)
+        name, source, directory = campaign_name(path), path.name, path.resolve().parent
+        text = _read(path)
+    else:
+        name, source, directory = str(reference), Path(str(reference)).name, Path(directory or Path.cwd())
+    document = parse_toml(text, source)
+    _override(document, {"cases": cases, "seed": seed})
+    found = Findings()
+    campaign = _assemble(name, text, directory, document, cases is not None, found)
+    if campaign is None or found.problems:
+        raise CampaignError(source, found.problems)
+    return campaign
+
+
+def _read(path: Path) -> str:
+    try:
+        data = path.read_bytes() if path.stat().st_size <= _LARGEST_FILE else None
+    except OSError as error:
+        raise CampaignError(path.name, [Problem("", f"cannot be read: {error.strerror}")]) from None
+    if data is None:
+        raise CampaignError(
+            path.name, [Problem("", "is larger than 5 MB; a long table of cases belongs into a CSV file")]
+        )
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise CampaignError(path.name, [Problem(f"line {line}", "is not text in UTF-8")]) from None
+
+
+def _override(document: dict[str, Any], wanted: dict[str, int | None]) -> None:
+    section = document.get("campaign")
+    if isinstance(section, dict):
+        section.update({key: value for key, value in wanted.items() if value is not None})
+
+
+def _assemble(
+    name: str, text: str, directory: Path, document: dict[str, Any], shortened: bool, found: Findings
+) -> Campaign | None:
+    """The campaign, or None where it lacks a section or a model to hold the rest against."""
+    sections = read_sections(document, found)
+    model = _model(document, directory, found)
+    if model is None:
+        return None
+    inside = found.under("campaign")
+    nominal = _nominal(model, sections, found)
+    section = sections.campaign
+    design = section.design if section is not None else None
+    requirements = check_requirements(sections.requirements, model, found.under("requirement"))
+    dispersions = _dispersions(sections, model, nominal, design, directory, found)
+    correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", found)
+    table_path, table = _table(section, model, dispersions, directory, found)
+    if design == "table":
+        dispersions = table_dispersions(table, {one.name: one for one in dispersions}, found) if table else ()
+    count = _case_count(section, dispersions, table, inside) if section is not None else None
+    if count is not None:
+        _check_size(count, design or "", dispersions, correlations, inside)
+    retention = Retention()
+    if sections.retention is not None:
+        retention = check_retention(sections.retention, model, count, shortened, found.under("retention"))
+    if section is None or count is None or found.problems:
+        return None
+    return Campaign(
+        name=name,
+        title=section.title or model.title,
+        text=text,
+        directory=directory,
+        model=model,
+        model_reference=section.model,
+        cases=count,
+        design=section.design,
+        seed=section.seed or 0,
+        parameters={key: nominal[key] for key in sections.parameters},
+        nominal=nominal,
+        dispersions=dispersions,
+        correlations=correlations,
+        requirements=requirements,
+        retention=retention,
+        digest=_digest(document, section, directory, dispersions, table_path),
+        table_path=table_path,
+        table=table,
+    )
+
+
+def _model(document: dict[str, Any], directory: Path, found: Findings) -> Model | None:
+    """The model, even where other keys of [campaign] are wrong: the rest of the file is read against it."""
+    section = document.get("campaign")
+    reference = section.get("model") if isinstance(section, dict) else None
+    if not isinstance(reference, str) or not reference:
+        return None
+    try:
+        return load_model(reference, directory)
+    except ModelError as error:
+        shipped = [f"campaigns.{folder.parent.name}" for folder in SHIPPED.glob("*/campaign.toml")]
+        near = "" if reference in shipped or reference.endswith(".py") else hint(reference, shipped)
+        found.under("campaign").add("model", f"{error}{near if 'did you mean' in near else ''}")
+        return None
+
+
+def _nominal(model: Model, sections: Sections, found: Findings) -> dict[str, Scalar]:
+    spot = found.under("parameters")
+    before = len(found.problems)
+    nominal = nominal_values(model, sections.parameters, spot)
+    if len(found.problems) == before:
+        sentence = refusal(model, nominal)
+        if sentence:
+            spot.add("", f"the nominal case cannot be flown: {sentence}")
+    return nominal
+
+
+def _dispersions(
+    sections: Sections,
+    model: Model,
+    nominal: Mapping[str, Scalar],
+    design: str | None,
+    directory: Path,
+    found: Findings,
+) -> tuple[Dispersion, ...]:
+    built = []
+    for name, section in sections.dispersions.items():
+        spot = found.under("dispersion", name)
+        if name not in nominal:
+            spot.add("", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}")
+        elif design is not None:  # without a design it is unknown which keys make sense
+            built.append(build_dispersion(name, section, model.input(name), nominal[name], design, directory, spot))
+    return tuple(built)
+
+
+def _table(
+    section: CampaignSection | None,
+    model: Model,
+    dispersions: tuple[Dispersion, ...],
+    directory: Path,
+    found: Findings,
+) -> tuple[Path | None, dict[str, np.ndarray]]:
+    spot = found.under("campaign", "table")
+    if section is None or (section.design != "table" and section.table is None):
+        return None, {}
+    if section.design != "table":
+        spot.add("", f'the design "{section.design}" reads no table; it is for design = "table"')
+    elif section.table is None:
+        spot.add("", "is missing: CSV or Parquet beside this file, a case a row")
+    else:
+        try:
+            path = resolve_beside(directory, section.table)
+            units = {one.name: one.spec["unit"] for one in dispersions if "unit" in one.spec}
+            return path, read_case_table(path, model, units, spot)
+        except FileFault as fault:
+            spot.add("", str(fault))
+    return None, {}
+
+
+def _case_count(
+    section: CampaignSection, dispersions: tuple[Dispersion, ...], table: Mapping[str, np.ndarray], found: Findings
+) -> int | None:
+    """How many cases the design has; None where that is unknown."""
+    if section.design in RANDOM:
+        for key, value in (("cases", section.cases), ("seed", section.seed)):
+            if value is None:
+                found.add(key, f"is missing: {CampaignSection.model_fields[key].description}")
+        return section.cases
+    if found.problems:
+        return None
+    if section.design in BY_LEVELS:
+        count = level_count(section.design, [len(one.levels) for one in dispersions])
+    else:
+        count = len(next(iter(table.values())))
+    if count > MOST_CASES:
+        found.add("design", f"{count} cases; at most {MOST_CASES} are possible")
+        return None
+    if section.cases not in (None, count):
+        found.add("cases", f'{section.cases} is not allowed; the design "{section.design}" has {count} cases by itself')
+    return count
+
+
+def _check_size(
+    count: int, design: str, dispersions: tuple[Dispersion, ...], correlations: tuple[Correlation, ...], found: Findings
+) -> None:
+    if design == "lhs":
+        check_room_for_correlations(count, correlations, found)
+        if count > _LARGEST_HYPERCUBE:
+            found.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
+    if design == "sobol" and len(dispersions) > MAX_DIMENSIONS:
+        found.add("design", f'"sobol" has at most {MAX_DIMENSIONS} dispersions, here are {len(dispersions)}; use "mc"')
+
+
+def _digest(
+    document: dict[str, Any],
+    section: CampaignSection,
+    directory: Path,
+    dispersions: tuple[Dispersion, ...],
+    table_path: Path | None,
+) -> str:
+    content = json.loads(json.dumps(document))
+    if section.design != "lhs":
+        content["campaign"].pop("cases", None)
+    order = [one.name for one in dispersions]
+    digest = sha256(json.dumps([content, order], sort_keys=True).encode())
+    files = [directory / one.spec["file"] for one in dispersions if one.dist == "empirical"]
+    for path in [*files, *([table_path] if table_path is not None else [])]:
+        digest.update(sha256(path.read_bytes()).digest())
+    return digest.hexdigest()

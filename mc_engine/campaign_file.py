@@ -1,0 +1,266 @@
+"""The words of a campaign file: its sections, their keys, and the JSON schema of the whole.
+
+These classes know nothing of a model; `mc_engine.campaign` holds the file against one.
+"""
+
+import math
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from mc_engine.distributions import Scalar
+
+MOST_CASES = 1_000_000_000
+MOST_LEVELS = 1_000_000
+LARGEST = 1e50  # beyond it, squares and quotients of numbers leave the range of float64
+
+DesignName = Literal["mc", "lhs", "sobol", "halton", "grid", "one_at_a_time", "table"]
+
+
+def _scalar(value: Any) -> Scalar:
+    if isinstance(value, bool | str):
+        return value
+    if not isinstance(value, int | float):
+        raise PydanticCustomError("scalar", "{shown} is neither a number, nor true or false, nor a word")
+    if math.isnan(value) or math.isinf(value):
+        raise PydanticCustomError("finite_number", "not a finite number")
+    if abs(value) > LARGEST:
+        raise PydanticCustomError("less_than_equal", "too large", {"le": LARGEST})
+    return float(value)
+
+
+def _not_tiny(value: float) -> float:
+    if value < 1.0 / LARGEST:
+        raise PydanticCustomError("greater_than", "too small", {"gt": 1.0 / LARGEST})
+    return value
+
+
+Value = Annotated[
+    Any, PlainValidator(_scalar), WithJsonSchema({"anyOf": [{"type": t} for t in ("number", "boolean", "string")]})
+]
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0.0, le=LARGEST), AfterValidator(_not_tiny)]
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+class Section(BaseModel):
+    """A table of the file: nothing unknown, nothing converted, nothing infinite."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+
+
+class CampaignSection(Section):
+    """[campaign]: which model, which cases."""
+
+    model: str = Field(min_length=1, description='a module such as "campaigns.deorbit", or "model.py" beside this file')
+    cases: int | None = Field(default=None, ge=1, le=MOST_CASES, description="number of cases; random designs only")
+    design: DesignName = Field(description="how the cases are laid out: mc, lhs, sobol, halton, grid, ...")
+    seed: int | None = Field(
+        default=None, ge=0, le=2**63 - 1, description="any whole number from 0 on; random designs only"
+    )
+    table: str | None = Field(
+        default=None, min_length=1, description='CSV or Parquet beside this file, with design = "table"'
+    )
+    title: str = Field(default="", description="one line for the report")
+    note: str = ""
+
+
+class DispersionSection(Section):
+    """Keys that every [dispersion.NAME] may have."""
+
+    unit: str | None = Field(default=None, description="unit of the numbers here; the parameter's own unless said")
+    levels: int | None = Field(
+        default=None, ge=2, le=MOST_LEVELS, description="grid, one_at_a_time: so many equal steps"
+    )
+    values: list[Value] | None = Field(
+        default=None, min_length=1, description="the levels themselves, or what discrete draws"
+    )
+    source: str = Field(default="", description="where the spread comes from, for the report")
+    note: str = ""
+
+
+class LevelsDispersion(DispersionSection):
+    """No distribution: the levels of a grid, or the source of a table's column."""
+
+    mean: Number | None = None
+    half_range: Positive | None = None
+    three_sigma: Positive | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+
+
+class NormalDispersion(DispersionSection):
+    dist: Literal["normal"]
+    mean: Number | None = Field(default=None, description="the nominal value unless said")
+    sigma: Positive | None = None
+    three_sigma: Positive | None = None
+    lower: Number | None = Field(default=None, description="cuts the distribution")
+    upper: Number | None = Field(default=None, description="cuts the distribution")
+
+
+class UniformDispersion(DispersionSection):
+    """lower and upper, or half_range about mean."""
+
+    dist: Literal["uniform"]
+    mean: Number | None = Field(default=None, description="the nominal value unless said")
+    half_range: Positive | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+
+
+class TriangularDispersion(DispersionSection):
+    """lower and upper, or half_range about mode."""
+
+    dist: Literal["triangular"]
+    mode: Number | None = Field(default=None, description="the nominal value unless said")
+    half_range: Positive | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+
+
+class LognormalDispersion(DispersionSection):
+    """median and log_sigma (standard deviation of ln x), or mean and sigma (of x itself)."""
+
+    dist: Literal["lognormal"]
+    median: Positive | None = Field(default=None, description="the nominal value unless said")
+    log_sigma: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
+    mean: Positive | None = Field(default=None, description="the nominal value unless said")
+    sigma: Positive | None = None
+    lower: Number | None = Field(default=None, description="cuts the distribution")
+    upper: Number | None = Field(default=None, description="cuts the distribution")
+
+
+class BetaDispersion(DispersionSection):
+    """Between lower and upper, density (x - lower)^(alpha - 1) (upper - x)^(beta - 1)."""
+
+    dist: Literal["beta"]
+    alpha: Positive = Field(description="a positive number")
+    beta: Positive = Field(description="a positive number")
+    lower: Number = Field(description="where the distribution begins")
+    upper: Number = Field(description="where the distribution ends")
+
+
+class ExponentialDispersion(DispersionSection):
+    """Begins at origin; its mean is origin + scale."""
+
+    dist: Literal["exponential"]
+    scale: Positive = Field(description="mean distance from the origin")
+    origin: Number | None = Field(default=None, description="the nominal value unless said")
+    lower: Number | None = Field(default=None, description="cuts the distribution")
+    upper: Number | None = Field(default=None, description="cuts the distribution")
+
+
+class DiscreteDispersion(DispersionSection):
+    dist: Literal["discrete"]
+    values: list[Value] = Field(min_length=1, description="what is drawn")
+    weights: list[Annotated[float, Field(ge=0.0)]] | None = Field(
+        default=None, description="equal unless said; need not sum to 1"
+    )
+
+
+class EmpiricalDispersion(DispersionSection):
+    dist: Literal["empirical"]
+    file: str = Field(min_length=1, description="CSV or Parquet beside this file; each draw is one of its numbers")
+    column: str | None = Field(default=None, description="which column, where the file has more than one")
+    lower: Number | None = Field(default=None, description="leaves out the numbers below")
+    upper: Number | None = Field(default=None, description="leaves out the numbers above")
+
+
+class ConstantDispersion(DispersionSection):
+    dist: Literal["constant"]
+    value: Value = Field(description="the same for every case")
+
+
+DISTRIBUTIONS: dict[str, type[DispersionSection]] = {
+    "normal": NormalDispersion,
+    "uniform": UniformDispersion,
+    "triangular": TriangularDispersion,
+    "lognormal": LognormalDispersion,
+    "beta": BetaDispersion,
+    "exponential": ExponentialDispersion,
+    "discrete": DiscreteDispersion,
+    "empirical": EmpiricalDispersion,
+    "constant": ConstantDispersion,
+}
+
+
+class CorrelationSection(Section):
+    """[[correlation]]: one pair of dispersions; several entries make one matrix."""
+
+    between: list[str] = Field(min_length=2, max_length=2, description="the names of two dispersions")
+    rank: float = Field(gt=-1.0, lt=1.0, description="Spearman rank correlation, between -1 and 1")
+    source: str = ""
+    note: str = ""
+
+
+class RequirementSection(Section):
+    """[requirement.NAME]: at_most, at_least or both, by `share` of the cases with `confidence`."""
+
+    metric: str = Field(description="a metric of the model")
+    at_most: Number | None = None
+    at_least: Number | None = None
+    share: Share = 0.9973
+    confidence: Share = 0.90
+    source: str = ""
+    note: str = ""
+
+
+class WorstSection(Section):
+    metric: str = Field(description="a metric of the model")
+    count: int = Field(default=5, ge=1, le=1000)
+    side: Literal["largest", "smallest"] = "largest"
+
+
+def _one_or_many(value: Any) -> str:
+    return "many" if isinstance(value, list) else "one"
+
+
+Worst = Annotated[
+    Annotated[WorstSection, Tag("one")] | Annotated[list[WorstSection], Tag("many")], Discriminator(_one_or_many)
+]
+
+
+class HistoriesSection(Section):
+    """Which cases keep their flight history."""
+
+    nominal: bool = True
+    first: int = Field(default=0, ge=0, le=100_000, description="the first cases")
+    cases: list[Annotated[int, Field(ge=0)]] = Field(default_factory=list, description="these cases")
+    worst: Worst | None = Field(default=None, description="the cases with the largest (or smallest) values of a metric")
+
+
+class RetentionSection(Section):
+    """[retention]"""
+
+    histories: HistoriesSection = Field(default=HistoriesSection())
+
+
+AnyDispersion = (
+    LevelsDispersion
+    | NormalDispersion
+    | UniformDispersion
+    | TriangularDispersion
+    | LognormalDispersion
+    | BetaDispersion
+    | ExponentialDispersion
+    | DiscreteDispersion
+    | EmpiricalDispersion
+    | ConstantDispersion
+)
+
+
+class CampaignFile(Section):
+    """A campaign of mc-engine: a model, the spread of its inputs, and what the results must meet."""
+
+    campaign: CampaignSection = Field(description="the table [campaign] with model, design, ...")
+    parameters: dict[str, Value] = Field(default_factory=dict, description="other nominal values and settings")
+    dispersion: dict[str, AnyDispersion] = Field(default_factory=dict)
+    correlation: list[CorrelationSection] = Field(default_factory=list)
+    requirement: dict[str, RequirementSection] = Field(default_factory=dict)
+    retention: RetentionSection = Field(default_factory=RetentionSection)
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of a campaign file, for editors that complete and check TOML."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **CampaignFile.model_json_schema()}

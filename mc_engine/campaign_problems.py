@@ -1,0 +1,253 @@
+"""Reading the sections of a campaign file one by one, every mistake turned into a sentence with its place."""
+
+import json
+import re
+import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
+
+from mc_engine.campaign_file import (
+    DISTRIBUTIONS,
+    CampaignFile,
+    CampaignSection,
+    CorrelationSection,
+    DispersionSection,
+    LevelsDispersion,
+    RequirementSection,
+    RetentionSection,
+    Section,
+    Value,
+)
+from mc_engine.distributions import Scalar
+from mc_engine.errors import CampaignError, Problem
+from mc_engine.suggestions import hint, listed
+
+_TAGS = ("one", "many")  # pydantic puts the tag of a union into the place
+_AnySection = TypeVar("_AnySection", bound=Section)
+
+_MESSAGES = {
+    "int_type": "{shown} is not a whole number{whole}",
+    "float_type": "{shown} is not a number",
+    "finite_number": "{shown} is not a finite number",
+    "scalar": "{shown} is neither a number, nor true or false, nor a word",
+    "string_type": "{shown} is not text in quotes",
+    "bool_type": "{shown} is neither true nor false",
+    "list_type": "{shown} is not a list in brackets",
+    "model_type": "{shown} is not a table",
+    "dict_type": "{shown} is not a table",
+    "greater_than": "{shown} is not allowed; it must be above {gt}",
+    "greater_than_equal": "{shown} is not allowed; it must be at least {ge}",
+    "less_than": "{shown} is not allowed; it must be below {lt}",
+    "less_than_equal": "{shown} is not allowed; it must be at most {le}",
+    "too_short": "{actual_length} given; at least {min_length} needed",
+    "too_long": "{actual_length} given; at most {max_length} allowed",
+    "string_too_short": "{shown} is empty",
+}
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The problems found so far, and the place in the file where we are looking."""
+
+    place: str = ""
+    problems: list[Problem] = field(default_factory=list)
+
+    def under(self, *names: str) -> "Findings":
+        """The same list, one or more steps further in."""
+        readable = [name if name.isprintable() else json.dumps(name) for name in names]
+        return Findings(".".join(part for part in (self.place, *readable) if part), self.problems)
+
+    def add(self, key: str, message: str) -> None:
+        """Note a problem with `key` of the place we are at; the place itself where `key` is empty."""
+        self.problems.append(Problem(self.under(key).place, message))
+
+
+@dataclass(frozen=True)
+class Sections:
+    """The sections that could be read; what could not is None or left out, and among the findings."""
+
+    campaign: CampaignSection | None
+    parameters: dict[str, Scalar]
+    dispersions: dict[str, DispersionSection]
+    correlations: dict[str, CorrelationSection]  # by place: "correlation 1", "correlation 2", ...
+    requirements: dict[str, RequirementSection]
+    retention: RetentionSection | None
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The text as a document; CampaignError with line and column where it is not TOML."""
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        match = re.fullmatch(r"(.*) \(at (line \d+, column \d+|end of document)\)", str(error), re.DOTALL)
+        message, place = match.groups() if match else (str(error), "")
+        raise CampaignError(source, [Problem(place, f"this is not TOML: {_lower_first(message)}")]) from None
+    except (ValueError, RecursionError) as error:
+        raise CampaignError(source, [Problem("", f"this is not TOML that can be read: {error}")]) from None
+
+
+def read_sections(document: dict[str, Any], found: Findings) -> Sections:
+    """Read every section, noting all that is wrong inside each."""
+    for name in document:
+        if name not in CampaignFile.model_fields:
+            found.add(name, f"is not a section{hint(name, CampaignFile.model_fields)}")
+    if "campaign" not in document:
+        found.add("campaign", "is missing: the table [campaign] with model, design, ...")
+    inside = {name: found.under(name) for name in CampaignFile.model_fields}
+    return Sections(
+        campaign=read(CampaignSection, document.get("campaign"), inside["campaign"])
+        if "campaign" in document
+        else None,
+        parameters=_parameters(document, inside["parameters"]),
+        dispersions=_read_each(_dispersion, _named(document, "dispersion", found)),
+        correlations=_read_each(_correlation, _correlations(document, found)),
+        requirements=_read_each(_requirement, _named(document, "requirement", found)),
+        retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
+    )
+
+
+def read(section: type[_AnySection], raw: Any, found: Findings) -> _AnySection | None:
+    """`raw` as a section, or None with all its mistakes noted."""
+    try:
+        return section.model_validate(raw)
+    except ValidationError as error:
+        for details in error.errors(include_url=False):
+            found.add(_place(raw, details["loc"]), _sentence(section, details))
+        return None
+
+
+def shown(value: Any) -> str:
+    """A value as the campaign file writes it, shortened where it is long."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a table"
+    try:
+        text = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else str(value)
+    except ValueError:  # a whole number of thousands of digits
+        return "a number of that size"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _read_each(
+    reader: Callable[[Any, Findings], _AnySection | None], entries: Iterable[tuple[str, Any, Findings]]
+) -> dict[str, _AnySection]:
+    """The entries that could be read, by name."""
+    sections = {}
+    for name, raw, spot in entries:
+        section = reader(raw, spot)
+        if section is not None:
+            sections[name] = section
+    return sections
+
+
+def _named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+    raw = document.get(name, {})
+    if isinstance(raw, dict):
+        return [(key, entry, found.under(name, key)) for key, entry in raw.items()]
+    found.add(name, f"{shown(raw)} is not a table; write [{name}.NAME]")
+    return []
+
+
+def _correlations(document: dict[str, Any], found: Findings) -> list[tuple[str, Any, Findings]]:
+    raw = document.get("correlation", [])
+    if isinstance(raw, list):
+        places = [f"correlation {k}" for k in range(1, len(raw) + 1)]
+        return [(place, entry, found.under(place)) for place, entry in zip(places, raw, strict=True)]
+    found.add("correlation", f"{shown(raw)} is not a list of tables; write [[correlation]] with two brackets")
+    return []
+
+
+def _correlation(raw: Any, found: Findings) -> CorrelationSection | None:
+    return read(CorrelationSection, raw, found)
+
+
+def _requirement(raw: Any, found: Findings) -> RequirementSection | None:
+    return read(RequirementSection, raw, found)
+
+
+def _parameters(document: dict[str, Any], found: Findings) -> dict[str, Scalar]:
+    raw = document.get("parameters", {})
+    if not isinstance(raw, dict):
+        found.add("", f"{shown(raw)} is not a table; write [parameters]")
+        return {}
+    values: dict[str, Scalar] = {}
+    for name, value in raw.items():
+        try:
+            values[name] = TypeAdapter(Value).validate_python(value)
+        except ValidationError as error:
+            found.add(name, _sentence(None, error.errors(include_url=False)[0]))
+    return values
+
+
+def _dispersion(raw: Any, found: Findings) -> DispersionSection | None:
+    """The section of the distribution that `dist` names; the keys allowed depend on it."""
+    dist = raw.get("dist") if isinstance(raw, dict) else None
+    if dist is None:
+        return read(LevelsDispersion, raw, found)
+    if not isinstance(dist, str):
+        found.add("dist", f"{shown(dist)} is not text in quotes; known are {listed(DISTRIBUTIONS)}")
+        return None
+    if dist not in DISTRIBUTIONS:
+        found.add("dist", f'"{dist}" is not known{hint(dist, DISTRIBUTIONS)}')
+        return None
+    return read(DISTRIBUTIONS[dist], raw, found)
+
+
+def _place(raw: Any, location: tuple[int | str, ...]) -> str:
+    """The location as a reader finds it: names with dots, places in a list counted from 1."""
+    place = ""
+    for part in location:
+        if isinstance(part, int):
+            place += f" {part + 1}"
+            raw = raw[part]
+        elif part not in _TAGS or (isinstance(raw, dict) and part in raw):
+            place += f".{part}" if place else part
+            raw = raw.get(part) if isinstance(raw, dict) else None
+    return place
+
+
+def _sentence(section: type[Section] | None, details: ErrorDetails) -> str:
+    kind, context, location = details["type"], details.get("ctx", {}), details["loc"]
+    value = details["input"]
+    if kind == "missing" and section is not None:
+        return f"is missing: {_class_at(section, location).model_fields[str(location[-1])].description}"
+    if kind == "extra_forbidden" and section is not None:
+        return f"is not a known key{hint(str(location[-1]), _class_at(section, location).model_fields)}"
+    if kind == "literal_error":
+        allowed = re.findall(r"'([^']*)'", context["expected"])
+        if isinstance(value, str):
+            return f"{shown(value)} is not known{hint(value, allowed)}"
+        return f"{shown(value)} is not one of {listed(allowed)}"
+    whole = f"; write {int(value)}" if isinstance(value, float) and value.is_integer() else ""
+    limits = {key: _plain(limit) for key, limit in context.items()}
+    template = _MESSAGES.get(kind)
+    if template is None:
+        return f"{shown(value)}: {_lower_first(details['msg'])}"
+    return template.format(shown=shown(value), whole=whole, **limits)
+
+
+def _plain(limit: Any) -> Any:
+    return f"{limit:g}" if isinstance(limit, float) else limit
+
+
+def _class_at(section: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel]:
+    """The class whose key stands last in `location`."""
+    for part in location[:-1]:
+        if part in section.model_fields:
+            section = _section_in(section.model_fields[str(part)].annotation) or section
+    return section
+
+
+def _section_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _section_in(part))), None)
+
+
+def _lower_first(message: str) -> str:
+    return message[:1].lower() + message[1:]

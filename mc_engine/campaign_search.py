@@ -1,0 +1,80 @@
+"""Where campaign files are: the shipped ones by name, any other by its path."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+from mc_engine.errors import CampaignError, Problem
+from mc_engine.suggestions import hint
+
+SHIPPED = Path(__file__).resolve().parents[1] / "campaigns"
+
+
+class ShippedCampaign(NamedTuple):
+    """A campaign that comes with the engine; `title` is the one in its file."""
+
+    name: str
+    path: Path
+    title: str
+
+
+def list_campaigns() -> list[ShippedCampaign]:
+    """Every shipped campaign file: "deorbit" is campaigns/deorbit/campaign.toml, "deorbit/map" its map.toml."""
+    return [ShippedCampaign(name, path, _title(path)) for name, path in sorted(_shipped().items())]
+
+
+def find_campaign(reference: str | Path) -> Path:
+    """The file of a shipped name, of a path to a .toml file, or of a folder that holds campaign.toml.
+
+    A shipped name goes before a folder of that name; write "./deorbit" for the folder.
+    """
+    text = str(reference)
+    shipped = _shipped()
+    if text in shipped:
+        return shipped[text]
+    path = Path(text)
+    try:
+        if path.is_dir() and (path / "campaign.toml").is_file():
+            return path / "campaign.toml"
+        if path.is_file():
+            return path
+    except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
+        pass
+    raise CampaignError(text, [Problem("", _not_found(text, path, list(shipped)))])
+
+
+def campaign_name(path: Path) -> str:
+    """The shipped name of a file, or the name that its path suggests."""
+    path = path.resolve()
+    for name, shipped in _shipped().items():
+        if shipped == path:
+            return name
+    return path.parent.name if path.stem == "campaign" and path.parent.name else path.stem
+
+
+def _shipped() -> dict[str, Path]:
+    files = {}
+    for path in SHIPPED.glob("*/*.toml"):
+        name = path.parent.name if path.stem == "campaign" else f"{path.parent.name}/{path.stem}"
+        if path.stem != "published" and re.fullmatch(r"[\w-]+(/[\w-]+)?", name):
+            files[name] = path
+    return files
+
+
+def _title(path: Path) -> str:
+    """The title alone, without loading the model; empty where there is none."""
+    try:
+        campaign = tomllib.loads(path.read_text(encoding="utf-8")).get("campaign")
+    except (OSError, ValueError):
+        return ""
+    return str(campaign.get("title", "")) if isinstance(campaign, dict) else ""
+
+
+def _not_found(text: str, path: Path, names: list[str]) -> str:
+    if path.suffix == ".toml":
+        return "there is no such file"
+    if "/" not in text and not text.startswith("."):
+        return f"there is no campaign of that name, and no such path{hint(text, names)}"
+    near = hint(text, names)
+    return f"there is no such path{near}" if "did you mean" in near else "there is no such path with a campaign.toml"

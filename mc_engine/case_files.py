@@ -1,0 +1,123 @@
+"""Tables that stand beside a campaign file: the cases of the design "table", the numbers of "empirical".
+
+CSV (comma, first line the names) or Parquet.  Every fault is a sentence with file, line and column.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+
+class FileFault(Exception):
+    """What is wrong with the file, as one sentence; the reader of the campaign file adds the place."""
+
+
+def resolve_beside(directory: Path, reference: str) -> Path:
+    """The file `reference`, which must stand in `directory` or below it."""
+    path = (directory / reference).resolve()
+    if not path.is_relative_to(directory.resolve()):
+        raise FileFault(f'"{reference}" lies outside the folder of the campaign file; put it beside that file')
+    if not path.is_file():
+        raise FileFault(f'there is no file "{reference}" beside the campaign file')
+    return path
+
+
+def read_columns(path: Path) -> dict[str, np.ndarray]:
+    """Column name -> object[n] of text (CSV) or a plain array (Parquet), in the order of the file."""
+    if path.suffix.lower() in (".parquet", ".pq"):
+        return _read_parquet(path)
+    if path.suffix.lower() not in (".csv", ".txt"):
+        raise FileFault(f'"{path.name}" ends in neither .csv nor .parquet')
+    return _read_csv(path)
+
+
+def _read_parquet(path: Path) -> dict[str, np.ndarray]:
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        table = pyarrow.parquet.ParquetFile(path).read()
+    except (pyarrow.ArrowException, OSError) as error:
+        raise FileFault(f'"{path.name}" is not a Parquet file that can be read: {error}') from None
+    repeated = sorted({name for name in table.column_names if table.column_names.count(name) > 1})
+    if repeated:
+        raise FileFault(f'"{path.name}" has the column "{repeated[0]}" twice')
+    return {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
+
+
+def _read_csv(path: Path) -> dict[str, np.ndarray]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        rows = list(csv.reader(io.StringIO(text), strict=True))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FileFault(f'"{path.name}" is not CSV text in UTF-8: {error}') from None
+    numbered = [(line, row) for line, row in enumerate(rows, start=1) if any(cell.strip() for cell in row)]
+    if not numbered:
+        raise FileFault(f'"{path.name}" is empty')
+    names = [cell.strip() for cell in numbered[0][1]]
+    _check_names(path, names)
+    for line, row in numbered[1:]:
+        if len(row) != len(names):
+            raise FileFault(f'"{path.name}", line {line}: {len(row)} fields where {len(names)} columns are named')
+    return {name: np.array([row[k].strip() for _, row in numbered[1:]], dtype=object) for k, name in enumerate(names)}
+
+
+def _check_names(path: Path, names: list[str]) -> None:
+    for name in names:
+        if not name:
+            raise FileFault(f'"{path.name}" has a column without a name in its first line')
+        if names.count(name) > 1:
+            raise FileFault(f'"{path.name}" has the column "{name}" twice')
+
+
+def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
+    """float64[n]: the cells as finite numbers."""
+    values = np.empty(len(cells))
+    for row, cell in enumerate(cells):
+        try:
+            values[row] = math.nan if isinstance(cell, bool | np.bool_) or cell is None else float(cell)
+        except (TypeError, ValueError):
+            values[row] = math.nan
+        if not math.isfinite(values[row]):
+            raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{cell}" is not a finite number')
+    return values
+
+
+def words(path: Path, name: str, cells: np.ndarray, choices: Sequence[str]) -> np.ndarray:
+    """object[n]: the cells, each one of `choices`."""
+    for row, cell in enumerate(cells):
+        if cell not in choices:
+            raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{cell}" is none of {", ".join(choices)}')
+    return np.array(list(cells), dtype=object)
+
+
+def switches(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
+    """bool[n]: the cells, each true or false."""
+    return words(path, name, np.array([str(cell).lower() for cell in cells], dtype=object), ("true", "false")) == "true"
+
+
+def empirical_numbers(path: Path, column: str | None) -> tuple[float, ...]:
+    """The finite numbers of one column, sorted.  A CSV file of one column may do without a name."""
+    columns = read_columns(path)
+    if column is None and len(columns) > 1:
+        raise FileFault(f'"{path.name}" has {len(columns)} columns; say which with column = "{next(iter(columns))}"')
+    name = column if column is not None else next(iter(columns))
+    if name not in columns:
+        raise FileFault(f'"{path.name}" has no column "{name}"; it has {", ".join(columns)}')
+    cells = columns[name]
+    if column is None and _is_number(name):
+        cells = np.array([name, *cells], dtype=object)
+    if len(cells) == 0:
+        raise FileFault(f'"{path.name}" has no numbers below its first line')
+    return tuple(sorted(numbers(path, name, cells).tolist()))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False

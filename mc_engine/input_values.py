@@ -1,0 +1,58 @@
+"""Single values held against the model's inputs: is it a number, in range, one of the words?"""
+
+from mc_engine.campaign_problems import Findings, shown
+from mc_engine.distributions import Scalar
+from mc_engine.model import Model, Parameter, Setting
+from mc_engine.suggestions import hint, listed
+
+
+def inputs_of(model: Model) -> dict[str, Parameter | Setting]:
+    """All parameters and settings by name."""
+    inputs: list[Parameter | Setting] = [*model.parameters, *model.settings]
+    return {item.name: item for item in inputs}
+
+
+def check_value(value: Scalar, item: Parameter | Setting, found: Findings, key: str) -> Scalar | None:
+    """`value` as `item` takes it, or None with the mistake noted: not a number, out of range, a word not known."""
+    if isinstance(item, Setting) and item.choices:
+        if isinstance(value, str) and value in item.choices:
+            return value
+        if isinstance(value, str):
+            found.add(key, f"{shown(value)} is not known{hint(value, item.choices)}")
+        else:
+            found.add(key, f"{shown(value)} is not one of {listed(item.choices)}")
+        return None
+    if isinstance(item, Setting) and isinstance(item.default, bool):
+        if isinstance(value, bool):
+            return value
+        found.add(key, f"{shown(value)} is neither true nor false")
+        return None
+    if isinstance(value, bool | str):
+        found.add(key, f"{shown(value)} is not a number; {item.name} is {described(item)}")
+        return None
+    if not item.low <= value <= item.high:
+        found.add(key, f"{number(value)} is not allowed; the model accepts {accepted_range(item)}")
+        return None
+    return float(value)
+
+
+def accepted_range(item: Parameter | Setting) -> str:
+    """The range of numbers that the input accepts, with its unit."""
+    unit = f" {item.unit}" if item.unit else ""
+    if item.low == item.high == 0.0 or (item.low > float("-inf") and item.high < float("inf")):
+        return f"{number(item.low)} to {number(item.high)}{unit}"
+    if item.low > float("-inf"):
+        return f"{number(item.low)}{unit} and above"
+    if item.high < float("inf"):
+        return f"{number(item.high)}{unit} and below"
+    return "any finite number"
+
+
+def described(item: Parameter | Setting) -> str:
+    """What the input is, with its unit."""
+    return f"{item.description} [{item.unit}]" if item.unit else item.description
+
+
+def number(value: float) -> str:
+    """A number as people write it: no trailing zeros, ten digits at most."""
+    return f"{value:.10g}"

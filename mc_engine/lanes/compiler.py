@@ -1,0 +1,31 @@
+"""The one place where compiler flags stand."""
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+
+from mc_engine.lanes import lowering as _lowering  # registers the lane type and its functions
+
+# numpy's error model: 1/0 is infinite, as in the vector instructions.  No fastmath and no contraction:
+# a case has the same bits alone and among seven others.
+STRICT: dict[str, Any] = {"error_model": "numpy", "boundscheck": False, "fastmath": False}
+
+_UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # a fifth of the compile time
+
+assert _lowering
+
+
+def compile_inline(function: Callable[..., Any]) -> Any:
+    """Dispatcher for physics and loops that are inlined into the kernel; never called from Python, so unwrapped."""
+    return njit(forceinline=True, **_UNWRAPPED, **STRICT)(function)
+
+
+def compile_callable(function: Callable[..., Any]) -> Any:
+    """Dispatcher for code that several places of a kernel share without copying it."""
+    return njit(**_UNWRAPPED, **STRICT)(function)
+
+
+def compile_kernel(function: Callable[..., Any]) -> Any:
+    """Dispatcher for a kernel: cached beside its file, and free of the interpreter lock while it runs."""
+    return njit(nogil=True, cache=True, **STRICT)(function)

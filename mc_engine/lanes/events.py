@@ -1,0 +1,110 @@
+"""Events of a lane: zeros of functions of the state, found to full order by shortening the lane's own step.
+
+A step that oversteps an event is taken again from its start with a shorter length, found by a bracketed
+secant search (Illinois rule) on the event function itself, so an event is as exact as the integrator.  The
+side that has crossed is kept: an event never fires twice on one crossing.
+
+M. Dowell, P. Jarratt, "A modified regula falsi method", BIT 11 (1971) 168-174.
+"""
+
+from mc_engine.lanes.compiler import compile_inline
+from mc_engine.lanes.functions import any_lane, minimum, where
+from mc_engine.lanes.physics_function import physics
+from mc_engine.lanes.runge_kutta import rk4_shared
+from mc_engine.lanes.tuples import any_field, least, map_2, map_3, map_6, select, spread
+
+EVENTS_PER_STEP = 32
+_ITERATIONS = 90
+_SECANT_ITERATIONS = 40  # then bisection, which cannot stall
+
+
+@physics
+def crossed(before, after, direction):
+    """Mask: the event function went through zero; direction 1 rising, -1 falling, 0 either.
+
+    A function that leaves zero has not crossed it: the step that arrived there has.
+    """
+    rising = (before < 0.0) & (after >= 0.0) & (direction >= 0.0)
+    falling = (before > 0.0) & (after <= 0.0) & (direction <= 0.0)
+    return rising | falling
+
+
+@physics
+def _secant(before, after, direction, low, high, unused):
+    """Length at which the chord of one event function meets zero; `high` where it does not cross."""
+    return where(crossed(before, after, direction), low + (high - low) * (before / (before - after)), high)
+
+
+@physics
+def _halved(value, mask):
+    return where(mask, 0.5 * value, value)
+
+
+@physics
+def _flag(mask, unused):
+    return where(mask, 1.0, 0.0)
+
+
+def _locate(f, signs, t, finish, s, m, p, o, length, end, g_start, g_end, open_lanes):
+    """(length, state, event values) just past the first event of each open lane inside a step from s to `finish`."""
+    low, high, side = 0.0 * length, length, 0.0 * length
+    g_low, g_high, found = g_start, g_end, g_end
+    tolerance = 4.5e-16 * (abs(t) + length)
+    for iteration in range(_ITERATIONS):
+        if not any_lane(open_lanes):
+            break
+        middle = 0.5 * (low + high)
+        guess = least(map_6(_secant, g_low, g_high, signs, low, high, high))
+        chord = (guess > low) & (guess < high)
+        if iteration >= _SECANT_ITERATIONS:
+            chord = chord & (not chord)
+        guess = where(chord, guess, middle)
+        state = rk4_shared(f.rhs, t, guess, s, m, p, o)
+        values = spread(f.events(minimum(t + guess, finish), state, m, p, o), t)
+        after = any_field(map_3(crossed, g_low, values, signs))
+        ahead, back = open_lanes & (not after), open_lanes & after
+        g_low = select(ahead, values, map_2(_halved, g_low, back & (side > 0.0)))
+        g_high = select(back, values, map_2(_halved, g_high, ahead & (side < 0.0)))
+        side = where(back, 1.0, where(ahead, -1.0, side))
+        low, high = where(ahead, guess, low), where(back, guess, high)
+        end, found = select(back, state, end), select(back, values, found)
+        open_lanes = open_lanes & (high - low > tolerance)
+    return high, end, found
+
+
+locate = compile_inline(_locate)
+
+
+def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying):
+    """What becomes of a step [t, finish] of length h in which some flying lane meets events.
+
+    s, end : states at both ends of the step as if there were no events; g_start, g_end : event values there.
+    Returns (state, memory, time, stopped, overrun): lanes that stop end at their event, the others at `finish`.
+    Event functions of time see `finish` itself at the end, not the sum t + h: the next step starts from the same
+    number, so an event on the grid is met once, neither missed nor met twice by a rounding.
+    """
+    signs = f.signs_of(g_start)
+    pending = flying & any_field(map_3(crossed, g_start, g_end, signs))
+    stopped = pending & (not pending)
+    rest, time = t * 0.0 + h, finish
+    for _ in range(EVENTS_PER_STEP):
+        if not any_lane(pending):
+            break
+        length, state, values = locate(f, signs, t, finish, s, m, p, o, rest, end, g_start, g_end, pending)
+        fired = map_3(crossed, g_start, values, signs)
+        now = where(length < rest, minimum(t + length, finish), finish)
+        stops = pending & f.stops_of(fired)
+        stopped = stopped | stops
+        time, end = where(stops, now, time), select(stops, state, end)
+        on = pending & (not stops)
+        switched, memory = f.switch(now, state, m, p, o, map_2(_flag, fired, t))
+        s, m = select(on, spread(switched, t), s), select(on, spread(memory, t), m)
+        t, rest = where(on, now, t), where(on, rest - length, rest)
+        g_start = select(on, spread(f.events(t, s, m, p, o), t), g_start)
+        end = select(on, rk4_shared(f.rhs, t, rest, s, m, p, o), end)
+        g_end = select(on, spread(f.events(finish, end, m, p, o), t), g_end)
+        pending = on & any_field(map_3(crossed, g_start, g_end, signs))
+    return end, m, time, stopped, pending
+
+
+follow = compile_inline(_follow)

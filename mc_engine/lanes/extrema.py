@@ -1,0 +1,74 @@
+"""Running extrema of quantities along a flight, finer than the grid on which they are seen."""
+
+from mc_engine.lanes.functions import where
+from mc_engine.lanes.physics_function import physics
+
+
+@physics
+def crest(v0, v1, v2, best):
+    """Mask: the middle one of three neighbouring values tops both and may top the best so far."""
+    return (v1 >= v0) & (v1 >= v2) & (v1 + abs(v1 - v0) + abs(v1 - v2) > best)
+
+
+@physics
+def _vertex(t0, t1, t2, v0, v1, v2):
+    """Time from t1 to the vertex of the parabola through three points; 0 where they are in line."""
+    a, b = t1 - t0, t2 - t1
+    left, right = (v1 - v0) * b, (v2 - v1) * a
+    bend = left - right
+    shift = 0.5 * (left * b + right * a) / where(bend == 0.0, 1.0, bend)
+    return where(bend == 0.0, 0.0, shift)
+
+
+@physics
+def crest_time(when, best, v0, v1, v2, t0, t1, t2, smooth, mask):
+    """Time of the best value, the crest of the last three values included where the mask holds."""
+    better = crest_value(best, best, v0, v1, v2, t0, t1, t2, smooth, mask) > best
+    return where(better, t1 + smooth * _vertex(t0, t1, t2, v0, v1, v2), when)
+
+
+@physics
+def crest_value(best, unused, v0, v1, v2, t0, t1, t2, smooth, mask):
+    """Best value so far, the crest of the last three values included where the mask holds.
+
+    smooth : 1.0 takes the crest of the parabola, 0.0 the middle value itself.
+    """
+    a, b = t1 - t0, t2 - t1
+    x = smooth * _vertex(t0, t1, t2, v0, v1, v2)
+    # the parabola through the three points, about the middle one
+    slope = ((v1 - v0) * b * b + (v2 - v1) * a * a) / (a * b * (a + b))
+    bend = ((v2 - v1) * a - (v1 - v0) * b) / (a * b * (a + b))
+    top = v1 + x * (slope + x * bend)
+    usable = mask & (v1 >= v0) & (v1 >= v2) & (a > 0.0) & (b > 0.0)
+    return where(usable & (top > best), top, best)
+
+
+@physics
+def end_value(best, value, mask):
+    """Best value, an end point of the flight included where the mask holds."""
+    return where(mask & (value > best), value, best)
+
+
+@physics
+def end_time(when, best, value, t, mask, unused):
+    """Time of the best value, an end point of the flight included where the mask holds."""
+    return where(mask & (value > best), t, when)
+
+
+@physics
+def above(when, v1, t1, mask):
+    """Last time at which the value stood above zero, as far as the steps tell."""
+    return where(mask & (v1 > 0.0), t1, when)
+
+
+@physics
+def falls(v0, v1, mask):
+    """Mask: the value has come down to zero or below between two neighbours."""
+    return mask & (v0 > 0.0) & (v1 <= 0.0)
+
+
+@physics
+def fall_time(when, v0, v1, t0, t1, mask):
+    """Last time above zero, by linear interpolation where the value came down between two neighbours."""
+    falling = falls(v0, v1, mask)
+    return where(falling, t0 + (t1 - t0) * (v0 / where(falling, v0 - v1, 1.0)), when)

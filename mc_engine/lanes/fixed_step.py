@@ -1,0 +1,169 @@
+"""The block loop on a fixed time grid: W cases side by side, sampled control, events, running extrema.
+
+All lanes of a block share the grid; a lane that meets an event takes its own way to the end of the step and
+rejoins.  Lanes never look at each other: a lane that has ended or failed keeps its last values.
+"""
+
+from mc_engine.lanes import extrema
+from mc_engine.lanes.compiler import compile_callable, compile_inline
+from mc_engine.lanes.events import crossed, follow
+from mc_engine.lanes.functions import any_lane, where
+from mc_engine.lanes.noise import Draws
+from mc_engine.lanes.runge_kutta import rk4
+from mc_engine.lanes.tuples import (
+    any_field,
+    load,
+    load_fields,
+    load_scalars,
+    map_2,
+    map_3,
+    map_4,
+    map_6,
+    map_10,
+    record,
+    select,
+    spread,
+    store,
+    store_fields,
+    total,
+)
+from mc_engine.status import EVENT_LIMIT, NO_STOP, NOT_FINITE
+
+_OVERRUN, _BROKEN, _UNSTOPPED = float(EVENT_LIMIT), float(NOT_FINITE), float(NO_STOP)
+
+
+def _track(flying, smooth, seen, times, lasts, best, when, last):
+    """Running extrema after one more look at the quantities; the newest look is the last of `seen`."""
+    v0, v1, v2 = seen
+    t0, t1, t2 = times
+    crests = flying & any_field(map_4(extrema.crest, v0, v1, v2, best))
+    if any_lane(crests):
+        when = map_10(extrema.crest_time, when, best, v0, v1, v2, t0, t1, t2, smooth, crests)
+        best = map_10(extrema.crest_value, best, when, v0, v1, v2, t0, t1, t2, smooth, crests)
+    w1, w2 = lasts
+    last = map_4(extrema.above, last, w2, t2, flying)
+    if any_lane(any_field(map_3(extrema.falls, w1, w2, flying))):
+        last = map_6(extrema.fall_time, last, w1, w2, t1, t2, flying)
+    return best, when, last
+
+
+track = compile_inline(_track)
+
+
+@compile_inline
+def _at(value, t):
+    return t
+
+
+def _look(f, t, s, m, p, o):
+    return spread(f.observe(t, s, m, p, o), t)
+
+
+# for places off the main path: one copy in the kernel, called where needed
+look_shared = compile_callable(_look)
+
+
+def _step(f, has_events, t, finish, h, s, m, p, o, flying):
+    """One grid step from t to `finish`: (state, memory, quantities, time, stopped, overrun, broken) of every lane.
+
+    The event values at the start are taken anew, not handed on: they share what the first derivative computes,
+    as those at the end share what `observe` computes.
+    """
+    end = rk4(f.rhs, t, h, s, m, p, o)
+    now, stopped = finish, flying & (not flying)
+    overrun = stopped
+    seen = spread(f.observe(now, end, m, p, o), t)
+    if has_events:
+        g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
+        if any_lane(flying & any_field(map_3(crossed, g, g_end, f.signs_of(g)))):
+            end, m, now, stopped, overrun = follow(f, t, finish, h, s, end, m, p, o, g, g_end, flying)
+            seen = look_shared(f, now, end, m, p, o)
+    size = total(end)
+    broken = flying & (not (size - size == 0.0))
+    return end, m, seen, now, stopped, overrun & (not broken), broken
+
+
+step = compile_inline(_step)
+
+
+def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, history, stride):
+    """Fly one block from its first state to the stop or the time limit.
+
+    Returns (time, state, memory, status, unstopped, best, when, last, rows): per lane, and the history rows
+    written, those of the first lane.  Row 0 is the start; then every `stride` steps, and the end.
+    """
+    t = case * 0.0
+    flying, status = t == t, t
+    s, m = spread(f.initial(p, o), t), spread(f.start(p, o), t)
+    m = spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
+    seen = spread(f.observe(t, s, m, p, o), t)
+    rows = 0
+    if rows < history.shape[0]:
+        record(history, rows, t, look_shared(f, t, s, m, p, o))
+        rows += 1
+    v0 = v1 = best = f.peaks_of(seen)
+    w1 = f.lasts_of(seen)
+    when, last = map_2(_at, v1, t), map_2(_at, w1, t)
+    t0 = t1 = t
+    for k in range(n_steps):
+        if k > 0 and k % control_every == 0:
+            held = spread(f.control(t, s, m, p, o, Draws(key, case, float(k // control_every))), t)
+            m = select(flying, held, m)
+        finish = case * 0.0 + float(k + 1) * h
+        end, memory, seen, now, stopped, overrun, broken = step(f, has_events, t1, finish, h, s, m, p, o, flying)
+        moved = flying & (not broken)
+        s, m, t = select(moved, end, s), select(moved, memory, m), where(moved, now, t)
+        status = where(overrun, _OVERRUN, where(broken, _BROKEN, status))
+        v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
+        best, when, last = track(moved, f.smooth_of(v2), (v0, v1, v2), (t0, t1, t), (w1, w2), best, when, last)
+        ended = moved & (stopped | overrun)
+        flying = moved & (not ended)
+        at_end = ended | (flying & (k + 1 == n_steps))
+        if any_lane(at_end):
+            when = map_6(extrema.end_time, when, best, v2, t, at_end, t)
+            best = map_3(extrema.end_value, best, v2, at_end)
+        if rows < history.shape[0] and ((k + 1) % stride == 0 or any_lane(at_end)):
+            # looked at anew: so the quantities that only a history wants cost nothing where there is none
+            record(history, rows, t, look_shared(f, t, s, m, p, o))
+            rows += 1
+        if not any_lane(flying):
+            break
+        v0, v1, w1, t0, t1 = v1, v2, w2, t1, finish
+    return t, s, m, status, flying, best, when, last, rows
+
+
+fly_block = compile_inline(_fly_block)
+
+
+def _fly(f, parameter_class, setting_class, width, parameters, settings, key, cases, grid, kinds, out, history, stride):
+    """Fly all cases of a chunk.
+
+    parameters : float64[n_parameters, n], SI, n a multiple of the width
+    settings : float64[n_settings];  key : uint64;  cases : float64[n], case numbers
+    grid : (n_steps, h [s], control_every);  kinds : (has_events, must_stop), both literal truths
+    out : (time, status) float64[n], state float64[n_states, n], metrics float64[n_metrics, n]
+    Returns the number of history rows of the last block.
+    """
+    n_steps, h, control_every = grid
+    has_events, must_stop = kinds
+    end_time, end_status, end_state, metrics = out
+    o = load_scalars(setting_class, settings)
+    rows = 0
+    for first in range(0, cases.shape[0], width):
+        p = load_fields(parameter_class, parameters, first, width)
+        case = load(cases, first, width)
+        t, s, m, status, unstopped, best, when, last, rows = fly_block(
+            f, p, o, key, case, n_steps, h, control_every, has_events, history, stride
+        )
+        if must_stop:
+            status = where(unstopped, _UNSTOPPED, status)
+        extreme, instant = f.best_of(best + last), f.when_of(when + last)
+        values = spread(f.evaluate(t, s, m, p, o, extreme, instant), t)
+        store(end_time, first, t)
+        store(end_status, first, status)
+        store_fields(end_state, first, s)
+        store_fields(metrics, first, values)
+    return rows
+
+
+fly = compile_inline(_fly)

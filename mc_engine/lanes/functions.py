@@ -1,0 +1,101 @@
+"""Arithmetic on a number or on a vector of cases: the functions that physics imports instead of `math`.
+
+Each function here is its own interpreted meaning, on floats and NumPy arrays.  Compiled physics uses the
+vector instruction of the same name (see `lowering`), with the same result to the last bit.
+"""
+
+import math
+from fractions import Fraction
+
+import numpy as np
+
+
+def sqrt(x):
+    """Square root; NaN below zero.  Correctly rounded."""
+    with np.errstate(invalid="ignore"):
+        return _plain(np.sqrt(x))
+
+
+def fma(x, y, z):
+    """x y + z with one rounding."""
+    with np.errstate(invalid="ignore"):
+        return _plain(np.asarray(_exact_fma(x, y, z), dtype=np.float64))
+
+
+def rint(x):
+    """Nearest whole number, halves to even."""
+    return _plain(np.rint(x))
+
+
+def floor(x):
+    """Largest whole number not above x."""
+    return _plain(np.floor(x))
+
+
+def minimum(x, y):
+    """The smaller of x and y; y where either is not a number."""
+    return where(x < y, x, y)
+
+
+def maximum(x, y):
+    """The larger of x and y; y where either is not a number."""
+    return where(x > y, x, y)
+
+
+def copysign(x, y):
+    """|x| with the sign of y."""
+    return _plain(np.copysign(x, y))
+
+
+def where(mask, x, y):
+    """x where mask holds, y elsewhere.  Both are computed, so their arguments must be in range."""
+    return _plain(np.where(mask, x, y))
+
+
+def two_to(n):
+    """2**n for a whole number -1022 <= n <= 1023, given as a float."""
+    n = np.asarray(n, dtype=np.float64)
+    return _plain(np.where(np.isfinite(n), np.ldexp(1.0, np.nan_to_num(n).astype(np.int64)), np.nan))
+
+
+def exponent(x):
+    """floor(log2 |x|) as a float, for normal x: the number's own binary exponent."""
+    return _plain(np.frexp(x)[1] - 1.0)
+
+
+def mantissa(x):
+    """|x| / 2**exponent(x), in [1, 2), for normal x."""
+    return _plain(np.frexp(np.abs(x))[0] * 2.0)
+
+
+def any_lane(mask):
+    """True if mask holds in at least one lane."""
+    return bool(np.any(mask))
+
+
+def _plain(x):
+    """NumPy scalars become Python floats, so that interpreted physics prints and compares simply."""
+    return float(x) if np.ndim(x) == 0 and np.asarray(x).dtype != bool else x
+
+
+def _fma_of_floats(x, y, z):
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        return x * y + z
+    exact = Fraction(x) * Fraction(y) + Fraction(z)
+    if exact == 0:
+        return x * y + z  # the sign of zero follows IEEE 754
+    try:
+        return float(exact)
+    except OverflowError:
+        return math.inf if exact > 0 else -math.inf
+
+
+def _fused(x, y, z):
+    """Python's own fma where there is one (3.13), which raises instead of going to infinity or NaN."""
+    try:
+        return math.fma(x, y, z)  # type: ignore[attr-defined,unused-ignore]
+    except (AttributeError, OverflowError, ValueError):
+        return _fma_of_floats(x, y, z)  # exact rational arithmetic: the same bits, slowly
+
+
+_exact_fma = np.frompyfunc(_fused, 3, 1)

@@ -1,0 +1,180 @@
+"""Vector instructions for the functions of `functions`: types and LLVM code, registered on import."""
+
+from collections.abc import Callable
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import lower_builtin
+
+from mc_engine.lanes import functions, noise
+from mc_engine.lanes.lane_type import (
+    F64,
+    I64,
+    Lanes,
+    common_width,
+    convert,
+    is_mask,
+    is_number,
+    mask_type,
+    number_type,
+    splat,
+)
+
+Emit = Callable[[Any, int, list[Any]], Any]
+
+
+def llvm_type(width: int, element: Any = F64) -> Any:
+    """LLVM type of a number (width 1) or of lanes."""
+    return ir.VectorType(element, width) if width > 1 else element
+
+
+def constant(width: int, value: Any, element: Any = F64) -> Any:
+    """LLVM constant, the same in every lane."""
+    return ir.Constant(llvm_type(width, element), [value] * width if width > 1 else value)
+
+
+def _register(function: Any, n_numbers: int, emit: Emit, *, mask_first: bool = False) -> None:
+    """Type `function` on numbers and lanes (after a leading mask if asked) and lower it by `emit`."""
+    n_args = n_numbers + mask_first
+
+    @infer_global(function)
+    class Typing(AbstractTemplate):
+        key = function
+
+        def generic(self, args, kws):
+            if len(args) != n_args or not all(is_number(a) for a in args[mask_first:]):
+                return None
+            if mask_first and not is_mask(args[0]):
+                return None
+            width = common_width(*args)
+            masks = [args[0] if isinstance(args[0], Lanes) else types.boolean] if mask_first else []
+            numbers = [a if isinstance(a, Lanes) else types.float64 for a in args[mask_first:]]
+            return signature(number_type(width), *masks, *numbers)
+
+    def lower(context, builder, sig, args):
+        width = common_width(sig.return_type)
+        targets = [mask_type(width)] * mask_first + [number_type(width)] * n_numbers
+        wide = [convert(context, builder, v, t, to) for v, t, to in zip(args, sig.args, targets, strict=True)]
+        return emit(builder, width, wide)
+
+    lower_builtin(function, *([types.Any] * n_args))(lower)
+
+
+def _intrinsic(base: str) -> Emit:
+    def emit(builder, width, args):
+        kind = llvm_type(width)
+        name = f"llvm.{base}." + (f"v{width}f64" if width > 1 else "f64")
+        function_type = ir.FunctionType(kind, [kind] * len(args))
+        return builder.call(cgutils.get_or_insert_function(builder.module, function_type, name), args)
+
+    return emit
+
+
+def _select(builder, width, args):
+    mask, x, y = args
+    if width == 1 and mask.type != ir.IntType(1):
+        mask = builder.trunc(mask, ir.IntType(1))
+    return builder.select(mask, x, y)
+
+
+def _two_to(builder, width, args):
+    # adding 1.5 * 2**52 leaves the whole number in the low bits; the exponent field is 52 bits up
+    shifted = builder.fadd(args[0], constant(width, 6755399441055744.0 + 1023.0))
+    bits = builder.shl(builder.bitcast(shifted, llvm_type(width, I64)), constant(width, 52, I64))
+    return builder.bitcast(bits, llvm_type(width))
+
+
+def _exponent(builder, width, args):
+    bits = builder.bitcast(args[0], llvm_type(width, I64))
+    field = builder.and_(builder.lshr(bits, constant(width, 52, I64)), constant(width, 2047, I64))
+    # as a float by the same trick backwards: the bits of 2**52 + field
+    number = builder.bitcast(builder.or_(field, constant(width, 0x4330 << 48, I64)), llvm_type(width))
+    return builder.fsub(number, constant(width, 4503599627370496.0 + 1023.0))
+
+
+def _mantissa(builder, width, args):
+    bits = builder.bitcast(args[0], llvm_type(width, I64))
+    fraction = builder.and_(bits, constant(width, (1 << 52) - 1, I64))
+    return builder.bitcast(builder.or_(fraction, constant(width, 1023 << 52, I64)), llvm_type(width))
+
+
+_register(functions.sqrt, 1, _intrinsic("sqrt"))
+_register(functions.rint, 1, _intrinsic("rint"))
+_register(functions.floor, 1, _intrinsic("floor"))
+_register(functions.fma, 3, _intrinsic("fma"))
+_register(functions.copysign, 2, _intrinsic("copysign"))
+# compare and select, not minnum: one instruction, and the same choice at every width for 0.0 and -0.0
+_register(functions.minimum, 2, lambda b, w, a: b.select(b.fcmp_ordered("<", a[0], a[1]), a[0], a[1]))
+_register(functions.maximum, 2, lambda b, w, a: b.select(b.fcmp_ordered(">", a[0], a[1]), a[0], a[1]))
+_register(functions.where, 2, _select, mask_first=True)
+_register(functions.two_to, 1, _two_to)
+_register(functions.exponent, 1, _exponent)
+_register(functions.mantissa, 1, _mantissa)
+
+
+@infer_global(functions.any_lane)
+class _AnyTyping(AbstractTemplate):
+    key = functions.any_lane
+
+    def generic(self, args, kws):
+        return signature(types.boolean, args[0]) if len(args) == 1 and is_mask(args[0]) else None
+
+
+@lower_builtin(functions.any_lane, types.Any)
+def _any_lane(context, builder, sig, args):
+    width = common_width(sig.args[0])
+    if width == 1:
+        return args[0]
+    word = builder.bitcast(args[0], ir.IntType(width))
+    return builder.icmp_unsigned("!=", word, ir.Constant(ir.IntType(width), 0))
+
+
+@infer_global(noise.uniform_pair)
+class _UniformPairTyping(AbstractTemplate):
+    key = noise.uniform_pair
+
+    def generic(self, args, kws):
+        if len(args) != 2 or not isinstance(args[0], types.BaseNamedTuple) or not isinstance(args[1], types.Integer):
+            return None
+        return signature(types.UniTuple(number_type(common_width(*args[0])), 2), args[0], types.int64)
+
+
+@lower_builtin(noise.uniform_pair, types.BaseNamedTuple, types.Integer)
+def _uniform_pair(context, builder, sig, args):
+    draws, width = sig.args[0], common_width(*sig.args[0])
+
+    def whole(value):
+        return constant(width, value, I64)
+
+    def widen(value):
+        return splat(builder, value, width) if width > 1 else value
+
+    def counter(i):
+        number = convert(context, builder, builder.extract_value(args[0], i), draws[i], number_type(width))
+        return builder.fptoui(number, llvm_type(width, I64))
+
+    def low(value):
+        return builder.and_(value, whole(0xFFFFFFFF))
+
+    def high(value):
+        return builder.lshr(value, whole(32))
+
+    key = widen(context.cast(builder, builder.extract_value(args[0], 0), draws[0], types.uint64))
+    k0, k1, case = low(key), high(key), counter(1)
+    c0, c1, c2, c3 = low(case), high(case), low(counter(2)), low(widen(args[1]))
+    for _ in range(noise.ROUNDS):
+        p0, p1 = builder.mul(c0, whole(noise.MULTIPLIERS[0])), builder.mul(c2, whole(noise.MULTIPLIERS[1]))
+        c0, c2 = builder.xor(builder.xor(high(p1), c1), k0), builder.xor(builder.xor(high(p0), c3), k1)
+        c1, c3 = low(p1), low(p0)
+        k0, k1 = low(builder.add(k0, whole(noise.WEYL[0]))), low(builder.add(k1, whole(noise.WEYL[1])))
+
+    def fraction(upper, lower):
+        # 52 bits behind the point of a number in [1, 2), then less one: no conversion, no rounding
+        bits = builder.or_(builder.shl(upper, whole(20)), builder.lshr(lower, whole(12)))
+        number = builder.bitcast(builder.or_(bits, whole(1023 << 52)), llvm_type(width))
+        return builder.fsub(number, constant(width, 1.0))
+
+    return context.make_tuple(builder, sig.return_type, (fraction(c0, c1), fraction(c2, c3)))

@@ -1,0 +1,38 @@
+"""The decorator of compiled physics.
+
+`physics` marks a function that is written once on plain numbers.  Called from Python it simply runs, on
+floats or NumPy arrays; used inside a kernel it is compiled for one case and for vectors of cases.
+Nothing is compiled, and numba is not imported, before a kernel asks for it.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+
+class PhysicsFunction:
+    """A function on numbers that kernels can compile.  `compiled` is its numba dispatcher."""
+
+    def __init__(self, function: Callable[..., Any]):
+        self.function = function
+        functools.update_wrapper(self, function)
+
+    def __call__(self, *args: Any) -> Any:
+        return self.function(*args)
+
+    @functools.cached_property
+    def compiled(self) -> Any:
+        """The numba dispatcher; one flag set for all physics, and no fastmath: every width has the same bits."""
+        from mc_engine.lanes.compiler import compile_inline
+
+        return compile_inline(self.function)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What numba sees when compiled code names this function."""
+        return self.compiled._numba_type_
+
+
+def physics(function: Callable[..., Any]) -> PhysicsFunction:
+    """Mark `function` as physics: numbers and named tuples in and out, functions from `mc_engine.lanes` inside."""
+    return PhysicsFunction(function)

@@ -1,0 +1,316 @@
+"""Arithmetic on named tuples of lanes, and their way from and to arrays.  For the compiled loops only.
+
+The engine's loops know no field names: they add, select and store whole tuples.  Each function here is a
+numba intrinsic, so any tuple of any length works without generated source.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+from numba.np import arrayobj
+
+from mc_engine.lanes.lane_type import I1, Lanes, common_width, convert, mask_type, number_type
+from mc_engine.lanes.lowering import constant, llvm_type
+
+
+def _tuple_type(fields: Sequence[Any], like: Any = None) -> Any:
+    """Tuple type of the given field types; named as `like` is, if it is a named tuple or its class."""
+    cls = getattr(like, "instance_class", None)
+    return types.BaseTuple.from_types(tuple(fields), cls)
+
+
+def _pack(context: Any, builder: Any, ty: Any, values: Sequence[Any]) -> Any:
+    packed = ir.Constant(context.get_value_type(ty), ir.Undefined)
+    for i, value in enumerate(values):
+        packed = builder.insert_value(packed, value, i)
+    return packed
+
+
+def _item(builder: Any, value: Any, i: int) -> Any:
+    return builder.extract_value(value, i)
+
+
+@intrinsic
+def spread(typingctx, value, like):
+    """Every field of a tuple (or a plain number) as lanes of the width of `like`."""
+    width = common_width(like)
+    if isinstance(value, types.BaseTuple):
+        result = _tuple_type([number_type(width)] * len(value), value)
+    else:
+        result = number_type(width)
+
+    def codegen(context, builder, sig, args):
+        if not isinstance(value, types.BaseTuple):
+            return convert(context, builder, args[0], value, result)
+        fields = [convert(context, builder, _item(builder, args[0], i), value[i], result[i]) for i in range(len(value))]
+        return _pack(context, builder, result, fields)
+
+    return result(value, like), codegen
+
+
+@intrinsic
+def mask_like(typingctx, flag, like):
+    """A plain truth value in every lane of the width of `like`."""
+    result = mask_type(common_width(like))
+    return result(flag, like), lambda context, builder, sig, args: convert(context, builder, args[0], flag, result)
+
+
+@intrinsic
+def add_scaled(typingctx, y, h, k):
+    """y + h k, field by field."""
+
+    def codegen(context, builder, sig, args):
+        step = convert(context, builder, args[1], h, number_type(common_width(*y)))
+        fields = []
+        for i in range(len(y)):
+            product = builder.fmul(step, _item(builder, args[2], i))
+            fields.append(builder.fadd(_item(builder, args[0], i), product))
+        return _pack(context, builder, y, fields)
+
+    return y(y, h, k), codegen
+
+
+@intrinsic
+def select(typingctx, mask, chosen, other):
+    """The fields of `chosen` in the lanes where mask holds, of `other` elsewhere; also for single values."""
+
+    def codegen(context, builder, sig, args):
+        condition = args[0]
+        if not isinstance(chosen, types.BaseTuple):
+            return builder.select(condition, args[1], args[2])
+        pairs = [(_item(builder, args[1], i), _item(builder, args[2], i)) for i in range(len(chosen))]
+        return _pack(context, builder, chosen, [builder.select(condition, a, b) for a, b in pairs])
+
+    return chosen(mask, chosen, other), codegen
+
+
+def _map_fields(typingctx: Any, function: Any, args: Sequence[Any]) -> Any:
+    length = next(len(a) for a in args if isinstance(a, types.BaseTuple))
+    is_tuple = [isinstance(a, types.BaseTuple) for a in args]
+    rows: list[list[Any]] = [[a[i] if t else a for a, t in zip(args, is_tuple, strict=True)] for i in range(length)]
+    sigs = [function.get_call_type(typingctx, tuple(row), {}) for row in rows]
+    named = next((a for a in args if isinstance(a, types.BaseTuple)), None)
+    result = _tuple_type([sig.return_type for sig in sigs], named)
+
+    def codegen(context, builder, sig, values):
+        fields = []
+        for i, row_sig in enumerate(sigs):
+            row = [_item(builder, v, i) if t else v for v, t in zip(values[1:], is_tuple, strict=True)]
+            fields.append(context.get_function(function, row_sig)(builder, row))
+        return _pack(context, builder, result, fields)
+
+    return result(function, *args), codegen
+
+
+@intrinsic
+def map_2(typingctx, function, a, b):
+    """function(a_i, b_i) for every field; an argument that is no tuple counts for every field."""
+    return _map_fields(typingctx, function, (a, b))
+
+
+@intrinsic
+def map_3(typingctx, function, a, b, c):
+    """function(a_i, b_i, c_i) for every field."""
+    return _map_fields(typingctx, function, (a, b, c))
+
+
+@intrinsic
+def map_4(typingctx, function, a, b, c, d):
+    """function(a_i, b_i, c_i, d_i) for every field."""
+    return _map_fields(typingctx, function, (a, b, c, d))
+
+
+@intrinsic
+def map_6(typingctx, function, a, b, c, d, e, f):
+    """function of six arguments for every field."""
+    return _map_fields(typingctx, function, (a, b, c, d, e, f))
+
+
+@intrinsic
+def map_10(typingctx, function, a, b, c, d, e, f, g, h, i, j):
+    """function of ten arguments for every field."""
+    return _map_fields(typingctx, function, (a, b, c, d, e, f, g, h, i, j))
+
+
+def _reduction(emit: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any], Any]:
+    def build(typingctx: Any, fields: Any) -> Any:
+        def codegen(context, builder, sig, args):
+            value = _item(builder, args[0], 0)
+            for i in range(1, len(fields)):
+                value = emit(builder, value, _item(builder, args[0], i))
+            return value
+
+        return fields[0](fields), codegen
+
+    return build
+
+
+@intrinsic
+def any_field(typingctx, masks):
+    """Mask of the lanes in which at least one field holds."""
+    return _reduction(lambda b, x, y: b.or_(x, y))(typingctx, masks)
+
+
+@intrinsic
+def total(typingctx, fields):
+    """Sum of the fields."""
+    return _reduction(lambda b, x, y: b.fadd(x, y))(typingctx, fields)
+
+
+@intrinsic
+def least(typingctx, fields):
+    """Smallest field."""
+    return _reduction(lambda b, x, y: b.select(b.fcmp_ordered("<", x, y), x, y))(typingctx, fields)
+
+
+def _pointer(context: Any, builder: Any, array_type: Any, array: Any, row: Any, first: Any, width: int) -> Any:
+    """Pointer to `width` numbers from column `first` of `row` (None for a 1-D array), contiguous."""
+    struct = arrayobj.make_array(array_type)(context, builder, array)
+    offset = first
+    if row is not None:
+        row_length = builder.extract_value(struct.shape, 1)
+        offset = builder.add(builder.mul(row, row_length), first)
+    return builder.bitcast(builder.gep(struct.data, [offset]), llvm_type(width).as_pointer())
+
+
+def _read(builder: Any, pointer: Any) -> Any:
+    value = builder.load(pointer)
+    value.align = 8
+    return value
+
+
+@intrinsic(prefer_literal=True)
+def load(typingctx, array, first, width):
+    """The next `width` numbers of a 1-D array as lanes; `width` is a literal."""
+    result = number_type(width.literal_value)
+
+    def codegen(context, builder, sig, args):
+        return _read(builder, _pointer(context, builder, array, args[0], None, args[1], width.literal_value))
+
+    return result(array, types.intp, width), codegen
+
+
+@intrinsic(prefer_literal=True)
+def load_fields(typingctx, cls, array, first, width):
+    """Named tuple of class `cls` with field i from row i of array[n_fields, n], `width` columns from `first`."""
+    count = len(cls.instance_class._fields)
+    result = _tuple_type([number_type(width.literal_value)] * count, cls)
+
+    def codegen(context, builder, sig, args):
+        rows = [ir.Constant(ir.IntType(64), i) for i in range(count)]
+        at = [_pointer(context, builder, array, args[1], row, args[2], width.literal_value) for row in rows]
+        return _pack(context, builder, result, [_read(builder, pointer) for pointer in at])
+
+    return result(cls, array, types.intp, width), codegen
+
+
+@intrinsic
+def load_scalars(typingctx, cls, array):
+    """Named tuple of class `cls` with one plain float64 per field from a 1-D array."""
+    count = len(cls.instance_class._fields)
+    result = _tuple_type([types.float64] * count, cls)
+
+    def codegen(context, builder, sig, args):
+        places = [ir.Constant(ir.IntType(64), i) for i in range(count)]
+        at = [_pointer(context, builder, array, args[1], None, place, 1) for place in places]
+        return _pack(context, builder, result, [_read(builder, pointer) for pointer in at])
+
+    return result(cls, array), codegen
+
+
+def _write(builder: Any, value: Any, pointer: Any) -> None:
+    builder.store(value, pointer).align = 8
+
+
+@intrinsic
+def store(typingctx, array, first, value):
+    """Write one number or the lanes to a 1-D array from `first` on."""
+
+    def codegen(context, builder, sig, args):
+        _write(builder, args[2], _pointer(context, builder, array, args[0], None, args[1], common_width(value)))
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, value), codegen
+
+
+@intrinsic
+def store_fields(typingctx, array, first, fields):
+    """Write field i of a tuple to row i of array[n_fields, n], from column `first` on."""
+
+    def codegen(context, builder, sig, args):
+        for i in range(len(fields)):
+            row = ir.Constant(ir.IntType(64), i)
+            pointer = _pointer(context, builder, array, args[0], row, args[1], common_width(fields[i]))
+            _write(builder, _item(builder, args[2], i), pointer)
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, fields), codegen
+
+
+@intrinsic
+def record(typingctx, array, row, time, fields):
+    """Write time and fields of the first lane to a row of array[n_rows, 1 + n_fields]."""
+
+    def codegen(context, builder, sig, args):
+        for i in range(len(fields) + 1):
+            value, ty = (args[2], time) if i == 0 else (_item(builder, args[3], i - 1), fields[i - 1])
+            if isinstance(ty, Lanes):
+                value = builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
+            place = ir.Constant(ir.IntType(64), i)
+            _write(builder, value, _pointer(context, builder, array, args[0], args[1], place, 1))
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, time, fields), codegen
+
+
+def picker(cls: type | None, picks: Sequence[tuple[int, float, float]]) -> Any:
+    """Intrinsic taking a tuple of lanes to (sign * field - offset, ...) for each (field, sign, offset)."""
+
+    @intrinsic
+    def pick(typingctx, fields):
+        result = types.BaseTuple.from_types(tuple(fields[i] for i, _, _ in picks), cls)
+
+        def codegen(context, builder, sig, args):
+            values = []
+            for i, sign, offset in picks:
+                width, value = common_width(fields[i]), _item(builder, args[0], i)
+                value = builder.fneg(value) if sign < 0 else value
+                values.append(builder.fsub(value, constant(width, offset)) if offset else value)
+            return _pack(context, builder, result, values)
+
+        return result(fields), codegen
+
+    return pick
+
+
+def directions(signs: Sequence[float]) -> Any:
+    """Intrinsic giving a tuple of constant lanes like the one it is handed."""
+
+    @intrinsic
+    def give(typingctx, fields):
+        def codegen(context, builder, sig, args):
+            values = [constant(common_width(fields[i]), sign) for i, sign in enumerate(signs)]
+            return _pack(context, builder, fields, values)
+
+        return fields(fields), codegen
+
+    return give
+
+
+def any_of(indices: Sequence[int]) -> Any:
+    """Intrinsic giving the mask of lanes in which at least one of the chosen mask fields holds."""
+
+    @intrinsic
+    def chosen(typingctx, masks):
+        def codegen(context, builder, sig, args):
+            value = constant(common_width(masks[0]), 0, I1)
+            for i in indices:
+                value = builder.or_(value, _item(builder, args[0], i))
+            return value
+
+        return masks[0](masks), codegen
+
+    return chosen

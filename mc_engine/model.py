@@ -1,0 +1,246 @@
+"""What a model gives the engine: its fields, its physics, its events and its clock.
+
+A `Model` is a record.  It names every number that goes in (parameters, settings) and comes out (states,
+quantities along the flight, metrics), with unit and one-line meaning, and points to the physics: plain
+functions on named tuples of numbers, marked with `mc_engine.lanes.physics`.
+
+Inside physics everything is SI and radians and a parameter loses its unit suffix (`inclination_deg` is
+`inclination`, in radians); outside, every column has the unit its field declares.
+"""
+
+import importlib
+import importlib.util
+import re
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from mc_engine.errors import ModelError
+from mc_engine.units import UNITS, unit_suffix
+
+Number = float | np.ndarray
+
+
+@dataclass(frozen=True)
+class Field:
+    """A named number: column name ending in its unit, the unit, a one-line meaning."""
+
+    name: str
+    unit: str
+    description: str
+
+    @property
+    def symbol(self) -> str:
+        """Name inside SI code: the column name without its unit suffix."""
+        suffix = unit_suffix(self.unit)
+        return self.name.removesuffix(suffix) if suffix else self.name
+
+    @property
+    def si_factor(self) -> float:
+        """Factor from the declared unit to SI."""
+        return UNITS[self.unit].factor
+
+
+@dataclass(frozen=True)
+class Parameter(Field):
+    """An input that may differ from case to case.  Values outside [low, high] are refused."""
+
+    default: float
+    low: float = -np.inf
+    high: float = np.inf
+
+
+@dataclass(frozen=True)
+class Setting(Field):
+    """An input shared by all cases of one kernel call: a choice of words, a switch, or a number.
+
+    In kernels a choice is the index of the word in `choices`, a switch is 0.0 or 1.0, a number is SI.
+    """
+
+    default: str | bool | float
+    choices: tuple[str, ...] = ()
+    low: float = -np.inf
+    high: float = np.inf
+
+    def code(self, value: str | bool | float) -> float:
+        """The number that stands for `value` inside a kernel."""
+        if self.choices:
+            return float(self.choices.index(str(value)))
+        return float(value) * (1.0 if isinstance(self.default, bool) else self.si_factor)
+
+
+@dataclass(frozen=True)
+class Extremum:
+    """A running extremum of one quantity: the symbols under which `evaluate` finds value and time.
+
+    kind : "max", "min", or "last_above": the last time at which the quantity stood above `level`
+    (then `time` is meant, and `value` is the quantity at the end).
+    smooth : between the steps the extremum is a parabola's; a quantity with corners is taken at the steps.
+    """
+
+    name: str
+    quantity: str
+    kind: str = "max"
+    level: float = 0.0
+    smooth: bool = True
+
+
+@dataclass(frozen=True)
+class Event:
+    """A zero of one component of `events`.
+
+    direction : "rising", "falling" or "either".  action : "stop" ends the case, "switch" calls the model's `switch`.
+    """
+
+    name: str
+    direction: str = "falling"
+    action: str = "stop"
+
+
+@dataclass(frozen=True)
+class FixedStep:
+    """Classical Runge-Kutta of fourth order on a common grid; control is sampled every `control_every` steps.
+
+    step, until : SI numbers, or the symbols of settings that hold them.
+    """
+
+    step: float | str
+    until: float | str
+    control_every: int | str = 1
+    method: str = "rk4"
+
+
+@dataclass(frozen=True)
+class Model:
+    """A flyable system.  All functions are physics (see `mc_engine.lanes`) unless said otherwise.
+
+    prepare(inputs, settings, refusals) : NumPy, whole chunk.  SI arrays and setting codes by symbol in; SI arrays
+        by the field names of `kernel_parameters` out; cases that cannot start join `refusals`.  Default: pass on.
+    initial(p, o) -> State
+    rhs(t, s, m, p, o) -> State of derivatives
+    control(t, s, m, p, o, draws) -> memory, at samples (t = 0 first, with m = start(p, o)'s memory)
+    start(p, o) -> the first memory
+    events(t, s, m, p, o) -> named tuple, one component per Event
+    switch(t, s, m, p, o, hit) -> (state, memory) after a "switch" event; hit has 1.0 where the event fired
+    observe(t, s, m, p, o) -> named tuple of the quantities
+    evaluate(t, s, m, p, o, best, when) -> named tuple of the metrics; best and when hold value and time of
+        each Extremum
+    """
+
+    name: str
+    title: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    settings: tuple[Setting, ...]
+    states: tuple[Field, ...]
+    quantities: tuple[Field, ...]
+    metrics: tuple[Field, ...]
+    clock: FixedStep
+    kernel_parameters: type
+    initial: Callable[..., Any]
+    rhs: Callable[..., Any]
+    observe: Callable[..., Any]
+    evaluate: Callable[..., Any]
+    prepare: Callable[..., Any] | None = None
+    start: Callable[..., Any] | None = None
+    control: Callable[..., Any] | None = None
+    events: Callable[..., Any] | None = None
+    switch: Callable[..., Any] | None = None
+    event_list: tuple[Event, ...] = ()
+    extrema: tuple[Extremum, ...] = ()
+    figures: tuple[Any, ...] = ()
+    published: tuple[Mapping[str, Any], ...] = ()
+    reference: str = field(default="", compare=False)
+
+    def input(self, name: str) -> Parameter | Setting:
+        """The parameter or setting called `name`; KeyError if the model has none."""
+        items: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
+        for item in items:
+            if item.name == name:
+                return item
+        raise KeyError(name)
+
+
+@dataclass
+class Refusals:
+    """Cases whose inputs the model cannot start from: a mask and one sentence per refused case."""
+
+    reason: np.ndarray
+
+    @classmethod
+    def none(cls, n_cases: int) -> "Refusals":
+        return cls(np.full(n_cases, "", dtype=object))
+
+    def add(self, mask: np.ndarray, sentence: str) -> None:
+        """Refuse the cases in `mask` (bool[n_cases]) unless they were refused before."""
+        self.reason[mask & (self.reason == "")] = sentence
+
+    @property
+    def mask(self) -> np.ndarray:
+        """bool[n_cases], true where the case is refused."""
+        return self.reason != ""
+
+
+def load_model(reference: str, beside: Path | None = None) -> Model:
+    """The `MODEL` of a module ("campaigns.deorbit") or of a `.py` file beside the campaign file.
+
+    Raises ModelError with one sentence when the module, the file or its MODEL is missing or broken.
+    """
+    module = _module_from_file(_model_path(reference, beside)) if reference.endswith(".py") else _module(reference)
+    model = getattr(module, "MODEL", None)
+    if not isinstance(model, Model):
+        raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
+    object.__setattr__(model, "reference", reference)
+    return model
+
+
+def _module(reference: str) -> ModuleType:
+    if not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", reference):
+        raise ModelError(f'"{reference}" is neither a module such as "campaigns.deorbit" nor a .py file')
+    try:
+        return importlib.import_module(reference)
+    except ModuleNotFoundError as error:
+        if error.name and reference.startswith(error.name):
+            raise ModelError(f'there is no module "{reference}"; a file beside the campaign ends in .py') from None
+        raise ModelError(f'"{reference}" needs the package "{error.name}", which is not installed') from None
+
+
+def _model_path(reference: str, beside: Path | None) -> Path:
+    path = ((beside or Path.cwd()) / reference).resolve()
+    if not path.is_file():
+        raise ModelError(f'there is no file "{reference}" beside the campaign file')
+    return path
+
+
+def _module_from_file(path: Path) -> ModuleType:
+    """Import a user's file under a name that depends on its text, so that an edited file is a new module."""
+    name = f"mc_engine_user_{path.stem}_{sha256(path.read_bytes() + str(path).encode()).hexdigest()[:12]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None  # a .py path always has a loader
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        line = error.lineno if isinstance(error, SyntaxError) else _line_in(path, error)
+        raise ModelError(f'"{path.name}", line {line}: {type(error).__name__}: {error}') from error
+    return module
+
+
+def _line_in(path: Path, error: BaseException) -> int:
+    line, trace = 0, error.__traceback__
+    while trace is not None:
+        if trace.tb_frame.f_code.co_filename == str(path):
+            line = trace.tb_lineno
+        trace = trace.tb_next
+    return line

@@ -1,0 +1,179 @@
+"""Parts: the Parquet files of a run directory, one range of cases or one set of histories each.
+
+The same columns give the same bytes.  Unit, role and meaning of a column stand in its Arrow field's metadata, and
+once more where `pandas.read_parquet` looks for `DataFrame.attrs`.  Numbers are written without dictionaries, words
+with; every page has a checksum.  A part is read through its SHA-256: damaged bytes are an error, never a table.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mc_engine.durable_file import read_file, write_durably
+from mc_engine.errors import StoreError
+from mc_engine.status import STATUS_NAME
+
+ARROW_TYPES = {"number": pa.float64(), "integer": pa.int64(), "word": pa.string(), "switch": pa.bool_()}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: its name ends in the unit; role is "case", "dispersion", "metric" or "state".
+
+    kind : "number" (float64), "integer" (int64), "word" (string) or "switch" (bool).
+    """
+
+    name: str
+    unit: str
+    role: str
+    description: str
+    kind: str = "number"
+
+
+@dataclass(frozen=True)
+class Part:
+    """Receipt of a part that is on the disk: what its journal line says.  `file` is relative to the run directory."""
+
+    file: str
+    first: int
+    rows: int
+    bytes: int
+    sha256: str
+    status: dict[str, int]
+
+    @property
+    def stop(self) -> int:
+        """One past the last case."""
+        return self.first + self.rows
+
+
+CASE_COLUMNS = (
+    Column("case_id", "", "case", "number of the case, from 0; -1 is the nominal", "integer"),
+    Column("status", "", "case", "how the case ended", "word"),
+    Column("reason", "", "case", "why the case was refused or failed, in words", "word"),
+)
+
+
+def attributes(columns: Sequence[Column]) -> dict[str, dict[str, str]]:
+    """What a table's `DataFrame.attrs` holds: units, descriptions and roles by column name."""
+    return {
+        "units": {column.name: column.unit for column in columns},
+        "descriptions": {column.name: column.description for column in columns},
+        "roles": {column.name: column.role for column in columns},
+    }
+
+
+def arrow_schema(columns: Sequence[Column]) -> pa.Schema:
+    """The Arrow schema of tables of `columns`."""
+    fields = []
+    for column in columns:
+        metadata = {"unit": column.unit, "role": column.role, "description": column.description}
+        fields.append(pa.field(column.name, ARROW_TYPES[column.kind], metadata=metadata))
+    return pa.schema(fields, metadata={"PANDAS_ATTRS": json.dumps(attributes(columns))})
+
+
+def arrow_table(columns: Sequence[Column], arrays: Mapping[str, Any], n_rows: int, place: Path) -> pa.Table:
+    """The table of `columns` from arrays of `n_rows`; StoreError naming `place` and every column that does not fit."""
+    names = [column.name for column in columns]
+    problems = [f'column "{name}" is missing' for name in names if name not in arrays]
+    problems += [f'column "{name}" is not one of this run' for name in arrays if name not in names]
+    filled = {}
+    for column in columns:
+        if column.name not in arrays:
+            continue
+        values = np.asarray(arrays[column.name])
+        if values.shape != (n_rows,):
+            problems.append(f'column "{column.name}" has shape {values.shape}, not ({n_rows},)')
+            continue
+        try:
+            filled[column.name] = _arrow_array(column, values)
+        except (pa.ArrowException, ValueError, TypeError, KeyError) as error:
+            problems.append(f'column "{column.name}" is no {column.kind}: {error}')
+    if problems:
+        raise StoreError(f"{place}: " + "; ".join(problems))
+    return pa.Table.from_arrays([filled[name] for name in names], schema=arrow_schema(columns))
+
+
+def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
+    if column.name == "status" and values.dtype.kind in "iu":
+        codes, positions = np.unique(values, return_inverse=True)
+        words = pa.array([STATUS_NAME[int(code)] for code in codes], pa.string())
+        return words.take(pa.array(positions))
+    if column.kind == "word":
+        return pa.array(values, pa.string()).fill_null("")
+    if column.kind == "number":
+        return pa.array(values.astype(np.float64, copy=False))  # NaN stays NaN: it is no missing value
+    return pa.array(values, ARROW_TYPES[column.kind])
+
+
+def parquet_bytes(table: pa.Table) -> bytes:
+    """The bytes of a Parquet file of `table`."""
+    words = [field.name for field in table.schema if field.type == pa.string()]
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table,
+        sink,
+        compression="zstd",
+        compression_level=1,
+        use_dictionary=words or False,
+        write_statistics=["case_id"] if "case_id" in table.column_names else False,
+        write_page_checksum=True,
+    )
+    return sink.getvalue().to_pybytes()
+
+
+def part_name(first: int, rows: int) -> str:
+    """File name of the part of cases first .. first + rows - 1; names sort as the cases do."""
+    return f"part-{first:010d}-{first + rows - 1:010d}.parquet"
+
+
+def write_part(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> Part:
+    """Put one range of cases durably into `run`/cases; it counts once its receipt is in the journal.
+
+    Needs no lock and no journal, so that a worker may write and send back the receipt alone.
+    """
+    if first < 0 or count < 1:
+        raise StoreError(f"{run}: a part of {count} cases from {first} cannot be")
+    case_ids = np.arange(first, first + count, dtype=np.int64)
+    if "case_id" in arrays and not np.array_equal(arrays["case_id"], case_ids):
+        raise StoreError(f"{run}: case_id does not count from {first} to {first + count - 1}")
+    table = arrow_table(columns, {**arrays, "case_id": case_ids}, count, run)
+    counts = Counter(table.column("status").to_pylist())
+    return write_table(run, f"cases/{part_name(first, count)}", table, first, dict(sorted(counts.items())))
+
+
+def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: dict[str, int] | None = None) -> Part:
+    """Write any table durably as `run`/`file`."""
+    content = parquet_bytes(table)
+    write_durably(run / file, content)
+    return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), status or {})
+
+
+def read_part(run: Path, part: Part, names: Sequence[str] | None = None) -> pa.Table:
+    """The table of a part, all columns or those in `names`; StoreError naming the file if a byte of it changed."""
+    path = run / part.file
+    content = read_file(path)
+    problem = content_problem(content, part)
+    if problem:
+        raise StoreError(f"{path}: {problem}")
+    try:
+        return pq.read_table(pa.BufferReader(content), columns=names, use_threads=False)
+    except (pa.ArrowException, OSError, KeyError) as error:
+        raise StoreError(f"{path}: no readable Parquet file: {error}") from error
+
+
+def content_problem(content: bytes, part: Part) -> str:
+    """What is wrong with the bytes of a part; empty if they are those that were written."""
+    if len(content) != part.bytes:
+        return f"damaged, {len(content)} bytes where {part.bytes} were written"
+    if sha256(content).hexdigest() != part.sha256:
+        return "damaged, its SHA-256 is not the one in the journal"
+    return ""

@@ -1,0 +1,12 @@
+"""Where a run goes when the user names no folder."""
+
+import re
+from datetime import UTC, datetime
+from pathlib import Path
+
+
+def default_folder(campaign_name: str) -> Path:
+    """`runs/<campaign>-<UTC time>`, a folder that is not there yet."""
+    stem = re.sub(r"[^\w.-]+", "-", campaign_name)
+    path = Path("runs") / f"{stem}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    return path if not path.exists() else path.with_name(f"{path.name}-{datetime.now(UTC):%f}")

@@ -1,0 +1,30 @@
+"""What a table of cases means: summaries, requirement verdicts, maps.  Tables in, plain records out."""
+
+from mc_engine.statistics.binomial import clopper_pearson, lower_bound, upper_bound
+from mc_engine.statistics.maps import SurfaceMap, map_metric
+from mc_engine.statistics.normality import Normality, normality
+from mc_engine.statistics.order_statistics import QUANTILES, Quantile, quantile, quantile_ranks
+from mc_engine.statistics.requirements import SAMPLING_DESIGNS, Verdict, judge, pass_probability
+from mc_engine.statistics.summary import Summary, summarize
+from mc_engine.statistics.worst import worst_cases
+
+__all__ = [
+    "QUANTILES",
+    "SAMPLING_DESIGNS",
+    "Normality",
+    "Quantile",
+    "Summary",
+    "SurfaceMap",
+    "Verdict",
+    "clopper_pearson",
+    "judge",
+    "lower_bound",
+    "map_metric",
+    "normality",
+    "pass_probability",
+    "quantile",
+    "quantile_ranks",
+    "summarize",
+    "upper_bound",
+    "worst_cases",
+]

@@ -1,0 +1,32 @@
+"""How a case ended: small codes in the kernels, words in the tables.
+
+A failed case is data.  Its row keeps the inputs, the status and the last state; metrics are NaN.
+"""
+
+OK = 0
+NOT_FINITE = 1
+STEP_LIMIT = 2
+EVENT_LIMIT = 3
+NO_STOP = 4
+REFUSED = 5
+WORKER_DIED = 6
+
+STATUS_NAME = {
+    OK: "ok",
+    NOT_FINITE: "not-finite",
+    STEP_LIMIT: "step-limit",
+    EVENT_LIMIT: "event-limit",
+    NO_STOP: "no-stop",
+    REFUSED: "refused",
+    WORKER_DIED: "worker-died",
+}
+
+STATUS_TEXT = {
+    OK: "flown to its end",
+    NOT_FINITE: "the state became infinite or not a number; the row holds the last finite state",
+    STEP_LIMIT: "the cap on integration steps was reached",
+    EVENT_LIMIT: "more events in one step than the engine follows; the control chatters",
+    NO_STOP: "the flight reached its time limit before the event that should end it",
+    REFUSED: "the model cannot start from these inputs; the column `reason` says why",
+    WORKER_DIED: "the process flying this case died",
+}

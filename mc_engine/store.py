@@ -1,0 +1,369 @@
+"""The run directory: what a campaign's run leaves behind, and the only meeting point of engine and reports.
+
+    campaign.toml   manifest.json   journal.jsonl   nominal.parquet   cases/part-*.parquet   history/part-*.parquet
+
+A part exists once its journal line is synced.  A file without a line is what a kill left: readers here ignore it,
+the next writer removes it.  (`pandas.read_parquet(run / "cases")` knows no journal and would show such a part;
+its rows are right, but not yet counted.)  Manifest and campaign are never changed: what came later is in the
+journal.  A `Store` is for one thread; one process at a time may write.
+"""
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, fields
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from mc_engine import parts
+from mc_engine.durable_file import is_temporary, make_folder, naming, read_file, write_durably
+from mc_engine.errors import StoreError
+from mc_engine.journal import Entry, Journal, encode, plain, utc_now
+from mc_engine.parts import CASE_COLUMNS, Column, Part
+from mc_engine.writer_lock import LOCK_NAME, WriterLock
+
+__all__ = ["Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
+
+CAMPAIGN, MANIFEST, JOURNAL, NOMINAL = "campaign.toml", "manifest.json", "journal.jsonl", "nominal.parquet"
+PART_FOLDERS = ("cases", "history")
+FORMAT = 1  # of the directory; the manifest's "format"
+_OURS_BEFORE_THE_JOURNAL = {LOCK_NAME, CAMPAIGN, MANIFEST, *PART_FOLDERS}
+
+Range = tuple[int, int]
+
+
+def create_store(
+    path: str | Path,
+    manifest: Mapping[str, Any],
+    campaign_text: str,
+    columns: Sequence[Column],
+    companions: Mapping[str, bytes] | None = None,
+) -> "Store":
+    """Make `path` the directory of a new run; its `manifest["columns"]` are set from `columns`.
+
+    companions : files that the campaign reads from its own folder, by their names there; they are kept beside it.
+    case_id, status and reason come first, whether or not `columns` has them.  Refuses a directory that holds
+    anything, except what a creation that was cut short left there.
+    """
+    path, companions = Path(path), companions or {}
+    refuse_occupied(path, companions)
+    make_folder(path)
+    lock = WriterLock(path)
+    lock.acquire()
+    try:
+        refuse_occupied(path, companions)  # again: two may have come this far
+        names = {column.name for column in CASE_COLUMNS}
+        columns = [*CASE_COLUMNS, *(column for column in columns if column.name not in names)]
+        record = {**manifest, "columns": [asdict(column) for column in columns]}
+        content = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False, default=plain).encode()
+        text = campaign_text.encode()
+        for name, companion in companions.items():
+            make_folder((path / name).parent)
+            write_durably(path / name, companion)
+        write_durably(path / CAMPAIGN, text)
+        write_durably(path / MANIFEST, content)
+        for folder in PART_FOLDERS:
+            make_folder(path / folder)
+        # The journal comes last: with it the store exists.
+        digests = {"manifest": sha256(content).hexdigest(), "campaign": sha256(text).hexdigest()}
+        write_durably(path / JOURNAL, encode(1, utc_now(), "created", digests))
+    finally:
+        lock.release()
+    return Store(path)
+
+
+def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
+    """StoreError if no new run can be made in `path`: it holds a run, or anything else.
+
+    companions : files that an earlier attempt, cut short, may have left there.
+    """
+    expected = _OURS_BEFORE_THE_JOURNAL | {Path(name).parts[0] for name in companions}
+    with naming(path):
+        names = {entry.name for entry in path.iterdir()} if path.exists() else set()
+    if JOURNAL in names:
+        raise StoreError(f"{path}: holds a run already; `resume` or `extend` it, or choose another folder")
+    cut_short = LOCK_NAME in names and all(name in expected or is_temporary(name) for name in names)
+    if names and not cut_short:
+        raise StoreError(f"{path}: is not empty and holds no run; choose another folder")
+
+
+def is_run_directory(path: str | Path) -> bool:
+    """True if `path` is or was a run directory, whole or damaged."""
+    path = Path(path)
+    return (path / JOURNAL).is_file() or (path / MANIFEST).is_file()
+
+
+def open_store(path: str | Path) -> "Store":
+    """The run in directory `path`, for reading; its writing methods take the lock themselves."""
+    return Store(Path(path))
+
+
+class Store:
+    """One run directory.  Ranges of cases are half open: (first, stop)."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        if not is_run_directory(path):
+            raise StoreError(f"{path}: is no run directory" if path.exists() else f"{path}: there is no such folder")
+        self._lock = WriterLock(path)
+        self._read_journal()
+        content = read_file(path / MANIFEST)
+        if sha256(content).hexdigest() != self._created["manifest"]:
+            raise StoreError(f"{path / MANIFEST}: damaged or edited, it is not the one this run began with")
+        self.manifest: dict[str, Any] = json.loads(content)
+        if self.manifest.get("format", FORMAT) > FORMAT:
+            raise StoreError(f"{path}: was written by a newer engine; this one reads format {FORMAT}")
+        known = {field.name for field in fields(Column)}
+        self.columns = tuple(
+            Column(**{key: value for key, value in record.items() if key in known})
+            for record in self.manifest["columns"]
+        )
+
+    def _read_journal(self) -> None:
+        self._journal = Journal(self.path / JOURNAL)
+        if not self._journal.entries or self._journal.entries[0].event != "created":
+            raise StoreError(f"{self.path / JOURNAL}, line 1: damaged, a journal begins with its creation")
+        self._created = self._journal.entries[0].facts
+
+    @property
+    def campaign_text(self) -> str:
+        """The campaign file as it was flown; StoreError if someone changed it since."""
+        content = read_file(self.path / CAMPAIGN)
+        if sha256(content).hexdigest() != self._created["campaign"]:
+            raise StoreError(f"{self.path / CAMPAIGN}: damaged or edited, it is not the one this run began with")
+        return content.decode()
+
+    # ---- what the journal says
+
+    @property
+    def parts(self) -> list[Part]:
+        """Receipts of all committed parts, by their first case."""
+        return sorted(self._receipts("part"), key=lambda part: part.first)
+
+    def _receipts(self, event: str) -> list[Part]:
+        return [Part(**entry.facts) for entry in self._journal.entries if entry.event == event]
+
+    @property
+    def nominal_part(self) -> Part | None:
+        """Receipt of the nominal case, if it was written."""
+        entries = [entry for entry in self._journal.entries if entry.event in ("nominal", "nominal-withdrawn")]
+        return Part(**entries[-1].facts) if entries and entries[-1].event == "nominal" else None
+
+    @property
+    def history_part(self) -> Part | None:
+        """Receipt of the retained histories, if any were written."""
+        return next(reversed(self._receipts("history")), None)
+
+    def notes(self, event: str | None = None) -> list[Entry]:
+        """Journal entries in order, all or those of one event."""
+        return [entry for entry in self._journal.entries if event is None or entry.event == event]
+
+    @property
+    def n_cases(self) -> int:
+        """How many cases are wanted, after all extensions."""
+        extended = self.notes("extended")
+        return int(extended[-1].facts["cases"] if extended else self.manifest["campaign"]["cases"])
+
+    def committed(self) -> list[Range]:
+        """The cases on the disk, as merged ranges in order."""
+        merged: list[Range] = []
+        for part in self.parts:
+            if merged and part.first == merged[-1][1]:
+                merged[-1] = (merged[-1][0], part.stop)
+            else:
+                merged.append((part.first, part.stop))
+        return merged
+
+    def missing(self, cases: int | range | None = None) -> list[Range]:
+        """The ranges not committed among `cases`: the first so many, a range, or all wanted ones."""
+        wanted = cases if isinstance(cases, range) else range(self.n_cases if cases is None else cases)
+        gaps, begin = [], wanted.start
+        for first, stop in self.committed():
+            if min(first, wanted.stop) > begin:
+                gaps.append((begin, min(first, wanted.stop)))
+            begin = max(begin, stop)
+        if begin < wanted.stop:
+            gaps.append((begin, wanted.stop))
+        return gaps
+
+    def status_counts(self) -> dict[str, int]:
+        """Committed cases by status word, without reading a part."""
+        counts: dict[str, int] = {}
+        for part in self.parts:
+            for word, count in part.status.items():
+                counts[word] = counts.get(word, 0) + count
+        return counts
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every column of `cases`."""
+        return {column.name: column.unit for column in self.columns}
+
+    # ---- reading
+
+    def cases(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
+        """One row per committed case, by case_id; all columns or the named ones.
+
+        `attrs["units"]`, `["descriptions"]` and `["roles"]` hold what the columns are.
+        """
+        wanted = self.columns if columns is None else tuple(self._column(name) for name in columns)
+        names = [column.name for column in wanted]
+        tables = [parts.read_part(self.path, part, names) for part in self.parts]
+        return _frame(tables, wanted)
+
+    def _column(self, name: str) -> Column:
+        for column in self.columns:
+            if column.name == name:
+                return column
+        raise StoreError(f'{self.path}: there is no column "{name}"; there are {", ".join(self.units)}')
+
+    def row(self, case_id: int) -> dict[str, Any]:
+        """One case by column name; StoreError if it is not there."""
+        for part in self.parts:
+            if part.first <= case_id < part.stop:
+                return parts.read_part(self.path, part).slice(case_id - part.first, 1).to_pylist()[0]
+        raise StoreError(f"{self.path}: case {case_id} is not there")
+
+    def nominal(self) -> dict[str, Any]:
+        """The nominal case by column name (case_id is -1); empty if none was written."""
+        receipt = self.nominal_part
+        return parts.read_part(self.path, receipt).to_pylist()[0] if receipt else {}
+
+    def histories(self) -> pd.DataFrame:
+        """The retained histories: case_id, t_s and the quantities; no rows if none were written."""
+        quantities = self.manifest.get("quantities", [])
+        receipt = self.history_part
+        tables = [parts.read_part(self.path, receipt)] if receipt else []
+        names = tables[0].column_names if tables else [quantity["name"] for quantity in quantities]
+        return _frame(tables, history_columns(names, quantities))
+
+    def verify(self) -> list[str]:
+        """All damage in the directory, a sentence each; empty if every byte is as written."""
+        from mc_engine.verification import damage  # which opens stores
+
+        return damage(self.path)
+
+    # ---- writing
+
+    @contextmanager
+    def lock(self) -> Iterator["Store"]:
+        """Be the one writer of this directory for the length of the block; may be nested.
+
+        On the way in, what a killed writer left is removed; StoreError if another writer is at work.
+        """
+        if self._lock.held:
+            yield self
+            return
+        dead = self._lock.acquire()
+        try:
+            self._read_journal()  # another writer may have been here since this object was made
+            self._sweep()
+            if dead is not None:
+                self._journal.append("lock-taken-over", {"from": dead})
+            yield self
+        finally:
+            self._lock.release()
+
+    def _sweep(self) -> None:
+        """Remove temporary files and parts without a journal line."""
+        counted = {part.file for part in (*self._receipts("part"), *self._receipts("history")[-1:])}
+        for folder in (self.path, *(self.path / name for name in PART_FOLDERS)):
+            with naming(folder):
+                stray = [path for path in folder.iterdir() if self._is_stray(path, counted)]
+            for path in stray:
+                with naming(path):
+                    path.unlink(missing_ok=True)
+
+    def _is_stray(self, path: Path, counted: set[str]) -> bool:
+        file = path.relative_to(self.path).as_posix()
+        return is_temporary(path.name) or (is_part_file(file) and file not in counted)
+
+    def append(self, first: int, count: int, columns: Mapping[str, Any]) -> None:
+        """Commit the cases first .. first + count - 1; on return they survive a power cut.
+
+        columns : arrays of `count` for every column but case_id; status in words or codes.
+        """
+        with self.lock():
+            self._refuse_overlap(first, count)
+            self.commit(parts.write_part(self.path, self.columns, first, count, columns))
+
+    def commit(self, part: Part) -> None:
+        """Count a part that `parts.write_part` put into this directory."""
+        with self.lock():
+            self._refuse_overlap(part.first, part.rows)
+            self._journal.append("part", asdict(part))
+
+    def _refuse_overlap(self, first: int, count: int) -> None:
+        if count > 0 and self.missing(range(first, first + count)) != [(first, first + count)]:
+            raise StoreError(f"{self.path}: some of the cases {first} to {first + count - 1} are committed already")
+
+    def note(self, event: str, /, **facts: Any) -> None:
+        """Put an event that is no part into the journal: "started", "finished", "extended" (with cases), ..."""
+        with self.lock():
+            self._journal.append(event, facts)
+
+    def write_nominal(self, row: Mapping[str, Any]) -> None:
+        """Keep the nominal case: a value for every column but case_id."""
+        arrays = {name: np.asarray([value]) for name, value in {**row, "case_id": -1}.items()}
+        table = parts.arrow_table(self.columns, arrays, 1, self.path / NOMINAL)
+        with self.lock():
+            if self.nominal_part is not None:
+                # A kill between the new file and its line must not leave the old line with the new file.
+                self._journal.append("nominal-withdrawn", {})
+            self._journal.append("nominal", asdict(parts.write_table(self.path, NOMINAL, table, first=-1)))
+
+    def write_histories(self, table: "pd.DataFrame | Mapping[str, Any]") -> None:
+        """Keep these histories (case_id, t_s and quantities, one row per sample) in place of any kept before."""
+        arrow = _history_table(table, self.manifest.get("quantities", []), self.path / "history")
+        with self.lock():
+            before = self.history_part
+            file = f"history/part-{len(self._receipts('history')):05d}.parquet"
+            self._journal.append("history", asdict(parts.write_table(self.path, file, arrow)))
+            if before is not None:
+                with suppress(OSError):  # it no longer counts, and the next writer tries again
+                    (self.path / before.file).unlink(missing_ok=True)
+
+
+def is_part_file(file: str) -> bool:
+    """True if `file`, relative to the run directory, has the name of a part."""
+    folder, _, name = file.rpartition("/")
+    return folder in PART_FOLDERS and name.startswith("part-") and name.endswith(".parquet")
+
+
+def history_columns(names: Sequence[str], quantities: Sequence[Mapping[str, str]]) -> tuple[Column, ...]:
+    """Columns of a history table with these names: case_id and t_s first, units from the model's quantities."""
+    known = {quantity["name"]: quantity for quantity in quantities}
+    columns = [CASE_COLUMNS[0], Column("t_s", "s", "time", "time since the start of the case")]
+    for name in names:
+        if name not in ("case_id", "t_s"):
+            quantity = known.get(name, {"unit": "", "description": ""})
+            columns.append(Column(name, quantity["unit"], "quantity", quantity["description"]))
+    return tuple(columns)
+
+
+def _history_table(
+    table: "pd.DataFrame | Mapping[str, Any]", quantities: Sequence[Mapping[str, str]], place: Path
+) -> pa.Table:
+    arrays = {name: np.asarray(table[name]) for name in table}
+    columns = history_columns(list(arrays), quantities)
+    return parts.arrow_table(columns, arrays, len(arrays.get("t_s", ())), place)
+
+
+def history_bytes(
+    table: "pd.DataFrame | Mapping[str, Any]", quantities: Sequence[Mapping[str, str]], place: Path
+) -> bytes:
+    """A Parquet file of histories that are kept outside the run's own; `place` is for messages."""
+    return parts.parquet_bytes(_history_table(table, quantities, place))
+
+
+def _frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> pd.DataFrame:
+    schema = parts.arrow_schema(columns)
+    table = pa.concat_tables(tables) if tables else schema.empty_table()
+    frame = table.to_pandas()
+    frame.attrs.update(parts.attributes(columns))
+    return frame

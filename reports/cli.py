@@ -1,0 +1,38 @@
+"""What `mc-engine report RUN [--format html|pdf]` does: read the run, build the contents, write the files."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from mc_engine.store import open_store
+from reports.contents import build
+from reports.document import Document
+from reports.html import render_html
+from reports.pdf import render_pdf
+
+RENDERERS: dict[str, Callable[[Document], bytes]] = {"html": render_html, "pdf": render_pdf}
+
+
+def write_reports(run_path: str | Path, formats: Sequence[str] = ("html", "pdf")) -> list[Path]:
+    """Write report.html and report.pdf (those asked for) into the run directory; returns their paths.
+
+    The contents are built once.  Every file appears whole or not at all.
+    """
+    unknown = [name for name in formats if name not in RENDERERS]
+    if unknown:
+        raise ValueError(f'"{unknown[0]}" is no format of a report; use {" or ".join(RENDERERS)}')
+    path = Path(run_path)
+    document = build(open_store(path), path.resolve().name)
+    return [_write(path / f"report.{name}", RENDERERS[name](document)) for name in dict.fromkeys(formats)]
+
+
+def report(run_path: str | Path, format: str | None = None) -> list[Path]:
+    """`write_reports` for one format, or for both without one."""
+    return write_reports(run_path, (format,) if format else tuple(RENDERERS))
+
+
+def _write(path: Path, content: bytes) -> Path:
+    # A hidden neighbour first, so that a reader never sees half a report.
+    unfinished = path.with_name(f".{path.name}.unfinished")
+    unfinished.write_bytes(content)
+    unfinished.replace(path)
+    return path

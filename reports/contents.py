@@ -1,0 +1,76 @@
+"""The contents of a report, in reading order: first the verdicts, last what is needed to make the numbers again."""
+
+from collections.abc import Iterable, Iterator
+
+from reports.case_tables import case_table, worst_tables
+from reports.document import Block, Document, FigureBlock, Section, Table, Text, numbered
+from reports.drawings import distribution_blocks, history_blocks, map_blocks, scatter_blocks
+from reports.flown import Flown, Run
+from reports.glossary import GLOSSARY
+from reports.headline import cost_cards, summary_sentence, verdict_cards, warnings
+from reports.provenance import campaign_facts, provenance_table
+from reports.published import published_table
+from reports.tables import (
+    fixed_table,
+    input_table,
+    quantile_table,
+    requirement_table,
+    status_table,
+    summary_table,
+)
+
+
+def build(run: Run, name: str) -> Document:
+    """The report of a run; `name` is its directory's name, as commands in the report spell it."""
+    flown = Flown(run, name)
+    title = str(flown.campaign.get("title") or flown.manifest.get("model", {}).get("title") or name)
+    return numbered(
+        Document(
+            title=title,
+            subtitle=summary_sentence(flown),
+            created=str(flown.manifest.get("created_utc", "")),
+            facts=campaign_facts(flown),
+            verdicts=verdict_cards(flown),
+            costs=cost_cards(flown),
+            warnings=warnings(flown),
+            sections=tuple(section for section in _sections(flown) if section.blocks),
+        )
+    )
+
+
+def _sections(flown: Flown) -> Iterator[Section]:
+    yield Section("requirements", "Requirements", _requirements(flown))
+    yield Section("maps", "Maps", blocks(map_blocks(flown)))
+    yield Section("distributions", "Distributions", blocks(distribution_blocks(flown)))
+    yield Section("metrics", "Metrics in numbers", _metrics(flown))
+    yield Section("histories", "Time histories", blocks(history_blocks(flown)))
+    yield Section("scatter", "One against another", blocks(scatter_blocks(flown)))
+    yield Section("worst", "Worst and failed cases", blocks(worst_tables(flown)))
+    yield Section("status", "How the cases ended", (status_table(flown),))
+    yield Section("published", "Published and ours", blocks([published_table(flown)]))
+    yield Section("inputs", "Inputs", blocks(_inputs(flown)))
+    yield Section("provenance", "Provenance", (provenance_table(flown),))
+    yield Section("reading", "How to read this report", (GLOSSARY,))
+
+
+def blocks(found: Iterable[FigureBlock | Table | str | None]) -> tuple[Block, ...]:
+    """Blocks without the absent ones; a sentence becomes a paragraph."""
+    return tuple(Text((item,)) if isinstance(item, str) else item for item in found if item is not None)
+
+
+def _requirements(flown: Flown) -> tuple[Block, ...]:
+    if flown.verdicts:
+        return (requirement_table(flown),)
+    return (Text(("The campaign file sets no requirement; [requirement.NAME] with a metric and a limit adds one.",)),)
+
+
+def _metrics(flown: Flown) -> tuple[Block, ...]:
+    if not flown.summaries:
+        return (Text(("The model declares no metric.",)),)
+    return blocks([case_table(flown), summary_table(flown), quantile_table(flown)])
+
+
+def _inputs(flown: Flown) -> Iterator[Table | str | None]:
+    yield input_table(flown) or "No input is dispersed: all cases are the nominal one."
+    yield fixed_table(flown, "parameters", "Parameters that all cases share")
+    yield fixed_table(flown, "settings", "Settings of the run")

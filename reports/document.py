@@ -1,0 +1,155 @@
+"""What a report says, as plain data: sections of texts, tables and figures, in reading order.
+
+Built once by `contents`, drawn twice by `html` and `pdf`.  All strings are plain text; escaping is the
+renderers' work.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Key:
+    """One entry of a figure's key.  mark: "line", "dash", "dot", "band", "bar", "field", "point" or "ring"."""
+
+    mark: str
+    colour: str
+    text: str
+
+
+class Drawing(ABC):
+    """A figure's data, with what it takes to draw it on a screen and on paper."""
+
+    @property
+    @abstractmethod
+    def key(self) -> tuple[Key, ...]:
+        """What the marks mean."""
+
+    @property
+    @abstractmethod
+    def alternative(self) -> str:
+        """The figure in words, for those who do not see it."""
+
+    @abstractmethod
+    def interactive(self) -> list[dict[str, Any]]:
+        """One plotly specification ("data", "layout") per panel; colours may be "@ink" and other page colours."""
+
+    @abstractmethod
+    def printed(self) -> Figure:
+        """The figure for the page, all panels."""
+
+
+@dataclass(frozen=True)
+class Text:
+    """Paragraphs; kind "plain" or "warning"."""
+
+    paragraphs: tuple[str, ...]
+    kind: str = "plain"
+
+
+@dataclass(frozen=True)
+class Terms:
+    """A glossary: pairs of a term and its meaning."""
+
+    entries: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """text, with a number to sort by; small stands under it; tone: "", "good", "bad" or "open"."""
+
+    text: str
+    value: float | None = None
+    small: str = ""
+    tone: str = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """kind: "text", "name" (a column name), "code" or "number"; width: relative, on paper."""
+
+    title: str
+    kind: str = "text"
+    width: float = 0.0
+
+
+@dataclass(frozen=True)
+class Table:
+    """A numbered table; rows hold one Cell per column."""
+
+    caption: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+    number: int = 0
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """A numbered figure; size: "wide", "half" or "small", the least width of a panel on the screen."""
+
+    caption: str
+    drawing: Drawing
+    size: str = "wide"
+    number: int = 0
+
+
+Block = Text | Terms | Table | FigureBlock
+
+
+@dataclass(frozen=True)
+class Section:
+    """A titled part of the report; anchor is unique in it."""
+
+    anchor: str
+    title: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class Card:
+    """One line of the headline box: a label, its answer, and the sentence behind it."""
+
+    label: str
+    answer: str
+    detail: str
+    tone: str = ""
+
+
+@dataclass(frozen=True)
+class Document:
+    """The whole report.  created: ISO date and time, UTC, of the run (not of the report)."""
+
+    title: str
+    subtitle: str
+    created: str
+    facts: tuple[tuple[str, str], ...]
+    verdicts: tuple[Card, ...]
+    costs: tuple[Card, ...]
+    warnings: tuple[str, ...]
+    sections: tuple[Section, ...] = field(default=())
+
+
+def numbered(document: Document) -> Document:
+    """The document with its tables and figures numbered from 1 in reading order."""
+    counts: dict[type, int] = {Table: 0, FigureBlock: 0}
+    sections = []
+    for section in document.sections:
+        blocks: list[Block] = []
+        for block in section.blocks:
+            if isinstance(block, Table | FigureBlock):
+                counts[type(block)] += 1
+                block = replace(block, number=counts[type(block)])
+            blocks.append(block)
+        sections.append(replace(section, blocks=tuple(blocks)))
+    return replace(document, sections=tuple(sections))
+
+
+def blocks_of(document: Document, kind: type) -> Iterator[Any]:
+    """All blocks of one kind, in reading order."""
+    for section in document.sections:
+        yield from (block for block in section.blocks if isinstance(block, kind))

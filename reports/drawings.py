@@ -1,0 +1,193 @@
+"""The figures of a run: picks the data, bounds how much of it is drawn, and says what was left out."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mc_engine.figures import HistoryFigure, MapFigure, ScatterFigure
+from mc_engine.statistics import map_metric
+from reports.case_tables import FEW_CASES, input_words
+from reports.document import FigureBlock
+from reports.figures import DistributionPanel, Distributions, Histories, HistoryLine, MapDrawing, ScatterDrawing
+from reports.flown import Flown
+from reports.numbers import axis_label, words
+
+POINTS_SHOWN = 2000
+PANELS_IN_A_FIGURE = 12
+COLOURED_CASES = 8
+WORST_RANKS = 10
+HISTORIES_SHOWN = 40
+FEWEST_VALUES = 10  # of a histogram
+NOMINAL = -1
+
+
+def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN) -> np.ndarray:
+    """At most about `most` of the row numbers: evenly through the table, and those of `always` among them."""
+    if rows.size <= most:
+        return rows
+    even = rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
+    return np.union1d(even, np.intersect1d(always, rows))
+
+
+def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
+    """The model's maps; a sentence in place of one that cannot be drawn."""
+    for figure in flown.figures:
+        if isinstance(figure, MapFigure):
+            yield _map_block(flown, figure)
+
+
+def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
+    x, y, z = (flown.values(name) for name in (figure.x, figure.y, figure.metric))
+    surface = map_metric(x, y, z)
+    if surface is None or not np.isfinite(surface.value).any():
+        return f"{figure.title}: not drawn; the run has too few cases over {figure.x} and {figure.y} for a map."
+    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z))
+    rows = thinned_rows(used, flown.worst(figure.metric, WORST_RANKS))
+    drawing = MapDrawing(
+        surface=surface,
+        x_label=flown.axis(figure.x),
+        y_label=flown.axis(figure.y),
+        metric_label=flown.axis(figure.metric),
+        unit=flown.unit(figure.metric),
+        points=np.column_stack([x[rows], y[rows]]),
+        case_ids=flown.case_ids[rows],
+        point_values=z[rows],
+        n_points=int(used.size),
+        nominal=_nominal_point(flown, figure.x, figure.y),
+    )
+    caption = figure.title if surface.exact else f"{figure.title}. Blank where the cases do not support a surface."
+    return FigureBlock(caption, drawing, "wide")
+
+
+def _nominal_point(flown: Flown, x: str, y: str) -> tuple[float, float] | None:
+    place = flown.nominal_value(x), flown.nominal_value(y)
+    return None if place[0] is None or place[1] is None else (place[0], place[1])
+
+
+def scatter_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
+    """The model's scatter figures; a sentence in place of an empty one."""
+    for figure in flown.figures:
+        if isinstance(figure, ScatterFigure):
+            yield _scatter_block(flown, figure)
+
+
+def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
+    x, y = flown.values(figure.x), flown.values(figure.y)
+    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    if not used.size:
+        return f"{figure.title}: not drawn; no case has both {figure.x} and {figure.y}."
+    ends = [int(used[pick(values[used])]) for values in (x, y) for pick in (np.argmin, np.argmax)]
+    rows = thinned_rows(used, np.array(ends))
+    drawing = ScatterDrawing(
+        x=x[rows],
+        y=y[rows],
+        case_ids=flown.case_ids[rows],
+        x_label=flown.axis(figure.x),
+        y_label=flown.axis(figure.y),
+        n_used=int(used.size),
+        n_tried=flown.n_tried,
+        nominal=_nominal_point(flown, figure.x, figure.y),
+    )
+    return FigureBlock(figure.title, drawing, "wide")
+
+
+def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
+    """Histograms: first the metrics that matter, then the others; constant ones in a sentence."""
+    drawable = [name for name, item in flown.summaries.items() if item.n_used >= FEWEST_VALUES and not item.constant]
+    others = [name for name in drawable if name not in flown.key_metrics]
+    key = [name for name in flown.key_metrics if name in drawable]
+    if key:
+        title = "Distributions of the metrics that matter" if others else "Distributions of the metrics"
+        yield from _distribution_figures(flown, key, title)
+    if others:
+        yield from _distribution_figures(flown, others, "Distributions of the other metrics")
+    few = [name for name, item in flown.summaries.items() if 0 < item.n_used < FEWEST_VALUES and not item.constant]
+    if few:
+        yield f"Not drawn, fewer than {FEWEST_VALUES} cases have a number: {', '.join(few)}."
+    silent = [name for name, item in flown.summaries.items() if item.n_used == 0]
+    constant = [name for name, item in flown.summaries.items() if item.constant]
+    if constant:
+        yield f"Not drawn, the same in all cases that have it: {', '.join(constant)}."
+    if silent:
+        yield f"Not drawn, no case has a number: {', '.join(silent)}."
+
+
+def _distribution_figures(flown: Flown, names: list[str], title: str) -> Iterator[FigureBlock]:
+    pages = [names[first : first + PANELS_IN_A_FIGURE] for first in range(0, len(names), PANELS_IN_A_FIGURE)]
+    for page, group in enumerate(pages, start=1):
+        panels = tuple(_distribution_panel(flown, name) for name in group)
+        part = f" ({page} of {len(pages)})" if len(pages) > 1 else ""
+        yield FigureBlock(f"{title}{part}", Distributions(panels, (0.00135, 0.99865), flown.random), "small")
+
+
+def _distribution_panel(flown: Flown, name: str) -> DistributionPanel:
+    values, summary = flown.values(name), flown.summaries[name]
+    limits = {
+        limit
+        for verdict in flown.verdicts
+        if verdict.metric == name
+        for limit in (verdict.at_most, verdict.at_least)
+        if limit is not None
+    }
+    used = f"{summary.n_used:,} of {summary.n_tried:,} cases".replace(",", "\u202f")
+    return DistributionPanel(
+        title=used,
+        label=flown.axis(name),
+        values=values[np.isfinite(values)],
+        summary=summary,
+        nominal=flown.nominal_value(name),
+        limits=tuple(sorted(limits)),
+    )
+
+
+def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
+    """The model's history figures over all retained cases; a sentence in place of one without histories."""
+    wanted = [figure for figure in flown.figures if isinstance(figure, HistoryFigure)]
+    if not wanted:
+        return
+    if not len(flown.histories):
+        yield "No histories were retained in this run; [retention] in the campaign file asks for them."
+        return
+    cases = _history_cases(flown)
+    for figure in wanted:
+        names = [name for name in figure.quantities if name in flown.histories.columns]
+        if names:
+            lines = tuple(_history_line(flown, case, label, rank, names) for case, (label, rank) in cases.items())
+            labels = {name: axis_label(words(name, flown.unit(name)), flown.unit(name)) for name in names}
+            yield FigureBlock(figure.title, Histories(lines, labels), "half")
+
+
+def _history_cases(flown: Flown) -> dict[int, tuple[str, int | None]]:
+    """Name and rank of the retained cases: nominal 0, then by how bad they are in the metrics that matter."""
+    kept = [int(case) for case in np.unique(flown.histories["case_id"].to_numpy())]
+    reasons = _worst_reasons(flown)
+    ordered = sorted((case for case in kept if case in reasons), key=lambda case: reasons[case][0])
+    coloured = {case: rank for rank, case in enumerate(ordered[:COLOURED_CASES], start=1)}
+    named: dict[int, tuple[str, int | None]] = {}
+    for case in kept:
+        if case == NOMINAL:
+            named[case] = ("nominal", 0)
+        elif case in coloured:
+            named[case] = (f"case {case}: {reasons[case][1]}".removesuffix(": "), coloured[case])
+        elif len(named) < HISTORIES_SHOWN:
+            named[case] = (f"case {case}", None)
+    return named
+
+
+def _worst_reasons(flown: Flown) -> dict[int, tuple[int, str]]:
+    """Per case among the worst: sort key and what it is worst in; for a handful of cases, what sets them apart."""
+    if flown.n_tried <= FEW_CASES:
+        return {int(case): (row, input_words(flown, row)) for row, case in enumerate(flown.case_ids)}
+    reasons: dict[int, tuple[int, str]] = {}
+    for order, metric in enumerate(flown.key_metrics):
+        which = "largest" if flown.large_is_bad(metric) else "smallest"
+        for place, row in enumerate(flown.worst(metric, WORST_RANKS), start=1):
+            text = f"{which} {flown.words(metric)}" + (f", no. {place}" if place > 1 else "")
+            reasons.setdefault(int(flown.case_ids[row]), (place + WORST_RANKS * order, text))
+    return reasons
+
+
+def _history_line(flown: Flown, case: int, label: str, rank: int | None, names: list[str]) -> HistoryLine:
+    rows = flown.histories[flown.histories["case_id"] == case].sort_values("t_s")
+    quantities = {name: rows[name].to_numpy(dtype=np.float64) for name in names}
+    return HistoryLine(label, rows["t_s"].to_numpy(dtype=np.float64), quantities, rank)

@@ -1,0 +1,166 @@
+"""The run as the report sees it: the table, the nominal, what every column is, and which metrics matter."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import pandas as pd
+
+from mc_engine.figures import KINDS, MapFigure, ScatterFigure, from_record
+from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, judge, summarize, worst_cases
+from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
+from reports.numbers import axis_label, words
+
+CONFIDENCE = 0.90
+LONGEST_LABEL = 52
+
+
+class Run(Protocol):
+    """What a report needs of a store."""
+
+    @property
+    def manifest(self) -> dict[str, Any]: ...
+    @property
+    def n_cases(self) -> int: ...
+    def cases(self) -> pd.DataFrame: ...
+    def nominal(self) -> dict[str, Any]: ...
+    def histories(self) -> pd.DataFrame: ...
+
+
+@dataclass(frozen=True)
+class ColumnFacts:
+    """name, unit, role and one-line meaning of a column."""
+
+    name: str
+    unit: str
+    role: str
+    description: str
+
+
+class Flown:
+    """A run with its tables read once.  name : of the run directory, as the commands in the report spell it."""
+
+    def __init__(self, run: Run, name: str):
+        self.run = run
+        self.name = name
+        self.manifest = run.manifest
+        self.cases = run.cases()
+        self.nominal = run.nominal()
+        self.histories = run.histories()
+        self.n_wanted = int(run.n_cases)
+
+    # ---- what the manifest says
+
+    @cached_property
+    def campaign(self) -> Mapping[str, Any]:
+        return self.manifest.get("campaign", {})
+
+    @cached_property
+    def design(self) -> str:
+        return str(self.campaign.get("design", "mc"))
+
+    @property
+    def random(self) -> bool:
+        """Whether shares of cases estimate probabilities."""
+        return self.design in SAMPLING_DESIGNS
+
+    @cached_property
+    def columns(self) -> dict[str, ColumnFacts]:
+        """All columns and history quantities by name."""
+        records = [*self.manifest.get("quantities", []), *self.manifest.get("columns", [])]
+        facts = [
+            ColumnFacts(record["name"], record.get("unit", ""), record.get("role", ""), record.get("description", ""))
+            for record in records
+        ]
+        return {"t_s": ColumnFacts("t_s", "s", "time", "time"), **{fact.name: fact for fact in facts}}
+
+    def with_role(self, role: str) -> list[ColumnFacts]:
+        """Columns of one role that the table holds, in order."""
+        return [fact for fact in self.columns.values() if fact.role == role and fact.name in self.cases.columns]
+
+    def unit(self, name: str) -> str:
+        return self.columns[name].unit if name in self.columns else ""
+
+    def words(self, name: str) -> str:
+        return words(name, self.unit(name))
+
+    def axis(self, name: str) -> str:
+        """An axis label: an input's meaning up to a comma (its name is often a symbol), else the column's name."""
+        fact = self.columns.get(name)
+        meaning = fact.description.split(",")[0] if fact and fact.role == "dispersion" else ""
+        if fact and 0 < len(meaning) <= LONGEST_LABEL:
+            return axis_label(meaning, fact.unit)
+        return axis_label(self.words(name), self.unit(name))
+
+    @cached_property
+    def figures(self) -> list[Any]:
+        """The model's figures, of the kinds that this report knows."""
+        return [from_record(record) for record in self.manifest.get("figures", []) if record.get("kind") in KINDS]
+
+    # ---- the table
+
+    @property
+    def n_tried(self) -> int:
+        return len(self.cases)
+
+    @cached_property
+    def ok(self) -> np.ndarray:
+        """bool[n_tried]: flown to its end."""
+        return np.asarray(self.cases["status"] == STATUS_NAME[OK], dtype=bool)
+
+    @cached_property
+    def case_ids(self) -> np.ndarray:
+        return self.cases["case_id"].to_numpy(dtype=np.int64)
+
+    def values(self, name: str) -> np.ndarray:
+        """float64[n_tried] of a column; NaN for words, for a missing column, and for metrics of failed cases."""
+        if name not in self.cases.columns:
+            return np.full(self.n_tried, np.nan)
+        values = pd.to_numeric(self.cases[name], errors="coerce").to_numpy(dtype=np.float64)
+        return values if self.columns[name].role == "dispersion" else np.where(self.ok, values, np.nan)
+
+    def nominal_value(self, name: str) -> float | None:
+        """The nominal case's number in a column, None if it has none."""
+        value = self.nominal.get(name)
+        return float(value) if isinstance(value, int | float | np.number) and np.isfinite(float(value)) else None
+
+    # ---- statistics, made once
+
+    @cached_property
+    def summaries(self) -> dict[str, Summary]:
+        """Summary per metric."""
+        return {
+            fact.name: summarize(self.values(fact.name), confidence=CONFIDENCE) for fact in self.with_role("metric")
+        }
+
+    @cached_property
+    def verdicts(self) -> list[Verdict]:
+        """One verdict per requirement, in the order of the campaign file."""
+        records = self.manifest.get("requirements", [])
+        return [judge(record, self.values(record["metric"]), self.ok, self.design) for record in records]
+
+    @cached_property
+    def key_metrics(self) -> list[str]:
+        """The metrics that matter: those with a requirement, then those that the model maps or plots; else all."""
+        wanted = [verdict.metric for verdict in self.verdicts]
+        for figure in self.figures:
+            wanted += [figure.metric] if isinstance(figure, MapFigure) else []
+            wanted += [figure.y, figure.x] if isinstance(figure, ScatterFigure) else []
+        metrics = [fact.name for fact in self.with_role("metric")]
+        return [name for name in dict.fromkeys(wanted) if name in metrics] or metrics
+
+    def large_is_bad(self, metric: str) -> bool:
+        """False for a metric that is only required to be at least something."""
+        limits = [verdict for verdict in self.verdicts if verdict.metric == metric]
+        return not limits or any(verdict.at_most is not None for verdict in limits)
+
+    def worst(self, metric: str, count: int) -> np.ndarray:
+        """Rows of the worst cases of a metric."""
+        return worst_cases(self.values(metric), self.ok, count, self.large_is_bad(metric))
+
+    def status_text(self, status: str) -> str:
+        """The sentence behind a status word: the run's own, or this engine's."""
+        texts = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}
+        return str({**texts, **self.manifest.get("status_texts", {})}.get(status, ""))

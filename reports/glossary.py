@@ -1,0 +1,61 @@
+"""How to read the report: the words it uses, and what its numbers can and cannot carry."""
+
+from reports.document import Terms
+
+GLOSSARY = Terms(
+    (
+        (
+            "case",
+            "One flight with its own drawn inputs. It is addressed by its number: the same seed and number give "
+            "the same flight, alone or among a million.",
+        ),
+        ("nominal", "The flight with every input at its nominal value; it has the number −1 and is in no statistic."),
+        ("dispersion", "An input that differs from case to case, with its distribution and the source of that."),
+        ("metric", "A number that a flight ends with. A failed case has none: it is counted, never dropped."),
+        (
+            "n of n tried",
+            "How many cases a number rests on, of how many were flown. The difference failed, or has a "
+            "metric that is not a number.",
+        ),
+        (
+            "requirement",
+            "A limit on a metric, a share of cases that must lie inside it, and the confidence with which "
+            "the flown cases must show that share.",
+        ),
+        (
+            "pass",
+            "The Clopper–Pearson lower bound on the share, at the confidence required, reaches that share.",
+        ),
+        ("fail", "Even the upper bound, at the same confidence, stays below the share required."),
+        (
+            "not demonstrable",
+            "The cases decide neither way: more of them are needed, or the design gives no probabilities.",
+        ),
+        (
+            "limit shown",
+            "The value that the wanted share of cases lies inside, with the wanted confidence: an order "
+            "statistic (Wilks), whatever the distribution. Cases without a number take the worst ranks.",
+        ),
+        (
+            "quantile",
+            "The value below which the stated share of cases lies. 0.135, 2.275, 50, 97.725 and 99.865 % are "
+            "a normal distribution’s −3, −2, 0, +2 and +3 standard deviations; no normality is assumed here.",
+        ),
+        (
+            "interval of a quantile",
+            "Two order statistics, each on its side of the true quantile with 95 % for a 90 % "
+            "interval. A dash: the cases are too few for that limit.",
+        ),
+        (
+            "exactness of the bounds",
+            "Bounds and intervals are exact for independent draws (mc). Latin hypercube, "
+            "Sobol and Halton designs scatter less, so the same bounds are then on the safe side. Nothing is said "
+            "of the correctness of the model.",
+        ),
+        (
+            "map",
+            "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by a local "
+            "quadratic regression, with the standard error given, and left blank outside the cases.",
+        ),
+    )
+)

@@ -1,0 +1,113 @@
+"""The headline box: will it work, how surely, and what does it cost."""
+
+from collections.abc import Iterator
+
+from mc_engine.figures import MapFigure
+from mc_engine.statistics import Verdict
+from reports.document import Card
+from reports.flown import CONFIDENCE, Flown
+from reports.numbers import count, number, percent, with_unit
+from reports.tables import TONES, limit_text
+
+MOST_COSTS = 4
+HIGH, LOW = 0.99865, 0.00135
+
+
+def verdict_cards(flown: Flown) -> tuple[Card, ...]:
+    """One card per requirement, failed ones first."""
+    order = {"fail": 0, "not demonstrable": 1, "pass": 2}
+    verdicts = sorted(flown.verdicts, key=lambda verdict: order[verdict.outcome])
+    return tuple(_verdict_card(flown, verdict) for verdict in verdicts)
+
+
+def _verdict_card(flown: Flown, verdict: Verdict) -> Card:
+    words, limit = flown.words(verdict.metric), limit_text(verdict, flown.unit(verdict.metric))
+    wanted = f"{percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
+    counted = f"{count(verdict.passed)} of {count(verdict.tried)} cases inside"
+    return Card(
+        label=verdict.name,
+        answer=verdict.outcome,
+        detail=f"{words} {limit} for {wanted}: {counted}{_because(verdict)}.",
+        tone=TONES[verdict.outcome],
+    )
+
+
+def _because(verdict: Verdict) -> str:
+    """What the counts show, as the end of a sentence."""
+    lost = f", {count(verdict.no_number)} of the others without a number" if verdict.no_number else ""
+    if verdict.lower is None or verdict.upper is None:
+        return f"{lost}; " + ("no case was flown" if not verdict.tried else "cases of this design are no random sample")
+    if verdict.outcome == "fail":
+        return f"{lost}; the true share is at most {percent(verdict.upper)}"
+    more = f", {count(verdict.needed)} cases would be needed without a further failure" if verdict.needed else ""
+    return f"{lost}; the true share is at least {percent(verdict.lower)}{more}"
+
+
+def cost_cards(flown: Flown) -> tuple[Card, ...]:
+    """What the metrics that the model maps (or those that matter) come to."""
+    mapped = [figure.metric for figure in flown.figures if isinstance(figure, MapFigure)]
+    names = [name for name in dict.fromkeys([*mapped, *flown.key_metrics]) if name in flown.summaries]
+    return tuple(_cost_cards(flown, names[:MOST_COSTS]))
+
+
+def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
+    for name in names:
+        summary, unit = flown.summaries[name], flown.unit(name)
+        used = f"{count(summary.n_used)} of {count(summary.n_tried)} cases"
+        if summary.minimum is None or summary.maximum is None:
+            yield Card(flown.words(name), "no number", f"{used} have one", "open")
+            continue
+        large = flown.large_is_bad(name)
+        end = summary.maximum if large else summary.minimum
+        tail = summary.at(HIGH if large else LOW)
+        limit = None if tail is None else (tail.upper if large else tail.lower)
+        side = "at most" if large else "at least"
+        median = summary.at(0.5)
+        middle = f"median {number(median.value, 4) if median else '–'}"
+        nominal = flown.nominal_value(name)
+        rest = [middle, f"{'largest' if large else 'smallest'} {number(end, 4)}", f"from {used}"]
+        rest[:0] = [f"nominal {number(nominal, 4)}"] if nominal is not None else []
+        if flown.random and limit is not None and tail is not None:
+            each = percent(0.5 * (1.0 + CONFIDENCE))
+            rest.insert(0, f"quantile {number(tail.value, 4)}, this limit of it holds with {each}")
+            answer = f"{side} {with_unit(number(limit, 4), unit)} in {percent(HIGH, 3)} of cases"
+        else:
+            answer = f"{side} {with_unit(number(end, 4), unit)} in the cases flown"
+        yield Card(flown.words(name), answer, f"{'; '.join(rest)}.")
+
+
+def warnings(flown: Flown) -> tuple[str, ...]:
+    """What a reader must know before believing any number below."""
+    found = []
+    missing = flown.n_wanted - flown.n_tried
+    if missing > 0:
+        found.append(
+            f"The run is not complete: {count(missing)} of {count(flown.n_wanted)} cases are missing; "
+            f"mc-engine resume {flown.name} flies them."
+        )
+    if flown.n_tried and not flown.ok.any():
+        found.append(f"All {count(flown.n_tried)} cases failed: no metric has a number.")
+    elif not flown.ok.all():
+        failed = int((~flown.ok).sum())
+        found.append(f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement.")
+    if flown.n_tried == 0:
+        found.append("No case was flown.")
+    if not flown.random:
+        found.append(
+            f"The design is “{flown.design}”: its cases are chosen, not drawn, so shares and quantiles below "
+            "describe these cases and are no probabilities."
+        )
+    return tuple(found)
+
+
+def summary_sentence(flown: Flown) -> str:
+    """All verdicts in one sentence."""
+    outcomes = [verdict.outcome for verdict in flown.verdicts]
+    if not outcomes:
+        return "The campaign sets no requirement; below is what the cases cost."
+    total = len(outcomes)
+    if all(outcome == "pass" for outcome in outcomes):
+        return "The requirement is met." if total == 1 else f"All {total} requirements are met."
+    parts = [(outcomes.count("pass"), "met"), (outcomes.count("fail"), "failed"),
+             (outcomes.count("not demonstrable"), "not demonstrable with these cases")]  # fmt: skip
+    return f"Of {total} requirement{'s' if total > 1 else ''}: {', '.join(f'{n} {what}' for n, what in parts if n)}."

@@ -1,0 +1,86 @@
+"""Numbers and names as a reader wants them: sensible digits, a true minus sign, units beside every name."""
+
+from math import floor, isfinite, log10
+
+from mc_engine.units import UNITS, unit_suffix
+
+SPACE = "\u202f"  # narrow, no-break: groups digits and stands before a unit
+MOST_DIGITS = 8  # of one number in a table
+_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def count(number: int) -> str:
+    """A whole number with its digits in groups of three: 10 000."""
+    return f"{number:,}".replace(",", SPACE).replace("-", "−")
+
+
+def number(value: float | None, digits: int = 5, scale: float | None = None) -> str:
+    """`value` to `digits` significant digits, or to three digits of `scale` (a spread) if that is finer.
+
+    None is a dash.  Very large and very small values are written as powers of ten.
+    """
+    if value is None:
+        return "–"
+    value = float(value)
+    if not isfinite(value):
+        return "not a number" if value != value else ("∞" if value > 0 else "−∞")
+    if value == 0.0:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e7:
+        mantissa, exponent = f"{value:.{max(digits - 2, 2)}e}".split("e")
+        return f"{_trim(mantissa)}·10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", "−")
+    decimals = max(digits - 1 - floor(log10(abs(value))), 0)
+    if scale is not None and isfinite(scale) and scale > 0.0:
+        room = max(MOST_DIGITS - 1 - floor(log10(abs(value))), 0)
+        decimals = min(max(2 - floor(log10(scale)), 0), room, MOST_DIGITS)
+    text = f"{value:,.{decimals}f}" if abs(value) >= 1e4 else f"{value:.{decimals}f}"
+    if scale is None:
+        text = _trim(text)
+    return "0" if float(text.replace(",", "")) == 0.0 else text.replace(",", SPACE).replace("-", "−")
+
+
+def _trim(text: str) -> str:
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def interval(lower: float | None, upper: float | None, scale: float | None = None) -> str:
+    """[lower, upper]; a limit that the cases are too few for is a dash."""
+    if lower is None and upper is None:
+        return "too few cases"
+    return f"[{number(lower, scale=scale)}, {number(upper, scale=scale)}]"
+
+
+def percent(share: float | None, digits: int = 2) -> str:
+    """A share in percent; never rounded up to 100 %, nor more digits than needed near it."""
+    if share is None:
+        return "–"
+    while 0.0 < 1.0 - share < 0.5 * 10.0 ** -(digits + 2) and digits < 8:
+        digits += 1
+    scaled = floor(share * 10 ** (digits + 2) + 1e-6) / 10**digits
+    return f"{_trim(f'{scaled:.{digits}f}')}{SPACE}%"
+
+
+def exact(value: float | str | bool) -> str:
+    """An input as it was given: shortest text that reads back to the same number, yes and no for switches."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, str):
+        return value
+    text = repr(float(value))
+    return text.removesuffix(".0").replace("-", "−")
+
+
+def with_unit(text: str, unit: str) -> str:
+    """The text with its unit behind it."""
+    return f"{text}{SPACE}{unit}" if unit else text
+
+
+def words(name: str, unit: str) -> str:
+    """A column name as words, without its unit suffix: correction_impulse_m_s is "correction impulse"."""
+    suffix = unit_suffix(unit) if unit in UNITS else ""
+    return (name.removesuffix(suffix) or name).replace("_", " ").strip()
+
+
+def axis_label(text: str, unit: str) -> str:
+    """A label with its unit in brackets."""
+    return f"{text} [{unit}]" if unit else text

@@ -1,0 +1,71 @@
+"""The report typeset on A4 by typst: the same contents, vector figures, the same bytes every time."""
+
+import json
+from dataclasses import asdict
+from datetime import datetime
+from importlib.resources import as_file, files
+from typing import Any
+
+import matplotlib
+import typst
+
+from reports.document import Block, Document, FigureBlock, Table, Terms, Text
+from reports.figures import paper
+
+KINDS = {Text: "text", Terms: "terms", Table: "table", FigureBlock: "figure"}
+
+
+def render_pdf(document: Document) -> bytes:
+    """The PDF.  Its creation date is that of the run.
+
+    All text reaches typst as JSON strings, which it never reads as markup.
+    """
+    content = json.dumps(_plain(document), ensure_ascii=False, allow_nan=False)
+    with as_file(files("reports").joinpath("templates")) as templates:
+        return typst.compile(
+            str(templates / "report.typ"),
+            root=str(templates),
+            font_paths=[matplotlib.get_data_path() + "/fonts/ttf"],
+            ignore_system_fonts=True,  # the machine's fonts must not change the pages
+            sys_inputs={"report": content},
+            format="pdf",
+        )
+
+
+def _plain(document: Document) -> dict[str, Any]:
+    """The document as plain data, figures as SVG."""
+    return {
+        "title": document.title,
+        "subtitle": document.subtitle,
+        "date": _date(document.created),
+        "facts": [list(fact) for fact in document.facts],
+        "verdicts": [asdict(card) for card in document.verdicts],
+        "costs": [asdict(card) for card in document.costs],
+        "warnings": list(document.warnings),
+        "sections": [
+            {"title": section.title, "anchor": section.anchor, "blocks": [_block(block) for block in section.blocks]}
+            for section in document.sections
+        ],
+    }
+
+
+def _block(block: Block) -> dict[str, Any]:
+    if isinstance(block, FigureBlock):
+        drawing = block.drawing
+        body: dict[str, Any] = {
+            "caption": block.caption,
+            "alternative": drawing.alternative,
+            "svg": paper.svg(drawing.printed),
+        }
+    else:
+        body = asdict(block)
+    return {"kind": KINDS[type(block)], **body}
+
+
+def _date(created: str) -> list[int] | None:
+    """Year to second of an ISO time; None for one that cannot be read."""
+    try:
+        moment = datetime.fromisoformat(created)
+    except ValueError:
+        return None
+    return [moment.year, moment.month, moment.day, moment.hour, moment.minute, moment.second]

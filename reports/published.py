@@ -1,0 +1,129 @@
+"""Published values beside ours.
+
+A record of the manifest's `published`:
+
+  quantity   what it is, in words
+  published  the number or the words in the source
+  unit       unit of both
+  source     place in the source: table, figure, page (optional)
+  column     a column of the run that holds the same quantity, in the same unit, or
+  ours       a number (or words) of our own that is no column; a test of the campaign holds it
+  at         inputs of the case to compare with, {column: value}; without it, the nominal case (optional)
+  tolerance  how far ours may lie from the printed number, from its digits (optional)
+  status     how sure the print is: "legible", "restored", "not reproduced", ... (optional)
+  note       a sentence (optional)
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from reports.document import Cell, Column, Table
+from reports.flown import Flown
+from reports.numbers import count, exact, number, with_unit
+
+
+def published_table(flown: Flown) -> Table | None:
+    """Published and computed side by side; None if the model states nothing published."""
+    records = flown.manifest.get("published", [])
+    if not records:
+        return None
+    columns = (
+        Column("Quantity", "text", 2.6),
+        Column("Published", "number", 1.4),
+        Column("Ours", "number", 1.5),
+        Column("Difference", "number", 1.3),
+        Column("Remark", "text", 3.2),
+    )
+    note = (
+        "Ours is the nominal case of this run unless a case is named; “fixed” is a number that the campaign’s tests "
+        "hold. Difference: ours less published, marked as inside or outside the printed digits where those say how far."
+    )
+    return Table("Published values and ours", columns, tuple(_row(flown, record) for record in records), note)
+
+
+def _row(flown: Flown, record: Mapping[str, Any]) -> tuple[Cell, ...]:
+    unit = str(record.get("unit", ""))
+    published = record.get("published", "")
+    ours, where = our_value(flown, record)
+    return (
+        Cell(str(record.get("quantity", "")), small=str(record.get("source", ""))),
+        Cell(_text(published, unit, exact), _as_number(published)),
+        Cell(_text(ours, unit, lambda value: number(value, 8)), _as_number(ours), small=where),
+        _difference(ours, published, record.get("tolerance"), unit),
+        Cell(str(record.get("status", "")), small=str(record.get("note", ""))),
+    )
+
+
+def our_value(flown: Flown, record: Mapping[str, Any]) -> tuple[Any, str]:
+    """Our number and where it comes from; (None, why not) if this run does not have it."""
+    column = record.get("column") or record.get("computed_column")
+    at = record.get("at") or {}
+    if column:
+        value = flown.nominal_value(column)
+        if value is not None and _holds(flown.nominal, at):
+            return value, "nominal case"
+        row = _matching_case(flown, at) if at else None
+        if row is not None and column in flown.cases.columns:
+            return float(flown.values(column)[row]), f"case {count(int(flown.case_ids[row]))}"
+    if "ours" in record:
+        return record["ours"], "fixed"
+    return None, "not flown in this run"
+
+
+def _holds(row: Mapping[str, Any], at: Mapping[str, Any]) -> bool:
+    """Whether the row has all the inputs of `at`."""
+    return all(name in row and _same(row[name], value) for name, value in at.items())
+
+
+def _same(ours: Any, wanted: Any) -> bool:
+    if isinstance(wanted, str | bool) or isinstance(ours, str | bool):
+        return bool(ours == wanted)
+    return bool(np.isclose(float(ours), float(wanted), rtol=1e-9, atol=1e-12))
+
+
+def _matching_case(flown: Flown, at: Mapping[str, Any]) -> int | None:
+    """Row of the first case with the inputs of `at`; inputs that are not dispersed must be those of the run."""
+    shared = {record["name"]: record.get("value") for key in ("parameters", "settings")
+              for record in flown.manifest.get(key, [])}  # fmt: skip
+    match = np.ones(flown.n_tried, dtype=bool)
+    for name, value in at.items():
+        if name in flown.cases.columns:
+            match &= _equal(flown.cases[name], value)
+        elif name not in shared or not _same(shared[name], value):
+            return None
+    rows = np.flatnonzero(match)
+    return int(rows[0]) if rows.size else None
+
+
+def _equal(column: pd.Series, value: Any) -> np.ndarray:
+    if isinstance(value, str | bool):
+        return np.asarray(column == value, dtype=bool)
+    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    return np.isclose(numbers, float(value), rtol=1e-9, atol=1e-12)
+
+
+def _as_number(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+def _text(value: Any, unit: str, form: Callable[[float], str]) -> str:
+    """A number with its unit; words as they are."""
+    plain = _as_number(value)
+    if plain is None:
+        return "–" if value is None else str(value)
+    return with_unit(form(plain), unit)
+
+
+def _difference(ours: Any, published: Any, tolerance: Any, unit: str) -> Cell:
+    mine, printed = _as_number(ours), _as_number(published)
+    if mine is None or printed is None or not np.isfinite(mine):
+        return Cell("–")
+    gap = mine - printed
+    text = with_unit(number(gap, 3), unit)
+    if tolerance is None:
+        return Cell(text, gap)
+    inside = abs(gap) <= float(tolerance)
+    return Cell(text, gap, small="inside" if inside else "outside", tone="good" if inside else "open")

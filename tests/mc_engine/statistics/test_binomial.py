@@ -1,0 +1,50 @@
+"""Clopper-Pearson bounds on a share."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from mc_engine.statistics import clopper_pearson, lower_bound, upper_bound
+
+# Clopper-Pearson 95 % intervals, printed to eight or more digits in the statement of the statistics package.
+INTERVALS = [
+    (0, 1000, 0.0, 0.00368208),
+    (3, 2000, 0.000309443, 0.004377320),
+    (27, 10_000, 0.001780048, 0.003925945),
+]
+
+
+@pytest.mark.parametrize(("count", "tried", "lower", "upper"), INTERVALS)
+def test_two_sided_bounds_have_the_printed_digits(count, tried, lower, upper):
+    assert clopper_pearson(count, tried) == pytest.approx((lower, upper), abs=5e-9)
+
+
+@pytest.mark.parametrize(("passed", "tried"), [(1, 3), (40, 50), (999, 1000)])
+def test_at_the_lower_bound_so_many_passes_have_just_the_left_over_probability(passed, tried):
+    share = lower_bound(passed, tried, 0.9)
+    assert binom.sf(passed - 1, tried, share) == pytest.approx(0.1, abs=1e-9)
+
+
+def test_bounds_without_a_case_say_nothing():
+    assert (lower_bound(0, 0), upper_bound(0, 0)) == (0.0, 1.0)
+
+
+def test_all_and_none_passing_give_the_ends_of_the_interval():
+    assert upper_bound(10, 10) == 1.0
+    assert lower_bound(0, 10) == 0.0
+
+
+def test_upper_bound_mirrors_the_lower_bound_of_the_failures():
+    assert upper_bound(7, 20, 0.9) == pytest.approx(1.0 - lower_bound(13, 20, 0.9), abs=1e-12)
+
+
+@pytest.mark.parametrize(("passed", "tried", "confidence"), [(-1, 3, 0.9), (4, 3, 0.9), (1, 3, 1.0)])
+def test_impossible_counts_and_confidences_are_refused(passed, tried, confidence):
+    with pytest.raises(ValueError, match=r"passed|confidence"):
+        lower_bound(passed, tried, confidence)
+
+
+def test_the_lower_bound_lies_below_the_true_share_as_often_as_it_promises():
+    draw = np.random.Generator(np.random.Philox(key=7))
+    covered = [lower_bound(int(k), 300, 0.9) <= 0.97 for k in draw.binomial(300, 0.97, 2000)]
+    assert np.mean(covered) >= 0.9 - 0.015

@@ -1,0 +1,46 @@
+import subprocess
+import sys
+
+import pytest
+from cart import CAMPAIGN, MODEL, small_store
+from small_run import ENVIRONMENT
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A working folder with a campaign of a cart in `cart/`."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cart").mkdir()
+    (tmp_path / "cart" / "model.py").write_text(MODEL)
+    (tmp_path / "cart" / "campaign.toml").write_text(CAMPAIGN)
+    return tmp_path
+
+
+def loaded_by(*arguments):
+    """The modules that a process of its own has loaded after the verb."""
+    script = (
+        "import sys\nfrom mc_engine.cli import app\n"
+        f"try:\n    app({list(map(str, arguments))!r})\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
+        "print('\\n'.join(['LOADED', *sys.modules]))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=ENVIRONMENT)
+    return set(done.stdout.split("LOADED\n")[1].split())
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--help"], ["run", "--help"], ["list"], ["schema"], ["plan", "--share", "0.99", "--confidence", "0.9"]],
+)
+def test_help_list_schema_and_plan_load_neither_numba_nor_matplotlib(arguments):
+    modules = loaded_by(*arguments)
+    assert not {"numba", "matplotlib", "reports"} & modules
+
+
+def test_help_loads_no_numpy_either():
+    assert not {"numpy", "pandas", "pyarrow"} & loaded_by("--help")
+
+
+def test_check_and_status_load_neither_numba_nor_matplotlib(here):
+    small_store(here / "flown")
+    for arguments in (["check", here / "cart"], ["status", here / "flown"]):
+        assert not {"numba", "matplotlib", "reports"} & loaded_by(*arguments)

@@ -1,0 +1,191 @@
+"""What a report says, before it is drawn."""
+
+import pytest
+from synthetic_run import synthetic_run
+
+from reports.contents import build
+from reports.document import FigureBlock, Table, blocks_of
+
+RUN = "deorbit-20260421-101500"
+
+
+@pytest.fixture(scope="module")
+def document():
+    return build(synthetic_run(), RUN)
+
+
+def tables(document):
+    return {block.caption: block for block in blocks_of(document, Table)}
+
+
+def cells(table):
+    return [[cell.text for cell in row] for row in table.rows]
+
+
+def said(document):
+    """Every text of the tables, headline and terms."""
+    return repr(document)
+
+
+def test_the_sections_come_in_the_order_of_a_review(document):
+    assert [section.anchor for section in document.sections] == [
+        "requirements", "maps", "distributions", "metrics", "histories", "scatter", "worst", "status", "published",
+        "inputs", "provenance", "reading",
+    ]  # fmt: skip
+
+
+def test_figures_and_tables_are_numbered_in_reading_order(document):
+    for kind in (FigureBlock, Table):
+        numbers = [block.number for block in blocks_of(document, kind)]
+        assert numbers == list(range(1, len(numbers) + 1))
+
+
+def test_failed_requirements_come_first_in_the_headline(document):
+    assert [(card.label, card.answer) for card in document.verdicts] == [
+        ("force", "fail"), ("settling", "fail"), ("fuel", "pass"),
+    ]  # fmt: skip
+    assert document.subtitle == "Of 3 requirements: 1 met, 2 failed."
+
+
+def test_the_cost_comes_with_its_limit_and_the_cases_it_rests_on(document):
+    fuel = document.costs[0]
+    assert fuel.label == "propellant"
+    assert fuel.answer.startswith("at most 2.")
+    assert "9\u202f988 of 10\u202f000 cases" in fuel.detail
+
+
+def test_every_metric_says_how_many_cases_it_used_of_how_many_tried(document):
+    for row in cells(tables(document)["Metrics: how many, where, how wide"]):
+        assert row[1] == "9\u202f988 / 10\u202f000"
+
+
+def test_failed_cases_are_listed_with_their_status_and_its_meaning(document):
+    ended = cells(tables(document)["How the cases ended"])
+    assert ended[0][:2] == ["ok", "9\u202f988"]
+    assert ended[1][:2] == ["not-finite", "12"]
+    assert "infinite" in ended[1][3]
+    assert "the guidance lost its way" in ended[2][3]
+    assert "Failed cases: the first 10 of 12" in tables(document)
+
+
+def test_the_worst_case_comes_with_the_command_that_repeats_it(document):
+    run = synthetic_run()
+    worst = int(run.table["propellant_kg"].idxmax())
+    row = cells(tables(document)["Cases with the largest propellant"])[0]
+    assert row[0].replace("\u202f", "") == str(worst)
+    assert row[-1] == f"mc-engine replay {RUN} {worst}"
+
+
+def test_the_map_says_that_it_is_smoothed_and_from_how_many_cases(document):
+    key = " ".join(entry.text for entry in next(blocks_of(document, FigureBlock)).drawing.key)
+    assert "local quadratic regression on the 60 nearest of 9\u202f988 of 10\u202f000 cases" in key
+    assert "standard error" in key
+    assert "of 9\u202f988 shown" in key
+
+
+def test_every_figure_has_an_alternative_text_a_key_and_units_on_its_axes(document):
+    for block in blocks_of(document, FigureBlock):
+        assert len(block.drawing.alternative) > 40
+        assert block.drawing.key
+    assert "propellant [kg]" in said(document)
+
+
+def test_inputs_stand_with_their_distribution_and_source(document):
+    row = cells(tables(document)["Dispersed inputs"])[0]
+    assert row[0] == "ve_pct [%]"
+    assert "normal, 3σ = 20 %" in row
+    assert "abstract: 20 % in size" in row
+
+
+def test_provenance_holds_seed_digests_versions_and_timing(document):
+    rows = dict(cells(tables(document)["Provenance of the run"]))
+    assert rows["seed"] == "20160421"
+    assert rows["campaign digest"] == "3b1f" * 16
+    assert rows["packages"] == "numpy 2.3.0, scipy 1.16.0"
+    assert "uncommitted" in rows["git"]
+    assert rows["timing: compile"] == "8.25\u202fs"
+
+
+def test_an_unfinished_run_says_so_and_how_to_finish_it():
+    run = synthetic_run(500, failed=0)
+    run.wanted = 2000
+    warnings = " ".join(build(run, RUN).warnings)
+    assert "1\u202f500 of 2\u202f000 cases are missing" in warnings
+    assert f"mc-engine resume {RUN}" in warnings
+
+
+def test_cases_of_a_grid_are_not_sold_as_probabilities():
+    run = synthetic_run(400, failed=0)
+    run.manifest["campaign"]["design"] = "grid"
+    document = build(run, RUN)
+    assert {card.answer for card in document.verdicts} == {"not demonstrable"}
+    assert "no probabilities" in " ".join(document.warnings)
+    assert "in the cases flown" in document.costs[0].answer
+    assert not any("[" in cell.small for row in tables(document)["Quantiles of the metrics"].rows for cell in row)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2])
+def test_hardly_any_cases_make_a_report_that_says_so(n):
+    document = build(synthetic_run(n, failed=0), RUN)
+    assert {card.answer for card in document.verdicts} == {"not demonstrable"}
+    assert any("too few cases" in text for text in _sentences(document))
+
+
+def test_all_failed_is_said_first():
+    document = build(synthetic_run(40, failed=40), RUN)
+    assert document.warnings[0] == "All 40 cases failed: no metric has a number."
+    assert all(card.answer == "no number" for card in document.costs)
+
+
+def test_a_campaign_without_requirements_figures_or_dispersions_still_reports():
+    run = synthetic_run(50, failed=0, requirements=[], figures=[], inputs=[], published=[], parameters=[], settings=[])
+    document = build(run, RUN)
+    assert "sets no requirement" in document.subtitle
+    assert "published" not in [section.anchor for section in document.sections]
+
+
+def test_constant_and_empty_metrics_are_named_and_not_drawn():
+    run = synthetic_run(200, failed=0)
+    run.table["pulse_count"] = 3.0
+    run.table["entry_speed_m_s"] = float("nan")
+    sentences = " ".join(_sentences(build(run, RUN)))
+    assert "the same in all cases that have it: pulse_count." in sentences
+    assert "no case has a number: entry_speed_m_s." in sentences
+
+
+def test_a_handful_of_cases_is_shown_case_by_case_and_named_by_what_sets_them_apart():
+    run = synthetic_run(4, failed=1)
+    run.manifest["columns"].insert(5, {"name": "control", "unit": "", "role": "dispersion", "description": "mode"})
+    run.table["ve_pct"], run.table["oe_pct"] = -20.0, 10.0
+    run.table["control"] = ["continuous", "clipped", "pulsed", "off"]
+    document = build(run, RUN)
+    rows = cells(tables(document)["Case by case"])
+    assert [row[1] for row in rows] == ["continuous", "clipped", "pulsed", "off"]
+    assert [row[-1] for row in rows] == ["ok", "ok", "ok", "not-finite"]
+    keys = [entry.text for block in blocks_of(document, FigureBlock) for entry in block.drawing.key]
+    assert "case 1: control clipped" in keys
+
+
+def test_sources_of_requirements_and_notes_of_inputs_are_kept():
+    run = synthetic_run(20, failed=0)
+    run.manifest["requirements"][0]["source"] = "tank of this study"
+    run.manifest["inputs"][0]["note"] = "read as three sigma"
+    document = build(run, RUN)
+    assert "tank of this study" in said(document)
+    assert "read as three sigma" in said(document)
+
+
+def test_infinite_metrics_are_not_used():
+    run = synthetic_run(200, failed=0)
+    run.table.loc[7, "propellant_kg"] = float("inf")
+    row = cells(tables(build(run, RUN))["Metrics: how many, where, how wide"])[1]
+    assert row[1] == "199 / 200"
+
+
+def _sentences(document):
+    return [
+        sentence
+        for section in document.sections
+        for block in section.blocks
+        for sentence in getattr(block, "paragraphs", ())
+    ]

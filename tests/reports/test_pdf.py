@@ -1,0 +1,69 @@
+"""The typeset report."""
+
+import re
+import shutil
+import subprocess
+
+import pytest
+from synthetic_run import synthetic_run
+
+from reports import build, render_pdf
+
+MARKUP = [
+    '#panic("x")',
+    "*bold* _x_ $x^2$ `raw`",
+    "= heading",
+    "@reference <label>",
+    "\\ \\u{41} // comment",
+    "$\\frac{",
+]
+
+
+@pytest.fixture(scope="module")
+def pdf():
+    return render_pdf(build(synthetic_run(3000), "run"))
+
+
+def text_of(pdf, tmp_path):
+    """What a reader's text search finds."""
+    if shutil.which("pdftotext") is None:
+        pytest.skip("needs the Debian package poppler-utils")
+    (tmp_path / "report.pdf").write_bytes(pdf)
+    done = subprocess.run(["pdftotext", "-layout", tmp_path / "report.pdf", "-"], capture_output=True, check=True)
+    return done.stdout.decode()
+
+
+def test_the_same_run_gives_the_same_bytes(pdf):
+    assert pdf.startswith(b"%PDF")
+    assert render_pdf(build(synthetic_run(3000), "run")) == pdf
+
+
+def test_the_creation_date_is_that_of_the_run(pdf):
+    dates = set(re.findall(rb"D:(\d{14})", pdf))
+    assert dates == {b"20260421101500"}
+
+
+def test_numbered_tables_figures_and_pages_are_there(pdf, tmp_path):
+    text = text_of(pdf, tmp_path)
+    assert "Table 1. Requirements and their verdicts" in text
+    assert "Figure 1. Correction fuel" in text
+    assert re.search(r"\b2 ?/ ?\d", text)
+    assert re.search(r"Provenance\W+\d", text)
+
+
+@pytest.mark.parametrize("markup", MARKUP)
+def test_what_users_write_is_never_read_as_markup(markup, tmp_path):
+    run = synthetic_run(40, failed=2, figures=[])
+    run.manifest["campaign"]["title"] = markup
+    run.manifest["inputs"][0]["source"] = markup
+    squeezed = re.sub(r"\s", "", text_of(render_pdf(build(run, "run")), tmp_path))
+    assert re.sub(r"\s", "", markup) in squeezed
+
+
+@pytest.mark.parametrize(("n", "failed"), [(0, 0), (1, 0), (2, 0), (20, 20)])
+def test_hardly_any_cases_and_all_failed_are_still_typeset(n, failed):
+    assert render_pdf(build(synthetic_run(n, failed=failed), "run")).startswith(b"%PDF")
+
+
+def test_a_date_that_cannot_be_read_is_left_out():
+    assert render_pdf(build(synthetic_run(5, failed=0, created_utc="yesterday"), "run")).startswith(b"%PDF")
