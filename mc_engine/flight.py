@@ -94,8 +94,8 @@ def fly(
 def _groups(ready: Prepared) -> list[np.ndarray]:
     """Indices of the cases that can fly, one array per combination of settings."""
     able = np.flatnonzero(~ready.refusals.mask)
-    if not able.size:
-        return []
+    if not able.size or (ready.settings == ready.settings[able[0]]).all():
+        return [able] if able.size else []
     _, group = np.unique(ready.settings[able], axis=0, return_inverse=True)
     group = group.ravel()
     return [able[group == i] for i in range(int(group.max()) + 1)]

@@ -17,11 +17,12 @@ import pandas as pd
 from mc_engine.campaign import Campaign, load_campaign
 from mc_engine.cases import case_table, full_inputs, nominal_row
 from mc_engine.designs import EXTENSIBLE
-from mc_engine.errors import EngineError, ModelError, RunInterrupted, StoreError
+from mc_engine.errors import RunInterrupted, StoreError
 from mc_engine.flight import fly, fly_history
 from mc_engine.interruption import stop_signal
 from mc_engine.kernel import source_digest
 from mc_engine.manifest import columns_of, manifest_of
+from mc_engine.model_faults import naming_faults
 from mc_engine.run_folder import default_folder
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store import Store, create_store, open_store
@@ -213,21 +214,16 @@ def fly_chunk(campaign: Campaign, first: int, stop: int) -> dict[str, np.ndarray
     """All columns but case_id of the cases first to stop - 1."""
     ids = np.arange(first, stop, dtype=np.int64)
     table = case_table(campaign, ids)
-    try:
+    with naming_faults(campaign.model_reference, f"cases {first} to {stop - 1}"):
         flight = fly(campaign.model, full_inputs(campaign, table), ids, campaign.seed, folder=campaign.directory)
-    except EngineError:
-        raise
-    except Exception as error:
-        raise ModelError(
-            f"{campaign.model_reference}: cases {first} to {stop - 1} cannot be flown: {type(error).__name__}: {error}"
-        ) from error
     return {**table, **flight}
 
 
 def _nominal(campaign: Campaign) -> dict[str, Any]:
     inputs = nominal_row(campaign)
     ids = np.array([NOMINAL_NOISE])
-    flight = fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
+    with naming_faults(campaign.model_reference, "the nominal case"):
+        flight = fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
     dispersed = {one.name: inputs[one.name] for one in campaign.dispersions}
     return {**dispersed, **_scalars(flight)}
 

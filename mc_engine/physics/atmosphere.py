@@ -36,7 +36,8 @@ def exponential(h, rho_ref, h_ref, scale_height):
 
     Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., eq. (8-33).
     """
-    return rho_ref * exp(-(h - h_ref) / scale_height)
+    # the inverse of a constant is known before the flight; a quotient would be taken at every step
+    return rho_ref * exp((h_ref - h) * (1.0 / scale_height))
 
 
 @physics
