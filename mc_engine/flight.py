@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.kernel import WIDTH, build_kernel, settings_class
+from mc_engine.kernel import WIDTH, build_kernel
+from mc_engine.kernel_parts import settings_class
 from mc_engine.lanes.noise import noise_key
-from mc_engine.model import FixedStep, Model, Refusals
+from mc_engine.lanes.runge_kutta_pairs import PAIRS
+from mc_engine.model import AdaptiveStep, FixedStep, Model, Refusals
 from mc_engine.status import OK, REFUSED, STATUS_NAME
 
 Inputs = Mapping[str, Any]
@@ -37,6 +39,7 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
     refusals = Refusals.none(n_cases)
     for parameter in model.parameters:
         column = np.broadcast_to(np.asarray(inputs[parameter.name], dtype=np.float64), n_cases)
+        refusals.add(np.isnan(column), f"{parameter.name} is not a number")
         outside = ~((column >= parameter.low) & (column <= parameter.high))
         refusals.add(outside, f"{parameter.name} is outside {parameter.low:g} to {parameter.high:g} {parameter.unit}")
         setattr(si, parameter.symbol, column * parameter.si_factor)
@@ -101,26 +104,36 @@ def _groups(ready: Prepared) -> list[np.ndarray]:
     return [able[group == i] for i in range(int(group.max()) + 1)]
 
 
+def _number(item: float | int | str, settings: Any) -> float:
+    return float(getattr(settings, item) if isinstance(item, str) else item)
+
+
 def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
     """(n_steps, step [s], control_every) of one flight; the last step is the one that reaches `until`."""
-
-    def value(item: float | int | str) -> float:
-        return float(getattr(settings, item) if isinstance(item, str) else item)
-
-    step = value(clock.step)
+    step = _number(clock.step, settings)
     # a hair under the quotient, so that 300 s in steps of 0.01 s are 30 000 steps, not 30 001
-    return max(1, int(np.ceil(value(clock.until) / step - 1e-9))), step, int(value(clock.control_every))
+    n_steps = max(1, int(np.ceil(_number(clock.until, settings) / step - 1e-9)))
+    return n_steps, step, int(_number(clock.control_every, settings))
+
+
+def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tuple[np.ndarray, ...]:
+    """Tables of the pair, clock and absolute tolerances, as the adaptive kernels take them."""
+    pair = PAIRS[clock.method]
+    numbers = [_number(one, settings) for one in (clock.until, clock.rtol, clock.control_period)]
+    numbers += [float(clock.attempts), clock.first_step, float(pair.order)]
+    return *pair.tables(), np.array(numbers), np.array(np.broadcast_to(clock.atol, len(model.states)), dtype=np.float64)
 
 
 def _fly_group(
     model: Model, ready: Prepared, chosen: np.ndarray, case_ids: np.ndarray, seed: int, folder: Path | None, width: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     n = chosen.size
-    padded = -(-n // width) * width
+    # blocks on a fixed grid are filled up; adaptive lanes take the cases in turn, and want one each to begin with
+    padded = max(n, width) if isinstance(model.clock, AdaptiveStep) else -(-n // width) * width
     index = np.concatenate([chosen, np.full(padded - n, chosen[-1])])
     out = _outputs(model, padded)
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
-    _call(model, folder, width, ready.parameters[:, index], settings, seed, case_ids[index], out, _NO_HISTORY, 1)
+    _call(model, folder, width, ready.parameters[:, index], settings, seed, case_ids[index], out, _NO_HISTORY, 1.0)
     time, status, states, metrics = out
     return time[:n], status[:n], states[:, :n], metrics[:, :n]
 
@@ -142,13 +155,16 @@ def _call(
     case_ids: np.ndarray,
     out: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     history: np.ndarray,
-    stride: int,
+    pace: float,
 ) -> int:
+    """Call the kernel; `pace` is the distance of two history rows, in steps or, if the steps are adaptive, seconds."""
     kernel = build_kernel(model, folder, width)
-    grid = grid_of(model.clock, settings_class(model)(*settings))
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
-    key = np.uint64(noise_key(seed))
-    return kernel(np.ascontiguousarray(parameters), settings, key, cases, *grid, *out, history, stride)
+    shared = np.ascontiguousarray(parameters), settings, np.uint64(noise_key(seed)), cases
+    chosen = settings_class(model)(*settings)
+    if isinstance(model.clock, AdaptiveStep):
+        return kernel(*shared, *adaptive_arguments(model, model.clock, chosen), *out, history, float(pace))
+    return kernel(*shared, *grid_of(model.clock, chosen), *out, history, int(pace))
 
 
 def fly_history(
@@ -163,7 +179,8 @@ def fly_history(
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """(columns, history) of one case alone: the same bits as among others, whatever the width of the build.
 
-    rows : about how many instants a flight to the time limit has, the start and the end among them.
+    rows : about how many instants the history of a flight to the time limit has, the start and the end among them;
+        with adaptive steps, the history of this flight.
     history : t_s and the model's quantities in declared units; empty if the case was refused.
     """
     ready = prepare(model, inputs, 1)
@@ -171,11 +188,19 @@ def fly_history(
     names = ["t_s", *(quantity.name for quantity in model.quantities)]
     if ready.refusals.mask[0]:
         return columns, {name: np.empty(0) for name in names}
-    n_steps = grid_of(model.clock, settings_class(model)(*ready.settings[0]))[0]
-    stride = max(1, n_steps // rows)
-    history = np.empty((n_steps // stride + 4, len(names)))
-    ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
     settings = np.ascontiguousarray(ready.settings[0])
-    n = _call(model, folder, width, parameters, settings, seed, ids, _outputs(model, width), history, stride)
+    n_rows, pace = _history_grid(model, settings, float(columns[END_TIME][0]), rows)
+    history = np.empty((n_rows, len(names)))
+    ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
+    n = _call(model, folder, width, parameters, settings, seed, ids, _outputs(model, width), history, pace)
     factors = [1.0, *(quantity.si_factor for quantity in model.quantities)]
     return columns, {name: history[:n, i] / factors[i] for i, name in enumerate(names)}
+
+
+def _history_grid(model: Model, settings: np.ndarray, end_time: float, rows: int) -> tuple[int, float]:
+    """(room for rows, pace) of a history of about `rows` rows."""
+    if isinstance(model.clock, AdaptiveStep):
+        return rows + 1, max(end_time, 1e-9) / (rows - 1)
+    n_steps = grid_of(model.clock, settings_class(model)(*settings))[0]
+    stride = max(1, n_steps // rows)
+    return n_steps // stride + 4, float(stride)

@@ -117,6 +117,28 @@ class FixedStep:
 
 
 @dataclass(frozen=True)
+class AdaptiveStep:
+    """An embedded Runge-Kutta pair whose step every case chooses by itself, to the tolerances.
+
+    until : time limit [s], or the symbol of a setting that holds it
+    rtol : error of a step in the state's own size, or the symbol of a setting
+    atol : the same in SI, one number for all states or one for each
+    control_period : time [s] from one sample of `control` to the next, or the symbol of a setting; steps end there
+    method : "dop853" (order 8), or "dp54" (order 5)
+    attempts : a case that needs more steps, good or rejected, ends as step-limit
+    first_step : length [s] of the first attempt; 0 chooses it
+    """
+
+    until: float | str
+    rtol: float | str = 1e-9
+    atol: float | tuple[float, ...] = 1e-9
+    control_period: float | str = np.inf
+    method: str = "dop853"
+    attempts: int = 100_000
+    first_step: float = 0.0
+
+
+@dataclass(frozen=True)
 class Model:
     """A flyable system.  All functions are physics (see `mc_engine.lanes`) unless said otherwise.
 
@@ -141,7 +163,7 @@ class Model:
     states: tuple[Field, ...]
     quantities: tuple[Field, ...]
     metrics: tuple[Field, ...]
-    clock: FixedStep
+    clock: FixedStep | AdaptiveStep
     kernel_parameters: type
     initial: Callable[..., Any]
     rhs: Callable[..., Any]

@@ -11,7 +11,7 @@ from mc_engine.lanes.compiler import compile_inline
 from mc_engine.lanes.functions import any_lane, minimum, where
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.runge_kutta import rk4_shared
-from mc_engine.lanes.tuples import any_field, least, map_2, map_3, map_6, select, spread
+from mc_engine.lanes.tuples import any_field, least, map_fields, select, spread
 
 EVENTS_PER_STEP = 32
 _ITERATIONS = 90
@@ -54,17 +54,17 @@ def _locate(f, signs, t, finish, s, m, p, o, length, end, g_start, g_end, open_l
         if not any_lane(open_lanes):
             break
         middle = 0.5 * (low + high)
-        guess = least(map_6(_secant, g_low, g_high, signs, low, high, high))
+        guess = least(map_fields(_secant, g_low, g_high, signs, low, high, high))
         chord = (guess > low) & (guess < high)
         if iteration >= _SECANT_ITERATIONS:
             chord = chord & (not chord)
         guess = where(chord, guess, middle)
         state = rk4_shared(f.rhs, t, guess, s, m, p, o)
         values = spread(f.events(minimum(t + guess, finish), state, m, p, o), t)
-        after = any_field(map_3(crossed, g_low, values, signs))
+        after = any_field(map_fields(crossed, g_low, values, signs))
         ahead, back = open_lanes & (not after), open_lanes & after
-        g_low = select(ahead, values, map_2(_halved, g_low, back & (side > 0.0)))
-        g_high = select(back, values, map_2(_halved, g_high, ahead & (side < 0.0)))
+        g_low = select(ahead, values, map_fields(_halved, g_low, back & (side > 0.0)))
+        g_high = select(back, values, map_fields(_halved, g_high, ahead & (side < 0.0)))
         side = where(back, 1.0, where(ahead, -1.0, side))
         low, high = where(ahead, guess, low), where(back, guess, high)
         end, found = select(back, state, end), select(back, values, found)
@@ -84,26 +84,26 @@ def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying):
     number, so an event on the grid is met once, neither missed nor met twice by a rounding.
     """
     signs = f.signs_of(g_start)
-    pending = flying & any_field(map_3(crossed, g_start, g_end, signs))
+    pending = flying & any_field(map_fields(crossed, g_start, g_end, signs))
     stopped = pending & (not pending)
     rest, time = t * 0.0 + h, finish
     for _ in range(EVENTS_PER_STEP):
         if not any_lane(pending):
             break
         length, state, values = locate(f, signs, t, finish, s, m, p, o, rest, end, g_start, g_end, pending)
-        fired = map_3(crossed, g_start, values, signs)
+        fired = map_fields(crossed, g_start, values, signs)
         now = where(length < rest, minimum(t + length, finish), finish)
         stops = pending & f.stops_of(fired)
         stopped = stopped | stops
         time, end = where(stops, now, time), select(stops, state, end)
         on = pending & (not stops)
-        switched, memory = f.switch(now, state, m, p, o, map_2(_flag, fired, t))
+        switched, memory = f.switch(now, state, m, p, o, map_fields(_flag, fired, t))
         s, m = select(on, spread(switched, t), s), select(on, spread(memory, t), m)
         t, rest = where(on, now, t), where(on, rest - length, rest)
         g_start = select(on, spread(f.events(t, s, m, p, o), t), g_start)
         end = select(on, rk4_shared(f.rhs, t, rest, s, m, p, o), end)
         g_end = select(on, spread(f.events(finish, end, m, p, o), t), g_end)
-        pending = on & any_field(map_3(crossed, g_start, g_end, signs))
+        pending = on & any_field(map_fields(crossed, g_start, g_end, signs))
     return end, m, time, stopped, pending
 
 

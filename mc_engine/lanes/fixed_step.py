@@ -15,11 +15,7 @@ from mc_engine.lanes.tuples import (
     load,
     load_fields,
     load_scalars,
-    map_2,
-    map_3,
-    map_4,
-    map_6,
-    map_10,
+    map_fields,
     record,
     select,
     spread,
@@ -36,14 +32,14 @@ def _track(flying, smooth, seen, times, lasts, best, when, last):
     """Running extrema after one more look at the quantities; the newest look is the last of `seen`."""
     v0, v1, v2 = seen
     t0, t1, t2 = times
-    crests = flying & any_field(map_4(extrema.crest, v0, v1, v2, best))
+    crests = flying & any_field(map_fields(extrema.crest, v0, v1, v2, best))
     if any_lane(crests):
-        when = map_10(extrema.crest_time, when, best, v0, v1, v2, t0, t1, t2, smooth, crests)
-        best = map_10(extrema.crest_value, best, when, v0, v1, v2, t0, t1, t2, smooth, crests)
+        when = map_fields(extrema.crest_time, when, best, v0, v1, v2, t0, t1, t2, smooth, crests)
+        best = map_fields(extrema.crest_value, best, when, v0, v1, v2, t0, t1, t2, smooth, crests)
     w1, w2 = lasts
-    last = map_4(extrema.above, last, w2, t2, flying)
-    if any_lane(any_field(map_3(extrema.falls, w1, w2, flying))):
-        last = map_6(extrema.fall_time, last, w1, w2, t1, t2, flying)
+    last = map_fields(extrema.above, last, w2, t2, flying)
+    if any_lane(any_field(map_fields(extrema.falls, w1, w2, flying))):
+        last = map_fields(extrema.fall_time, last, w1, w2, t1, t2, flying)
     return best, when, last
 
 
@@ -75,7 +71,7 @@ def _step(f, has_events, t, finish, h, s, m, p, o, flying):
     seen = spread(f.observe(now, end, m, p, o), t)
     if has_events:
         g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
-        if any_lane(flying & any_field(map_3(crossed, g, g_end, f.signs_of(g)))):
+        if any_lane(flying & any_field(map_fields(crossed, g, g_end, f.signs_of(g)))):
             end, m, now, stopped, overrun = follow(f, t, finish, h, s, end, m, p, o, g, g_end, flying)
             seen = look_shared(f, now, end, m, p, o)
     size = total(end)
@@ -103,7 +99,7 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
         rows += 1
     v0 = v1 = best = f.peaks_of(seen)
     w1 = f.lasts_of(seen)
-    when, last = map_2(_at, v1, t), map_2(_at, w1, t)
+    when, last = map_fields(_at, v1, t), map_fields(_at, w1, t)
     t0 = t1 = t
     for k in range(n_steps):
         if k > 0 and k % control_every == 0:
@@ -112,7 +108,9 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
         finish = case * 0.0 + float(k + 1) * h
         end, memory, seen, now, stopped, overrun, broken = step(f, has_events, t1, finish, h, s, m, p, o, flying)
         moved = flying & (not broken)
-        s, m, t = select(moved, end, s), select(moved, memory, m), where(moved, now, t)
+        if any_lane(not moved):  # a branch, foretold by the processor: the next step need not wait for the check
+            end, memory, now = select(moved, end, s), select(moved, memory, m), where(moved, now, t)
+        s, m, t = end, memory, now
         status = where(overrun, _OVERRUN, where(broken, _BROKEN, status))
         v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
         best, when, last = track(moved, f.smooth_of(v2), (v0, v1, v2), (t0, t1, t), (w1, w2), best, when, last)
@@ -120,8 +118,8 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
         flying = moved & (not ended)
         at_end = ended | (flying & (k + 1 == n_steps))
         if any_lane(at_end):
-            when = map_6(extrema.end_time, when, best, v2, t, at_end, t)
-            best = map_3(extrema.end_value, best, v2, at_end)
+            when = map_fields(extrema.end_time, when, best, v2, t, at_end, t)
+            best = map_fields(extrema.end_value, best, v2, at_end)
         if rows < history.shape[0] and ((k + 1) % stride == 0 or any_lane(at_end)):
             # looked at anew: so the quantities that only a history wants cost nothing where there is none
             record(history, rows, t, look_shared(f, t, s, m, p, o))

@@ -5,7 +5,7 @@ W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
 
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.physics_function import physics
-from mc_engine.lanes.tuples import add_scaled, map_6, spread
+from mc_engine.lanes.tuples import add_scaled, map_fields, spread
 
 
 @physics
@@ -20,7 +20,7 @@ def _rk4(rhs, t, h, s, m, p, o):
     k2 = spread(rhs(t + half, add_scaled(s, half, k1), m, p, o), t)
     k3 = spread(rhs(t + half, add_scaled(s, half, k2), m, p, o), t)
     k4 = spread(rhs(t + h, add_scaled(s, h, k3), m, p, o), t)
-    return map_6(_advance, s, h * (1.0 / 6.0), k1, k2, k3, k4)
+    return map_fields(_advance, s, h * (1.0 / 6.0), k1, k2, k3, k4)
 
 
 rk4 = compile_inline(_rk4)

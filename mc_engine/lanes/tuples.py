@@ -73,66 +73,68 @@ def add_scaled(typingctx, y, h, k):
     return y(y, h, k), codegen
 
 
+def _select(context, builder, condition, ty, chosen, other):
+    if not isinstance(ty, types.BaseTuple):
+        return builder.select(condition, chosen, other)
+    pairs = [(_item(builder, chosen, i), _item(builder, other, i)) for i in range(len(ty))]
+    return _pack(
+        context, builder, ty, [_select(context, builder, condition, ty[i], *pair) for i, pair in enumerate(pairs)]
+    )
+
+
 @intrinsic
 def select(typingctx, mask, chosen, other):
-    """The fields of `chosen` in the lanes where mask holds, of `other` elsewhere; also for single values."""
+    """`chosen` in the lanes where mask holds, `other` elsewhere; for lanes, tuples of lanes, and tuples of tuples."""
 
     def codegen(context, builder, sig, args):
-        condition = args[0]
-        if not isinstance(chosen, types.BaseTuple):
-            return builder.select(condition, args[1], args[2])
-        pairs = [(_item(builder, args[1], i), _item(builder, args[2], i)) for i in range(len(chosen))]
-        return _pack(context, builder, chosen, [builder.select(condition, a, b) for a, b in pairs])
+        return _select(context, builder, args[0], chosen, args[1], args[2])
 
     return chosen(mask, chosen, other), codegen
 
 
-def _map_fields(typingctx: Any, function: Any, args: Sequence[Any]) -> Any:
-    length = next(len(a) for a in args if isinstance(a, types.BaseTuple))
+@intrinsic
+def map_fields(typingctx, function, *args):
+    """function(a_i, b_i, ...) for every field i; an argument that is no tuple counts for every field."""
     is_tuple = [isinstance(a, types.BaseTuple) for a in args]
+    length = next(len(a) for a, t in zip(args, is_tuple, strict=True) if t)
     rows: list[list[Any]] = [[a[i] if t else a for a, t in zip(args, is_tuple, strict=True)] for i in range(length)]
     sigs = [function.get_call_type(typingctx, tuple(row), {}) for row in rows]
-    named = next((a for a in args if isinstance(a, types.BaseTuple)), None)
+    named = next(a for a, t in zip(args, is_tuple, strict=True) if t)
     result = _tuple_type([sig.return_type for sig in sigs], named)
 
     def codegen(context, builder, sig, values):
+        given = [_item(builder, values[1], i) for i in range(len(args))]
         fields = []
         for i, row_sig in enumerate(sigs):
-            row = [_item(builder, v, i) if t else v for v, t in zip(values[1:], is_tuple, strict=True)]
+            row = [_item(builder, v, i) if t else v for v, t in zip(given, is_tuple, strict=True)]
             fields.append(context.get_function(function, row_sig)(builder, row))
         return _pack(context, builder, result, fields)
 
-    return result(function, *args), codegen
+    return result(function, types.StarArgTuple.from_types(args)), codegen
 
 
 @intrinsic
-def map_2(typingctx, function, a, b):
-    """function(a_i, b_i) for every field; an argument that is no tuple counts for every field."""
-    return _map_fields(typingctx, function, (a, b))
+def joined(typingctx, *tuples):
+    """One plain tuple of the fields of all tuples."""
+    result = _tuple_type([field for one in tuples for field in one])
+
+    def codegen(context, builder, sig, args):
+        given = [_item(builder, args[0], i) for i in range(len(tuples))]
+        fields = [_item(builder, one, i) for one, ty in zip(given, tuples, strict=True) for i in range(len(ty))]
+        return _pack(context, builder, result, fields)
+
+    return result(types.StarArgTuple.from_types(tuples)), codegen
 
 
 @intrinsic
-def map_3(typingctx, function, a, b, c):
-    """function(a_i, b_i, c_i) for every field."""
-    return _map_fields(typingctx, function, (a, b, c))
+def first_fields(typingctx, fields, like):
+    """The first fields of a tuple, as many as `like` has and under its names."""
+    result = _tuple_type([fields[i] for i in range(len(like))], like)
 
+    def codegen(context, builder, sig, args):
+        return _pack(context, builder, result, [_item(builder, args[0], i) for i in range(len(like))])
 
-@intrinsic
-def map_4(typingctx, function, a, b, c, d):
-    """function(a_i, b_i, c_i, d_i) for every field."""
-    return _map_fields(typingctx, function, (a, b, c, d))
-
-
-@intrinsic
-def map_6(typingctx, function, a, b, c, d, e, f):
-    """function of six arguments for every field."""
-    return _map_fields(typingctx, function, (a, b, c, d, e, f))
-
-
-@intrinsic
-def map_10(typingctx, function, a, b, c, d, e, f, g, h, i, j):
-    """function of ten arguments for every field."""
-    return _map_fields(typingctx, function, (a, b, c, d, e, f, g, h, i, j))
+    return result(fields, like), codegen
 
 
 def _reduction(emit: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any], Any]:
@@ -205,6 +207,19 @@ def load_fields(typingctx, cls, array, first, width):
         return _pack(context, builder, result, [_read(builder, pointer) for pointer in at])
 
     return result(cls, array, types.intp, width), codegen
+
+
+@intrinsic
+def scalars_like(typingctx, like, array):
+    """A tuple like `like` with one plain float64 per field from a 1-D array."""
+    result = _tuple_type([types.float64] * len(like), like)
+
+    def codegen(context, builder, sig, args):
+        places = [ir.Constant(ir.IntType(64), i) for i in range(len(like))]
+        at = [_pointer(context, builder, array, args[1], None, place, 1) for place in places]
+        return _pack(context, builder, result, [_read(builder, pointer) for pointer in at])
+
+    return result(like, array), codegen
 
 
 @intrinsic

@@ -1,0 +1,355 @@
+"""Adaptive flight in lanes: every lane steps, meets events and ends by itself, then takes the next case.
+
+A lane is always in one of three ways: it steps; it closes in on an event, looking at shorter and shorter parts of
+the step that went over it; or it shortens a step that may have touched zero and come back.  A round of the loop is
+one attempt of every lane, so no lane waits for the events of another.
+
+An event is a zero of a sense (see `adaptive_step`); peaks are zeros of rates, so they are as exact as events.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+
+from mc_engine.lanes.adaptive_step import (
+    CORNER,
+    EVENT,
+    LAST,
+    PEAK,
+    arrive,
+    first_length,
+    glance,
+    leap,
+    sense,
+    step_factor,
+)
+from mc_engine.lanes.compiler import compile_callable, compile_inline
+from mc_engine.lanes.events import crossed
+from mc_engine.lanes.functions import any_lane, maximum, minimum, where
+from mc_engine.lanes.lane_access import lane_holds, store_lane, with_column, with_lane
+from mc_engine.lanes.noise import Draws
+from mc_engine.lanes.physics_function import physics
+from mc_engine.lanes.tuples import (
+    any_field,
+    first_fields,
+    least,
+    load,
+    load_fields,
+    load_scalars,
+    map_fields,
+    record,
+    scalars_like,
+    select,
+    spread,
+    total,
+)
+from mc_engine.status import NO_STOP, NOT_FINITE, STEP_LIMIT
+
+# until: time limit [s]; period: of the sampled control [s]; attempts: cap; first: first length [s], or 0
+Clock = namedtuple("Clock", "until rtol period attempts first order")
+# part of a step that holds an event: lengths, senses at both, which side moved last, next length to look at, how often
+Bracket = namedtuple("Bracket", "low high at_low at_high side look looks")
+
+_BROKEN, _CAPPED, _UNSTOPPED = float(NOT_FINITE), float(STEP_LIMIT), float(NO_STOP)
+_REACH = 1e-5  # of a step: length of the tangent over which rates are taken
+_SECANTS = 30  # then bisection, which cannot stall
+_CLOSED = 4.5e-16
+_NEVER = 1e300
+
+
+@physics
+def _arm(kind, sense0, value0, sense1, value1, best, h):
+    """1 where a crossing counts; a peak counts if its top, bounded by the tangents, may beat the best so far."""
+    hill = (sense0 > 0.0) & (sense1 < 0.0)
+    x = (value1 - value0 - sense1 * h) / where(hill, sense0 - sense1, 1.0)
+    promising = hill & (value0 + sense0 * x > best)
+    return where(kind == PEAK, where(promising, 1.0, 0.0), where(kind == CORNER, 0.0, 1.0))
+
+
+@physics
+def _watched(armed, sense):
+    """The sense where it is armed, else a constant, which crosses nothing."""
+    return where(armed > 0.5, sense, 1.0)
+
+
+@physics
+def _secant(before, after, direction, low, high):
+    """Length at which the chord of one sense meets zero; `high` where it does not cross."""
+    return where(crossed(before, after, direction), low + (high - low) * (before / (before - after)), high)
+
+
+@physics
+def _turn(kind, sense0, rate0, sense1, rate1, direction, h):
+    """Length to the turn of a sense that may have crossed zero and come back; h where it has not.
+
+    The tangents at both ends bound a sense that is bent one way; where they meet beyond zero it is worth a look.
+    """
+    down = (sense0 > 0.0) & (sense1 > 0.0) & (rate0 < 0.0) & (rate1 > 0.0) & (direction <= 0.0)
+    up = (sense0 < 0.0) & (sense1 < 0.0) & (rate0 > 0.0) & (rate1 < 0.0) & (direction >= 0.0)
+    turning = (down | up) & ((kind == EVENT) | (kind == LAST))
+    x = (sense1 - sense0 - rate1 * h) / where(turning, rate0 - rate1, 1.0)
+    reaches = (sense0 + rate0 * x) * sense0 <= 0.0
+    return where(turning & reaches & (x > 0.02 * h) & (x < 0.98 * h), x, h)
+
+
+@physics
+def _best(kind, best, value, mask):
+    """Largest value of a peak; the present one of anything else."""
+    return where(mask & ((value > best) | (kind == LAST) | (kind == EVENT)), value, best)
+
+
+@physics
+def _when(kind, when, best, value, fired, t, mask):
+    """Time of the best value of a peak, of the last moment above zero, of the last event."""
+    peak = (kind == PEAK) | (kind == CORNER)
+    news = where(peak, where(value > best, 1.0, 0.0), where(fired | ((kind == LAST) & (value > 0.0)), 1.0, 0.0))
+    return where(mask & (news > 0.5), t, when)
+
+
+@physics
+def _fires(armed, before, after, direction, mask):
+    return mask & (armed > 0.5) & crossed(before, after, direction)
+
+
+@physics
+def _flag(mask, like):
+    return where(mask, 1.0, 0.0) + 0.0 * like
+
+
+@physics
+def _halved(value, mask):
+    return where(mask, 0.5 * value, value)
+
+
+@physics
+def _at(value, t):
+    return t
+
+
+@physics
+def _nothing(value):
+    return 0.0 * value
+
+
+def _narrow(bracket, signs, values, looking):
+    """The bracket after a look, and the next length to look at: the first zero of the chords, or the middle.
+
+    The Illinois rule halves the sense at a side that stays: M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
+    """
+    after = any_field(map_fields(crossed, bracket.at_low, values, signs))
+    ahead, back = looking & (not after), looking & after
+    at_low = select(ahead, values, map_fields(_halved, bracket.at_low, back & (bracket.side > 0.0)))
+    at_high = select(back, values, map_fields(_halved, bracket.at_high, ahead & (bracket.side < 0.0)))
+    side = where(back, 1.0, where(ahead, -1.0, bracket.side))
+    low, high = where(ahead, bracket.look, bracket.low), where(back, bracket.look, bracket.high)
+    chord = least(map_fields(_secant, at_low, at_high, signs, low, high))
+    inside = (chord > low) & (chord < high) & (bracket.looks < float(_SECANTS))
+    look = where(inside, chord, 0.5 * (low + high))
+    return Bracket(low, high, at_low, at_high, side, look, bracket.looks + 1.0), back
+
+
+narrow = compile_callable(_narrow)
+
+
+def _begin(f, p, o, key, case):
+    """First state and memory of every lane."""
+    t = case * 0.0
+    s, m = spread(f.initial(p, o), t), spread(f.start(p, o), t)
+    return s, spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
+
+
+begin = compile_callable(_begin)
+
+
+def _first(f, clock, case, s, m, p, o, atol):
+    """(first instant, first length) of every lane."""
+    t = case * 0.0
+    k = spread(f.rhs(t, s, m, p, o), t)
+    longest = minimum(clock.until, clock.period)
+    h = first_length(f, t, s, k, m, p, o, atol, clock.rtol, clock.order, longest + t)
+    h = where(clock.first + t > 0.0, clock.first + t, h)
+    return sense(f, t, s, m, k, p, o, _REACH * h), h
+
+
+first = compile_callable(_first)
+
+
+def _finish(f, here, best, when, p, o):
+    """Metrics of every lane, were it to end here."""
+    return spread(f.evaluate(here.t, here.s, here.m, p, o, f.best_of(best), f.when_of(when)), here.t)
+
+
+finish = compile_callable(_finish)
+
+
+def _changed(f, key, case, sample, here, fired, switching, sampling, p, o, reach):
+    """The instant after what the model does at it: `switch` on events, `control` at samples."""
+    t = here.t
+    like = spread(f.events(t, here.s, here.m, p, o), t)
+    state, memory = f.switch(t, here.s, here.m, p, o, first_fields(map_fields(_flag, fired, t), like))
+    s, m = select(switching, spread(state, t), here.s), select(switching, spread(memory, t), here.m)
+    m = select(sampling, spread(f.control(t, s, m, p, o, Draws(key, case, sample)), t), m)
+    return arrive(f, t, s, m, p, o, reach)
+
+
+changed = compile_callable(_changed)
+
+
+def _record_between(f, tables, history, rows, spacing, here, end, p, o):
+    """Number of history rows after those of the first lane up to the time `end`; each is a step of its own."""
+    while rows < history.shape[0] - 1 and lane_holds(here.t * 0.0 + float(rows) * spacing <= end, 0):
+        t = here.t * 0.0 + float(rows) * spacing
+        s = glance(f, tables, t - here.t, here, p, o)
+        record(history, rows, t, spread(f.observe(t, s, here.m, p, o), t))
+        rows += 1
+    return rows
+
+
+record_between = compile_callable(_record_between)
+
+
+def _record_last(f, history, rows, here, p, o):
+    record(history, rows, here.t, spread(f.observe(here.t, here.s, here.m, p, o), here.t))
+    return rows + 1
+
+
+record_last = compile_callable(_record_last)
+
+
+def _fly(
+    f,
+    tables,
+    parameter_class,
+    setting_class,
+    width,
+    parameters,
+    settings,
+    key,
+    cases,
+    clock,
+    atol,
+    must_stop,
+    out,
+    history,
+    spacing,
+):
+    """Fly all cases of a chunk, the lanes taking them in turn.
+
+    tables : of the Runge-Kutta pair.  parameters : float64[n_parameters, n], SI, n at least the width
+    settings : float64[n_settings];  key : uint64;  cases : float64[n], case numbers
+    clock : the fields of `Clock`, float64;  atol : float64[n_states], SI
+    out : (time, status) float64[n], state float64[n_states, n], metrics float64[n_metrics, n]
+    history : float64[n_rows, 1 + n_quantities] of the first lane, a row every `spacing` [s]; no rows, no history
+    Returns the number of history rows.
+    """
+    end_time, end_status, end_state, metrics = out
+    clock = Clock(clock[0], clock[1], clock[2], clock[3], clock[4], clock[5])
+    o = load_scalars(setting_class, settings)
+    p, case = load_fields(parameter_class, parameters, 0, width), load(cases, 0, width)
+    columns, waiting = np.arange(width), width
+    s, m = begin(f, p, o, key, case)
+    atol = scalars_like(s, atol)
+    here, h = first(f, clock, case, s, m, p, o, atol)
+    kinds, signs = f.kinds_of(here.values), f.signs_of(here.values)
+    zero = case * 0.0
+    active, status, attempts, sample, limit = zero + 1.0, zero, zero, zero + 1.0, zero + _NEVER
+    closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
+    bracket = Bracket(zero, zero, armed, armed, zero, zero, zero)
+    best, when = here.values, map_fields(_at, here.values, zero)
+    rows = 0
+    if history.shape[0] > 0:
+        rows = record_last(f, history, rows, here, p, o)
+    while True:
+        flying = active > 0.5
+        target = minimum(clock.until + zero, sample * clock.period)
+        room = target - here.t
+        length = minimum(where(room <= 1.001 * h, room, h), limit)
+        landing = (not closing) & (length == room)
+        trial = where(closing, bracket.look, length)
+        end, k, error = leap(f, tables, trial, here, p, o, atol, clock.rtol)
+        t_end = where(landing, target, here.t + trial)
+        there = sense(f, t_end, end, here.m, k, p, o, _REACH * h)
+        attempts = attempts + 1.0
+        stepping, looking = flying & (not closing), flying & closing
+        good = stepping & (error <= 1.0)
+        poor = stepping & (not good)
+        hopes = map_fields(_arm, kinds, here.senses, here.values, there.senses, there.values, best, trial)
+        over = any_field(map_fields(_fires, hopes, here.senses, there.senses, signs, good))
+        turn = least(map_fields(_turn, kinds, here.senses, here.rates, there.senses, there.rates, signs, trial))
+        dip = good & (not over) & (turn < trial)
+        fits = good & (not over) & (not dip)
+        cut = (length < h) & (not poor)
+        scaled = trial * step_factor(error, -1.0 / clock.order)
+        h = where(good, where(cut, maximum(h, scaled), scaled), where(poor, scaled, h))
+        limit = where(dip, turn, where(good, _NEVER, limit))
+        closed = flying & (not flying)
+        if any_lane(over | looking):
+            armed = select(over, hopes, armed)
+            seen = map_fields(_watched, armed, there.senses)
+            opened = Bracket(zero, trial, map_fields(_watched, armed, here.senses), seen, zero, trial, zero)
+            bracket, back = narrow(select(over, opened, bracket), signs, seen, over | looking)
+            beyond = select(back, there, beyond)
+            closing = closing | over
+            closed = flying & closing & (bracket.high - bracket.low <= _CLOSED * (abs(here.t) + bracket.high))
+        arrived = fits | closed
+        now = select(closed, beyond, there)
+        fired = map_fields(_fires, armed, here.senses, now.senses, signs, closed)
+        stopped = closed & f.stops_of(fired)
+        when = map_fields(_when, kinds, when, best, now.values, fired, now.t, arrived)
+        best = map_fields(_best, kinds, best, now.values, arrived)
+        ended = arrived & (stopped | (now.t >= clock.until))
+        stuck = poor & (h <= 1e-14 * abs(here.t) + 1e-290)
+        capped = flying & (not ended) & (attempts >= clock.attempts)
+        size = total(end) + error
+        failure = where(stuck & (not (size - size == 0.0)), _BROKEN, _CAPPED)
+        status = where(stuck | capped, failure, status)
+        if must_stop:
+            status = where(ended & (not stopped), _UNSTOPPED, status)
+        if history.shape[0] > 0 and lane_holds(arrived, 0):
+            rows = record_between(f, tables, history, rows, spacing, here, now.t, p, o)
+        here = select(arrived, now, here)
+        closing = closing & (not arrived)
+        sampling = arrived & (not ended) & (here.t >= sample * clock.period)
+        switching = closed & (not ended) & f.switches_of(fired)
+        if any_lane(sampling | switching):
+            after = changed(f, key, case, sample, here, fired, switching, sampling, p, o, _REACH * h)
+            here = select(sampling | switching, after, here)
+            best = map_fields(_best, kinds, best, here.values, sampling | switching)
+            sample = where(sampling, sample + 1.0, sample)
+        done = ended | stuck | capped
+        if any_lane(done):
+            if rows > 0 and lane_holds(done, 0) and columns[0] == 0:
+                rows = record_last(f, history, rows, here, p, o)
+            results = finish(f, here, best, when, p, o)
+            fresh = zero
+            for lane in range(width):
+                if lane_holds(done, lane):
+                    column = columns[lane]
+                    store_lane(end_time, column, here.t, lane)
+                    store_lane(end_status, column, status, lane)
+                    store_lane(end_state, column, here.s, lane)
+                    store_lane(metrics, column, results, lane)
+                    if waiting < cases.shape[0]:
+                        p = with_column(p, lane, parameters, waiting)
+                        case = with_lane(case, lane, cases[waiting])
+                        columns[lane] = waiting
+                        waiting += 1
+                        fresh = with_lane(fresh, lane, 1.0)
+                    else:
+                        active = with_lane(active, lane, 0.0)
+            if not any_lane(active > 0.5):
+                break
+            new = fresh > 0.5
+            if any_lane(new):
+                s, m = begin(f, p, o, key, case)
+                start, length = first(f, clock, case, s, m, p, o, atol)
+                here, h = select(new, start, here), where(new, length, h)
+                best = select(new, start.values, best)
+                when = select(new, map_fields(_at, start.values, zero), when)
+                status, attempts = where(new, 0.0, status), where(new, 0.0, attempts)
+                sample, limit = where(new, 1.0, sample), where(new, _NEVER, limit)
+                closing = closing & (not new)
+    return rows
+
+
+fly = compile_inline(_fly)

@@ -1,0 +1,156 @@
+"""One attempt of an adaptive Runge-Kutta step in lanes, its error, and what its end looks like.
+
+Every lane has a time, a length and an error of its own.  The stages stand in memory, so a step is a short loop over
+the tables of the method (`runge_kutta_pairs`).
+"""
+
+from collections import namedtuple
+
+from mc_engine.lanes.compiler import compile_callable, compile_inline
+from mc_engine.lanes.elementary import exp, log
+from mc_engine.lanes.functions import maximum, minimum, sqrt, where
+from mc_engine.lanes.physics_function import physics
+from mc_engine.lanes.runge_kutta_pairs import LARGEST_STAGES
+from mc_engine.lanes.stage_memory import put_stage, stage_memory, stage_sum, take_stage
+from mc_engine.lanes.tuples import add_scaled, joined, map_fields, spread, total
+
+# What is known at one instant of a flight: time, state, memory, derivative of the state; then, for every event, peak
+# and last time that is looked for, its sense (the function of which a zero is sought), its value and its rate.
+# The sense of an event or of a last time is its value, the sense of a peak is its rate.
+Instant = namedtuple("Instant", "t s m k senses rates values")
+EVENT, PEAK, CORNER, LAST = 0.0, 1.0, 2.0, 3.0  # a corner is a peak that is taken at the steps
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
+DAMPING = 0.01  # weight of the second error estimate, Hairer's DOP853
+
+
+@physics
+def weighted_square(error, before, after, atol, rtol):
+    """Square of the error in units of the tolerance."""
+    x = error / (atol + rtol * maximum(abs(before), abs(after)))
+    return x * x
+
+
+def _attempt(f, tables, memory, t, h, s, m, p, o):
+    """State after a step of length h [s] from state s, whose derivative is stage 0; fills the other stages."""
+    nodes, starts, columns, weights = tables
+    end = s
+    for i in range(1, nodes.shape[0]):
+        end = add_scaled(s, h, stage_sum(memory, s, starts[i], starts[i + 1], columns, weights))
+        put_stage(memory, i, spread(f.rhs(t + nodes[i] * h, end, m, p, o), t))
+    return end
+
+
+attempt = compile_inline(_attempt)
+
+
+def _step_error(tables, memory, h, s, end, atol, rtol):
+    """Error of the step just attempted: 1 is what the tolerances allow, root mean square over the state.
+
+    Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, 2nd ed., eqs (4.11) and (10.17 ff).
+    """
+    nodes, starts, columns, weights = tables
+    n = nodes.shape[0]
+    first = stage_sum(memory, s, starts[n], starts[n + 1], columns, weights)
+    second = stage_sum(memory, s, starts[n + 1], starts[n + 2], columns, weights)
+    high = total(map_fields(weighted_square, first, s, end, atol, rtol))
+    low = total(map_fields(weighted_square, second, s, end, atol, rtol))
+    both = (high + DAMPING * low) * float(len(atol))
+    return abs(h) * high / sqrt(where(both == 0.0, 1.0, both))
+
+
+step_error = compile_inline(_step_error)
+
+
+@physics
+def step_factor(error, exponent):
+    """Factor from this step's length to the next one's, for an error in units of the tolerance."""
+    known = minimum(maximum(error, 1e-20), 1e20)
+    factor = SAFETY * exp(exponent * log(known))
+    # an error that is no number fails the comparison and shrinks the step as much as allowed
+    return where(error < 1e20, minimum(GROW, maximum(SHRINK, factor)), SHRINK)
+
+
+def _first_length(f, t, s, k, m, p, o, atol, rtol, order, longest):
+    """A first step length [s]: Hairer, Norsett, Wanner, section II.4, "Starting step size"."""
+    n = float(len(atol))
+    d0 = sqrt(total(map_fields(weighted_square, s, s, s, atol, rtol)) / n)
+    d1 = sqrt(total(map_fields(weighted_square, k, s, s, atol, rtol)) / n)
+    small = (d0 < 1e-5) | (d1 < 1e-5)
+    h = minimum(where(small, 1e-6, 0.01 * d0 / where(small, 1.0, d1)), longest)
+    later = spread(f.rhs(t + h, add_scaled(s, h, k), m, p, o), t)
+    d2 = sqrt(total(map_fields(weighted_square, map_fields(_difference, later, k), s, s, atol, rtol)) / n) / h
+    steep = maximum(d1, d2)
+    flat = steep <= 1e-15
+    guess = exp(log(0.01 / where(flat, 1.0, steep)) / order)
+    return minimum(minimum(100.0 * h, where(flat, maximum(1e-6, 1e-3 * h), guess)), longest)
+
+
+first_length = compile_callable(_first_length)
+
+
+@physics
+def _difference(a, b):
+    return a - b
+
+
+@physics
+def _rate(ahead, behind, inverse):
+    return (ahead - behind) * inverse
+
+
+@physics
+def _sense_of(kind, value, rate):
+    return where(kind == PEAK, rate, value)
+
+
+def _watch(f, t, s, m, p, o):
+    """Events, then the values of which peaks and last times are sought, in one tuple."""
+    seen = spread(f.observe(t, s, m, p, o), t)
+    return joined(spread(f.events(t, s, m, p, o), t), f.peaks_of(seen), f.lasts_of(seen))
+
+
+watch = compile_callable(_watch)
+
+
+def _sense(f, t, s, m, k, p, o, reach):
+    """The `Instant` at a state and its derivative.
+
+    Rates along the flight are central differences over the tangent, exact up to the square of `reach` [s].
+    """
+    values = watch(f, t, s, m, p, o)
+    ahead = watch(f, t + reach, add_scaled(s, reach, k), m, p, o)
+    behind = watch(f, t - reach, add_scaled(s, -reach, k), m, p, o)
+    rates = map_fields(_rate, ahead, behind, 0.5 / reach)
+    return Instant(t, s, m, k, map_fields(_sense_of, f.kinds_of(values), values, rates), rates, values)
+
+
+sense = compile_callable(_sense)
+
+
+def _arrive(f, t, s, m, p, o, reach):
+    """The `Instant` at a state whose derivative is not yet known."""
+    return sense(f, t, s, m, spread(f.rhs(t, s, m, p, o), t), p, o, reach)
+
+
+arrive = compile_callable(_arrive)
+
+
+def _glance(f, tables, h, here, p, o):
+    """State a length h [s] after `here`, by a step of its own that leaves the flight as it is."""
+    memory = stage_memory(here.s, LARGEST_STAGES)
+    put_stage(memory, 0, here.k)
+    return attempt(f, tables, memory, here.t, h, here.s, here.m, p, o)
+
+
+def _leap(f, tables, h, here, p, o, atol, rtol):
+    """(end, derivative there, error) of one attempt of length h [s] from `here`."""
+    memory = stage_memory(here.s, LARGEST_STAGES)
+    put_stage(memory, 0, here.k)
+    end = attempt(f, tables, memory, here.t, h, here.s, here.m, p, o)
+    error = step_error(tables, memory, h, here.s, end, atol, rtol)
+    return end, take_stage(memory, tables[0].shape[0] - 1, here.k), error
+
+
+leap = compile_inline(_leap)
+glance = compile_callable(_glance)

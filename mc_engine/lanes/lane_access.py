@@ -1,0 +1,67 @@
+"""One lane of a block: read from and written to columns of arrays, so that a finished lane can take the next case."""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from mc_engine.lanes.lane_type import I32, Lanes
+from mc_engine.lanes.tuples import _item, _pack, _pointer
+
+
+def _get(builder: Any, value: Any, ty: Any, lane: Any) -> Any:
+    return builder.extract_element(value, builder.trunc(lane, I32)) if isinstance(ty, Lanes) else value
+
+
+def _put(builder: Any, value: Any, ty: Any, lane: Any, number: Any) -> Any:
+    return builder.insert_element(value, number, builder.trunc(lane, I32)) if isinstance(ty, Lanes) else number
+
+
+@intrinsic
+def lane_holds(typingctx, mask, lane):
+    """Whether a mask holds in one lane."""
+    return types.boolean(mask, types.intp), lambda context, builder, sig, args: _get(builder, args[0], mask, args[1])
+
+
+@intrinsic
+def with_lane(typingctx, value, lane, number):
+    """The lanes with one of them replaced by a plain number."""
+
+    def codegen(context, builder, sig, args):
+        return _put(builder, args[0], value, args[1], args[2])
+
+    return value(value, types.intp, types.float64), codegen
+
+
+@intrinsic
+def with_column(typingctx, fields, lane, array, column):
+    """The tuple of lanes with one lane of field i replaced by array[i, column]."""
+
+    def codegen(context, builder, sig, args):
+        values = []
+        for i in range(len(fields)):
+            row = ir.Constant(ir.IntType(64), i)
+            number = builder.load(_pointer(context, builder, array, args[2], row, args[3], 1))
+            values.append(_put(builder, _item(builder, args[0], i), fields[i], args[1], number))
+        return _pack(context, builder, fields, values)
+
+    return fields(fields, types.intp, array, types.intp), codegen
+
+
+@intrinsic
+def store_lane(typingctx, array, column, value, lane):
+    """Write one lane of a value to array[column], or of the fields of a tuple to array[i, column]."""
+
+    def codegen(context, builder, sig, args):
+        if not isinstance(value, types.BaseTuple):
+            number = _get(builder, args[2], value, args[3])
+            builder.store(number, _pointer(context, builder, array, args[0], None, args[1], 1))
+            return context.get_dummy_value()
+        for i in range(len(value)):
+            number = _get(builder, _item(builder, args[2], i), value[i], args[3])
+            row = ir.Constant(ir.IntType(64), i)
+            builder.store(number, _pointer(context, builder, array, args[0], row, args[1], 1))
+        return context.get_dummy_value()
+
+    return types.none(array, types.intp, value, types.intp), codegen
