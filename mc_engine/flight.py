@@ -200,7 +200,7 @@ def fly_history(
 def _history_grid(model: Model, settings: np.ndarray, end_time: float, rows: int) -> tuple[int, float]:
     """(room for rows, pace) of a history of about `rows` rows."""
     if isinstance(model.clock, AdaptiveStep):
-        return rows + 1, max(end_time, 1e-9) / (rows - 1)
+        return rows, max(end_time, 1e-9) / (rows - 1)
     n_steps = grid_of(model.clock, settings_class(model)(*settings))[0]
     stride = max(1, n_steps // rows)
     return n_steps // stride + 4, float(stride)

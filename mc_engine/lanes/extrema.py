@@ -34,12 +34,13 @@ def crest_value(best, unused, v0, v1, v2, t0, t1, t2, smooth, mask):
     smooth : 1.0 takes the crest of the parabola, 0.0 the middle value itself.
     """
     a, b = t1 - t0, t2 - t1
+    usable = mask & (v1 >= v0) & (v1 >= v2) & (a > 0.0) & (b > 0.0)
     x = smooth * _vertex(t0, t1, t2, v0, v1, v2)
     # the parabola through the three points, about the middle one
-    slope = ((v1 - v0) * b * b + (v2 - v1) * a * a) / (a * b * (a + b))
-    bend = ((v2 - v1) * a - (v1 - v0) * b) / (a * b * (a + b))
+    scale = where(usable, a * b * (a + b), 1.0)
+    slope = ((v1 - v0) * b * b + (v2 - v1) * a * a) / scale
+    bend = ((v2 - v1) * a - (v1 - v0) * b) / scale
     top = v1 + x * (slope + x * bend)
-    usable = mask & (v1 >= v0) & (v1 >= v2) & (a > 0.0) & (b > 0.0)
     return where(usable & (top > best), top, best)
 
 

@@ -1,0 +1,180 @@
+"""Adaptive flight: orders, events, peaks, histories, and lanes that never look at each other."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from mc_engine.flight import fly, fly_history
+from mc_engine.model import load_model
+
+FOLDER = Path(__file__).resolve().parent / "adaptive"
+MU = 398600.4418e9
+
+
+def inputs_of(model, inputs):
+    return {**{item.name: item.default for item in (*model.parameters, *model.settings)}, **inputs}
+
+
+def flown(model, width=8, ids=None, **inputs):
+    """Columns of the cases with these inputs."""
+    n = max((np.size(value) for value in inputs.values()), default=1)
+    return fly(model, inputs_of(model, inputs), np.arange(n) if ids is None else ids, 1, folder=FOLDER, width=width)
+
+
+def bits(columns, cases=slice(None)):
+    """Columns as bytes and words."""
+    return {name: list(v[cases]) if v.dtype == object else v[cases].tobytes() for name, v in columns.items()}
+
+
+@pytest.fixture(scope="module")
+def orbit():
+    return load_model("orbit.py", FOLDER)
+
+
+@pytest.fixture(scope="module")
+def wave():
+    return load_model("wave.py", FOLDER)
+
+
+SPEEDS = np.linspace(7700.0, 9500.0, 40)  # near-circular to e = 0.58
+
+
+@pytest.fixture(scope="module")
+def day(orbit):
+    return flown(orbit, speed_m_s=SPEEDS)
+
+
+@pytest.mark.parametrize("width", [1, 16])
+def test_every_width_gives_the_same_bits(orbit, day, width):
+    assert bits(flown(orbit, width, speed_m_s=SPEEDS)) == bits(day)
+
+
+def test_neither_order_nor_company_of_the_cases_changes_a_bit(wave):
+    rng = np.random.default_rng(2)
+    inputs = {"omega_rad_s": rng.uniform(0.3, 3.0, 60), "noise_m_s2": rng.uniform(0.0, 0.1, 60)}
+    straight, order = flown(wave, **inputs), rng.permutation(60)
+    shuffled = flown(wave, ids=order, **{name: values[order] for name, values in inputs.items()})
+    assert bits(shuffled) == bits(straight, order)
+    for case in rng.integers(0, 60, 12):
+        alone = flown(wave, 1, np.array([case]), **{name: values[case] for name, values in inputs.items()})
+        assert bits(alone) == bits(straight, slice(case, case + 1))
+
+
+def test_apogee_and_perigee_are_those_of_kepler(day):
+    a = 1.0 / (2.0 / 7e6 - SPEEDS**2 / MU)
+    assert day["highest_m"] == pytest.approx(np.maximum(7e6, 2.0 * a - 7e6), rel=1e-10)
+    assert day["lowest_m"] == pytest.approx(np.minimum(7e6, 2.0 * a - 7e6), rel=1e-10)
+    # one of the apogees; a peak is flat, so that its time is known to the root of its height only
+    turns = day["highest_time_s"] / (np.pi * np.sqrt(a**3 / MU))
+    assert np.abs(turns - np.rint(turns))[a > 7e6].max() < 1e-6
+
+
+def test_energy_and_angular_momentum_drift_less_than_1e_9_in_a_day(day):
+    assert day["energy"] == pytest.approx(SPEEDS**2 / 2.0 - MU / 7e6, rel=1e-9)
+    assert day["angular_momentum"] == pytest.approx(7e6 * SPEEDS, rel=1e-9)
+
+
+def kepler(t, v=8000.0, r=7e6):
+    """Place at time t of the orbit that starts at its perigee (r, 0) with speed v."""
+    a = 1.0 / (2.0 / r - v**2 / MU)
+    e, mean = 1.0 - r / a, t * np.sqrt(MU / a**3)
+    anomaly = brentq(lambda x: x - e * np.sin(x) - mean, mean - 1.0, mean + 1.0, xtol=1e-15, rtol=1e-15)
+    return np.array([a * (np.cos(anomaly) - e), a * np.sqrt(1.0 - e * e) * np.sin(anomaly)])
+
+
+@pytest.mark.parametrize(("method", "order", "longest"), [("dop853", 8, 200.0), ("dp54", 5, 25.0)])
+def test_the_error_falls_with_the_order_of_the_method(orbit, method, order, longest):
+    """Tolerances that allow anything, and samples of the control that hold the step: halve it, and see."""
+    errors = []
+    for step in (longest, longest / 2.0):
+        clock = replace(orbit.clock, method=method, atol=1e9, control_period=step, first_step=step)
+        end = flown(replace(orbit, clock=clock, extrema=()), speed_m_s=8000.0, duration_s=4000.0)
+        errors.append(np.hypot(*(np.array([end["end_x_m"][0], end["end_y_m"][0]]) - kepler(4000.0))))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.7)
+
+
+@pytest.mark.parametrize("level", [-0.999, -0.5, 0.0, 0.7, 0.999, 0.999999])
+def test_every_crossing_is_met_even_two_close_ones_in_one_step(wave, level):
+    """Near its top the wave is over the level 0.999999 for 0.0028 rad, in steps of about one."""
+    got = flown(wave, level_m=level, stop_s=50.0)
+    turns = 2.0 * np.pi * np.arange(9)
+    rises, falls = np.arcsin(level) + turns, np.pi - np.arcsin(level) + turns
+    assert got["rises"][0] == np.count_nonzero((rises > 0.0) & (rises < 50.0))  # it does not cross where it begins
+    assert got["falls"][0] == np.count_nonzero(falls < 50.0)
+
+
+@pytest.mark.parametrize("level", [1.000001, 1.01, -1.000001])
+def test_a_level_that_the_wave_does_not_reach_is_never_crossed(wave, level):
+    got = flown(wave, level_m=level)
+    assert (got["rises"][0], got["falls"][0]) == (0, 0)
+
+
+def test_event_times_are_within_1e_9_s_of_the_root(wave):
+    levels = np.linspace(-0.99, 0.99, 37)
+    got = flown(wave, level_m=levels, tolerance=1e-13)
+    root = np.arcsin(levels) + 2.0 * np.pi * np.rint((got["rise_time_s"] - np.arcsin(levels)) / (2.0 * np.pi))
+    assert np.abs(got["rise_time_s"] - root).max() < 1e-9
+    fall = np.pi - np.arcsin(levels)
+    fall += 2.0 * np.pi * np.floor((50.0 - fall) / (2.0 * np.pi))
+    last = np.where(np.sin(50.0) > levels, 50.0, fall)
+    assert np.abs(got["last_above_s"] - last).max() < 1e-9
+
+
+def test_a_peak_is_as_exact_as_the_integrator_and_not_the_step(wave):
+    got = flown(wave, tolerance=1e-12, omega_rad_s=np.linspace(0.5, 2.0, 16))
+    assert got["top_m"] == pytest.approx(1.0, abs=1e-10)
+
+
+def test_the_control_is_sampled_at_its_times_with_its_own_draws(wave):
+    """Samples at 0, 7, 14, ... 49 s: the last push is the draw of the eighth."""
+    longer = flown(wave, noise_m_s2=1.0, stop_s=np.array([50.0, 55.9, 56.1]), ids=np.array([4, 4, 4]))
+    assert longer["push_m_s2"][0] == longer["push_m_s2"][1] != longer["push_m_s2"][2]
+
+
+def test_a_history_disturbs_nothing_and_passes_through_the_requested_times(wave):
+    inputs = inputs_of(wave, {"omega_rad_s": 1.3, "tolerance": 1e-12})
+    plain = flown(wave, omega_rad_s=1.3, tolerance=1e-12)
+    for rows in (11, 501):
+        columns, history = fly_history(wave, inputs, 0, 1, folder=FOLDER, rows=rows)
+        assert bits(columns) == bits(plain)
+        assert len(history["t_s"]) == rows
+        assert history["t_s"] == pytest.approx(np.linspace(0.0, 50.0, rows), rel=1e-14)
+        assert history["height_m"] == pytest.approx(np.sin(1.3 * history["t_s"]), abs=1e-9)
+    assert history["height_m"][-1] == plain["end_x_m"][0]
+
+
+@pytest.mark.parametrize(("ill", "status"), [(1.0, "not-finite"), (2.0, "step-limit"), (3.0, "step-limit")])
+def test_a_poisoned_case_ends_with_its_status_and_leaves_its_neighbours_bits_alone(wave, ill, status):
+    rng = np.random.default_rng(5)
+    omega, noise = rng.uniform(0.3, 3.0, 64), rng.uniform(0.0, 0.1, 64)
+    healthy = flown(wave, omega_rad_s=omega, noise_m_s2=noise)
+    sick = np.zeros(64)
+    sick[[3, 17, 18, 40]] = ill
+    mixed = flown(wave, omega_rad_s=omega, noise_m_s2=noise, ill=sick)
+    assert set(mixed["status"][sick > 0.0]) == {status}
+    assert np.isnan(mixed["top_m"][sick > 0.0]).all()
+    assert np.isfinite(mixed["end_x_m"]).all()
+    assert bits(mixed, sick == 0.0) == bits(healthy, sick == 0.0)
+
+
+def test_512_of_512_cases_flown_alone_have_the_bits_of_the_flight_together(wave):
+    rng = np.random.default_rng(11)
+    n = 512
+    inputs = {
+        "omega_rad_s": rng.uniform(0.2, 4.0, n),
+        "level_m": rng.uniform(-1.1, 1.1, n),
+        "noise_m_s2": rng.uniform(0.0, 0.3, n),
+        "stop_s": rng.uniform(1.0, 99.0, n),
+        "ill": rng.choice([0.0, 0.0, 0.0, 1.0, 2.0], n),
+    }
+    together = flown(wave, **inputs)
+    alone = [flown(wave, 1, np.array([i]), **{name: values[i] for name, values in inputs.items()}) for i in range(n)]
+    assert sum(bits(one) == bits(together, slice(i, i + 1)) for i, one in enumerate(alone)) == n
+
+
+def test_a_flight_to_the_time_limit_without_its_stop_says_so(wave):
+    assert flown(wave, stop_s=1000.0)["status"][0] == "no-stop"
+    assert flown(wave, stop_s=1000.0)["end_time_s"][0] == 100.0
