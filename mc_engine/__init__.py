@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from mc_engine.campaign import Campaign, list_campaigns, load_campaign
     from mc_engine.cases import case_table
     from mc_engine.errors import CampaignError, EngineError, ModelError, RunInterrupted, StoreError
-    from mc_engine.model import Event, Extremum, Field, FixedStep, Model, Parameter, Refusals, Setting
+    from mc_engine.model import AdaptiveStep, Event, Extremum, Field, FixedStep, Model, Parameter, Refusals, Setting
     from mc_engine.runner import Replay, extend, replay, resume, run
     from mc_engine.store import Store, open_store
 
@@ -18,7 +18,7 @@ _HOME = {
     "campaign": ("Campaign", "list_campaigns", "load_campaign"),
     "cases": ("case_table",),
     "errors": ("CampaignError", "EngineError", "ModelError", "RunInterrupted", "StoreError"),
-    "model": ("Event", "Extremum", "Field", "FixedStep", "Model", "Parameter", "Refusals", "Setting"),
+    "model": ("AdaptiveStep", "Event", "Extremum", "Field", "FixedStep", "Model", "Parameter", "Refusals", "Setting"),
     "runner": ("Replay", "extend", "replay", "resume", "run"),
     "store": ("Store", "open_store"),
 }
@@ -34,6 +34,7 @@ __all__ = [  # noqa: RUF022 - by module, as above
     "ModelError",
     "RunInterrupted",
     "StoreError",
+    "AdaptiveStep",
     "Event",
     "Extremum",
     "Field",

@@ -30,7 +30,7 @@ from mc_engine.campaign_problems import Findings, Sections, parse_toml, read_sec
 from mc_engine.campaign_search import SHIPPED, ShippedCampaign, campaign_name, find_campaign, list_campaigns
 from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.case_table_file import read_case_table, table_dispersions
-from mc_engine.designs import BY_LEVELS, RANDOM, level_count
+from mc_engine.designs import BY_LEVELS, DESIGNS, RANDOM, level_count
 from mc_engine.dispersions import Dispersion, build_dispersion
 from mc_engine.distributions import Scalar
 from mc_engine.errors import CampaignError, ModelError, Problem
@@ -151,8 +151,9 @@ def _assemble(
     inside = found.under("campaign")
     nominal = _nominal(model, sections, found)
     section = sections.campaign
-    design = section.design if section is not None else None
+    design = section.design if section is not None else _named_design(document)
     requirements = check_requirements(sections.requirements, model, found.under("requirement"))
+    _unknown_names(document, sections, nominal, model, found)
     dispersions = _dispersions(sections, model, nominal, design, directory, found)
     correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", found)
     table_path, table = _table(section, model, dispersions, directory, found)
@@ -188,6 +189,13 @@ def _assemble(
     )
 
 
+def _named_design(document: dict[str, Any]) -> str | None:
+    """The design, even where other keys of [campaign] are wrong: the dispersions are read against it."""
+    section = document.get("campaign")
+    design = section.get("design") if isinstance(section, dict) else None
+    return design if isinstance(design, str) and design in DESIGNS else None
+
+
 def _model(document: dict[str, Any], directory: Path, found: Findings) -> Model | None:
     """The model, even where other keys of [campaign] are wrong: the rest of the file is read against it."""
     section = document.get("campaign")
@@ -212,6 +220,16 @@ def _nominal(model: Model, sections: Sections, found: Findings) -> dict[str, Sca
         if sentence:
             spot.add("", f"the nominal case cannot be flown: {sentence}")
     return nominal
+
+
+def _unknown_names(
+    document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: Model, found: Findings
+) -> None:
+    """Name dispersions of no parameter also where their section is wrong in itself."""
+    written = document.get("dispersion")
+    for name in written if isinstance(written, dict) else ():
+        if name not in sections.dispersions and name not in nominal:
+            found.under("dispersion", name).add("", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}")
 
 
 def _dispersions(

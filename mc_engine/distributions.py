@@ -112,7 +112,9 @@ class Lognormal(Continuous):
         return self.median / factor, self.median * factor
 
     def _standard(self, x: float) -> float:
-        return math.log(x / self.median) / (self.log_sigma * math.sqrt(2.0)) if x > 0.0 else -math.inf
+        # a difference of logarithms: the quotient of extreme numbers would fall to zero
+        distance = math.log(x) - math.log(self.median) if x > 0.0 else -math.inf
+        return distance / (self.log_sigma * math.sqrt(2.0))
 
     def cdf(self, x: float) -> float:
         return 0.5 * math.erfc(-self._standard(x))

@@ -236,3 +236,33 @@ def test_a_dispersion_is_either_refused_or_draws_what_the_model_accepts(design, 
     assert ((values >= item.low) & (values <= item.high)).all()
     assert np.isfinite(values).all()
     assert dispersion_records(campaign)[0]["distribution"].startswith((dist, "3 levels", "2 levels", "1 level"))
+
+
+def test_a_wrong_key_in_campaign_hides_no_mistake_further_down():
+    """The design is still known, so bounds and names of the dispersions are read against it."""
+    text = """
+[campaign]
+model = "campaigns.minimal.model"
+cases = 10
+design = "mc"
+seed = 1
+color = "red"
+
+[dispersion.pitch_error_deg]
+dist = "normal"
+sigma = 1.0
+lower = 5.0
+upper = -5.0
+
+[dispersion.burn_dv]
+dist = "normal"
+sigma = nan
+"""
+    with pytest.raises(CampaignError) as caught:
+        load_campaign("slips.toml", text=text)
+    told = str(caught.value)
+    assert "4 problems" in told
+    assert "campaign.color" in told
+    assert "dispersion.pitch_error_deg.lower: 5 is not below upper = -5" in told
+    assert "dispersion.burn_dv.sigma: nan is not a finite number" in told
+    assert 'dispersion.burn_dv: is not a parameter of minimal; did you mean "burn_dv_m_s"?' in told
