@@ -177,7 +177,7 @@ class Model:
     event_list: tuple[Event, ...] = ()
     extrema: tuple[Extremum, ...] = ()
     figures: tuple[Any, ...] = ()
-    published: tuple[Mapping[str, Any], ...] = ()
+    published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
 
     def input(self, name: str) -> Parameter | Setting:

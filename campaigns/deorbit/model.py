@@ -1,5 +1,6 @@
 """The de-orbit model as the engine sees it: inputs, settings, design of each case, and the MODEL record."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from campaigns.deorbit import dynamics, figures, outcome, path_design
 from mc_engine.model import Event, Field, FixedStep, Model, Parameter, Refusals, Setting
 from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY
+from mc_engine.published import read_published
 
 SOURCE = (
     "S. Divsalar, R. Nadafi, M. Kabganian, Design of a trajectory-correction algorithm for a spacecraft in a "
@@ -202,4 +204,5 @@ MODEL = Model(
     evaluate=outcome.evaluate,
     extrema=outcome.EXTREMA,
     figures=figures.FIGURES,
+    published=read_published(Path(__file__).with_name("published.toml")),
 )
