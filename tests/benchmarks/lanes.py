@@ -1,0 +1,117 @@
+"""Time of one case-step of the lane kernels, one case at a time and in vectors, for two models.
+
+    python -m tests.benchmarks.lanes
+
+Only the kernel call is timed; compiling, or loading the compiled kernel, is printed apart.  The widths take
+turns and the shortest time of each counts, so that other work on the machine disturbs the ratio little.
+"""
+
+import platform
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine import flight
+from mc_engine.kernel import build_kernel
+from mc_engine.kernel_parts import settings_class
+from mc_engine.model import Model, load_model
+
+HERE = Path(__file__).resolve().parent
+WIDTHS = (1, 8, 16)
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Cases of one model that all fly with the same settings."""
+
+    title: str
+    model: Model
+    folder: Path | None
+    inputs: flight.Inputs
+    n_cases: int
+
+
+@dataclass
+class Timing:
+    """Shortest time of a case-step [ns] and time [s] to compile or load the kernel, by width."""
+
+    ns: dict[int, float] = field(default_factory=dict)
+    ready_s: dict[int, float] = field(default_factory=dict)
+
+    def ratio(self, width: int = 8) -> float:
+        """How many times longer a step takes one case at a time."""
+        return self.ns[1] / self.ns[width]
+
+
+def orbit(n_cases: int = 2048) -> Flight:
+    """Low orbits with J2 and drag, 400 steps."""
+    rng = np.random.default_rng(1)
+    model = load_model("orbit_model.py", HERE)
+    inputs: dict[str, Any] = {parameter.name: parameter.default for parameter in model.parameters}
+    inputs |= {"altitude_km": 400.0 + rng.normal(size=n_cases), "climb_m_s": 5800.0 + rng.normal(size=n_cases)}
+    return Flight("two-body + J2 + drag orbit", model, HERE, inputs, n_cases)
+
+
+def deorbit(n_cases: int = 2048) -> Flight:
+    """The de-orbit campaign with the errors of its file and continuous control: about 707 steps to entry."""
+    rng = np.random.default_rng(1)
+    model = load_model("campaigns.deorbit")
+    inputs: dict[str, Any] = {item.name: item.default for item in (*model.parameters, *model.settings)}
+    inputs |= {"ve_pct": rng.normal(size=n_cases) * 20 / 3, "oe_pct": rng.normal(size=n_cases) * 5}
+    return Flight("de-orbit campaign", model, None, inputs, n_cases)
+
+
+def caller(cases: Flight, width: int) -> Callable[[], float]:
+    """Function that flies all cases once and returns the time of a case-step [ns], that of the kernel call alone."""
+    ready = flight.prepare(cases.model, cases.inputs, cases.n_cases)
+    settings = np.ascontiguousarray(ready.settings[0])
+    grid = flight.grid_of(cases.model.clock, settings_class(cases.model)(*settings))
+    end_time, status = np.empty(cases.n_cases), np.empty(cases.n_cases)
+    states = np.empty((len(cases.model.states), cases.n_cases))
+    metrics = np.empty((len(cases.model.metrics), cases.n_cases))
+    numbers, key, history = np.arange(float(cases.n_cases)), np.uint64(1), np.empty((0, 0))
+    kernel = build_kernel(cases.model, cases.folder, width)
+
+    def fly() -> float:
+        start = time.perf_counter()
+        kernel(ready.parameters, settings, key, numbers, *grid, end_time, status, states, metrics, history, 1)
+        elapsed = time.perf_counter() - start
+        return elapsed / np.ceil(end_time / grid[1]).sum() * 1e9
+
+    return fly
+
+
+def measure(cases: Flight, widths: Iterable[int] = WIDTHS, repeats: int = 12) -> Timing:
+    """Timing of the kernels of several widths on the same cases."""
+    timing = Timing()
+    flights = {}
+    for width in widths:
+        start = time.perf_counter()
+        flights[width] = caller(cases, width)
+        flights[width]()
+        timing.ready_s[width] = time.perf_counter() - start
+    for _ in range(repeats):
+        for width, fly in flights.items():
+            timing.ns[width] = min(timing.ns.get(width, np.inf), fly())
+    return timing
+
+
+def main() -> None:
+    from llvmlite import binding
+
+    print(f"{platform.processor() or platform.machine()} ({binding.get_host_cpu_name()}), one thread")
+    for cases in (orbit(), deorbit()):
+        timing = measure(cases)
+        for width, ns in timing.ns.items():
+            print(
+                f"{cases.title}, width {width:2d}: {ns:6.1f} ns per case-step, "
+                f"{timing.ratio(width):5.2f} times width 1 (ready in {timing.ready_s[width]:.1f} s)"
+            )
+
+
+if __name__ == "__main__":
+    main()
