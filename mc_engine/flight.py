@@ -40,6 +40,7 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
     for parameter in model.parameters:
         column = np.broadcast_to(np.asarray(inputs[parameter.name], dtype=np.float64), n_cases)
         refusals.add(np.isnan(column), f"{parameter.name} is not a number")
+        refusals.add(np.isinf(column), f"{parameter.name} is infinite")
         outside = ~((column >= parameter.low) & (column <= parameter.high))
         refusals.add(outside, f"{parameter.name} is outside {parameter.low:g} to {parameter.high:g} {parameter.unit}")
         setattr(si, parameter.symbol, column * parameter.si_factor)

@@ -22,7 +22,7 @@ def _sentence(error: Exception) -> str:
     """The error in one line; of the compiler's pages only the cause, the place and what to use instead."""
     if not type(error).__module__.startswith("numba"):
         return f"{type(error).__name__}: {error}"
-    lines = [line.strip() for line in str(error).splitlines()]
+    lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]  # without colours
     cause = next((line for line in lines if line and not line.startswith("Failed in")), type(error).__name__)
     place = next((match for line in lines if (match := re.match(r'File "([^"]+)", line (\d+)', line))), None)
     where = f"{place[1].replace(chr(92), '/').split('/')[-1]}, line {place[2]}: " if place else ""

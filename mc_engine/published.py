@@ -1,14 +1,14 @@
 """Published values of a model's source, kept as a table beside the model: `published.toml`.
 
-    [[published]]
-    quantity = "semi-major axis of the desired path"
-    published = 6431.5            # a number, or words
-    unit = "km"
-    source = "Table 2"
-    column = "desired_semi_major_axis_km"    # and/or ours = 6431.4934
-    at = { ve_pct = -20.0 }       # inputs of the case to compare with
-    tolerance = 0.05
-    status = "legible"
+[[published]]
+quantity = "semi-major axis of the desired path"
+published = 6431.5            # a number, or words
+unit = "km"
+source = "Table 2"
+column = "desired_semi_major_axis_km"    # and/or ours = 6431.4934
+at = { ve_pct = -20.0 }       # inputs of the case to compare with
+tolerance = 0.05
+status = "legible"
 """
 
 import tomllib

@@ -41,7 +41,7 @@ PARAMETERS = (
     ),
     Parameter("target_speed_m_s", "m/s", "desired inertial speed at entry", 7800.0, low=1.0),
     Parameter(
-        "target_flight_path_angle_deg", "deg", "desired flight-path angle at entry, below the horizon", 2.0, -90, 90
+        "target_flight_path_angle_deg", "deg", "desired flight-path angle at entry, below the horizon", 2.0, 0, 89
     ),
     Parameter("target_radius_km", "km", "desired radius of entry", 6491.0, low=1.0),
     Parameter("target_latitude_argument_deg", "deg", "desired argument of latitude at entry", 60.0),
@@ -99,6 +99,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
         i.initial_semi_major_axis <= i.target_radius,
         "the initial orbit is not above the entry interface to come down to",
     )
+    refusals.add(i.gain * settings.step > 0.3, "gain_1_s times step_s is above 0.3: the step is too long for the law")
     to_perigee, ahead = _path_axes(path.omega, i.inclination)
     normal = np.cross(to_perigee, ahead, axis=0)
     # the burn happens `delay` after its time: the craft has gone on along the circle, its target along the path

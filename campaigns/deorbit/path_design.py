@@ -70,7 +70,10 @@ def design_path(a_initial, speed, angle, radius, theta_entry, ascending, refusal
     a = MU_EARTH / (2.0 * (MU_EARTH / radius - speed**2 / 2.0))  # eq. (11)
     refusals.add(~((a > 0.0) & np.isfinite(a)), "no ellipse reaches the entry state: its speed is at or above escape")
     e = np.sqrt(1.0 - (radius * speed * np.cos(angle)) ** 2 / (MU_EARTH * a))  # eq. (12)
-    refusals.add(~(e > 1e-9), "the entry state lies on a circle, which has no perigee to aim with")
+    refusals.add(
+        ~(e > 1e-7),  # rounding in eq. (12) leaves about 1e-8 of a circle
+        "the entry state lies on a circle, which has no perigee to aim with",
+    )
     cos_psi = (a - radius) / (a * e)  # eq. (15)
     sin_psi = -radius * speed * np.sin(angle) / (e * np.sqrt(MU_EARTH * a))  # eq. (16)
     f_entry = np.mod(np.arctan2(np.sqrt(1.0 - e**2) * sin_psi, cos_psi - e), TAU)  # eq. (14)

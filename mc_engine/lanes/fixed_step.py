@@ -60,23 +60,20 @@ look_shared = compile_callable(_look)
 
 
 def _step(f, has_events, t, finish, h, s, m, p, o, flying):
-    """One grid step from t to `finish`: (state, memory, quantities, time, stopped, overrun, broken) of every lane.
+    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken) of every lane.
 
-    The event values at the start are taken anew, not handed on: they share what the first derivative computes,
-    as those at the end share what `observe` computes.
+    The event values at the start are taken anew, not handed on: they share what the first derivative computes.
     """
     end = rk4(f.rhs, t, h, s, m, p, o)
     now, stopped = finish, flying & (not flying)
     overrun = stopped
-    seen = spread(f.observe(now, end, m, p, o), t)
     if has_events:
         g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
         if any_lane(flying & any_field(map_fields(crossed, g, g_end, f.signs_of(g)))):
             end, m, now, stopped, overrun = follow(f, t, finish, h, s, end, m, p, o, g, g_end, flying)
-            seen = look_shared(f, now, end, m, p, o)
     size = total(end)
     broken = flying & (not (size - size == 0.0))
-    return end, m, seen, now, stopped, overrun & (not broken), broken
+    return end, m, now, stopped, overrun & (not broken), broken
 
 
 step = compile_inline(_step)
@@ -85,48 +82,54 @@ step = compile_inline(_step)
 def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, history, stride):
     """Fly one block from its first state to the stop or the time limit.
 
+    The quantities are looked at where a step begins, beside its first derivative, with which they share most of
+    their work, and where a flight ends.
     Returns (time, state, memory, status, unstopped, best, when, last, rows): per lane, and the history rows
     written, those of the first lane.  Row 0 is the start; then every `stride` steps, and the end.
     """
     t = case * 0.0
-    flying, status = t == t, t
+    flying, status, rows = t == t, t, 0
     s, m = spread(f.initial(p, o), t), spread(f.start(p, o), t)
     m = spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
-    seen = spread(f.observe(t, s, m, p, o), t)
-    rows = 0
-    if rows < history.shape[0]:
-        record(history, rows, t, look_shared(f, t, s, m, p, o))
-        rows += 1
+    seen = look_shared(f, t, s, m, p, o)
     v0 = v1 = best = f.peaks_of(seen)
     w1 = f.lasts_of(seen)
     when, last = map_fields(_at, v1, t), map_fields(_at, w1, t)
-    t0 = t1 = t
+    t0 = t1 = t2 = t
     for k in range(n_steps):
         if k > 0 and k % control_every == 0:
-            held = spread(f.control(t, s, m, p, o, Draws(key, case, float(k // control_every))), t)
+            held = spread(f.control(t2, s, m, p, o, Draws(key, case, float(k // control_every))), t)
             m = select(flying, held, m)
+        seen = spread(f.observe(t2, s, m, p, o), t)
+        v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
+        best, when, last = track(flying, f.smooth_of(v2), (v0, v1, v2), (t0, t1, t2), (w1, w2), best, when, last)
+        if rows < history.shape[0] and k % stride == 0:
+            # looked at anew: so the quantities that only a history wants cost nothing where there is none
+            record(history, rows, t2, look_shared(f, t2, s, m, p, o))
+            rows += 1
+        # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
         finish = case * 0.0 + float(k + 1) * h
-        end, memory, seen, now, stopped, overrun, broken = step(f, has_events, t1, finish, h, s, m, p, o, flying)
+        end, memory, now, stopped, overrun, broken = step(f, has_events, t2, finish, h, s, m, p, o, flying)
         moved = flying & (not broken)
         if any_lane(not moved):  # a branch, foretold by the processor: the next step need not wait for the check
             end, memory, now = select(moved, end, s), select(moved, memory, m), where(moved, now, t)
         s, m, t = end, memory, now
         status = where(overrun, _OVERRUN, where(broken, _BROKEN, status))
-        v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
-        best, when, last = track(moved, f.smooth_of(v2), (v0, v1, v2), (t0, t1, t), (w1, w2), best, when, last)
         ended = moved & (stopped | overrun)
         flying = moved & (not ended)
         at_end = ended | (flying & (k + 1 == n_steps))
         if any_lane(at_end):
-            when = map_fields(extrema.end_time, when, best, v2, t, at_end, t)
-            best = map_fields(extrema.end_value, best, v2, at_end)
-        if rows < history.shape[0] and ((k + 1) % stride == 0 or any_lane(at_end)):
-            # looked at anew: so the quantities that only a history wants cost nothing where there is none
-            record(history, rows, t, look_shared(f, t, s, m, p, o))
-            rows += 1
+            seen = look_shared(f, t, s, m, p, o)
+            v3, w3 = f.peaks_of(seen), f.lasts_of(seen)
+            best, when, last = track(at_end, f.smooth_of(v3), (v1, v2, v3), (t1, t2, t), (w2, w3), best, when, last)
+            when = map_fields(extrema.end_time, when, best, v3, t, at_end, t)
+            best = map_fields(extrema.end_value, best, v3, at_end)
+            if rows < history.shape[0]:
+                record(history, rows, t, seen)
+                rows += 1
         if not any_lane(flying):
             break
-        v0, v1, w1, t0, t1 = v1, v2, w2, t1, finish
+        v0, v1, w1, t0, t1, t2 = v1, v2, w2, t1, t2, finish
     return t, s, m, status, flying, best, when, last, rows
 
 

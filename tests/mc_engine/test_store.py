@@ -1,4 +1,5 @@
 import json
+import os
 import time
 from hashlib import sha256
 from itertools import pairwise
@@ -337,27 +338,38 @@ def wide(run):
     return store, {**arrays, "status": np.zeros(5000, int), "reason": np.full(5000, "", object)}
 
 
+def shortest(act, repeats=7):
+    """Shortest of some times [s] that `act` takes; it gets the number of the repeat."""
+    times = []
+    for repeat in range(repeats):
+        begin = time.perf_counter()
+        act(repeat)
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
 @pytest.mark.benchmark
-def test_ten_thousand_cases_of_forty_columns_are_read_in_50_ms(wide):
+def test_reading_a_store_costs_at_most_four_times_what_pandas_takes_for_the_same_files(wide):
+    """The digest of every part is checked on the way."""
     store, arrays = wide
     store.append(0, 5000, arrays)
     store.append(5000, 5000, arrays)
-    store.cases()
-    times = []
-    for _ in range(5):
-        begin = time.perf_counter()
-        assert len(store.cases()) == 10_000
-        times.append(time.perf_counter() - begin)
-    assert min(times) < 0.050
+    ours = shortest(lambda _: store.cases())
+    assert len(store.cases()) == 10_000
+    assert ours < 4.0 * shortest(lambda _: pd.read_parquet(store.path / "cases"))
 
 
 @pytest.mark.benchmark
-def test_storing_costs_less_than_10_us_per_case(wide):
+def test_storing_costs_at_most_four_times_a_synced_file_of_the_same_table(wide, tmp_path):
+    """A part and its line in the journal are two synced files and a synced folder."""
     store, arrays = wide
-    times = []
+
+    def plain(repeat):
+        path = tmp_path / f"{repeat}.parquet"
+        pd.DataFrame(arrays).to_parquet(path, compression="zstd")
+        with path.open("rb+") as file:
+            os.fsync(file.fileno())
+
     with store.lock():
-        for part in range(4):
-            begin = time.perf_counter()
-            store.append(5000 * part, 5000, arrays)
-            times.append(time.perf_counter() - begin)
-    assert min(times) / 5000 < 10e-6
+        ours = shortest(lambda repeat: store.append(5000 * repeat, 5000, arrays))
+    assert ours < 4.0 * shortest(plain)
