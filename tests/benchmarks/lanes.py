@@ -3,7 +3,7 @@
     python -m tests.benchmarks.lanes
 
 Only the kernel call is timed; compiling, or loading the compiled kernel, is printed apart.  The widths take
-turns and the shortest time of each counts, so that other work on the machine disturbs the ratio little.
+turns at short flights and the shortest time of each counts, so that other work on the machine disturbs little.
 """
 
 import platform
@@ -47,7 +47,7 @@ class Timing:
         return self.ns[1] / self.ns[width]
 
 
-def orbit(n_cases: int = 2048) -> Flight:
+def orbit(n_cases: int = 256) -> Flight:
     """Low orbits with J2 and drag, 400 steps."""
     rng = np.random.default_rng(1)
     model = load_model("orbit_model.py", HERE)
@@ -56,7 +56,7 @@ def orbit(n_cases: int = 2048) -> Flight:
     return Flight("two-body + J2 + drag orbit", model, HERE, inputs, n_cases)
 
 
-def deorbit(n_cases: int = 2048) -> Flight:
+def deorbit(n_cases: int = 256) -> Flight:
     """The de-orbit campaign with the errors of its file and continuous control: about 707 steps to entry."""
     rng = np.random.default_rng(1)
     model = load_model("campaigns.deorbit")
@@ -85,7 +85,7 @@ def caller(cases: Flight, width: int) -> Callable[[], float]:
     return fly
 
 
-def measure(cases: Flight, widths: Iterable[int] = WIDTHS, repeats: int = 12) -> Timing:
+def measure(cases: Flight, widths: Iterable[int] = WIDTHS, repeats: int = 60) -> Timing:
     """Timing of the kernels of several widths on the same cases."""
     timing = Timing()
     flights = {}
@@ -100,10 +100,18 @@ def measure(cases: Flight, widths: Iterable[int] = WIDTHS, repeats: int = 12) ->
     return timing
 
 
-def main() -> None:
+def processor() -> str:
+    """The processor's name as its maker and as the compiler calls it."""
     from llvmlite import binding
 
-    print(f"{platform.processor() or platform.machine()} ({binding.get_host_cpu_name()}), one thread")
+    about = Path("/proc/cpuinfo")
+    lines = about.read_text().splitlines() if about.exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return f"{names[0] if names else platform.processor()} ({binding.get_host_cpu_name()})"
+
+
+def main() -> None:
+    print(f"{processor()}, one thread")
     for cases in (orbit(), deorbit()):
         timing = measure(cases)
         for width, ns in timing.ns.items():
