@@ -79,8 +79,8 @@ class Setting(Field):
 class Extremum:
     """A running extremum of one quantity: the symbols under which `evaluate` finds value and time.
 
-    kind : "max", "min", or "last_above": the last time at which the quantity stood above `level`
-    (then `time` is meant, and `value` is the quantity at the end).
+    kind : "max", "min", or "last_above": the last time at which the quantity stood above `level` (SI); then only
+        the time is of use.
     smooth : between the steps the extremum is a parabola's; a quantity with corners is taken at the steps.
     """
 
@@ -180,6 +180,22 @@ class Model:
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
 
+    def __post_init__(self) -> None:
+        inputs: tuple[Field, ...] = (*self.parameters, *self.settings)
+        outputs: tuple[Field, ...] = (*self.metrics, *(Field(f"end_{one.name}", "", "") for one in self.states))
+        _refuse_twice("input", [one.symbol for one in inputs])
+        _refuse_twice("column", [one.name for one in (*inputs, *outputs)])
+        _refuse_twice("quantity", [one.name for one in self.quantities])
+        _refuse_twice("extremum", [one.name for one in self.extrema])
+        known = {one.name for one in self.quantities}
+        for extremum in self.extrema:
+            if extremum.quantity not in known:
+                raise ModelError(f'extremum "{extremum.name}": there is no quantity "{extremum.quantity}"')
+        if self.event_list and self.events is None:
+            raise ModelError("event_list names events, but the model has no function `events`")
+        if any(event.action == "switch" for event in self.event_list) and self.switch is None:
+            raise ModelError('an event has action = "switch", but the model has no function `switch`')
+
     def input(self, name: str) -> Parameter | Setting:
         """The parameter or setting called `name`; KeyError if the model has none."""
         items: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
@@ -187,6 +203,13 @@ class Model:
             if item.name == name:
                 return item
         raise KeyError(name)
+
+
+def _refuse_twice(what: str, names: list[str]) -> None:
+    """ModelError if a name occurs twice; inputs are compared by their names inside SI code, without unit."""
+    for name in names:
+        if names.count(name) > 1:
+            raise ModelError(f'two {what}s of the model are called "{name}"; give each a name of its own')
 
 
 @dataclass
