@@ -25,7 +25,7 @@ from mc_engine.lanes.adaptive_step import (
 )
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import crossed
-from mc_engine.lanes.functions import any_lane, maximum, minimum, where
+from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, where
 from mc_engine.lanes.lane_access import lane_holds, store_lane, with_column, with_lane
 from mc_engine.lanes.noise import Draws
 from mc_engine.lanes.physics_function import physics
@@ -47,13 +47,15 @@ from mc_engine.status import NO_STOP, NOT_FINITE, STEP_LIMIT
 
 # until: time limit [s]; period: of the sampled control [s]; attempts: cap; first: first length [s], or 0
 Clock = namedtuple("Clock", "until rtol period attempts first order")
-# part of a step that holds an event: lengths, senses at both, which side moved last, next length to look at, how often
-Bracket = namedtuple("Bracket", "low high at_low at_high side look looks")
+# part of a step that holds an event: lengths, senses at both, which side moved last, next length to look at, how
+# often one was looked at, width at which it is closed
+Bracket = namedtuple("Bracket", "low high at_low at_high side look looks width")
 
 _BROKEN, _CAPPED, _UNSTOPPED = float(NOT_FINITE), float(STEP_LIMIT), float(NO_STOP)
 _REACH = 1e-5  # of a step: length of the tangent over which rates are taken
-_SECANTS = 30  # then bisection, which cannot stall
-_CLOSED = 4.5e-16
+_CHORDS = 8.0  # then every other look halves the bracket, so that none stalls
+_CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
+_CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
 _NEVER = 1e300
 
 
@@ -112,6 +114,12 @@ def _fires(armed, before, after, direction, mask):
 
 
 @physics
+def _fires_sharply(kind, armed, before, after, direction):
+    """Mask: something else than a peak crosses, whose time is wanted to the last digits."""
+    return (kind != PEAK) & (armed > 0.5) & crossed(before, after, direction)
+
+
+@physics
 def _flag(mask, like):
     return where(mask, 1.0, 0.0) + 0.0 * like
 
@@ -134,6 +142,8 @@ def _nothing(value):
 def _narrow(bracket, signs, values, looking):
     """The bracket after a look, and the next length to look at: the first zero of the chords, or the middle.
 
+    A look keeps a little off both ends, so that a zero found from one side is soon enclosed from the other.
+
     The Illinois rule halves the sense at a side that stays: M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
     """
     after = any_field(map_fields(crossed, bracket.at_low, values, signs))
@@ -143,9 +153,12 @@ def _narrow(bracket, signs, values, looking):
     side = where(back, 1.0, where(ahead, -1.0, bracket.side))
     low, high = where(ahead, bracket.look, bracket.low), where(back, bracket.look, bracket.high)
     chord = least(map_fields(_secant, at_low, at_high, signs, low, high))
-    inside = (chord > low) & (chord < high) & (bracket.looks < float(_SECANTS))
+    margin = 0.4 * bracket.width
+    chord = minimum(maximum(chord, low + margin), high - margin)
+    every_other = bracket.looks - 2.0 * floor(0.5 * bracket.looks) < 0.5
+    inside = (chord > low) & (chord < high) & ((bracket.looks < _CHORDS) | every_other)
     look = where(inside, chord, 0.5 * (low + high))
-    return Bracket(low, high, at_low, at_high, side, look, bracket.looks + 1.0), back
+    return Bracket(low, high, at_low, at_high, side, look, bracket.looks + 1.0, bracket.width), back
 
 
 narrow = compile_callable(_narrow)
@@ -254,7 +267,7 @@ def _fly(
     zero = case * 0.0
     active, status, attempts, sample, limit = zero + 1.0, zero, zero, zero + 1.0, zero + _NEVER
     closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
-    bracket = Bracket(zero, zero, armed, armed, zero, zero, zero)
+    bracket = Bracket(zero, zero, armed, armed, zero, zero, zero, zero)
     best, when = here.values, map_fields(_at, here.values, zero)
     rows = 0
     if history.shape[0] > 0:
@@ -286,11 +299,13 @@ def _fly(
         if any_lane(over | looking):
             armed = select(over, hopes, armed)
             seen = map_fields(_watched, armed, there.senses)
-            opened = Bracket(zero, trial, map_fields(_watched, armed, here.senses), seen, zero, trial, zero)
+            sharp = any_field(map_fields(_fires_sharply, kinds, armed, here.senses, there.senses, signs))
+            enough = where(sharp, _CLOSED * (abs(here.t) + trial), maximum(_CREST * trial, _CLOSED * abs(here.t)))
+            opened = Bracket(zero, trial, map_fields(_watched, armed, here.senses), seen, zero, trial, zero, enough)
             bracket, back = narrow(select(over, opened, bracket), signs, seen, over | looking)
             beyond = select(back, there, beyond)
             closing = closing | over
-            closed = flying & closing & (bracket.high - bracket.low <= _CLOSED * (abs(here.t) + bracket.high))
+            closed = flying & closing & (bracket.high - bracket.low <= bracket.width)
         arrived = fits | closed
         now = select(closed, beyond, there)
         fired = map_fields(_fires, armed, here.senses, now.senses, signs, closed)

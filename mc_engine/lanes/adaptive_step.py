@@ -100,9 +100,9 @@ def _rate(ahead, behind, inverse):
 
 
 @physics
-def _sense_of(kind, value, rate, reach):
+def _sense_of(kind, value, rate):
     """Rate of a peak, else the value; on zero, where an event has just ended a step, the side it is going to."""
-    return where(kind == PEAK, rate, where(value == 0.0, rate * reach, value))
+    return where(kind == PEAK, rate, where(value == 0.0, 1e-30 * rate, value))
 
 
 def _watch(f, t, s, m, p, o):
@@ -123,7 +123,7 @@ def _sense(f, t, s, m, k, p, o, reach):
     ahead = watch(f, t + reach, add_scaled(s, reach, k), m, p, o)
     behind = watch(f, t - reach, add_scaled(s, -reach, k), m, p, o)
     rates = map_fields(_rate, ahead, behind, 0.5 / reach)
-    return Instant(t, s, m, k, map_fields(_sense_of, f.kinds_of(values), values, rates, reach), rates, values)
+    return Instant(t, s, m, k, map_fields(_sense_of, f.kinds_of(values), values, rates), rates, values)
 
 
 sense = compile_callable(_sense)

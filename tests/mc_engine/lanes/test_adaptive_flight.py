@@ -178,3 +178,26 @@ def test_512_of_512_cases_flown_alone_have_the_bits_of_the_flight_together(wave)
 def test_a_flight_to_the_time_limit_without_its_stop_says_so(wave):
     assert flown(wave, stop_s=1000.0)["status"][0] == "no-stop"
     assert flown(wave, stop_s=1000.0)["end_time_s"][0] == 100.0
+
+
+def test_a_case_that_needs_more_attempts_than_allowed_ends_as_step_limit(wave):
+    clock = replace(wave.clock, attempts=40)
+    got = flown(replace(wave, clock=clock), stop_s=np.array([1.0, 99.0]))
+    assert list(got["status"]) == ["ok", "step-limit"]
+    assert 0.0 < got["end_time_s"][1] < 99.0
+
+
+def test_the_step_is_chosen_for_the_tolerance_not_far_below_it(wave):
+    """Attempts of DOP853 on a sine: a tenth of the tolerance costs 10^(1/8) = 1.33 times the steps."""
+
+    def needed(tolerance):
+        def flies(attempts):
+            clock = replace(wave.clock, attempts=attempts, control_period=np.inf, atol=tolerance)
+            quiet = replace(wave, clock=clock, extrema=())
+            return flown(quiet, stop_s=99.0, level_m=9.0, tolerance=tolerance)["status"][0] == "ok"
+
+        return next(n for n in range(20, 1000, 4) if flies(n))
+
+    coarse, fine = needed(1e-6), needed(1e-12)
+    assert coarse < 200  # sixteen turns of the wave, each with a top that is met
+    assert 1.33**6 * 0.6 < fine / coarse < 1.33**6 * 1.4
