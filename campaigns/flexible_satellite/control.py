@@ -1,0 +1,138 @@
+"""Sampled attitude control: the robust constrained PID, its torque limit, and what the thrusters make of it.
+
+SI.  Numbers in brackets are equations of H. Taei, S. Ayati, S. F. Mousavi, Iranian Journal of Mechanical Engineering
+24(3), 2022.  Everything is computed at a sample and held until the next, `o.step * o.steps_per_sample` later.
+"""
+
+from campaigns.flexible_satellite.dynamics import Memory, body_rate, initial, orbital_rate
+from mc_engine.lanes import any_lane, physics, sqrt, where
+from mc_engine.lanes.noise import normal_pair, uniform_pair
+from mc_engine.physics.attitude import turned_slightly
+from mc_engine.physics.pulse_modulators import Pulses, at_rest, sampled_pulses
+
+# settings arrive as numbers: places in the lists of words of `model.py`
+PWPF = 1.0
+ORBITAL = 1.0
+PER_SAMPLE = 1.0
+
+
+@physics
+def start(p, o):
+    """Before the first sample: nothing fired, and an integral that the first sample brings to zero."""
+    zero, calm, half = 0.0, at_rest(), -0.5 * o.step * o.steps_per_sample
+    q1, q2, q3, wx, wy, wz = known(initial(p, o), p, o)
+    return Memory(
+        half * (p.c1 * wx + p.c2 * q1), half * (p.c1 * wy + p.c2 * q2), half * (p.c1 * wz + p.c2 * q3),
+        zero, zero, zero, zero, zero, zero, zero, zero, zero,
+        calm.filtered, calm.output, calm.age, calm.pulses, calm.shortest,
+        calm.filtered, calm.output, calm.age, calm.pulses, calm.shortest,
+        calm.filtered, calm.output, calm.age, calm.pulses, calm.shortest,
+        zero, zero, zero, zero, zero, zero,
+    )  # fmt: skip
+
+
+@physics
+def known(s, p, o):
+    """Vector part of the attitude and the rate [rad/s] that the law works with, without errors."""
+    wx, wy, wz = body_rate(s, p)
+    if o.rate_used == ORBITAL:
+        wx, wy, wz = orbital_rate(s, wx, wy, wz, p)
+    return s.q1, s.q2, s.q3, wx, wy, wz
+
+
+@physics
+def measured(s, p, o, draws):
+    """The same as the sensors give it, each axis with a fresh error."""
+    q1, q2, q3, wx, wy, wz = known(s, p, o)
+    if any_lane(p.rate_noise + p.attitude_noise > 0.0):
+        n1, n2 = normal_pair(draws, 0)
+        n3, n4 = normal_pair(draws, 1)
+        n5, n6 = normal_pair(draws, 2)
+        wx, wy, wz = wx + p.rate_noise * n1, wy + p.rate_noise * n2, wz + p.rate_noise * n3
+        k = p.attitude_noise
+        q1, q2, q3 = turned_slightly(s.q0, q1, q2, q3, k * n4, k * n5, k * n6)
+    return q1, q2, q3, wx, wy, wz
+
+
+@physics
+def limited(x, y, z, limit):
+    """The vector, shortened to `limit` where it is longer.  (15)"""
+    size2 = x * x + y * y + z * z
+    over = size2 > limit * limit
+    if any_lane(over):
+        scale = where(over, limit / sqrt(where(over, size2, 1.0)), 1.0)
+        x, y, z = scale * x, scale * y, scale * z
+    return x, y, z
+
+
+@physics
+def sign(x):
+    """-1, 0 or 1."""
+    return where(x > 0.0, 1.0, where(x < 0.0, -1.0, 0.0))
+
+
+@physics
+def law(q1, q2, q3, wx, wy, wz, ix, iy, iz, p):
+    """Commanded torque [N m]; i is the integral of c1 w + c2 qv.  (11), (13)-(16)
+
+    The source's (12) and (13) subtract different multiples of qv - qv(0) from the integral; `gamma` is the multiple.
+    """
+    fast = wx * wx + wy * wy + wz * wz >= p.rate_limit * p.rate_limit
+    kp, kd, ki = where(fast, p.kp_fast, p.kp), where(fast, p.kd_fast, p.kd), where(fast, p.ki_fast, p.ki)
+    x = -kd * wx - kp * q1 - ki * (ix - p.gamma * (q1 - p.q1))
+    y = -kd * wy - kp * q2 - ki * (iy - p.gamma * (q2 - p.q2))
+    z = -kd * wz - kp * q3 - ki * (iz - p.gamma * (q3 - p.q3))
+    x, y, z = limited(x, y, z, p.torque_limit)
+    if any_lane(p.dbar > 0.0):
+        x = x - p.dbar * sign(p.beta * wx + p.lambda2 * q1)
+        y = y - p.dbar * sign(p.beta * wy + p.lambda2 * q2)
+        z = z - p.dbar * sign(p.beta * wz + p.lambda2 * q3)
+    return x, y, z
+
+
+@physics
+def modulated(pulses, command, p, period):
+    """One axis: the modulator after the sample, and the mean of its output over it."""
+    return sampled_pulses(pulses, command, p.gain, p.level, p.on, p.off, p.time_constant, period, p.decay)
+
+
+@physics
+def control(t, s, m, p, o, draws):
+    """One sample: measure, integrate, ask for a torque, fire."""
+    period = o.step * o.steps_per_sample
+    q1, q2, q3, wx, wy, wz = measured(s, p, o, draws)
+    nx, ny, nz = p.c1 * wx + p.c2 * q1, p.c1 * wy + p.c2 * q2, p.c1 * wz + p.c2 * q3
+    half = 0.5 * period  # by trapezoids: m.integral is half a sample behind
+    ix, iy, iz = m.integral_x + half * nx, m.integral_y + half * ny, m.integral_z + half * nz
+    ux, uy, uz = law(q1, q2, q3, wx, wy, wz, ix, iy, iz, p)
+    tx, ty, tz = ux, uy, uz
+    x = Pulses(m.filtered_x, m.output_x, m.age_x, m.pulses_x, m.shortest_x)
+    y = Pulses(m.filtered_y, m.output_y, m.age_y, m.pulses_y, m.shortest_y)
+    z = Pulses(m.filtered_z, m.output_z, m.age_z, m.pulses_z, m.shortest_z)
+    next_x, next_y, next_z, then_x, then_y, then_z = m.next_x, m.next_y, m.next_z, m.then_x, m.then_y, m.then_z
+    if o.actuator == PWPF:
+        x, fx = modulated(x, ux, p, period)
+        y, fy = modulated(y, uy, p, period)
+        z, fz = modulated(z, uz, p, period)
+        tx, ty, tz = p.torque * fx, p.torque * fy, p.torque * fz
+        if any_lane(p.now < 1.0):  # valves that open and close late: shares for the next two samples
+            ax, ay, az = m.next_x + p.now * tx, m.next_y + p.now * ty, m.next_z + p.now * tz
+            next_x, next_y, next_z = m.then_x + p.next * tx, m.then_y + p.next * ty, m.then_z + p.next * tz
+            then_x, then_y, then_z = p.then * tx, p.then * ty, p.then * tz
+            tx, ty, tz = ax, ay, az
+    tx, ty, tz = p.thrust_x * tx, p.thrust_y * ty, p.thrust_z * tz
+    offset = p.disturbance_offset
+    if o.disturbance_draw == PER_SAMPLE:
+        offset, _ = uniform_pair(draws, 3)
+    steady = p.disturbance_amplitude * offset
+    return Memory(
+        m.integral_x + period * nx, m.integral_y + period * ny, m.integral_z + period * nz,
+        ux, uy, uz, tx, ty, tz,
+        p.axx * tx + p.axy * ty + p.axz * tz + steady,
+        p.ayx * tx + p.ayy * ty + p.ayz * tz + steady,
+        p.azx * tx + p.azy * ty + p.azz * tz + steady,
+        x.filtered, x.output, x.age, x.pulses, x.shortest,
+        y.filtered, y.output, y.age, y.pulses, y.shortest,
+        z.filtered, z.output, z.age, z.pulses, z.shortest,
+        next_x, next_y, next_z, then_x, then_y, then_z,
+    )  # fmt: skip

@@ -1,0 +1,158 @@
+"""What is seen along a flight of the flexible satellite and what it comes to: quantities and metrics.  SI, radians."""
+
+from collections import namedtuple
+
+from campaigns.flexible_satellite.control import PWPF
+from campaigns.flexible_satellite.dynamics import body_rate
+from mc_engine.lanes import atan2, maximum, minimum, physics, sqrt, where
+from mc_engine.model import Extremum, Field
+
+SETTLED = 1e-3  # of 1 - q0: the source's "accuracy 0.001"
+DAMPED = 0.005  # of each mode: Table 5's bound on the modal displacement
+_MODAL = "kg^(1/2) m"
+
+QUANTITIES = (
+    Field("q0", "", "attitude in the orbital frame, scalar part"),
+    *(Field(f"q{i}", "", f"attitude in the orbital frame, component {i} of the vector part") for i in (1, 2, 3)),
+    *(Field(f"omega_{axis}_rad_s", "rad/s", f"inertial body rate about {axis}") for axis in "xyz"),
+    *(Field(f"eta_{i}", "", f"displacement of mode {i}, {_MODAL}") for i in (1, 2, 3, 4)),
+    *(Field(f"command_{axis}_n_m", "N m", f"torque that the law asks for about {axis}") for axis in "xyz"),
+    *(Field(f"torque_{axis}_n_m", "N m", f"torque of the {axis} actuator, mean over the sample") for axis in "xyz"),
+    Field("scalar_error", "", "1 - q0"),
+    Field("attitude_error_deg", "deg", "angle between body and orbital frame"),
+    Field("rate_rad_s", "rad/s", "size of the inertial body rate"),
+    Field("largest_mode", "", f"largest modal displacement without sign, {_MODAL}"),
+    Field("control_effort_n_m_s", "N m s", "impulse of all actuators so far"),
+)
+EXTREMA = (
+    Extremum("rate", "rate_rad_s", smooth=False),  # the rate limit switches gains: corners
+    Extremum("mode", "largest_mode"),
+    Extremum("settling", "scalar_error", "last_above", SETTLED),
+    Extremum("damping", "largest_mode", "last_above", DAMPED),
+)
+METRICS = (
+    *QUANTITIES[:11],
+    Field("peak_rate_rad_s", "rad/s", "largest inertial body rate"),
+    Field("peak_modal_displacement", "", f"largest displacement of any mode, {_MODAL}"),
+    Field("settling_time_s", "s", "last time with 1 - q0 above 1e-3"),
+    Field("damping_time_s", "s", "last time with the displacement of any mode above 0.005"),
+    Field("control_effort_n_m_s", "N m s", "impulse of all actuators: integral of |u1| + |u2| + |u3|"),
+    Field("attitude_effort_s", "s", "integral of |q1| + |q2| + |q3|"),
+    Field("scalar_effort_s", "s", "integral of |1 - q0|"),
+    Field("q_vector_norm", "", "size of the vector part at the end"),
+    Field("attitude_error_deg", "deg", "angle between body and orbital frame at the end"),
+    Field("eta_norm", "", f"root of the sum of squares of the modal displacements at the end, {_MODAL}"),
+    Field("pulse_count", "", "pulses of all modulators"),
+    Field("min_pulse_s", "s", "shortest pulse of any modulator; none for an ideal actuator"),
+    *(Field(f"pulse_count_{axis}", "", f"pulses about {axis}") for axis in "xyz"),
+    *(Field(f"min_pulse_{axis}_s", "s", f"shortest pulse about {axis}") for axis in "xyz"),
+    *(Field(f"on_time_{axis}_s", "s", f"time that the {axis} thrusters fired") for axis in "xyz"),
+    *(Field(f"impulse_{axis}_n_m_s", "N m s", f"impulse of the {axis} actuator, without sign") for axis in "xyz"),
+    Field("propellant_kg", "kg", "propellant for the impulse of all actuators"),
+)
+Quantities = namedtuple("Quantities", [field.symbol for field in QUANTITIES])  # type: ignore[misc]
+Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]
+
+
+@physics
+def observe(t, s, m, p, o):
+    """The quantities in the order of QUANTITIES."""
+    wx, wy, wz = body_rate(s, p)
+    mode = maximum(maximum(abs(s.eta1), abs(s.eta2)), maximum(abs(s.eta3), abs(s.eta4)))
+    return Quantities(
+        s.q0,
+        s.q1,
+        s.q2,
+        s.q3,
+        wx,
+        wy,
+        wz,
+        s.eta1,
+        s.eta2,
+        s.eta3,
+        s.eta4,
+        m.command_x,
+        m.command_y,
+        m.command_z,
+        m.torque_x,
+        m.torque_y,
+        m.torque_z,
+        1.0 - s.q0,
+        attitude_error(s),
+        sqrt(wx * wx + wy * wy + wz * wz),
+        mode,
+        s.impulse_x + s.impulse_y + s.impulse_z,
+    )
+
+
+@physics
+def vector_norm(s):
+    """Size of the quaternion's vector part."""
+    return sqrt(s.q1 * s.q1 + s.q2 * s.q2 + s.q3 * s.q3)
+
+
+@physics
+def attitude_error(s):
+    """Angle [rad] between body and orbital frame, 0 to pi."""
+    return 2.0 * atan2(vector_norm(s), abs(s.q0))
+
+
+@physics
+def counted(shortest):
+    """The shortest pulse [s], not a number where none has ended."""
+    return where(shortest < float("inf"), shortest, float("nan"))
+
+
+@physics
+def fired(impulse, thrust, p, o):
+    """Time [s] that one axis fired; not a number where its thrust is nothing."""
+    if o.actuator == PWPF:
+        time = impulse / where(thrust > 0.0, p.torque * thrust, float("nan"))
+    else:
+        time = 0.0 * impulse
+    return time
+
+
+@physics
+def evaluate(t, s, m, p, o, best, when):
+    """The metrics in the order of METRICS, at the end."""
+    wx, wy, wz = body_rate(s, p)
+    effort = s.impulse_x + s.impulse_y + s.impulse_z
+    return Metrics(
+        s.q0,
+        s.q1,
+        s.q2,
+        s.q3,
+        wx,
+        wy,
+        wz,
+        s.eta1,
+        s.eta2,
+        s.eta3,
+        s.eta4,
+        best.rate,
+        best.mode,
+        when.settling,
+        when.damping,
+        effort,
+        s.attitude_effort,
+        s.scalar_effort,
+        vector_norm(s),
+        attitude_error(s),
+        sqrt(s.eta1 * s.eta1 + s.eta2 * s.eta2 + s.eta3 * s.eta3 + s.eta4 * s.eta4),
+        m.pulses_x + m.pulses_y + m.pulses_z,
+        counted(minimum(m.shortest_x, minimum(m.shortest_y, m.shortest_z))),
+        m.pulses_x,
+        m.pulses_y,
+        m.pulses_z,
+        counted(m.shortest_x),
+        counted(m.shortest_y),
+        counted(m.shortest_z),
+        fired(s.impulse_x, p.thrust_x, p, o),
+        fired(s.impulse_y, p.thrust_y, p, o),
+        fired(s.impulse_z, p.thrust_z, p, o),
+        s.impulse_x,
+        s.impulse_y,
+        s.impulse_z,
+        effort / p.exhaust_arm,
+    )

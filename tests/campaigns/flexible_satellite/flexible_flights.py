@@ -1,0 +1,67 @@
+"""Short ways to fly the flexible satellite: inputs and results by column name, in declared units."""
+
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+import campaigns.flexible_satellite
+from mc_engine.campaign import load_campaign
+from mc_engine.cases import case_table, full_inputs
+from mc_engine.flight import fly, fly_history, prepare
+from mc_engine.model import load_model
+
+MODEL = load_model("campaigns.flexible_satellite")
+NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settings)}
+FOLDER = Path(campaigns.flexible_satellite.__file__).parent
+SEED = 20221012
+AXES = "xyz"
+END = ["q0", "q1", "q2", "q3", *(f"omega_{axis}_rad_s" for axis in AXES), *(f"eta_{i}" for i in (1, 2, 3, 4))]
+
+_MODULATOR = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
+PWPF = {"actuator": "pwpf", "step_s": 0.005}
+TABLE_4 = PWPF | dict(zip(_MODULATOR, (7.6, 0.62, 0.13, 0.26, 1.1), strict=True))
+TABLE_8 = PWPF | dict(zip(_MODULATOR, (7.39, 0.713, 0.117, 0.225, 1.07), strict=True))
+# with the K_P that the print has lost
+TABLE_9 = PWPF | dict(zip(_MODULATOR, (6.3, 0.9, 0.06, 0.26, 0.8), strict=True)) | {"kp": 5.2, "kd": 26.5, "ki": 0.001}
+TABLE_9 |= {"switching_rate_gain": 0.055, "switching_attitude_gain_1_s": 0.08}
+# nothing acts from outside and nothing damps
+ALONE = {"kp": 0.0, "kd": 0.0, "ki": 0.0, "disturbance_amplitude_n_m": 0.0, "orbit_rate_rad_s": 0.0}
+ALONE |= {"modal_damping_factor": 0.0}
+
+# c0 of Table 11 as printed: rows body x, y, z; columns modes 1 to 4
+C0 = np.array([[7.0, -1.2, 1.1, 1.2], [1.2, 0.9, 2.5, -2.6], [2.2, -1.7, -0.8, -1.1]])
+J = np.diag([100.0, 75.0, 50.0])
+LAMBDA = np.array([0.7, 1.0, 1.8, 2.5])
+
+
+def fly_cases(**inputs):
+    """Columns of as many cases as the longest input has values, eight cases at a time."""
+    n_cases = max((np.size(value) for value in inputs.values()), default=1)
+    return fly(MODEL, NOMINAL | inputs, np.arange(n_cases), SEED, width=8)
+
+
+def fly_one(**inputs):
+    """The row of one case: a number or a word by column name."""
+    return {name: column[0] for name, column in fly_cases(**inputs).items()}
+
+
+def history(rows=30_000, **inputs):
+    """Quantities along the flight of one case."""
+    return fly_history(MODEL, NOMINAL | inputs, 0, SEED, rows=rows)[1]
+
+
+def prepared(**inputs):
+    """(kernel parameters by name, refusals) of as many cases as the longest input has values."""
+    n_cases = max((np.size(value) for value in inputs.values()), default=1)
+    ready = prepare(MODEL, NOMINAL | inputs, n_cases)
+    return dict(zip(MODEL.kernel_parameters._fields, ready.parameters, strict=True)), ready.refusals
+
+
+@lru_cache
+def fly_campaign(name, n_cases):
+    """Columns of the first cases of a campaign file of this folder, as its own runs have them."""
+    campaign = load_campaign(FOLDER / name)
+    ids = np.arange(n_cases)
+    inputs = full_inputs(campaign, case_table(campaign, ids))
+    return fly(campaign.model, inputs, ids, campaign.seed, width=8)

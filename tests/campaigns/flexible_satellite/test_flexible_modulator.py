@@ -1,0 +1,200 @@
+"""The pulse modulator: closed forms, the campaign's flight of them under a constant torque, and any held command."""
+
+import numpy as np
+import pytest
+from flexible_flights import TABLE_4, TABLE_8, TABLE_9, fly_cases, fly_one, history
+from scipy.integrate import solve_ivp
+
+from mc_engine.physics.pulse_modulators import (
+    at_rest,
+    dead_band,
+    first_on_time,
+    pause_time,
+    pulse_time,
+    sampled_pulses,
+    shortest_pulse,
+)
+
+GAIN, TAU, OFF, HYSTERESIS, LEVEL = 7.39, 0.713, 0.117, 0.225, 1.07  # Table 8
+ON = OFF + HYSTERESIS
+
+
+def modulator_of(table):
+    """(gain, time constant, level, on, off)."""
+    off = table["pwpf_u_off"]
+    return table["pwpf_gain"], table["pwpf_time_constant_s"], table["thrust_level"], off + table["pwpf_hysteresis"], off
+
+
+# ---- closed forms
+
+
+@pytest.mark.parametrize(
+    ("table", "shortest"), [(TABLE_4, 0.019589), (TABLE_8, 0.020582), (TABLE_9, 0.047669)], ids=["4", "8", "9"]
+)
+def test_the_shortest_pulse_of_each_table_is_that_of_equation_19(table, shortest):
+    assert shortest_pulse(*modulator_of(table)) == pytest.approx(shortest, abs=1e-6)
+
+
+def test_only_the_level_itself_as_output_gives_the_printed_0_021_s():
+    gain, tau, level, on, off = modulator_of(TABLE_8)
+    assert round(float(shortest_pulse(gain, tau, level, on, off)), 3) == 0.021
+    assert shortest_pulse(gain, tau, 1.0, on, off) == pytest.approx(0.0220, abs=5e-5)
+    assert shortest_pulse(gain, tau, 0.5 * level, on, off) == pytest.approx(0.0418, abs=5e-5)
+
+
+def test_the_closed_forms_of_table_8_under_0_3():
+    on, off = pulse_time(0.3, GAIN, TAU, LEVEL, ON, OFF), pause_time(0.3, GAIN, TAU, ON, OFF)
+    assert on == pytest.approx(0.027103, abs=1e-6)
+    assert off == pytest.approx(0.080803, abs=1e-6)
+    assert LEVEL * on / (on + off) == pytest.approx(0.26875, abs=1e-5)
+    assert dead_band(GAIN, ON) == pytest.approx(0.04628, abs=5e-6)
+
+
+# ---- the campaign under a constant torque
+
+# a body too heavy to turn, 120 s, and an attitude that asks for r = kp q1 about x
+HEAVY = TABLE_8 | {f"inertia_{axis}_kg_m2": 1e12 for axis in "xyz"} | {"kd": 0.0, "ki": 0.0, "duration_s": 120.0}
+HEAVY |= {"disturbance_amplitude_n_m": 0.0, "orbit_rate_rad_s": 0.0, "initial_q2": 0.0, "initial_q3": 0.0}
+HEAVY |= {f"initial_omega_{axis}_rad_s": 0.0 for axis in "xyz"}
+
+
+def asking(r):
+    """Inputs of a craft whose x axis asks for the torque r for ever."""
+    q1 = -np.asarray(r) / 5.0
+    return HEAVY | {"initial_q0": np.sqrt(1.0 - q1 * q1), "initial_q1": q1}
+
+
+@pytest.mark.parametrize("period", [0.005, 0.02, 0.1])
+def test_flown_pulses_and_pauses_are_those_of_the_closed_forms(period):
+    """However coarse the samples: a command that is held has pulses known to the last digit."""
+    row = fly_one(**asking(0.3), steps_per_sample=period / 0.005)
+    pulses, t = row["pulse_count_x"], 120.0
+    first = first_on_time(0.3, GAIN, TAU, ON)
+    cycle = 0.027103 + 0.080803
+    assert pulses == np.floor((t - first) / cycle) + 1.0
+    assert row["min_pulse_x_s"] == pytest.approx(0.027103, abs=1e-6)
+    assert row["on_time_x_s"] / pulses == pytest.approx(0.027103, rel=1e-3)
+    assert (t - first - row["on_time_x_s"]) / pulses == pytest.approx(0.080803, rel=1e-3)
+
+
+def test_the_mean_output_is_that_of_the_closed_forms():
+    row = fly_one(**asking(0.3))
+    assert LEVEL * row["on_time_x_s"] / 120.0 == pytest.approx(0.26875, rel=0.01)
+    assert row["impulse_x_n_m_s"] / 120.0 == pytest.approx(0.5 * 0.26875, rel=0.01)  # pairing B
+
+
+def test_flown_over_the_whole_range_the_closed_forms_hold():
+    r = np.linspace(0.06, 0.49, 8)
+    flown = fly_cases(**asking(r))
+    pulses, pauses = pulse_time(r, GAIN, TAU, LEVEL, ON, OFF), pause_time(r, GAIN, TAU, ON, OFF)
+    np.testing.assert_allclose(flown["min_pulse_x_s"], pulses, rtol=1e-7)  # the body turns by some nanoradians
+    np.testing.assert_allclose(flown["on_time_x_s"] / flown["pulse_count_x"], pulses, rtol=1e-2)
+    rest = 120.0 - first_on_time(r, GAIN, TAU, ON) - flown["on_time_x_s"]
+    np.testing.assert_allclose(rest / flown["pulse_count_x"], pauses, rtol=1e-2)
+
+
+def test_inside_the_dead_band_nothing_is_ever_fired():
+    edge = dead_band(GAIN, ON)
+    inside, outside = fly_cases(**asking(np.array([0.9999 * edge, 1.0001 * edge])))["pulse_count_x"]
+    assert (inside, outside > 0.0) == (0.0, True)
+
+
+def test_beyond_the_level_and_the_switch_off_the_thruster_fires_for_good():
+    strong = asking(1.09) | {"torque_limit_n_m": 2.0}
+    row = fly_one(**strong)
+    assert row["pulse_count_x"] == 1.0
+    assert np.isnan(row["min_pulse_x_s"])  # it has not ended
+    assert row["on_time_x_s"] == pytest.approx(120.0 - first_on_time(1.09, GAIN, TAU, ON), abs=1e-9)
+
+
+def test_a_torque_of_the_other_sign_fires_the_other_thrusters_alike():
+    plus, minus = fly_cases(**asking(np.array([0.3, -0.3])))["impulse_x_n_m_s"]
+    assert plus == minus > 0.0
+    seen = history(**asking(-0.3))["torque_x_n_m"]
+    assert seen.min() == -0.535
+    assert seen.max() <= 0.0
+
+
+def test_an_axis_that_asks_for_nothing_stays_silent():
+    row = fly_one(**asking(0.3))
+    assert (row["pulse_count_y"], row["pulse_count_z"], row["impulse_y_n_m_s"]) == (0.0, 0.0, 0.0)
+
+
+# ---- valves that open and close late
+
+
+@pytest.mark.parametrize("delay", [0.0025, 0.005, 0.008, 0.01])
+def test_a_late_valve_moves_every_pulse_by_its_delay_and_keeps_its_impulse(delay):
+    on_time, late = (history(rows=30_000, **asking(0.3), valve_delay_s=d) for d in (0.0, delay))
+    t = on_time["t_s"][:-1] + 0.0025
+    first, second = (seen["torque_x_n_m"][:-1] for seen in (on_time, late))
+    window = (t > 0.1) & (t < 0.3)  # two whole pulses, pauses about them
+    assert second[window].sum() == pytest.approx(first[window].sum(), rel=1e-9)
+    centre = [np.sum(t[window] * one[window]) / np.sum(one[window]) for one in (first, second)]
+    assert centre[1] - centre[0] == pytest.approx(delay, abs=1e-12)
+
+
+def test_late_valves_do_not_change_what_the_modulator_counts():
+    on_time, late = fly_one(**asking(0.3)), fly_one(**asking(0.3), valve_delay_s=0.008)
+    assert late["pulse_count_x"] == on_time["pulse_count_x"]
+    assert late["min_pulse_x_s"] == pytest.approx(on_time["min_pulse_x_s"], rel=1e-9)
+
+
+# ---- any command that is held from sample to sample
+
+
+def followed(commands, period):
+    """(lag, mean outputs, pulses, shortest): the lag integrated by SciPy from switch to switch."""
+    f, y, means, begins, shortest, t = 0.0, 0.0, [], [], np.inf, 0.0
+    for command in commands:
+        left, fired = period, 0.0
+        while left > 0.0:
+
+            def rate(_, f, r=command, y=y):
+                return (GAIN * (r - LEVEL * y) - f) / TAU
+
+            events = [lambda _, f, y=y: y * f[0] - OFF] if y else [lambda _, f, s=s: s * f[0] - ON for s in (1, -1)]
+            for event in events:
+                event.terminal, event.direction = True, -1 if y else 1
+            flight = solve_ivp(rate, (0.0, left), [f], "DOP853", events=events, rtol=1e-12, atol=1e-13)
+            f, spent = flight.y[0, -1], flight.t[-1]
+            left, t, fired = left - spent, t + spent, fired + y * spent
+            if flight.status == 1:
+                if y:
+                    shortest = min(shortest, t - begins[-1])
+                    y = 0.0
+                else:
+                    y = np.sign(f)
+                    begins.append(t)
+                left = 0.0 if left < 1e-13 else left
+            else:
+                left = 0.0
+        means.append(fired / period)
+    return f, np.array(means), len(begins), shortest
+
+
+@pytest.mark.parametrize("period", [0.005, 0.03, 0.2])
+def test_under_any_held_command_the_samples_are_those_of_the_integrated_lag(period):
+    draw = np.random.default_rng([20221012, int(1000 * period)])
+    commands = np.clip(np.cumsum(draw.normal(0.0, 0.15, 40)), -0.9, 0.9)
+    pulses, means = at_rest(), []
+    for command in commands:
+        pulses, mean = sampled_pulses(pulses, command, GAIN, LEVEL, ON, OFF, TAU, period, np.exp(-period / TAU))
+        means.append(mean)
+    lag, wanted, count, shortest = followed(commands, period)
+    np.testing.assert_allclose(means, wanted, rtol=0.0, atol=1e-8)
+    assert pulses.filtered == pytest.approx(lag, abs=1e-8)
+    assert pulses.pulses == count
+    assert pulses.shortest == pytest.approx(shortest, abs=1e-8)
+    assert period < 0.01 or count > 3
+
+
+def test_a_sample_with_more_switches_than_are_followed_goes_on_with_the_next():
+    """0.5 s hold four pulses and pauses of 0.108 s, eight switches: the ninth waits for the next sample."""
+    pulses, fired = at_rest(), 0.0
+    for _ in range(20):
+        pulses, mean = sampled_pulses(pulses, 0.3, GAIN, LEVEL, ON, OFF, TAU, 1.0, np.exp(-1.0 / TAU))
+        fired += mean
+        assert abs(mean) <= 1.0
+        assert np.isfinite(pulses.filtered)
+    assert 0.1 < fired / 20.0 < 0.5
