@@ -62,13 +62,17 @@ def kernel(
 
 
 def model_sources(model: Model, folder: Path | None) -> list[Path]:
-    """Source files that decide the model's numbers: its package, or the Python files beside it."""
+    """Source files that decide the model's numbers: its package, or the Python files beside it.
+
+    More than the model may import; an edit of a file it does not need costs a compilation, no wrong number.
+    """
     if model.reference.endswith(".py"):
         return sorted(((folder or Path.cwd()) / model.reference).resolve().parent.glob("*.py"))
     module = sys.modules[model.reference]
     assert module.__file__ is not None  # a model's module always comes from a file
     home = Path(module.__file__)
-    return sorted(home.parent.rglob("*.py")) if home.name == "__init__.py" else [home]
+    inside_package = home.name == "__init__.py" or "." in model.reference
+    return sorted(home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py"))
 
 
 def source_digest(model: Model, folder: Path | None) -> str:
@@ -111,6 +115,7 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
     import llvmlite
     import numba
 
+    folder = folder if model.reference.endswith(".py") else None  # a module is the same from everywhere
     versions = f"{numba.__version__} {llvmlite.__version__} {platform.machine()} {sys.version_info[:2]} {_processor()}"
     digest = sha256(f"{model.reference} {source_digest(model, folder)} {versions} {folder}".encode()).hexdigest()
     path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"

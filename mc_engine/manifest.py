@@ -1,6 +1,8 @@
 """The manifest of a run: all that is known before the first case flies, as plain data; and the table's columns."""
 
 from dataclasses import asdict
+from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 from mc_engine.campaign import Campaign
@@ -15,6 +17,28 @@ from mc_engine.parts import Column
 from mc_engine.provenance import engine_version, environment
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
 from mc_engine.streams import SEED_CONTRACT
+
+_SAMPLING = (
+    "cases",
+    "correlation",
+    "designs",
+    "dispersions",
+    "distribution_keys",
+    "distributions",
+    "flight",
+    "halton",
+    "sobol",
+    "sobol_numbers",
+    "streams",
+)
+
+
+def sampling_digest() -> str:
+    """SHA-256 over the sources that draw the inputs of a case and hand them to its kernel."""
+    digest = sha256()
+    for name in _SAMPLING:
+        digest.update(f"{name}\n".encode() + Path(__file__).with_name(f"{name}.py").read_bytes())
+    return digest.hexdigest()
 
 
 def columns_of(campaign: Campaign) -> list[Column]:
@@ -58,6 +82,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
             "title": model.title,
             "source": model.source,
             "digest": source_digest(model, campaign.directory),
+            "sampling_digest": sampling_digest(),
         },
         "inputs": dispersion_records(campaign),
         **_shared_inputs(campaign),

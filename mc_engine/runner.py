@@ -21,11 +21,12 @@ from mc_engine.errors import RunInterrupted, StoreError
 from mc_engine.flight import fly, fly_history
 from mc_engine.interruption import stop_signal
 from mc_engine.kernel import source_digest
-from mc_engine.manifest import columns_of, manifest_of
+from mc_engine.manifest import columns_of, manifest_of, sampling_digest
 from mc_engine.model_faults import naming_faults
 from mc_engine.run_folder import default_folder
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store import Store, create_store, open_store
+from mc_engine.streams import SEED_CONTRACT
 
 ProgressCall = Callable[[int, int, int], None]
 Chunk = tuple[int, int]
@@ -109,9 +110,12 @@ def campaign_of(store: Store) -> Campaign:
     """The campaign as it was flown, at its present length; StoreError if model or campaign have changed since."""
     recorded = store.manifest["campaign"]
     cases = store.n_cases if recorded["design"] in ("lhs", *EXTENSIBLE) else None
-    seed = recorded["seed"] if cases is not None else None
-    campaign = load_campaign(recorded["name"], cases=cases, seed=seed, text=store.campaign_text, directory=store.path)
-    if source_digest(campaign.model, campaign.directory) != store.manifest["model"]["digest"]:
+    campaign = load_campaign(
+        recorded["name"], cases=cases, seed=recorded["seed"], text=store.campaign_text, directory=store.path
+    )
+    ours = source_digest(campaign.model, campaign.directory), sampling_digest(), SEED_CONTRACT
+    model, contract = store.manifest["model"], store.manifest["seed_contract"]
+    if ours != (model["digest"], model["sampling_digest"], contract):
         raise StoreError(f"{store.path}: was flown by other sources of engine or model; run the campaign anew")
     return campaign
 

@@ -17,6 +17,7 @@ from mc_engine.lanes import asin, atan2, floor, maximum, minimum, physics, rint,
 from mc_engine.model import Extremum, Field
 from mc_engine.physics.constants import EARTH_RATE
 
+SETTLED = 0.01  # of its first value: an element's error below this has settled
 QUANTITIES = (
     Field("position_error_m", "m", "distance from the desired place"),
     Field("velocity_error_m_s", "m/s", "difference from the desired velocity"),
@@ -41,13 +42,17 @@ EXTREMA = (
     Extremum("a_below", "a_remaining_pct", "min"),
     Extremum("e_below", "e_remaining_pct", "min"),
     Extremum("omega_below", "omega_remaining_pct", "min"),
-    Extremum("settling", "unsettled_pct", "last_above", 0.01),
+    Extremum("settling", "unsettled_pct", "last_above", SETTLED),
 )
 METRICS = (
     Field("correction_impulse_m_s", "m/s", "S: time integral of thrust over mass"),
     Field("propellant_kg", "kg", "propellant of the correction, from S"),
     Field("peak_force_n", "N", "largest thrust"),
-    Field("settling_time_s", "s", "last time at which the error of a, e or omega is above 1 % of its first value"),
+    Field(
+        "settling_time_s",
+        "s",
+        "last time with the error of a, e or omega above 1 % of its first value; none if so at entry",
+    ),
     Field("overshoot_a_pct", "%", "largest error of a beyond zero, in its first value"),
     Field("overshoot_e_pct", "%", "largest error of e beyond zero, in its first value"),
     Field("overshoot_omega_pct", "%", "largest error of omega beyond zero, in its first value"),
@@ -142,13 +147,16 @@ def evaluate(t, s, m, p, o, best, when):
     entry_time = t + p.delay
     longitude = right_ascension - p.greenwich - EARTH_RATE * entry_time
     spent = propellant(s, p)
-    uncontrolled = o.control == OFF
+    a_error, e_error, omega_error = element_errors(s, p)
+    left = maximum(maximum(abs(m.a_scale * a_error), abs(m.e_scale * e_error)), abs(m.omega_scale * omega_error))
+    # not settled at entry is no settling time: such a case counts against a requirement on it
+    unsettled = (left > SETTLED) | (o.control == OFF)
     a_error, e_error, omega_error = element_errors(initial(p, o), p)
     return Metrics(
         s.impulse,
         spent,
         best.force,
-        where(uncontrolled, float("nan"), when.settling + p.delay),
+        where(unsettled, float("nan"), when.settling + p.delay),
         maximum(-best.a_below, 0.0),
         maximum(-best.e_below, 0.0),
         maximum(-best.omega_below, 0.0),
