@@ -97,6 +97,15 @@ def modulated(pulses, command, p, period):
 
 
 @physics
+def late(fired, coming, after, p):
+    """(torque now, in the next sample, in the one after it) of an axis whose valves open and close late.
+
+    coming, after : what earlier samples have left for this sample and for the next.
+    """
+    return coming + p.now * fired, after + p.next * fired, p.then * fired
+
+
+@physics
 def control(t, s, m, p, o, draws):
     """One sample: measure, integrate, ask for a torque, fire."""
     period = o.step * o.steps_per_sample
@@ -115,11 +124,10 @@ def control(t, s, m, p, o, draws):
         y, fy = modulated(y, uy, p, period)
         z, fz = modulated(z, uz, p, period)
         tx, ty, tz = p.torque * fx, p.torque * fy, p.torque * fz
-        if any_lane(p.now < 1.0):  # valves that open and close late: shares for the next two samples
-            ax, ay, az = m.next_x + p.now * tx, m.next_y + p.now * ty, m.next_z + p.now * tz
-            next_x, next_y, next_z = m.then_x + p.next * tx, m.then_y + p.next * ty, m.then_z + p.next * tz
-            then_x, then_y, then_z = p.then * tx, p.then * ty, p.then * tz
-            tx, ty, tz = ax, ay, az
+        if any_lane(p.now < 1.0):
+            tx, next_x, then_x = late(tx, m.next_x, m.then_x, p)
+            ty, next_y, then_y = late(ty, m.next_y, m.then_y, p)
+            tz, next_z, then_z = late(tz, m.next_z, m.then_z, p)
     tx, ty, tz = p.thrust_x * tx, p.thrust_y * ty, p.thrust_z * tz
     offset = p.disturbance_offset
     if o.disturbance_draw == PER_SAMPLE:

@@ -95,7 +95,7 @@ def rhs(t, s, m, p, o):
     eta1, eta2, eta3, eta4 = modal_rates(s, wx, wy, wz, p)
     wave = p.disturbance_amplitude * sin(p.disturbance_frequency * t)
     dq0, dq1, dq2, dq3 = quaternion_rates(s.q0, s.q1, s.q2, s.q3, wx, wy, wz)
-    turn = 0.5 * p.orbit_rate
+    turn = 0.5 * p.orbit_rate  # the orbital frame's own rate multiplies q from the left: no matrix (9) is needed
     return State(
         dq0 - turn * s.q2,
         dq1 + turn * s.q3,

@@ -19,9 +19,11 @@ from mc_engine.lanes.adaptive_step import (
     arrive,
     first_length,
     glance,
+    ideal_factor,
     leap,
+    next_length,
     sense,
-    step_factor,
+    sense_shared,
 )
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import crossed
@@ -47,16 +49,17 @@ from mc_engine.status import NO_STOP, NOT_FINITE, STEP_LIMIT
 
 # until: time limit [s]; period: of the sampled control [s]; attempts: cap; first: first length [s], or 0
 Clock = namedtuple("Clock", "until rtol period attempts first order")
-# part of a step that holds an event: lengths, senses at both, which side moved last, next length to look at, how
-# often one was looked at, width at which it is closed
-Bracket = namedtuple("Bracket", "low high at_low at_high side look looks width")
+# part of a step that holds an event: lengths, senses and rates at both sides, which side moved last, next length to
+# look at, how often one was looked at, width at which it is closed
+Bracket = namedtuple("Bracket", "low high at_low at_high rate_low rate_high side look looks width")
 
 _BROKEN, _CAPPED, _UNSTOPPED = float(NOT_FINITE), float(STEP_LIMIT), float(NO_STOP)
 _REACH = 1e-5  # of a step: length of the tangent over which rates are taken
+_FEW = 3.0  # looks at an event with its width; then the width grows
 _CHORDS = 8.0  # then every other look halves the bracket, so that none stalls
 _CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
 _CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
-_NEVER = 1e300
+_NEVER, _NONE = 1e300, 1e-300
 
 
 @physics
@@ -75,9 +78,25 @@ def _watched(armed, sense):
 
 
 @physics
-def _secant(before, after, direction, low, high):
-    """Length at which the chord of one sense meets zero; `high` where it does not cross."""
-    return where(crossed(before, after, direction), low + (high - low) * (before / (before - after)), high)
+def _root(kind, before, after, rate_before, rate_after, direction, low, high):
+    """Length at which one sense meets zero: a cubic in the sense, with its rates at both sides, or its chord.
+
+    `high` where the sense does not cross.  The sense of a peak has no rate.
+    """
+    across = crossed(before, after, direction)
+    width, span = high - low, after - before
+    u = before / where(across, -span, 1.0)
+    v = 1.0 - u
+    cubic = low + width * (u * u * (3.0 - 2.0 * u)) + u * v * span * (v / rate_before - u / rate_after)
+    usable = (kind != PEAK) & (cubic > low) & (cubic < high)
+    return where(across, where(usable, cubic, low + width * u), high)
+
+
+@physics
+def _near(kind, root, before, after, rate, direction, high, width):
+    """Not negative where the side that has crossed is near the zero, and its sense is as small as its rate says."""
+    small = (kind == PEAK) | (abs(after) < 2.0 * width * abs(rate))
+    return where(crossed(before, after, direction), where(small, root + width - high, -1.0), 1.0)
 
 
 @physics
@@ -125,8 +144,8 @@ def _flag(mask, like):
 
 
 @physics
-def _halved(value, mask):
-    return where(mask, 0.5 * value, value)
+def _halved(kind, value, mask):
+    return where(mask & (kind == PEAK), 0.5 * value, value)
 
 
 @physics
@@ -139,26 +158,28 @@ def _nothing(value):
     return 0.0 * value
 
 
-def _narrow(bracket, signs, values, looking):
-    """The bracket after a look, and the next length to look at: the first zero of the chords, or the middle.
+def _narrow(kinds, signs, bracket, seen, rates, looking):
+    """(bracket after a look, where the look has crossed, where it is near enough to what it has crossed).
 
-    A look keeps a little off both ends, so that a zero found from one side is soon enclosed from the other.
-
-    The Illinois rule halves the sense at a side that stays: M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
+    The next look goes a little behind the first zero that the sides tell of, so that it finds it crossed.  The sense
+    of a peak is halved at a side that stays (Illinois rule): M. Dowell, P. Jarratt, BIT 11 (1971) 168-174.
     """
-    after = any_field(map_fields(crossed, bracket.at_low, values, signs))
+    after = any_field(map_fields(crossed, bracket.at_low, seen, signs))
     ahead, back = looking & (not after), looking & after
-    at_low = select(ahead, values, map_fields(_halved, bracket.at_low, back & (bracket.side > 0.0)))
-    at_high = select(back, values, map_fields(_halved, bracket.at_high, ahead & (bracket.side < 0.0)))
+    at_low = select(ahead, seen, map_fields(_halved, kinds, bracket.at_low, back & (bracket.side > 0.0)))
+    at_high = select(back, seen, map_fields(_halved, kinds, bracket.at_high, ahead & (bracket.side < 0.0)))
+    rate_low, rate_high = select(ahead, rates, bracket.rate_low), select(back, rates, bracket.rate_high)
     side = where(back, 1.0, where(ahead, -1.0, bracket.side))
     low, high = where(ahead, bracket.look, bracket.low), where(back, bracket.look, bracket.high)
-    chord = least(map_fields(_secant, at_low, at_high, signs, low, high))
-    margin = 0.4 * bracket.width
-    chord = minimum(maximum(chord, low + margin), high - margin)
+    # many looks: the rounding of the sense is in the way
+    width = where(bracket.looks > _FEW, 2.0, 1.0) * bracket.width
+    roots = map_fields(_root, kinds, at_low, at_high, rate_low, rate_high, signs, low, high)
+    near = least(map_fields(_near, kinds, roots, at_low, at_high, rate_high, signs, high, width)) >= 0.0
+    look = minimum(maximum(least(roots), low) + 0.5 * width, high - 0.4 * width)
     every_other = bracket.looks - 2.0 * floor(0.5 * bracket.looks) < 0.5
-    inside = (chord > low) & (chord < high) & ((bracket.looks < _CHORDS) | every_other)
-    look = where(inside, chord, 0.5 * (low + high))
-    return Bracket(low, high, at_low, at_high, side, look, bracket.looks + 1.0, bracket.width), back
+    inside = (look > low) & (look < high) & ((bracket.looks < _CHORDS) | every_other)
+    look, looks = where(inside, look, 0.5 * (low + high)), bracket.looks + 1.0
+    return Bracket(low, high, at_low, at_high, rate_low, rate_high, side, look, looks, width), back, near
 
 
 narrow = compile_callable(_narrow)
@@ -181,7 +202,7 @@ def _first(f, clock, case, s, m, p, o, atol):
     longest = minimum(clock.until, clock.period)
     h = first_length(f, t, s, k, m, p, o, atol, clock.rtol, clock.order, longest + t)
     h = where(clock.first + t > 0.0, clock.first + t, h)
-    return sense(f, t, s, m, k, p, o, _REACH * h), h
+    return sense_shared(f, t, s, m, k, p, o, _REACH * h), h
 
 
 first = compile_callable(_first)
@@ -266,8 +287,9 @@ def _fly(
     kinds, signs = f.kinds_of(here.values), f.signs_of(here.values)
     zero = case * 0.0
     active, status, attempts, sample, limit = zero + 1.0, zero, zero, zero + 1.0, zero + _NEVER
+    last_ideal = zero + _NONE  # of the step before this one: there is none
     closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
-    bracket = Bracket(zero, zero, armed, armed, zero, zero, zero, zero)
+    bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
     best, when = here.values, map_fields(_at, here.values, zero)
     rows = 0
     if history.shape[0] > 0:
@@ -292,7 +314,9 @@ def _fly(
         dip = good & (not over) & (turn < trial)
         fits = good & (not over) & (not dip)
         cut = (length < h) & (not poor)
-        scaled = trial * step_factor(error, -1.0 / clock.order)
+        ideal = trial * ideal_factor(error, -1.0 / clock.order)
+        scaled = next_length(trial, error, ideal, where(good, last_ideal, _NONE))
+        last_ideal = where(good, ideal, last_ideal)
         h = where(good, where(cut, maximum(h, scaled), scaled), where(poor, scaled, h))
         limit = where(dip, turn, where(good, _NEVER, limit))
         closed = flying & (not flying)
@@ -301,11 +325,12 @@ def _fly(
             seen = map_fields(_watched, armed, there.senses)
             sharp = any_field(map_fields(_fires_sharply, kinds, armed, here.senses, there.senses, signs))
             enough = where(sharp, _CLOSED * (abs(here.t) + trial), maximum(_CREST * trial, _CLOSED * abs(here.t)))
-            opened = Bracket(zero, trial, map_fields(_watched, armed, here.senses), seen, zero, trial, zero, enough)
-            bracket, back = narrow(select(over, opened, bracket), signs, seen, over | looking)
+            at_start, rates = map_fields(_watched, armed, here.senses), here.rates
+            opened = Bracket(zero, trial, at_start, seen, rates, there.rates, zero, trial, zero, enough)
+            bracket, back, near = narrow(kinds, signs, select(over, opened, bracket), seen, there.rates, over | looking)
             beyond = select(back, there, beyond)
             closing = closing | over
-            closed = flying & closing & (bracket.high - bracket.low <= bracket.width)
+            closed = flying & closing & (near | (bracket.high - bracket.low <= bracket.width))
         arrived = fits | closed
         now = select(closed, beyond, there)
         fired = map_fields(_fires, armed, here.senses, now.senses, signs, closed)
@@ -313,7 +338,7 @@ def _fly(
         when = map_fields(_when, kinds, when, best, now.values, fired, now.t, arrived)
         best = map_fields(_best, kinds, best, now.values, arrived)
         ended = arrived & (stopped | (now.t >= clock.until))
-        stuck = poor & (h <= 1e-14 * abs(here.t) + 1e-290)
+        stuck = stepping & (not ended) & (h <= 1e-14 * abs(here.t) + 1e-290)
         capped = flying & (not ended) & (attempts >= clock.attempts)
         size = total(end) + error
         failure = where(stuck & (not (size - size == 0.0)), _BROKEN, _CAPPED)
@@ -331,6 +356,7 @@ def _fly(
             here = select(sampling | switching, after, here)
             best = map_fields(_best, kinds, best, here.values, sampling | switching)
             sample = where(sampling, sample + 1.0, sample)
+            last_ideal = where(sampling | switching, _NONE, last_ideal)
         done = ended | stuck | capped
         if any_lane(done):
             if rows > 0 and lane_holds(done, 0) and columns[0] == 0:
@@ -363,6 +389,7 @@ def _fly(
                 when = select(new, map_fields(_at, start.values, zero), when)
                 status, attempts = where(new, 0.0, status), where(new, 0.0, attempts)
                 sample, limit = where(new, 1.0, sample), where(new, _NEVER, limit)
+                last_ideal = where(new, _NONE, last_ideal)
                 closing = closing & (not new)
     return rows
 

@@ -8,7 +8,7 @@ from collections import namedtuple
 
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.elementary import exp, log
-from mc_engine.lanes.functions import maximum, minimum, sqrt, where
+from mc_engine.lanes.functions import exponent, fma, mantissa, maximum, minimum, rint, sqrt, two_to, where
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.runge_kutta_pairs import LARGEST_STAGES
 from mc_engine.lanes.stage_memory import put_stage, stage_memory, stage_sum, take_stage
@@ -25,9 +25,15 @@ DAMPING = 0.01  # weight of the second error estimate, Hairer's DOP853
 
 
 @physics
-def weighted_square(error, before, after, atol, rtol):
+def weight(before, after, atol, rtol):
+    """One over the tolerance of a component."""
+    return 1.0 / (atol + rtol * maximum(abs(before), abs(after)))
+
+
+@physics
+def weighted_square(error, weight):
     """Square of the error in units of the tolerance."""
-    x = error / (atol + rtol * maximum(abs(before), abs(after)))
+    x = error * weight
     return x * x
 
 
@@ -53,8 +59,9 @@ def _step_error(tables, memory, h, s, end, atol, rtol):
     n = nodes.shape[0]
     first = stage_sum(memory, s, starts[n], starts[n + 1], columns, weights)
     second = stage_sum(memory, s, starts[n + 1], starts[n + 2], columns, weights)
-    high = total(map_fields(weighted_square, first, s, end, atol, rtol))
-    low = total(map_fields(weighted_square, second, s, end, atol, rtol))
+    per_tolerance = map_fields(weight, s, end, atol, rtol)
+    high = total(map_fields(weighted_square, first, per_tolerance))
+    low = total(map_fields(weighted_square, second, per_tolerance))
     both = (high + DAMPING * low) * float(len(atol))
     return abs(h) * high / sqrt(where(both == 0.0, 1.0, both))
 
@@ -63,23 +70,44 @@ step_error = compile_inline(_step_error)
 
 
 @physics
-def step_factor(error, exponent):
-    """Factor from this step's length to the next one's, for an error in units of the tolerance."""
+def ideal_factor(error, power):
+    """error**power to three digits: the factor from a step's length to the one whose error would be 1.
+
+    power : -1 over the order.  log2 is a parabola over each octave, 2**f a cubic.
+    """
     known = minimum(maximum(error, 1e-20), 1e20)
-    factor = SAFETY * exp(exponent * log(known))
+    m = mantissa(known)
+    y = power * (exponent(known) + fma(m, fma(m, -1.0 / 3.0, 2.0), -5.0 / 3.0))
+    n = rint(y)
+    f = y - n
+    return two_to(n) * fma(f, fma(f, fma(f, 0.0558, 0.2402), 0.6931), 1.0)
+
+
+@physics
+def next_length(length, error, ideal, last_ideal):
+    """Length [s] of the attempt after one of this length and error.
+
+    ideal, last_ideal : lengths whose error would have been 1, now and a step before.  Where they fall, the next is
+    expected to be less by the same ratio, which saves most of the rejected steps towards air or a perigee.
+
+    K. Gustafsson, ACM Transactions on Mathematical Software 20 (1994) 496-517.
+    """
+    wanted = SAFETY * ideal * minimum(1.0, ideal / last_ideal)
+    bounded = minimum(GROW * length, maximum(SHRINK * length, wanted))
     # an error that is no number fails the comparison and shrinks the step as much as allowed
-    return where(error < 1e20, minimum(GROW, maximum(SHRINK, factor)), SHRINK)
+    return where(error < 1e20, bounded, SHRINK * length)
 
 
 def _first_length(f, t, s, k, m, p, o, atol, rtol, order, longest):
     """A first step length [s]: Hairer, Norsett, Wanner, section II.4, "Starting step size"."""
     n = float(len(atol))
-    d0 = sqrt(total(map_fields(weighted_square, s, s, s, atol, rtol)) / n)
-    d1 = sqrt(total(map_fields(weighted_square, k, s, s, atol, rtol)) / n)
+    per_tolerance = map_fields(weight, s, s, atol, rtol)
+    d0 = sqrt(total(map_fields(weighted_square, s, per_tolerance)) / n)
+    d1 = sqrt(total(map_fields(weighted_square, k, per_tolerance)) / n)
     small = (d0 < 1e-5) | (d1 < 1e-5)
     h = minimum(where(small, 1e-6, 0.01 * d0 / where(small, 1.0, d1)), longest)
     later = spread(f.rhs(t + h, add_scaled(s, h, k), m, p, o), t)
-    d2 = sqrt(total(map_fields(weighted_square, map_fields(_difference, later, k), s, s, atol, rtol)) / n) / h
+    d2 = sqrt(total(map_fields(weighted_square, map_fields(_difference, later, k), per_tolerance)) / n) / h
     steep = maximum(d1, d2)
     flat = steep <= 1e-15
     guess = exp(log(0.01 / where(flat, 1.0, steep)) / order)
@@ -95,8 +123,9 @@ def _difference(a, b):
 
 
 @physics
-def _rate(ahead, behind, inverse):
-    return (ahead - behind) * inverse
+def _rate(kind, value, ahead, behind, inverse):
+    """Central for a peak, whose place it decides; forward for what only guides a search: one look less."""
+    return where(kind == PEAK, 0.5 * (ahead - behind), ahead - value) * inverse
 
 
 @physics
@@ -111,27 +140,31 @@ def _watch(f, t, s, m, p, o):
     return joined(spread(f.events(t, s, m, p, o), t), f.peaks_of(seen), f.lasts_of(seen))
 
 
-watch = compile_callable(_watch)
+watch = compile_inline(_watch)
 
 
 def _sense(f, t, s, m, k, p, o, reach):
     """The `Instant` at a state and its derivative.
 
-    Rates along the flight are central differences over the tangent, exact up to the square of `reach` [s].
+    Rates along the flight are differences over the tangent; central ones are exact up to the square of `reach` [s].
     """
     values = watch(f, t, s, m, p, o)
+    kinds = f.kinds_of(values)
     ahead = watch(f, t + reach, add_scaled(s, reach, k), m, p, o)
     behind = watch(f, t - reach, add_scaled(s, -reach, k), m, p, o)
-    rates = map_fields(_rate, ahead, behind, 0.5 / reach)
-    return Instant(t, s, m, k, map_fields(_sense_of, f.kinds_of(values), values, rates), rates, values)
+    rates = map_fields(_rate, kinds, values, ahead, behind, 1.0 / reach)
+    return Instant(t, s, m, k, map_fields(_sense_of, kinds, values, rates), rates, values)
 
 
-sense = compile_callable(_sense)
+# inlined, what a model does not watch costs nothing
+sense = compile_inline(_sense)
+# for places off the main path: one copy in the kernel, called where needed
+sense_shared = compile_callable(_sense)
 
 
 def _arrive(f, t, s, m, p, o, reach):
     """The `Instant` at a state whose derivative is not yet known."""
-    return sense(f, t, s, m, spread(f.rhs(t, s, m, p, o), t), p, o, reach)
+    return sense_shared(f, t, s, m, spread(f.rhs(t, s, m, p, o), t), p, o, reach)
 
 
 arrive = compile_callable(_arrive)

@@ -96,14 +96,22 @@ def stage_sum(typingctx, memory, like, first, last, columns, weights):
             stage = builder.load(builder.gep(column_data, [entry]))
             weight = _splat(builder, builder.load(builder.gep(weight_data, [entry])), width)
             for i, total in enumerate(sums):
-                term = builder.fmul(weight, builder.load(_place(builder, memory, args[0], stage, i)))
-                builder.store(builder.fadd(builder.load(total), term), total)
+                value = builder.load(_place(builder, memory, args[0], stage, i))
+                builder.store(_fused(builder, width, [weight, value, builder.load(total)]), total)
         packed = ir.Constant(context.get_value_type(like), ir.Undefined)
         for i, total in enumerate(sums):
             packed = builder.insert_value(packed, builder.load(total), i)
         return packed
 
     return like(memory, like, types.intp, types.intp, columns, weights), codegen
+
+
+def _fused(builder: Any, width: int, factors: list[Any]) -> Any:
+    """x y + z with one rounding: the same at every width, because it is asked for."""
+    kind = llvm_type(width)
+    name = "llvm.fma." + (f"v{width}f64" if width > 1 else "f64")
+    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind] * 3), name)
+    return builder.call(function, factors)
 
 
 def _splat(builder: Any, value: Any, width: int) -> Any:

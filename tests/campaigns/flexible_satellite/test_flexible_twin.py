@@ -5,7 +5,9 @@ import pytest
 from flexible_flights import MODEL, NOMINAL, PWPF, SEED, TABLE_8, fly_one
 from flexible_twin import fly_twin
 
-from mc_engine.flight import fly
+from mc_engine.flight import fly, fly_history, prepare
+from mc_engine.kernel_parts import settings_class
+from mc_engine.lanes.noise import Draws, noise_key
 
 # both fly the same samples; what is left is that of Runge-Kutta steps of 10 ms, and trapezoids of |q| at their corners
 TOLERANCE = {"q": 5e-11, "omega": 2e-10, "eta": 3e-9, "end_momentum": 5e-9, "impulse": 5e-9, "control_effort": 1e-8}
@@ -100,3 +102,32 @@ def test_every_width_of_the_build_has_the_bits_of_the_others():
     wide, alone = (fly(MODEL, case, np.array([17]), SEED, width=width) for width in (8, 1))
     for name, column in wide.items():
         np.testing.assert_array_equal(column, alone[name], err_msg=name)
+
+
+def test_a_case_has_the_same_bits_among_others_of_every_kind():
+    """Noise, late valves and the switching torque are skipped where no case of a block has them."""
+    mixed = {
+        "rate_noise_rad_s": np.array([0.0, 1e-4, 0.0, 0.0]),
+        "valve_delay_s": np.array([0.0, 0.0, 0.007, 0.0]),
+        "dbar_n_m": np.array([0.0, 0.0, 0.0, 1e-3]),
+    }
+    together = fly(MODEL, NOMINAL | PULSED | mixed, np.arange(4), SEED, width=8)
+    for case in range(4):
+        own = {name: column[case] for name, column in mixed.items()}
+        alone = fly(MODEL, NOMINAL | PULSED | own, np.array([case]), SEED, width=8)
+        for name, column in alone.items():
+            np.testing.assert_array_equal(together[name][case], column[0], err_msg=name)
+
+
+@pytest.mark.parametrize("actuator", ["ideal", "pwpf"])
+def test_the_interpreted_control_gives_the_bits_of_the_compiled_one(actuator):
+    case = random_case(5) | PULSED | {"actuator": actuator, "rate_noise_rad_s": 1e-4, "attitude_noise_rad": 1e-3}
+    seen = fly_history(MODEL, NOMINAL | case, 0, SEED)[1]
+    ready = prepare(MODEL, NOMINAL | case, 1)
+    p = MODEL.kernel_parameters(*(float(row[0]) for row in ready.parameters))
+    o = settings_class(MODEL)(*ready.settings[0])
+    state, memory = MODEL.initial(p, o), MODEL.start(p, o)
+    memory = MODEL.control(0.0, state, memory, p, o, Draws(noise_key(SEED), 0.0, 0.0))
+    quantities = MODEL.observe(0.0, state, memory, p, o)
+    for field, value in zip(MODEL.quantities, quantities, strict=True):
+        assert value / field.si_factor == seen[field.name][0], field.name
