@@ -20,6 +20,7 @@ from mc_engine.campaign_parts import (
     Retention,
     Worst,
     check_correlations,
+    check_metric,
     check_requirements,
     check_retention,
     check_room_for_correlations,
@@ -38,6 +39,7 @@ from mc_engine.input_values import inputs_of
 from mc_engine.model import Model, load_model
 from mc_engine.sobol import MAX_DIMENSIONS
 from mc_engine.suggestions import hint
+from mc_engine.tuning_parts import Tuning, check_tuning
 
 __all__ = [
     "SHIPPED",
@@ -47,6 +49,7 @@ __all__ = [
     "Requirement",
     "Retention",
     "ShippedCampaign",
+    "Tuning",
     "Worst",
     "find_campaign",
     "list_campaigns",
@@ -64,7 +67,7 @@ class Campaign:
 
     text : the file as read; `cases` and `seed` may have been changed on the command line since.
     parameters : what [parameters] says.  nominal : every parameter and setting of the model.
-    table : the columns of the design "table", else empty.
+    table : the columns of the design "table", else empty.  tuning : what [tuning] says, if it is there.
     digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
         cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
     """
@@ -87,6 +90,7 @@ class Campaign:
     digest: str
     table_path: Path | None = None
     table: Mapping[str, np.ndarray] = field(default_factory=dict, compare=False, repr=False)
+    tuning: Tuning | None = None
 
 
 def load_campaign(
@@ -165,6 +169,10 @@ def _assemble(
     retention = Retention()
     if sections.retention is not None:
         retention = check_retention(sections.retention, model, count, shortened, found.under("retention"))
+    tuning = None
+    if sections.tuning is not None:
+        names = [one.name for one in dispersions]
+        tuning = check_tuning(sections.tuning, model, names, design, found.under("tuning"))
     if section is None or count is None or found.problems:
         return None
     return Campaign(
@@ -186,6 +194,7 @@ def _assemble(
         digest=_digest(document, section, directory, dispersions, table_path),
         table_path=table_path,
         table=table,
+        tuning=tuning,
     )
 
 
@@ -225,11 +234,16 @@ def _nominal(model: Model, sections: Sections, found: Findings) -> dict[str, Sca
 def _unknown_names(
     document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: Model, found: Findings
 ) -> None:
-    """Name dispersions of no parameter also where their section is wrong in itself."""
+    """Dispersions of no parameter and requirements of no metric, also where their section is wrong in itself."""
     written = document.get("dispersion")
     for name in written if isinstance(written, dict) else ():
         if name not in sections.dispersions and name not in nominal:
             found.under("dispersion", name).add("", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}")
+    written = document.get("requirement")
+    for name, raw in written.items() if isinstance(written, dict) else ():
+        metric = raw.get("metric") if isinstance(raw, dict) else None
+        if name not in sections.requirements and isinstance(metric, str):
+            check_metric(metric, model, found.under("requirement", name))
 
 
 def _dispersions(

@@ -157,7 +157,7 @@ def check_requirements(
     kept = []
     for name, section in sections.items():
         spot = found.under(name)
-        _check_metric(section.metric, model, spot)
+        check_metric(section.metric, model, spot)
         low, high = section.at_least, section.at_most
         if low is None and high is None:
             spot.add("", "has no limit; give at_most, at_least or both")
@@ -179,7 +179,7 @@ def check_retention(
     entries = [worst] if isinstance(worst, WorstSection) else worst
     spot = found.under("histories")
     for k, entry in enumerate(entries, start=1):
-        _check_metric(entry.metric, model, spot.under("worst" if entries is not worst else f"worst {k}"))
+        check_metric(entry.metric, model, spot.under("worst" if entries is not worst else f"worst {k}"))
     for case in histories.cases:
         if cases is not None and case >= cases and not shortened:
             spot.add("cases", f"there is no case {case}; they are 0 to {cases - 1}")
@@ -188,7 +188,8 @@ def check_retention(
     return Retention(histories.nominal, histories.first, chosen, kept)
 
 
-def _check_metric(metric: str, model: Model, found: Findings) -> None:
+def check_metric(metric: str, model: Model, found: Findings) -> None:
+    """Note a name that is not a metric of the model."""
     names = [field.name for field in model.metrics]
     if metric not in names:
         found.add("metric", f'"{metric}" is not a metric of {model.name}{hint(metric, names)}')

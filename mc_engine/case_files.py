@@ -11,6 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
+_MOST_LINES = 5  # named in one sentence
+
 
 class FileFault(Exception):
     """What is wrong with the file, as one sentence; the reader of the campaign file adds the place."""
@@ -60,9 +62,11 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
         raise FileFault(f'"{path.name}" is empty')
     names = [cell.strip() for cell in numbered[0][1]]
     _check_names(path, names)
-    for line, row in numbered[1:]:
-        if len(row) != len(names):
-            raise FileFault(f'"{path.name}", line {line}: {len(row)} fields where {len(names)} columns are named')
+    ragged = [(line, len(row)) for line, row in numbered[1:] if len(row) != len(names)]
+    if ragged:
+        lines = ", ".join(f"line {line}: {count} fields" for line, count in ragged[:_MOST_LINES])
+        more = f" and {len(ragged) - _MOST_LINES} lines more" if len(ragged) > _MOST_LINES else ""
+        raise FileFault(f'"{path.name}", {lines}{more} where {len(names)} columns are named')
     return {name: np.array([row[k].strip() for _, row in numbered[1:]], dtype=object) for k, name in enumerate(names)}
 
 

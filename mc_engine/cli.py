@@ -9,6 +9,7 @@ numba nor matplotlib.
 
 import importlib
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -42,7 +43,10 @@ NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the reports o
 
 def main() -> None:
     """Run the command line of this process; does not return."""
-    app(prog_name="mc-engine")
+    try:
+        app(prog_name="mc-engine")
+    except KeyboardInterrupt:  # before a verb was under way
+        raise SystemExit(INTERRUPTED) from None
 
 
 @contextmanager
@@ -58,6 +62,8 @@ def exit_status() -> Iterator[None]:
         _leave(INTERRUPTED, str(error))
     except KeyboardInterrupt:
         _leave(INTERRUPTED, "interrupted")
+    except OSError as error:
+        _leave(USAGE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
 
 
 def _leave(status: int, message: str) -> NoReturn:
@@ -134,7 +140,7 @@ def plan(
     else:
         cases = smallest_sample(share, confidence, failures)
         rows = [PlanRow(failures, cases, demonstrated_share(cases, failures, confidence))]
-    typer.echo(f"share {share:g} with confidence {confidence:g}\n")
+    typer.echo(f"share {share:.10g} with confidence {confidence:.10g}\n")
     typer.echo(f"{'failures':>8}  {'cases':>9}  demonstrated share")
     for row in rows:
         typer.echo(f"{row.failures:>8}  {row.cases:>9}  {row.shown:.6f}")
@@ -219,6 +225,9 @@ def _refuse_folder(path: Path) -> None:
         refuse_occupied(path)
     except StoreError as error:
         _leave(USAGE, f"--out {error}")
+    existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
+    if not (existing.is_dir() and os.access(existing, os.W_OK)):
+        _leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")
 
 
 def _fly(fly: Callable[[Any, Any], "Store"]) -> "Store":
@@ -226,6 +235,8 @@ def _fly(fly: Callable[[Any, Any], "Store"]) -> "Store":
     from mc_engine.progress import Progress
 
     with Progress() as progress:
+        if not progress.stream.isatty():
+            typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
         return fly(runner, progress)
 
 
@@ -272,7 +283,12 @@ def extend(
     workers: Workers = None,
 ) -> None:
     """Add cases to a run; 1000 extended to 2000 are the same as 2000 from the start."""
-    wanted = _existing_run(folder).n_cases
+    from mc_engine.designs import EXTENSIBLE
+
+    store = _existing_run(folder)
+    wanted, design = store.n_cases, store.manifest["campaign"]["design"]
+    if design not in EXTENSIBLE:
+        _leave(USAGE, f'{folder}: the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can')
     if cases <= wanted:
         _leave(USAGE, f"--cases {cases}: {folder} has {wanted} cases; give the number it is to have in all")
     store = _fly(lambda runner, progress: runner.extend(folder, cases, progress=progress, workers=workers))
@@ -337,6 +353,8 @@ def status(folder: RunFolder) -> None:
         typer.echo(f"flying    by {described(writer)}")
     elif missing:
         typer.echo(f"missing   {_ranges(missing)}; `mc-engine resume {folder}` flies them")
+    elif lost := store.lost_files():
+        _leave(DAMAGED, f"{folder}/{lost[0]}: is gone; `mc-engine verify {folder}` names all damage")
     else:
         typer.echo("complete")
 

@@ -33,6 +33,9 @@ def check_value(value: Scalar, item: Parameter | Setting, found: Findings, key: 
     if not item.low <= value <= item.high:
         found.add(key, f"{number(value)} is not allowed; the model accepts {accepted_range(item)}")
         return None
+    if isinstance(item, Setting) and item.whole and value != int(value):
+        found.add(key, f"{number(value)} is not a whole number; {item.name} is {described(item)}")
+        return None
     return float(value)
 
 

@@ -12,19 +12,23 @@ import importlib
 import importlib.util
 import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
+from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
 from mc_engine.errors import ModelError
+from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_suffix
 
 Number = float | np.ndarray
+_USER = "mc_engine_user_"  # names of the modules that come from files
 
 
 @dataclass(frozen=True)
@@ -61,12 +65,14 @@ class Setting(Field):
     """An input shared by all cases of one kernel call: a choice of words, a switch, or a number.
 
     In kernels a choice is the index of the word in `choices`, a switch is 0.0 or 1.0, a number is SI.
+    whole : only whole numbers are accepted, as for a count.
     """
 
     default: str | bool | float
     choices: tuple[str, ...] = ()
     low: float = -np.inf
     high: float = np.inf
+    whole: bool = False
 
     def code(self, value: str | bool | float) -> float:
         """The number that stands for `value` inside a kernel."""
@@ -182,6 +188,9 @@ class Model:
 
     def __post_init__(self) -> None:
         inputs: tuple[Field, ...] = (*self.parameters, *self.settings)
+        for one in (*inputs, *self.states, *self.quantities, *self.metrics):
+            if one.unit not in UNITS:
+                raise ModelError(f'"{one.name}" has the unit "{one.unit}"{hint(one.unit, UNITS)}')
         outputs: tuple[Field, ...] = (*self.metrics, *(Field(f"end_{one.name}", "", "") for one in self.states))
         _refuse_twice("input", [one.symbol for one in inputs])
         _refuse_twice("column", [one.name for one in (*inputs, *outputs)])
@@ -254,6 +263,8 @@ def _module(reference: str) -> ModuleType:
         if error.name and reference.startswith(error.name):
             raise ModelError(f'there is no module "{reference}"; a file beside the campaign ends in .py') from None
         raise ModelError(f'"{reference}" needs the package "{error.name}", which is not installed') from None
+    except (Exception, SystemExit) as error:
+        raise ModelError(_fault(reference, error)) from error
 
 
 def _model_path(reference: str, beside: Path | None) -> Path:
@@ -264,8 +275,12 @@ def _model_path(reference: str, beside: Path | None) -> Path:
 
 
 def _module_from_file(path: Path) -> ModuleType:
-    """Import a user's file under a name that depends on its text, so that an edited file is a new module."""
-    name = f"mc_engine_user_{path.stem}_{sha256(path.read_bytes() + str(path).encode()).hexdigest()[:12]}"
+    """Import a user's file under a name that depends on its text, so that an edited file is a new module.
+
+    The files beside it can be imported, and count as its text.
+    """
+    texts = b"".join(file.read_bytes() for file in sorted(path.parent.glob("*.py")))
+    name = f"{_USER}{path.stem}_{sha256(texts + str(path).encode()).hexdigest()[:12]}"
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, path)
@@ -274,18 +289,39 @@ def _module_from_file(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:
+        with _importable(path.parent):
+            spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:
         del sys.modules[name]
-        line = error.lineno if isinstance(error, SyntaxError) else _line_in(path, error)
-        raise ModelError(f'"{path.name}", line {line}: {type(error).__name__}: {error}') from error
+        raise ModelError(_fault(path.name, error)) from error
     return module
 
 
-def _line_in(path: Path, error: BaseException) -> int:
-    line, trace = 0, error.__traceback__
-    while trace is not None:
-        if trace.tb_frame.f_code.co_filename == str(path):
-            line = trace.tb_lineno
-        trace = trace.tb_next
-    return line
+@contextmanager
+def _importable(folder: Path) -> Iterator[None]:
+    """Let the files of `folder` be imported, and forget them again: another campaign's may have the same names."""
+    before = set(sys.modules)
+    sys.path.insert(0, str(folder))
+    try:
+        yield
+    finally:
+        sys.path.remove(str(folder))
+        for name in set(sys.modules) - before:
+            file = getattr(sys.modules[name], "__file__", None)
+            if file is not None and Path(file).parent == folder and not name.startswith(_USER):
+                del sys.modules[name]
+
+
+def _fault(reference: str, error: BaseException) -> str:
+    """The error of a model's own code in a sentence with its place."""
+    frames = [] if error.__traceback__ is None else extract_tb(error.__traceback__)
+    ours = [frame for frame in frames if "importlib" not in frame.filename and frame.filename != __file__]
+    place = f'"{reference}"'
+    if isinstance(error, SyntaxError):
+        place = f'"{Path(error.filename or reference).name}", line {error.lineno}'
+    elif ours:
+        place = f'"{Path(ours[-1].filename).name}", line {ours[-1].lineno}'
+    if isinstance(error, SystemExit):
+        return f"{place}: ends the program; a model only defines MODEL"
+    text = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{place}: {type(error).__name__}: {text}"

@@ -199,6 +199,10 @@ class Store:
                 counts[word] = counts.get(word, 0) + count
         return counts
 
+    def lost_files(self) -> list[str]:
+        """Parts that the journal counts and whose file is gone; `verify` looks for all other damage too."""
+        return [part.file for part in self.parts if not (self.path / part.file).exists()]
+
     @property
     def units(self) -> dict[str, str]:
         """Unit of every column of `cases`."""

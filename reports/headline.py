@@ -57,22 +57,22 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         if summary.minimum is None or summary.maximum is None:
             yield Card(flown.words(name), "no number", f"{used} have one", "open")
             continue
-        large = flown.large_is_bad(name)
+        large, spread = flown.large_is_bad(name), summary.sd
         end = summary.maximum if large else summary.minimum
         tail = summary.at(HIGH if large else LOW)
         limit = None if tail is None else (tail.upper if large else tail.lower)
         side = "at most" if large else "at least"
         median = summary.at(0.5)
-        middle = f"median {number(median.value, 4) if median else '–'}"
+        middle = f"median {number(median.value, 4, spread) if median else '–'}"
         nominal = flown.nominal_value(name)
-        rest = [middle, f"{'largest' if large else 'smallest'} {number(end, 4)}", f"from {used}"]
-        rest[:0] = [f"nominal {number(nominal, 4)}"] if nominal is not None else []
+        rest = [middle, f"{'largest' if large else 'smallest'} {number(end, 4, spread)}", f"from {used}"]
+        rest[:0] = [f"nominal {number(nominal, 4, spread)}"] if nominal is not None else []
         if flown.random and limit is not None and tail is not None:
             each = percent(0.5 * (1.0 + CONFIDENCE))
-            rest.insert(0, f"quantile {number(tail.value, 4)}, this limit of it holds with {each}")
-            answer = f"{side} {with_unit(number(limit, 4), unit)} in {percent(HIGH, 3)} of cases"
+            rest.insert(0, f"quantile {number(tail.value, 4, spread)}, this limit of it holds with {each}")
+            answer = f"{side} {with_unit(number(limit, 4, spread), unit)} in {percent(HIGH, 3)} of cases"
         else:
-            answer = f"{side} {with_unit(number(end, 4), unit)} in the cases flown"
+            answer = f"{side} {with_unit(number(end, 4, spread), unit)} in the cases flown"
         yield Card(flown.words(name), answer, f"{'; '.join(rest)}.")
 
 
@@ -107,7 +107,8 @@ def summary_sentence(flown: Flown) -> str:
         return "The campaign sets no requirement; below is what the cases cost."
     total = len(outcomes)
     if all(outcome == "pass" for outcome in outcomes):
-        return "The requirement is met." if total == 1 else f"All {total} requirements are met."
+        met = "The requirement is met" if total == 1 else f"All {total} requirements are met"
+        return f"{met}{' by the cases flown so far' if flown.n_tried < flown.n_wanted else ''}."
     parts = [(outcomes.count("pass"), "met"), (outcomes.count("fail"), "failed"),
              (outcomes.count("not demonstrable"), "not demonstrable with these cases")]  # fmt: skip
     return f"Of {total} requirement{'s' if total > 1 else ''}: {', '.join(f'{n} {what}' for n, what in parts if n)}."

@@ -57,12 +57,12 @@ def fails_with(status, result, *words):
 REQUIREMENT = {"metric": "propellant_kg", "at_most": None, "at_least": None, "share": 0.5, "confidence": 0.9}
 
 
-def small_store(path, cases=40, fly=True):
+def small_store(path, cases=40, fly=True, design="mc"):
     """A run as the runner leaves it; the requirement "fuel" passes, "zero" does not."""
     requirements = [
         {**REQUIREMENT, "name": "fuel", "at_most": 100.0},
         {**REQUIREMENT, "name": "zero", "at_most": -100.0},
     ]
-    campaign = {"name": "test", "cases": cases, "design": "mc"}
+    campaign = {"name": "test", "cases": cases, "design": design}
     store = create_store(path, {**MANIFEST, "campaign": campaign, "requirements": requirements}, TEXT, COLUMNS)
     return filled(store) if fly else store

@@ -279,6 +279,12 @@ def test_extend_takes_the_new_number_of_cases(here, calls):
     fails_with(2, call("extend", "flown", "--cases", 60), "--cases 60: flown has 60 cases")
 
 
+def test_a_design_that_cannot_grow_is_a_usage_error(here, calls):
+    small_store(here / "flown", design="grid")
+    fails_with(2, call("extend", "flown", "--cases", 60), 'flown: the design "grid" cannot be extended')
+    assert calls.runner == []
+
+
 def test_replay_says_that_the_bits_agree_and_leaves_history_and_picture(here, calls):
     small_store(here / "flown")
     result = call("replay", "flown", 17)
@@ -321,6 +327,9 @@ def test_status_says_how_far_a_run_is(here):
     assert "missing   40 to 59; `mc-engine resume flown` flies them" in text
     store.append(40, 20, block(40, 20))
     assert "complete" in call("status", "flown").stdout
+    lost = sorted((here / "flown" / "cases").iterdir())[0]
+    lost.unlink()
+    fails_with(5, call("status", "flown"), f"flown/cases/{lost.name}: is gone; `mc-engine verify flown`")
 
 
 def test_status_of_a_run_in_flight_names_the_writer(here):

@@ -3,6 +3,7 @@ from toy import MODEL
 
 from mc_engine.campaign_problems import Findings
 from mc_engine.input_values import accepted_range, check_value, inputs_of, number
+from mc_engine.model import Setting
 
 
 @pytest.mark.parametrize(
@@ -41,6 +42,14 @@ def test_a_value_of_the_wrong_kind_or_size_is_noted(name, value):
     found = Findings()
     assert check_value(value, MODEL.input(name), found, "here") is None
     assert [problem.place for problem in found.problems] == ["here"]
+
+
+def test_a_count_is_a_whole_number():
+    count = Setting("steps_per_fix", "", "steps from fix to fix", 1.0, low=1.0, whole=True)
+    found = Findings()
+    assert check_value(2.0, count, found, "") == 2.0
+    assert check_value(1.5, count, found, "here") is None
+    assert found.problems[0].message == "1.5 is not a whole number; steps_per_fix is steps from fix to fix"
 
 
 def test_ranges_are_said_with_their_unit():

@@ -8,7 +8,8 @@ import pytest
 from mc_engine.errors import ModelError
 from mc_engine.model import Event, Extremum, Field, Parameter, load_model
 
-WAVE = load_model("wave.py", Path(__file__).resolve().parent / "lanes" / "adaptive")
+WAVE_FOLDER = Path(__file__).resolve().parent / "lanes" / "adaptive"
+WAVE = load_model("wave.py", WAVE_FOLDER)
 
 
 @pytest.mark.parametrize(
@@ -24,3 +25,50 @@ WAVE = load_model("wave.py", Path(__file__).resolve().parent / "lanes" / "adapti
 def test_a_model_that_contradicts_itself_is_refused(change, sentence):
     with pytest.raises(ModelError, match=sentence):
         replace(WAVE, **change)
+
+
+def test_a_unit_that_is_not_known_is_named():
+    with pytest.raises(ModelError, match=r'"depth_m" has the unit "metre"'):
+        replace(WAVE, metrics=(Field("depth_m", "metre", ""),))
+
+
+def model_file(folder, helper):
+    (folder / "helper.py").write_text(helper)
+    model = Path(WAVE_FOLDER / "wave.py").read_text()
+    (folder / "model.py").write_text(
+        f"from helper import TITLE\n\n{model}\nobject.__setattr__(MODEL, 'title', TITLE)\n"
+    )
+
+
+def test_a_model_imports_the_files_beside_it_and_sees_their_edits(tmp_path):
+    for title in ("first", "second"):
+        model_file(tmp_path, f"TITLE = '{title}'\n")
+        assert load_model("model.py", tmp_path).title == title
+    other = tmp_path / "other"
+    other.mkdir()
+    model_file(other, "TITLE = 'another campaign'\n")
+    assert load_model("model.py", other).title == "another campaign"
+
+
+@pytest.mark.parametrize(
+    ("helper", "sentence"),
+    [
+        ("TITLE = = 2\n", '"helper.py", line 1: SyntaxError: invalid syntax'),
+        ("import sys\nsys.exit(3)\n", '"helper.py", line 2: ends the program; a model only defines MODEL'),
+        ("def f():\n    return 1 / 0\nTITLE = f()\n", '"helper.py", line 2: ZeroDivisionError: division by zero'),
+        ("import no_such_package\n", """"helper.py", line 1: ModuleNotFoundError: No module named 'no_such_package'"""),
+    ],
+)
+def test_an_error_of_the_model_s_own_code_is_a_sentence_with_its_place(tmp_path, monkeypatch, helper, sentence):
+    model_file(tmp_path, helper)
+    with pytest.raises(ModelError) as from_file:
+        load_model("model.py", tmp_path)
+    assert str(from_file.value) == sentence
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "faulty_module.py").write_text(helper)
+    with pytest.raises(ModelError) as from_module:
+        load_model("faulty_module")
+    assert str(from_module.value) in (
+        sentence.replace("helper.py", "faulty_module.py"),
+        '"faulty_module" needs the package "no_such_package", which is not installed',
+    )
