@@ -1,10 +1,14 @@
 """Atmospheric density models: one function per model, density in kg/m^3.
 
-`exponential` is one layer; `layered` joins the layers of Vallado's table from 100 to 700 km and is for
-orbits and de-orbit arcs (tens of percent of day-to-day variation are not modelled).
+`exponential` is one layer, and with EXPONENTIALS the textbook atmosphere of a planet.  `layered` joins the layers of
+Vallado's table from 100 to 700 km and is for orbits and de-orbit arcs (tens of percent of day-to-day variation are
+not modelled).  `us76` is for entry: the 1976 standard, exact from the ground to 86 km, tabulated above.
 """
 
-from mc_engine.lanes import exp, physics, where
+import math
+from itertools import pairwise
+
+from mc_engine.lanes import exp, log, physics, where
 
 # Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., Table 8-4:
 # base altitude [m], density there [kg/m^3], scale height [m].
@@ -48,3 +52,107 @@ def layered(h):
         inside = h >= _H[i]
         rho, base, scale = where(inside, _RHO[i], rho), where(inside, _H[i], base), where(inside, _SCALE[i], scale)
     return exponential(h, rho, base, scale)
+
+
+# Textbook atmospheres: density [kg/m^3] at the ground, scale height [m].  The one of Venus is a fit at the ground
+# and far too thin aloft: a mathematical test, no model of the planet.
+EXPONENTIALS = {"earth": (1.225, 7200.0), "mars": (0.020, 11_100.0), "venus": (65.0, 15_900.0)}
+
+# U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562), tables 2 to 4: radius for the geopotential altitude [m],
+# g0 M0 / R* [K/m], and of each layer the base [geopotential m], the lapse rate [K/m] and the base temperature [K].
+GEOPOTENTIAL_RADIUS = 6_356_766.0
+_GAS_CONSTANT = 8314.32 / 28.9644  # of air [J/(kg K)]
+_G_OVER_R = 9.80665 / _GAS_CONSTANT
+_US76_LAYERS = (
+    (0.0, -6.5e-3),
+    (11e3, 0.0),
+    (20e3, 1.0e-3),
+    (32e3, 2.8e-3),
+    (47e3, 0.0),
+    (51e3, -2.8e-3),
+    (71e3, -2.0e-3),
+)
+# Geometric altitude [m] and density [kg/m^3] of the same standard's table I; between them the logarithm of the
+# density is linear.  The first is the top of the layers, whose density is their own.
+US76_TOP = 86e3
+_US76_ALOFT = (
+    (90e3, 3.416e-6),
+    (95e3, 1.393e-6),
+    (100e3, 5.604e-7),
+    (105e3, 2.325e-7),
+    (110e3, 9.708e-8),
+    (115e3, 4.289e-8),
+    (120e3, 2.222e-8),
+    (130e3, 8.152e-9),
+    (150e3, 2.076e-9),
+    (200e3, 2.541e-10),
+)
+
+
+def _layer_constants():
+    """Of each layer (base, T at zero, lapse rate, a, b, c): T = T at zero + lapse x, ln rho = a + b ln T + c x.
+
+    x [m] is the geopotential altitude.  b is zero where the layer is isothermal, else c is.
+    """
+    rows = []
+    temperature, log_density = 288.15, math.log(101_325.0 / (_GAS_CONSTANT * 288.15))
+    for i, (base, lapse) in enumerate(_US76_LAYERS):
+        b = -(1.0 + _G_OVER_R / lapse) if lapse else 0.0
+        c = 0.0 if lapse else -_G_OVER_R / temperature
+        a = log_density - b * math.log(temperature) - c * base
+        rows.append((base, temperature - lapse * base, lapse, a, b, c))
+        top = _US76_LAYERS[i + 1][0] if i + 1 < len(_US76_LAYERS) else _geopotential_of_number(US76_TOP)
+        temperature += lapse * (top - base)
+        log_density = a + b * math.log(temperature) + c * top
+    return tuple(rows), temperature, log_density
+
+
+def _geopotential_of_number(h):
+    return GEOPOTENTIAL_RADIUS * h / (GEOPOTENTIAL_RADIUS + h)
+
+
+def _aloft_constants(log_density):
+    """Of each interval (base [m], a, c): ln rho = a + c h."""
+    nodes = [(US76_TOP, log_density), *((h, math.log(rho)) for h, rho in _US76_ALOFT)]
+    slopes = [(y1 - y0) / (h1 - h0) for (h0, y0), (h1, y1) in pairwise(nodes)]
+    return tuple((h, y - c * h, c) for (h, y), c in zip(nodes, slopes, strict=False))
+
+
+_LAYERS, _TOP_TEMPERATURE, _TOP_LOG_DENSITY = _layer_constants()
+_ALOFT = _aloft_constants(_TOP_LOG_DENSITY)
+_BASE, _T0, _LAPSE, _A, _B, _C = tuple(zip(*_LAYERS, strict=True))
+_ALOFT_BASE, _ALOFT_A, _ALOFT_C = tuple(zip(*_ALOFT, strict=True))
+
+
+@physics
+def us76_logarithm(h):
+    """(ln rho, its slope [1/m], molecular-scale temperature [K]) at geometric altitude h [m].
+
+    U.S. Standard Atmosphere, 1976, eqs (18), (23), (33a), (33b): exact to 86 km.  Above, its tabulated densities, the
+    logarithm linear in between and going on beyond 200 km; the temperature is then that of 86 km, which serves for a
+    Mach number and nothing else.  The lowest layer goes on below the ground.
+    """
+    # both sides of 86 km are computed, so the altitude of each stays within its own
+    low = where(h < US76_TOP, h, US76_TOP)
+    stretch = GEOPOTENTIAL_RADIUS / (GEOPOTENTIAL_RADIUS + low)
+    x = stretch * low
+    t0, lapse, a, b, c = _T0[0], _LAPSE[0], _A[0], _B[0], _C[0]
+    for i in range(1, len(_BASE)):
+        inside = x >= _BASE[i]
+        t0, lapse = where(inside, _T0[i], t0), where(inside, _LAPSE[i], lapse)
+        a, b, c = where(inside, _A[i], a), where(inside, _B[i], b), where(inside, _C[i], c)
+    temperature = t0 + lapse * x
+    value = a + b * log(temperature) + c * x
+    slope = (b * lapse / temperature + c) * (stretch * stretch)
+    a, c = _ALOFT_A[0], _ALOFT_C[0]
+    for i in range(1, len(_ALOFT_BASE)):
+        inside = h >= _ALOFT_BASE[i]
+        a, c = where(inside, _ALOFT_A[i], a), where(inside, _ALOFT_C[i], c)
+    aloft = h >= US76_TOP
+    return where(aloft, a + c * h, value), where(aloft, c, slope), temperature
+
+
+@physics
+def us76(h):
+    """Density [kg/m^3] of the U.S. Standard Atmosphere, 1976, at geometric altitude h [m]; see `us76_logarithm`."""
+    return exp(us76_logarithm(h)[0])

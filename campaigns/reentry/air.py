@@ -1,0 +1,56 @@
+"""Air along an entry: the atmosphere of the scenario and the slow part of its uncertainty."""
+
+import math
+
+from mc_engine.lanes import any_lane, physics, sqrt, where
+from mc_engine.physics.atmosphere import us76_logarithm
+
+US76 = 0.0
+GAS_CONSTANT = 287.05287  # of air [J/(kg K)], U.S. Standard Atmosphere, 1976
+HEAT_RATIO = 1.4
+
+# Slow density uncertainty, of the class of the Global Reference Atmosphere Models (Leslie, Justus,
+# NASA/TM-2011-216467): three sigma in five bands of altitude.  Log-normal, so that +3 sigma is exactly the share
+# below; linear between the middles of the bands, so that the density has no steps.
+SLOW_BANDS = ((15e3, 0.10), (45e3, 0.15), (70e3, 0.30), (90e3, 0.45), (110e3, 0.60))
+_BASE = tuple(h for h, _ in SLOW_BANDS)
+_SIGMA = tuple(math.log1p(share) / 3.0 for _, share in SLOW_BANDS)
+_SLOPE = tuple((_SIGMA[i + 1] - _SIGMA[i]) / (_BASE[i + 1] - _BASE[i]) for i in range(len(_BASE) - 1))
+
+
+@physics
+def slow_sigma(h):
+    """(1-sigma of the logarithm of the density, its slope [1/m]) of the slow part at altitude h [m]."""
+    base, sigma, slope = _BASE[0], _SIGMA[0], 0.0 * h
+    for i in range(len(_SLOPE)):
+        inside = h >= _BASE[i]
+        base, sigma, slope = (
+            where(inside, _BASE[i], base),
+            where(inside, _SIGMA[i], sigma),
+            where(inside, _SLOPE[i], slope),
+        )
+    top = h >= _BASE[-1]
+    return where(top, _SIGMA[-1], sigma + slope * (h - base)), where(top, 0.0, slope)
+
+
+@physics
+def logarithm_of_density(h, p, o):
+    """(ln rho, its slope [1/m], temperature [K]) at altitude h [m], without the constant density factor."""
+    if o.atmosphere == US76:
+        value, slope, temperature = us76_logarithm(h)
+    else:
+        value, slope, temperature = (
+            p.log_density - p.inverse_scale * h,
+            0.0 * h - p.inverse_scale,
+            p.temperature + 0.0 * h,
+        )
+    if any_lane(abs(p.deviation) > 0.0):
+        sigma, change = slow_sigma(h)
+        value, slope = value + p.deviation * sigma, slope + p.deviation * change
+    return value, slope, temperature
+
+
+@physics
+def sound_speed(temperature):
+    """Speed of sound in air [m/s]; an exponential atmosphere has the temperature that its scale height belongs to."""
+    return sqrt(HEAT_RATIO * GAS_CONSTANT * temperature)

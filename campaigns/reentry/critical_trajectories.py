@@ -1,0 +1,88 @@
+"""Critical trajectories, found by flying: the two of aerobraking, and the roll that keeps a skip inside.
+
+    python -m campaigns.reentry.critical_trajectories
+
+prints those of the campaign files aerobraking.toml and skip.toml.  Every round flies a few dozen cases at once
+between two limits and keeps the pair of neighbours between which the outcome changes.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mc_engine.campaign import load_campaign
+from mc_engine.flight import fly
+from mc_engine.model import Parameter, Setting, load_model
+
+HERE = Path(__file__).parent
+CASES = 32  # flown at once
+Inputs = Mapping[str, Any]
+Columns = dict[str, np.ndarray]
+
+
+class CriticalPeriapses(NamedTuple):
+    """Altitudes [km] of the vacuum periapsis between which one pass captures."""
+
+    capture: float
+    entry: float
+
+
+def fly_inputs(inputs: Inputs) -> Columns:
+    """Results of the model with these inputs, the others at their defaults; one case a value of the longest."""
+    model = load_model("campaigns.reentry")
+    items: tuple[Parameter | Setting, ...] = (*model.parameters, *model.settings)
+    defaults = {item.name: item.default for item in items}
+    n_cases = max(np.size(value) for value in inputs.values())
+    return fly(model, defaults | dict(inputs), np.arange(n_cases), 0)
+
+
+def boundary(inputs: Inputs, name: str, low: float, high: float, holds: Callable[[Columns], np.ndarray], width: float):
+    """Value of the input `name` at which `holds` becomes true, going from low to high, to within `width`.
+
+    holds : columns -> bool[n], false at low and true at high; ValueError if it is not.
+    """
+    while high - low > width:
+        values = np.linspace(low, high, CASES)
+        true = holds(fly_inputs({**inputs, name: values}))
+        if true[0] or not true[-1]:
+            raise ValueError(f"{name} from {low:g} to {high:g} has no boundary")
+        first = int(np.argmax(true))
+        low, high = float(values[first - 1]), float(values[first])
+    return 0.5 * (low + high)
+
+
+def critical_periapses(inputs: Inputs, low_km: float = 30.0, high_km: float = 110.0) -> CriticalPeriapses:
+    """Vacuum periapses of the first and the second critical trajectory of an arrival on a hyperbola.
+
+    On the first the vehicle leaves the atmosphere at escape speed: higher, and it is lost.  On the second it just
+    still leaves: lower, and it comes down at once.  Drag only, no gravity but that of the point mass.
+    """
+    asked = {**inputs, "arrival": "hyperbola", "on_exit": "stop"}
+    # a hyperbola has no apoapsis
+    capture = boundary(
+        asked, "vacuum_periapsis_km", low_km, high_km, lambda c: (c["exits"] > 0) & np.isnan(c[APOAPSIS]), 1e-5
+    )
+    entry = boundary(asked, "vacuum_periapsis_km", low_km, capture, lambda c: c["exits"] > 0, 1e-5)
+    return CriticalPeriapses(capture, entry)
+
+
+APOAPSIS = "exit_apoapsis_altitude_km"
+
+
+def critical_roll(inputs: Inputs, low_deg: float = 0.1, high_deg: float = 45.0) -> float:
+    """Climb angle [deg] of the roll to lift down, above which a skip leaves through its entry altitude all the same."""
+    asked = {**inputs, "rolled_bank_deg": 180.0, "on_exit": "stop"}
+    return boundary(asked, "roll_flight_path_angle_deg", low_deg, high_deg, lambda c: c["exits"] > 0, 1e-6)
+
+
+def main() -> None:
+    """Print the critical trajectories of the campaign files."""
+    periapses = critical_periapses(load_campaign(HERE / "aerobraking.toml").nominal)
+    print(f"aerobraking: capture below {periapses.capture:.3f} km, entry below {periapses.entry:.3f} km")
+    print(f"skip: roll to lift down at {critical_roll(load_campaign(HERE / 'skip.toml').nominal):.4f} deg")
+
+
+if __name__ == "__main__":
+    main()

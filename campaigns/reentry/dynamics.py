@@ -1,0 +1,240 @@
+"""Flight of an entering vehicle: a point mass with drag and banked lift about a turning planet.
+
+Planet-fixed Cartesian axes (x to longitude 0, z to the north pole), SI.  The motion is that of Vinh's equations
+(`vinh.py`), in components that have no singularity: a vehicle may start at rest, fall vertically, and pass over a pole.
+On a flat Earth x points ahead, y to the left and z up.
+"""
+
+from collections import namedtuple
+
+from campaigns.reentry.air import logarithm_of_density
+from mc_engine.lanes import any_lane, atan2, exp, maximum, physics, sqrt, where
+from mc_engine.physics.aerodynamics import lift_direction
+from mc_engine.physics.frames import over_ellipsoid, velocity_angles
+from mc_engine.physics.gravity import j2_perturbation, point_mass
+from mc_engine.physics.heating import DKR_EXPONENT, detra_kemp_riddell, sutton_graves
+
+State = namedtuple("State", "x y z vx vy vz heat")  # place [m], velocity [m/s] over ground, heat load [J/m^2]
+# largest dynamic pressure and heat rate so far, with time, altitude and speed; first pull-out; present lift direction
+# and how often it was changed; first exit from the atmosphere
+Memory = namedtuple(
+    "Memory",
+    "pressure pressure_time pressure_altitude pressure_speed "
+    "flux flux_time flux_altitude flux_speed "
+    "low low_time cos_bank sin_bank rolls "
+    "exits exit_time exit_speed exit_angle exit_inertial exit_apoapsis",
+)
+Parameters = namedtuple(
+    "Parameters",
+    "x y z vx vy vz "  # first state
+    "mu rate polar_radius e2 gravity "  # planet; gravity: of a flat Earth
+    "log_density inverse_scale temperature density deviation "  # exponential atmosphere; dispersions of the density
+    "drag lift total axial heating "  # areas over mass [m^2/kg]; coefficient of the heating correlation
+    "cos_bank sin_bank cos_rolled sin_rolled roll_at roll_back_at "  # lift directions; sines of flight-path angles
+    "stop exit stop_time "
+    "ex ey ez fx fy fz nx ny nz "  # unit vectors to the planned entry place, ahead and to the right of it
+    "radius heading speed path aim_down aim_cross aimed",  # of the ground; entry over ground; target
+)
+Events = namedtuple("Events", "pressure_peak heat_peak pull_out roll leave stop left over")
+Place = namedtuple("Place", "altitude climb ux uy uz")  # climb: rate of the altitude; u: unit vector up
+Air = namedtuple("Air", "density slope temperature")  # slope: of the logarithm of the density, by altitude [1/m]
+
+# settings arrive as numbers: places in the lists of words of `model.py`
+FLAT = 2.0
+J2, NO_GRAVITY = 0.0, 2.0
+SUTTON_GRAVES = 0.0
+STOP_ON_EXIT = 0.0
+NEVER = -1.0  # value of an event that is not looked for
+UNKNOWN = 1e300  # the pull-out has not come
+
+
+@physics
+def initial(p, o):
+    """State at entry."""
+    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz, 0.0)
+
+
+@physics
+def place_of(s, p, o):
+    """Altitude, its rate, and the direction up."""
+    if o.shape == FLAT:
+        zero = 0.0 * s.x
+        altitude, climb, ux, uy, uz = s.z + zero, s.vz + zero, zero, zero, 1.0 + zero
+    else:
+        r2 = s.x * s.x + s.y * s.y + s.z * s.z
+        inverse2 = 1.0 / r2
+        r = sqrt(r2)
+        inverse = r * inverse2
+        altitude, slope = over_ellipsoid(r, inverse, s.z * s.z * inverse2, p.polar_radius, p.e2)
+        radial = (s.x * s.vx + s.y * s.vy + s.z * s.vz) * inverse
+        # rate of the squared sine of latitude, z^2 / r^2
+        climb = radial - slope * (2.0 * s.z * inverse2 * (s.vz - s.z * radial * inverse))
+        ux, uy, uz = s.x * inverse, s.y * inverse, s.z * inverse
+    return Place(altitude, climb, ux, uy, uz)
+
+
+@physics
+def air_of(altitude, p, o):
+    """Air at an altitude [m]."""
+    value, slope, temperature = logarithm_of_density(altitude, p, o)
+    return Air(p.density * exp(value), slope, temperature)
+
+
+@physics
+def field(s, p, o):
+    """Acceleration [m/s^2] by gravity and, on a turning planet, the centrifugal force."""
+    if o.gravity == NO_GRAVITY:
+        gx, gy, gz = 0.0 * s.x, 0.0 * s.y, 0.0 * s.z
+    elif o.shape == FLAT:
+        gx, gy, gz = 0.0 * s.x, 0.0 * s.y, -p.gravity + 0.0 * s.z
+    else:
+        gx, gy, gz = point_mass(s.x, s.y, s.z, p.mu)
+    if o.gravity == J2:
+        jx, jy, jz = j2_perturbation(s.x, s.y, s.z, p.mu)
+        gx, gy, gz = gx + jx, gy + jy, gz + jz
+    centrifugal = p.rate * p.rate
+    return gx + centrifugal * s.x, gy + centrifugal * s.y, gz
+
+
+@physics
+def heat_rate(density, speed, p, o):
+    """Convective heat rate [W/m^2] at the stagnation point."""
+    if o.heating == SUTTON_GRAVES:
+        q = sutton_graves(density, speed, p.heating)
+    else:
+        q = detra_kemp_riddell(density, speed, p.heating)
+    return q
+
+
+@physics
+def speed2(s):
+    """Squared speed over ground [m^2/s^2]."""
+    return s.vx * s.vx + s.vy * s.vy + s.vz * s.vz
+
+
+@physics
+def rhs(t, s, m, p, o):
+    """Time derivative of the state: field, Coriolis force, drag, lift, and the heat rate."""
+    place = place_of(s, p, o)
+    air = air_of(place.altitude, p, o)
+    v = sqrt(speed2(s))
+    push = 0.5 * air.density * v  # dynamic pressure over speed
+    gx, gy, gz = field(s, p, o)
+    k, twice = push * p.drag, 2.0 * p.rate
+    ax, ay, az = gx + twice * s.vy - k * s.vx, gy - twice * s.vx - k * s.vy, gz - k * s.vz
+    if any_lane(abs(p.lift) > 0.0):
+        lx, ly, lz = lift_direction(s.vx, s.vy, s.vz, place.ux, place.uy, place.uz, v, m.cos_bank, m.sin_bank)
+        lift = push * v * p.lift
+        ax, ay, az = ax + lift * lx, ay + lift * ly, az + lift * lz
+    return State(s.vx, s.vy, s.vz, ax, ay, az, heat_rate(air.density, v, p, o))
+
+
+@physics
+def events(t, s, m, p, o):
+    """Peaks of dynamic pressure and heat rate, pull-out, rolls, and the ends of the flight.
+
+    A peak is where the rate falls through zero.  Both quantities are rho^a V^b, whose logarithm has the rate
+    a rho'/rho climb + b v.a/V^2; the events are V^2 times that, so that a vehicle at rest divides nothing by zero.
+    """
+    place = place_of(s, p, o)
+    air = air_of(place.altitude, p, o)
+    v2 = speed2(s)
+    v = sqrt(v2)
+    gx, gy, gz = field(s, p, o)
+    gain = (s.vx * gx + s.vy * gy + s.vz * gz) - 0.5 * air.density * p.drag * (v2 * v)  # v.a: lift does no work
+    thicker = air.slope * place.climb * v2
+    power = 3.0 if o.heating == SUTTON_GRAVES else DKR_EXPONENT
+    sine = (s.vx * place.ux + s.vy * place.uy + s.vz * place.uz) / where(v > 0.0, v, 1.0)
+    roll = where(m.rolls == 0.0, sine - p.roll_at, where(m.rolls == 1.0, p.roll_back_at - sine, NEVER))
+    above = place.altitude - p.exit
+    stops = o.on_exit == STOP_ON_EXIT
+    return Events(
+        thicker + 2.0 * gain,
+        0.5 * thicker + power * gain,
+        where(m.low < UNKNOWN, NEVER, place.climb),
+        roll,
+        NEVER + 0.0 * above if stops else above,
+        place.altitude - p.stop,
+        above if stops else NEVER + 0.0 * above,
+        p.stop_time - t,
+    )
+
+
+@physics
+def pressure_of(s, p, o):
+    """(dynamic pressure [Pa], heat rate [W/m^2], altitude [m], speed [m/s])."""
+    altitude = place_of(s, p, o).altitude
+    density, v2 = air_of(altitude, p, o).density, speed2(s)
+    v = sqrt(v2)
+    return 0.5 * density * v2, heat_rate(density, v, p, o), altitude, v
+
+
+@physics
+def start(p, o):
+    """Peaks begin with the values at entry."""
+    pressure, flux, altitude, v = pressure_of(initial(p, o), p, o)
+    zero = 0.0 * v
+    unknown = zero + UNKNOWN
+    return Memory(
+        pressure, zero, altitude, v, flux, zero, altitude, v, unknown, unknown, p.cos_bank, p.sin_bank,
+        zero, zero, unknown, unknown, unknown, unknown, unknown,
+    )  # fmt: skip
+
+
+@physics
+def exit_of(s, p, o):
+    """(speed, flight-path angle, inertial speed, apoapsis altitude [m]) of a vehicle that leaves the atmosphere.
+
+    SI; relative to the ground but for the inertial speed.  The apoapsis is that of a point mass; on a hyperbola, and
+    over a flat Earth, it is UNKNOWN.
+    """
+    v = sqrt(speed2(s))
+    if o.shape == FLAT:
+        angle, inertial, apoapsis = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy)), v, UNKNOWN + 0.0 * v
+    else:
+        angle = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)[0]
+        wx, wy = s.vx - p.rate * s.y, s.vy + p.rate * s.x
+        r = sqrt(s.x * s.x + s.y * s.y + s.z * s.z)
+        w2 = wx * wx + wy * wy + s.vz * s.vz
+        hx, hy, hz = s.y * s.vz - s.z * wy, s.z * wx - s.x * s.vz, s.x * wy - s.y * wx
+        inverse_a = 2.0 / r - w2 / p.mu
+        bound = inverse_a > 0.0
+        a = 1.0 / where(bound, inverse_a, 1.0)
+        e2 = maximum(1.0 - (hx * hx + hy * hy + hz * hz) / (p.mu * a), 0.0)
+        inertial, apoapsis = sqrt(w2), where(bound, a * (1.0 + sqrt(e2)) - p.radius, UNKNOWN)
+    return v, angle, inertial, apoapsis
+
+
+@physics
+def switch(t, s, m, p, o, hit):
+    """Keep the larger of each peak, the first pull-out and the first exit; change the bank where a roll is due."""
+    pressure, flux, altitude, v = pressure_of(s, p, o)
+    push = (hit.pressure_peak > 0.5) & (pressure > m.pressure)
+    heat = (hit.heat_peak > 0.5) & (flux > m.flux)
+    low = hit.pull_out > 0.5
+    roll = hit.roll > 0.5
+    leaving = hit.leave > 0.5
+    first = leaving & (m.exits == 0.0)
+    speed, angle, inertial, apoapsis = exit_of(s, p, o)
+    over = roll & (m.rolls == 0.0)
+    return s, Memory(
+        where(push, pressure, m.pressure),
+        where(push, t, m.pressure_time),
+        where(push, altitude, m.pressure_altitude),
+        where(push, v, m.pressure_speed),
+        where(heat, flux, m.flux),
+        where(heat, t, m.flux_time),
+        where(heat, altitude, m.flux_altitude),
+        where(heat, v, m.flux_speed),
+        where(low, altitude, m.low),
+        where(low, t, m.low_time),
+        where(over, p.cos_rolled, where(roll, p.cos_bank, m.cos_bank)),
+        where(over, p.sin_rolled, where(roll, p.sin_bank, m.sin_bank)),
+        where(roll, m.rolls + 1.0, m.rolls),
+        where(leaving, m.exits + 1.0, m.exits),
+        where(first, t, m.exit_time),
+        where(first, speed, m.exit_speed),
+        where(first, angle, m.exit_angle),
+        where(first, inertial, m.exit_inertial),
+        where(first, apoapsis, m.exit_apoapsis),
+    )

@@ -1,0 +1,19 @@
+"""Figures of the entry campaigns' reports; a map is drawn where the run disperses its two inputs."""
+
+from mc_engine.figures import HistoryFigure, MapFigure, ScatterFigure
+
+FIGURES = (
+    MapFigure("exit_speed_m_s", "vacuum_periapsis_km", "density_factor", "Speed that a pass leaves"),
+    MapFigure(
+        "peak_load_g",
+        "entry_flight_path_angle_error_deg",
+        "entry_speed_error_m_s",
+        "Largest load over the entry errors",
+    ),
+    HistoryFigure(("altitude_km", "speed_m_s", "flight_path_angle_deg"), "Altitude, speed and flight-path angle"),
+    HistoryFigure(("load_g", "heat_rate_w_m2", "dynamic_pressure_pa"), "Load, heat rate and dynamic pressure"),
+    HistoryFigure(("downrange_km", "crossrange_km", "bank_deg"), "Distances over ground and bank"),
+    ScatterFigure("downrange_km", "crossrange_km", "Where the flight ends"),
+    ScatterFigure("peak_load_altitude_km", "peak_load_g", "Largest load and its altitude"),
+    ScatterFigure("heat_load_j_m2", "peak_heat_rate_w_m2", "Largest heat rate and heat load"),
+)

@@ -1,0 +1,75 @@
+"""What can be set in an entry campaign: parameters, which may differ from case to case, and settings."""
+
+from campaigns.reentry.planets import PLANETS
+from campaigns.reentry.vehicles import VEHICLES
+from mc_engine.model import Parameter, Setting
+
+SHAPES = ("ellipsoid", "sphere", "flat")
+
+PARAMETERS = (
+    Parameter("entry_speed_m_s", "m/s", "speed at entry, in the frame speed_frame", 7800.0, low=0.0),
+    Parameter("entry_flight_path_angle_deg", "deg", "flight-path angle at entry, negative down", -2.0, -90.0, 90.0),
+    Parameter("entry_heading_deg", "deg", "heading at entry, from north, clockwise", 90.0, -360.0, 360.0),
+    Parameter("entry_latitude_deg", "deg", "geocentric latitude of entry", 0.0, -90.0, 90.0),
+    Parameter("entry_longitude_deg", "deg", "longitude of entry, east", 0.0, -360.0, 360.0),
+    Parameter("entry_altitude_km", "km", "geodetic altitude of entry", 120.0, low=0.0),
+    Parameter(
+        "entry_radius_km", "km", "distance of entry from the planet's centre; 0 takes entry_altitude_km", 0.0, 0.0
+    ),
+    Parameter("excess_speed_m_s", "m/s", "hyperbolic excess speed of an arrival from far away", 3000.0, low=0.0),
+    Parameter("vacuum_periapsis_km", "km", "altitude of the periapsis of that arrival, were there no air", 80.0),
+    Parameter("entry_speed_error_m_s", "m/s", "error of the speed at entry", 0.0),
+    Parameter("entry_flight_path_angle_error_deg", "deg", "error of the flight-path angle at entry", 0.0, -90.0, 90.0),
+    Parameter("entry_heading_error_deg", "deg", "error of the heading at entry", 0.0, -360.0, 360.0),
+    Parameter("entry_latitude_error_deg", "deg", "error of the latitude of entry", 0.0, -90.0, 90.0),
+    Parameter("entry_longitude_error_deg", "deg", "error of the longitude of entry", 0.0, -360.0, 360.0),
+    Parameter("entry_altitude_error_km", "km", "error of the altitude of entry", 0.0),
+    Parameter("mass_kg", "kg", "mass", 5498.22, low=1e-6),
+    Parameter("reference_area_m2", "m^2", "area that the coefficients belong to", 12.017, low=0.0),
+    Parameter("drag_coefficient", "", "drag coefficient", 1.2569, low=0.0),
+    Parameter("lift_coefficient", "", "lift coefficient, 0.30 of the drag coefficient", 0.37707),
+    Parameter("trim_angle_deg", "deg", "trim angle of attack: turns drag and lift into axial force", 0.0, -90.0, 90.0),
+    Parameter("nose_radius_m", "m", "radius of the nose, for the heating", 3.05, low=1e-6),
+    Parameter("mass_factor", "", "true over planned mass", 1.0, low=1e-6),
+    Parameter("cd_factor", "", "true over planned drag coefficient; the lift grows alike", 1.0, low=0.0),
+    Parameter("ld_factor", "", "true over planned lift-to-drag ratio", 1.0),
+    Parameter("nose_radius_factor", "", "true over planned nose radius", 1.0, low=1e-6),
+    Parameter("heating_factor", "", "true over computed heat rate", 1.0, low=0.0),
+    Parameter("density_factor", "", "true over standard density, at all altitudes", 1.0, low=0.0),
+    Parameter("density_deviation", "", "slow density error, in sigmas of its profile over altitude", 0.0, -10.0, 10.0),
+    Parameter("bank_deg", "deg", "bank angle: 0 lift up, 90 to the right, 180 down", 60.0, -360.0, 360.0),
+    Parameter("bank_error_deg", "deg", "error of every bank angle", 0.0, -360.0, 360.0),
+    Parameter(
+        "roll_flight_path_angle_deg", "deg", "climbing through this angle, roll to rolled_bank_deg", 90.0, -90, 90
+    ),
+    Parameter("rolled_bank_deg", "deg", "bank angle after that roll", 180.0, -360.0, 360.0),
+    Parameter("roll_back_flight_path_angle_deg", "deg", "sinking through this angle, roll back", -90.0, -90.0, 90.0),
+    Parameter("stop_altitude_km", "km", "geodetic altitude at which the flight ends on the way down", 10.0),
+    Parameter(
+        "exit_altitude_km", "km", "altitude at which a rising vehicle leaves; 0 takes that of entry", 0.0, low=0.0
+    ),
+    Parameter("stop_time_s", "s", "time at which the flight ends, wherever it is", 1e9, low=0.0),
+    Parameter(
+        "target_downrange_km", "km", "planned distance to the end; 0 means that there is no target", 0.0, low=0.0
+    ),
+    Parameter("target_crossrange_km", "km", "planned distance to the right", 0.0),
+    Parameter("surface_radius_km", "km", "equatorial radius; 0 takes that of the planet", 0.0, low=0.0),
+)
+SETTINGS = (
+    Setting("planet", "", "planet", "earth", tuple(PLANETS)),
+    Setting("shape", "", "shape of the planet", "ellipsoid", SHAPES),
+    Setting("planar", "", "no lift to the side: banking takes lift out of the vertical plane, and that is all", False),
+    Setting("gravity", "", "gravity", "j2", ("j2", "point", "none")),
+    Setting("rotating", "", "the planet turns", True),
+    Setting("atmosphere", "", "density over altitude", "us76", ("us76", "exponential")),
+    Setting("heating", "", "correlation of the heat rate", "sutton_graves", ("sutton_graves", "detra_kemp_riddell")),
+    Setting("speed_frame", "", "frame of the speed at entry", "inertial", ("inertial", "relative")),
+    Setting(
+        "arrival", "", "whether the entry is given by its state or by a hyperbola", "state", ("state", "hyperbola")
+    ),
+    Setting("vehicle", "", "a vehicle of vehicles.py, or the one given here", "given", ("given", *VEHICLES)),
+    Setting("on_exit", "", "what happens when the vehicle leaves the atmosphere", "stop", ("stop", "continue")),
+    Setting("guidance", "", "guidance law", "none", ("none",)),
+    Setting("tolerance", "", "relative error of an integration step", 1e-8, low=1e-14, high=1e-3),
+    Setting("time_limit_s", "s", "longest flight; a case that has not ended by then is no-stop", 20_000.0, low=1.0),
+)

@@ -1,0 +1,212 @@
+"""What is seen along an entry and what it comes to: quantities and metrics.  SI, radians."""
+
+from collections import namedtuple
+
+from campaigns.reentry.air import sound_speed
+from campaigns.reentry.dynamics import (
+    FLAT,
+    STOP_ON_EXIT,
+    UNKNOWN,
+    air_of,
+    exit_of,
+    heat_rate,
+    place_of,
+    pressure_of,
+    speed2,
+)
+from mc_engine.lanes import atan2, floor, physics, rint, sqrt, where
+from mc_engine.model import Field
+from mc_engine.physics.frames import geodetic_latitude, spherical, velocity_angles
+
+TAU = 6.283185307179586
+
+QUANTITIES = (
+    Field("altitude_km", "km", "geodetic altitude"),
+    Field("speed_m_s", "m/s", "speed over ground"),
+    Field("flight_path_angle_deg", "deg", "flight-path angle over ground, negative below the horizon"),
+    Field("heading_deg", "deg", "heading over ground, from north, clockwise"),
+    Field("latitude_deg", "deg", "geodetic latitude"),
+    Field("longitude_deg", "deg", "longitude, east"),
+    Field("downrange_km", "km", "distance over ground along the planned great circle"),
+    Field("crossrange_km", "km", "distance over ground to the right of the planned great circle"),
+    Field("load_g", "g", "total aerodynamic load"),
+    Field("axial_load_g", "g", "load along the body axis"),
+    Field("dynamic_pressure_pa", "Pa", "dynamic pressure"),
+    Field("heat_rate_w_m2", "W/m^2", "convective heat rate at the stagnation point"),
+    Field("heat_load_j_m2", "J/m^2", "convective heat load at the stagnation point"),
+    Field("mach", "", "Mach number"),
+    Field("density_kg_m3", "kg/m^3", "density of the air"),
+    Field("bank_deg", "deg", "bank angle, positive to the right"),
+)
+_PEAKS = (
+    ("load_g", "g", "largest total aerodynamic load"),
+    ("axial_load_g", "g", "largest load along the body axis"),
+    ("dynamic_pressure_pa", "Pa", "largest dynamic pressure"),
+    ("heat_rate_w_m2", "W/m^2", "largest convective heat rate at the stagnation point"),
+)
+
+
+def _peak(name: str, unit: str, text: str) -> tuple[Field, ...]:
+    """The peak itself, and when, where and how fast it was."""
+    stem = f"peak_{Field(name, unit, text).symbol}"
+    return (
+        Field(f"peak_{name}", unit, text),
+        Field(f"{stem}_time_s", "s", f"{text}: when"),
+        Field(f"{stem}_altitude_km", "km", f"{text}: at what altitude"),
+        Field(f"{stem}_speed_m_s", "m/s", f"{text}: at what speed over ground"),
+    )
+
+
+METRICS = (
+    *(field for peak in _PEAKS for field in _peak(*peak)),
+    Field("heat_load_j_m2", "J/m^2", "convective heat load at the stagnation point"),
+    Field("min_altitude_km", "km", "altitude of the first pull-out, or of the end of a flight without one"),
+    Field("min_altitude_time_s", "s", "when that was"),
+    Field("exits", "", "how often the vehicle left the atmosphere, upwards through the exit altitude"),
+    Field("exit_time_s", "s", "first exit"),
+    Field("exit_speed_m_s", "m/s", "speed over ground at the first exit"),
+    Field("exit_flight_path_angle_deg", "deg", "flight-path angle over ground at the first exit"),
+    Field("exit_inertial_speed_m_s", "m/s", "inertial speed at the first exit"),
+    Field("exit_apoapsis_altitude_km", "km", "altitude of the apoapsis that the first exit leads to"),
+    Field("flight_time_s", "s", "length of the flight"),
+    Field("final_altitude_km", "km", "geodetic altitude at the end"),
+    Field("final_speed_m_s", "m/s", "speed over ground at the end"),
+    Field("final_flight_path_angle_deg", "deg", "flight-path angle over ground at the end"),
+    Field("final_mach", "", "Mach number at the end"),
+    Field("final_latitude_deg", "deg", "geodetic latitude of the end"),
+    Field("final_longitude_deg", "deg", "longitude of the end, east"),
+    Field("downrange_km", "km", "distance over ground to the end, along the planned great circle"),
+    Field("crossrange_km", "km", "distance over ground to the end, to the right of the planned great circle"),
+    Field("miss_km", "km", "distance of the end from the target"),
+    Field("relative_speed_m_s", "m/s", "speed over ground at entry"),
+    Field("relative_flight_path_angle_deg", "deg", "flight-path angle over ground at entry"),
+    Field("ballistic_coefficient_kg_m2", "kg/m^2", "mass over drag area, dispersions included"),
+)
+Quantities = namedtuple(
+    "Quantities",
+    "altitude speed path heading latitude longitude downrange crossrange load axial pressure flux heat mach density "
+    "bank",
+)
+Metrics = namedtuple("Metrics", [field.name for field in METRICS])  # type: ignore[misc]
+Ground = namedtuple("Ground", "latitude longitude downrange crossrange path heading")
+
+
+@physics
+def half_turn(angle):
+    """The angle in [-pi, pi]."""
+    return angle - TAU * rint(angle * (1.0 / TAU))
+
+
+@physics
+def full_turn(angle):
+    """The angle in [0, 2 pi)."""
+    return angle - TAU * floor(angle * (1.0 / TAU))
+
+
+@physics
+def ground_of(s, altitude, p, o):
+    """Place over ground and direction of flight.  Distances are counted from the planned entry place.
+
+    Downrange goes on beyond the antipodes, from a quarter of a turn behind the entry place to three quarters ahead.
+    """
+    if o.shape == FLAT:
+        latitude, longitude, downrange, crossrange = 0.0 * s.x, 0.0 * s.x, s.x + 0.0 * s.x, -s.y
+        path = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy))
+        heading = p.heading + atan2(-s.vy, s.vx)
+    else:
+        _, longitude = spherical(s.x, s.y, s.z)
+        latitude = geodetic_latitude(s.x, s.y, s.z, altitude, p.polar_radius, p.e2)
+        up = s.x * p.ex + s.y * p.ey + s.z * p.ez
+        ahead = s.x * p.fx + s.y * p.fy + s.z * p.fz
+        right = s.x * p.nx + s.y * p.ny + s.z * p.nz
+        along = atan2(ahead, up)
+        downrange = p.radius * where(along < -0.25 * TAU, along + TAU, along)
+        crossrange = p.radius * atan2(right, sqrt(up * up + ahead * ahead))
+        path, heading = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)
+    return Ground(latitude, longitude, downrange, crossrange, path, full_turn(heading))
+
+
+@physics
+def observe(t, s, m, p, o):
+    """The quantities in the order of QUANTITIES."""
+    place = place_of(s, p, o)
+    air = air_of(place.altitude, p, o)
+    v2 = speed2(s)
+    v = sqrt(v2)
+    pressure = 0.5 * air.density * v2
+    ground = ground_of(s, place.altitude, p, o)
+    return Quantities(
+        place.altitude,
+        v,
+        ground.path,
+        ground.heading,
+        ground.latitude,
+        ground.longitude,
+        ground.downrange,
+        ground.crossrange,
+        pressure * p.total,
+        pressure * p.axial,
+        pressure,
+        heat_rate(air.density, v, p, o),
+        s.heat,
+        v / sound_speed(air.temperature),
+        air.density,
+        atan2(m.sin_bank, m.cos_bank),
+    )
+
+
+@physics
+def known(value):
+    """The value, or not a number where it is unknown."""
+    return where(abs(value) < UNKNOWN, value, float("nan"))
+
+
+@physics
+def evaluate(t, s, m, p, o, best, when):
+    """The metrics in the order of METRICS, at the end of the flight."""
+    pressure, flux, altitude, v = pressure_of(s, p, o)
+    ground = ground_of(s, altitude, p, o)
+    push, heat = pressure > m.pressure, flux > m.flux  # the flight may end before a peak
+    pressure, flux = where(push, pressure, m.pressure), where(heat, flux, m.flux)
+    pressure_when = (
+        where(push, t, m.pressure_time),
+        where(push, altitude, m.pressure_altitude),
+        where(push, v, m.pressure_speed),
+    )
+    heat_when = where(heat, t, m.flux_time), where(heat, altitude, m.flux_altitude), where(heat, v, m.flux_speed)
+    leaves = (o.on_exit == STOP_ON_EXIT) & (altitude > p.exit - 1e-3) & (ground.path > 0.0)
+    speed, angle, inertial, apoapsis = exit_of(s, p, o)
+    pulled = m.low < UNKNOWN
+    miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.aim_cross
+    return Metrics(
+        pressure * p.total,
+        *pressure_when,
+        pressure * p.axial,
+        *pressure_when,
+        pressure,
+        *pressure_when,
+        flux,
+        *heat_when,
+        s.heat,
+        where(pulled, m.low, altitude),
+        where(pulled, m.low_time, t),
+        where(leaves, 1.0, m.exits),
+        known(where(leaves, t, m.exit_time)),
+        known(where(leaves, speed, m.exit_speed)),
+        known(where(leaves, angle, m.exit_angle)),
+        known(where(leaves, inertial, m.exit_inertial)),
+        known(where(leaves, apoapsis, m.exit_apoapsis)),
+        t,
+        altitude,
+        v,
+        ground.path,
+        v / sound_speed(air_of(altitude, p, o).temperature),
+        ground.latitude,
+        ground.longitude,
+        ground.downrange,
+        ground.crossrange,
+        where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), float("nan")),
+        p.speed,
+        p.path,
+        where(p.drag > 0.0, 1.0 / where(p.drag > 0.0, p.drag, 1.0), float("nan")),
+    )

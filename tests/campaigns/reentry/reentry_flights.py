@@ -1,0 +1,55 @@
+"""Short ways to fly the entry model: inputs and results by column name, in declared units."""
+
+import numpy as np
+
+from mc_engine.flight import fly, fly_history
+from mc_engine.model import load_model
+
+MODEL = load_model("campaigns.reentry")
+NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settings)}
+MU, RADIUS = 3.986004418e14, 6_378_137.0
+G0 = 9.80665
+EXACT = 1e-12  # tolerance of an integration step where the flight must be as good as its closed form
+
+# a spherical Earth that does not turn, motion in the plane of the equator
+PLANAR = {"shape": "sphere", "gravity": "point", "rotating": False, "speed_frame": "relative", "planar": True}
+# the same with the textbook atmosphere, and a flat Earth without gravity
+TEXTBOOK = PLANAR | {"atmosphere": "exponential"}
+IDEAL = TEXTBOOK | {"shape": "flat", "gravity": "none"}
+
+
+def ballistic(b):
+    """A vehicle without lift of ballistic coefficient b [kg/m^2]."""
+    return {"mass_kg": b, "reference_area_m2": 1.0, "drag_coefficient": 1.0, "lift_coefficient": 0.0}
+
+
+def gliding(lift_area, lift_to_drag):
+    """A vehicle with its lift up; lift_area is C_L A / m [m^2/kg]."""
+    return {
+        "mass_kg": 1.0,
+        "reference_area_m2": lift_area,
+        "lift_coefficient": 1.0,
+        "drag_coefficient": 1.0 / lift_to_drag,
+        "bank_deg": 0.0,
+    }
+
+
+def fly_cases(width=8, ids=None, **inputs):
+    """Columns of as many cases as the longest input has values."""
+    n_cases = max((np.size(value) for value in inputs.values()), default=1)
+    return fly(MODEL, NOMINAL | inputs, np.arange(n_cases) if ids is None else ids, 1, width=width)
+
+
+def fly_one(**inputs):
+    """The row of one case: a number or a word by column name."""
+    return {name: column[0] for name, column in fly_cases(**inputs).items()}
+
+
+def history(rows=2001, **inputs):
+    """Quantities along the flight of one case."""
+    return fly_history(MODEL, NOMINAL | inputs, 0, 1, rows=rows)[1]
+
+
+def circular_speed(altitude_km):
+    """Circular speed [m/s] over the sphere."""
+    return np.sqrt(MU / (RADIUS + 1e3 * np.asarray(altitude_km)))

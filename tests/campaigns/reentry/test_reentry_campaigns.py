@@ -1,0 +1,141 @@
+"""The campaign files: each kind of entry does what it is there to show."""
+
+import numpy as np
+import pytest
+from reentry_flights import EXACT, PLANAR, ballistic, fly_cases
+
+from campaigns.reentry.critical_trajectories import APOAPSIS, boundary, critical_periapses
+from mc_engine.campaign import list_campaigns, load_campaign
+from mc_engine.flight import fly
+
+NAMES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "reentry")
+KINDS = {"steep_ballistic", "ballistic_orbit", "skip", "double_dip", "aerobraking"}
+
+
+def nominal(name, **inputs):
+    """The row of a file's nominal case."""
+    campaign = load_campaign(name)
+    return {
+        key: column[0] for key, column in fly(campaign.model, {**campaign.nominal, **inputs}, np.array([0]), 1).items()
+    }
+
+
+def test_the_five_kinds_of_entry_have_a_file_each():
+    assert {name.partition("/")[2] for name in NAMES} == KINDS | {""}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_nominal_case_of_each_file_flies_to_its_end(name):
+    assert nominal(name)["status"] == "ok"
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if "target_downrange_km" in load_campaign(name).parameters])
+def test_the_target_of_a_file_is_where_its_nominal_case_ends(name):
+    ten_metres = 0.010
+    assert nominal(name)["miss_km"] < ten_metres
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_dispersion_and_requirement_says_where_it_comes_from(name):
+    campaign = load_campaign(name)
+    assert all(dispersion.source for dispersion in campaign.dispersions)
+    assert all(requirement.source for requirement in campaign.requirements)
+
+
+def test_the_main_campaign_enters_where_the_deorbit_campaign_aims():
+    aimed, flown = nominal("deorbit"), load_campaign("reentry").nominal
+    for name in (
+        "entry_speed_m_s",
+        "entry_heading_deg",
+        "entry_latitude_deg",
+        "entry_longitude_deg",
+        "entry_radius_km",
+    ):
+        assert flown[name] == pytest.approx(aimed[name], abs=1e-4), name
+    assert flown["entry_flight_path_angle_deg"] == pytest.approx(aimed["entry_flight_path_angle_deg"], abs=1e-4)
+
+
+def test_the_steep_entry_stays_almost_straight_down_to_its_peak_load():
+    campaign = load_campaign("reentry/steep_ballistic")
+    row = nominal(campaign.name, stop_altitude_km=nominal(campaign.name)["peak_load_altitude_km"])
+    assert row["final_flight_path_angle_deg"] == pytest.approx(row["relative_flight_path_angle_deg"], abs=1.0)
+
+
+def test_the_skip_campaign_is_the_sources_lift_loadings():
+    row = load_campaign("reentry/skip")
+    areas = next(one.levels for one in row.dispersions if one.name == "reference_area_m2")
+    assert [area * 1.225 * 7200.0 / 2000.0 for area in areas] == pytest.approx([1.0, 3.0, 5.0], rel=1e-7)
+
+
+def test_the_double_dip_stays_inside_and_would_leave_without_its_roll():
+    assert nominal("reentry/double_dip")["exits"] == 0.0
+    assert nominal("reentry/double_dip", roll_flight_path_angle_deg=90.0)["exits"] > 0.0
+
+
+@pytest.fixture(scope="module")
+def periapses():
+    return critical_periapses(load_campaign("reentry/aerobraking").nominal)
+
+
+def test_the_critical_trajectories_of_aerobraking_are_those_of_the_digest(periapses):
+    tenth_of_a_kilometre = 0.1
+    assert periapses.capture == pytest.approx(84.92, abs=tenth_of_a_kilometre)
+    assert periapses.entry == pytest.approx(70.41, abs=tenth_of_a_kilometre)
+
+
+def test_at_the_first_critical_trajectory_the_vehicle_leaves_at_escape_speed(periapses):
+    campaign = load_campaign("reentry/aerobraking").nominal
+    for step, lost in ((1e-4, True), (-1e-4, False)):
+        row = nominal("reentry/aerobraking", vacuum_periapsis_km=periapses.capture + step)
+        escape = np.sqrt(2.0 * 3.986004418e14 / (6_378_137.0 + 1e3 * campaign["entry_altitude_km"]))
+        assert row["exit_speed_m_s"] == pytest.approx(escape, rel=1e-5)
+        assert np.isnan(row[APOAPSIS]) == lost
+
+
+def test_below_the_second_critical_trajectory_the_vehicle_comes_down_at_once(periapses):
+    above = nominal("reentry/aerobraking", vacuum_periapsis_km=periapses.entry + 1e-4)
+    below = nominal("reentry/aerobraking", vacuum_periapsis_km=periapses.entry - 1e-4)
+    assert (above["exits"], below["exits"]) == (1.0, 0.0)
+    assert below["final_altitude_km"] == pytest.approx(0.0, abs=1e-6)
+    # it leaves below circular speed, almost level
+    assert above["exit_speed_m_s"] < np.sqrt(3.986004418e14 / (6_378_137.0 + 120e3))
+    assert above["exit_flight_path_angle_deg"] < 0.1
+
+
+def test_a_boundary_that_is_not_there_is_said_so():
+    with pytest.raises(ValueError, match="no boundary"):
+        boundary({}, "entry_speed_m_s", 7000.0, 7100.0, lambda c: c["exits"] > 0, 1.0)
+
+
+def test_captured_passes_come_back_with_falling_apoapses():
+    """Between the two critical trajectories: the next passes keep their periapsis and lose apoapsis."""
+    campaign = load_campaign("reentry/aerobraking")
+    first = nominal(campaign.name)
+    assert first["exit_apoapsis_altitude_km"] > 10_000.0
+    # the orbit that the first pass leaves, entered again on its way down
+    second = nominal(
+        campaign.name, arrival="state", entry_speed_m_s=first["exit_speed_m_s"],
+        entry_flight_path_angle_deg=-first["exit_flight_path_angle_deg"],
+    )  # fmt: skip
+    assert second["exits"] == 1.0
+    assert second["exit_apoapsis_altitude_km"] < first["exit_apoapsis_altitude_km"]
+    assert second["min_altitude_km"] == pytest.approx(first["min_altitude_km"], abs=2.0)
+
+
+def test_open_loop_misses_have_the_scatter_of_the_linear_root_sum_square():
+    """The digest's planar baseline and dispersions: 56.76 km within 8 %."""
+    rng, n = np.random.default_rng(20030401), 4000
+    sigma = {
+        "entry_speed_error_m_s": 5.0, "entry_flight_path_angle_error_deg": 0.05, "density_factor": 0.1,
+        "cd_factor": 0.1 / 3, "ld_factor": 0.1 / 3, "mass_factor": 0.02 / 3,
+    }  # fmt: skip
+    inputs = {name: rng.normal(1.0 if name.endswith("factor") else 0.0, s, n) for name, s in sigma.items()}
+    flown = fly_cases(**PLANAR, **inputs)["downrange_km"]
+    assert flown.std() == pytest.approx(56.76, rel=0.08)
+
+
+def test_the_range_and_load_of_a_ballistic_entry_do_not_hang_on_the_tolerance():
+    rough = fly_cases(**PLANAR, **ballistic(np.array([100.0, 400.0, 1000.0])))
+    exact = fly_cases(**PLANAR, **ballistic(np.array([100.0, 400.0, 1000.0])), tolerance=EXACT)
+    assert rough["downrange_km"] == pytest.approx(exact["downrange_km"], abs=0.01)
+    assert rough["peak_load_g"] == pytest.approx(exact["peak_load_g"], rel=1e-4)

@@ -1,0 +1,131 @@
+"""Published check cases, and the table of published values: ours computed again, every verdict held."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reentry_flights import EXACT, MODEL, NOMINAL, PLANAR, fly_one, history
+
+import campaigns.reentry
+from campaigns.reentry.closed_forms import shallow_peak
+from mc_engine.physics.atmosphere import us76
+
+FILE = Path(campaigns.reentry.__file__).with_name("published.toml")
+RECORDS = tomllib.loads(FILE.read_text(encoding="utf-8"))["published"]
+STATUSES = {"legible", "not reproduced", "fitted"}
+IDS = [record["quantity"] for record in RECORDS]
+DIGITS = 5e-7  # ours is written to seven digits and more
+FOOT = 0.3048
+TENTH_OF_A_FOOT = 0.1
+
+# NASA/TM-2015-218675: a sphere of one slug and 0.1963495 ft^2, dropped from 30 000 ft over (0, 0) for 30 s.
+SPHERE = {
+    "mass_kg": 14.593903, "reference_area_m2": 0.1963495 * FOOT**2, "drag_coefficient": 0.1, "lift_coefficient": 0.0,
+    "entry_altitude_km": 30_000 * FOOT / 1e3, "entry_speed_m_s": 0.0, "entry_flight_path_angle_deg": -90.0,
+    "speed_frame": "relative", "stop_altitude_km": 0.0, "stop_time_s": 30.0,
+}  # fmt: skip
+ROUND = {"shape": "sphere", "gravity": "point", "rotating": False, "surface_radius_km": 20_902_255.199 * FOOT / 1e3}
+STARDUST = {
+    "vehicle": "sample_return", "entry_radius_km": 6503.14, "entry_speed_m_s": 12_900.0,
+    "entry_flight_path_angle_deg": -8.2, "entry_heading_deg": 103.0, "entry_latitude_deg": 42.3,
+    "stop_altitude_km": 20.0,
+}  # fmt: skip
+
+
+def altitude_ft(**inputs):
+    row = fly_one(**SPHERE | inputs)
+    assert row["status"] == "ok"
+    return 1e3 * row["final_altitude_km"] / FOOT
+
+
+def test_nasa_case_1_a_sphere_dropped_in_vacuum_over_the_turning_ellipsoid():
+    assert altitude_ft(drag_coefficient=0.0) == pytest.approx(15_598.904, abs=TENTH_OF_A_FOOT)
+
+
+def test_nasa_case_4_a_sphere_dropped_over_a_round_earth_at_rest():
+    assert altitude_ft(**ROUND) == pytest.approx(16_231.307, abs=TENTH_OF_A_FOOT)
+    assert fly_one(**SPHERE | ROUND)["final_speed_m_s"] / FOOT == pytest.approx(867.105, abs=TENTH_OF_A_FOOT)
+
+
+def test_nasa_case_6_a_sphere_dropped_over_the_turning_ellipsoid():
+    assert altitude_ft() == pytest.approx(16_284.44, abs=TENTH_OF_A_FOOT)
+
+
+def mach_time(mach, **inputs):
+    """Time [s] at which the Mach number has come down to `mach`."""
+    seen = history(rows=8001, **inputs)
+    after = int(np.argmax(seen["mach"]))
+    return float(np.interp(-mach, -seen["mach"][after:], seen["t_s"][after:]))
+
+
+def test_stardust_has_the_load_of_the_reconstruction_within_ten_percent():
+    row = fly_one(**STARDUST)
+    assert row["peak_load_g"] == pytest.approx(32.41, rel=0.02)
+    assert row["peak_load_g"] == pytest.approx(32.89, rel=0.10)
+
+
+def test_stardust_slows_to_mach_1_23_when_its_drogue_opened():
+    assert mach_time(1.23, **STARDUST) == pytest.approx(138.0, abs=2.0)
+
+
+def test_treating_the_inertial_speed_as_relative_overpredicts_the_load_of_stardust():
+    """The digest: by 11 % on a sphere at rest."""
+    planar = fly_one(**STARDUST | {"rotating": False, "shape": "sphere", "gravity": "point"})
+    assert planar["peak_load_g"] / fly_one(**STARDUST)["peak_load_g"] == pytest.approx(1.11, abs=0.03)
+
+
+def test_the_planar_reference_has_the_range_and_load_of_the_digest():
+    row = fly_one(**PLANAR)
+    assert row["downrange_km"] == pytest.approx(2548.7, rel=3e-3)
+    assert row["flight_time_s"] == pytest.approx(523.0, abs=1.0)
+    assert row["peak_load_g"] == pytest.approx(3.66, rel=5e-3)
+    assert row["peak_load_altitude_km"] == pytest.approx(39.5, abs=0.1)
+    assert abs(row["crossrange_km"]) < 1e-12
+
+
+# numbers that are no column
+COMPUTED = {
+    "density at 30 km": lambda: us76(30e3),
+    "density at 71.5 km": lambda: us76(71.5e3),
+    "density at 86 km": lambda: us76(86e3),
+    "density at 120 km": lambda: us76(120e3),
+    "largest load of a grazing ballistic entry": lambda: 30.0 * shallow_peak(0.0),
+    "Stardust: drogue, at Mach 1.23": lambda: mach_time(1.23, **STARDUST),
+}
+
+
+def computed(record):
+    """Our number, flown or computed again."""
+    if "column" in record:
+        return fly_one(**record.get("at", {}), tolerance=EXACT)[record["column"]]
+    return COMPUTED[record["quantity"]]()
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=IDS)
+def test_our_number_is_what_the_campaign_computes(record):
+    # a history's rows tell the time of a Mach number to a millisecond
+    error = 1e-3 if record["quantity"].startswith("Stardust: drogue") else DIGITS * abs(record["ours"])
+    assert computed(record) == pytest.approx(record["ours"], rel=0.0, abs=error)
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=IDS)
+def test_our_number_lies_in_the_printed_digits_unless_it_is_said_not_to(record):
+    inside = abs(computed(record) - record["published"]) <= record["tolerance"]
+    assert inside == (record["status"] != "not reproduced")
+
+
+@pytest.mark.parametrize("record", RECORDS, ids=IDS)
+def test_each_record_is_complete_and_in_the_unit_of_its_column(record):
+    assert {"quantity", "published", "unit", "source", "ours", "tolerance", "status"} <= set(record)
+    assert record["status"] in STATUSES
+    assert set(record.get("at", {})) <= set(NOMINAL)
+    if "column" in record:
+        assert {field.name: field.unit for field in MODEL.metrics}[record["column"]] == record["unit"]
+    else:
+        assert record["quantity"] in COMPUTED
+
+
+def test_the_model_carries_the_records_into_its_reports():
+    assert MODEL.published == tuple(RECORDS)
+    assert len(set(IDS)) == len(IDS)
