@@ -236,6 +236,68 @@ class RetentionSection(Section):
     histories: HistoriesSection = Field(default=HistoriesSection())
 
 
+class TunedSection(Section):
+    """[tuning.parameter.NAME]: the range in which a parameter may be chosen."""
+
+    lower: Number = Field(description="the smallest value that may be chosen")
+    upper: Number = Field(description="the largest value that may be chosen")
+    source: str = ""
+    note: str = ""
+
+
+class ObjectiveSection(Section):
+    """[tuning.objective.NAME]: what is to be as small or as large as possible."""
+
+    metric: str = Field(description="a metric of the model")
+    goal: Literal["minimise", "maximise"] = "minimise"
+    quantile: Share | None = Field(
+        default=None, description="this quantile over the dispersed cases; the nominal case unless said"
+    )
+    note: str = ""
+
+
+class ConstraintSection(Section):
+    """[tuning.constraint.NAME]: at_most, at_least or both."""
+
+    metric: str = Field(description="a metric of the model")
+    at_most: Number | None = None
+    at_least: Number | None = None
+    quantile: Share | None = Field(
+        default=None, description="this quantile over the dispersed cases; the nominal case unless said"
+    )
+    source: str = ""
+    note: str = ""
+
+
+class PublishedPointSection(Section):
+    """[[tuning.published]]: a point to be drawn beside the front."""
+
+    name: str = Field(min_length=1, description="what the report calls the point")
+    values: dict[str, Number] = Field(description="a number for every objective, by its name")
+    source: str = ""
+
+
+class TuningSection(Section):
+    """[tuning]: which parameters `mc-engine tune` chooses, what for, and how long it searches (NSGA-II)."""
+
+    parameter: dict[str, TunedSection] = Field(default_factory=dict)
+    objective: dict[str, ObjectiveSection] = Field(default_factory=dict)
+    constraint: dict[str, ConstraintSection] = Field(default_factory=dict)
+    published: list[PublishedPointSection] = Field(default_factory=list)
+    population: int = Field(default=48, ge=4, le=100_000, description="candidates in a generation")
+    generations: int = Field(default=60, ge=1, le=100_000, description="generations, the first one among them")
+    patience: int | None = Field(
+        default=None, ge=1, description="stop when so many generations in a row bring nothing; never unless said"
+    )
+    seed: int | None = Field(
+        default=None, ge=0, le=2**32 - 1, description="of the search; that of [campaign] unless said"
+    )
+    crossover: float = Field(default=0.9, ge=0.0, le=1.0, description="probability that two parents are crossed")
+    mutation: float | None = Field(
+        default=None, gt=0.0, le=1.0, description="probability that a parameter mutates; 1 in all tuned unless said"
+    )
+
+
 AnyDispersion = (
     LevelsDispersion
     | NormalDispersion
@@ -259,6 +321,7 @@ class CampaignFile(Section):
     correlation: list[CorrelationSection] = Field(default_factory=list)
     requirement: dict[str, RequirementSection] = Field(default_factory=dict)
     retention: RetentionSection = Field(default_factory=RetentionSection)
+    tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")
 
 
 def schema() -> dict[str, Any]:

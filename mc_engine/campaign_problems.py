@@ -5,6 +5,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
@@ -14,12 +15,17 @@ from mc_engine.campaign_file import (
     DISTRIBUTIONS,
     CampaignFile,
     CampaignSection,
+    ConstraintSection,
     CorrelationSection,
     DispersionSection,
     LevelsDispersion,
+    ObjectiveSection,
+    PublishedPointSection,
     RequirementSection,
     RetentionSection,
     Section,
+    TunedSection,
+    TuningSection,
     Value,
 )
 from mc_engine.distributions import Scalar
@@ -76,6 +82,18 @@ class Sections:
     correlations: dict[str, CorrelationSection]  # by place: "correlation 1", "correlation 2", ...
     requirements: dict[str, RequirementSection]
     retention: RetentionSection | None
+    tuning: "TuningSections | None"
+
+
+@dataclass(frozen=True)
+class TuningSections:
+    """What could be read of [tuning]; `head` has its plain keys alone."""
+
+    head: TuningSection | None
+    parameters: dict[str, TunedSection]
+    objectives: dict[str, ObjectiveSection]
+    constraints: dict[str, ConstraintSection]
+    published: dict[str, PublishedPointSection]  # by place: "published 1", "published 2", ...
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
@@ -104,9 +122,10 @@ def read_sections(document: dict[str, Any], found: Findings) -> Sections:
         else None,
         parameters=_parameters(document, inside["parameters"]),
         dispersions=_read_each(_dispersion, _named(document, "dispersion", found)),
-        correlations=_read_each(_correlation, _correlations(document, found)),
+        correlations=_read_each(_correlation, _listed(document, "correlation", found)),
         requirements=_read_each(_requirement, _named(document, "requirement", found)),
         retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
+        tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
     )
 
 
@@ -149,16 +168,18 @@ def _named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[s
     raw = document.get(name, {})
     if isinstance(raw, dict):
         return [(key, entry, found.under(name, key)) for key, entry in raw.items()]
-    found.add(name, f"{shown(raw)} is not a table; write [{name}.NAME]")
+    header = f"{found.place}.{name}" if found.place else name
+    found.add(name, f"{shown(raw)} is not a table; write [{header}.NAME]")
     return []
 
 
-def _correlations(document: dict[str, Any], found: Findings) -> list[tuple[str, Any, Findings]]:
-    raw = document.get("correlation", [])
+def _listed(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+    raw = document.get(name, [])
     if isinstance(raw, list):
-        places = [f"correlation {k}" for k in range(1, len(raw) + 1)]
+        places = [f"{name} {k}" for k in range(1, len(raw) + 1)]
         return [(place, entry, found.under(place)) for place, entry in zip(places, raw, strict=True)]
-    found.add("correlation", f"{shown(raw)} is not a list of tables; write [[correlation]] with two brackets")
+    header = f"{found.place}.{name}" if found.place else name
+    found.add(name, f"{shown(raw)} is not a list of tables; write [[{header}]] with two brackets")
     return []
 
 
@@ -168,6 +189,21 @@ def _correlation(raw: Any, found: Findings) -> CorrelationSection | None:
 
 def _requirement(raw: Any, found: Findings) -> RequirementSection | None:
     return read(RequirementSection, raw, found)
+
+
+def _tuning(raw: Any, found: Findings) -> TuningSections | None:
+    """[tuning], each of its tables read for itself, so that a slip in one hides nothing in the others."""
+    if not isinstance(raw, dict):
+        found.add("", f"{shown(raw)} is not a table; write [tuning]")
+        return None
+    tables = ("parameter", "objective", "constraint", "published")
+    return TuningSections(
+        head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, found),
+        parameters=_read_each(partial(read, TunedSection), _named(raw, "parameter", found)),
+        objectives=_read_each(partial(read, ObjectiveSection), _named(raw, "objective", found)),
+        constraints=_read_each(partial(read, ConstraintSection), _named(raw, "constraint", found)),
+        published=_read_each(partial(read, PublishedPointSection), _listed(raw, "published", found)),
+    )
 
 
 def _parameters(document: dict[str, Any], found: Findings) -> dict[str, Scalar]:

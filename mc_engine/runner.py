@@ -30,7 +30,7 @@ from mc_engine.streams import SEED_CONTRACT
 
 ProgressCall = Callable[[int, int, int], None]
 Chunk = tuple[int, int]
-SMALLEST_CHUNK, LARGEST_CHUNK = 64, 8192
+SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
 CHUNKS_PER_WORKER = 8  # enough for an even end, few enough that parts stay large
 NOMINAL_NOISE = 2**52  # the nominal draws its noise where no case does
 
