@@ -65,9 +65,7 @@ SETTINGS = (
     Setting("mass_model", "", "mass that turns force into acceleration", "constant", ("constant", "burning")),
     Setting("burn_point", "", "crossing of orbit and path", "descending", ("descending", "ascending")),
     Setting("step_s", "s", "integration step", 1.0, low=1e-3, high=60.0),
-    Setting(
-        "steps_per_fix", "", "integration steps between navigation fixes", 1.0, low=1.0, high=1e6, whole=True
-    ),
+    Setting("steps_per_fix", "", "integration steps between navigation fixes", 1.0, low=1.0, high=1e6, whole=True),
     Setting(
         "time_limit_s", "s", "longest flight; a case that has not entered by then ends as no-stop", 3000.0, low=1.0
     ),
