@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from mc_engine.model import AdaptiveStep, Event, Extremum, Field, FixedStep, Model, Parameter, Refusals, Setting
     from mc_engine.runner import Replay, extend, replay, resume, run
     from mc_engine.store import Store, open_store
+    from mc_engine.tuning import tune
+    from mc_engine.tuning_folder import TuningRecord, open_tuning
 
 _HOME = {
     "campaign": ("Campaign", "list_campaigns", "load_campaign"),
@@ -21,6 +23,8 @@ _HOME = {
     "model": ("AdaptiveStep", "Event", "Extremum", "Field", "FixedStep", "Model", "Parameter", "Refusals", "Setting"),
     "runner": ("Replay", "extend", "replay", "resume", "run"),
     "store": ("Store", "open_store"),
+    "tuning": ("tune",),
+    "tuning_folder": ("TuningRecord", "open_tuning"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 
@@ -50,6 +54,9 @@ __all__ = [  # noqa: RUF022 - by module, as above
     "run",
     "Store",
     "open_store",
+    "tune",
+    "TuningRecord",
+    "open_tuning",
 ]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from mc_engine.campaign_problems import Findings, Sections, parse_toml, read_sec
 from mc_engine.campaign_search import SHIPPED, ShippedCampaign, campaign_name, find_campaign, list_campaigns
 from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.case_table_file import read_case_table, table_dispersions
+from mc_engine.chain import chained_count, check_taken, take_inputs
 from mc_engine.designs import BY_LEVELS, DESIGNS, RANDOM, level_count
 from mc_engine.dispersions import Dispersion, build_dispersion
 from mc_engine.distributions import Scalar
@@ -40,6 +41,9 @@ from mc_engine.model import Model, load_model
 from mc_engine.sobol import MAX_DIMENSIONS
 from mc_engine.suggestions import hint
 from mc_engine.tuning_parts import Tuning, check_tuning
+
+if TYPE_CHECKING:
+    from mc_engine.upstream import Upstream
 
 __all__ = [
     "SHIPPED",
@@ -67,6 +71,7 @@ class Campaign:
 
     text : the file as read; `cases` and `seed` may have been changed on the command line since.
     parameters : what [parameters] says.  nominal : every parameter and setting of the model.
+    upstream : what is taken from another run.  first : that run's campaign, where it has yet to be flown.
     table : the columns of the design "table", else empty.  tuning : what [tuning] says, if it is there.
     digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
         cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
@@ -91,6 +96,8 @@ class Campaign:
     table_path: Path | None = None
     table: Mapping[str, np.ndarray] = field(default_factory=dict, compare=False, repr=False)
     tuning: Tuning | None = None
+    upstream: "Upstream | None" = field(default=None, compare=False, repr=False)
+    first: "Campaign | None" = field(default=None, compare=False, repr=False)
 
 
 def load_campaign(
@@ -100,12 +107,14 @@ def load_campaign(
     seed: int | None = None,
     text: str | None = None,
     directory: Path | None = None,
+    upstream: Path | None = None,
 ) -> Campaign:
     """The campaign of a shipped name or of a path; CampaignError lists all that is wrong with it.
 
     cases, seed : in place of what the file says.
     text, directory : the text of the file and the folder it counts as being in, where it is kept elsewhere;
         `reference` is then only its name.
+    upstream : the run to take inputs from, in place of the one that [inputs] names.
     """
     if text is None:
         path = find_campaign(reference)
@@ -116,7 +125,7 @@ def load_campaign(
     document = parse_toml(text, source)
     _override(document, {"cases": cases, "seed": seed})
     found = Findings()
-    campaign = _assemble(name, text, directory, document, cases is not None, found)
+    campaign = _assemble(name, text, directory, document, cases is not None, upstream, found)
     if campaign is None or found.problems:
         raise CampaignError(source, found.problems)
     return campaign
@@ -145,7 +154,13 @@ def _override(document: dict[str, Any], wanted: dict[str, int | None]) -> None:
 
 
 def _assemble(
-    name: str, text: str, directory: Path, document: dict[str, Any], shortened: bool, found: Findings
+    name: str,
+    text: str,
+    directory: Path,
+    document: dict[str, Any],
+    shortened: bool,
+    run: Path | None,
+    found: Findings,
 ) -> Campaign | None:
     """The campaign, or None where it lacks a section or a model to hold the rest against."""
     sections = read_sections(document, found)
@@ -153,17 +168,22 @@ def _assemble(
     if model is None:
         return None
     inside = found.under("campaign")
-    nominal = _nominal(model, sections, found)
     section = sections.campaign
     design = section.design if section is not None else _named_design(document)
+    upstream, first = take_inputs(sections, model, directory, run, design, load_campaign, found)
+    nominal = _nominal(model, sections, {} if upstream is None or first is not None else upstream.nominal, found)
     requirements = check_requirements(sections.requirements, model, found.under("requirement"))
     _unknown_names(document, sections, nominal, model, found)
+    check_taken(sections, upstream, design, found)
     dispersions = _dispersions(sections, model, nominal, design, directory, found)
     correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", found)
-    table_path, table = _table(section, model, dispersions, directory, found)
-    if design == "table":
+    table_path, table = (None, {}) if upstream is not None else _table(section, model, dispersions, directory, found)
+    if design == "table" and upstream is None:
         dispersions = table_dispersions(table, {one.name: one for one in dispersions}, found) if table else ()
-    count = _case_count(section, dispersions, table, inside) if section is not None else None
+    count = None
+    if section is not None and (sections.inputs is None or upstream is not None):
+        rows = 0 if upstream is None else (first.cases if first is not None else upstream.rows.n_cases)
+        count = chained_count(section, rows, inside) if rows else _case_count(section, dispersions, table, inside)
     if count is not None:
         _check_size(count, design or "", dispersions, correlations, inside)
     retention = Retention()
@@ -191,10 +211,12 @@ def _assemble(
         correlations=correlations,
         requirements=requirements,
         retention=retention,
-        digest=_digest(document, section, directory, dispersions, table_path),
+        digest=_digest(document, section, directory, dispersions, table_path, upstream),
         table_path=table_path,
         table=table,
         tuning=tuning,
+        upstream=upstream,
+        first=first,
     )
 
 
@@ -220,10 +242,10 @@ def _model(document: dict[str, Any], directory: Path, found: Findings) -> Model 
         return None
 
 
-def _nominal(model: Model, sections: Sections, found: Findings) -> dict[str, Scalar]:
+def _nominal(model: Model, sections: Sections, taken: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
     spot = found.under("parameters")
     before = len(found.problems)
-    nominal = nominal_values(model, sections.parameters, spot)
+    nominal = {**nominal_values(model, sections.parameters, spot), **taken}
     if len(found.problems) == before:
         sentence = refusal(model, nominal)
         if sentence:
@@ -328,6 +350,7 @@ def _digest(
     directory: Path,
     dispersions: tuple[Dispersion, ...],
     table_path: Path | None,
+    upstream: "Upstream | None",
 ) -> str:
     content = json.loads(json.dumps(document))
     if section.design != "lhs":
@@ -337,4 +360,6 @@ def _digest(
     files = [directory / one.spec["file"] for one in dispersions if one.dist == "empirical"]
     for path in [*files, *([table_path] if table_path is not None else [])]:
         digest.update(sha256(path.read_bytes()).digest())
+    if upstream is not None:
+        digest.update(upstream.digest.encode())
     return digest.hexdigest()

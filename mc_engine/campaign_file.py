@@ -227,6 +227,7 @@ class HistoriesSection(Section):
     nominal: bool = True
     first: int = Field(default=0, ge=0, le=100_000, description="the first cases")
     cases: list[Annotated[int, Field(ge=0)]] = Field(default_factory=list, description="these cases")
+    rows: int = Field(default=1500, ge=10, le=1_000_000, description="about how many instants each history has")
     worst: Worst | None = Field(default=None, description="the cases with the largest (or smallest) values of a metric")
 
 
@@ -312,6 +313,19 @@ AnyDispersion = (
 )
 
 
+class InputsSection(Section):
+    """[inputs]: parameters that every case takes from the same case of another run, flown before."""
+
+    source: str = Field(
+        alias="from", min_length=1, description='a run directory, or the campaign to be flown first, such as "deorbit"'
+    )
+    columns: dict[str, str] = Field(
+        default_factory=dict,
+        description="parameter = column of that run; results that have a parameter's name need no line here",
+    )
+    note: str = ""
+
+
 class CampaignFile(Section):
     """A campaign of mc-engine: a model, the spread of its inputs, and what the results must meet."""
 
@@ -319,6 +333,7 @@ class CampaignFile(Section):
     parameters: dict[str, Value] = Field(default_factory=dict, description="other nominal values and settings")
     dispersion: dict[str, AnyDispersion] = Field(default_factory=dict)
     correlation: list[CorrelationSection] = Field(default_factory=list)
+    inputs: InputsSection | None = Field(default=None, description="what is taken from another run, case by case")
     requirement: dict[str, RequirementSection] = Field(default_factory=dict)
     retention: RetentionSection = Field(default_factory=RetentionSection)
     tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")

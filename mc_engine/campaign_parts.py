@@ -53,12 +53,13 @@ class Worst(NamedTuple):
 
 @dataclass(frozen=True)
 class Retention:
-    """Which cases keep their flight history."""
+    """Which cases keep their flight history, and of about how many rows."""
 
     nominal: bool = True
     first: int = 0
     worst: tuple[Worst, ...] = ()
     cases: tuple[int, ...] = ()
+    rows: int = 1500
 
 
 def nominal_values(model: Model, overrides: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
@@ -185,7 +186,7 @@ def check_retention(
             spot.add("cases", f"there is no case {case}; they are 0 to {cases - 1}")
     kept = tuple(case for case in histories.cases if cases is None or case < cases)
     chosen = tuple(Worst(entry.metric, entry.count, entry.side) for entry in entries)
-    return Retention(histories.nominal, histories.first, chosen, kept)
+    return Retention(histories.nominal, histories.first, chosen, kept, histories.rows)
 
 
 def check_metric(metric: str, model: Model, found: Findings) -> None:

@@ -18,6 +18,7 @@ from mc_engine.campaign_file import (
     ConstraintSection,
     CorrelationSection,
     DispersionSection,
+    InputsSection,
     LevelsDispersion,
     ObjectiveSection,
     PublishedPointSection,
@@ -83,6 +84,7 @@ class Sections:
     requirements: dict[str, RequirementSection]
     retention: RetentionSection | None
     tuning: "TuningSections | None"
+    inputs: InputsSection | None
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,7 @@ def read_sections(document: dict[str, Any], found: Findings) -> Sections:
         requirements=_read_each(_requirement, _named(document, "requirement", found)),
         retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
         tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
+        inputs=read(InputsSection, document["inputs"], inside["inputs"]) if "inputs" in document else None,
     )
 
 

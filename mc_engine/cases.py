@@ -23,6 +23,9 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
     number of cases: these are the cases it would have if it were longer.
     """
     ids = _checked(campaign, case_ids)
+    if campaign.upstream is not None:
+        taken = {name: values[ids] for name, values in campaign.upstream.table.items()}
+        return taken if campaign.design == "table" else {**taken, **_random_table(campaign, ids)}
     if campaign.design == "table":
         return {name: values[ids] for name, values in campaign.table.items()}
     if campaign.design == "grid":
@@ -40,7 +43,11 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
 
 def _checked(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
     ids = np.asarray(case_ids, dtype=np.int64).reshape(-1)
-    beyond = ids >= (math.inf if campaign.design in EXTENSIBLE else campaign.cases)
+    if campaign.first is not None:
+        message = f'has yet to be flown; `mc-engine run` flies "{campaign.first.name}" before this campaign'
+        raise CampaignError(campaign.name, [Problem("inputs.from", message)])
+    endless = campaign.design in EXTENSIBLE and campaign.upstream is None
+    beyond = ids >= (math.inf if endless else campaign.cases)
     if ids.size and (ids.min() < 0 or beyond.any()):
         wrong = int(ids[(ids < 0) | beyond][0])
         raise CampaignError(

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from mc_engine.errors import CampaignError, ModelError, RunInterrupted, StoreError
+from mc_engine.errors import EngineError, RunInterrupted, StoreError
 
 if TYPE_CHECKING:
     from mc_engine.store import Store
@@ -54,12 +54,12 @@ def exit_status() -> Iterator[None]:
     """Turn what the engine raises on purpose into its sentence on stderr and an exit status."""
     try:
         yield
-    except (CampaignError, ModelError) as error:
-        _leave(USAGE, str(error))
     except StoreError as error:
         _leave(DAMAGED, str(error))
     except RunInterrupted as error:
         _leave(INTERRUPTED, str(error))
+    except EngineError as error:  # of the campaign, the model, or a package that is missing
+        _leave(USAGE, str(error))
     except KeyboardInterrupt:
         _leave(INTERRUPTED, "interrupted")
     except OSError as error:
@@ -203,6 +203,9 @@ def run(
     seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
     no_report: NoReport = False,
     workers: Workers = None,
+    upstream: Annotated[
+        Path | None, typer.Option("--from", help="Run to take inputs from, in place of the one that [inputs] names.")
+    ] = None,
     judge: Annotated[bool, typer.Option("--judge", help="Exit with 1 unless every requirement passes.")] = False,
     max_failed: Annotated[int | None, typer.Option(min=0, help="Exit with 3 if more cases fail.")] = None,
 ) -> None:
@@ -210,7 +213,9 @@ def run(
     from mc_engine.campaign import load_campaign
     from mc_engine.run_folder import default_folder
 
-    campaign = load_campaign(file, cases=cases, seed=seed)
+    if upstream is not None:
+        _existing_run(upstream)
+    campaign = load_campaign(file, cases=cases, seed=seed, upstream=upstream)
     path = out if out is not None else default_folder(campaign.name)
     _refuse_folder(path)
     store = _fly(lambda runner, progress: runner.run(campaign, path, progress=progress, workers=workers))
@@ -287,6 +292,8 @@ def extend(
 
     store = _existing_run(folder)
     wanted, design = store.n_cases, store.manifest["campaign"]["design"]
+    if store.manifest.get("upstream") is not None:
+        _leave(USAGE, f"{folder}: takes its inputs from another run; extend that one, and fly this campaign anew")
     if design not in EXTENSIBLE:
         _leave(USAGE, f'{folder}: the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can')
     if cases <= wanted:
@@ -319,6 +326,46 @@ def _ranges(ranges: list[tuple[int, int]]) -> str:
     return ", ".join(f"{first} to {stop - 1}" for first, stop in ranges) or "none"
 
 
+@app.command()
+@exit_status()
+def tune(
+    file: CampaignFile,
+    out: Annotated[
+        Path | None, typer.Option(help="Directory of the result; by default runs/<campaign>-<time>.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")] = None,
+    generations: Annotated[int | None, typer.Option(min=1, help="Generations, in place of the file's.")] = None,
+    population: Annotated[int | None, typer.Option(min=4, help="Candidates in each, in place of the file's.")] = None,
+    no_report: NoReport = False,
+    workers: Workers = None,
+) -> None:
+    """Search the parameters that [tuning] names for the best metrics, and write front and reports (needs pymoo)."""
+    from mc_engine.campaign import load_campaign
+    from mc_engine.run_folder import default_folder
+
+    campaign = load_campaign(file)
+    path = out if out is not None else default_folder(campaign.name)
+    _refuse_folder(path)
+    from mc_engine.progress import Progress
+    from mc_engine.tuning import tune
+    from mc_engine.tuning_folder import outcome_lines
+
+    with Progress() as progress:
+        record = tune(
+            campaign,
+            path,
+            seed=seed,
+            generations=generations,
+            population=population,
+            workers=workers,
+            progress=progress,
+        )
+    for line in [f"tuning       {path}", *outcome_lines(record)]:
+        typer.echo(line)
+    for report_path in [] if no_report else _write_reports(path, ("html", "pdf")):
+        typer.echo(f"report       {report_path}")
+
+
 # ---- after flying
 
 
@@ -328,12 +375,14 @@ def report(
     folder: RunFolder,
     kind: Annotated[str | None, typer.Option("--format", help="html or pdf; both by default.")] = None,
 ) -> None:
-    """Write the reports of a run anew."""
+    """Write the reports of a run, or of a tuning, anew."""
+    from mc_engine.tuning_folder import is_tuning_directory
+
     if kind not in (None, "html", "pdf"):
         _leave(USAGE, f'--format "{kind}" is not known; html or pdf')
-    store = _existing_run(folder)
-    for path in _write_reports(store.path, ("html", "pdf") if kind is None else (kind,)):
-        typer.echo(str(path))
+    path = folder if is_tuning_directory(folder) else _existing_run(folder).path
+    for written in _write_reports(path, ("html", "pdf") if kind is None else (kind,)):
+        typer.echo(str(written))
 
 
 @app.command()

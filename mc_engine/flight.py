@@ -1,22 +1,24 @@
 """From the inputs of some cases to their results: units, design, kernel, units again."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from mc_engine.case_columns import END_TIME
 from mc_engine.kernel import WIDTH, build_kernel
 from mc_engine.kernel_parts import settings_class
+from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.noise import noise_key
 from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model import AdaptiveStep, FixedStep, Model, Refusals
 from mc_engine.status import OK, REFUSED, STATUS_NAME
 
 Inputs = Mapping[str, Any]
-END_TIME = "end_time_s"
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
 
@@ -27,6 +29,7 @@ class Prepared:
     parameters: np.ndarray  # float64[n_kernel_parameters, n]
     settings: np.ndarray  # float64[n, n_settings]
     refusals: Refusals
+    tables: np.ndarray  # float64[...], what `prepare` adds to the model's tables, one case's numbers after another's
 
 
 def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
@@ -54,7 +57,8 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
             columns = model.prepare(si, words, refusals)
     names = model.kernel_parameters._fields  # type: ignore[attr-defined]
     rows = [np.broadcast_to(np.asarray(columns[name], dtype=np.float64), n_cases) for name in names]
-    return Prepared(np.array(rows).reshape(len(names), n_cases), settings, refusals)
+    tables = np.asarray(columns.get(TABLES, np.empty(0)), dtype=np.float64).ravel()
+    return Prepared(np.array(rows).reshape(len(names), n_cases), settings, refusals, tables)
 
 
 def _codes(setting: Any, values: Any, n_cases: int) -> np.ndarray:
@@ -105,8 +109,28 @@ def _groups(ready: Prepared) -> list[np.ndarray]:
     return [able[group == i] for i in range(int(group.max()) + 1)]
 
 
-def _number(item: float | int | str, settings: Any) -> float:
+def _number(item: float | str | Callable[[Any], float], settings: Any) -> float:
+    if callable(item):
+        return float(item(settings))
     return float(getattr(settings, item) if isinstance(item, str) else item)
+
+
+def settings_of(model: Model, codes: np.ndarray) -> Any:
+    """The settings of one kernel call by symbol, codes and SI numbers, with the model's tables if it has any."""
+    return _settings_of(model, tuple(float(code) for code in codes))
+
+
+@lru_cache(maxsize=64)
+def _settings_of(model: Model, codes: tuple[float, ...]) -> Any:
+    chosen = settings_class(model)
+    if model.tables is None:
+        return chosen(*codes)
+    return chosen(*codes, np.ascontiguousarray(model.tables(chosen(*codes, np.empty(0))), dtype=np.float64))
+
+
+def _kernel_settings(model: Model, codes: np.ndarray, tables: np.ndarray) -> np.ndarray:
+    """The same as one array, as kernels take it; `tables` : of the cases, behind those of the model."""
+    return codes if model.tables is None else np.concatenate([codes, settings_of(model, codes).tables, tables])
 
 
 def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
@@ -134,7 +158,8 @@ def _fly_group(
     index = np.concatenate([chosen, np.full(padded - n, chosen[-1])])
     out = _outputs(model, padded)
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
-    _call(model, folder, width, ready.parameters[:, index], settings, seed, case_ids[index], out, _NO_HISTORY, 1.0)
+    cases = ready.parameters[:, index], settings, ready.tables
+    _call(model, folder, width, cases, seed, case_ids[index], out, _NO_HISTORY, 1.0)
     time, status, states, metrics = out
     return time[:n], status[:n], states[:, :n], metrics[:, :n]
 
@@ -150,19 +175,24 @@ def _call(
     model: Model,
     folder: Path | None,
     width: int,
-    parameters: np.ndarray,
-    settings: np.ndarray,
+    inputs: tuple[np.ndarray, np.ndarray, np.ndarray],
     seed: int,
     case_ids: np.ndarray,
     out: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     history: np.ndarray,
     pace: float,
 ) -> int:
-    """Call the kernel; `pace` is the distance of two history rows, in steps or, if the steps are adaptive, seconds."""
+    """Call the kernel.
+
+    inputs : parameters [n_kernel_parameters, n], setting codes, tables of the cases
+    pace : distance of two history rows, in steps or, if the steps are adaptive, seconds
+    """
     kernel = build_kernel(model, folder, width)
+    parameters, settings, tables = inputs
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
-    shared = np.ascontiguousarray(parameters), settings, np.uint64(noise_key(seed)), cases
-    chosen = settings_class(model)(*settings)
+    kernel_settings = _kernel_settings(model, settings, tables)
+    shared = np.ascontiguousarray(parameters), kernel_settings, np.uint64(noise_key(seed)), cases
+    chosen = settings_of(model, settings)
     if isinstance(model.clock, AdaptiveStep):
         return kernel(*shared, *adaptive_arguments(model, model.clock, chosen), *out, history, float(pace))
     return kernel(*shared, *grid_of(model.clock, chosen), *out, history, int(pace))
@@ -193,7 +223,8 @@ def fly_history(
     n_rows, pace = _history_grid(model, settings, float(columns[END_TIME][0]), rows)
     history = np.empty((n_rows, len(names)))
     ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
-    n = _call(model, folder, width, parameters, settings, seed, ids, _outputs(model, width), history, pace)
+    cases = parameters, settings, ready.tables
+    n = _call(model, folder, width, cases, seed, ids, _outputs(model, width), history, pace)
     factors = [1.0, *(quantity.si_factor for quantity in model.quantities)]
     return columns, {name: history[:n, i] / factors[i] for i, name in enumerate(names)}
 
@@ -202,6 +233,6 @@ def _history_grid(model: Model, settings: np.ndarray, end_time: float, rows: int
     """(room for rows, pace) of a history of about `rows` rows."""
     if isinstance(model.clock, AdaptiveStep):
         return rows, max(end_time, 1e-9) / (rows - 1)
-    n_steps = grid_of(model.clock, settings_class(model)(*settings))[0]
+    n_steps = grid_of(model.clock, settings_of(model, settings))[0]
     stride = max(1, n_steps // rows)
     return n_steps // stride + 4, float(stride)

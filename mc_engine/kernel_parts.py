@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from mc_engine.lanes import physics
+from mc_engine.lanes.functions import TABLES
 from mc_engine.model import AdaptiveStep, Extremum, Model, load_model
 
 # The physics of a model, and intrinsics that pick or fill fields of tuples:
@@ -53,8 +54,9 @@ class Parts(NamedTuple):
 
 
 def settings_class(model: Model) -> type:
-    """Named tuple of the model's settings, by symbol."""
-    return namedtuple("Settings", [s.symbol for s in model.settings] or ["unused"])
+    """Named tuple of the model's settings, by symbol, with its tables at the end if it has any."""
+    names = [s.symbol for s in model.settings] or ["unused"]
+    return namedtuple("Settings", [*names, TABLES] if model.tables else names)
 
 
 def parts_of(reference: str, folder: str | None) -> Parts:

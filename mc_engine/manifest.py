@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from mc_engine.campaign import Campaign
+from mc_engine.case_columns import case_columns
 from mc_engine.cases import dispersion_records
 from mc_engine.figures import to_record
-from mc_engine.flight import END_TIME
 from mc_engine.input_values import inputs_of
 from mc_engine.journal import utc_now
 from mc_engine.kernel import source_digest
-from mc_engine.model import Field, Parameter, Setting
+from mc_engine.model import Field, Setting
 from mc_engine.parts import Column
 from mc_engine.provenance import engine_version, environment
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
@@ -30,6 +30,7 @@ _SAMPLING = (
     "sobol",
     "sobol_numbers",
     "streams",
+    "upstream",
 )
 
 
@@ -42,22 +43,9 @@ def sampling_digest() -> str:
 
 
 def columns_of(campaign: Campaign) -> list[Column]:
-    """Columns of the case table after case_id, status and reason: dispersions, metrics, last state."""
-    model = campaign.model
-    columns = [_input_column(model.input(one.name)) for one in campaign.dispersions]
-    columns += [Column(one.name, one.unit, "metric", one.description) for one in model.metrics]
-    columns.append(Column(END_TIME, "s", "state", "time at the end of the flight, from its start"))
-    columns += [Column(f"end_{one.name}", one.unit, "state", f"{one.description}, at the end") for one in model.states]
-    return columns
-
-
-def _input_column(item: Parameter | Setting) -> Column:
-    kind = "number"
-    if isinstance(item, Setting) and item.choices:
-        kind = "word"
-    elif isinstance(item.default, bool):
-        kind = "switch"
-    return Column(item.name, item.unit, "dispersion", item.description, kind)
+    """Columns of the case table after case_id, status and reason."""
+    taken = () if campaign.upstream is None else campaign.upstream.columns
+    return case_columns(campaign.model, campaign.dispersions, taken)
 
 
 def manifest_of(campaign: Campaign) -> dict[str, Any]:
@@ -84,15 +72,45 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
             "digest": source_digest(model, campaign.directory),
             "sampling_digest": sampling_digest(),
         },
-        "inputs": dispersion_records(campaign),
+        "inputs": [*_taken_inputs(campaign), *dispersion_records(campaign)],
         **_shared_inputs(campaign),
         "quantities": [_record(one) for one in model.quantities],
         "requirements": [asdict(one) for one in campaign.requirements],
-        "figures": [to_record(figure) for figure in model.figures],
+        "figures": [*(to_record(figure) for figure in model.figures), *_taken_figures(campaign)],
         "published": [dict(record) for record in model.published],
+        "upstream": _upstream_facts(campaign),
         "status_texts": {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()},
         "provenance": environment(),
     }
+
+
+def _upstream_facts(campaign: Campaign) -> dict[str, Any] | None:
+    """Which run the campaign takes its inputs from."""
+    if campaign.upstream is None:
+        return None
+    facts = {key: campaign.upstream.rows.facts[key] for key in ("name", "title", "model", "design", "seed", "digest")}
+    failed = int(campaign.upstream.failed.sum())
+    return {**facts, "cases": campaign.upstream.rows.n_cases, "failed": failed, "links": dict(campaign.upstream.links)}
+
+
+def _taken_inputs(campaign: Campaign) -> list[dict[str, Any]]:
+    """The dispersions of the run upstream, under the names that they have here, as its own manifest told them."""
+    if campaign.upstream is None:
+        return []
+    here = {column.name for column in campaign.upstream.columns}
+    name = campaign.upstream.name
+    records = [record for record in campaign.upstream.rows.facts["inputs"] if record["name"] in here]
+    return [{**record, "note": f"in the run of {name}. {record['note']}".strip()} for record in records]
+
+
+def _taken_figures(campaign: Campaign) -> list[dict[str, Any]]:
+    """Maps and scatter plots of the run upstream whose columns this table has too."""
+    if campaign.upstream is None:
+        return []
+    here = {column.name for column in columns_of(campaign)}
+    records = campaign.upstream.rows.facts["figures"]
+    drawn = [record for record in records if record["kind"] in ("map", "scatter")]
+    return [record for record in drawn if {record["x"], record["y"], record.get("metric", record["x"])} <= here]
 
 
 def _record(item: Field) -> dict[str, str]:

@@ -129,7 +129,8 @@ class AdaptiveStep:
     until : time limit [s], or the symbol of a setting that holds it
     rtol : error of a step in the state's own size, or the symbol of a setting
     atol : the same in SI, one number for all states or one for each
-    control_period : time [s] from one sample of `control` to the next, or the symbol of a setting; steps end there
+    control_period : time [s] from one sample of `control` to the next, the symbol of a setting, or a function of the
+        settings; steps end there
     method : "dop853" (order 8), or "dp54" (order 5)
     attempts : a case that needs more steps, good or rejected, ends as step-limit
     first_step : length [s] of the first attempt; 0 chooses it
@@ -138,7 +139,7 @@ class AdaptiveStep:
     until: float | str
     rtol: float | str = 1e-9
     atol: float | tuple[float, ...] = 1e-9
-    control_period: float | str = np.inf
+    control_period: float | str | Callable[[Any], float] = np.inf
     method: str = "dop853"
     attempts: int = 100_000
     first_step: float = 0.0
@@ -150,6 +151,7 @@ class Model:
 
     prepare(inputs, settings, refusals) : NumPy, whole chunk.  SI arrays and setting codes by symbol in; SI arrays
         by the field names of `kernel_parameters` out; cases that cannot start join `refusals`.  Default: pass on.
+        An array "tables" [n, k] goes behind the model's tables: a parameter must say where each case's begins.
     initial(p, o) -> State
     rhs(t, s, m, p, o) -> State of derivatives
     control(t, s, m, p, o, draws) -> memory, at samples (t = 0 first, with m = start(p, o)'s memory)
@@ -159,6 +161,8 @@ class Model:
     observe(t, s, m, p, o) -> named tuple of the quantities
     evaluate(t, s, m, p, o, best, when) -> named tuple of the metrics; best and when hold value and time of
         each Extremum
+    tables(o) -> float64[n], NumPy: numbers that all cases of the same settings share, such as a reference path;
+        physics reads them with look_up(o.tables, place)
     """
 
     name: str
@@ -182,6 +186,7 @@ class Model:
     switch: Callable[..., Any] | None = None
     event_list: tuple[Event, ...] = ()
     extrema: tuple[Extremum, ...] = ()
+    tables: Callable[..., np.ndarray] | None = None
     figures: tuple[Any, ...] = ()
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)

@@ -9,6 +9,13 @@ column = "desired_semi_major_axis_km"    # and/or ours = 6431.4934
 at = { ve_pct = -20.0 }       # inputs of the case to compare with
 tolerance = 0.05
 status = "legible"
+
+A number of many cases says which, and reports hold it against the same number of a run with these dispersions:
+
+statistic = "standard deviation"         # or "mean", "farthest"
+of = "q1"                     # column
+over = ["inertia_x_factor"]   # the inputs that are dispersed, all of them
+cases = 100                   # how many cases the source has, where the number depends on it
 """
 
 import tomllib
@@ -18,6 +25,7 @@ from typing import Any
 from mc_engine.errors import ModelError
 
 _KEYS = {"quantity", "published", "unit", "source", "column", "ours", "at", "tolerance", "status", "note"}
+_KEYS |= {"statistic", "of", "over", "cases"}
 _NEEDED = {"quantity", "published"}
 
 

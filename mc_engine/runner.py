@@ -5,6 +5,7 @@ writes.  What a case comes to depends on (campaign, sources, seed, case_id): chu
 """
 
 import os
+import re
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -25,8 +26,9 @@ from mc_engine.manifest import columns_of, manifest_of, sampling_digest
 from mc_engine.model_faults import naming_faults
 from mc_engine.run_folder import default_folder
 from mc_engine.status import OK, STATUS_NAME
-from mc_engine.store import Store, create_store, open_store
+from mc_engine.store import Store, create_store, is_run_directory, open_store
 from mc_engine.streams import SEED_CONTRACT
+from mc_engine.upstream import COMPANION
 
 ProgressCall = Callable[[int, int, int], None]
 Chunk = tuple[int, int]
@@ -56,9 +58,11 @@ def run(
     """Fly a campaign into the new directory `out` (default: runs/<campaign>-<time>).
 
     workers : threads, all cores by default.  chunk : cases a thread flies at a time.
+    A campaign that takes inputs from one that has yet to be flown has it flown first, beside `out`.
     Raises RunInterrupted on Ctrl-C; the store then holds whole chunks, and `resume` completes it.
     """
     path = Path(out) if out is not None else default_folder(campaign.name)
+    campaign = _after_first(campaign, path, progress, workers, chunk)
     store = create_store(path, manifest_of(campaign), campaign.text, columns_of(campaign), _companions(campaign))
     return _complete(store, campaign, progress, workers, chunk)
 
@@ -72,7 +76,32 @@ def _companions(campaign: Campaign) -> dict[str, bytes]:
     if campaign.model_reference.endswith(".py"):
         paths.update((campaign.directory / campaign.model_reference).resolve().parent.glob("*.py"))
     base = campaign.directory.resolve()
-    return {path.resolve().relative_to(base).as_posix(): path.read_bytes() for path in sorted(paths)}
+    contents = {path.resolve().relative_to(base).as_posix(): path.read_bytes() for path in sorted(paths)}
+    return contents if campaign.upstream is None else {**contents, COMPANION: campaign.upstream.rows.to_bytes()}
+
+
+def _after_first(
+    campaign: Campaign, path: Path, progress: ProgressCall | None, workers: int | None, chunk: int | None
+) -> Campaign:
+    """The campaign with the run that it takes inputs from, flown or completed beside `path` where it is not there."""
+    if campaign.first is None:
+        return campaign
+    name = re.sub(r"[^\w.-]+", "-", campaign.first.name)
+    beside = path.with_name(f"{path.name}-{name}")
+    if is_run_directory(beside):
+        store = resume(beside, progress=progress, workers=workers, chunk=chunk)
+        if store.manifest["campaign"]["digest"] != campaign.first.digest or store.n_cases != campaign.first.cases:
+            raise StoreError(f"{beside}: holds another run than this campaign takes its inputs from")
+    else:
+        run(campaign.first, beside, progress=progress, workers=workers, chunk=chunk)
+    return load_campaign(
+        campaign.name,
+        cases=campaign.cases,
+        seed=campaign.seed,
+        text=campaign.text,
+        directory=campaign.directory,
+        upstream=beside,
+    )
 
 
 def resume(
@@ -99,6 +128,8 @@ def extend(
     design = store.manifest["campaign"]["design"]
     if design not in EXTENSIBLE:
         raise StoreError(f'{path}: the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can')
+    if store.manifest.get("upstream") is not None:
+        raise StoreError(f"{path}: takes its inputs from another run; extend that one, and fly this campaign anew")
     if cases <= store.n_cases:
         raise StoreError(f"{path}: has {store.n_cases} cases; give the number it is to have in all")
     campaign_of(store)  # refuses changed sources before anything is written
@@ -111,8 +142,15 @@ def campaign_of(store: Store) -> Campaign:
     recorded = store.manifest["campaign"]
     cases = store.n_cases if recorded["design"] in ("lhs", *EXTENSIBLE) else None
     campaign = load_campaign(
-        recorded["name"], cases=cases, seed=recorded["seed"], text=store.campaign_text, directory=store.path
+        recorded["name"],
+        cases=cases,
+        seed=recorded["seed"],
+        text=store.campaign_text,
+        directory=store.path,
+        upstream=store.path / COMPANION if store.manifest.get("upstream") is not None else None,
     )
+    if campaign.digest != recorded["digest"]:
+        raise StoreError(f"{store.path}: a file of the campaign was edited; run the campaign anew")
     ours = source_digest(campaign.model, campaign.directory), sampling_digest(), SEED_CONTRACT
     model, contract = store.manifest["model"], store.manifest["seed_contract"]
     if ours != (model["digest"], model["sampling_digest"], contract):
@@ -184,7 +222,7 @@ def _complete(
                 f"interrupted with {done:,} of {total:,} cases; `mc-engine resume {store.path}` flies the rest"
             )
         flown = time.perf_counter()
-        _write_histories(store, campaign)
+        _write_histories(store, campaign, workers)
         store.note("finished", prepare_s=round(compiled - begin, 3), fly_s=round(flown - compiled, 3))
     return store
 
@@ -220,6 +258,9 @@ def fly_chunk(campaign: Campaign, first: int, stop: int) -> dict[str, np.ndarray
     table = case_table(campaign, ids)
     with naming_faults(campaign.model_reference, f"cases {first} to {stop - 1}"):
         flight = fly(campaign.model, full_inputs(campaign, table), ids, campaign.seed, folder=campaign.directory)
+    if campaign.upstream is not None:
+        reasons = campaign.upstream.refusals(ids)
+        flight["reason"] = np.where(reasons != "", reasons, flight["reason"])
     return {**table, **flight}
 
 
@@ -229,17 +270,21 @@ def _nominal(campaign: Campaign) -> dict[str, Any]:
     with naming_faults(campaign.model_reference, "the nominal case"):
         flight = fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
     dispersed = {one.name: inputs[one.name] for one in campaign.dispersions}
+    if campaign.upstream is not None:
+        dispersed |= campaign.upstream.nominal_row()
     return {**dispersed, **_scalars(flight)}
 
 
-def _write_histories(store: Store, campaign: Campaign) -> None:
-    frames = []
-    if campaign.retention.nominal:
-        frames.append(_history(campaign, -1, nominal_row(campaign), NOMINAL_NOISE))
+def _write_histories(store: Store, campaign: Campaign, workers: int) -> None:
+    """Fly the retained cases again, each alone and several at once, for their histories."""
+    from joblib import Parallel, delayed
+
+    flights = [(-1, nominal_row(campaign), NOMINAL_NOISE)] if campaign.retention.nominal else []
     for case_id in retained_cases(store, campaign):
         inputs = _scalars(case_table(campaign, np.array([case_id])))
-        frames.append(_history(campaign, case_id, full_inputs(campaign, inputs), case_id))
-    frames = [frame for frame in frames if len(frame)]
+        flights.append((case_id, full_inputs(campaign, inputs), case_id))
+    pool = Parallel(n_jobs=min(workers, max(len(flights), 1)), backend="threading")
+    frames = [frame for frame in pool(delayed(_history)(campaign, *flight) for flight in flights) if len(frame)]
     if frames:
         store.write_histories(pd.concat(frames, ignore_index=True))
 
@@ -258,7 +303,8 @@ def retained_cases(store: Store, campaign: Campaign) -> list[int]:
 
 
 def _history(campaign: Campaign, case_id: int, inputs: dict[str, Any], noise: int) -> pd.DataFrame:
-    _, history = fly_history(campaign.model, inputs, noise, campaign.seed, folder=campaign.directory)
+    rows = campaign.retention.rows
+    _, history = fly_history(campaign.model, inputs, noise, campaign.seed, folder=campaign.directory, rows=rows)
     return _history_frame(case_id, history)
 
 

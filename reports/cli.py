@@ -1,19 +1,21 @@
-"""What `mc-engine report RUN [--format html|pdf]` does: read the run, build the contents, write the files."""
+"""What `mc-engine report RUN [--format html|pdf]` does: read the run or tuning, build the contents, write the files."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mc_engine.store import open_store
+from mc_engine.tuning_folder import is_tuning_directory, open_tuning
 from reports.contents import build
 from reports.document import Document
 from reports.html import render_html
 from reports.pdf import render_pdf
+from reports.tuning import build_tuning
 
 RENDERERS: dict[str, Callable[[Document], bytes]] = {"html": render_html, "pdf": render_pdf}
 
 
 def write_reports(run_path: str | Path, formats: Sequence[str] = ("html", "pdf")) -> list[Path]:
-    """Write report.html and report.pdf (those asked for) into the run directory; returns their paths.
+    """Write report.html and report.pdf (those asked for) into the directory of a run or tuning; returns their paths.
 
     The contents are built once.  Every file appears whole or not at all.
     """
@@ -21,7 +23,8 @@ def write_reports(run_path: str | Path, formats: Sequence[str] = ("html", "pdf")
     if unknown:
         raise ValueError(f'"{unknown[0]}" is no format of a report; use {" or ".join(RENDERERS)}')
     path = Path(run_path)
-    document = build(open_store(path), path.resolve().name)
+    name = path.resolve().name
+    document = build_tuning(open_tuning(path), name) if is_tuning_directory(path) else build(open_store(path), name)
     return [_write(path / f"report.{name}", RENDERERS[name](document)) for name in dict.fromkeys(formats)]
 
 

@@ -10,6 +10,7 @@ from reports.glossary import GLOSSARY
 from reports.headline import cost_cards, summary_sentence, verdict_cards, warnings
 from reports.provenance import campaign_facts, provenance_table
 from reports.published import published_table
+from reports.published_statistics import statistics_tables
 from reports.tables import (
     fixed_table,
     input_table,
@@ -47,7 +48,7 @@ def _sections(flown: Flown) -> Iterator[Section]:
     yield Section("scatter", "One against another", blocks(scatter_blocks(flown)))
     yield Section("worst", "Worst and failed cases", blocks(worst_tables(flown)))
     yield Section("status", "How the cases ended", (status_table(flown),))
-    yield Section("published", "Published and ours", blocks([published_table(flown)]))
+    yield Section("published", "Published and ours", blocks([*statistics_tables(flown), published_table(flown)]))
     yield Section("inputs", "Inputs", blocks(_inputs(flown)))
     yield Section("provenance", "Provenance", (provenance_table(flown),))
     yield Section("reading", "How to read this report", (GLOSSARY,))

@@ -122,7 +122,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Document:
-    """The whole report.  created: ISO date and time, UTC, of the run (not of the report)."""
+    """The whole report.  created: ISO date and time, UTC, of the run (not of the report); kind: what stands above."""
 
     title: str
     subtitle: str
@@ -132,6 +132,7 @@ class Document:
     costs: tuple[Card, ...]
     warnings: tuple[str, ...]
     sections: tuple[Section, ...] = field(default=())
+    kind: str = "Monte Carlo dispersion report"
 
 
 def numbered(document: Document) -> Document:

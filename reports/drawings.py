@@ -10,11 +10,13 @@ from reports.case_tables import FEW_CASES, input_words
 from reports.document import FigureBlock
 from reports.figures import DistributionPanel, Distributions, Histories, HistoryLine, MapDrawing, ScatterDrawing
 from reports.flown import Flown
+from reports.history_bands import fair_cases, history_bands
 from reports.numbers import axis_label, words
 
 POINTS_SHOWN = 2000
 PANELS_IN_A_FIGURE = 12
 COLOURED_CASES = 8
+COLOURED_OVER_BANDS = 2  # more would hide the band
 WORST_RANKS = 10
 HISTORIES_SHOWN = 40
 FEWEST_VALUES = 10  # of a histogram
@@ -149,12 +151,28 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
         yield "No histories were retained in this run; [retention] in the campaign file asks for them."
         return
     cases = _history_cases(flown)
+    fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
+    constant = []
     for figure in wanted:
-        names = [name for name in figure.quantities if name in flown.histories.columns]
+        known = [name for name in figure.quantities if name in flown.histories.columns]
+        names = [name for name in known if not _is_constant(flown.histories[name].to_numpy())]
+        constant += [name for name in known if name not in names]
         if names:
-            lines = tuple(_history_line(flown, case, label, rank, names) for case, (label, rank) in cases.items())
+            bands = history_bands(flown.histories, fair, names)
+            lines = tuple(
+                _history_line(flown, case, label, rank, names)
+                for case, (label, rank) in cases.items()
+                if not bands or (rank is not None and rank <= COLOURED_OVER_BANDS)
+            )
             labels = {name: axis_label(words(name, flown.unit(name)), flown.unit(name)) for name in names}
-            yield FigureBlock(figure.title, Histories(lines, labels), "half")
+            yield FigureBlock(figure.title, Histories(lines, labels, bands), "half")
+    if constant:
+        yield f"Not drawn, the same all through in every retained case: {', '.join(constant)}."
+
+
+def _is_constant(values: np.ndarray) -> bool:
+    numbers = values[np.isfinite(values)]
+    return not numbers.size or numbers.min() == numbers.max()
 
 
 def _history_cases(flown: Flown) -> dict[int, tuple[str, int | None]]:

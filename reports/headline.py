@@ -47,6 +47,7 @@ def cost_cards(flown: Flown) -> tuple[Card, ...]:
     """What the metrics that the model maps (or those that matter) come to."""
     mapped = [figure.metric for figure in flown.figures if isinstance(figure, MapFigure)]
     names = [name for name in dict.fromkeys([*mapped, *flown.key_metrics]) if name in flown.summaries]
+    names.sort(key=lambda name: flown.summaries[name].n_used == 0)  # what no case has comes last
     return tuple(_cost_cards(flown, names[:MOST_COSTS]))
 
 

@@ -35,6 +35,7 @@ def render_pdf(document: Document) -> bytes:
 def _plain(document: Document) -> dict[str, Any]:
     """The document as plain data, figures as SVG."""
     return {
+        "kind": document.kind,
         "title": document.title,
         "subtitle": document.subtitle,
         "date": _date(document.created),

@@ -12,6 +12,14 @@ A record of the manifest's `published`:
   tolerance  how far ours may lie from the printed number, from its digits (optional)
   status     how sure the print is: "legible", "restored", "not reproduced", ... (optional)
   note       a sentence (optional)
+
+A number that the source gives of many cases has three more keys.  In a run that disperses the same inputs it stands in
+the table of `published_statistics`, beside the statistic of that run:
+
+  statistic  "mean", "standard deviation" or "farthest", the value of the case that is farthest from the mean
+  of         the column that it is of
+  over       the dispersed inputs; `at` then holds of the inputs that are shared
+  cases      how many cases the source has, where that matters to the number (optional)
 """
 
 from collections.abc import Callable, Mapping
@@ -27,7 +35,7 @@ from reports.numbers import count, exact, number, with_unit
 
 def published_table(flown: Flown) -> Table | None:
     """Published and computed side by side; None if the model states nothing published."""
-    records = flown.manifest.get("published", [])
+    records = [record for record in flown.manifest.get("published", []) if own_statistic(flown, record) is None]
     if not records:
         return None
     columns = (
@@ -63,7 +71,7 @@ def our_value(flown: Flown, record: Mapping[str, Any]) -> tuple[Any, str]:
     at = record.get("at") or {}
     if column:
         value = flown.nominal_value(column)
-        if value is not None and _holds(flown.nominal, at):
+        if value is not None and _holds({**_shared_inputs(flown), **flown.nominal}, at):
             return value, "nominal case"
         row = _matching_case(flown, at) if at else None
         if row is not None and column in flown.cases.columns:
@@ -71,6 +79,35 @@ def our_value(flown: Flown, record: Mapping[str, Any]) -> tuple[Any, str]:
     if "ours" in record:
         return record["ours"], "fixed"
     return None, "not flown in this run"
+
+
+def own_statistic(flown: Flown, record: Mapping[str, Any]) -> float | None:
+    """This run's number for a published statistic; None if the record is none, or speaks of other cases."""
+    inputs = {fact.name for fact in flown.with_role("dispersion")}
+    statistic, shared = record.get("statistic"), _shared_inputs(flown)
+    alike = set(record.get("over", ())) == inputs and _holds(shared, record.get("at") or {})
+    if statistic not in STATISTICS or not alike or not flown.random:
+        return None
+    values = flown.values(record["of"])[: record.get("cases")]
+    values = values[np.isfinite(values)]
+    return float(STATISTICS[statistic](values)) if values.size > 1 else None
+
+
+def _farthest(values: np.ndarray) -> float:
+    return float(values[np.argmax(np.abs(values - values.mean()))])
+
+
+STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
+    "mean": lambda values: float(values.mean()),
+    "standard deviation": lambda values: float(values.std(ddof=1)),
+    "farthest": _farthest,
+}
+
+
+def _shared_inputs(flown: Flown) -> dict[str, Any]:
+    """Value of every input that all cases share."""
+    records = [record for key in ("parameters", "settings") for record in flown.manifest.get(key, [])]
+    return {record["name"]: record.get("value") for record in records}
 
 
 def _holds(row: Mapping[str, Any], at: Mapping[str, Any]) -> bool:
@@ -86,8 +123,7 @@ def _same(ours: Any, wanted: Any) -> bool:
 
 def _matching_case(flown: Flown, at: Mapping[str, Any]) -> int | None:
     """Row of the first case with the inputs of `at`; inputs that are not dispersed must be those of the run."""
-    shared = {record["name"]: record.get("value") for key in ("parameters", "settings")
-              for record in flown.manifest.get(key, [])}  # fmt: skip
+    shared = _shared_inputs(flown)
     match = np.ones(flown.n_tried, dtype=bool)
     for name, value in at.items():
         if name in flown.cases.columns:

@@ -23,6 +23,7 @@ QUANTITIES = (
     Field("rate_rad_s", "rad/s", "size of the inertial body rate"),
     Field("largest_mode", "", f"largest modal displacement without sign, {_MODAL}"),
     Field("control_effort_n_m_s", "N m s", "impulse of all actuators so far"),
+    *(Field(f"pulse_count_{axis}", "", f"pulses about {axis} so far") for axis in "xyz"),
 )
 EXTREMA = (
     Extremum("rate", "rate_rad_s", smooth=False),  # the rate limit switches gains: corners
@@ -82,6 +83,9 @@ def observe(t, s, m, p, o):
         sqrt(wx * wx + wy * wy + wz * wz),
         mode,
         s.impulse_x + s.impulse_y + s.impulse_z,
+        m.pulses_x,
+        m.pulses_y,
+        m.pulses_z,
     )
 
 

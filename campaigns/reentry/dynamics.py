@@ -8,7 +8,9 @@ On a flat Earth x points ahead, y to the left and z up.
 from collections import namedtuple
 
 from campaigns.reentry.air import logarithm_of_density
-from mc_engine.lanes import any_lane, atan2, exp, maximum, physics, sqrt, where
+from campaigns.reentry.bank import angle_at
+from campaigns.reentry.weather import weather_at
+from mc_engine.lanes import any_lane, atan2, exp, maximum, physics, sincos, sqrt, where
 from mc_engine.physics.aerodynamics import lift_direction
 from mc_engine.physics.frames import over_ellipsoid, velocity_angles
 from mc_engine.physics.gravity import j2_perturbation, point_mass
@@ -16,13 +18,16 @@ from mc_engine.physics.heating import DKR_EXPONENT, detra_kemp_riddell, sutton_g
 
 State = namedtuple("State", "x y z vx vy vz heat")  # place [m], velocity [m/s] over ground, heat load [J/m^2]
 # largest dynamic pressure and heat rate so far, with time, altitude and speed; first pull-out; present lift direction
-# and how often it was changed; first exit from the atmosphere
+# and how often it was changed; first exit from the atmosphere; of a guided flight, time of the last sample, bank
+# there and at the next, and what the laws keep
 Memory = namedtuple(
     "Memory",
     "pressure pressure_time pressure_altitude pressure_speed "
     "flux flux_time flux_altitude flux_speed "
     "low low_time cos_bank sin_bank rolls "
-    "exits exit_time exit_speed exit_angle exit_inertial exit_apoapsis",
+    "exits exit_time exit_speed exit_angle exit_inertial exit_apoapsis "
+    "sampled bank bank_rate next_bank next_rate side active lost reckoned range_rate axial excess "  # see `guidance`
+    "samples saturated reversals",
 )
 Parameters = namedtuple(
     "Parameters",
@@ -33,16 +38,23 @@ Parameters = namedtuple(
     "cos_bank sin_bank cos_rolled sin_rolled roll_at roll_back_at "  # lift directions; sines of flight-path angles
     "stop exit stop_time "
     "ex ey ez fx fy fz nx ny nz "  # unit vectors to the planned entry place, ahead and to the right of it
-    "radius heading speed path aim_down aim_cross aimed",  # of the ground; entry over ground; target
+    "radius heading speed path aim_down aim_cross aimed tx ty tz "  # of the ground; entry over ground; target
+    "first_bank bank_error bank_lag bank_rate_limit reversal_floor reversal_width load_limit "
+    "planned_share planned_lift_to_drag sensed accelerometer_bias accelerometer_scale accelerometer_noise "
+    "weather corridor_load corridor_heat_rate corridor_heat_load corridor_pressure "
+    "nav_range nav_altitude nav_speed nav_path nav_climb",
 )
 Events = namedtuple("Events", "pressure_peak heat_peak pull_out roll leave stop left over")
 Place = namedtuple("Place", "altitude climb ux uy uz")  # climb: rate of the altitude; u: unit vector up
-Air = namedtuple("Air", "density slope temperature")  # slope: of the logarithm of the density, by altitude [1/m]
+# slope: of the logarithm of the density, by altitude [1/m]; v..: velocity through the air [m/s]; shear: rate of the
+# speed through the air, times it, per metre climbed, that a wind which changes with altitude brings [m/s^2]
+Air = namedtuple("Air", "density slope temperature vx vy vz shear")
 
 # settings arrive as numbers: places in the lists of words of `model.py`
 FLAT = 2.0
 J2, NO_GRAVITY = 0.0, 2.0
 SUTTON_GRAVES = 0.0
+UNGUIDED = 0.0
 STOP_ON_EXIT = 0.0
 NEVER = -1.0  # value of an event that is not looked for
 UNKNOWN = 1e300  # the pull-out has not come
@@ -74,10 +86,20 @@ def place_of(s, p, o):
 
 
 @physics
-def air_of(altitude, p, o):
-    """Air at an altitude [m]."""
-    value, slope, temperature = logarithm_of_density(altitude, p, o)
-    return Air(p.density * exp(value), slope, temperature)
+def air_of(s, place, p, o):
+    """Air where the vehicle is, and how it goes through it."""
+    value, slope, temperature = logarithm_of_density(place.altitude, p, o)
+    vx, vy, vz, shear = s.vx, s.vy, s.vz, 0.0 * s.vx
+    if o.weather > 0.5:
+        w = weather_at(place.altitude, p.weather, o.tables)
+        value, slope = value + w.density, slope + w.density_slope
+        level = sqrt(place.ux * place.ux + place.uy * place.uy)
+        inverse = 1.0 / maximum(level, 1e-9)  # over a pole the wind comes from nowhere
+        ex, ey = -place.uy * inverse, place.ux * inverse
+        nx, ny = -place.uz * place.ux * inverse, -place.uz * place.uy * inverse
+        vx, vy, vz = vx - w.east * ex - w.north * nx, vy - w.east * ey - w.north * ny, vz - w.north * level
+        shear = -(w.east_slope * (vx * ex + vy * ey) + w.north_slope * (vx * nx + vy * ny + vz * level))
+    return Air(p.density * exp(value), slope, temperature, vx, vy, vz, shear)
 
 
 @physics
@@ -108,22 +130,34 @@ def heat_rate(density, speed, p, o):
 
 @physics
 def speed2(s):
-    """Squared speed over ground [m^2/s^2]."""
+    """Squared speed [m^2/s^2] over ground, or through the air."""
     return s.vx * s.vx + s.vy * s.vy + s.vz * s.vz
+
+
+@physics
+def bank_of(t, m, o):
+    """(cosine, sine) of the bank; no sine in a planar flight."""
+    if o.guidance == UNGUIDED:
+        cosine, sine = m.cos_bank, m.sin_bank
+    else:
+        sine, cosine = sincos(angle_at(t, m, o.guidance_period))
+        sine = (1.0 - o.planar) * sine
+    return cosine, sine
 
 
 @physics
 def rhs(t, s, m, p, o):
     """Time derivative of the state: field, Coriolis force, drag, lift, and the heat rate."""
     place = place_of(s, p, o)
-    air = air_of(place.altitude, p, o)
-    v = sqrt(speed2(s))
+    air = air_of(s, place, p, o)
+    v = sqrt(speed2(air))
     push = 0.5 * air.density * v  # dynamic pressure over speed
     gx, gy, gz = field(s, p, o)
     k, twice = push * p.drag, 2.0 * p.rate
-    ax, ay, az = gx + twice * s.vy - k * s.vx, gy - twice * s.vx - k * s.vy, gz - k * s.vz
+    ax, ay, az = gx + twice * s.vy - k * air.vx, gy - twice * s.vx - k * air.vy, gz - k * air.vz
     if any_lane(abs(p.lift) > 0.0):
-        lx, ly, lz = lift_direction(s.vx, s.vy, s.vz, place.ux, place.uy, place.uz, v, m.cos_bank, m.sin_bank)
+        cos_bank, sin_bank = bank_of(t, m, o)
+        lx, ly, lz = lift_direction(air.vx, air.vy, air.vz, place.ux, place.uy, place.uz, v, cos_bank, sin_bank)
         lift = push * v * p.lift
         ax, ay, az = ax + lift * lx, ay + lift * ly, az + lift * lz
     return State(s.vx, s.vy, s.vz, ax, ay, az, heat_rate(air.density, v, p, o))
@@ -137,14 +171,15 @@ def events(t, s, m, p, o):
     a rho'/rho climb + b v.a/V^2; the events are V^2 times that, so that a vehicle at rest divides nothing by zero.
     """
     place = place_of(s, p, o)
-    air = air_of(place.altitude, p, o)
-    v2 = speed2(s)
+    air = air_of(s, place, p, o)
+    v2 = speed2(air)
     v = sqrt(v2)
     gx, gy, gz = field(s, p, o)
-    gain = (s.vx * gx + s.vy * gy + s.vz * gz) - 0.5 * air.density * p.drag * (v2 * v)  # v.a: lift does no work
+    # v.a through the air: lift does no work, and the Coriolis force of a wind is left out
+    gain = (air.vx * gx + air.vy * gy + air.vz * gz) - 0.5 * air.density * p.drag * (v2 * v) + air.shear * place.climb
     thicker = air.slope * place.climb * v2
     power = 3.0 if o.heating == SUTTON_GRAVES else DKR_EXPONENT
-    sine = (s.vx * place.ux + s.vy * place.uy + s.vz * place.uz) / where(v > 0.0, v, 1.0)
+    sine = (s.vx * place.ux + s.vy * place.uy + s.vz * place.uz) / where(v > 0.0, v, 1.0)  # winds are level
     roll = where(m.rolls == 0.0, sine - p.roll_at, where(m.rolls == 1.0, p.roll_back_at - sine, NEVER))
     above = place.altitude - p.exit
     stops = o.on_exit == STOP_ON_EXIT
@@ -162,11 +197,11 @@ def events(t, s, m, p, o):
 
 @physics
 def pressure_of(s, p, o):
-    """(dynamic pressure [Pa], heat rate [W/m^2], altitude [m], speed [m/s])."""
-    altitude = place_of(s, p, o).altitude
-    density, v2 = air_of(altitude, p, o).density, speed2(s)
-    v = sqrt(v2)
-    return 0.5 * density * v2, heat_rate(density, v, p, o), altitude, v
+    """(dynamic pressure [Pa], heat rate [W/m^2], altitude [m], speed over ground [m/s])."""
+    place = place_of(s, p, o)
+    air = air_of(s, place, p, o)
+    v2 = speed2(air)
+    return 0.5 * air.density * v2, heat_rate(air.density, sqrt(v2), p, o), place.altitude, sqrt(speed2(s))
 
 
 @physics
@@ -178,6 +213,8 @@ def start(p, o):
     return Memory(
         pressure, zero, altitude, v, flux, zero, altitude, v, unknown, unknown, p.cos_bank, p.sin_bank,
         zero, zero, unknown, unknown, unknown, unknown, unknown,
+        zero, p.first_bank, zero, p.first_bank, zero, where(p.first_bank < 0.0, -1.0, 1.0), zero,
+        zero, zero, zero, zero, zero, zero, zero, zero,
     )  # fmt: skip
 
 
@@ -237,4 +274,6 @@ def switch(t, s, m, p, o, hit):
         where(first, angle, m.exit_angle),
         where(first, inertial, m.exit_inertial),
         where(first, apoapsis, m.exit_apoapsis),
+        *(m.sampled, m.bank, m.bank_rate, m.next_bank, m.next_rate, m.side, m.active),
+        *(m.lost, m.reckoned, m.range_rate, m.axial, m.excess, m.samples, m.saturated, m.reversals),
     )

@@ -1,15 +1,17 @@
 """The entry model as the engine sees it: inputs, settings, what each case starts from, and the MODEL record."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.reentry import dynamics, figures, outcome
+from campaigns.reentry import dynamics, figures, guidance, outcome, reference_table, weather
 from campaigns.reentry.air import GAS_CONSTANT
 from campaigns.reentry.entry_state import Entry, World, entry_of
-from campaigns.reentry.inputs import PARAMETERS, SETTINGS, SHAPES
+from campaigns.reentry.inputs import PARAMETERS, PLANS, SETTINGS, SHAPES
 from campaigns.reentry.planets import PLANETS
+from campaigns.reentry.reference import planned_inputs, reference_tables
 from campaigns.reentry.vehicles import VEHICLES, Vehicle
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.physics.aerodynamics import axial_coefficient
@@ -39,14 +41,20 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     inputs : float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
     """
     _refuse_what_does_not_fit(settings, refusals)
+    refusals.add(
+        (settings.guidance > 0.5) & (settings.planar < 0.5) & (inputs.target_downrange == 0.0),
+        "a guidance law that turns to the side needs target_downrange_km, or planar = true",
+    )
     world = _world(inputs, settings)
     entry = entry_of(inputs, settings, world, refusals)
+    planned = _planned(settings, world, entry, refusals)
     exit_altitude = np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, entry.altitude)
     refusals.add(entry.altitude <= inputs.stop_altitude, "the entry is not above stop_altitude_km")
     names = ("x", "y", "z", "vx", "vy", "vz")
     rows = dict(zip(names, (*entry.position, *entry.velocity), strict=True))
     rows |= {"stop": inputs.stop_altitude, "exit": exit_altitude, "stop_time": inputs.stop_time}
-    rows |= _target(inputs, world, entry)
+    rows |= _target(inputs, world, planned) | {"speed": entry.speed, "path": entry.path}
+    rows |= _guidance_rows(inputs, settings) | _weather_rows(inputs, settings)
     return (
         rows
         | _planet_rows(inputs, settings, world)
@@ -64,7 +72,11 @@ def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> 
     refusals.add(
         other & (settings.heating == DETRA_KEMP_RIDDELL), 'the heating "detra_kemp_riddell" is that of the Earth\'s air'
     )
+    guided = settings.guidance > 0.5
+    refusals.add(guided & (settings.plan == PLANS.index("entry")), 'a guidance law needs its plan; set plan = "given"')
     flat = settings.shape == FLAT
+    refusals.add(flat & (settings.weather > 0.5), "a flat Earth has no weather")
+    refusals.add(guided & flat, "the guidance laws want a round planet")
     refusals.add(flat & (settings.rotating > 0.5), "a flat Earth does not turn; set rotating = false")
     refusals.add(flat & (settings.gravity == J2), 'a flat Earth has the gravity "point", which is uniform, or "none"')
 
@@ -95,6 +107,10 @@ def _planet_rows(i: SimpleNamespace, settings: SimpleNamespace, world: World) ->
         "temperature": gravity * air[:, 1] / GAS_CONSTANT,
         "density": i.density_factor,
         "deviation": i.density_deviation,
+        "corridor_load": i.corridor_load,
+        "corridor_heat_rate": i.corridor_heat_rate,
+        "corridor_heat_load": i.corridor_heat_load,
+        "corridor_pressure": i.corridor_dynamic_pressure,
         "radius": world.radius,
     }
 
@@ -129,6 +145,14 @@ def _chosen_vehicle(i: SimpleNamespace, settings: SimpleNamespace, refusals: Ref
     return numbers
 
 
+def _planned_lift_to_drag(settings: SimpleNamespace) -> np.ndarray:
+    """Lift-to-drag ratio that the laws know of."""
+    own = [vehicle.lift_coefficient / vehicle.drag_coefficient for vehicle in VEHICLES.values()]
+    ratios = np.array([0.0, *own])[settings.vehicle.astype(int)]
+    ratio = np.where(settings.vehicle > 0.5, ratios, settings.plan_lift_to_drag)
+    return np.where(ratio > 0.0, ratio, 1.0)  # a vehicle without lift is not guided
+
+
 def _vehicle_rows(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
     """Areas over mass of the four forces, and the coefficient of the heating."""
     mass, area, drag, lift, trim, nose = _chosen_vehicle(i, settings, refusals)
@@ -136,6 +160,7 @@ def _vehicle_rows(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refus
     lift = lift * i.cd_factor * i.ld_factor
     per_mass = area / (mass * i.mass_factor)
     nose = nose * i.nose_radius_factor
+    tilted = trim + i.accelerometer_misalignment
     sutton_graves = _of_planets(settings, "heating") / np.sqrt(nose)
     heating = np.where(settings.heating == DETRA_KEMP_RIDDELL, detra_kemp_riddell_coefficient(nose), sutton_graves)
     return {
@@ -143,6 +168,8 @@ def _vehicle_rows(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refus
         "lift": lift * per_mass,
         "total": np.hypot(drag, lift) * per_mass,
         "axial": axial_coefficient(drag, lift, np.cos(trim), np.sin(trim)) * per_mass,
+        "sensed": axial_coefficient(drag, lift, np.cos(tilted), np.sin(tilted)) * per_mass,
+        "planned_lift_to_drag": _planned_lift_to_drag(settings),
         "heating": heating * i.heating_factor,
     }
 
@@ -162,12 +189,62 @@ def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.nd
     }
 
 
+def _weather_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.ndarray]:
+    """The profiles of the cases, behind the tables of the guidance, and where each begins."""
+    asked = settings.weather > 0.5
+    if not asked.any():
+        return {"weather": np.zeros(asked.size)}
+    nodes = weather.weather_nodes(i.weather_draw, i.density_random_size, i.wind_random_size, i.wind_mean_size)
+    guidance_tables = np.where(settings.guidance > 0.5, float(reference_table.LENGTH), 0.0)
+    return {"weather": guidance_tables + weather.LENGTH * np.arange(asked.size), "tables": nodes}
+
+
+def _planned(settings: SimpleNamespace, world: World, entry: Entry, refusals: Refusals) -> Entry:
+    """The entry that distances are counted from: each case's own without errors, or that of the plan."""
+    given = settings.plan == PLANS.index("given")
+    if not given.any():
+        return entry
+    plain = SimpleNamespace(arrival=np.zeros_like(world.mu), speed_frame=settings.speed_frame)
+    plan = entry_of(planned_inputs(settings), plain, world, refusals)
+    mixed = {
+        name: np.where(given, getattr(plan, name), getattr(entry, name))
+        for name in ("place", "ahead", "right", "heading")
+    }
+    return replace(entry, **mixed)
+
+
+def _guidance_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.ndarray]:
+    """Bank execution, reversals, sensor errors, and what the laws know of the planned vehicle."""
+    return {
+        "first_bank": i.bank + i.bank_error,
+        "bank_error": i.bank_error,
+        "bank_lag": i.bank_lag,
+        "bank_rate_limit": i.bank_rate_limit,
+        "reversal_floor": i.reversal_floor,
+        "reversal_width": i.reversal_width,
+        "load_limit": i.load_limit,
+        "planned_share": np.cos(settings.plan_bank),
+        "accelerometer_bias": i.accelerometer_bias,
+        "accelerometer_scale": i.accelerometer_scale_error,
+        "accelerometer_noise": i.accelerometer_noise,
+        "nav_range": i.nav_range_error,
+        "nav_altitude": i.nav_altitude_error,
+        "nav_speed": i.nav_speed_error,
+        "nav_path": i.nav_flight_path_angle_error,
+        "nav_climb": i.nav_climb_error,
+    }
+
+
 def _target(i: SimpleNamespace, world: World, entry: Entry) -> dict[str, np.ndarray]:
     rows: dict[str, np.ndarray] = {}
     for letter, vectors in (("e", entry.place), ("f", entry.ahead), ("n", entry.right)):
         rows |= {f"{letter}{axis}": vectors[k] for k, axis in enumerate("xyz")}
-    rows |= {"heading": entry.heading, "speed": entry.speed, "path": entry.path}
+    along, across = i.target_downrange / world.radius, i.target_crossrange / world.radius
+    ahead = np.cos(along) * entry.place + np.sin(along) * entry.ahead
+    target = np.cos(across) * ahead + np.sin(across) * entry.right
+    rows |= {f"t{axis}": target[k] for k, axis in enumerate("xyz")}
     return rows | {
+        "heading": entry.heading,
         "aim_down": i.target_downrange,
         "aim_cross": i.target_crossrange,
         "aimed": np.where(i.target_downrange > 0.0, 1.0, 0.0),
@@ -184,12 +261,19 @@ MODEL = Model(
     quantities=outcome.QUANTITIES,
     metrics=outcome.METRICS,
     clock=AdaptiveStep(
-        "time_limit", "tolerance", (1e-5, 1e-5, 1e-5, 1e-8, 1e-8, 1e-8, 10.0), method="dp54", attempts=50_000
+        "time_limit",
+        "tolerance",
+        (1e-5, 1e-5, 1e-5, 1e-8, 1e-8, 1e-8, 10.0),
+        control_period=lambda o: o.guidance_period if o.guidance > 0.5 else np.inf,
+        method="dp54",
+        attempts=50_000,
     ),
     kernel_parameters=dynamics.Parameters,
     prepare=prepare,
     initial=dynamics.initial,
     start=dynamics.start,
+    control=guidance.control,
+    tables=reference_tables,
     rhs=dynamics.rhs,
     events=dynamics.events,
     switch=dynamics.switch,

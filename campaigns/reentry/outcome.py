@@ -3,9 +3,11 @@
 from collections import namedtuple
 
 from campaigns.reentry.air import sound_speed
+from campaigns.reentry.bank import angle_at
 from campaigns.reentry.dynamics import (
     FLAT,
     STOP_ON_EXIT,
+    UNGUIDED,
     UNKNOWN,
     air_of,
     exit_of,
@@ -14,6 +16,7 @@ from campaigns.reentry.dynamics import (
     pressure_of,
     speed2,
 )
+from campaigns.reentry.reference_table import whole_range
 from mc_engine.lanes import atan2, floor, physics, rint, sqrt, where
 from mc_engine.model import Field
 from mc_engine.physics.frames import geodetic_latitude, spherical, velocity_angles
@@ -60,6 +63,7 @@ def _peak(name: str, unit: str, text: str) -> tuple[Field, ...]:
 METRICS = (
     *(field for peak in _PEAKS for field in _peak(*peak)),
     Field("heat_load_j_m2", "J/m^2", "convective heat load at the stagnation point"),
+    Field("corridor_violations", "", "how many of the corridor's four limits were passed"),
     Field("min_altitude_km", "km", "altitude of the first pull-out, or of the end of a flight without one"),
     Field("min_altitude_time_s", "s", "when that was"),
     Field("exits", "", "how often the vehicle left the atmosphere, upwards through the exit altitude"),
@@ -78,6 +82,9 @@ METRICS = (
     Field("downrange_km", "km", "distance over ground to the end, along the planned great circle"),
     Field("crossrange_km", "km", "distance over ground to the end, to the right of the planned great circle"),
     Field("miss_km", "km", "distance of the end from the target"),
+    Field("reference_range_km", "km", "distance over ground to the end of the reference path"),
+    Field("saturated_share", "", "share of the guidance's samples at which its command was at a limit"),
+    Field("reversals", "", "how often the guidance changed the side of the lift"),
     Field("relative_speed_m_s", "m/s", "speed over ground at entry"),
     Field("relative_flight_path_angle_deg", "deg", "flight-path angle over ground at entry"),
     Field("ballistic_coefficient_kg_m2", "kg/m^2", "mass over drag area, dispersions included"),
@@ -130,14 +137,18 @@ def ground_of(s, altitude, p, o):
 def observe(t, s, m, p, o):
     """The quantities in the order of QUANTITIES."""
     place = place_of(s, p, o)
-    air = air_of(place.altitude, p, o)
-    v2 = speed2(s)
-    v = sqrt(v2)
+    air = air_of(s, place, p, o)
+    v2 = speed2(air)
+    through = sqrt(v2)
     pressure = 0.5 * air.density * v2
     ground = ground_of(s, place.altitude, p, o)
+    if o.guidance == UNGUIDED:
+        bank = atan2(m.sin_bank, m.cos_bank)
+    else:
+        bank = angle_at(t, m, o.guidance_period)
     return Quantities(
         place.altitude,
-        v,
+        sqrt(speed2(s)),
         ground.path,
         ground.heading,
         ground.latitude,
@@ -147,11 +158,11 @@ def observe(t, s, m, p, o):
         pressure * p.total,
         pressure * p.axial,
         pressure,
-        heat_rate(air.density, v, p, o),
+        heat_rate(air.density, through, p, o),
         s.heat,
-        v / sound_speed(air.temperature),
+        through / sound_speed(air.temperature),
         air.density,
-        atan2(m.sin_bank, m.cos_bank),
+        bank,
     )
 
 
@@ -159,6 +170,27 @@ def observe(t, s, m, p, o):
 def known(value):
     """The value, or not a number where it is unknown."""
     return where(abs(value) < UNKNOWN, value, float("nan"))
+
+
+@physics
+def violations(pressure, flux, heat, p):
+    """How many of load, heat rate, heat load and dynamic pressure were above their limits."""
+    return (
+        where(pressure * p.total > p.corridor_load, 1.0, 0.0)
+        + where(flux > p.corridor_heat_rate, 1.0, 0.0)
+        + where(heat > p.corridor_heat_load, 1.0, 0.0)
+        + where(pressure > p.corridor_pressure, 1.0, 0.0)
+    )
+
+
+@physics
+def planned_range(t, o):
+    """Range [m] of the reference path, not a number without one."""
+    if o.guidance == UNGUIDED:
+        value = float("nan") + t
+    else:
+        value = whole_range(o.tables) + 0.0 * t
+    return value
 
 
 @physics
@@ -177,6 +209,7 @@ def evaluate(t, s, m, p, o, best, when):
     leaves = (o.on_exit == STOP_ON_EXIT) & (altitude > p.exit - 1e-3) & (ground.path > 0.0)
     speed, angle, inertial, apoapsis = exit_of(s, p, o)
     pulled = m.low < UNKNOWN
+    air = air_of(s, place_of(s, p, o), p, o)
     miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.aim_cross
     return Metrics(
         pressure * p.total,
@@ -188,6 +221,7 @@ def evaluate(t, s, m, p, o, best, when):
         flux,
         *heat_when,
         s.heat,
+        violations(pressure, flux, s.heat, p),
         where(pulled, m.low, altitude),
         where(pulled, m.low_time, t),
         where(leaves, 1.0, m.exits),
@@ -200,12 +234,15 @@ def evaluate(t, s, m, p, o, best, when):
         altitude,
         v,
         ground.path,
-        v / sound_speed(air_of(altitude, p, o).temperature),
+        sqrt(speed2(air)) / sound_speed(air.temperature),
         ground.latitude,
         ground.longitude,
         ground.downrange,
         ground.crossrange,
         where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), float("nan")),
+        planned_range(t, o),
+        where(m.samples > 0.0, m.saturated / where(m.samples > 0.0, m.samples, 1.0), float("nan")),
+        m.reversals,
         p.speed,
         p.path,
         where(p.drag > 0.0, 1.0 / where(p.drag > 0.0, p.drag, 1.0), float("nan")),

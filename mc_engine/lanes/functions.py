@@ -68,6 +68,14 @@ def mantissa(x):
     return _plain(np.frexp(np.abs(x))[0] * 2.0)
 
 
+TABLES = "tables"  # name of the settings' field that holds a model's tables
+
+
+def look_up(tables, place):
+    """The number at `place` of the model's tables: a whole number as a float, 0 or more and inside them."""
+    return _plain(tables[np.asarray(place).astype(int)])
+
+
 def any_lane(mask):
     """True if mask holds in at least one lane."""
     return bool(np.any(mask))

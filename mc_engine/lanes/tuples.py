@@ -12,6 +12,7 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np import arrayobj
 
+from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.lane_type import I1, Lanes, common_width, convert, mask_type, number_type
 from mc_engine.lanes.lowering import constant, llvm_type
 
@@ -224,14 +225,19 @@ def scalars_like(typingctx, like, array):
 
 @intrinsic
 def load_scalars(typingctx, cls, array):
-    """Named tuple of class `cls` with one plain float64 per field from a 1-D array."""
-    count = len(cls.instance_class._fields)
-    result = _tuple_type([types.float64] * count, cls)
+    """Named tuple of class `cls` with one plain float64 per field from a 1-D array.
+
+    A last field called `tables` becomes the address of what follows in the array.
+    """
+    names = cls.instance_class._fields
+    count = len(names) - (names[-1] == TABLES)
+    extra = [types.CPointer(types.float64)] * (len(names) - count)
+    result = _tuple_type([types.float64] * count + extra, cls)
 
     def codegen(context, builder, sig, args):
-        places = [ir.Constant(ir.IntType(64), i) for i in range(count)]
+        places = [ir.Constant(ir.IntType(64), i) for i in range(len(names))]
         at = [_pointer(context, builder, array, args[1], None, place, 1) for place in places]
-        return _pack(context, builder, result, [_read(builder, pointer) for pointer in at])
+        return _pack(context, builder, result, [_read(builder, pointer) for pointer in at[:count]] + at[count:])
 
     return result(cls, array), codegen
 

@@ -8,6 +8,8 @@ not modelled).  `us76` is for entry: the 1976 standard, exact from the ground to
 import math
 from itertools import pairwise
 
+import numpy as np
+
 from mc_engine.lanes import exp, log, physics, where
 
 # Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., Table 8-4:
@@ -156,3 +158,13 @@ def us76_logarithm(h):
 def us76(h):
     """Density [kg/m^3] of the U.S. Standard Atmosphere, 1976, at geometric altitude h [m]; see `us76_logarithm`."""
     return exp(us76_logarithm(h)[0])
+
+
+def us76_of_array(h: np.ndarray) -> np.ndarray:
+    """The same density for float64[...] by NumPy alone, to the last digits but one: for designs before a flight."""
+    low = np.minimum(h, US76_TOP)
+    x = GEOPOTENTIAL_RADIUS / (GEOPOTENTIAL_RADIUS + low) * low
+    t0, lapse, a, b, c = np.array(_LAYERS)[np.maximum(np.searchsorted(_BASE, x, "right") - 1, 0), 1:].T
+    _, aloft_a, aloft_c = np.array(_ALOFT)[np.maximum(np.searchsorted(_ALOFT_BASE, h, "right") - 1, 0)].T
+    below = a.T + b.T * np.log(t0.T + lapse.T * x) + c.T * x
+    return np.exp(np.where(np.asarray(h) >= US76_TOP, aloft_a.T + aloft_c.T * h, below))

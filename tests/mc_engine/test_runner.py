@@ -14,6 +14,7 @@ import pytest
 from small_run import ENVIRONMENT
 
 from mc_engine import load_campaign, open_store, runner
+from mc_engine.campaign import SHIPPED
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
 
 
@@ -203,3 +204,17 @@ def test_physics_that_does_not_compile_is_named_with_its_line(tmp_path, slip, se
     (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
     with pytest.raises(ModelError, match=sentence):
         runner.run(load_campaign(tmp_path), tmp_path / "run")
+
+
+def test_histories_have_about_as_many_rows_as_asked_for(tmp_path):
+    text = (
+        SHIPPED.joinpath("minimal/campaign.toml")
+        .read_text(encoding="utf-8")
+        .replace("first = 3", "first = 3, rows = 20")
+    )
+    campaign = load_campaign("few.toml", text=text, directory=SHIPPED / "minimal", cases=10)
+    histories = runner.run(campaign, tmp_path / "run", workers=2).histories()
+    assert list(dict.fromkeys(histories["case_id"])) == [-1, 0, 1, 2]
+    assert histories.groupby("case_id").size().between(4, 24).all()
+    whole = runner.run(load_campaign("minimal", cases=10), tmp_path / "whole", workers=1).histories()
+    assert len(whole) > 4 * len(histories)

@@ -19,6 +19,11 @@ def test_without_a_case_ours_is_the_nominal(flown):
     assert (value, where) == (350.0, "nominal case")
 
 
+def test_the_nominal_case_has_the_inputs_that_all_cases_share(flown):
+    record = {"column": "settling_time_s", "at": {"control": "continuous"}}
+    assert our_value(flown, record) == (350.0, "nominal case")
+
+
 def test_a_named_case_is_found_by_its_inputs(flown):
     value, where = our_value(flown, {"column": "propellant_kg", "at": {"ve_pct": -20.0, "oe_pct": 10.0}})
     assert where == "case 17"

@@ -11,7 +11,7 @@ import reports
 from mc_engine.store import Column, create_store
 
 PUBLIC = {"build", "render_html", "render_pdf", "report", "write_reports"}
-SHARED = {"store", "statistics", "status", "units", "figures"}
+SHARED = {"store", "statistics", "status", "units", "figures", "tuning_folder"}
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from flexible_flights import FOLDER, MODEL, NOMINAL, TABLE_8, TABLE_9, fly_campaign, fly_one, history
 
+from mc_engine.campaign import load_campaign
 from mc_engine.physics.pulse_modulators import shortest_pulse
 
 RECORDS = tomllib.loads((FOLDER / "published.toml").read_text(encoding="utf-8"))["published"]
@@ -84,6 +85,17 @@ def test_each_record_is_complete_and_in_the_unit_of_its_column(record):
         assert {field.name: field.unit for field in MODEL.metrics}[record["column"]] == record["unit"]
     else:
         assert record["quantity"] in COMPUTED
+
+
+def test_every_number_of_table_12_says_which_statistic_of_which_column_it_is():
+    table_12 = [record for record in RECORDS if record["source"].startswith("Table 12")]
+    assert len(table_12) == 33
+    words = {"mean": "mean of {}", "standard deviation": "standard deviation of {}"}
+    words["farthest"] = "{} of the case farthest from the mean"
+    symbols = {name: symbol for symbol, name in COLUMNS.items()}
+    for record in table_12:
+        assert words[record["statistic"]].format(symbols[record["of"]]) == record["quantity"]
+        assert record["over"] == [one.name for one in load_campaign(FOLDER / "campaign.toml").dispersions]
 
 
 def test_words_in_the_print_are_true_of_our_number():

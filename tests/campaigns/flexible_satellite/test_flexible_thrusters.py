@@ -130,6 +130,9 @@ def test_the_bookkeeping_agrees_with_the_history(table_8, seen):
         torque = seen[f"torque_{axis}_n_m"][:-1]
         assert table_8[f"impulse_{axis}_n_m_s"] == pytest.approx(0.005 * np.abs(torque).sum(), rel=1e-9)
         firing = np.concatenate([[False], torque != 0.0])
+        counted = seen[f"pulse_count_{axis}"]
+        assert (np.diff(counted) >= 0.0).all()
+        assert counted[-1] == table_8[f"pulse_count_{axis}"]
         # pauses are longer than a sample, so each pulse is a train of samples of its own
         assert table_8[f"pulse_count_{axis}"] == np.sum(firing[1:] & ~firing[:-1])
 

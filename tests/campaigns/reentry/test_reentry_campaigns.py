@@ -10,6 +10,7 @@ from mc_engine.flight import fly
 
 NAMES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "reentry")
 KINDS = {"steep_ballistic", "ballistic_orbit", "skip", "double_dip", "aerobraking"}
+GUIDED = {"guided", "guided_law2r", "guided_law3r"}
 
 
 def nominal(name, **inputs):
@@ -21,7 +22,7 @@ def nominal(name, **inputs):
 
 
 def test_the_five_kinds_of_entry_have_a_file_each():
-    assert {name.partition("/")[2] for name in NAMES} == KINDS | {""}
+    assert {name.partition("/")[2] for name in NAMES} == KINDS | GUIDED | {"laws", ""}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -31,8 +32,19 @@ def test_the_nominal_case_of_each_file_flies_to_its_end(name):
 
 @pytest.mark.parametrize("name", [name for name in NAMES if "target_downrange_km" in load_campaign(name).parameters])
 def test_the_target_of_a_file_is_where_its_nominal_case_ends(name):
-    ten_metres = 0.010
-    assert nominal(name)["miss_km"] < ten_metres
+    ten_metres, one_and_a_half_kilometres = 0.010, 1.5
+    guided = name.partition("/")[2] in GUIDED
+    assert nominal(name)["miss_km"] < (one_and_a_half_kilometres if guided else ten_metres)
+
+
+@pytest.mark.parametrize("name", sorted(GUIDED))
+def test_a_guided_file_aims_at_the_end_of_its_reference_and_draws_what_the_open_loop_draws(name):
+    campaign, open_loop = load_campaign(f"reentry/{name}"), load_campaign("reentry")
+    row = nominal(campaign.name)
+    assert row["reference_range_km"] == pytest.approx(campaign.parameters["target_downrange_km"], abs=0.001)
+    assert campaign.seed == open_loop.seed
+    mine = {one.name: one for one in campaign.dispersions}
+    assert all(mine[one.name].distribution == one.distribution for one in open_loop.dispersions)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,0 +1,105 @@
+"""The air of one day: random density and winds over altitude, frozen for a case.
+
+Each case has its own profile, a function of altitude alone: a vehicle that comes back to an altitude, as in a skip,
+meets the same air again.  The profile stands in nodes two kilometres apart, drawn before the flight; between them it
+goes over smoothly, so that the density keeps a slope.  A profile is named by one number, `weather_draw`: the same
+number is the same air, whatever the vehicle, the law or the other errors, and 0 is air without a random part.
+
+Magnitudes are engineering defaults of the class of the Global Reference Atmosphere Models (F. W. Leslie, C. G. Justus,
+NASA/TM-2011-216467) and of J. W. Campbell, NASA TM X-3529 (1977).
+"""
+
+from collections import namedtuple
+
+import numpy as np
+from scipy.special import ndtri
+
+from mc_engine.lanes import floor, look_up, maximum, minimum, physics
+
+SPACING, NODES, FIELDS = 2e3, 66, 3  # m; up to 130 km; density, wind to the east and to the north
+LENGTH = NODES * FIELDS
+ALTITUDES = SPACING * np.arange(NODES)
+# altitude [km] against 1-sigma of the logarithm of the density, of each wind component [m/s], and the mean wind to
+# the east [m/s]
+_PROFILE = np.array(
+    [
+        (0.0, 0.01, 5.0, 3.0),
+        (11.0, 0.015, 18.0, 22.0),
+        (25.0, 0.02, 12.0, 8.0),
+        (60.0, 0.05, 35.0, 35.0),
+        (80.0, 0.085, 45.0, 20.0),
+        (100.0, 0.10, 45.0, 0.0),
+    ]
+)
+# half of each variance is of the small scale, half of the large one: correlation lengths of first-order Gauss-Markov
+# processes [m]
+SMALL_SCALE, LARGE_SCALE = 7.5e3, 20e3
+
+# value and slope [1/m] of the logarithm of the density over the standard; winds [m/s] and their slopes [1/s]
+Weather = namedtuple("Weather", "density density_slope east east_slope north north_slope")
+
+
+def standard_profile(column: int) -> np.ndarray:
+    """One column of the magnitudes at the nodes; constant above 100 km."""
+    return np.interp(ALTITUDES, 1e3 * _PROFILE[:, 0], _PROFILE[:, column])
+
+
+def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:
+    """float64[n, count]: independent standard normal deviates that belong to each number `draw` in [0, 1).
+
+    SplitMix64 counts on from the number: G. L. Steele, D. Lea, C. H. Flood, OOPSLA (2014) 453-472.
+    """
+    key = (draw * 2.0**53).astype(np.uint64)[:, None]
+    z = (key << np.uint64(11)) + np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    z = z ^ (z >> np.uint64(31))
+    return ndtri(((z >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52)
+
+
+def gauss_markov(deviates: np.ndarray, length: float) -> np.ndarray:
+    """float64[n, NODES] of unit variance, correlation exp(-distance / length), from as many deviates."""
+    a = np.exp(-SPACING / length)
+    out = np.empty_like(deviates)
+    out[:, 0] = deviates[:, 0]
+    for k in range(1, NODES):
+        out[:, k] = a * out[:, k - 1] + np.sqrt(1.0 - a * a) * deviates[:, k]
+    return out
+
+
+def weather_nodes(draw: np.ndarray, density_size, wind_size, mean_size) -> np.ndarray:
+    """float64[n, LENGTH]: the profiles of n cases, node after node, its three fields side by side.
+
+    draw : in [0, 1), 0 for no random part;  density_size, wind_size, mean_size : multiples of the magnitudes above
+    """
+    deviates = normal_deviates(draw, 2 * LENGTH).reshape(-1, FIELDS, 2, NODES)
+    there = np.where(draw > 0.0, np.sqrt(0.5), 0.0)
+    out = np.empty((draw.size, NODES, FIELDS))
+    for field, (size, column) in enumerate(((density_size, 1), (wind_size, 2), (wind_size, 2))):
+        both = gauss_markov(deviates[:, field, 0], SMALL_SCALE) + gauss_markov(deviates[:, field, 1], LARGE_SCALE)
+        out[:, :, field] = (there * size)[:, None] * both * standard_profile(column)
+    out[:, :, 1] += mean_size[:, None] * standard_profile(3)
+    return out.reshape(draw.size, LENGTH)
+
+
+@physics
+def _between(tables, at, x):
+    """(value, change of it per node) between two nodes, level in both."""
+    a, b = look_up(tables, at), look_up(tables, at + 3.0)
+    return a + (b - a) * (x * x * (3.0 - 2.0 * x)), (b - a) * (6.0 * x * (1.0 - x))
+
+
+@physics
+def weather_at(h, first, tables):
+    """The `Weather` at altitude h [m] of the case whose nodes begin at place `first` of the tables.
+
+    Below the ground and above the nodes the air is that of the first and the last of them.
+    """
+    place = minimum(maximum(h * (1.0 / SPACING), 0.0), NODES - 1.000001)
+    node = floor(place)
+    x, at = place - node, first + FIELDS * node
+    density, density_slope = _between(tables, at, x)
+    east, east_slope = _between(tables, at + 1.0, x)
+    north, north_slope = _between(tables, at + 2.0, x)
+    each = 1.0 / SPACING
+    return Weather(density, density_slope * each, east, east_slope * each, north, north_slope * each)

@@ -1,0 +1,102 @@
+"""Campaigns that take inputs from another run: [inputs] held against that run, or against the one to be flown first."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mc_engine.campaign_file import CampaignSection
+from mc_engine.campaign_problems import Findings, Sections
+from mc_engine.designs import BY_LEVELS, RANDOM
+from mc_engine.errors import CampaignError, StoreError
+from mc_engine.model import Model
+
+if TYPE_CHECKING:
+    from mc_engine.campaign import Campaign
+    from mc_engine.upstream import Rows, Upstream
+
+
+def take_inputs(
+    sections: Sections,
+    model: Model,
+    directory: Path,
+    run: Path | None,
+    design: str | None,
+    load: "Callable[..., Campaign]",
+    found: Findings,
+) -> "tuple[Upstream | None, Campaign | None]":
+    """What is taken from another run, and the campaign to be flown for it where there is none yet.
+
+    run : in place of the one that [inputs] names.  load : reads that campaign, as `load_campaign` does.
+    """
+    if sections.inputs is None:
+        return None, None
+    from mc_engine.case_columns import result_columns
+    from mc_engine.upstream import find_run, link, read_rows
+
+    spot = found.under("inputs")
+    taken = [column.name for column in result_columns(model)]
+    source = sections.inputs.source
+    first = None
+    try:
+        run = run or find_run(source, directory)
+        if run is not None:
+            rows = read_rows(run)
+        else:
+            cases = sections.campaign.cases if sections.campaign is not None else None
+            beside = directory / source
+            first = load(beside if beside.exists() else source, cases=cases)
+            rows = _rows_to_come(first)
+    except StoreError as error:
+        spot.add("from", str(error))
+        return None, None
+    except CampaignError as error:
+        spot.add("from", f'"{source}" is neither a run nor a campaign that can be flown: {error.problems[0]}')
+        return None, None
+    random = rows.facts["design"] in RANDOM
+    if design is not None and (design in BY_LEVELS or (design != "table" and not random)):
+        spot.add("from", f'its design "{rows.facts["design"]}" does not go with "{design}"; write design = "table"')
+    return link(rows, sections.inputs, model, taken, spot), first
+
+
+def _rows_to_come(first: "Campaign") -> "Rows":
+    """The columns that a campaign will have, without a case."""
+    from mc_engine.case_columns import case_columns
+    from mc_engine.parts import CASE_COLUMNS
+    from mc_engine.upstream import Rows
+
+    taken = () if first.upstream is None else first.upstream.columns
+    columns = (*CASE_COLUMNS, *case_columns(first.model, first.dispersions, taken))
+    facts: dict[str, Any] = {
+        "name": first.name,
+        "title": first.title,
+        "model": first.model_reference,
+        "design": first.design,
+    }
+    facts |= {"seed": first.seed, "digest": first.digest, "figures": [], "inputs": []}
+    nothing = {column.name: np.empty(0, dtype=object if column.kind == "word" else float) for column in columns}
+    return Rows(facts, columns, nothing, {column.name: 0.0 for column in columns})
+
+
+def check_taken(sections: Sections, upstream: "Upstream | None", design: str | None, found: Findings) -> None:
+    """Inputs that come from upstream and from this file too."""
+    if upstream is not None and design == "table":
+        for name in sections.dispersions:
+            message = 'the design "table" takes all cases from the run upstream; write design = "mc" to disperse more'
+            found.under("dispersion").add(name, message)
+    for name in upstream.links if upstream is not None else ():
+        for place, names in (("parameters", sections.parameters), ("dispersion", sections.dispersions)):
+            if name in names and upstream is not None:
+                found.under(place).add(name, f"comes from the run of {upstream.name}; leave it out here")
+
+
+def chained_count(section: CampaignSection, rows: int, found: Findings) -> int:
+    """How many cases a chain has: all of those upstream, or the first so many."""
+    if section.design in RANDOM and section.seed is None:
+        found.add("seed", f"is missing: {CampaignSection.model_fields['seed'].description}")
+    if section.table is not None:
+        found.add("table", "cannot be there together with [inputs]")
+    if section.cases is not None and section.cases > rows:
+        found.add("cases", f"{section.cases} is not allowed; the run upstream has {rows} cases")
+    return section.cases or rows

@@ -1,0 +1,74 @@
+"""The search behind `mc-engine tune`: NSGA-II of pymoo, asked for candidates and told what they came to.
+
+K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002), 182-197; its
+constraints: a feasible candidate beats any other, of two others the one with the smaller violation.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from mc_engine.candidates import Scores
+from mc_engine.errors import EngineError
+from mc_engine.tuning_parts import Tuning
+
+_WORST = 1e30  # stands for an objective without a number; such a candidate is infeasible anyway
+_DEAD = 1e15  # violation of a candidate without a number for every metric
+_CROSSOVER_INDEX, _MUTATION_INDEX = 15.0, 20.0  # Deb's distribution indices: how near children stay to their parents
+
+
+class GeneticSearch:
+    """One search; `ask` and `tell` in turn.  The same seed and the same answers give the same candidates."""
+
+    def __init__(self, tuning: Tuning, population: int, seed: int):
+        """EngineError in a sentence if pymoo is not installed."""
+        pymoo = _pymoo()
+        n_tuned = len(tuning.parameters)
+        self._signs = np.array([1.0 if one.large_is_bad else -1.0 for one in tuning.objectives])
+        self._problem = pymoo["Problem"](
+            n_var=n_tuned,
+            n_obj=len(tuning.objectives),
+            n_ieq_constr=len(tuning.constraints) + 1,
+            xl=np.array([one.lower for one in tuning.parameters]),
+            xu=np.array([one.upper for one in tuning.parameters]),
+        )
+        self._evaluate, self._static = pymoo["Evaluator"]().eval, pymoo["StaticProblem"]
+        self._algorithm = pymoo["NSGA2"](
+            pop_size=population,
+            sampling=pymoo["LHS"](),
+            crossover=pymoo["SBX"](prob=tuning.crossover, eta=_CROSSOVER_INDEX),
+            mutation=pymoo["PM"](prob=1.0, prob_var=tuning.mutation or 1.0 / n_tuned, eta=_MUTATION_INDEX),
+        )
+        self._algorithm.setup(self._problem, seed=seed, termination=("n_gen", 10**9), verbose=False)
+        self._asked: Any = None
+
+    def ask(self) -> np.ndarray:
+        """The next generation, float64[n, n_tuned]."""
+        self._asked = self._algorithm.ask()
+        return np.array(self._asked.get("X"), dtype=np.float64)
+
+    def tell(self, scores: Scores) -> None:
+        """What the candidates of the last `ask` came to."""
+        dead = ~np.isfinite(scores.violation)
+        objectives = np.where(np.isfinite(scores.objectives), scores.objectives * self._signs, _WORST)
+        excess = np.column_stack([np.nan_to_num(scores.excess, nan=0.0), np.where(dead, _DEAD, 0.0)])
+        self._evaluate(self._static(self._problem, F=objectives, G=excess), self._asked)
+        self._algorithm.tell(infills=self._asked)
+
+
+def _pymoo() -> dict[str, Any]:
+    """The names of pymoo that the search uses; imported here, so that only a search needs the package."""
+    try:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.evaluator import Evaluator
+        from pymoo.core.problem import Problem
+        from pymoo.operators.crossover.sbx import SBX
+        from pymoo.operators.mutation.pm import PM
+        from pymoo.operators.sampling.lhs import LHS
+        from pymoo.problems.static import StaticProblem
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] != "pymoo":
+            raise
+        raise EngineError("tuning needs pymoo, which is not installed; `pip install 'mc-engine[tune]'`") from None
+    names = (NSGA2, Evaluator, Problem, SBX, PM, LHS, StaticProblem)
+    return {one.__name__: one for one in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}

@@ -1,0 +1,141 @@
+"""The directory of a tuning: what `mc-engine tune` leaves behind.
+
+    tuning.toml   tuning.json   evaluations.parquet   generations.parquet   front.parquet   report.html   report.pdf
+
+Written once, when the search has ended; `tuning.json`, the manifest, comes last and holds the digest of each table.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mc_engine.durable_file import make_folder, read_file, write_durably
+from mc_engine.errors import StoreError
+from mc_engine.journal import plain
+from mc_engine.parts import Column, arrow_table, attributes, parquet_bytes
+
+MANIFEST, TEXT = "tuning.json", "tuning.toml"
+TABLES = ("evaluations", "generations", "front")
+FORMAT = 1  # of the directory; the manifest's "format"
+
+
+@dataclass(frozen=True)
+class TuningRecord:
+    """A finished tuning.
+
+    evaluations : every candidate flown, in order.  front : those of them inside all limits that no other one of these
+        beats; no rows if none is inside.  generations : how the search went on.
+    """
+
+    path: Path
+    manifest: dict[str, Any]
+    evaluations: pd.DataFrame
+    generations: pd.DataFrame
+    front: pd.DataFrame
+
+    @property
+    def feasible(self) -> bool:
+        """Whether a candidate was found inside all limits."""
+        return len(self.front) > 0
+
+
+def write_tuning(
+    path: Path,
+    text: str,
+    manifest: Mapping[str, Any],
+    tables: Mapping[str, tuple[Sequence[Column], Mapping[str, np.ndarray]]],
+) -> None:
+    """Write a tuning into `path`; tables : columns and arrays of each of TABLES."""
+    make_folder(path)
+    write_durably(path / TEXT, text.encode())
+    records = {}
+    for name in TABLES:
+        columns, arrays = tables[name]
+        rows = len(next(iter(arrays.values())))
+        content = parquet_bytes(arrow_table(columns, arrays, rows, path / f"{name}.parquet"))
+        write_durably(path / f"{name}.parquet", content)
+        records[name] = {
+            "rows": rows,
+            "sha256": sha256(content).hexdigest(),
+            "columns": [asdict(column) for column in columns],
+        }
+    record = {**manifest, "format": FORMAT, "text_sha256": sha256(text.encode()).hexdigest(), "tables": records}
+    content = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False, default=plain).encode()
+    write_durably(path / MANIFEST, content)
+
+
+def is_tuning_directory(path: str | Path) -> bool:
+    """True if `path` holds a finished tuning."""
+    return (Path(path) / MANIFEST).is_file()
+
+
+def open_tuning(path: str | Path) -> TuningRecord:
+    """The tuning in directory `path`; StoreError if there is none, or a byte of it changed."""
+    path = Path(path)
+    if not is_tuning_directory(path):
+        raise StoreError(
+            f"{path}: is no directory of a tuning" if path.exists() else f"{path}: there is no such folder"
+        )
+    try:
+        manifest = json.loads(read_file(path / MANIFEST))
+    except ValueError as error:
+        raise StoreError(f"{path / MANIFEST}: damaged, {error}") from None
+    if manifest.get("format", FORMAT) > FORMAT:
+        raise StoreError(f"{path}: was written by a newer engine; this one reads format {FORMAT}")
+    return TuningRecord(path, manifest, **{name: _table(path, name, manifest["tables"][name]) for name in TABLES})
+
+
+def _table(path: Path, name: str, record: Mapping[str, Any]) -> pd.DataFrame:
+    content = read_file(path / f"{name}.parquet")
+    if sha256(content).hexdigest() != record["sha256"]:
+        raise StoreError(f"{path / name}.parquet: damaged, its SHA-256 is not the one in {MANIFEST}")
+    frame = pq.read_table(pa.BufferReader(content)).to_pandas()
+    frame.attrs.update(attributes([Column(**column) for column in record["columns"]]))
+    return frame
+
+
+def outcome_lines(record: TuningRecord) -> list[str]:
+    """How the search ended, for the command line."""
+    tuning, evaluations = record.manifest["tuning"], record.evaluations
+    inside = int(evaluations["feasible"].sum())
+    lines = [
+        f"candidates   {len(evaluations):,} in {tuning['flown']} generations ({tuning['end']}), {inside:,} feasible"
+    ]
+    if not record.feasible:
+        return [*lines, f"front        {infeasibility(record)}"]
+    lines.append(f"front        {len(record.front)} candidates")
+    units = record.front.attrs["units"]
+    for one in tuning["objectives"]:
+        values = record.front[one["name"]]
+        lines.append(f"  {one['name']}  {values.min():.6g} to {values.max():.6g} {units[one['name']]}".rstrip())
+    return lines
+
+
+def infeasibility(record: TuningRecord) -> str:
+    """Why there is no front, in a sentence with the least violation found."""
+    tried = f"no feasible point among {len(record.evaluations):,} candidates"
+    row = least_violating(record)
+    if row is None:
+        return f"{tried}; none of them has a number for every metric"
+    units = record.evaluations.attrs["units"]
+    broken = []
+    for one in record.manifest["tuning"]["constraints"]:
+        value, unit = float(row[one["name"]]), units[one["name"]]
+        for word, limit, sign in (("at most", one["at_most"], 1.0), ("at least", one["at_least"], -1.0)):
+            if limit is not None and sign * (value - limit) > 0.0:
+                broken.append(f"{one['name']} {value:.4g}{' ' * bool(unit)}{unit} where {word} {limit:g} is allowed")
+    return f"{tried}; the least violation found is {float(row['violation']):.4g}: {', '.join(broken)}"
+
+
+def least_violating(record: TuningRecord) -> pd.Series | None:
+    """The candidate nearest to the limits; None if none has a number for every metric."""
+    violation = record.evaluations["violation"]
+    return record.evaluations.loc[violation.idxmin()] if np.isfinite(violation.min()) else None

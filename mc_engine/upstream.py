@@ -1,0 +1,186 @@
+"""The run that a campaign takes inputs from: a chain, in which the end of one flight is the start of the next.
+
+Case i of the campaign takes its inputs from case i upstream, and its row keeps all columns of that case.  A run
+directory holds a copy of what was taken, so that it can be resumed and replayed by itself.
+"""
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mc_engine.campaign_file import InputsSection
+from mc_engine.campaign_problems import Findings
+from mc_engine.case_columns import input_column
+from mc_engine.distributions import Scalar
+from mc_engine.errors import StoreError
+from mc_engine.input_values import inputs_of
+from mc_engine.model import Model
+from mc_engine.parts import CASE_COLUMNS, Column, arrow_table, parquet_bytes
+from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store import is_run_directory, open_store
+from mc_engine.suggestions import hint
+from mc_engine.units import compatible, convert
+
+COMPANION = "upstream.parquet"
+_FACTS = b"mc_engine.upstream"
+_OURS = {column.name for column in CASE_COLUMNS}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The cases of a run as they stand in its store; `facts` say which run it was."""
+
+    facts: Mapping[str, Any]
+    columns: tuple[Column, ...]
+    table: Mapping[str, np.ndarray]
+    nominal: Mapping[str, Any]
+
+    @property
+    def n_cases(self) -> int:
+        """How many cases the run has."""
+        return len(self.table["case_id"])
+
+    def to_bytes(self) -> bytes:
+        """A Parquet file of all this."""
+        table = arrow_table(self.columns, self.table, self.n_cases, Path(COMPANION))
+        more = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
+        return parquet_bytes(table.replace_schema_metadata({_FACTS: json.dumps(more, sort_keys=True, default=float)}))
+
+
+@dataclass(frozen=True)
+class Upstream:
+    """What a campaign takes from a run.
+
+    links : input of the model -> column that it takes its values from.  columns : what every row of the campaign
+    keeps, under names that its own columns leave free.  names : a column upstream -> its name here.
+    table : their values, and those of the linked inputs in the units of the model.  nominal : the linked inputs of
+    the nominal case.  failed : bool[n], cases that did not fly to their end.
+    """
+
+    rows: Rows
+    links: Mapping[str, str]
+    columns: tuple[Column, ...]
+    names: Mapping[str, str]
+    table: Mapping[str, np.ndarray]
+    nominal: Mapping[str, Scalar]
+    failed: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign that was flown."""
+        return str(self.rows.facts["name"])
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that is taken."""
+        return sha256(self.rows.to_bytes()).hexdigest()
+
+    def nominal_row(self) -> dict[str, Any]:
+        """What the row of the nominal case keeps: the nominal case upstream, and the linked inputs."""
+        names = {self.names[column.name]: column.name for column in self.rows.columns if column.name in self.names}
+        return {**{name: self.rows.nominal[column] for name, column in names.items()}, **self.nominal}
+
+    def refusals(self, case_ids: np.ndarray) -> np.ndarray:
+        """object[n]: why a case has nothing to start from, empty where it has."""
+        words = self.rows.table["status"][case_ids]
+        return np.where(self.failed[case_ids], f"its case of {self.name} ended as " + words.astype(object), "")
+
+
+def read_rows(path: Path) -> Rows:
+    """The rows of a complete run, or of the copy that a run directory keeps; StoreError if it is neither."""
+    return _rows_of_copy(path) if path.is_file() else _rows_of_run(path)
+
+
+def _rows_of_run(path: Path) -> Rows:
+    store = open_store(path)
+    if store.missing():
+        raise StoreError(f"{path}: is not complete; `mc-engine resume {path}` flies the rest")
+    frame = store.cases()
+    table = {name: frame[name].to_numpy() for name in frame.columns}
+    campaign = store.manifest["campaign"]
+    facts = {key: campaign[key] for key in ("name", "title", "model", "design", "seed", "digest")}
+    facts |= {"figures": store.manifest.get("figures", []), "inputs": store.manifest.get("inputs", [])}
+    nominal = {key: value.item() if hasattr(value, "item") else value for key, value in store.nominal().items()}
+    return Rows(facts, store.columns, table, nominal)
+
+
+def _rows_of_copy(path: Path) -> Rows:
+    try:
+        table = pq.read_table(pa.BufferReader(path.read_bytes()))
+        facts = json.loads(table.schema.metadata[_FACTS])
+    except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
+        raise StoreError(f"{path}: no copy of an upstream run: {error}") from error
+    columns = tuple(Column(**record) for record in facts.pop("columns"))
+    nominal = facts.pop("nominal")
+    arrays = {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
+    return Rows(facts, columns, arrays, nominal)
+
+
+def find_run(reference: str, directory: Path) -> Path | None:
+    """The run directory that `reference` names: beside the campaign file, or from the working folder."""
+    return next((path for path in (directory / reference, Path(reference)) if is_run_directory(path)), None)
+
+
+def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str], found: Findings) -> Upstream:
+    """Hold the rows against the model; what does not fit is noted.
+
+    taken : names that the campaign's own table has, beside those of the inputs.
+    """
+    upstream = {column.name: column for column in rows.columns}
+    links = _links(upstream, section, model, found)
+    failed = np.asarray(rows.table["status"] != STATUS_NAME[OK], dtype=bool)
+    table: dict[str, np.ndarray] = {}
+    nominal: dict[str, Scalar] = {}
+    inputs = inputs_of(model)
+    for name, column in links.items():
+        item, unit = inputs[name], upstream[column].unit
+        values = rows.table[column].astype(np.float64)
+        table[name] = np.where(failed, np.nan, convert(values, unit, item.unit))
+        nominal[name] = float(convert(float(rows.nominal[column]), unit, item.unit))
+    kept = [input_column(inputs[name]) for name in links]
+    names: dict[str, str] = {}
+    used = {*taken, *_OURS, *inputs}
+    for column_ in rows.columns:
+        if column_.name == "case_id" or links.get(column_.name) == column_.name:
+            continue
+        name = column_.name if column_.name not in used else f"{_word(rows.facts['name'])}_{column_.name}"
+        role = "dispersion" if column_.role == "dispersion" else "upstream"
+        description = f"{rows.facts['name']}: {column_.description}"
+        names[column_.name] = name
+        kept.append(Column(name, column_.unit, role, description, column_.kind))
+        table[name] = rows.table[column_.name]
+    return Upstream(rows, links, tuple(kept), names, table, nominal, failed)
+
+
+def _word(name: str) -> str:
+    return re.sub(r"\W+", "_", name)
+
+
+def _links(upstream: Mapping[str, Column], section: InputsSection, model: Model, found: Findings) -> dict[str, str]:
+    """Input -> column: those of [inputs.columns], and inputs that have the name of a result upstream."""
+    spot = found.under("columns")
+    parameters = {item.name: item for item in model.parameters}
+    results = [name for name, column in upstream.items() if column.role in ("metric", "state")]
+    links = {name: name for name in results if name in parameters}
+    for name, column in section.columns.items():
+        if name not in parameters:
+            spot.add(name, f"is not a parameter of {model.name}{hint(name, parameters)}")
+        elif column not in upstream or upstream[column].kind != "number":
+            spot.add(name, f'"{column}" is no column of numbers of that run{hint(column, results)}')
+        elif upstream[column].unit not in compatible(parameters[name].unit):
+            spot.add(name, f'"{column}" is in {upstream[column].unit}, which does not fit {parameters[name].unit}')
+        else:
+            links[name] = column
+    if not links and not section.columns:
+        found.add(
+            "", f"no result of that run has the name of a parameter of {model.name}; name them in [inputs.columns]"
+        )
+    return links

@@ -1,0 +1,6 @@
+"""Ballistic entry to 10 km, classical Runge-Kutta."""
+
+from mc_engine.model import FixedStep
+from tests.benchmarks.models.entry_physics import ballistic_rhs, entry_model
+
+MODEL = entry_model(FixedStep("step", "duration"), ballistic_rhs)

@@ -1,0 +1,124 @@
+"""Earth orbits with J2 and drag, and without: the physics of the orbits of the benchmarks.  SI.
+
+The air is one exponential layer that turns with the Earth: good for speed and accuracy of integration, not for
+lifetimes.
+"""
+
+from collections import namedtuple
+
+from mc_engine.lanes import physics, sqrt
+from mc_engine.model import Field, Model, Parameter, Setting
+from mc_engine.physics.atmosphere import exponential
+from mc_engine.physics.constants import EARTH_RATE, EQUATORIAL_RADIUS, MU_EARTH
+from mc_engine.physics.gravity import j2_perturbation, point_mass
+
+State = namedtuple("State", "x y z vx vy vz")
+Parameters = namedtuple("Parameters", "x y z vx vy vz drag")
+Quantities = namedtuple("Quantities", "radius")
+Metrics = namedtuple("Metrics", "radius")
+
+# Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., Table 8-4
+LOW_AIR = (3.725e-12, 400e3, 58_515.0)
+PERIGEE_AIR = (7.248e-11, 250e3, 45_546.0)
+# first states: a circular orbit of 59 degrees at 400 km; perigee of a transfer orbit of 7 degrees, 250 to 35786 km
+LOW_ORBIT = (6778e3, 0.0, 0.0, 0.0, 3950.0, 6574.0)
+TRANSFER_ORBIT = (6628e3, 0.0, 0.0, 0.0, 10086.0, 1238.0)
+AXES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
+
+
+def prepare(inputs, settings, refusals):
+    """What does not change in a flight: half the drag area over mass [m^2/kg], with its sign."""
+    return {**vars(inputs), "drag": -0.5 / inputs.ballistic_coefficient}
+
+
+@physics
+def initial(p, o):
+    """The parameters are the first state."""
+    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz)
+
+
+@physics
+def acceleration(s, p, air):
+    """Acceleration [m/s^2] by gravity with J2, and by drag in `air`: reference density, its altitude, scale height.
+
+    Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., sections 8.6 and 8.7.
+    """
+    gx, gy, gz = point_mass(s.x, s.y, s.z, MU_EARTH)
+    jx, jy, jz = j2_perturbation(s.x, s.y, s.z, MU_EARTH)
+    h = sqrt(s.x * s.x + s.y * s.y + s.z * s.z) - EQUATORIAL_RADIUS
+    ux, uy = s.vx + EARTH_RATE * s.y, s.vy - EARTH_RATE * s.x
+    speed = sqrt(ux * ux + uy * uy + s.vz * s.vz)
+    d = p.drag * exponential(h, air[0], air[1], air[2]) * speed
+    return gx + jx + d * ux, gy + jy + d * uy, gz + jz + d * s.vz
+
+
+@physics
+def low_rhs(t, s, m, p, o):
+    """Derivative of the state in the layer from 400 km."""
+    ax, ay, az = acceleration(s, p, LOW_AIR)
+    return State(s.vx, s.vy, s.vz, ax, ay, az)
+
+
+@physics
+def transfer_rhs(t, s, m, p, o):
+    """Derivative of the state in the layer from 250 km."""
+    ax, ay, az = acceleration(s, p, PERIGEE_AIR)
+    return State(s.vx, s.vy, s.vz, ax, ay, az)
+
+
+@physics
+def oblate_rhs(t, s, m, p, o):
+    """Derivative of the state without air: a point mass and J2."""
+    gx, gy, gz = point_mass(s.x, s.y, s.z, MU_EARTH)
+    jx, jy, jz = j2_perturbation(s.x, s.y, s.z, MU_EARTH)
+    return State(s.vx, s.vy, s.vz, gx + jx, gy + jy, gz + jz)
+
+
+@physics
+def two_body_rhs(t, s, m, p, o):
+    """Derivative of the state around a point mass, whose energy and angular momentum are kept."""
+    gx, gy, gz = point_mass(s.x, s.y, s.z, MU_EARTH)
+    return State(s.vx, s.vy, s.vz, gx, gy, gz)
+
+
+@physics
+def observe(t, s, m, p, o):
+    """Distance from the Earth's centre [m]."""
+    return Quantities(sqrt(s.x * s.x + s.y * s.y + s.z * s.z))
+
+
+@physics
+def evaluate(t, s, m, p, o, best, when):
+    """Distance from the Earth's centre [m] in the end."""
+    return Metrics(sqrt(s.x * s.x + s.y * s.y + s.z * s.z))
+
+
+def orbit_model(name, rhs, first_state, clock):
+    """The model of a drag orbit with the given derivative, nominal first state and clock."""
+    return Model(
+        name=name,
+        title="Earth orbit with J2 and drag",
+        source="D. A. Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., sections 8.6 and 8.7",
+        parameters=(
+            *(
+                Parameter(axis, axis.partition("_")[2].replace("_", "/"), f"first {axis[0]}", value)
+                for axis, value in zip(AXES, first_state, strict=True)
+            ),
+            Parameter("ballistic_coefficient_kg_m2", "kg/m^2", "mass over drag area", 100.0),
+        ),
+        settings=(
+            Setting("duration_s", "s", "length of the flight", 86400.0),
+            Setting("step_s", "s", "step of the fixed grid", 10.0),
+            Setting("tolerance", "", "error of a step, relative", 1e-10),
+        ),
+        states=tuple(Field(axis, axis.partition("_")[2].replace("_", "/"), f"inertial {axis[0]}") for axis in AXES),
+        quantities=(Field("radius_m", "m", "distance from the Earth's centre"),),
+        metrics=(Field("final_radius_m", "m", "distance from the Earth's centre in the end"),),
+        clock=clock,
+        kernel_parameters=Parameters,
+        prepare=prepare,
+        initial=initial,
+        rhs=rhs,
+        observe=observe,
+        evaluate=evaluate,
+    )

@@ -1,0 +1,144 @@
+"""Attitude of a flexible satellite under a robust PID law, 18 states: rate, quaternion, modes, integral.  SI.
+
+The control acts without a modulator, so the right-hand side is smooth but for its gain switch: a measure of speed
+for a long state.
+
+H. Taei, S. Ayati, S. F. Mousavi, Iranian Journal of Mechanical Engineering 24 (3) (2022), eqs (1)-(17); gains of its
+table 1, data of its tables 10 and 11.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+
+from mc_engine.lanes import minimum, physics, sin, sqrt, where
+from mc_engine.model import Field, FixedStep, Model, Parameter, Setting
+
+COUPLING = ((7.0, -1.2, 1.1, 1.2), (1.2, 0.9, 2.5, -2.6), (2.2, -1.7, -0.8, -1.1))  # kg^(1/2) m
+FREQUENCY = (0.7, 1.0, 1.8, 2.5)  # rad/s
+DAMPING = (0.0056, 0.0086, 0.0128, 0.0252)
+ORBITAL_RATE = 1.078e-3  # rad/s
+KP, KD, KI, C1, C2, GAMMA = 5.0, 20.0, 0.1, 0.025, 0.005, 1.5
+LARGEST_TORQUE, LARGEST_RATE = 0.5, 0.1  # N m, rad/s
+DELTA_P, DELTA_I, DELTA_D = 2.0, 5.0, 10.0
+DISTURBANCE = 2.8867513459481287e-4  # N m
+FIRST_QUATERNION = (0.4, 0.2, 0.4, -0.8)  # scalar first, body from orbit
+
+State = namedtuple("State", "wx wy wz q0 q1 q2 q3 a1 a2 a3 a4 b1 b2 b3 b4 nx ny nz")
+Parameters = namedtuple("Parameters", "jx jy jz ixx iyy izz ixy ixz iyz offset")
+Quantities = namedtuple("Quantities", "error")
+Metrics = namedtuple("Metrics", "error")
+
+
+def prepare(inputs, settings, refusals):
+    """Moments of inertia, and the inverse of inertia less coupling, symmetric."""
+    c = np.array(COUPLING)
+    j = np.stack([inputs.jx, inputs.jy, inputs.jz], axis=-1)
+    inverse = np.linalg.inv(j[:, :, None] * np.eye(3) - c @ c.T)
+    names = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+    return {**vars(inputs), **{name: inverse[:, i, k] for name, (i, k) in names.items()}}
+
+
+@physics
+def initial(p, o):
+    """A large turn ahead, the modes at rest."""
+    return State(0.07, -0.05, -0.04, 0.4, 0.2, 0.4, -0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@physics
+def _torque(s):
+    """Control torque [N m], eqs (11), (13)-(16), its size limited."""
+    fast = s.wx * s.wx + s.wy * s.wy + s.wz * s.wz >= LARGEST_RATE * LARGEST_RATE
+    kd, kp = where(fast, DELTA_D * KD, KD), where(fast, KP / DELTA_P, KP)
+    ki = where(fast, KI / DELTA_I, KI)
+    x = -kd * s.wx - kp * s.q1 - ki * (s.nx - GAMMA * (s.q1 - FIRST_QUATERNION[1]))
+    y = -kd * s.wy - kp * s.q2 - ki * (s.ny - GAMMA * (s.q2 - FIRST_QUATERNION[2]))
+    z = -kd * s.wz - kp * s.q3 - ki * (s.nz - GAMMA * (s.q3 - FIRST_QUATERNION[3]))
+    size = sqrt(x * x + y * y + z * z + 1e-300)
+    share = minimum(1.0, LARGEST_TORQUE / size)
+    return share * x, share * y, share * z
+
+
+@physics
+def rhs(t, s, m, p, o):
+    """Derivative of the state: eqs (1), (2) solved for the rates, (5)-(9), and the integral in (13)."""
+    ux, uy, uz = _torque(s)
+    td = DISTURBANCE * (sin(t) + p.offset)
+    c1, c2, c3 = COUPLING
+    hx = p.jx * s.wx + (c1[0] * s.b1 + c1[1] * s.b2 + c1[2] * s.b3 + c1[3] * s.b4)
+    hy = p.jy * s.wy + (c2[0] * s.b1 + c2[1] * s.b2 + c2[2] * s.b3 + c2[3] * s.b4)
+    hz = p.jz * s.wz + (c3[0] * s.b1 + c3[1] * s.b2 + c3[2] * s.b3 + c3[3] * s.b4)
+    e1 = 2.0 * DAMPING[0] * FREQUENCY[0] * s.b1 + FREQUENCY[0] * FREQUENCY[0] * s.a1
+    e2 = 2.0 * DAMPING[1] * FREQUENCY[1] * s.b2 + FREQUENCY[1] * FREQUENCY[1] * s.a2
+    e3 = 2.0 * DAMPING[2] * FREQUENCY[2] * s.b3 + FREQUENCY[2] * FREQUENCY[2] * s.a3
+    e4 = 2.0 * DAMPING[3] * FREQUENCY[3] * s.b4 + FREQUENCY[3] * FREQUENCY[3] * s.a4
+    tx = s.wz * hy - s.wy * hz + ux + td + (c1[0] * e1 + c1[1] * e2 + c1[2] * e3 + c1[3] * e4)
+    ty = s.wx * hz - s.wz * hx + uy + td + (c2[0] * e1 + c2[1] * e2 + c2[2] * e3 + c2[3] * e4)
+    tz = s.wy * hx - s.wx * hy + uz + td + (c3[0] * e1 + c3[1] * e2 + c3[2] * e3 + c3[3] * e4)
+    dx = p.ixx * tx + p.ixy * ty + p.ixz * tz
+    dy = p.ixy * tx + p.iyy * ty + p.iyz * tz
+    dz = p.ixz * tx + p.iyz * ty + p.izz * tz
+    # rate relative to the orbital frame, eqs (7)-(9)
+    rx = s.wx + ORBITAL_RATE * (2.0 * (s.q1 * s.q2 + s.q0 * s.q3))
+    ry = s.wy + ORBITAL_RATE * (s.q0 * s.q0 - s.q1 * s.q1 + s.q2 * s.q2 - s.q3 * s.q3)
+    rz = s.wz + ORBITAL_RATE * (2.0 * (s.q2 * s.q3 - s.q0 * s.q1))
+    return State(
+        dx,
+        dy,
+        dz,
+        -0.5 * (s.q1 * rx + s.q2 * ry + s.q3 * rz),
+        0.5 * (s.q0 * rx + s.q2 * rz - s.q3 * ry),
+        0.5 * (s.q0 * ry + s.q3 * rx - s.q1 * rz),
+        0.5 * (s.q0 * rz + s.q1 * ry - s.q2 * rx),
+        s.b1,
+        s.b2,
+        s.b3,
+        s.b4,
+        -e1 - (c1[0] * dx + c2[0] * dy + c3[0] * dz),
+        -e2 - (c1[1] * dx + c2[1] * dy + c3[1] * dz),
+        -e3 - (c1[2] * dx + c2[2] * dy + c3[2] * dz),
+        -e4 - (c1[3] * dx + c2[3] * dy + c3[3] * dz),
+        C1 * s.wx + C2 * s.q1,
+        C1 * s.wy + C2 * s.q2,
+        C1 * s.wz + C2 * s.q3,
+    )
+
+
+@physics
+def observe(t, s, m, p, o):
+    """Size of the vector part of the quaternion."""
+    return Quantities(sqrt(s.q1 * s.q1 + s.q2 * s.q2 + s.q3 * s.q3))
+
+
+@physics
+def evaluate(t, s, m, p, o, best, when):
+    """Size of the vector part of the quaternion in the end."""
+    return Metrics(sqrt(s.q1 * s.q1 + s.q2 * s.q2 + s.q3 * s.q3))
+
+
+MODEL = Model(
+    name="satellite",
+    title="Turn of a flexible satellite",
+    source="H. Taei, S. Ayati, S. F. Mousavi, Iranian Journal of Mechanical Engineering 24 (3) (2022)",
+    parameters=(
+        *(
+            Parameter(f"j{axis}_kg_m2", "kg m^2", f"moment of inertia, {axis}", value)
+            for axis, value in zip("xyz", (100.0, 75.0, 50.0), strict=True)
+        ),
+        Parameter("offset", "", "constant part of the disturbance, of its amplitude", 0.5),
+    ),
+    settings=(
+        Setting("duration_s", "s", "length of the flight", 200.0),
+        Setting("step_s", "s", "step", 0.01),
+    ),
+    states=tuple(Field(name, "", f"state {name} in SI") for name in State._fields),
+    quantities=(Field("error", "", "vector part of the quaternion"),),
+    metrics=(Field("final_error", "", "vector part of the quaternion in the end"),),
+    clock=FixedStep("step", "duration"),
+    kernel_parameters=Parameters,
+    prepare=prepare,
+    initial=initial,
+    rhs=rhs,
+    observe=observe,
+    evaluate=evaluate,
+)

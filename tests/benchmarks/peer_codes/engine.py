@@ -1,0 +1,59 @@
+"""The engine itself: its compiled kernels, called as a run calls them, eight cases at a time or one."""
+
+import numpy as np
+
+from mc_engine import flight
+from mc_engine.kernel import build_kernel
+from mc_engine.kernel_parts import settings_class
+from mc_engine.model import AdaptiveStep, Model, load_model
+from tests.benchmarks.peer_codes.entrant import TOLERANCES, Entrant, Flight, portions, shared
+from tests.benchmarks.peer_codes.problems import Problem
+
+FOLDER = "tests.benchmarks.models."
+# of RK4 [s]: parts of the day; entries end where they like
+ORBIT_STEPS = (60.0, 40.0, 30.0, 20.0, 15.0, 10.0, 7.5, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.3)
+ENTRY_STEPS = (4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.075, 0.05, 0.03, 0.02, 0.015, 0.01)
+
+
+def load(problem: Problem, method: str) -> Model:
+    """The model of a problem with one of its methods."""
+    return load_model(FOLDER + problem.models[method])
+
+
+def kernel_flight(problem: Problem, method: str, value: float | None, width: int) -> Flight:
+    """Flight of all cases of a problem in one thread.
+
+    value : step [s] or tolerance.  Only the kernel call is inside the flight: units and design come before.
+    """
+    model, n = load(problem, method), problem.first.shape[1]
+    inputs = {item.name: item.default for item in (*model.parameters, *model.settings)} | problem.inputs
+    adaptive = isinstance(model.clock, AdaptiveStep)
+    if value is not None:
+        inputs["tolerance" if adaptive else "step_s"] = value
+    ready = flight.prepare(model, inputs, n)
+    settings = np.ascontiguousarray(ready.settings[0])
+    chosen = settings_class(model)(*settings)
+    clock = flight.adaptive_arguments(model, model.clock, chosen) if adaptive else flight.grid_of(model.clock, chosen)
+    time, status, states = np.empty(n), np.empty(n), np.empty((len(model.states), n))
+    out = (time, status, states, np.empty((len(model.metrics), n)))
+    kernel, key, cases = build_kernel(model, None, width), np.uint64(1), np.arange(float(n))
+    nothing, pace = np.empty((0, 0)), 1.0 if adaptive else 1
+
+    def fly() -> np.ndarray:
+        kernel(ready.parameters, settings, key, cases, *clock, *out, nothing, pace)
+        return states
+
+    return fly
+
+
+def entrant(problem: Problem, method: str, width: int = 8, ladder: tuple[float, ...] = ()) -> Entrant:
+    """The engine with one method and width."""
+
+    def build(cases: Problem, value: float, threads: int) -> Flight:
+        parts = [cases.part(where) for where in portions(cases.first.shape[1], threads)]
+        return shared([kernel_flight(part, method, value, width) for part in parts])
+
+    form = f"{method}, {f'{width} cases at a time' if width > 1 else 'one case at a time'}"
+    if method != "RK4":
+        return Entrant("engine", form, problem, "tolerance", ladder or TOLERANCES, build)
+    return Entrant("engine", form, problem, "step", ladder or (ENTRY_STEPS if problem.height else ORBIT_STEPS), build)

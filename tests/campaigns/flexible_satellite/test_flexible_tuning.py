@@ -1,0 +1,102 @@
+"""The three stages of the source's optimisation: fronts against its optima, and the constraint that is out of reach."""
+
+import numpy as np
+import pytest
+from flexible_flights import FOLDER, TABLE_8, TABLE_9, fly_one
+
+from mc_engine import load_campaign, tune
+from mc_engine.candidates import fly_candidates
+from mc_engine.tuning_folder import infeasibility
+
+STAGES = ["stage_1", "stage_2", "stage_2_unconstrained", "stage_3", "stage_3_robust"]
+IMPULSE, ATTITUDE = 50.4, 133.8  # recomputed objectives of Table 8's thrusters
+_MODULATOR = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
+
+
+def stage(name):
+    return load_campaign(FOLDER / f"{name}.toml")
+
+
+def search(name, path, **sizes):
+    pytest.importorskip("pymoo")
+    return tune(stage(name), path, **sizes)
+
+
+def beats(front):
+    """Candidates of the front that are no worse than Table 8 in both objectives."""
+    return front[(front["impulse"] <= IMPULSE) & (front["attitude"] <= ATTITUDE)]
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_every_stage_is_a_campaign_with_a_tuning(name):
+    campaign = stage(name)
+    assert campaign.nominal["actuator"] == "pwpf"
+    assert campaign.nominal["pwpf_pairing"] == "B"
+    assert campaign.tuning.robust == (name == "stage_3_robust")
+
+
+# Table 2 and Table 6: K_m, T_m, U_off, h, T
+BOUNDS = {
+    "stage_1": [(1, 10), (0.05, 1), (0.05, 0.5), (0.05, 0.49), (0.1, 2)],
+    "stage_2": [(7, 8), (0.6, 0.8), (0.1, 0.2), (0.2, 0.3), (1, 1.5)],
+    "stage_2_unconstrained": [(7, 8), (0.6, 0.8), (0.1, 0.2), (0.2, 0.3), (1, 1.5)],
+}
+
+
+@pytest.mark.parametrize("name", BOUNDS)
+def test_the_bounds_of_the_thrusters_are_the_printed_ones(name):
+    tuned = {one.name: (one.lower, one.upper) for one in stage(name).tuning.parameters}
+    assert tuned == dict(zip(_MODULATOR, BOUNDS[name], strict=True))
+
+
+def test_the_published_optima_lie_within_the_bounds_and_have_the_stated_objectives():
+    for name, table in (("stage_2", TABLE_8), ("stage_3", TABLE_9)):
+        campaign = stage(name)
+        choice = np.array([[table.get(one.name, campaign.nominal[one.name]) for one in campaign.tuning.parameters]])
+        for one, value in zip(campaign.tuning.parameters, choice[0], strict=True):
+            assert one.lower <= value <= one.upper
+        ours = fly_candidates(campaign, campaign.tuning, choice).objectives[0]
+        assert ours == pytest.approx(list(campaign.tuning.published[-1].values.values()), rel=0.005)
+        flown = fly_one(**table)
+        assert ours.tolist() == [flown["control_effort_n_m_s"], flown["attitude_effort_s"]]
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_the_front_of_the_second_stage_has_a_point_no_worse_than_table_8(seed, tmp_path):
+    record = search("stage_2_unconstrained", tmp_path / "out", seed=seed, population=40, generations=3)
+    assert len(beats(record.front))
+
+
+def test_with_the_gains_of_table_1_no_thrusters_meet_the_attitude_of_table_5(tmp_path):
+    record = search("stage_2", tmp_path / "out", seed=1, population=40, generations=4)
+    assert not record.feasible
+    assert record.evaluations["end_attitude"].min() > 0.015
+    assert (record.evaluations["end_modes"] < 0.005).all()
+    assert "no feasible point among 160 candidates; the least violation found is" in infeasibility(record)
+    assert "where at most 0.005 is allowed" in infeasibility(record)
+
+
+def test_it_is_the_integral_that_keeps_the_attitude_out_of_reach():
+    """Without thrusters and their limit cycle the law alone leaves five times the bound."""
+    assert fly_one()["q_vector_norm"] == pytest.approx(0.027, abs=0.001)
+
+
+def test_a_robust_candidate_is_judged_by_the_dispersed_craft():
+    campaign = stage("stage_3_robust")
+    choice = np.array([[TABLE_9.get(one.name, 0.0) for one in campaign.tuning.parameters]])
+    robust = fly_candidates(campaign, campaign.tuning, choice)
+    nominal = fly_one(**TABLE_9)
+    assert robust.objectives[0, 0] > nominal["control_effort_n_m_s"]
+    assert robust.objectives[0, 0] < 1.2 * nominal["control_effort_n_m_s"]
+    assert robust.objectives[0, 1] > nominal["attitude_effort_s"]
+    assert robust.failed[0] == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_thrusters_and_gains_together_beat_tables_8_and_9_within_table_5(seed, tmp_path):
+    record = search("stage_3", tmp_path / "out", seed=seed)
+    found = beats(record.front)
+    assert len(found)
+    assert (found["end_attitude"] <= 0.005).all()
+    assert ((found["impulse"] <= 42.6) & (found["attitude"] <= 113.8)).any()

@@ -1,0 +1,76 @@
+"""Laws 1 and 2 flown by scipy in the plane, second by second, with nothing of the kernel but the designed gains."""
+
+import numpy as np
+from reentry_flights import MU, RADIUS
+from reentry_twin import standard_density
+from scipy.integrate import solve_ivp
+
+from campaigns.reentry.reference import RANGE_SET, Planner, fly_reference, linear_system, riccati_gains, steered_part
+
+G0 = 9.80665
+TRIGGER, LAST, SCALE_HEIGHT = 0.15 * G0, 400.0, 7000.0
+
+
+class Stored:
+    """The reference over the speed, its steered part, as the laws know it."""
+
+    def __init__(self, o):
+        planner = Planner(o)
+        whole = fly_reference(planner)
+        part = steered_part(whole)
+        self.path = type(whole)(**{name: value[part] for name, value in vars(whole).items()})
+        lost = self.path.speed[0] - self.path.speed
+        self.gains = riccati_gains(lost, *linear_system(planner, self.path), RANGE_SET)
+
+    def at(self, name, speed):
+        """One quantity of the reference, or one of its three gains, at a speed."""
+        column = self.gains[:, name] if isinstance(name, int) else getattr(self.path, name)
+        return np.interp(-speed, -self.path.speed, column)
+
+
+def share(law, stored, h, v, path, along, drag):
+    """Vertical share of the lift by law 1 or by law 2 with range."""
+    if law == "law1":
+        high, tilt = h - stored.at("altitude", v), path - stored.at("path", v)
+    else:
+        high = np.clip(-SCALE_HEIGHT * (drag / stored.at("drag", v) - 1.0), -6e3, 6e3)
+        tilt = (v * np.sin(path) - stored.at("climb", v)) / v
+    ahead = along - stored.at("along", v)
+    wanted = 0.5 - (stored.at(0, v) * high + stored.at(1, v) * tilt + stored.at(2, v) * ahead)
+    return np.clip(wanted, np.cos(np.radians(165.0)), 1.0)
+
+
+def rates(t, y, u, drag_area, lift_area):
+    """Rates of altitude, speed, path angle and range over a sphere at rest."""
+    h, v, path, _ = y
+    r, push = RADIUS + h, 0.5 * standard_density(h) * y[1] ** 2
+    g = MU / r**2
+    return [
+        v * np.sin(path),
+        -push * drag_area - g * np.sin(path),
+        (push * lift_area * u - (g - v * v / r) * np.cos(path)) / v,
+        v * np.cos(path) * RADIUS / r,
+    ]
+
+
+def low(t, y, *areas):
+    """Where the flight ends: 10 km."""
+    return y[0] - 10e3
+
+
+low.terminal = True
+
+
+def fly_guided(law, stored, start, drag_area, lift_area):
+    """(range [m], flight time [s]) at 10 km; start: altitude, speed, path angle; one command a second."""
+    y, t, steering = np.array([*start, 0.0]), 0.0, False
+    while True:
+        drag = 0.5 * standard_density(y[0]) * y[1] ** 2 * drag_area
+        steering = steering or drag > TRIGGER
+        u = share(law, stored, y[0], y[1], y[2], y[3], drag) if steering and y[1] > LAST else 0.5
+        second = solve_ivp(
+            rates, (t, t + 1.0), y, "DOP853", args=(u, drag_area, lift_area), rtol=1e-9, atol=1e-9, events=low
+        )
+        y, t = second.y[:, -1], second.t[-1]
+        if second.t_events[0].size:
+            return y[3], t

@@ -1,0 +1,223 @@
+"""Design of the reference: the path, its linear system, the gains, and the tables that the flights read."""
+
+import numpy as np
+import pytest
+from reentry_flights import MODEL, NOMINAL, PLANAR, fly_one, history
+from scipy.integrate import solve_ivp
+
+from campaigns.reentry.apollo_final_phase import FLOWN
+from campaigns.reentry.reference import (
+    PROFILE_SET,
+    RANGE_SET,
+    Planner,
+    Weights,
+    fly_reference,
+    linear_system,
+    riccati_gains,
+    steered_part,
+)
+from campaigns.reentry.reference_table import (
+    LENGTH,
+    BySpeed,
+    Influence,
+    by_loss,
+    by_speed,
+    clocked_range,
+    whole_range,
+)
+from mc_engine.flight import prepare, settings_of
+
+PLANNED = PLANAR | {"plan": "given"}
+
+
+def settings(**inputs):
+    """Settings by symbol, tables included."""
+    ready = prepare(MODEL, NOMINAL | inputs, 1)
+    assert ready.refusals.reason[0] == ""
+    return settings_of(MODEL, ready.settings[0])
+
+
+@pytest.fixture(scope="module")
+def o():
+    return settings(**PLANNED, guidance="law1")
+
+
+@pytest.fixture(scope="module")
+def path(o):
+    return fly_reference(Planner(o))
+
+
+def part_of(path):
+    part = steered_part(path)
+    return type(path)(**{name: value[part] for name, value in vars(path).items()})
+
+
+def test_the_planar_reference_is_that_of_the_digest(path):
+    assert path.along[-1] / 1e3 == pytest.approx(2548.7, rel=3e-3)
+    load = path.drag * np.sqrt(1.0 + 0.3**2) / 9.80665
+    assert load.max() == pytest.approx(3.66, rel=5e-3)
+    assert path.altitude[int(np.argmax(load))] / 1e3 == pytest.approx(39.5, abs=0.1)
+
+
+SCENARIOS = {
+    "planar": PLANNED,
+    "turning": {
+        "plan": "given", "planar": True, "plan_heading_deg": 53.9639, "plan_latitude_deg": 45.5379,
+        "plan_radius_km": 6491.0, "entry_heading_deg": 53.9639, "entry_latitude_deg": 45.5379,
+        "entry_radius_km": 6491.0,
+    },
+    "textbook air": PLANNED | {"atmosphere": "exponential"},
+    "Apollo at Mars": PLANNED | {
+        "planet": "mars", "atmosphere": "exponential", "vehicle": "apollo",
+        "plan_speed_m_s": 5600.0, "entry_speed_m_s": 5600.0, "plan_flight_path_angle_deg": -14.0,
+        "entry_flight_path_angle_deg": -14.0,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_the_reference_is_the_flight_of_the_planned_vehicle(name):
+    inputs = SCENARIOS[name]
+    path = fly_reference(Planner(settings(**inputs)))
+    row, seen = fly_one(**inputs, tolerance=1e-10), history(rows=801, **inputs, tolerance=1e-10)
+    # Coriolis force takes the flight off the great circle along which its downrange counts
+    a_kilometre, ten_metres = 1.0, 0.01
+    error = a_kilometre if name == "turning" else ten_metres
+    assert path.along[-1] / 1e3 == pytest.approx(row["downrange_km"], abs=error)
+    assert path.t[-1] == pytest.approx(row["flight_time_s"], abs=0.05)
+    for quantity, ours, error in (
+        ("altitude_km", path.altitude / 1e3, 0.01), ("speed_m_s", path.speed, 1.0),
+        ("flight_path_angle_deg", np.degrees(path.path), 0.02), ("axial_load_g", path.axial / 9.80665, 0.01),
+    ):  # fmt: skip
+        assert np.abs(np.interp(seen["t_s"], path.t, ours) - seen[quantity]).max() < error, quantity
+
+
+def test_the_climb_of_the_reference_is_the_rate_of_its_altitude():
+    path = fly_reference(Planner(settings(**SCENARIOS["turning"])))
+    assert np.gradient(path.altitude, path.t)[1:-1] == pytest.approx(path.climb[1:-1], abs=0.05)
+
+
+def test_the_linear_system_carries_small_differences_along(o, path):
+    """A neighbouring flight, differences taken at equal speed."""
+    planner, part = Planner(o), part_of(path)
+    a, b = linear_system(planner, part)
+    lost = part.speed[0] - part.speed
+    first, change = np.array([0.05, 0.005, 0.1]), 0.002  # km, deg, km; of the share of the lift
+
+    def linear(x, y):
+        m = np.array([np.interp(x, lost, column) for column in a.reshape(-1, 9).T]).reshape(3, 3)
+        return m @ y + change * np.array([np.interp(x, lost, column) for column in b.T])
+
+    end = lost[-1] * 0.9
+    expected = solve_ivp(linear, (0.0, end), first, rtol=1e-9, atol=1e-9, max_step=20.0).y[:, -1]
+
+    def flown(start, share):
+        def rates(x, y):
+            r, _, angle = y
+            v = part.speed[0] - x
+            latitude, heading = 0.0, 0.5 * np.pi
+            six, along, _ = planner.motion(r, latitude, v, angle, heading, share)
+            return np.array([six[0], along, six[4]]) / -six[3]
+
+        return solve_ivp(rates, (0.0, end), start, "DOP853", rtol=1e-11, atol=1e-9).y[:, -1]
+
+    start = np.array([part.r[0], part.along[0], part.path[0]])
+    moved = start + np.array([1e3 * first[0], 1e3 * first[2], np.radians(first[1])])
+    found = flown(moved, planner.share + change) - flown(start, planner.share)
+    assert np.array([found[0] / 1e3, np.degrees(found[2]), found[1] / 1e3]) == pytest.approx(
+        expected, rel=0.03, abs=0.003
+    )
+
+
+def test_the_gain_on_an_integrator_is_its_closed_form():
+    """x' = u, final weight S, control weight R: K = 1 / (R/S + what is left); units of km carried through."""
+    lost = np.linspace(0.0, 50.0, 201)
+    a, b = np.zeros((201, 3, 3)), np.zeros((201, 3))
+    b[:, 2] = 1.0
+    gains = riccati_gains(lost, a, b, Weights((0.0, 0.0, 0.25), 0.0, 2.0))
+    assert gains[:, 2] == pytest.approx(1e-3 / (2.0 / 0.25 + 50.0 - lost), rel=1e-5)
+    assert np.abs(gains[:, :2]).max() == 0.0
+
+
+def cost(o, path, gains, weights, first):
+    """Final and running cost of the linear system under gains, from first differences in km, deg, km."""
+    part = part_of(path)
+    a, b = linear_system(Planner(o), part)
+    lost = part.speed[0] - part.speed
+    k = gains * np.array([1e3, np.pi / 180.0, 1e3])
+
+    def rates(x, y):
+        m = np.array([np.interp(x, lost, column) for column in a.reshape(-1, 9).T]).reshape(3, 3)
+        v, g = (np.array([np.interp(x, lost, column) for column in each.T]) for each in (b, k))
+        u = -g @ y[:3]
+        return [*(m @ y[:3] + v * u), weights.control * u * u + weights.altitude * y[0] ** 2]
+
+    end = solve_ivp(rates, (0.0, lost[-1]), [*first, 0.0], "LSODA", rtol=1e-7, atol=1e-9).y[:, -1]
+    return end[3] + (np.array(weights.final) * end[:3] ** 2).sum()
+
+
+@pytest.mark.parametrize("weights", [RANGE_SET, PROFILE_SET], ids=["range set", "profile set"])
+def test_the_stored_gains_are_a_minimum_of_their_cost(o, path, weights):
+    part = part_of(path)
+    best = riccati_gains(part.speed[0] - part.speed, *linear_system(Planner(o), part), weights)
+    first = (0.5, 0.05, 5.0)
+    least = cost(o, path, best, weights, first)
+    for factor in (0.9, 1.1):
+        assert cost(o, path, factor * best, weights, first) > least
+        for one in (0, 1) if weights is PROFILE_SET else (0, 1, 2):
+            other = best.copy()
+            other[:, one] *= factor
+            assert cost(o, path, other, weights, first) > least
+
+
+def test_the_tables_hold_the_path_over_the_speed_and_over_the_speed_lost(o, path):
+    part = part_of(path)
+    assert len(o.tables) == LENGTH
+    at = slice(None, None, 37)
+    row = BySpeed(*by_speed(o.tables, part.speed[at]))
+    assert np.abs(row.altitude - part.altitude[at]).max() < 40.0
+    assert np.abs(row.range - part.along[at]).max() < 60.0
+    assert np.abs(row.path - part.path[at]).max() < 5e-3
+    assert row.drag == pytest.approx(part.drag[at], rel=5e-3)
+    lost = by_loss(o.tables, part.lost[at])
+    assert np.abs(lost.speed - part.speed[at]).max() < 1.0
+    assert lost.axial == pytest.approx(part.axial[at], rel=5e-3)
+    assert np.exp(lost.log_axial) == pytest.approx(part.axial[at], rel=5e-3)
+    assert np.abs(lost.range - part.along[at]).max() < 60.0
+    assert whole_range(o.tables) == path.along[-1]
+
+
+def test_beyond_the_tables_their_first_and_last_rows_stand(o):
+    first, last = by_speed(o.tables, 7816.6), by_speed(o.tables, 401.0)
+    assert by_speed(o.tables, 9000.0)[0] == pytest.approx(first[0], abs=30.0)
+    assert by_speed(o.tables, 1.0)[2] == pytest.approx(last[2], abs=100.0)
+    assert np.isfinite(by_speed(o.tables, float("nan"))).all()
+
+
+def test_the_clock_tells_the_range_until_the_air_is_felt(o, path):
+    early = path.lost == 0.0
+    assert np.abs(clocked_range(o.tables, path.t[early]) - path.along[early]).max() < 500.0
+    after = path.t[early][-1] + 10.0
+    assert clocked_range(o.tables, after) - clocked_range(o.tables, after - 10.0) == pytest.approx(77_200.0, rel=0.01)
+
+
+def test_a_law_without_range_has_no_gain_on_it():
+    for law, least, most in (("law2", 0.0, 0.0), ("law2r", 1e-7, 2e-3)):
+        rows = BySpeed(*by_speed(settings(**PLANNED, guidance=law).tables, np.linspace(800.0, 7700.0, 20)))
+        assert (rows.k_range >= least).all()
+        assert (rows.k_range <= most).all()
+
+
+@pytest.mark.parametrize("row", FLOWN, ids=lambda row: f"{row[0]:g} m/s")
+def test_the_apollo_table_is_the_flown_one_at_its_own_speeds(row):
+    found = Influence(*by_speed(settings(**PLANNED, guidance="apollo").tables, row[0]))
+    scaled = (
+        found.climb,
+        found.drag,
+        found.range / 1e3,
+        found.by_drag / 1e3,
+        found.by_climb / 1e3,
+        found.by_lift / 1e3,
+    )
+    # linear between rows 70 m/s apart, which need not hit a corner of the printed ones
+    assert scaled == pytest.approx(row[1:], rel=0.12)

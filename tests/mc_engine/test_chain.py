@@ -1,0 +1,198 @@
+"""A chain: every case takes its inputs from the same case of another run, and keeps that case's columns."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from cart import call, fails_with
+
+from mc_engine.campaign import load_campaign
+from mc_engine.errors import CampaignError, StoreError
+from mc_engine.runner import extend, replay, resume, run
+from mc_engine.store import open_store
+
+MODEL = '''
+"""A throw, straight up."""
+from collections import namedtuple
+from mc_engine.lanes import physics
+from mc_engine.model import Event, Field, FixedStep, Model, Parameter
+
+State = namedtuple("State", "height speed")
+Parameters = namedtuple("Parameters", "height speed gravity")
+Quantities = namedtuple("Quantities", "height")
+Events = namedtuple("Events", "top")
+Metrics = namedtuple("Metrics", "height fall")
+
+def prepare(inputs, settings, refusals):
+    refusals.add(inputs.speed < 1.5, "too slow")
+    return vars(inputs)
+
+@physics
+def initial(p, o):
+    return State(p.height, p.speed)
+
+@physics
+def rhs(t, s, m, p, o):
+    return State(s.speed, -p.gravity)
+
+@physics
+def events(t, s, m, p, o):
+    return Events(s.speed)
+
+@physics
+def observe(t, s, m, p, o):
+    return Quantities(s.height)
+
+@physics
+def evaluate(t, s, m, p, o, best, when):
+    return Metrics(s.height, t)
+
+MODEL = Model(
+    name="throw", title="A throw", source="Galilei",
+    parameters=(
+        Parameter("HEIGHT_km", "km", "first height", 0.0),
+        Parameter("speed_m_s", "m/s", "first speed", 10.0, low=0.0),
+        Parameter("gravity_m_s2", "m/s^2", "gravity", 9.80665),
+    ),
+    settings=(),
+    states=(Field("height_m", "m", "height"), Field("speed_m_s", "m/s", "speed")),
+    quantities=(Field("height_m", "m", "height"),),
+    metrics=(Field("RESULT_m", "m", "height of the top"), Field("fall_s", "s", "time to the top")),
+    clock=FixedStep(0.01, 5.0), kernel_parameters=Parameters, prepare=prepare, initial=initial, rhs=rhs, events=events,
+    event_list=(Event("top"),), observe=observe, evaluate=evaluate,
+)
+'''
+FIRST = """
+[campaign]
+model = "model.py"
+design = "mc"
+cases = 40
+seed = 1
+[dispersion.speed_m_s]
+dist = "normal"
+mean = 4.0
+sigma = 2.0
+lower = 0.0
+"""
+SECOND = """
+[campaign]
+model = "model.py"
+design = "mc"
+seed = 2
+[inputs]
+from = "{source}"
+[dispersion.gravity_m_s2]
+dist = "uniform"
+mean = 9.8
+half_range = 0.1
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two campaigns in folders of their own; the second begins at the top of the first one's throw."""
+    here = tmp_path_factory.mktemp("chain")
+    for name, text, height, result in (
+        ("first", FIRST, "height", "top"),
+        ("second", SECOND.format(source="../runs/first") + '[inputs.columns]\nheight_km = "top_m"\n', "height", "apex"),
+    ):
+        (here / name).mkdir()
+        (here / name / "model.py").write_text(MODEL.replace("HEIGHT", height).replace("RESULT", result))
+        (here / name / "campaign.toml").write_text(text)
+    run(load_campaign(here / "first"), here / "runs" / "first")
+    run(load_campaign(here / "second"), here / "runs" / "second")
+    return here
+
+
+@pytest.fixture(scope="module")
+def cases(folder):
+    return [pd.read_parquet(folder / "runs" / name / "cases").set_index("case_id") for name in ("first", "second")]
+
+
+def test_every_case_starts_where_its_own_case_ended(cases):
+    first, second = cases
+    flown = second["status"] == "ok"
+    assert flown.sum() == (first["status"] == "ok").sum() > 30
+    np.testing.assert_array_equal(second["height_km"][flown], first["top_m"][flown] / 1000.0)
+    rise = 10.0**2 / 2.0 / second["gravity_m_s2"]
+    assert second["apex_m"][flown].to_numpy() == pytest.approx((first["top_m"] + rise)[flown].to_numpy(), rel=1e-9)
+
+
+def test_the_rows_keep_the_columns_upstream_under_names_that_are_free(cases):
+    first, second = cases
+    assert list(second.columns[:2]) == ["status", "reason"]
+    for name, here in (("top_m", "top_m"), ("speed_m_s", "first_speed_m_s"), ("fall_s", "first_fall_s")):
+        np.testing.assert_array_equal(first[name], second[here])
+    assert second["first_status"].tolist() == first["status"].tolist()
+
+
+def test_roles_and_nominal_case_follow_the_chain(folder):
+    store = open_store(folder / "runs" / "second")
+    roles = {column.name: column.role for column in store.columns}
+    wanted = {"height_km": "dispersion", "first_speed_m_s": "dispersion", "top_m": "upstream", "apex_m": "metric"}
+    assert {name: roles[name] for name in wanted} == wanted
+    nominal = open_store(folder / "runs" / "first").nominal()
+    assert store.nominal()["height_km"] == nominal["top_m"] / 1000.0
+    assert store.nominal()["top_m"] == nominal["top_m"]
+    assert store.manifest["upstream"]["cases"] == 40
+    assert store.manifest["upstream"]["links"] == {"height_km": "top_m"}
+
+
+def test_a_case_that_failed_upstream_keeps_its_row_and_says_why(cases):
+    first, second = cases
+    failed = first["status"] != "ok"
+    assert failed.sum() >= 1
+    assert set(second["status"][failed]) == {"refused"}
+    assert set(second["reason"][failed]) == {"its case of first ended as refused"}
+    assert second["gravity_m_s2"][failed].notna().all()
+
+
+def test_a_run_in_a_chain_stands_alone(folder, tmp_path):
+    """Replay needs neither the campaign's folder nor the run upstream."""
+    import shutil
+
+    shutil.copytree(folder / "runs" / "second", tmp_path / "moved")
+    assert replay(tmp_path / "moved", 3).equal
+    assert resume(tmp_path / "moved").n_cases == 40
+    (tmp_path / "moved" / "upstream.parquet").write_bytes(b"")
+    with pytest.raises((StoreError, CampaignError), match="no copy of an upstream run"):
+        replay(tmp_path / "moved", 3)
+
+
+def test_neither_chunks_nor_the_number_of_cases_change_a_case(folder, cases, tmp_path):
+    some = run(load_campaign(folder / "second", cases=17), tmp_path / "some", chunk=5, workers=2).cases()
+    pd.testing.assert_frame_equal(some.set_index("case_id"), cases[1].iloc[:17], check_exact=True)
+
+
+def test_a_campaign_that_is_not_flown_yet_is_flown_first_beside_the_run(folder, cases, tmp_path):
+    text = (folder / "second" / "campaign.toml").read_text().replace("../runs/first", "../first/campaign.toml")
+    chain = load_campaign("second", text=text, directory=folder / "second")
+    run(chain, tmp_path / "both")
+    pd.testing.assert_frame_equal(
+        pd.read_parquet(tmp_path / "both" / "cases").set_index("case_id"), cases[1], check_exact=True
+    )
+    assert open_store(tmp_path / "both-first").n_cases == 40
+    with pytest.raises(StoreError, match="takes its inputs from another run"):
+        extend(tmp_path / "both", 80)
+    fails_with(2, call("extend", tmp_path / "both", "--cases", 80), "takes its inputs from another run")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('from = "../runs/first"', 'from = "../runs/none"'), "is neither a run nor a campaign that can be flown"),
+        (('height_km = "top_m"', 'heigth_km = "top_m"'), 'is not a parameter of throw; did you mean "height_km"?'),
+        (('height_km = "top_m"', 'height_km = "to_m"'), '"to_m" is no column of numbers of that run'),
+        (('height_km = "top_m"', 'height_km = "fall_s"'), '"fall_s" is in s, which does not fit km'),
+        (('height_km = "top_m"', ""), "no result of that run has the name of a parameter of throw"),
+        (('design = "mc"', 'design = "grid"'), 'its design "mc" does not go with "grid"'),
+        (('design = "mc"', 'design = "table"'), 'write design = "mc" to disperse more'),
+        (("[inputs]", "[parameters]\nheight_km = 1\n[inputs]"), "comes from the run of first; leave it out here"),
+        (("seed = 2", "seed = 2\ncases = 41"), "41 is not allowed; the run upstream has 40 cases"),
+    ],
+)
+def test_what_does_not_fit_is_said_with_its_place(folder, change, message):
+    text = (folder / "second" / "campaign.toml").read_text()
+    assert change[0] in text
+    with pytest.raises(CampaignError) as caught:
+        load_campaign("second", text=text.replace(*change), directory=folder / "second")
+    assert message in str(caught.value)

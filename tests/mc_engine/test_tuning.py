@@ -1,0 +1,181 @@
+"""A search from the file to its directory, on a front in closed form."""
+
+import signal
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+from apogee_tuning import CHOICE, apogee_and_speed, apogee_campaign
+from cart import call, fails_with
+
+from mc_engine import load_campaign, open_tuning, tune
+from mc_engine.campaign import SHIPPED
+from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
+from mc_engine.tuning import Generation, dominated_shares, is_stalled
+from mc_engine.tuning_folder import infeasibility
+
+UNREACHABLE = '\n[tuning.constraint.high]\nmetric = "apogee_altitude_km"\nat_least = 5000.0\n'
+
+
+@pytest.fixture(autouse=True)
+def search():
+    pytest.importorskip("pymoo")
+
+
+@pytest.fixture(scope="module")
+def tuned(tmp_path_factory):
+    pytest.importorskip("pymoo")
+    return tune(apogee_campaign(), tmp_path_factory.mktemp("tuned") / "out", seed=1, generations=25, population=24)
+
+
+def test_the_front_is_the_highest_circular_orbit_with_all_sizes_of_the_burn(tuned):
+    """For a speed after the burn the apogee grows with the altitude of the burn."""
+    front = tuned.front
+    assert len(front) > 20
+    assert front["altitude_km"].median() > 598.0
+    assert front["burn_dv_m_s"].min() < 52.0
+    assert front["burn_dv_m_s"].max() > 195.0
+    apogee, speed = apogee_and_speed(front["altitude_km"], front["burn_dv_m_s"])
+    np.testing.assert_allclose(front["apogee"], apogee, rtol=1e-6)
+    np.testing.assert_allclose(front["speed"], speed, rtol=1e-6)
+
+
+def test_no_candidate_beats_one_of_the_front(tuned):
+    every = tuned.evaluations
+    for row in tuned.front.itertuples():
+        better = (every["apogee"] >= row.apogee) & (every["speed"] <= row.speed)
+        assert (every[better][["apogee", "speed"]].to_numpy() == [row.apogee, row.speed]).all()
+
+
+def test_the_search_makes_progress_and_says_so(tuned):
+    generations = tuned.generations
+    assert (np.diff(generations["dominated_share"]) >= 0.0).all()
+    assert generations["dominated_share"].iloc[-1] > generations["dominated_share"].iloc[0] > 0.0
+    assert generations["evaluations"].iloc[-1] == len(tuned.evaluations) == 24 * 25
+
+
+def test_the_same_seed_finds_the_same_bits_whatever_the_threads_and_another_seed_another_way(tmp_path):
+    found = [
+        tune(apogee_campaign(), tmp_path / str(k), seed=seed, workers=workers)
+        for k, (seed, workers) in enumerate([(3, 1), (3, 2), (4, 1)])
+    ]
+    first, second, other = (one.path.joinpath("evaluations.parquet").read_bytes() for one in found)
+    assert first == second
+    assert first != other
+
+
+def test_the_directory_holds_tables_with_units_the_text_and_what_was_searched(tuned):
+    path = tuned.path
+    assert pd.read_parquet(path / "front.parquet").attrs["units"]["apogee"] == "km"
+    assert "[tuning.objective.apogee]" in (path / "tuning.toml").read_text()
+    plan = open_tuning(path).manifest["tuning"]
+    assert (plan["seed"], plan["population"], plan["flown"], plan["end"]) == (1, 24, 25, "all generations")
+    assert tuned.manifest["campaign"]["digest"] == apogee_campaign().digest
+
+
+def test_a_changed_byte_is_found(tmp_path):
+    path = tune(apogee_campaign(), tmp_path / "out").path
+    content = bytearray((path / "front.parquet").read_bytes())
+    content[50] ^= 1
+    (path / "front.parquet").write_bytes(content)
+    with pytest.raises(StoreError, match=r"front\.parquet: damaged"):
+        open_tuning(path)
+
+
+def test_without_a_feasible_candidate_the_front_is_empty_and_the_least_violation_is_told(tmp_path):
+    record = tune(apogee_campaign(UNREACHABLE), tmp_path / "out")
+    assert not record.feasible
+    assert not record.evaluations["feasible"].any()
+    highest = record.evaluations["high"].max()
+    assert record.evaluations["violation"].min() == pytest.approx((5000.0 - highest) / 5000.0)
+    assert f"high {highest:.4g} km where at least 5000 is allowed" in infeasibility(record)
+
+
+def test_a_robust_tuning_leaves_room_for_the_dispersed_burn(tmp_path):
+    """The tenth-worst of a hundred burns, uniform in ±10 %, must reach what the nominal one reaches otherwise."""
+    choice = CHOICE.replace('goal = "maximise"', 'goal = "maximise"\nquantile = 0.1')
+    record = tune(apogee_campaign(choice=choice, cases=100), tmp_path / "out", seed=1)
+    nominal, _ = apogee_and_speed(record.front["altitude_km"], record.front["burn_dv_m_s"])
+    low, _ = apogee_and_speed(record.front["altitude_km"], 0.9 * record.front["burn_dv_m_s"])
+    assert (record.front["apogee"] < nominal).all()
+    assert (record.front["apogee"] > low).all()
+
+
+def test_ctrl_c_keeps_the_generations_flown(tmp_path):
+    def progress(done, total, failed):
+        if done >= 24:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(RunInterrupted, match="after 2 of 6 generations"):
+        tune(apogee_campaign(), tmp_path / "out", progress=progress)
+    record = open_tuning(tmp_path / "out")
+    assert record.manifest["tuning"]["end"] == "interrupted"
+    assert len(record.evaluations) == 24
+
+
+def test_a_campaign_without_a_tuning_is_refused(tmp_path):
+    with pytest.raises(CampaignError, match="nothing says what is to be tuned"):
+        tune(load_campaign("minimal"), tmp_path / "out")
+
+
+def test_an_occupied_folder_is_refused_before_anything_is_flown(tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    with pytest.raises(StoreError, match="is not empty"):
+        tune(apogee_campaign(), tmp_path)
+
+
+def test_without_pymoo_there_is_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymoo.algorithms.moo.nsga2", None)
+    with pytest.raises(EngineError, match="needs pymoo, which is not installed"):
+        tune(apogee_campaign(), tmp_path / "out")
+
+
+# ---- when to stop
+
+
+def generation(front, least=0.0):
+    return Generation(np.empty((0, 2)), None, np.array(front, dtype=float).reshape(-1, 2), least)
+
+
+def test_a_search_stalls_when_neither_front_nor_violation_get_better():
+    same = [generation([[1.0, 2.0], [2.0, 1.0]])] * 4
+    assert is_stalled(same, 3)
+    assert not is_stalled(same, 4)
+    assert not is_stalled([*same, generation([[1.0, 2.0], [1.5, 1.5], [2.0, 1.0]])], 3)
+    assert not is_stalled([generation([], 3.0), generation([], 2.0)], 1)
+    assert is_stalled([generation([], 3.0), generation([], 3.0)], 1)
+    assert is_stalled([generation([], np.inf), generation([], np.inf)], 1)
+    assert not is_stalled([generation([], 3.0), generation([[1.0, 2.0]])], 1)
+
+
+def test_a_search_with_patience_ends_by_itself(tmp_path):
+    text = apogee_campaign().text.replace("generations = 6", "generations = 400\npatience = 3")
+    record = tune(load_campaign("apogee.toml", text=text, directory=SHIPPED / "minimal"), tmp_path / "out", seed=1)
+    assert record.manifest["tuning"]["flown"] < 200
+    assert record.manifest["tuning"]["end"] == "no progress in 3 generations"
+
+
+def test_a_front_that_dominates_more_has_the_larger_share():
+    shares = dominated_shares([np.empty((0, 2)), np.array([[2.0, 2.0]]), np.array([[1.0, 2.0], [2.0, 1.0]])])
+    assert shares[0] == 0.0 < shares[1] < shares[2] <= 1.0
+
+
+# ---- the command line
+
+
+def test_tune_writes_the_result_and_says_what_it_found(tmp_path):
+    (tmp_path / "model.py").write_bytes((SHIPPED / "minimal" / "model.py").read_bytes())
+    (tmp_path / "apogee.toml").write_text(apogee_campaign().text)
+    result = call("tune", tmp_path / "apogee.toml", "--out", tmp_path / "out", "--generations", 3, "--seed", 2)
+    assert result.exit_code == 0, result.output
+    assert "36 in 3 generations" in result.stdout
+    assert (tmp_path / "out" / "report.html").read_bytes().startswith(b"<!doctype html>")
+    assert (tmp_path / "out" / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert call("report", tmp_path / "out", "--format", "html").exit_code == 0
+    fails_with(2, call("tune", tmp_path / "apogee.toml", "--out", tmp_path / "out"), "is not empty")
+    fails_with(2, call("status", tmp_path / "out"), "is no run directory")
+
+
+def test_tune_without_a_tuning_gets_a_sentence():
+    fails_with(2, call("tune", "minimal", "--out", "nowhere-to-be-made"), "what is to be tuned")

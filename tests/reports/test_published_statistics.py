@@ -1,0 +1,74 @@
+"""What a source says of many cases, beside the same of a run with these dispersions."""
+
+import pytest
+from synthetic_run import synthetic_run
+
+from reports.flown import Flown
+from reports.published import own_statistic, published_table
+from reports.published_statistics import statistics_tables
+
+BOTH = ["ve_pct", "oe_pct"]
+
+
+def record(statistic, published, **more):
+    record = {"quantity": f"{statistic} of fuel", "published": published, "unit": "kg", "source": "Table 12, fuel"}
+    return record | {"statistic": statistic, "of": "propellant_kg", "over": BOTH, "ours": 9.0, **more}
+
+
+@pytest.fixture(scope="module")
+def fuel():
+    return synthetic_run(400, failed=3).table
+
+
+def flown(*records, design="mc"):
+    run = synthetic_run(400, failed=3)
+    run.manifest["published"] = list(records)
+    run.manifest["campaign"]["design"] = design
+    return Flown(run, "run")
+
+
+def test_mean_deviation_and_farthest_are_those_of_the_cases_that_flew(fuel):
+    values = fuel["propellant_kg"][fuel["status"] == "ok"]
+    run = flown()
+    assert own_statistic(run, record("mean", 1.0)) == pytest.approx(values.mean(), rel=1e-12)
+    assert own_statistic(run, record("standard deviation", 1.0)) == pytest.approx(values.std(ddof=1), rel=1e-12)
+    first = fuel["propellant_kg"][:50].dropna()
+    farthest = first.loc[(first - first.mean()).abs().idxmax()]
+    assert own_statistic(run, record("farthest", 1.0, cases=50)) == farthest
+
+
+def test_the_table_has_a_row_a_quantity_and_says_what_is_inside_its_tolerance(fuel):
+    mean = fuel["propellant_kg"].mean()
+    good = record("mean", mean * 1.1, tolerance=mean)
+    bad = record("standard deviation", 1e6, tolerance=1.0, status="restored")
+    (table,) = statistics_tables(flown(good, bad))
+    assert table.caption == "Table 12 beside this run"
+    (row,) = table.rows
+    assert row[0].text == "propellant_kg [kg]"
+    assert [row[2].tone, row[4].tone] == ["good", "open"]
+    assert row[2].small == "−9.1 %"
+    assert row[3].small == "restored"
+
+
+def test_such_a_record_then_leaves_the_other_table():
+    shown = record("mean", 1.0)
+    assert published_table(flown(shown)) is None
+    assert len(published_table(flown(shown, {"quantity": "other", "published": 3.0, "ours": 3.0})).rows) == 1
+
+
+@pytest.mark.parametrize(
+    "elsewhere",
+    [{"over": ["ve_pct"]}, {"over": [*BOTH, "isp_s"]}, {"at": {"control": "pulsed"}}, {"at": {"isp_s": 200.0}}],
+)
+def test_a_run_of_other_dispersions_or_settings_is_not_compared(elsewhere):
+    run = flown(record("mean", 1.0, **elsewhere))
+    assert list(statistics_tables(run)) == []
+    assert published_table(run).rows[0][2].small == "fixed"
+
+
+def test_a_run_of_chosen_cases_is_not_compared():
+    assert list(statistics_tables(flown(record("mean", 1.0), design="grid"))) == []
+
+
+def test_inputs_that_are_shared_and_agree_are_compared():
+    assert len(list(statistics_tables(flown(record("mean", 1.0, at={"control": "continuous", "isp_s": 246.0}))))) == 1
