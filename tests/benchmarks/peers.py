@@ -1,7 +1,7 @@
 """The engine beside what a user would pick instead: same physics, same error, one run.
 
     python tests/benchmarks/peers.py            # the table of the README, and peers.parquet
-    python tests/benchmarks/peers.py --short    # some minutes less: whether everybody flies to the same place
+    python tests/benchmarks/peers.py --short    # one error, few turns: whether everybody flies to the same place
 
 Needs the extra `bench`; a peer that is not installed is named as such.  The error is the largest distance of the end
 positions from a reference flight in 80-bit numbers.  Only flights are timed: neither compiling nor preparing inputs.
@@ -133,7 +133,7 @@ def machine() -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--short", action="store_true", help="one error, few turns, no file")
-    parser.add_argument("--turns", type=int, default=12, help="of each entrant in each contest")
+    parser.add_argument("--turns", type=int, default=40, help="of each entrant in each contest")
     arguments = parser.parse_args()
     print(machine(), flush=True)
     results: list[Result] = []

@@ -72,3 +72,21 @@ def test_a_peer_that_is_not_installed_is_named_and_is_no_error(monkeypatch):
     assert {name for contest in contests for name in contest.missing} >= set(peers.CODES)
     basilisk = next(contest for contest in contests if "Basilisk" in contest.missing)
     assert any(r.peer == "Basilisk" and r.note == "not installed" for r in told(basilisk))
+
+
+def test_the_reference_and_a_taylor_series_in_80_bits_agree_to_fifteen_digits():
+    heyoka = pytest.importorskip("heyoka")
+    from tests.benchmarks.peer_codes import taylor
+
+    real = np.longdouble
+    for key in ("orbit", "ballistic", "lifting"):
+        problem = problems.BY_KEY[key]()
+        equations, event = taylor._system(problem)
+        keys = {"pars": problem.parameters[:, 0].astype(real), "fp_type": real, "tol": real(1e-20)}
+        if event is not None:
+            falling = heyoka.event_direction.negative
+            keys["t_events"] = [heyoka.t_event(event, direction=falling, fp_type=real)]
+        taylor_series = heyoka.taylor_adaptive(equations, problem.first[:, 0].astype(real), compact_mode=True, **keys)
+        taylor_series.propagate_until(real(problem.duration))
+        apart = taylor_series.state[:3] - problems.reference_of(key)[:3, 0]
+        assert np.sqrt((apart**2).sum()) < 2e-15 * 6.8e6

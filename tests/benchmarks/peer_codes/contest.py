@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from tests.benchmarks.peer_codes.entrant import Entrant, Flight
 
-TURN = 0.03  # s, about the length of a turn
+TURN = 0.01  # s, about the length of a turn: short, so that some turns have the core for themselves
 LONG = 0.4  # s: an entrant whose turn is longer has few of them
 
 

@@ -12,7 +12,30 @@ from tests.benchmarks.peer_codes.problems import Problem
 FOLDER = "tests.benchmarks.models."
 # of RK4 [s]: parts of the day; entries end where they like
 ORBIT_STEPS = (60.0, 40.0, 30.0, 20.0, 15.0, 10.0, 7.5, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.3)
-ENTRY_STEPS = (4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.3, 0.2, 0.15, 0.1, 0.075, 0.05, 0.03, 0.02, 0.015, 0.01)
+ENTRY_STEPS = (
+    16.0,
+    12.0,
+    8.0,
+    6.0,
+    4.0,
+    3.0,
+    2.0,
+    1.5,
+    1.0,
+    0.75,
+    0.5,
+    0.4,
+    0.3,
+    0.2,
+    0.15,
+    0.1,
+    0.075,
+    0.05,
+    0.03,
+    0.02,
+    0.015,
+    0.01,
+)
 
 
 def load(problem: Problem, method: str) -> Model:
