@@ -25,6 +25,7 @@ from mc_engine.lanes.adaptive_step import (
     sense,
     sense_shared,
 )
+from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import crossed
 from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, where
@@ -276,6 +277,7 @@ def _fly(
     history : float64[n_rows, 1 + n_quantities] of the first lane, a row every `spacing` [s]; no rows, no history
     Returns the number of history rows.
     """
+    align_stack()
     end_time, end_status, end_state, metrics = out
     clock = Clock(clock[0], clock[1], clock[2], clock[3], clock[4], clock[5])
     o = load_scalars(setting_class, settings)

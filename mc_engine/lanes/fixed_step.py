@@ -5,6 +5,7 @@ rejoins.  Lanes never look at each other: a lane that has ended or failed keeps 
 """
 
 from mc_engine.lanes import extrema
+from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import crossed, follow
 from mc_engine.lanes.functions import any_lane, where
@@ -145,6 +146,7 @@ def _fly(f, parameter_class, setting_class, width, parameters, settings, key, ca
     out : (time, status) float64[n], state float64[n_states, n], metrics float64[n_metrics, n]
     Returns the number of history rows of the last block.
     """
+    align_stack()
     n_steps, h, control_every = grid
     has_events, must_stop = kinds
     end_time, end_status, end_state, metrics = out

@@ -101,10 +101,12 @@ def _mantissa(builder, width, args):
     return builder.bitcast(builder.or_(fraction, constant(width, 1023 << 52, I64)), llvm_type(width))
 
 
+fused = _intrinsic("fma")  # x y + z, rounded once: the same at every width, because it is asked for
+
 _register(functions.sqrt, 1, _intrinsic("sqrt"))
 _register(functions.rint, 1, _intrinsic("rint"))
 _register(functions.floor, 1, _intrinsic("floor"))
-_register(functions.fma, 3, _intrinsic("fma"))
+_register(functions.fma, 3, fused)
 _register(functions.copysign, 2, _intrinsic("copysign"))
 # compare and select, not minnum: one instruction, and the same choice at every width for 0.0 and -0.0
 _register(functions.minimum, 2, lambda b, w, a: b.select(b.fcmp_ordered("<", a[0], a[1]), a[0], a[1]))

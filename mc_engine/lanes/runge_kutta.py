@@ -4,13 +4,14 @@ W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
 """
 
 from mc_engine.lanes.compiler import compile_callable, compile_inline
+from mc_engine.lanes.functions import fma
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.tuples import add_scaled, map_fields, spread
 
 
 @physics
 def _advance(y, sixth, k1, k2, k3, k4):
-    return y + sixth * ((k1 + k4) + 2.0 * (k2 + k3))
+    return fma(sixth, fma(2.0, k2 + k3, k1 + k4), y)
 
 
 def _rk4(rhs, t, h, s, m, p, o):

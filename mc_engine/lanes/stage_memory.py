@@ -13,7 +13,7 @@ from numba.core.datamodel.models import PrimitiveModel
 from numba.extending import intrinsic, register_model
 
 from mc_engine.lanes.lane_type import I64, common_width
-from mc_engine.lanes.lowering import constant, llvm_type
+from mc_engine.lanes.lowering import constant, fused, llvm_type
 
 
 class StageMemory(types.Type):
@@ -97,21 +97,13 @@ def stage_sum(typingctx, memory, like, first, last, columns, weights):
             weight = _splat(builder, builder.load(builder.gep(weight_data, [entry])), width)
             for i, total in enumerate(sums):
                 value = builder.load(_place(builder, memory, args[0], stage, i))
-                builder.store(_fused(builder, width, [weight, value, builder.load(total)]), total)
+                builder.store(fused(builder, width, [weight, value, builder.load(total)]), total)
         packed = ir.Constant(context.get_value_type(like), ir.Undefined)
         for i, total in enumerate(sums):
             packed = builder.insert_value(packed, builder.load(total), i)
         return packed
 
     return like(memory, like, types.intp, types.intp, columns, weights), codegen
-
-
-def _fused(builder: Any, width: int, factors: list[Any]) -> Any:
-    """x y + z with one rounding: the same at every width, because it is asked for."""
-    kind = llvm_type(width)
-    name = "llvm.fma." + (f"v{width}f64" if width > 1 else "f64")
-    function = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind] * 3), name)
-    return builder.call(function, factors)
 
 
 def _splat(builder: Any, value: Any, width: int) -> Any:

@@ -14,7 +14,7 @@ from numba.np import arrayobj
 
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.lane_type import I1, Lanes, common_width, convert, mask_type, number_type
-from mc_engine.lanes.lowering import constant, llvm_type
+from mc_engine.lanes.lowering import constant, fused, llvm_type
 
 
 def _tuple_type(fields: Sequence[Any], like: Any = None) -> Any:
@@ -61,14 +61,14 @@ def mask_like(typingctx, flag, like):
 
 @intrinsic
 def add_scaled(typingctx, y, h, k):
-    """y + h k, field by field."""
+    """y + h k, field by field, each rounded once."""
 
     def codegen(context, builder, sig, args):
-        step = convert(context, builder, args[1], h, number_type(common_width(*y)))
+        width = common_width(*y)
+        step = convert(context, builder, args[1], h, number_type(width))
         fields = []
         for i in range(len(y)):
-            product = builder.fmul(step, _item(builder, args[2], i))
-            fields.append(builder.fadd(_item(builder, args[0], i), product))
+            fields.append(fused(builder, width, [step, _item(builder, args[2], i), _item(builder, args[0], i)]))
         return _pack(context, builder, y, fields)
 
     return y(y, h, k), codegen

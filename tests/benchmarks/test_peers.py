@@ -81,7 +81,7 @@ def test_the_reference_and_a_taylor_series_in_80_bits_agree_to_fifteen_digits():
     real = np.longdouble
     for key in ("orbit", "ballistic", "lifting"):
         problem = problems.BY_KEY[key]()
-        equations, event = taylor._system(problem)
+        equations, event = taylor.system(problem)
         keys = {"pars": problem.parameters[:, 0].astype(real), "fp_type": real, "tol": real(1e-20)}
         if event is not None:
             falling = heyoka.event_direction.negative
@@ -90,3 +90,9 @@ def test_the_reference_and_a_taylor_series_in_80_bits_agree_to_fifteen_digits():
         taylor_series.propagate_until(real(problem.duration))
         apart = taylor_series.state[:3] - problems.reference_of(key)[:3, 0]
         assert np.sqrt((apart**2).sum()) < 2e-15 * 6.8e6
+
+
+@pytest.mark.skipif(not handwritten.compilers(), reason="no C++ compiler is installed")
+def test_the_peers_leave_the_arithmetic_of_this_process_alone():
+    handwritten.library(handwritten.compilers()[0])
+    assert np.float64(5e-324) * 1.0 > 0.0

@@ -1,7 +1,7 @@
 """nyx: its propagators on a two-body orbit, many cases in one call.
 
-Its gravity field and its drag need tables of the Earth's orientation that do not come with the package, so it flies
-the point mass alone; an almanac without contents is enough for that.
+Its gravity field and its drag look the Earth up in tables of planetary constants that do not come with the package, so
+it flies the point mass alone; an almanac without contents is enough for that.
 """
 
 import tempfile

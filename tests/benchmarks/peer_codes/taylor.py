@@ -15,7 +15,7 @@ from tests.benchmarks.peer_codes.problems import Problem
 WIDTH = hy.recommended_simd_size()
 
 
-def _system(problem: Problem) -> tuple[list, object]:
+def system(problem: Problem) -> tuple[list, object]:
     """(equations, event) as expressions; the event is that of `height`, or None."""
     assert problem.rate is not None  # the satellite is not flown here: a Taylor series does not cross its corners
     state = hy.make_vars("x", "y", "z", "vx", "vy", "vz")
@@ -58,7 +58,7 @@ class Refill:
 
 def _batch(problem: Problem, tolerance: float) -> Flight:
     """Flight in batches, in one thread."""
-    equations, event = _system(problem)
+    equations, event = system(problem)
     n, width = problem.first.shape[1], min(WIDTH, problem.first.shape[1])
     first, parameters = problem.first, problem.parameters
     keys = {"tol": tolerance, "compact_mode": False, "fast_math": True, "pars": parameters[:, :width].copy()}
@@ -90,7 +90,7 @@ def _batch(problem: Problem, tolerance: float) -> Flight:
 
 def _single(problem: Problem, tolerance: float) -> Flight:
     """Flight of one case after the other, in one thread."""
-    equations, event = _system(problem)
+    equations, event = system(problem)
     first, parameters, n = problem.first, problem.parameters, problem.first.shape[1]
     keys = {"tol": tolerance, "compact_mode": False, "fast_math": True, "pars": parameters[:, 0].copy()}
     if event is not None:

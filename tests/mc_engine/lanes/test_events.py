@@ -46,9 +46,9 @@ def test_a_time_limit_before_the_stop_is_no_stop_and_keeps_the_last_state():
 
 
 def test_an_event_exactly_at_the_end_of_a_step_is_met_there():
-    # x = 1 - t**2 is zero at t = 1 to the last bit, four steps of a quarter
-    columns = flown(RAIL, gravity_m_s2=2.0, x0_m=1.0, end_m=0.0, step_s=0.25)
-    assert (columns["end_time_s"][0], columns["end_x_m"][0], columns["end_v_m_s"][0]) == (1.0, 0.0, -2.0)
+    # x = 9 - t**2 is zero at t = 3 to the last bit, four steps of three quarters
+    columns = flown(RAIL, gravity_m_s2=2.0, x0_m=9.0, end_m=0.0, step_s=0.75)
+    assert (columns["end_time_s"][0], columns["end_x_m"][0], columns["end_v_m_s"][0]) == (3.0, 0.0, -6.0)
 
 
 def test_a_bounce_exactly_at_the_end_of_a_step_happens_once():

@@ -8,6 +8,7 @@ from compiled_physics import WIDTHS
 from numba import njit
 
 from mc_engine.lanes.compiler import STRICT
+from mc_engine.lanes.functions import fma
 from mc_engine.lanes.tuples import (
     add_scaled,
     any_field,
@@ -65,9 +66,9 @@ def test_fields_come_from_the_rows_of_an_array_and_go_to_rows(results):
     np.testing.assert_array_equal(out[6:9], table)
 
 
-def test_add_scaled_rounds_the_product_and_then_the_sum(results):
+def test_add_scaled_rounds_once(results):
     table, _, _, out = results
-    np.testing.assert_array_equal(out[:3], table + 0.1 * table[[1, 2, 0]])
+    np.testing.assert_array_equal(out[:3], fma(0.1, table[[1, 2, 0]], table))
 
 
 def test_select_takes_whole_tuples_lane_by_lane(results):
