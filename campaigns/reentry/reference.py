@@ -15,11 +15,12 @@ from scipy.integrate import solve_ivp
 from campaigns.reentry import reference_table as table
 from campaigns.reentry.apollo_final_phase import influence_rows
 from campaigns.reentry.entry_state import World, entry_of
-from campaigns.reentry.inputs import GUIDANCE, PLANS
+from campaigns.reentry.inputs import GUIDANCE
 from campaigns.reentry.planets import PLANETS
 from campaigns.reentry.reference_table import FELT, LAST_SPEED, STEERED
 from campaigns.reentry.vehicles import VEHICLES, Vehicle
 from campaigns.reentry.vinh import gravity, rates
+from mc_engine.errors import ModelError
 from mc_engine.model import Refusals
 from mc_engine.physics.atmosphere import us76_of_array
 from mc_engine.physics.constants import J2_EARTH
@@ -155,6 +156,8 @@ def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
     path = solve_ivp(
         derivative, (0.0, 5000.0), planner.start(), "DOP853", rtol=1e-10, atol=1e-9, events=low, dense_output=True
     )
+    if path.t_events[0].size == 0:
+        raise ModelError("the planned entry does not come down to plan_stop_altitude_km, so there is no reference path")
     t = np.linspace(0.0, path.t[-1], rows)
     r, _, latitude, v, angle, heading, along, lost = path.sol(t)
     six, _, drag = planner.motion(r, latitude, v, angle, heading, planner.share)
@@ -168,6 +171,8 @@ def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
 def steered_part(path: Reference) -> slice:
     """Where the laws command: from STEERED down to LAST_SPEED."""
     first = int(np.argmax(path.drag > STEERED))
+    if path.drag[first] <= STEERED:
+        raise ModelError("the planned entry never has 0.15 g of drag, so that no law could steer")
     last = int(np.argmax((path.speed < LAST_SPEED) & (path.t > path.t[first])))
     return slice(first, last + 1 if last else path.t.size)  # the last row is below, so that law 3 gets there
 
@@ -215,8 +220,6 @@ def reference_tables(o: Any) -> np.ndarray:
     if law == "none":
         return np.empty(0)
     out = np.zeros(table.LENGTH)
-    if PLANS[int(o.plan)] == "entry":  # such cases are refused
-        return out
     planner = Planner(o)
     path = fly_reference(planner)
     out[table.RANGE] = path.along[-1]

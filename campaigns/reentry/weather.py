@@ -34,6 +34,7 @@ _PROFILE = np.array(
 # half of each variance is of the small scale, half of the large one: correlation lengths of first-order Gauss-Markov
 # processes [m]
 SMALL_SCALE, LARGE_SCALE = 7.5e3, 20e3
+BLOCK = 1024  # cases drawn at once: their deviates stay in the processor's cache
 
 # value and slope [1/m] of the logarithm of the density over the standard; winds [m/s] and their slopes [1/s]
 Weather = namedtuple("Weather", "density density_slope east east_slope north north_slope")
@@ -72,14 +73,23 @@ def weather_nodes(draw: np.ndarray, density_size, wind_size, mean_size) -> np.nd
 
     draw : in [0, 1), 0 for no random part;  density_size, wind_size, mean_size : multiples of the magnitudes above
     """
-    deviates = normal_deviates(draw, 2 * LENGTH).reshape(-1, FIELDS, 2, NODES)
-    there = np.where(draw > 0.0, np.sqrt(0.5), 0.0)
+    sizes = np.where(draw > 0.0, 1.0, 0.0) * np.array([density_size, wind_size, wind_size])
     out = np.empty((draw.size, NODES, FIELDS))
-    for field, (size, column) in enumerate(((density_size, 1), (wind_size, 2), (wind_size, 2))):
-        both = gauss_markov(deviates[:, field, 0], SMALL_SCALE) + gauss_markov(deviates[:, field, 1], LARGE_SCALE)
-        out[:, :, field] = (there * size)[:, None] * both * standard_profile(column)
-    out[:, :, 1] += mean_size[:, None] * standard_profile(3)
+    for first in range(0, draw.size, BLOCK):
+        block = slice(first, first + BLOCK)
+        out[block] = _random_part(draw[block], sizes[:, block])
+    out[:, :, 1] += np.asarray(mean_size)[:, None] * standard_profile(3)
     return out.reshape(draw.size, LENGTH)
+
+
+def _random_part(draw: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """float64[n, NODES, FIELDS] for sizes [FIELDS, n]: the sum of the two scales, half of the variance each."""
+    deviates = normal_deviates(draw, 2 * LENGTH).reshape(-1, FIELDS, 2, NODES)
+    out = np.empty((draw.size, NODES, FIELDS))
+    for field, column in enumerate((1, 2, 2)):
+        both = gauss_markov(deviates[:, field, 0], SMALL_SCALE) + gauss_markov(deviates[:, field, 1], LARGE_SCALE)
+        out[:, :, field] = np.sqrt(0.5) * sizes[field][:, None] * both * standard_profile(column)
+    return out
 
 
 @physics

@@ -1,4 +1,4 @@
-"""Laws 1 and 2 flown by scipy in the plane, second by second, with nothing of the kernel but the designed gains."""
+"""The laws flown by scipy in the plane, second by second, with nothing of the kernel but the designed gains."""
 
 import numpy as np
 from reentry_flights import MU, RADIUS
@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from campaigns.reentry.reference import RANGE_SET, Planner, fly_reference, linear_system, riccati_gains, steered_part
 
 G0 = 9.80665
-TRIGGER, LAST, SCALE_HEIGHT = 0.15 * G0, 400.0, 7000.0
+TRIGGER, LAST, SCALE_HEIGHT, FELT = 0.15 * G0, 400.0, 7000.0, 0.05 * G0
 
 
 class Stored:
@@ -16,7 +16,7 @@ class Stored:
 
     def __init__(self, o):
         planner = Planner(o)
-        whole = fly_reference(planner)
+        self.whole = whole = fly_reference(planner)
         part = steered_part(whole)
         self.path = type(whole)(**{name: value[part] for name, value in vars(whole).items()})
         lost = self.path.speed[0] - self.path.speed
@@ -26,6 +26,50 @@ class Stored:
         """One quantity of the reference, or one of its three gains, at a speed."""
         column = self.gains[:, name] if isinstance(name, int) else getattr(self.path, name)
         return np.interp(-speed, -self.path.speed, column)
+
+
+class Account:
+    """What law 3 keeps: speed lost by the accelerometer, reckoned range, last deceleration, last log-excess."""
+
+    def __init__(self, stored):
+        self.stored, whole = stored, stored.whole
+        felt = (whole.lost > 0.0) & (whole.speed > LAST - 5.0)
+        self.lost, self.rows = whole.lost[felt], {
+            "axial": whole.axial[felt], "speed": whole.speed[felt], "along": whole.along[felt],
+            "rate": np.gradient(whole.along, whole.t)[felt],
+        }  # fmt: skip
+        self.begin = whole.t[felt][0]
+        self.w, self.range, self.rate, self.n, self.excess = 0.0, 0.0, 0.0, 0.0, 0.0
+
+    def at(self, name):
+        """One quantity of the reference at the speed lost so far."""
+        return np.interp(self.w, self.lost, self.rows[name])
+
+    def clocked(self, t):
+        """Range of the reference at a time before the air is felt, going on at its last rate."""
+        early = np.interp(min(t, self.begin), self.stored.whole.t, self.stored.whole.along)
+        return early + max(0.0, t - self.begin) * self.rows["rate"][0]
+
+    def sample(self, t, n):
+        """Vertical share of the lift after a second with the deceleration n at its end."""
+        before = self.w <= 0.0
+        if not before:
+            self.w += 0.5 * (n + self.n)
+        elif n > FELT:
+            self.w = 0.5 * (n + FELT) * min(1.0, (n - FELT) / (n - self.n))
+        rate = self.at("rate")
+        self.range = self.clocked(t) if before else self.range + 0.5 * (rate + self.rate)
+        excess = np.log(n) - np.log(self.at("axial"))
+        growth = excess - self.excess
+        self.rate, self.n, self.excess = rate, n, excess
+        v = self.at("speed")
+        high = np.clip(-SCALE_HEIGHT * (n / self.at("axial") - 1.0), -6e3, 6e3)
+        climb = -SCALE_HEIGHT * (growth + 2.0 * (n - self.at("axial")) / v)
+        tilt = np.clip(climb / v, -np.radians(2.0), np.radians(2.0))
+        known = min(v, self.stored.path.speed[0])
+        k = [self.stored.at(i, known) for i in range(3)]
+        wanted = 0.5 - (k[0] * high + k[1] * tilt + k[2] * (self.range - self.at("along")))
+        return np.clip(wanted, np.cos(np.radians(165.0)), 1.0) if v > LAST else 0.5
 
 
 def share(law, stored, h, v, path, along, drag):
@@ -63,11 +107,15 @@ low.terminal = True
 
 def fly_guided(law, stored, start, drag_area, lift_area):
     """(range [m], flight time [s]) at 10 km; start: altitude, speed, path angle; one command a second."""
-    y, t, steering = np.array([*start, 0.0]), 0.0, False
+    y, t, steering, account = np.array([*start, 0.0]), 0.0, False, Account(stored)
     while True:
         drag = 0.5 * standard_density(y[0]) * y[1] ** 2 * drag_area
         steering = steering or drag > TRIGGER
-        u = share(law, stored, y[0], y[1], y[2], y[3], drag) if steering and y[1] > LAST else 0.5
+        if law == "law3r":
+            u = account.sample(t, drag)
+        else:
+            u = share(law, stored, y[0], y[1], y[2], y[3], drag) if y[1] > LAST else 0.5
+        u = u if steering else 0.5
         second = solve_ivp(
             rates, (t, t + 1.0), y, "DOP853", args=(u, drag_area, lift_area), rtol=1e-9, atol=1e-9, events=low
         )

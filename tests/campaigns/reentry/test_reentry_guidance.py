@@ -105,7 +105,7 @@ def test_without_a_law_there_is_no_reference_and_no_saturation():
     assert np.isnan(row["saturated_share"])
 
 
-@pytest.mark.parametrize("law", ["law1", "law2r"])
+@pytest.mark.parametrize("law", ["law1", "law2r", "law3r"])
 def test_a_guided_flight_is_that_of_an_independent_one_second_by_second(law):
     inputs = NOMINAL | PLANNED | {"guidance": law}
     stored = Stored(settings_of(MODEL, prepare(MODEL, inputs, 1).settings[0]))

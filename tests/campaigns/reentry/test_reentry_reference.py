@@ -25,6 +25,7 @@ from campaigns.reentry.reference_table import (
     clocked_range,
     whole_range,
 )
+from mc_engine.errors import ModelError
 from mc_engine.flight import prepare, settings_of
 
 PLANNED = PLANAR | {"plan": "given"}
@@ -199,6 +200,13 @@ def test_the_clock_tells_the_range_until_the_air_is_felt(o, path):
     assert np.abs(clocked_range(o.tables, path.t[early]) - path.along[early]).max() < 500.0
     after = path.t[early][-1] + 10.0
     assert clocked_range(o.tables, after) - clocked_range(o.tables, after - 10.0) == pytest.approx(77_200.0, rel=0.01)
+
+
+def test_a_plan_that_does_not_come_down_is_said_so():
+    with pytest.raises(ModelError, match="does not come down"):
+        settings(**PLANNED, guidance="law1", plan_speed_m_s=11_500.0, plan_flight_path_angle_deg=-4.0)
+    with pytest.raises(ModelError, match="no law could steer"):
+        settings(**PLANNED, guidance="law1", plan_stop_altitude_km=100.0)
 
 
 def test_a_law_without_range_has_no_gain_on_it():

@@ -1,0 +1,146 @@
+"""Lead compensation by frequency response: gain from the static error, phase lead from the margin asked for.
+
+    python -m campaigns.reentry.lead_compensator OUT.png
+
+draws the Bode diagram of the pitch loop at three dynamic pressures.  NumPy, SI; frequencies in rad/s.
+
+K. Ogata, Modern Control Engineering, section on lead compensation by the frequency-response approach.
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+Response = Callable[[Any], Any]  # frequency [rad/s] -> complex gain
+FREQUENCIES = np.geomspace(1e-3, 1e4, 4001)
+LARGEST_LEAD = np.radians(75.0)  # of one stage
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Phase margin [rad] at the highest crossover [rad/s], where the loop's gain falls through 1."""
+
+    phase: float
+    crossover: float
+
+
+@dataclass(frozen=True)
+class Lead:
+    """gain (s + zero) / (s + pole); margins : of the compensated loop."""
+
+    gain: float
+    zero: float
+    pole: float
+    margins: Margins
+
+    def response(self, w: Any) -> Any:
+        """Complex gain at a frequency."""
+        return self.gain * (1j * w + self.zero) / (1j * w + self.pole)
+
+
+def crossover_of(loop: Response, level: float = 1.0) -> float:
+    """Highest frequency at which the loop's gain falls through a level."""
+
+    def above(logarithm: float) -> float:
+        return float(np.log(np.abs(loop(np.exp(logarithm))) / level))
+
+    grid = np.log(FREQUENCIES)
+    high = np.abs(loop(FREQUENCIES)) > level
+    if not high.any() or high[-1]:
+        raise ValueError("the gain does not fall through this level between 1e-3 and 1e4 rad/s")
+    last = int(np.flatnonzero(high)[-1])
+    return float(np.exp(brentq(above, grid[last], grid[last + 1], xtol=1e-13)))
+
+
+def margins_of(loop: Response) -> Margins:
+    """Phase margin and crossover of an open loop; the phase counts from -180 degrees, within half a turn of it."""
+    w = crossover_of(loop)
+    return Margins(float(np.angle(-loop(w))), w)
+
+
+def design_lead(plant: Response, gain: float, margin: float) -> Lead:
+    """Lead compensator that keeps the low-frequency gain of `gain` times the plant and has a phase margin [rad].
+
+    The crossover moves up, where the plant may lag more: the lead is changed until the margin is the one asked for.  A
+    margin that one stage cannot give is as large as it can.
+    """
+    bare = margins_of(lambda w: gain * plant(w))
+    extra = np.radians(5.0)
+    for _ in range(30):
+        lead = _lead_of(plant, gain, min(max(margin - bare.phase + extra, 1e-3), LARGEST_LEAD))
+        short = margin - lead.margins.phase
+        if abs(short) <= 1e-6:
+            break
+        extra += short
+    return lead
+
+
+def _lead_of(plant: Response, gain: float, lead: float) -> Lead:
+    """The stage that gives this phase [rad] at the new crossover."""
+    alpha = (1.0 - np.sin(lead)) / (1.0 + np.sin(lead))
+    w = crossover_of(lambda x: gain * plant(x), float(np.sqrt(alpha)))
+    stage = Lead(gain / alpha, w * float(np.sqrt(alpha)), w / float(np.sqrt(alpha)), Margins(0.0, 0.0))
+    return Lead(stage.gain, stage.zero, stage.pole, margins_of(lambda x: stage.response(x) * plant(x)))
+
+
+def short_period(stiffness: float, damping: float = 0.0) -> Response:
+    """Angle over angular acceleration of a vehicle about its trim: 1 / (s^2 + damping s + stiffness)."""
+
+    def response(w: Any) -> Any:
+        return 1.0 / (stiffness - np.asarray(w) ** 2 + 1j * damping * np.asarray(w))
+
+    return response
+
+
+def bode_figure(loops: dict[str, tuple[Response, Response]]) -> Any:
+    """Figure of gain and phase of open loops over the frequency: dashed without, solid with compensation.
+
+    loops : by legend text, (plant times gain, plant times compensator)
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.0, 6.0), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    w = np.geomspace(0.05, 200.0, 1200)
+    for colour, (text, (bare, compensated)) in enumerate(loops.items()):
+        found = margins_of(compensated)
+        legend = f"{text}: {np.degrees(found.phase):.1f}° at {found.crossover:.2f} rad/s"
+        for loop, style, label in ((bare, "--", None), (compensated, "-", legend)):
+            upper.loglog(w, np.abs(loop(w)), style, color=f"C{colour}", label=label)
+            phase = np.degrees(np.angle(loop(w)))
+            # a quarter of a turn of lead at most: what is above it has lagged by the rest of a turn
+            lower.semilogx(w, np.where(phase > 90.0, phase - 360.0, phase), style, color=f"C{colour}")
+        lower.plot(found.crossover, np.degrees(found.phase) - 180.0, "o", color=f"C{colour}")
+    upper.axhline(1.0, color="0.5", linewidth=0.8)
+    lower.axhline(-180.0, color="0.5", linewidth=0.8)
+    upper.set_ylabel("gain of the open loop")
+    lower.set_ylabel("phase, degrees")
+    lower.set_xlabel("frequency, rad/s")
+    upper.legend(title="phase margin at crossover, compensated (solid)")
+    return figure
+
+
+def main(path: str) -> None:
+    """Draw the pitch loop of the autopilot campaign."""
+    from campaigns.reentry.autopilot import MODEL
+    from campaigns.reentry.autopilot_gains import pitch_design
+
+    o = {setting.symbol: setting.code(setting.default) for setting in MODEL.settings}
+    loops = {}
+    for pressure in (0.0, 4e3, 12e3):
+        plant, gain, lead = pitch_design(o, pressure)
+        bare, compensated = _loops(plant, gain, lead)
+        loops[f"{pressure / 1e3:g} kPa"] = bare, compensated
+    bode_figure(loops).savefig(path, dpi=120)
+
+
+def _loops(plant: Response, gain: float, lead: Lead) -> tuple[Response, Response]:
+    return lambda w: gain * plant(w), lambda w: lead.response(w) * plant(w)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,230 @@
+"""Random density and winds of a case: their statistics, their frozen profiles, and a flight through them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from reentry_flights import MU, NOMINAL, PLANAR, RADIUS, fly_cases, fly_one, history
+from reentry_twin import standard_density
+from scipy.integrate import solve_ivp
+
+from campaigns.reentry.weather import (
+    ALTITUDES,
+    LARGE_SCALE,
+    LENGTH,
+    NODES,
+    SMALL_SCALE,
+    SPACING,
+    normal_deviates,
+    standard_profile,
+    weather_at,
+    weather_nodes,
+)
+
+N = 6000
+draws = st.floats(1e-9, 1.0 - 1e-9)
+
+
+@pytest.fixture(scope="module")
+def nodes():
+    """float64[N, NODES, 3] of full size, without a mean wind."""
+    one = np.ones(N)
+    return weather_nodes(np.random.default_rng(76).uniform(size=N), one, one, 0.0 * one).reshape(N, NODES, 3)
+
+
+def test_deviates_are_standard_normal_and_independent():
+    z = normal_deviates(np.random.default_rng(2).uniform(size=4000), 50)
+    assert z.mean() == pytest.approx(0.0, abs=5.0 / np.sqrt(z.size))
+    assert z.std() == pytest.approx(1.0, abs=5.0 / np.sqrt(2.0 * z.size))
+    assert np.abs(np.corrcoef(z.T) - np.eye(50)).max() < 5.0 / np.sqrt(4000)
+    assert (z**4).mean() == pytest.approx(3.0, abs=0.15)
+
+
+def test_neighbouring_numbers_name_unrelated_airs():
+    z = normal_deviates(np.array([0.3, np.nextafter(0.3, 1.0)]), 4000)
+    assert abs(np.corrcoef(z)[0, 1]) < 0.08
+
+
+@pytest.mark.parametrize(("field", "column"), [(0, 1), (1, 2), (2, 2)])
+def test_each_altitude_has_the_size_of_its_profile(nodes, field, column):
+    assert nodes[:, :, field].std(axis=0) == pytest.approx(standard_profile(column), rel=0.05)
+    assert np.abs(nodes[:, :, field].mean(axis=0)).max() < 5.0 * standard_profile(column).max() / np.sqrt(N)
+
+
+def test_the_correlation_over_altitude_is_the_mean_of_the_two_scales(nodes):
+    for apart in (1, 3, 8):
+        found = np.corrcoef(nodes[:, 30, 0], nodes[:, 30 + apart, 0])[0, 1]
+        distance = apart * SPACING
+        expected = 0.5 * (np.exp(-distance / SMALL_SCALE) + np.exp(-distance / LARGE_SCALE))
+        assert found == pytest.approx(expected, abs=0.06)
+
+
+def test_density_and_winds_are_independent(nodes):
+    for one, other in ((0, 1), (0, 2), (1, 2)):
+        assert abs(np.corrcoef(nodes[:, 25, one], nodes[:, 25, other])[0, 1]) < 0.07
+
+
+def test_zero_names_the_mean_air():
+    one = np.ones(2)
+    found = weather_nodes(np.array([0.0, 0.5]), one, one, one).reshape(2, NODES, 3)
+    assert np.abs(found[0, :, [0, 2]]).max() == 0.0
+    assert found[0, :, 1].tolist() == standard_profile(3).tolist()
+    assert np.abs(found[1, :, 0]).max() > 0.0
+
+
+@given(draw=draws, h=st.floats(-1e3, 140e3))
+def test_values_meet_the_nodes_and_slopes_are_derivatives(draw, h):
+    one = np.ones(1)
+    table = weather_nodes(np.array([draw]), one, one, one)[0]
+    k = int(np.clip(h / SPACING, 0, NODES - 2))
+    at_node = weather_at(float(ALTITUDES[k]), 0.0, table)
+    assert (at_node.density, at_node.east, at_node.north) == pytest.approx(table[3 * k : 3 * k + 3], abs=1e-12)
+    low, here, high = (weather_at(h + step, 0.0, table) for step in (-0.5, 0.0, 0.5))
+    if 1.0 < h < ALTITUDES[-1] - 1.0:
+        assert here.density_slope == pytest.approx(high.density - low.density, abs=1e-7)
+        assert here.east_slope == pytest.approx(high.east - low.east, abs=1e-4)
+        assert here.north_slope == pytest.approx(high.north - low.north, abs=1e-4)
+
+
+def twin_rates(t, y, table, drag, lift):
+    """A sphere at rest, inertial axes, bank 60 degrees; winds from local north and east."""
+    r, v = y[:3], y[3:]
+    size = np.sqrt(r @ r)
+    up = r / size
+    east = np.cross([0.0, 0.0, 1.0], up)
+    east = east / np.sqrt(east @ east)
+    w = weather_at(size - RADIUS, 0.0, table)
+    through = v - w.east * east - w.north * np.cross(up, east)
+    speed = np.sqrt(through @ through)
+    push = 0.5 * standard_density(size - RADIUS) * np.exp(w.density) * speed
+    right = np.cross(through, up)
+    right = right / np.sqrt(right @ right)
+    above = np.cross(right, through / speed)
+    turned = 0.5 * above + np.sqrt(0.75) * right
+    return np.concatenate([v, -MU / size**3 * r + push * (speed * lift * turned - drag * through)])
+
+
+def test_a_flight_through_weather_is_that_of_a_twin():
+    ten_centimetres, duration = 0.1, 250.0
+    drag = 1.2569 * 12.017 / 5498.22
+    world = PLANAR | {"planar": False, "weather": True, "tolerance": 1e-11, "stop_time_s": duration}
+    for draw, latitude, heading in ((0.123, 30.0, 40.0), (0.77, -50.0, 200.0)):
+        row = fly_one(
+            **world, weather_draw=draw, entry_latitude_deg=latitude, entry_heading_deg=heading, stop_altitude_km=0.0
+        )
+        table = weather_nodes(np.array([draw]), *np.ones((3, 1)))[0]
+        phi, psi, path = np.radians([latitude, heading, -2.0])
+        up, north, east = (
+            np.array([np.cos(phi), 0.0, np.sin(phi)]), np.array([-np.sin(phi), 0.0, np.cos(phi)]),
+            np.array([0.0, 1.0, 0.0]),
+        )  # fmt: skip
+        v = 7800.0 * (np.cos(path) * (np.cos(psi) * north + np.sin(psi) * east) + np.sin(path) * up)
+        start = np.concatenate([(RADIUS + 120e3) * up, v])
+        end = solve_ivp(
+            twin_rates, (0.0, duration), start, "DOP853", rtol=1e-11, atol=1e-8, args=(table, drag, 0.3 * drag)
+        ).y[:, -1]
+        flown = np.array([row[f"end_{axis}_m"] for axis in "xyz"])
+        assert np.abs(flown - end[:3]).max() < ten_centimetres * 10.0  # corners of the 1976 standard
+        assert np.abs(np.array([row[f"end_v{axis}_m_s"] for axis in "xyz"]) - end[3:]).max() < 0.01
+
+
+def test_the_density_of_a_history_is_the_standard_one_times_the_profile():
+    seen = history(rows=301, **PLANAR, weather=True, weather_draw=0.4)
+    table = weather_nodes(np.array([0.4]), *np.ones((3, 1)))[0]
+    for i in range(0, 301, 25):
+        h = 1e3 * seen["altitude_km"][i]
+        expected = standard_density(h) * np.exp(weather_at(h, 0.0, table).density)
+        assert seen["density_kg_m3"][i] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_skip_meets_the_same_air_on_its_way_down_and_up():
+    inputs = {
+        **PLANAR, "weather": True, "weather_draw": 0.9, "entry_speed_m_s": 11e3, "entry_flight_path_angle_deg": -6.5,
+        "bank_deg": 0.0,
+    }  # fmt: skip
+    mixed, standard = (history(rows=2001, **inputs | {"weather": on}) for on in (True, False))
+    turn = int(np.argmin(mixed["altitude_km"]))
+    assert 0 < turn < 2000
+    assert len(standard["t_s"]) == 2001
+    ratio = mixed["density_kg_m3"] / [standard_density(1e3 * h) for h in mixed["altitude_km"]]
+    down, up = slice(turn, None, -1), slice(turn, None)
+    levels = np.linspace(mixed["altitude_km"][turn] + 1.0, 110.0, 40)
+    first, second = (np.interp(levels, mixed["altitude_km"][part], ratio[part]) for part in (down, up))
+    assert second == pytest.approx(first, rel=1e-3)
+    assert np.ptp(first) > 0.01
+
+
+def test_the_peaks_are_those_of_a_dense_history_through_weather_too():
+    draws_of = np.linspace(0.05, 0.95, 6)
+    rows = fly_cases(**PLANAR, weather=True, weather_draw=draws_of, tolerance=1e-9)
+    for i, draw in enumerate(draws_of):
+        seen = history(rows=8001, **PLANAR, weather=True, weather_draw=float(draw), tolerance=1e-9)
+        for name in ("load_g", "heat_rate_w_m2", "dynamic_pressure_pa"):
+            assert rows[f"peak_{name}"][i] == pytest.approx(seen[name].max(), rel=2e-5)
+
+
+def test_a_tail_wind_carries_the_landing_along():
+    """A mean wind to the east, an entry to the east."""
+    still, blown = (
+        fly_one(**PLANAR, lift_coefficient=0.0, weather=True, wind_mean_size=size)["downrange_km"]
+        for size in (0.0, 1.0)
+    )
+    assert 0.5 < blown - still < 10.0
+
+
+def test_weather_of_size_zero_is_no_weather():
+    calm = {"density_random_size": 0.0, "wind_random_size": 0.0, "wind_mean_size": 0.0, "weather_draw": 0.3}
+    with_it, without = fly_one(**PLANAR, weather=True, **calm), fly_one(**PLANAR)
+    assert with_it["downrange_km"] == pytest.approx(without["downrange_km"], rel=1e-12)
+    assert with_it["peak_load_g"] == pytest.approx(without["peak_load_g"], rel=1e-12)
+
+
+def test_the_air_of_a_case_hangs_on_its_number_alone():
+    """Not on its place in the chunk, the width of the build, its neighbours, or the law."""
+    draw = np.random.default_rng(3).uniform(size=21)
+    together = fly_cases(**PLANAR, weather=True, weather_draw=draw, guidance="law1", plan="given")
+    for i in (0, 10, 20):
+        alone = fly_cases(
+            width=1,
+            ids=np.array([i]),
+            **PLANAR,
+            weather=True,
+            weather_draw=draw[i : i + 1],
+            guidance="law1",
+            plan="given",
+        )
+        for name, column in together.items():
+            assert column[i : i + 1].tolist() == alone[name].tolist() or np.isnan(column[i]), name
+    mixed = fly_cases(
+        **PLANAR, weather=True, weather_draw=draw, plan="given",
+        guidance=np.array(["law1", "none", "law2r"] * 7, dtype=object),
+    )  # fmt: skip
+    assert mixed["downrange_km"][::3].tolist() == together["downrange_km"][::3].tolist()
+
+
+def test_law_1_flies_through_weather_to_its_target():
+    rng = np.random.default_rng(12)
+    cases = {"weather_draw": rng.uniform(size=200), "entry_flight_path_angle_error_deg": rng.normal(0.0, 0.05, 200)}
+    guided, open_loop = (
+        fly_cases(**PLANAR, weather=True, **cases, plan="given", guidance=law)["downrange_km"]
+        for law in ("law1", "none")
+    )
+    assert guided.std() < 2.0 < open_loop.std()
+
+
+def test_violations_count_the_limits_that_were_passed():
+    plain = fly_one(**PLANAR)
+    limits = {
+        "corridor_load_g": plain["peak_load_g"], "corridor_heat_rate_w_m2": plain["peak_heat_rate_w_m2"],
+        "corridor_heat_load_j_m2": plain["heat_load_j_m2"],
+        "corridor_dynamic_pressure_pa": plain["peak_dynamic_pressure_pa"],
+    }  # fmt: skip
+    assert plain["corridor_violations"] == 0.0
+    for k in range(5):
+        scaled = {name: value * (0.999 if i < k else 1.001) for i, (name, value) in enumerate(limits.items())}
+        assert fly_one(**PLANAR, **scaled)["corridor_violations"] == float(k)
+
+
+def test_the_nodes_of_a_case_take_as_many_numbers_as_said():
+    assert weather_nodes(np.array([0.1, 0.2, 0.3]), *np.ones((3, 3))).shape == (3, LENGTH)
+    assert NOMINAL["weather_draw"] == 0.0
