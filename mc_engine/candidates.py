@@ -13,7 +13,7 @@ from mc_engine.campaign import Campaign
 from mc_engine.cases import case_table, full_inputs
 from mc_engine.distributions import column
 from mc_engine.flight import fly
-from mc_engine.kernel import WIDTH
+from mc_engine.kernel import usual_width
 from mc_engine.model_faults import naming_faults
 from mc_engine.runner import NOMINAL_NOISE
 from mc_engine.status import OK, STATUS_NAME
@@ -96,7 +96,8 @@ def _fly(
         flown = fly(campaign.model, piece, ids[rows], campaign.seed, folder=campaign.directory)
         return {name: flown[name] for name in wanted}
 
-    size = WIDTH * -(-len(ids) // (WIDTH * workers))
+    width = usual_width(campaign.model)
+    size = width * -(-len(ids) // (width * workers))
     pieces = [slice(first, first + size) for first in range(0, len(ids), size)]
     if len(pieces) == 1:
         return task(pieces[0])

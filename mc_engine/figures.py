@@ -34,7 +34,50 @@ class ScatterFigure:
     title: str
 
 
-KINDS = {"map": MapFigure, "history": HistoryFigure, "scatter": ScatterFigure}
+@dataclass(frozen=True)
+class FootprintFigure:
+    """Where the flights end on a planet, with the regions that hold them; written as KML and GeoJSON besides.
+
+    latitude, longitude : columns, geodetic, degrees.  ends_below : (column, value): a case above it has not come
+    down.  planet : the setting that names the planet, if the model flies to others than the Earth.  target : columns
+    or parameters with the latitude and longitude aimed at; without them distances count from the nominal case.
+    """
+
+    latitude: str
+    longitude: str
+    title: str
+    ends_below: tuple[str, float] | None = None
+    planet: str = ""
+    target: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True)
+class ProfileFigure:
+    """One history quantity against another, as altitude against speed, with percentile bands of x at each y."""
+
+    x: str
+    y: str
+    title: str
+
+
+@dataclass(frozen=True)
+class CorridorFigure:
+    """Cases over two columns, coloured by the limits that they violate, of the requirements on these metrics."""
+
+    x: str
+    y: str
+    metrics: tuple[str, ...]
+    title: str
+
+
+KINDS = {
+    "map": MapFigure,
+    "history": HistoryFigure,
+    "scatter": ScatterFigure,
+    "footprint": FootprintFigure,
+    "profile": ProfileFigure,
+    "corridor": CorridorFigure,
+}
 
 
 def to_record(figure: Any) -> dict[str, Any]:

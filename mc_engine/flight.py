@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.case_columns import END_TIME
-from mc_engine.kernel import WIDTH, build_kernel
+from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.kernel_parts import settings_class
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.noise import noise_key
@@ -74,13 +74,14 @@ def fly(
     seed: int,
     *,
     folder: Path | None = None,
-    width: int = WIDTH,
+    width: int | None = None,
 ) -> dict[str, np.ndarray]:
     """Results of some cases as columns: status, reason, `end_...` states and metrics in declared units.
 
     case_ids : int64[n], the addresses of the noise.  Cases of different settings may be mixed.
+    width : cases at a time, 1, 8 or 16; what is fastest for the model unless said.
     """
-    n = len(case_ids)
+    n, width = len(case_ids), width or usual_width(model)
     ready = prepare(model, inputs, n)
     status = np.where(ready.refusals.mask, REFUSED, OK).astype(np.float64)
     time = np.full(n, np.nan)
@@ -205,7 +206,7 @@ def fly_history(
     seed: int,
     *,
     folder: Path | None = None,
-    width: int = WIDTH,
+    width: int | None = None,
     rows: int = 1500,
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """(columns, history) of one case alone: the same bits as among others, whatever the width of the build.
@@ -214,6 +215,7 @@ def fly_history(
         with adaptive steps, the history of this flight.
     history : t_s and the model's quantities in declared units; empty if the case was refused.
     """
+    width = width or usual_width(model)
     ready = prepare(model, inputs, 1)
     columns = fly(model, inputs, np.array([case_id]), seed, folder=folder, width=width)
     names = ["t_s", *(quantity.name for quantity in model.quantities)]

@@ -6,6 +6,7 @@ writes.  What a case comes to depends on (campaign, sources, seed, case_id): chu
 
 import os
 import re
+import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ from mc_engine.upstream import COMPANION
 ProgressCall = Callable[[int, int, int], None]
 Chunk = tuple[int, int]
 SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
+CHUNKS_IN_FLIGHT = 3  # per worker: flying, or flown and not yet stored
 CHUNKS_PER_WORKER = 8  # enough for an even end, few enough that parts stay large
 NOMINAL_NOISE = 2**52  # the nominal draws its noise where no case does
 
@@ -236,20 +238,33 @@ def _chunks(missing: list[Chunk], size: int) -> Iterator[Chunk]:
 def _flights(
     campaign: Campaign, chunks: list[Chunk], workers: int, stopped: Callable[[], bool]
 ) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
-    """(first case, columns) of every chunk as it lands, in any order; chunks not begun when stopped stay out."""
+    """(first case, columns) of every chunk as it lands, in any order; chunks not begun when stopped stay out.
+
+    At most a few chunks a worker wait to be taken: where storing is slower than flying, memory does not fill up, and
+    a stop has little left to bring in.
+    """
     from joblib import Parallel, delayed
 
+    room, left = threading.Semaphore(CHUNKS_IN_FLIGHT * workers), threading.Event()
+
     def task(first: int, stop: int) -> tuple[int, dict[str, np.ndarray]] | None:
-        return None if stopped() else (first, fly_chunk(campaign, first, stop))
+        while not room.acquire(timeout=0.1):
+            if stopped() or left.is_set():
+                return None
+        return None if stopped() or left.is_set() else (first, fly_chunk(campaign, first, stop))
 
     if workers == 1 or len(chunks) <= 1:
         landed: Any = (task(*chunk) for chunk in chunks)
     else:
         pool = Parallel(n_jobs=workers, backend="threading", return_as="generator_unordered")
         landed = pool(delayed(task)(*chunk) for chunk in chunks)
-    for result in landed:
-        if result is not None:
-            yield result
+    try:
+        for result in landed:
+            if result is not None:
+                yield result
+            room.release()
+    finally:
+        left.set()  # whoever waits for room waits in vain
 
 
 def fly_chunk(campaign: Campaign, first: int, stop: int) -> dict[str, np.ndarray]:

@@ -17,7 +17,8 @@ RENDERERS: dict[str, Callable[[Document], bytes]] = {"html": render_html, "pdf":
 def write_reports(run_path: str | Path, formats: Sequence[str] = ("html", "pdf")) -> list[Path]:
     """Write report.html and report.pdf (those asked for) into the directory of a run or tuning; returns their paths.
 
-    The contents are built once.  Every file appears whole or not at all.
+    The contents are built once, and files that belong to them (a footprint's KML) are written besides.  Every file
+    appears whole or not at all.
     """
     unknown = [name for name in formats if name not in RENDERERS]
     if unknown:
@@ -25,7 +26,8 @@ def write_reports(run_path: str | Path, formats: Sequence[str] = ("html", "pdf")
     path = Path(run_path)
     name = path.resolve().name
     document = build_tuning(open_tuning(path), name) if is_tuning_directory(path) else build(open_store(path), name)
-    return [_write(path / f"report.{name}", RENDERERS[name](document)) for name in dict.fromkeys(formats)]
+    pages = [_write(path / f"report.{name}", RENDERERS[name](document)) for name in dict.fromkeys(formats)]
+    return pages + [_write(path / file.name, file.content) for file in document.files]
 
 
 def report(run_path: str | Path, format: str | None = None) -> list[Path]:

@@ -3,11 +3,15 @@
 from collections.abc import Iterable, Iterator
 
 from reports.case_tables import case_table, worst_tables
+from reports.corridors import corridor_blocks
 from reports.document import Block, Document, FigureBlock, Section, Table, Text, numbered
 from reports.drawings import distribution_blocks, history_blocks, map_blocks, scatter_blocks
 from reports.flown import Flown, Run
+from reports.footprints import FootprintContents, footprint_contents
 from reports.glossary import GLOSSARY
 from reports.headline import cost_cards, summary_sentence, verdict_cards, warnings
+from reports.levels import level_blocks
+from reports.profiles import profile_blocks
 from reports.provenance import campaign_facts, provenance_table
 from reports.published import published_table
 from reports.published_statistics import statistics_tables
@@ -24,6 +28,7 @@ from reports.tables import (
 def build(run: Run, name: str) -> Document:
     """The report of a run; `name` is its directory's name, as commands in the report spell it."""
     flown = Flown(run, name)
+    landing = footprint_contents(flown)
     title = str(flown.campaign.get("title") or flown.manifest.get("model", {}).get("title") or name)
     return numbered(
         Document(
@@ -34,17 +39,21 @@ def build(run: Run, name: str) -> Document:
             verdicts=verdict_cards(flown),
             costs=cost_cards(flown),
             warnings=warnings(flown),
-            sections=tuple(section for section in _sections(flown) if section.blocks),
+            sections=tuple(section for section in _sections(flown, landing) if section.blocks),
+            files=tuple(landing.files),
         )
     )
 
 
-def _sections(flown: Flown) -> Iterator[Section]:
+def _sections(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
     yield Section("requirements", "Requirements", _requirements(flown))
+    yield Section("corridor", "Corridor", blocks(corridor_blocks(flown)))
+    yield Section("footprint", "Footprint", blocks(landing.blocks))
+    yield Section("levels", "Choices compared", blocks(level_blocks(flown)))
     yield Section("maps", "Maps", blocks(map_blocks(flown)))
     yield Section("distributions", "Distributions", blocks(distribution_blocks(flown)))
     yield Section("metrics", "Metrics in numbers", _metrics(flown))
-    yield Section("histories", "Time histories", blocks(history_blocks(flown)))
+    yield Section("histories", "Time histories", blocks([*profile_blocks(flown), *history_blocks(flown)]))
     yield Section("scatter", "One against another", blocks(scatter_blocks(flown)))
     yield Section("worst", "Worst and failed cases", blocks(worst_tables(flown)))
     yield Section("status", "How the cases ended", (status_table(flown),))

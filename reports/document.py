@@ -121,6 +121,14 @@ class Card:
 
 
 @dataclass(frozen=True)
+class Attachment:
+    """A file that is written beside the report."""
+
+    name: str
+    content: bytes
+
+
+@dataclass(frozen=True)
 class Document:
     """The whole report.  created: ISO date and time, UTC, of the run (not of the report); kind: what stands above."""
 
@@ -133,6 +141,7 @@ class Document:
     warnings: tuple[str, ...]
     sections: tuple[Section, ...] = field(default=())
     kind: str = "Monte Carlo dispersion report"
+    files: tuple[Attachment, ...] = ()
 
 
 def numbered(document: Document) -> Document:

@@ -32,9 +32,9 @@ def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN)
 
 
 def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
-    """The model's maps; a sentence in place of one that cannot be drawn."""
+    """The model's maps over inputs of this run; a sentence in place of one that cannot be drawn."""
     for figure in flown.figures:
-        if isinstance(figure, MapFigure):
+        if isinstance(figure, MapFigure) and {figure.x, figure.y} <= set(flown.cases.columns):
             yield _map_block(flown, figure)
 
 
@@ -55,13 +55,13 @@ def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
         case_ids=flown.case_ids[rows],
         point_values=z[rows],
         n_points=int(used.size),
-        nominal=_nominal_point(flown, figure.x, figure.y),
+        nominal=nominal_point(flown, figure.x, figure.y),
     )
     caption = figure.title if surface.exact else f"{figure.title}. Blank where the cases do not support a surface."
     return FigureBlock(caption, drawing, "wide")
 
 
-def _nominal_point(flown: Flown, x: str, y: str) -> tuple[float, float] | None:
+def nominal_point(flown: Flown, x: str, y: str) -> tuple[float, float] | None:
     place = flown.nominal_value(x), flown.nominal_value(y)
     return None if place[0] is None or place[1] is None else (place[0], place[1])
 
@@ -88,7 +88,7 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
         y_label=flown.axis(figure.y),
         n_used=int(used.size),
         n_tried=flown.n_tried,
-        nominal=_nominal_point(flown, figure.x, figure.y),
+        nominal=nominal_point(flown, figure.x, figure.y),
     )
     return FigureBlock(figure.title, drawing, "wide")
 
@@ -150,7 +150,7 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     if not len(flown.histories):
         yield "No histories were retained in this run; [retention] in the campaign file asks for them."
         return
-    cases = _history_cases(flown)
+    cases = history_cases(flown)
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
     constant = []
     for figure in wanted:
@@ -160,7 +160,7 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
         if names:
             bands = history_bands(flown.histories, fair, names)
             lines = tuple(
-                _history_line(flown, case, label, rank, names)
+                history_line(flown, case, label, rank, names)
                 for case, (label, rank) in cases.items()
                 if not bands or (rank is not None and rank <= COLOURED_OVER_BANDS)
             )
@@ -175,7 +175,7 @@ def _is_constant(values: np.ndarray) -> bool:
     return not numbers.size or numbers.min() == numbers.max()
 
 
-def _history_cases(flown: Flown) -> dict[int, tuple[str, int | None]]:
+def history_cases(flown: Flown) -> dict[int, tuple[str, int | None]]:
     """Name and rank of the retained cases: nominal 0, then by how bad they are in the metrics that matter."""
     kept = [int(case) for case in np.unique(flown.histories["case_id"].to_numpy())]
     reasons = _worst_reasons(flown)
@@ -205,7 +205,7 @@ def _worst_reasons(flown: Flown) -> dict[int, tuple[int, str]]:
     return reasons
 
 
-def _history_line(flown: Flown, case: int, label: str, rank: int | None, names: list[str]) -> HistoryLine:
+def history_line(flown: Flown, case: int, label: str, rank: int | None, names: list[str]) -> HistoryLine:
     rows = flown.histories[flown.histories["case_id"] == case].sort_values("t_s")
     quantities = {name: rows[name].to_numpy(dtype=np.float64) for name in names}
     return HistoryLine(label, rows["t_s"].to_numpy(dtype=np.float64), quantities, rank)

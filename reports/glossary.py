@@ -53,6 +53,21 @@ GLOSSARY = Terms(
             "of the correctness of the model.",
         ),
         (
+            "ellipse",
+            "The covariance ellipse of the cases, scaled so that it would hold the stated share of a normal cloud. "
+            "What it really holds is counted beside it.",
+        ),
+        (
+            "region of any shape",
+            "Holds at least the stated share of all possible cases, with the stated confidence, whatever their "
+            "distribution: half of the cases draw it, the other half set its size.",
+        ),
+        (
+            "choices compared",
+            "Cases that differ in one word and share all other inputs are pairs; differences within pairs do not hold "
+            "the scatter of the draws.",
+        ),
+        (
             "map",
             "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by a local "
             "quadratic regression, with the standard error given, and left blank outside the cases.",

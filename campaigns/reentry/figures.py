@@ -1,8 +1,39 @@
 """Figures of the entry campaigns' reports; a map is drawn where the run disperses its two inputs."""
 
-from mc_engine.figures import HistoryFigure, MapFigure, ScatterFigure
+from mc_engine.figures import (
+    CorridorFigure,
+    FootprintFigure,
+    HistoryFigure,
+    MapFigure,
+    ProfileFigure,
+    ScatterFigure,
+)
+
+HIGHEST_LANDING_KM = 35.0  # a flight that ends higher has left the atmosphere again, or ran out of time
 
 FIGURES = (
+    CorridorFigure(
+        "relative_speed_m_s",
+        "relative_flight_path_angle_deg",
+        (
+            "peak_load_g",
+            "peak_axial_load_g",
+            "peak_dynamic_pressure_pa",
+            "peak_heat_rate_w_m2",
+            "heat_load_j_m2",
+            "exits",
+            "min_altitude_km",
+        ),
+        "Entry corridor: speed and flight-path angle at entry, over ground",
+    ),
+    FootprintFigure(
+        "final_latitude_deg",
+        "final_longitude_deg",
+        "Where the flights end",
+        ends_below=("final_altitude_km", HIGHEST_LANDING_KM),
+        planet="planet",
+    ),
+    ProfileFigure("speed_m_s", "altitude_km", "Altitude against speed"),
     MapFigure("exit_speed_m_s", "vacuum_periapsis_km", "density_factor", "Speed that a pass leaves"),
     MapFigure(
         "peak_load_g",

@@ -1,20 +1,32 @@
 """The kinds of figures: data in, one drawing for the screen and one for paper out."""
 
 from reports.figures.convergence import Convergence
+from reports.figures.corridors import CorridorDrawing, LimitLine
 from reports.figures.distributions import DistributionPanel, Distributions
+from reports.figures.footprints import FootprintCurve, FootprintDrawing
 from reports.figures.fronts import FrontDrawing
 from reports.figures.histories import Histories, HistoryBand, HistoryLine
+from reports.figures.levels import LevelPanel, LevelsDrawing
 from reports.figures.maps import MapDrawing
+from reports.figures.profiles import ProfileBand, ProfileDrawing
 from reports.figures.scatter import ScatterDrawing
 
 __all__ = [
     "Convergence",
+    "CorridorDrawing",
     "DistributionPanel",
     "Distributions",
+    "FootprintCurve",
+    "FootprintDrawing",
     "FrontDrawing",
     "Histories",
     "HistoryBand",
     "HistoryLine",
+    "LevelPanel",
+    "LevelsDrawing",
+    "LimitLine",
     "MapDrawing",
+    "ProfileBand",
+    "ProfileDrawing",
     "ScatterDrawing",
 ]

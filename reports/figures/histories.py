@@ -61,7 +61,7 @@ def thinned(t: np.ndarray, y: np.ndarray, samples: int = SAMPLES) -> tuple[np.nd
     return t[rows], y[rows]
 
 
-def _style(rank: int | None) -> tuple[str, str, float]:
+def line_style(rank: int | None) -> tuple[str, str, float]:
     """Colour, dash and width of a line."""
     if rank is None:
         return MUTED, "solid", 1.0
@@ -81,7 +81,7 @@ class Histories(Drawing):
     @property
     def key(self) -> tuple[Key, ...]:
         marks = {"solid": "line", "dash": "dash", "dot": "dot"}
-        entries = [Key(marks[_style(line.rank)[1]], _style(line.rank)[0], line.name) for line in self.named]
+        entries = [Key(marks[line_style(line.rank)[1]], line_style(line.rank)[0], line.name) for line in self.named]
         for band in list(self.bands.values())[:1]:
             for low, high, opacity in band.pairs:
                 text = f"{percent(low)} to {percent(high)} of {count(band.n_cases)} cases"
@@ -117,7 +117,7 @@ class Histories(Drawing):
         data = self._screen_bands(name)
         for line in self.drawn:
             t, y = thinned(line.t, line.quantities[name])
-            colour, dash, width = _style(line.rank)
+            colour, dash, width = line_style(line.rank)
             data.append(
                 {
                     "type": "scatter",
@@ -163,7 +163,7 @@ class Histories(Drawing):
                         band.t, band.curves[low], band.curves[high], color=SKY, alpha=opacity, linewidth=0
                     )
             for line in self.drawn:
-                colour, dash, width = _style(line.rank)
+                colour, dash, width = line_style(line.rank)
                 t, y = thinned(line.t, line.quantities[name])
                 axis.plot(t, y, color=on_paper(colour), linestyle=_PRINT_DASH[dash], linewidth=0.6 * width)
             axis.set_title(paper.literal(label))

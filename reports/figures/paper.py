@@ -48,10 +48,12 @@ LONGEST_LINE = 104  # characters of a key that fit the width of the page
 _DASH: dict[str, Any] = {"line": "-", "dash": "--", "dot": ":"}
 
 
-def new_figure(height: float, rows: int = 1, columns: int = 1) -> tuple[Figure, list[Axes]]:
-    """A figure as wide as the text, `height` inches high, and its axes row by row."""
+def new_figure(
+    height: float, rows: int = 1, columns: int = 1, heights: Sequence[float] | None = None
+) -> tuple[Figure, list[Axes]]:
+    """A figure as wide as the text, `height` inches high, and its axes row by row.  heights : of the rows, relative."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    axes = figure.subplots(rows, columns, squeeze=False)
+    axes = figure.subplots(rows, columns, squeeze=False, height_ratios=heights)
     return figure, [axis for row in axes for axis in row]
 
 

@@ -41,6 +41,19 @@ def axis(title: str, **more: Any) -> dict[str, Any]:
     }
 
 
+def ring(place: tuple[float, float], colour: str, words: str) -> dict[str, Any]:
+    """A ring about one place that leaves what lies under it to be seen."""
+    return {
+        "type": "scatter",
+        "mode": "markers",
+        "x": [place[0]],
+        "y": [place[1]],
+        "marker": {"size": 12, "color": "rgba(0,0,0,0)", "line": {"width": 3, "color": colour}},
+        "text": plain(words),
+        "hovertemplate": "%{text} (%{x:.6g}, %{y:.6g})<extra></extra>",
+    }
+
+
 def layout(x: dict[str, Any], y: dict[str, Any], height: int, title: str = "", **more: Any) -> dict[str, Any]:
     """A panel's layout; a title stands left above the axes."""
     heading = {"text": plain(title), "x": 0.0, "xref": "paper", "xanchor": "left", "font": {"size": 14}}

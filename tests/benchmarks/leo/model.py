@@ -5,7 +5,7 @@ from collections import namedtuple
 from mc_engine.lanes import physics, sqrt
 from mc_engine.model import AdaptiveStep, Extremum, Field, Model, Parameter, Setting
 from mc_engine.physics.constants import MU_EARTH
-from mc_engine.physics.gravity import j2_perturbation, point_mass
+from mc_engine.physics.gravity import oblate
 
 AXES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
 RADIUS = 7000e3
@@ -26,9 +26,7 @@ def initial(p, o):
 @physics
 def rhs(t, s, m, p, o):
     """Gravity with J2.  Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., section 8.7."""
-    gx, gy, gz = point_mass(s.x, s.y, s.z, MU_EARTH)
-    jx, jy, jz = j2_perturbation(s.x, s.y, s.z, MU_EARTH)
-    return State(s.vx, s.vy, s.vz, gx + jx, gy + jy, gz + jz)
+    return State(s.vx, s.vy, s.vz, *oblate(s.x, s.y, s.z, MU_EARTH))
 
 
 @physics

@@ -6,11 +6,11 @@ lifetimes.
 
 from collections import namedtuple
 
-from mc_engine.lanes import physics, sqrt
+from mc_engine.lanes import fma, physics, sqrt
 from mc_engine.model import Field, Model, Parameter, Setting
 from mc_engine.physics.atmosphere import exponential
 from mc_engine.physics.constants import EARTH_RATE, EQUATORIAL_RADIUS, MU_EARTH
-from mc_engine.physics.gravity import j2_perturbation, point_mass
+from mc_engine.physics.gravity import oblate, point_mass
 
 State = namedtuple("State", "x y z vx vy vz")
 Parameters = namedtuple("Parameters", "x y z vx vy vz drag")
@@ -43,13 +43,12 @@ def acceleration(s, p, air):
 
     Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., sections 8.6 and 8.7.
     """
-    gx, gy, gz = point_mass(s.x, s.y, s.z, MU_EARTH)
-    jx, jy, jz = j2_perturbation(s.x, s.y, s.z, MU_EARTH)
-    h = sqrt(s.x * s.x + s.y * s.y + s.z * s.z) - EQUATORIAL_RADIUS
+    gx, gy, gz = oblate(s.x, s.y, s.z, MU_EARTH)
+    h = sqrt(fma(s.x, s.x, fma(s.y, s.y, s.z * s.z))) - EQUATORIAL_RADIUS  # written as in `oblate`: one root for both
     ux, uy = s.vx + EARTH_RATE * s.y, s.vy - EARTH_RATE * s.x
-    speed = sqrt(ux * ux + uy * uy + s.vz * s.vz)
+    speed = sqrt(fma(ux, ux, fma(uy, uy, s.vz * s.vz)))
     d = p.drag * exponential(h, air[0], air[1], air[2]) * speed
-    return gx + jx + d * ux, gy + jy + d * uy, gz + jz + d * s.vz
+    return fma(d, ux, gx), fma(d, uy, gy), fma(d, s.vz, gz)
 
 
 @physics
@@ -69,9 +68,7 @@ def transfer_rhs(t, s, m, p, o):
 @physics
 def oblate_rhs(t, s, m, p, o):
     """Derivative of the state without air: a point mass and J2."""
-    gx, gy, gz = point_mass(s.x, s.y, s.z, MU_EARTH)
-    jx, jy, jz = j2_perturbation(s.x, s.y, s.z, MU_EARTH)
-    return State(s.vx, s.vy, s.vz, gx + jx, gy + jy, gz + jz)
+    return State(s.vx, s.vy, s.vz, *oblate(s.x, s.y, s.z, MU_EARTH))
 
 
 @physics

@@ -92,6 +92,20 @@ def test_a_robust_candidate_is_judged_by_the_dispersed_craft():
     assert robust.failed[0] == 0
 
 
+def test_candidates_that_are_alike_meet_the_same_noise():
+    text = FOLDER.joinpath("stage_3_robust.toml").read_text(encoding="utf-8")
+    noisy = 'actuator = "ideal"\nduration_s = 5.0\nrate_noise_rad_s = 1e-3\nattitude_noise_rad = 1e-3'
+    text = text.replace('actuator = "pwpf"', noisy).replace("cases = 32", "cases = 8")
+    campaign = load_campaign("noisy.toml", text=text, directory=FOLDER)
+    choice = np.array([[TABLE_9.get(one.name, 0.0) for one in campaign.tuning.parameters]])
+    three = fly_candidates(campaign, campaign.tuning, np.repeat(choice, 3, axis=0))
+    assert three.objectives[0].tolist() == three.objectives[1].tolist() == three.objectives[2].tolist()
+    alone = fly_candidates(campaign, campaign.tuning, choice)
+    assert alone.objectives[0].tolist() == three.objectives[0].tolist()
+    calm = load_campaign("calm.toml", text=text.replace("1e-3", "0.0"), directory=FOLDER)
+    assert fly_candidates(calm, calm.tuning, choice).objectives[0, 0] != alone.objectives[0, 0]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_thrusters_and_gains_together_beat_tables_8_and_9_within_table_5(seed, tmp_path):
