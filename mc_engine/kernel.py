@@ -40,6 +40,8 @@ def kernel(parameters, settings, key, cases, n_steps, h, control_every, time, st
 '''
 _ADAPTIVE = '''"""Kernel of {reference}, {width} cases at a time.  Written by the engine; edit the model instead."""
 
+import numpy as np
+
 from mc_engine.kernel_parts import Functions, parts_of
 from mc_engine.lanes.adaptive_flight import fly
 from mc_engine.lanes.compiler import compile_kernel
@@ -56,8 +58,8 @@ def kernel(
     f = Functions({names})
     tables, out = (nodes, starts, columns, weights), (time, status, state, metrics)
     return fly(
-        f, tables, Parameters, Settings, {width}, parameters, settings, key, cases, clock, atol, MUST_STOP, out,
-        history, spacing,
+        f, tables, Parameters, Settings, {width}, np.arange({width}), parameters, settings, key, cases, clock, atol,
+        MUST_STOP, out, history, spacing,
     )
 '''
 

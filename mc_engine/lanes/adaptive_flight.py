@@ -9,8 +9,6 @@ An event is a zero of a sense (see `adaptive_step`); peaks are zeros of rates, s
 
 from collections import namedtuple
 
-import numpy as np
-
 from mc_engine.lanes.adaptive_step import (
     CORNER,
     EVENT,
@@ -257,6 +255,7 @@ def _fly(
     parameter_class,
     setting_class,
     width,
+    columns,
     parameters,
     settings,
     key,
@@ -270,7 +269,8 @@ def _fly(
 ):
     """Fly all cases of a chunk, the lanes taking them in turn.
 
-    tables : of the Runge-Kutta pair.  parameters : float64[n_parameters, n], SI, n at least the width
+    tables : of the Runge-Kutta pair.  columns : int64[width], the case that each lane begins with: 0, 1, 2, ...
+    parameters : float64[n_parameters, n], SI, n at least the width
     settings : float64[n_settings];  key : uint64;  cases : float64[n], case numbers
     clock : the fields of `Clock`, float64;  atol : float64[n_states], SI
     out : (time, status) float64[n], state float64[n_states, n], metrics float64[n_metrics, n]
@@ -282,7 +282,7 @@ def _fly(
     clock = Clock(clock[0], clock[1], clock[2], clock[3], clock[4], clock[5])
     o = load_scalars(setting_class, settings)
     p, case = load_fields(parameter_class, parameters, 0, width), load(cases, 0, width)
-    columns, waiting = np.arange(width), width
+    waiting = width
     s, m = begin(f, p, o, key, case)
     atol = scalars_like(s, atol)
     here, h = first(f, clock, case, s, m, p, o, atol)

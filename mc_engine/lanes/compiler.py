@@ -16,6 +16,7 @@ STRICT: dict[str, Any] = {"error_model": "numpy", "boundscheck": False, "fastmat
 _UNWRAPPED: dict[str, Any] = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
+    "_nrt": False,  # no counting of references: what they allocate is on the stack
     "pipeline_class": LinkedCompiler,
 }
 

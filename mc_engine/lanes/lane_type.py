@@ -12,11 +12,13 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core.datamodel.models import PrimitiveModel
+from numba.core.registry import cpu_target
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, lower_cast, register_model
 
 F64, I64, I32, I1 = ir.DoubleType(), ir.IntType(64), ir.IntType(32), ir.IntType(1)
+_TYPED: list[Any] = []  # the operators that know lanes
 
 
 class Lanes(types.Type):
@@ -93,6 +95,8 @@ def _cast_plain(context, builder, source, target, value):
 def _operator(op: Any, emit: Callable[..., Any], accepts: Callable[[Any], bool], kind: str) -> None:
     """Type and lower `op` wherever at least one argument is lanes."""
 
+    _TYPED.append(op)
+
     @infer_global(op)
     class Typing(AbstractTemplate):
         key = op
@@ -146,6 +150,8 @@ for _op, _plain_op in (
 
 
 def _unary(op: Any, emit: Callable[..., Any], kind: str) -> None:
+    _TYPED.append(op)
+
     @infer_global(op)
     class Typing(AbstractTemplate):
         key = op
@@ -207,3 +213,16 @@ def _whole_power(context, builder, sig, args):
         return one
     value = power_by_squaring(builder.fmul, args[0], abs(n))
     return value if n > 0 else builder.fdiv(one, value)
+
+
+def _try_lanes_first() -> None:
+    """Put the operators of lanes before numba's own, which know no lanes and would be tried in vain each time."""
+    context = cpu_target.typing_context
+    context.refresh()
+    for op in (*_TYPED, operator.pow):
+        known = context._lookup_global(op).templates
+        ours = [template for template in known if template.__module__ == __name__]
+        context._globals[op] = types.Function((*ours, *(template for template in known if template not in ours)))
+
+
+_try_lanes_first()

@@ -41,6 +41,5 @@ if __name__ == "__main__":
     cases = int(sys.argv[2]) if len(sys.argv) > 2 else 4000
     best = scaling(name, cases)
     for workers, time_taken in best.items():
-        print(
-            f"{name}, {cases:,} cases, {workers} threads: {time_taken:.2f} s, {best[1] / time_taken:.2f} times one thread"
-        )
+        gain = best[1] / time_taken
+        print(f"{name}, {cases:,} cases, {workers} threads: {time_taken:.2f} s, {gain:.2f} times one thread")
