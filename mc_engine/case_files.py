@@ -42,7 +42,7 @@ def _read_parquet(path: Path) -> dict[str, np.ndarray]:
     import pyarrow.parquet
 
     try:
-        table = pyarrow.parquet.ParquetFile(path).read()
+        table = pyarrow.parquet.ParquetFile(path).read(use_threads=False)
     except (pyarrow.ArrowException, OSError) as error:
         raise FileFault(f'"{path.name}" is not a Parquet file that can be read: {error}') from None
     repeated = sorted({name for name in table.column_names if table.column_names.count(name) > 1})

@@ -17,10 +17,10 @@ from pathlib import Path
 from types import ModuleType
 
 from mc_engine.kernel_parts import Functions
-from mc_engine.model import AdaptiveStep, FixedStep, Model
+from mc_engine.model import AdaptiveStep, Model
 
 WIDTH = 8  # one register of eight doubles
-_FEW_STATES = 12
+_FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
 
 _FIXED = '''"""Kernel of {reference}, {width} cases at a time.  Written by the engine; edit the model instead."""
 
@@ -112,10 +112,14 @@ def cache_folder() -> Path:
 def usual_width(model: Model) -> int:
     """How many cases of a model fly at a time: 8, or 16 where two registers a number hide the waiting of one another.
 
-    Measured (tests/benchmarks): on a fixed grid of few states sixteen are up to a fifth faster; large states and
-    adaptive steps, whose values do not fit into the registers, are not.  The results have the same bits.
+    Measured (tests/benchmarks): with few values to hold sixteen are a tenth to a third faster, with many they are
+    not.  Adaptive steps hold the events and extrema too.  The results have the same bits.
     """
-    return 2 * WIDTH if isinstance(model.clock, FixedStep) and len(model.states) <= _FEW_STATES else WIDTH
+    if isinstance(model.clock, AdaptiveStep):
+        few = len(model.states) + len(model.event_list) + len(model.extrema) <= _FEW_ADAPTIVE
+    else:
+        few = len(model.states) <= _FEW_FIXED
+    return 2 * WIDTH if few else WIDTH
 
 
 @lru_cache(maxsize=64)

@@ -141,6 +141,7 @@ def extend(
 
 def campaign_of(store: Store) -> Campaign:
     """The campaign as it was flown, at its present length; StoreError if model or campaign have changed since."""
+    store.check_companions()
     recorded = store.manifest["campaign"]
     cases = store.n_cases if recorded["design"] in ("lhs", *EXTENSIBLE) else None
     campaign = load_campaign(
@@ -173,6 +174,7 @@ def replay(path: str | Path, case_id: int) -> Replay:
         folder=campaign.directory,
         width=1,
     )
+    _name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
     again = {**inputs, **flight}
     differences = [
@@ -273,10 +275,15 @@ def fly_chunk(campaign: Campaign, first: int, stop: int) -> dict[str, np.ndarray
     table = case_table(campaign, ids)
     with naming_faults(campaign.model_reference, f"cases {first} to {stop - 1}"):
         flight = fly(campaign.model, full_inputs(campaign, table), ids, campaign.seed, folder=campaign.directory)
+    _name_upstream(campaign, ids, flight)
+    return {**table, **flight}
+
+
+def _name_upstream(campaign: Campaign, ids: np.ndarray, flight: dict[str, np.ndarray]) -> None:
+    """Say of cases that have nothing to start from what became of theirs upstream."""
     if campaign.upstream is not None:
         reasons = campaign.upstream.refusals(ids)
         flight["reason"] = np.where(reasons != "", reasons, flight["reason"])
-    return {**table, **flight}
 
 
 def _nominal(campaign: Campaign) -> dict[str, Any]:

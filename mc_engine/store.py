@@ -70,7 +70,8 @@ def create_store(
         for folder in PART_FOLDERS:
             make_folder(path / folder)
         # The journal comes last: with it the store exists.
-        digests = {"manifest": sha256(content).hexdigest(), "campaign": sha256(text).hexdigest()}
+        digests: dict[str, Any] = {"manifest": sha256(content).hexdigest(), "campaign": sha256(text).hexdigest()}
+        digests["companions"] = {name: sha256(companion).hexdigest() for name, companion in companions.items()}
         write_durably(path / JOURNAL, encode(1, utc_now(), "created", digests))
     finally:
         lock.release()
@@ -137,6 +138,11 @@ class Store:
         if sha256(content).hexdigest() != self._created["campaign"]:
             raise StoreError(f"{self.path / CAMPAIGN}: damaged or edited, it is not the one this run began with")
         return content.decode()
+
+    def check_companions(self) -> None:
+        """StoreError if a file that the campaign reads from its own folder is no more the one it was flown with."""
+        for problem in companion_problems(self.path, self._created):
+            raise StoreError(f"{self.path}/{problem}")
 
     # ---- what the journal says
 
@@ -331,6 +337,18 @@ class Store:
             if before is not None:
                 with suppress(OSError):  # it no longer counts, and the next writer tries again
                     (self.path / before.file).unlink(missing_ok=True)
+
+
+def companion_problems(run: Path, created: Mapping[str, Any]) -> list[str]:
+    """A sentence for every file beside the campaign that is gone or edited; `created` are the facts of the creation."""
+    problems = []
+    for name, digest in created.get("companions", {}).items():
+        try:
+            if sha256((run / name).read_bytes()).hexdigest() != digest:
+                problems.append(f"{name}: damaged or edited, its SHA-256 is not the one in the journal")
+        except OSError as error:
+            problems.append(f"{name}: {error.strerror}")
+    return problems
 
 
 def is_part_file(file: str) -> bool:

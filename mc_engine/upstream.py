@@ -114,7 +114,7 @@ def _rows_of_run(path: Path) -> Rows:
 
 def _rows_of_copy(path: Path) -> Rows:
     try:
-        table = pq.read_table(pa.BufferReader(path.read_bytes()))
+        table = pq.read_table(pa.BufferReader(path.read_bytes()), use_threads=False)
         facts = json.loads(table.schema.metadata[_FACTS])
     except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
         raise StoreError(f"{path}: no copy of an upstream run: {error}") from error
@@ -136,6 +136,8 @@ def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str],
     """
     upstream = {column.name: column for column in rows.columns}
     links = _links(upstream, section, model, found)
+    if rows.n_cases and rows.nominal.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]:
+        found.add("from", f"the nominal case of that run ended as {rows.nominal['status']}; choose one that flies")
     failed = np.asarray(rows.table["status"] != STATUS_NAME[OK], dtype=bool)
     table: dict[str, np.ndarray] = {}
     nominal: dict[str, Scalar] = {}

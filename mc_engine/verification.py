@@ -15,7 +15,15 @@ import pyarrow.parquet as pq
 from mc_engine.errors import StoreError
 from mc_engine.journal import Entry, Scan, scan
 from mc_engine.parts import Column, Part, arrow_schema, content_problem
-from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, PART_FOLDERS, is_part_file, is_run_directory
+from mc_engine.store import (
+    CAMPAIGN,
+    JOURNAL,
+    MANIFEST,
+    PART_FOLDERS,
+    companion_problems,
+    is_part_file,
+    is_run_directory,
+)
 from mc_engine.writer_lock import holder
 
 
@@ -73,7 +81,7 @@ def _head_problems(run: Path, journal: Scan) -> list[str]:
                 problems.append(f"{name}: damaged or edited, its SHA-256 is not the one in the journal")
         except OSError as error:
             problems.append(f"{name}: {error.strerror}")
-    return problems
+    return problems + companion_problems(run, journal.entries[0].facts)
 
 
 def _receipts(journal: Scan, event: str) -> list[Part]:
@@ -102,7 +110,7 @@ def _part_problems(run: Path, part: Part, columns: list[Column] | None, is_cases
         return [f"{part.file}: {problem}"]
     # From here on only a faulty writer can have done it: the bytes are those that were written.
     try:
-        table = pq.read_table(pa.BufferReader(content), page_checksum_verification=True)
+        table = pq.read_table(pa.BufferReader(content), page_checksum_verification=True, use_threads=False)
     except (pa.ArrowException, OSError) as error:
         return [f"{part.file}: no readable Parquet file: {error}"]
     problems = []

@@ -106,4 +106,4 @@ def _case_table(flown: Flown, caption: str, metric: str | None, rows: np.ndarray
 def _input_cell(value: Any) -> Cell:
     if isinstance(value, str | bool | np.bool_):
         return Cell(exact(bool(value) if isinstance(value, np.bool_) else value))
-    return Cell(number(float(value), 4), float(value))
+    return Cell(number(float(value), 4), _sortable(float(value)))

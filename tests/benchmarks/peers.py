@@ -45,8 +45,8 @@ def _absent(*names: str) -> tuple[str, ...]:
 
 
 def _fixed_step(problem: Problem, step: float) -> Contest:
-    """RK4 with one step: the engine eight at a time and one, and the lanes written by hand."""
-    entrants = [engine.entrant(problem, "RK4", width, (step,)) for width in (8, 1)]
+    """RK4 with one step: the engine sixteen, eight and one at a time, and the lanes written by hand."""
+    entrants = [engine.entrant(problem, "RK4", width, (step,)) for width in (16, 8, 1)]
     entrants += handwritten.entrants(problem, step)
     if problem.rate is None:
         entrants.append(scipy_peer.entrant(problem))
@@ -66,7 +66,7 @@ def _equal_error(problem: Problem, target: float) -> Contest:
 
 def _basilisk() -> Contest:
     problem, step = problems.oblate(), 10.0
-    entrants = [engine.entrant(problem, "RK4", 8, (step,))]
+    entrants = [engine.entrant(problem, "RK4", ladder=(step,))]
     if code := peer("Basilisk"):
         entrants += code.entrants(problem, step)
     return Contest(f"{problem.title}, RK4, {step:g} s", entrants, None, _absent("Basilisk"))
@@ -78,7 +78,7 @@ def _nyx(target: float | None) -> Contest:
     methods, code = ("RK4",) if target is None else ("RK4", "DOP853"), peer("nyx")
     entrants: list[Entrant] = []
     for method in methods:
-        entrants.append(engine.entrant(problem, method, 8, (step,) if target is None else ()))
+        entrants.append(engine.entrant(problem, method, 0, (step,) if target is None else ()))
     if code and target is None:
         entrants.append(code.entrant(problem, "RK4", (step,)))
     elif code:

@@ -153,9 +153,43 @@ def test_a_run_in_a_chain_stands_alone(folder, tmp_path):
     shutil.copytree(folder / "runs" / "second", tmp_path / "moved")
     assert replay(tmp_path / "moved", 3).equal
     assert resume(tmp_path / "moved").n_cases == 40
-    (tmp_path / "moved" / "upstream.parquet").write_bytes(b"")
-    with pytest.raises((StoreError, CampaignError), match="no copy of an upstream run"):
-        replay(tmp_path / "moved", 3)
+    assert open_store(tmp_path / "moved").verify() == []
+
+
+@pytest.mark.parametrize("damage", ["gone", "flipped"])
+def test_what_was_taken_is_verified_before_it_is_used(folder, tmp_path, damage):
+    import shutil
+
+    shutil.copytree(folder / "runs" / "second", tmp_path / "run")
+    copy = tmp_path / "run" / "upstream.parquet"
+    content = bytearray(copy.read_bytes())
+    content[len(content) // 2] ^= 1
+    copy.unlink() if damage == "gone" else copy.write_bytes(content)
+    word = "No such file" if damage == "gone" else "damaged or edited"
+    assert [problem for problem in open_store(tmp_path / "run").verify() if word in problem]
+    for use in (replay, lambda path, case: resume(path)):
+        with pytest.raises(StoreError, match=rf"upstream.parquet: {word}"):
+            use(tmp_path / "run", 3)
+
+
+def test_a_case_that_failed_upstream_replays_the_same(folder, cases):
+    failed = int(np.flatnonzero(cases[0]["status"] != "ok")[0])
+    assert replay(folder / "runs" / "second", failed).differences == ()
+
+
+def test_the_reports_of_a_chain_with_failed_cases_are_written(folder):
+    from reports import write_reports
+
+    files = write_reports(folder / "runs" / "second", formats=("html", "pdf"))
+    assert {"report.html", "report.pdf"} <= {file.name for file in files}
+
+
+def test_a_run_whose_nominal_case_failed_is_no_start_of_a_chain(folder, tmp_path):
+    text = (folder / "first" / "campaign.toml").read_text() + "[parameters]\nspeed_m_s = 60\n"  # 6 s up, 5 s allowed
+    run(load_campaign("high", text=text, directory=folder / "first"), tmp_path / "high")
+    chain = (folder / "second" / "campaign.toml").read_text()
+    with pytest.raises(CampaignError, match="the nominal case of that run ended as no-stop; choose one that flies"):
+        load_campaign("second", text=chain, directory=folder / "second", upstream=tmp_path / "high")
 
 
 def test_neither_chunks_nor_the_number_of_cases_change_a_case(folder, cases, tmp_path):

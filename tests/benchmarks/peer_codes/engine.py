@@ -3,7 +3,7 @@
 import numpy as np
 
 from mc_engine import flight
-from mc_engine.kernel import build_kernel
+from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.kernel_parts import settings_class
 from mc_engine.model import AdaptiveStep, Model, load_model
 from tests.benchmarks.peer_codes.entrant import TOLERANCES, Entrant, Flight, portions, shared
@@ -69,8 +69,9 @@ def kernel_flight(problem: Problem, method: str, value: float | None, width: int
     return fly
 
 
-def entrant(problem: Problem, method: str, width: int = 8, ladder: tuple[float, ...] = ()) -> Entrant:
-    """The engine with one method and width."""
+def entrant(problem: Problem, method: str, width: int = 0, ladder: tuple[float, ...] = ()) -> Entrant:
+    """The engine with one method and width; the width that it takes by itself unless said."""
+    width = width or usual_width(load(problem, method))
 
     def build(cases: Problem, value: float, threads: int) -> Flight:
         parts = [cases.part(where) for where in portions(cases.first.shape[1], threads)]
