@@ -11,7 +11,7 @@ from reports.document import FigureBlock
 from reports.figures import DistributionPanel, Distributions, Histories, HistoryLine, MapDrawing, ScatterDrawing
 from reports.flown import Flown
 from reports.history_bands import fair_cases, history_bands
-from reports.numbers import axis_label, words
+from reports.numbers import axis_label, number, words
 
 POINTS_SHOWN = 2000
 PANELS_IN_A_FIGURE = 12
@@ -40,6 +40,8 @@ def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
 
 def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
     x, y, z = (flown.values(name) for name in (figure.x, figure.y, figure.metric))
+    if np.isfinite(z).any() and np.nanmin(z) == np.nanmax(z):
+        return f"{figure.title}: not drawn; it is {number(np.nanmin(z))} in all cases."
     surface = map_metric(x, y, z)
     if surface is None or not np.isfinite(surface.value).any():
         return f"{figure.title}: not drawn; the run has too few cases over {figure.x} and {figure.y} for a map."

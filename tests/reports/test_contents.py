@@ -83,6 +83,12 @@ def test_the_map_says_that_it_is_smoothed_and_from_how_many_cases(document):
     assert "of 9\u202f988 shown" in key
 
 
+def test_a_map_of_what_is_the_same_in_all_cases_is_a_sentence():
+    run = synthetic_run(n=200)
+    run.table["propellant_kg"] = 1.5
+    assert "not drawn; it is 1.5 in all cases" in said(build(run, RUN))
+
+
 def test_every_figure_has_an_alternative_text_a_key_and_units_on_its_axes(document):
     for block in blocks_of(document, FigureBlock):
         assert len(block.drawing.alternative) > 40
