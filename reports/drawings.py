@@ -40,7 +40,7 @@ def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
 
 def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
     x, y, z = (flown.values(name) for name in (figure.x, figure.y, figure.metric))
-    if np.isfinite(z).any() and np.nanmin(z) == np.nanmax(z):
+    if np.isfinite(z).sum() > 1 and np.nanmin(z) == np.nanmax(z):
         return f"{figure.title}: not drawn; it is {number(np.nanmin(z))} in all cases."
     surface = map_metric(x, y, z)
     if surface is None or not np.isfinite(surface.value).any():
