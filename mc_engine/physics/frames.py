@@ -91,3 +91,19 @@ def radius_at_altitude(
     for _ in range(6):  # altitude grows by almost a metre for a metre of radius: each step gains five digits
         r = r + altitude - over_ellipsoid(r, 1.0 / r, sin2, polar_radius, e2)[0]
     return r
+
+
+@physics
+def turned(x, y, cosine, sine):
+    """(x, y) of the same vector in axes that are turned about z by an angle, given by its cosine and sine."""
+    return cosine * x + sine * y, cosine * y - sine * x
+
+
+@physics
+def orbital_axes(x, y, z, vx, vy, vz):
+    """Unit vectors outward, transverse (ahead, across the radius) and normal to the orbit, nine numbers."""
+    u = 1.0 / sqrt(x * x + y * y + z * z)
+    hx, hy, hz = y * vz - z * vy, z * vx - x * vz, x * vy - y * vx
+    w = 1.0 / sqrt(hx * hx + hy * hy + hz * hz)
+    rx, ry, rz, nx, ny, nz = u * x, u * y, u * z, w * hx, w * hy, w * hz
+    return rx, ry, rz, ny * rz - nz * ry, nz * rx - nx * rz, nx * ry - ny * rx, nx, ny, nz

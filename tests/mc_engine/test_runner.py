@@ -124,7 +124,7 @@ def test_changed_sources_refuse_to_continue_a_run(flown, tmp_path):
     model = moved / "model.py"
     model.write_text(model.read_text().replace("burn_dv * (1.0", "burn_dv * (1.1"))
     for act in (lambda: runner.resume(moved), lambda: runner.replay(moved, 0), lambda: runner.extend(moved, 3000)):
-        with pytest.raises(StoreError, match="flown by other sources|model.py: damaged or edited"):
+        with pytest.raises(StoreError, match=r"flown by other sources|model\.py: damaged or edited"):
             act()
 
 

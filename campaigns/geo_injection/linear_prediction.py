@@ -1,0 +1,65 @@
+"""Standard deviations by linear theory beside those of flown cases: what a Monte Carlo run has to agree with.
+
+`python -m campaigns.geo_injection.linear_prediction [CAMPAIGN]` prints both for a campaign file of this folder.
+Good for metrics that are smooth in the errors, such as the semi-major axis; eccentricity, inclination and correction
+are lengths, which grow whichever sign an error has.
+"""
+
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from campaigns.geo_injection.model import MODEL
+from mc_engine.flight import fly
+
+SMOOTH = ("semi_major_axis_km", "radius_error_km", "longitude_drift_deg_day", "propellant_kg", "final_mass_kg")
+LENGTHS = ("eccentricity", "inclination_deg", "correction_dv_m_s")
+_SHARE = 0.1  # of a standard deviation: the step of the differences
+
+
+def contributions(nominal: Mapping[str, Any], sigmas: Mapping[str, float]) -> dict[str, np.ndarray]:
+    """Change of each smooth metric by one standard deviation of each dispersion, float64[n_dispersions].
+
+    nominal : inputs by column name;  sigmas : standard deviation of each dispersed input, in its unit.
+    """
+    names, n = list(sigmas), len(sigmas)
+    inputs = dict(nominal)
+    for k, name in enumerate(names):
+        step = np.zeros(2 * n)
+        step[[k, n + k]] = _SHARE * sigmas[name], -_SHARE * sigmas[name]
+        inputs[name] = float(nominal[name]) + step
+    flown = fly(MODEL, inputs, np.arange(2 * n), 0)
+    return {metric: (flown[metric][:n] - flown[metric][n:]) / (2.0 * _SHARE) for metric in SMOOTH}
+
+
+def predicted_sigmas(nominal: Mapping[str, Any], sigmas: Mapping[str, float]) -> dict[str, float]:
+    """Standard deviation of each smooth metric for independent dispersions: the root of the sum of squares."""
+    return {name: float(np.sqrt((column**2).sum())) for name, column in contributions(nominal, sigmas).items()}
+
+
+def _report(name: str, n_cases: int = 4000) -> None:
+    from mc_engine.campaign import load_campaign
+    from mc_engine.cases import case_table
+
+    campaign = load_campaign(name)
+    ids = np.arange(n_cases)
+    drawn = case_table(campaign, ids)
+    flown = fly(MODEL, {**campaign.nominal, **drawn}, ids, campaign.seed)
+    sigmas = {one.name: float(np.std(drawn[one.name], ddof=1)) for one in campaign.dispersions}
+    parts = contributions(campaign.nominal, sigmas)
+    print(f"{name}: {n_cases} cases; change by one standard deviation of each dispersion")
+    print(f"{'':28}" + "".join(f"{metric:>26}" for metric in SMOOTH))
+    for k, dispersion in enumerate(sigmas):
+        print(f"{dispersion:28}" + "".join(f"{parts[metric][k]:26.6g}" for metric in SMOOTH))
+    linear = [float(np.sqrt((parts[metric] ** 2).sum())) for metric in SMOOTH]
+    print(f"{'sigma, linear':28}" + "".join(f"{value:26.6g}" for value in linear))
+    print(f"{'sigma, flown':28}" + "".join(f"{np.std(flown[metric], ddof=1):26.6g}" for metric in SMOOTH))
+    for metric in LENGTHS:
+        spread = np.percentile(flown[metric], [50.0, 99.0])
+        print(f"{metric:28} median {spread[0]:.6g}, 99 % {spread[1]:.6g}")
+
+
+if __name__ == "__main__":
+    _report(sys.argv[1] if len(sys.argv) > 1 else "geo_injection")

@@ -1,0 +1,83 @@
+"""What a burn program is designed for: the orbits, the engine and the method, in SI; and its canonical problem."""
+
+import json
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+
+import numpy as np
+
+from campaigns.geo_injection.optimal import Problem
+from campaigns.geo_injection.staged import Orbit
+from mc_engine.physics.constants import MU_EARTH
+
+DESIGN = 1  # of the design's method: another number, and programs designed before are not taken for its own
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """radii [m], inclinations [rad], thrust [N], mass flow [kg/s], mass [kg].
+
+    between : of the staged procedure alone: (semi-major axis [m], eccentricity, plane change so far [rad]) of each
+    orbit between two burns
+    """
+
+    method: str
+    burns: int
+    initial_inclination: float
+    final_inclination: float
+    parking_radius: float
+    final_radius: float
+    thrust: float
+    mass_flow: float
+    mass: float
+    between: tuple[tuple[float, float, float], ...] = ()
+
+    @property
+    def speed_unit(self) -> float:
+        """Circular speed of the parking orbit [m/s]; section 1.2 of the digest of units: mu = radius = mass = 1."""
+        return float(np.sqrt(MU_EARTH / self.parking_radius))
+
+    @property
+    def time_unit(self) -> float:
+        """Time in which the parking orbit turns by one radian [s]."""
+        return self.parking_radius / self.speed_unit
+
+    @property
+    def exhaust(self) -> float:
+        """Exhaust speed [m/s]."""
+        return self.thrust / self.mass_flow
+
+    @property
+    def turn(self) -> float:
+        """1 where the inclination falls, -1 where it rises."""
+        return -1.0 if self.final_inclination > self.initial_inclination else 1.0
+
+    def problem(self) -> Problem:
+        """The canonical problem."""
+        acceleration = self.speed_unit / self.time_unit
+        return Problem(
+            self.burns,
+            abs(self.initial_inclination - self.final_inclination),
+            self.final_radius / self.parking_radius,
+            self.thrust / self.mass / acceleration,
+            self.mass_flow / self.mass * self.time_unit,
+        )
+
+    def orbits_between(self) -> tuple[Orbit, ...]:
+        """Canonical orbits of the staged procedure."""
+        change = abs(self.initial_inclination - self.final_inclination)
+        return tuple(Orbit(a / self.parking_radius, e, max(change - so_far, 0.0)) for a, e, so_far in self.between)
+
+    def inertial(self, vectors: np.ndarray) -> np.ndarray:
+        """Vectors [..., 3] of the design's axes (z normal to the final orbit) in axes with z to the north pole."""
+        x, y, z = vectors[..., 0], vectors[..., 1], self.turn * vectors[..., 2]
+        c, s = np.cos(self.final_inclination), np.sin(self.final_inclination)
+        return np.stack([x, c * y - s * z, s * y + c * z], axis=-1)
+
+    def record(self) -> dict[str, object]:
+        """The inputs as plain data."""
+        return {**asdict(self), "between": [list(row) for row in self.between]}
+
+    def digest(self) -> str:
+        """SHA-256 over the inputs and the design's number."""
+        return sha256(json.dumps([DESIGN, self.record()], sort_keys=True).encode()).hexdigest()

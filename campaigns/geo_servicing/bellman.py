@@ -1,0 +1,58 @@
+"""Optimal corrections under errors that grow with them: Bellman's recursion for a linear system.  NumPy.
+
+x_{k+1} = A_k x_k + B_k (1 + mu_k) u_k + C_k + xi_k with mu_k of mean zero and 1-sigma `sigma`, independent of the
+additive noise xi_k, which changes no correction.  Wanted: least mean of sum(x' G x + w u^2) + x_end' L x_end.
+Equations (3.25)-(3.30) of the source (`model.SOURCE`), where they are destroyed; their remains in (3.53)-(3.57) agree.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Corrections:
+    """u_k = -gains[k] x_k - offsets[k], and the matrices of the cost to go, `costs[k]` at step k."""
+
+    gains: np.ndarray  # float64[n, 2]
+    offsets: np.ndarray  # float64[n]
+    costs: np.ndarray  # float64[n + 1, 2, 2]
+
+
+def best_corrections(a, b, c, running, weight, terminal, sigma) -> Corrections:
+    """The corrections of least mean cost.
+
+    a : float64[n, 2, 2];  b, c : float64[n, 2];  running, terminal : float64[2, 2];  weight : w
+    """
+    n = len(a)
+    gains, offsets, costs = np.zeros((n, 2)), np.zeros(n), np.zeros((n + 1, 2, 2))
+    costs[n], linear = terminal, np.zeros(2)
+    for k in reversed(range(n)):
+        pull = costs[k + 1] @ b[k]
+        size = weight + (1.0 + sigma**2) * b[k] @ pull
+        gains[k] = a[k].T @ pull / size
+        later = costs[k + 1] @ c[k] + linear
+        offsets[k] = b[k] @ later / size
+        costs[k] = running + a[k].T @ costs[k + 1] @ a[k] - size * np.outer(gains[k], gains[k])
+        linear = (a[k] - np.outer(b[k], gains[k])).T @ later
+    return Corrections(gains, offsets, costs)
+
+
+def mean_cost(a, b, c, running, weight, terminal, sigma, corrections, first) -> float:
+    """The mean cost of any such corrections from the state `first`, by its first and second moments."""
+    mean, second, cost = np.array(first, dtype=np.float64), np.outer(first, first), 0.0
+    for k in range(len(a)):
+        gain, offset = corrections.gains[k], corrections.offsets[k]
+        u2 = gain @ second @ gain + 2.0 * offset * gain @ mean + offset**2
+        cost += np.trace(running @ second) + weight * u2
+        closed, push = a[k] - np.outer(b[k], gain), c[k] - b[k] * offset
+        cross = np.outer(closed @ mean, push)
+        second = closed @ second @ closed.T + cross + cross.T + np.outer(push, push)
+        second = second + sigma**2 * u2 * np.outer(b[k], b[k])
+        mean = closed @ mean + push
+    return float(cost + np.trace(terminal @ second))
+
+
+def planned_cost(b, costs, u, sigma) -> float:
+    """Mean cost that the execution errors of planned corrections u [n] leave, the later ones answering the earlier."""
+    return float(sum(sigma**2 * u[k] ** 2 * b[k] @ costs[k + 1] @ b[k] for k in range(len(u))))

@@ -1,0 +1,232 @@
+"""What happens between coasts: ignitions, cut-offs, decisions, and the looks at what a transfer has come to.
+
+A flight waits for one thing at a time, which is due at a time that the memory holds.  Phasing follows its plan, with
+feedback on what navigation tells at ignition; the inspection decides for itself, burn after burn.
+"""
+
+from collections import namedtuple
+
+from campaigns.geo_servicing import plan_table
+from campaigns.geo_servicing.dynamics import (
+    INSPECTION,
+    MU,
+    PHASING,
+    RATE,
+    SIDEREAL_DAY,
+    TURN,
+    V0,
+    Memory,
+    longitudes,
+)
+from campaigns.geo_servicing.inspection import PAIRS, next_coast, next_pair, relative_orbit, velocity_change
+from campaigns.geo_servicing.navigation import FILTERED, burnt, estimate_of
+from mc_engine.lanes import any_lane, atan, exp, maximum, physics, rint, sincos, sqrt, where
+from mc_engine.physics.frames import orbital_axes
+from mc_engine.physics.orbital_elements import equinoctial
+from mc_engine.physics.radiation import discs
+from mc_engine.physics.sun_moon import ephemeris
+
+Events = namedtuple("Events", "due settle penumbra umbra")
+# push: commanded thrust ahead [N]; tilts: sines of the pointing errors outward and to the normal
+Burn = namedtuple("Burn", "dv length outward ahead across")
+IGNITION, CUT_OFF, DECISION, DAY_LATER, NOTHING = 0.0, 1.0, 2.0, 3.0, 4.0
+NEVER = 1e15  # s
+FIRST_LOOK = 1.0  # s: the inspection decides first when the first fix is there
+SHORTEST_BURN = 1e-6  # s
+MISSING = float("nan")
+DRIFT_PER_DV = -3.0 * TURN / V0  # rad/rev per m/s, first order about the geostationary orbit
+
+
+@physics
+def start(p, o):
+    """Before the first sample: what is due first."""
+    zero = 0.0 * p.x
+    due, mode = zero + NEVER, zero + NOTHING
+    if o.phase == PHASING:
+        none = plan_table.corrections(o.tables) < 0.5
+        due = zero + where(none, NEVER, plan_table.planned(o.tables, 0.0, plan_table.IGNITION))
+        mode = zero + where(none, NOTHING, IGNITION)
+    elif o.phase == INSPECTION:
+        due, mode = zero + maximum(o.observation, FIRST_LOOK), zero + DECISION
+    gone = zero + MISSING
+    return Memory(
+        due, mode, zero, zero, zero, zero, zero, zero, zero,
+        gone, gone, gone, gone, gone, gone, gone, gone, gone,
+        zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero,
+    )  # fmt: skip
+
+
+@physics
+def events(t, s, m, p, o):
+    """What is due, when the inspection counts as settled, and the edges of the Earth's shadow.
+
+    At the edges nothing is done: steps end there, since the light has corners that no step may go over.
+    """
+    penumbra, umbra = 1.0 + 0.0 * t, 1.0 + 0.0 * t
+    if o.sunlight > 0.5:
+        sx, sy, sz, _, _, _ = ephemeris(p.sun_moon_time + t, o.tables, p.sun_moon)
+        sun, earth, apart = discs(s.x, s.y, s.z, sx, sy, sz)
+        penumbra, umbra = apart - earth - sun, apart - earth + sun
+    return Events(t - m.due, t - o.settle_time, penumbra, umbra)
+
+
+@physics
+def drift_of(a):
+    """Drift [rad/rev], east positive, of an orbit of semi-major axis a [m]: 2 pi (T0 - T)/T."""
+    return TURN * (SIDEREAL_DAY / (TURN * a * sqrt(a / MU)) - 1.0)
+
+
+@physics
+def navigated(t, s, m, p):
+    """(mean longitude deviation [rad], drift [rad/rev]) as navigation tells them."""
+    rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
+    x = equinoctial(
+        s.x + m.r * rx + m.s * ax,
+        s.y + m.r * ry + m.s * ay,
+        s.z + m.r * rz + m.s * az,
+        s.vx + m.u * rx + m.w * ax,
+        s.vy + m.u * ry + m.w * ay,
+        s.vz + m.u * rz + m.w * az,
+        MU,
+    )
+    mean = x.mean - (p.aim + RATE * t)
+    return mean - TURN * rint(mean / TURN), drift_of(x.a)
+
+
+@physics
+def phasing_change(t, s, m, p, o):
+    """Velocity change [m/s] of the present correction: the plan's, and feedback on the deviation from the plan."""
+    dv = plan_table.planned(o.tables, m.burns, plan_table.DV)
+    if o.feedback > 0.5:
+        y, v = navigated(t, s, m, p)
+        y = y - plan_table.planned(o.tables, m.burns, plan_table.LONGITUDE)
+        v = v - plan_table.planned(o.tables, m.burns, plan_table.DRIFT)
+        gain_y = plan_table.planned(o.tables, m.burns, plan_table.GAIN_Y)
+        gain_v = plan_table.planned(o.tables, m.burns, plan_table.GAIN_V)
+        dv = dv - (gain_y * y + gain_v * v) / DRIFT_PER_DV
+    return dv
+
+
+@physics
+def of_burn(k, a, b, c, d, e):
+    """The number that belongs to burn k, counted from 0."""
+    return where(k < 0.5, a, where(k < 1.5, b, where(k < 2.5, c, where(k < 3.5, d, e))))
+
+
+@physics
+def execution(m, p, o):
+    """(thrust error, tilt outward [rad], tilt to the normal [rad]) of the present burn.
+
+    In phasing those of the case; in the inspection fresh ones, besides what holds for all its burns.
+    """
+    thrust = of_burn(m.burns, p.thrust_1, p.thrust_2, p.thrust_3, p.thrust_4, p.thrust_5)
+    radial = of_burn(m.burns, p.radial_1, p.radial_2, p.radial_3, p.radial_4, p.radial_5)
+    normal = of_burn(m.burns, p.normal_1, p.normal_2, p.normal_3, p.normal_4, p.normal_5)
+    if o.phase == INSPECTION:
+        thrust = thrust + p.thrust_noise * m.d1
+        radial, normal = radial + p.pointing_noise * m.d2, normal + p.pointing_noise * m.d3
+    return thrust, radial, normal
+
+
+@physics
+def ignited(t, s, m, p, o):
+    """The burn that begins now."""
+    dv = (
+        phasing_change(t, s, m, p, o)
+        if o.phase == PHASING
+        else velocity_change(relative_orbit(s, m), 1.0 - m.second, p, o)
+    )
+    length = s.mass * p.exhaust / p.thrust * (1.0 - exp(-abs(dv) / p.exhaust))
+    error, radial, normal = execution(m, p, o)
+    push = p.thrust * (1.0 + error)
+    sine_r, cosine_r = sincos(radial)
+    sine_n, cosine_n = sincos(normal)
+    ahead = where(dv < 0.0, -push, push)
+    return Burn(
+        dv,
+        maximum(length, SHORTEST_BURN),
+        ahead * sine_r,
+        ahead * cosine_r * cosine_n,
+        ahead * cosine_r * sine_n,
+    )
+
+
+@physics
+def learnt(m, p, o, cut):
+    """The estimate after a burn, where `cut` holds."""
+    e = estimate_of(m)
+    if o.navigation == FILTERED:
+        # what the burn gave: the command, stretched and tilted
+        size = where(cut, abs(m.dv), 0.0)
+        outward, ahead = size * m.outward / p.thrust, size * m.ahead / p.thrust
+        e = burnt(e, outward, ahead - where(cut, m.dv, 0.0), size, o.assumed_thrust, o.assumed_pointing)
+    return e
+
+
+@physics
+def inspection_coast(s, m, e, cut, p, o):
+    """(coast [rev] from now, 1 if it ends with a burn, 1 if that is the second of a pair); e : the estimate."""
+    x = relative_orbit(s, e)
+    if o.inspection_law == PAIRS:
+        second = where(cut, 1.0 - m.second, 0.0)
+        coast, found = where(second > 0.5, 0.5, next_pair(x, p)), 1.0 + 0.0 * second
+    else:
+        coast, found = next_coast(x, p, o)
+        second = 0.0 * coast
+    return coast, found, second
+
+
+@physics
+def switch(t, s, m, p, o, hit):
+    """Do what is due, and say what is due next."""
+    now = hit.due > 0.5
+    ignite, cut = now & (m.mode == IGNITION), now & (m.mode == CUT_OFF)
+    decide, day = now & (m.mode == DECISION), now & (m.mode == DAY_LATER)
+    e = learnt(m, p, o, cut)
+    due, mode, second, over = m.due, m.mode, m.second, cut & (not cut)
+    if o.phase == PHASING:
+        burns = m.burns + where(cut, 1.0, 0.0)
+        n = plan_table.corrections(o.tables)
+        over = cut & (burns > n - 0.5)
+        following = plan_table.planned(o.tables, where(burns > n - 0.5, n - 1.0, burns), plan_table.IGNITION)
+        due = where(cut, where(over, t + SIDEREAL_DAY, maximum(following, t + 1.0)), due)
+        mode = where(cut, where(over, DAY_LATER, IGNITION), mode)
+        due, mode = where(day, NEVER, due), where(day, NOTHING, mode)
+    else:
+        deciding = cut | decide
+        if any_lane(deciding):
+            coast, found, second = inspection_coast(s, m, e, cut, p, o)
+            due = where(deciding, t + SIDEREAL_DAY * coast, due)
+            mode = where(deciding, where(found > 0.5, IGNITION, DECISION), mode)
+            second = where(deciding, second, m.second)
+    outward, ahead, across, dv = m.outward, m.ahead, m.across, m.dv
+    if any_lane(ignite):
+        burn = ignited(t, s, m, p, o)
+        due, mode, dv = where(ignite, t + burn.length, due), where(ignite, CUT_OFF, mode), where(ignite, burn.dv, dv)
+        outward, ahead = where(ignite, burn.outward, outward), where(ignite, burn.ahead, ahead)
+        across = where(ignite, burn.across, across)
+    end = ended(t, s, m, p, over, day)
+    return s, Memory(
+        due, mode, m.burns + where(cut, 1.0, 0.0),
+        where(cut, 0.0, outward), where(cut, 0.0, ahead), where(cut, 0.0, across), dv,
+        where(hit.settle > 0.5, 1.0, m.settled), second, *end,
+        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww, m.d1, m.d2, m.d3,
+    )  # fmt: skip
+
+
+@physics
+def ended(t, s, m, p, over, day):
+    """What is kept of the transfer's end: at the last cut-off, and a sidereal day later."""
+    true, mean, x = longitudes(t, s, p)
+    e, tilt = sqrt(x.k * x.k + x.h * x.h), 2.0 * atan(sqrt(x.q * x.q + x.p * x.p))
+    return (
+        where(over, t, m.end_time),
+        where(over, true, m.end_true),
+        where(over, mean, m.end_mean),
+        where(over, drift_of(x.a), m.end_drift),
+        where(over, e, m.end_e),
+        where(over, tilt, m.end_inclination),
+        where(over, s.longitude_sum, m.end_sum),
+        where(day, (s.longitude_sum - m.end_sum) / SIDEREAL_DAY, m.day_mean),
+        where(day, mean - m.end_mean, m.day_drift),
+    )

@@ -1,0 +1,88 @@
+"""Angular motion near a geostationary place to first order, and first approximations of a phasing.  NumPy.
+
+Longitudes in the unit of the drift, drift per revolution (sidereal day), east positive; times in revolutions unless a
+name says otherwise.  Numbers in brackets are equations of the source (`model.SOURCE`).
+"""
+
+import numpy as np
+
+from campaigns.geo_servicing.dynamics import R0, RATE, TURN, V0
+
+DRIFT_PER_DV = -3.0 * TURN / V0  # rad/rev per m/s of a transverse impulse
+E_PER_DV = 2.0 / V0  # length of the eccentricity vector per m/s of it
+
+
+def longitude_after(y, v, e, anomaly, flown):
+    """Longitude deviation [rad] after an angle flown [rad]; y, v : of it and its drift [rad, rad/rev].  (3.36)"""
+    return y + v * flown / TURN + 4.0 * e * np.sin(0.5 * flown) * np.cos(anomaly + 0.5 * flown)
+
+
+def radius_deviation(v, e, anomaly, flown):
+    """Radius less the synchronous one [m] after an angle flown [rad].  (3.38)-(3.40)"""
+    return R0 * (-v / (1.5 * TURN) - e * np.cos(anomaly + flown))
+
+
+def relative_eccentricity(e_s, anomaly_s, e_t, anomaly_t):
+    """(length of the difference of two eccentricity vectors, anomaly on the relative ellipse [rad]).  (3.43), (3.44)
+
+    The pericentres point alike.
+    """
+    along = e_s * np.cos(anomaly_s) - e_t * np.cos(anomaly_t)
+    across = e_s * np.sin(anomaly_s) - e_t * np.sin(anomaly_t)
+    return np.hypot(along, across), np.arctan2(across, along)
+
+
+def perturbation_coefficients(transverse, radial):
+    """(b_s [rad/rev^2], b_r [rad/rev]) of mean accelerations [m/s^2] ahead and outward, section 4.1 of the source.
+
+    Over a coast t the longitude gains b_s t^2 + b_r t and the drift 2 b_s t.
+    """
+    revolution = TURN / RATE
+    return -1.5 * RATE / V0 * transverse * revolution**2, -2.0 * radial / V0 * revolution
+
+
+def after_correction(y, v, u, t, b_s=0.0, b_r=0.0):
+    """(longitude, drift) a coast t after a correction u.  (3.46)"""
+    return y + (v + u) * t + b_s * t * t + b_r * t, v + u + 2.0 * b_s * t
+
+
+def two_impulses(y, v, first, second):
+    """Corrections (u1, u2) that bring longitude and drift to zero over two coasts."""
+    u1 = -(y + v * (first + second)) / second
+    return u1, -v - u1
+
+
+def corrections_for(e_first, e_last, step):
+    """Number of corrections that bring the eccentricity down, each by `step` at most."""
+    return int((e_first - e_last) / step) + 1
+
+
+def largest_last(y_tolerance, v_tolerance, e_change, sigma, rest):
+    """Largest last correction [deg/rev] whose execution error leaves the end within its tolerances (3 sigma).
+
+    Tolerances in deg and deg/rev;  e_change : what it may do to the eccentricity;  rest : time to the check [rev]
+    """
+    return min(y_tolerance / (3.0 * sigma * rest), v_tolerance / (3.0 * sigma), 540.0 * e_change)
+
+
+def braking(y, v, last, shortest):
+    """(corrections, coasts before them) that only brake: the cheapest profile.  (3.32)-(3.35)
+
+    last : size of the last correction;  shortest : float64[n], least coasts
+    """
+    n, sign = len(shortest), np.sign(v)
+    u = np.full(n, -(abs(v) - last) / (n - 1) * sign)
+    u[-1] = -last * sign
+    t = np.array(shortest, dtype=np.float64)
+    drift = v + np.concatenate([[0.0], np.cumsum(u)[:-1]])
+    t[0] = max(t[0], -(y + (drift[1:] * t[1:]).sum()) / v)
+    return u, t
+
+
+def fastest(y, v, last, shortest):
+    """(corrections, coasts) that hurry first and brake then: the first as of two impulses, the rest as in `braking`."""
+    t = np.array(shortest, dtype=np.float64)
+    u1, _ = two_impulses(y, v, t[0], t[1:].sum())
+    after = y + v * t[0], v + u1
+    u, rest = braking(*after, last, t[1:]) if len(t) > 2 else (np.array([-after[1]]), t[1:])
+    return np.concatenate([[u1], u]), np.concatenate([t[:1], rest])

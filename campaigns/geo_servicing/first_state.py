@@ -1,0 +1,68 @@
+"""Where a flight begins: states from elements, for whole chunks of cases.  NumPy, SI, radians."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from campaigns.geo_servicing.dynamics import MU, TURN
+from mc_engine.model import Refusals
+
+_AXES = ("x", "y", "z", "vx", "vy", "vz")
+
+
+def state_of(a, e, inclination, node, pericentre, anomaly) -> np.ndarray:
+    """Place [m] and velocity [m/s], float64[6, n], of an orbit of semi-major axis a [m].
+
+    Montenbruck, Gill, Satellite Orbits, eqs (2.43)-(2.51).
+    """
+    parameter = a * (1.0 - e * e)
+    r, speed = parameter / (1.0 + e * np.cos(anomaly)), np.sqrt(MU / parameter)
+    ci, si, cn, sn = np.cos(inclination), np.sin(inclination), np.cos(node), np.sin(node)
+    cp, sp = np.cos(pericentre), np.sin(pericentre)
+    p = np.array([cp * cn - sp * ci * sn, cp * sn + sp * ci * cn, sp * si])
+    q = np.array([-sp * cn - cp * ci * sn, -sp * sn + cp * ci * cn, cp * si])
+    place = r * (np.cos(anomaly) * p + np.sin(anomaly) * q)
+    return np.concatenate([place, speed * (-np.sin(anomaly) * p + (e + np.cos(anomaly)) * q)])
+
+
+def above_longitude(right_ascension, inclination, node) -> np.ndarray:
+    """Argument of latitude [rad] at which an orbit passes a right ascension."""
+    ahead = right_ascension - node
+    return np.arctan2(np.sin(ahead) / np.cos(inclination), np.cos(ahead))
+
+
+def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals) -> dict[str, np.ndarray]:
+    """The servicing module above its longitude, osculating elements; sidereal : angle [rad] at the start."""
+    period = o.initial_period + i.initial_period_error
+    e = o.initial_eccentricity + i.initial_eccentricity_error
+    # a negative error of a small eccentricity is one to the other side of the orbit
+    anomaly = o.initial_true_anomaly + i.initial_true_anomaly_error + np.where(e < 0.0, np.pi, 0.0)
+    e = np.abs(e)
+    inclination = o.initial_inclination + i.initial_inclination_error
+    refusals.add(~((period > 0.0) & (e < 0.9)), "the first orbit is none: its period or its eccentricity is impossible")
+    a = np.cbrt(MU * (period / TURN) ** 2)
+    right_ascension = sidereal + o.initial_longitude + i.initial_longitude_error
+    latitude = above_longitude(right_ascension, inclination, o.initial_node)
+    state = state_of(a, e, inclination, o.initial_node, latitude - anomaly, anomaly)
+    return dict(zip(_AXES, state, strict=True))
+
+
+def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
+    """State float64[6, n] of the craft whose parameters begin with `name`."""
+    e, pericentre = getattr(i, f"{name}_eccentricity"), getattr(i, f"{name}_argument_of_pericentre")
+    return state_of(
+        getattr(i, f"{name}_pericentre_radius") / (1.0 - e),
+        e,
+        getattr(i, f"{name}_inclination"),
+        getattr(i, f"{name}_node"),
+        pericentre,
+        getattr(i, f"{name}_argument_of_latitude") - pericentre,
+    )
+
+
+def first_states(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals, two) -> dict[str, np.ndarray]:
+    """Rows of the first state of both craft; two : bool[n], the inspection, in which the second flies."""
+    one = phasing_start(i, o, sidereal, refusals)
+    module, target = craft_start(i, "module"), craft_start(i, "target")
+    rows = {axis: np.where(two, module[k], one[axis]) for k, axis in enumerate(_AXES)}
+    return rows | {f"t{axis}": np.where(two, target[k], 0.0) for k, axis in enumerate(_AXES)}

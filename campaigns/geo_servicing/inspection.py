@@ -1,0 +1,142 @@
+"""The inspection law: when to correct, and by how much, so that the module stays at its place beside the target.
+
+Numbers in brackets are equations of the source (`model.SOURCE`); the procedure around them is the README's.
+"""
+
+from collections import namedtuple
+
+from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, TURN
+from mc_engine.lanes import atan, atan2, floor, maximum, minimum, physics, rint, sincos, sqrt, where
+from mc_engine.physics.frames import orbital_axes
+from mc_engine.physics.orbital_elements import equinoctial
+
+# along: mean distance ahead of the target [m], drift of it [m/rev]; e: length of the difference of the eccentricity
+# vectors, phase: anomaly on the relative ellipse [rad], 0 where the module is lowest
+Relative = namedtuple("Relative", "along drift e phase")
+SHORTEST = 21_600.0 / SIDEREAL_DAY  # rev: coasts last six hours at least
+PAIRS = 1.0
+LAST = 0.25  # rev by which a coast may fall short of its whole revolutions
+
+
+@physics
+def correction(y, v, t, chi1, chi2, weight, sigma):
+    """Change of the drift by the correction law (3.57), in the unit of v.
+
+    y : deviation from the nominal separation;  v : its drift per revolution;  t : coast that follows [rev]
+    chi1, chi2 : L22/L11 [rev^2] and L12/L11 [rev] of the terminal matrix;  weight : w/L11;  sigma : of the execution
+    """
+    q = t * t + 2.0 * chi2 * t + chi1
+    return -((t + chi2) * y + q * v) / (weight + (1.0 + sigma * sigma) * q)
+
+
+@physics
+def coast_time(e_s, theta_s, e_t, theta_t, u, turns):
+    """Coast [s] to the place where a correction u makes the relative ellipse smaller (3.45).
+
+    e, theta : eccentricities and anomalies [rad] of the module and the target, pericentres alike;  turns : m_k
+    """
+    sine_s, cosine_s = sincos(theta_s)
+    sine_t, cosine_t = sincos(theta_t)
+    a = e_s * cosine_s - e_t * cosine_t
+    alpha = atan((e_s * sine_s - e_t * sine_t) / a)
+    sign = where(u * a > 0.0, 1.0, where(u * a < 0.0, -1.0, 0.0))
+    return SIDEREAL_DAY * (turns + 0.25 * (1.0 - sign)) - alpha / RATE
+
+
+@physics
+def relative_orbit(s, m):
+    """The module's motion about the target, as navigation tells it."""
+    rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
+    one = equinoctial(
+        s.x + m.r * rx + m.s * ax,
+        s.y + m.r * ry + m.s * ay,
+        s.z + m.r * rz + m.s * az,
+        s.vx + m.u * rx + m.w * ax,
+        s.vy + m.u * ry + m.w * ay,
+        s.vz + m.u * rz + m.w * az,
+        MU,
+    )
+    other = equinoctial(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz, MU)
+    ahead = one.mean - other.mean
+    dk, dh = one.k - other.k, one.h - other.h
+    return Relative(
+        R0 * (ahead - TURN * rint(ahead / TURN)),
+        -1.5 * TURN * R0 * (one.a - other.a) / other.a,
+        sqrt(dk * dk + dh * dh),
+        one.true - atan2(dh, dk),
+    )
+
+
+@physics
+def wait_until(x, phase, least):
+    """Coast [rev] from now to the next time that the relative ellipse has this phase, `least` or more."""
+    share = (phase - x.phase) / TURN
+    share = share - floor(share)
+    return share + maximum(-floor(share - least), 0.0)
+
+
+@physics
+def candidate(x, phase, sign, p, o):
+    """(coast [rev], 1 if the law asks there for a correction of this sign)."""
+    least = maximum(SHORTEST, p.coast - LAST)
+    wait = wait_until(x, phase, least)
+    u = correction(x.along - p.nominal + x.drift * wait, x.drift, p.coast, p.chi1, p.chi2, p.weight, o.assumed_thrust)
+    return wait, where(u * sign > 0.0, 1.0, 0.0)
+
+
+@physics
+def next_coast(x, p, o):
+    """(coast [rev] to the next correction, 1 if there is one); without one, look again a revolution later.
+
+    A relative ellipse that is wider than wanted is corrected where that makes it narrower, and the other way about.
+    """
+    narrow = x.e < p.around
+    high = where(narrow, 0.5 * TURN, 0.0)
+    wait_down, down = candidate(x, high, 1.0, p, o)  # u > 0: braking
+    wait_up, up = candidate(x, 0.5 * TURN - high, -1.0, p, o)
+    wait = minimum(where(down > 0.5, wait_down, 1e3), where(up > 0.5, wait_up, 1e3))
+    found = wait < 1e3
+    return where(found, wait, 1.0), where(found, 1.0, 0.0)
+
+
+@physics
+def next_pair(x, p):
+    """Coast [rev] to the first burn of a pair: to the next end of the relative ellipse that is far enough away."""
+    least = maximum(SHORTEST, p.coast - LAST)
+    return minimum(wait_until(x, 0.0, least), wait_until(x, 0.5 * TURN, least))
+
+
+@physics
+def first_of_pair(x, p, o):
+    """Change of the drift [m/rev] now, half a revolution before that of the law, that takes the relative ellipse away.
+
+    Both together change the eccentricity vectors' difference by what is too much of it, u_a - u_p = -+E with E the
+    drift that belongs to V0 (e - wanted)/2, and u_p is the law's at its own time; two equations, solved for u_a.
+    """
+    q = p.coast * p.coast + 2.0 * p.chi2 * p.coast + p.chi1
+    size = p.weight + (1.0 + o.assumed_thrust * o.assumed_thrust) * q
+    g_y, g_v = (p.coast + p.chi2) / size, q / size
+    low = _low(x)
+    apart = low * 1.5 * TURN * R0 * (x.e - p.around)  # drift of V0 e/2: 6 pi/w V0 e/2 = 3 pi R0 e
+    y = x.along - p.nominal
+    feedback = -g_y * (y + 0.5 * x.drift) - g_v * x.drift
+    return (feedback + apart) / (1.0 + 0.5 * g_y + g_v)
+
+
+@physics
+def _low(x):
+    """1 in the lower half of the relative ellipse, -1 in the upper one."""
+    phase = x.phase - TURN * rint(x.phase / TURN)
+    return where(abs(phase) < 0.25 * TURN, 1.0, -1.0)
+
+
+@physics
+def velocity_change(x, first, p, o):
+    """Transverse velocity change [m/s] that the law asks for now: -u w / (6 pi), u in m/rev.
+
+    first : 1 for the first burn of a pair
+    """
+    u = correction(x.along - p.nominal, x.drift, p.coast, p.chi1, p.chi2, p.weight, o.assumed_thrust)
+    if o.inspection_law == PAIRS:
+        u = where(first > 0.5, first_of_pair(x, p, o), u)
+    return -u * RATE / (3.0 * TURN)

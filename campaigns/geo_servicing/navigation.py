@@ -1,0 +1,147 @@
+"""Navigation: what is known of the servicing module, single fixes or a filter that works on them.
+
+The estimate is the true state plus an error; the error is what is kept.  It has four components, place [m] and velocity
+[m/s] outward and ahead: the motion out of the plane is not controlled and does not act on the one in it.  In the
+inspection the error is that of the relative navigation of both craft.
+
+The filter is a Kalman filter on Hill's equations.  Its error obeys the same equations without the model's help, so no
+estimate need be integrated beside the flight: between fixes error and covariance go on by Hill's solution, a fix takes
+its share off both, and a burn adds what it did differently from the command.
+
+R. E. Kalman, Journal of Basic Engineering 82 (1960) 35-45; G. W. Hill, American Journal of Mathematics 1 (1878) 5-26.
+"""
+
+from collections import namedtuple
+
+from campaigns.geo_servicing.dynamics import RATE, Memory
+from mc_engine.lanes import physics, sincos, where
+from mc_engine.lanes.noise import normal_pair
+
+# error and covariance of the estimate
+Estimate = namedtuple("Estimate", "r s u w prr prs pru prw pss psu psw puu puw pww")
+RAW, FILTERED = 1.0, 2.0
+
+
+@physics
+def hill(r, s, u, w, sine, cosine, t):
+    """Deviation from a circular orbit t [s] later; sine, cosine of the angle flown.
+
+    r, s : outward and ahead [m];  u, w : the inertial velocity's deviation along the turning axes [m/s]
+    """
+    n = RATE
+    across = w - n * r  # rates seen in the turning axes
+    along = u + n * s
+    r1 = (4.0 - 3.0 * cosine) * r + (sine * along + 2.0 * (1.0 - cosine) * across) / n
+    s1 = s + 6.0 * (sine - n * t) * r + (-2.0 * (1.0 - cosine) * along + (4.0 * sine - 3.0 * n * t) * across) / n
+    along1 = 3.0 * n * sine * r + cosine * along + 2.0 * sine * across
+    across1 = -6.0 * n * (1.0 - cosine) * r - 2.0 * sine * along + (4.0 * cosine - 3.0) * across
+    return r1, s1, along1 - n * s1, across1 + n * r1
+
+
+@physics
+def propagated(e, t, noise):
+    """The estimate t [s] later; noise : 1-sigma of the velocity [m/s] that unknown forces add to either axis."""
+    sine, cosine = sincos(RATE * t)
+    r, s, u, w = hill(e.r, e.s, e.u, e.w, sine, cosine, t)
+    # the covariance: its columns go on like errors, then its rows
+    a0, a1, a2, a3 = hill(e.prr, e.prs, e.pru, e.prw, sine, cosine, t)
+    b0, b1, b2, b3 = hill(e.prs, e.pss, e.psu, e.psw, sine, cosine, t)
+    c0, c1, c2, c3 = hill(e.pru, e.psu, e.puu, e.puw, sine, cosine, t)
+    d0, d1, d2, d3 = hill(e.prw, e.psw, e.puw, e.pww, sine, cosine, t)
+    prr, prs, pru, prw = hill(a0, b0, c0, d0, sine, cosine, t)
+    _, pss, psu, psw = hill(a1, b1, c1, d1, sine, cosine, t)
+    _, _, puu, puw = hill(a2, b2, c2, d2, sine, cosine, t)
+    _, _, _, pww = hill(a3, b3, c3, d3, sine, cosine, t)
+    q = noise * noise
+    return Estimate(r, s, u, w, prr, prs, pru, prw, pss, psu, psw, puu + q, puw, pww + q)
+
+
+@physics
+def first_measured(e, error, variance):
+    """The estimate after a measurement of its first component with this error."""
+    inverse = 1.0 / (e.prr + variance)
+    kr, ks, ku, kw = e.prr * inverse, e.prs * inverse, e.pru * inverse, e.prw * inverse
+    news = error - e.r
+    return Estimate(
+        e.r + kr * news, e.s + ks * news, e.u + ku * news, e.w + kw * news,
+        variance * kr, variance * ks, variance * ku, variance * kw,
+        e.pss - ks * e.prs, e.psu - ks * e.pru, e.psw - ks * e.prw,
+        e.puu - ku * e.pru, e.puw - ku * e.prw, e.pww - kw * e.prw,
+    )  # fmt: skip
+
+
+@physics
+def rotated(e):
+    """The same estimate with its components in the order s, u, w, r."""
+    return Estimate(
+        e.s, e.u, e.w, e.r, e.pss, e.psu, e.psw, e.prs, e.puu, e.puw, e.pru, e.pww, e.prw, e.prr,
+    )  # fmt: skip
+
+
+@physics
+def fixed(e, n1, n2, n3, n4, place, velocity):
+    """The estimate after a fix with errors n times the 1-sigma of place [m] and velocity [m/s]."""
+    place2, velocity2 = place * place, velocity * velocity
+    e = rotated(first_measured(e, place * n1, place2))
+    e = rotated(first_measured(e, place * n2, place2))
+    e = rotated(first_measured(e, velocity * n3, velocity2))
+    return rotated(first_measured(e, velocity * n4, velocity2))
+
+
+@physics
+def single_fix(n1, n2, n3, n4, place, velocity):
+    """The estimate that one fix alone gives."""
+    zero = 0.0 * n1
+    a, b = place * place + zero, velocity * velocity + zero
+    return Estimate(
+        place * n1, place * n2, velocity * n3, velocity * n4, a, zero, zero, zero, a, zero, zero, b, zero, b
+    )
+
+
+@physics
+def burnt(e, outward, ahead, dv, thrust_sigma, pointing_sigma):
+    """The estimate after a burn of dv [m/s] that gave so much more than commanded outward and ahead [m/s]."""
+    a, b = pointing_sigma * dv, thrust_sigma * dv
+    return Estimate(
+        e.r, e.s, e.u - outward, e.w - ahead,
+        e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu + a * a, e.puw, e.pww + b * b,
+    )  # fmt: skip
+
+
+@physics
+def estimate_of(m):
+    """The part of the memory that is the estimate."""
+    return Estimate(m.r, m.s, m.u, m.w, m.prr, m.prs, m.pru, m.prw, m.pss, m.psu, m.psw, m.puu, m.puw, m.pww)
+
+
+@physics
+def control(t, s, m, p, o, draws):
+    """A fix, if there are any, and fresh deviates for the burn that may come before the next."""
+    n1, n2 = normal_pair(draws, 0)
+    n3, n4 = normal_pair(draws, 1)
+    d1, d2 = normal_pair(draws, 2)
+    d3, _ = normal_pair(draws, 3)
+    e = estimate_of(m)
+    if o.navigation == RAW:
+        e = single_fix(n1, n2, n3, n4, p.nav_position, p.nav_velocity)
+    elif o.navigation == FILTERED:
+        alone = single_fix(n1, n2, n3, n4, p.nav_position, p.nav_velocity)
+        going = propagated(e, o.fix_period, o.filter_noise * o.fix_period)
+        going = fixed(going, n1, n2, n3, n4, p.nav_position, p.nav_velocity)
+        e = chosen(t > 0.0, going, alone)
+    return Memory(
+        m.due, m.mode, m.burns, m.outward, m.ahead, m.across, m.dv, m.settled, m.second,
+        m.end_time, m.end_true, m.end_mean, m.end_drift, m.end_e, m.end_inclination, m.end_sum, m.day_mean, m.day_drift,
+        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww, d1, d2, d3,
+    )  # fmt: skip
+
+
+@physics
+def chosen(mask, a, b):
+    """Estimate a where the mask holds, b elsewhere."""
+    return Estimate(
+        where(mask, a.r, b.r), where(mask, a.s, b.s), where(mask, a.u, b.u), where(mask, a.w, b.w),
+        where(mask, a.prr, b.prr), where(mask, a.prs, b.prs), where(mask, a.pru, b.pru), where(mask, a.prw, b.prw),
+        where(mask, a.pss, b.pss), where(mask, a.psu, b.psu), where(mask, a.psw, b.psw),
+        where(mask, a.puu, b.puu), where(mask, a.puw, b.puw), where(mask, a.pww, b.pww),
+    )  # fmt: skip

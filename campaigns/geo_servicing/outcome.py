@@ -1,0 +1,150 @@
+"""What is seen along a flight and what it comes to: quantities and metrics.  SI, radians."""
+
+from collections import namedtuple
+
+from campaigns.geo_servicing.corrections import drift_of
+from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, SIDEREAL_DAY, TURN, longitudes
+from campaigns.geo_servicing.inspection import relative_orbit
+from mc_engine.lanes import atan, log, physics, sqrt, where
+from mc_engine.model import Extremum, Field
+from mc_engine.physics.frames import orbital_axes
+
+FAR = 1e9  # m, a range that is none
+
+QUANTITIES = (
+    Field("longitude_deviation_deg", "deg", "longitude less the required one, of the servicing module"),
+    Field("mean_longitude_deviation_deg", "deg", "the same of its osculating mean longitude"),
+    Field("drift_rate_deg_rev", "deg/rev", "drift by the osculating period, east positive"),
+    Field("period_error_s", "s", "osculating period less the sidereal day"),
+    Field("eccentricity", "", "osculating eccentricity"),
+    Field("inclination_deg", "deg", "osculating inclination"),
+    Field("thrust_n", "N", "thrust ahead"),
+    Field("delta_v_m_s", "m/s", "characteristic velocity so far"),
+    Field("along_track_m", "m", "module ahead of the target, along the target's transverse axis"),
+    Field("radial_m", "m", "module above the target, along its radius"),
+    Field("range_m", "m", "distance of the two craft"),
+    Field("settled_range_m", "m", "the same once settle_time_days have passed; 0 before"),
+    Field("settled_nearness_m", "m", "minus the range once settle_time_days have passed; far below before"),
+    Field("relative_drift_m", "m", "drift of the module past the target in a revolution, by osculating elements"),
+    Field("relative_eccentricity", "", "length of the difference of the eccentricity vectors"),
+    Field("corrections", "", "burns so far"),
+)
+EXTREMA = (
+    Extremum("eccentricity", "eccentricity"),
+    Extremum("far", "range_m"),
+    Extremum("near", "range_m", "min"),
+    Extremum("settled_far", "settled_range_m"),
+    Extremum("settled_near", "settled_nearness_m"),
+)
+METRICS = (
+    Field("longitude_deviation_deg", "deg", "longitude less the required one at the end of the transfer"),
+    Field("mean_longitude_deviation_deg", "deg", "the same of the osculating mean longitude"),
+    Field("daily_mean_longitude_deviation_deg", "deg", "mean of the longitude deviation over the sidereal day after"),
+    Field("drift_rate_deg_rev", "deg/rev", "drift by the osculating period at the end of the transfer"),
+    Field("actual_drift_rate_deg_rev", "deg/rev", "what the mean longitude changes in the sidereal day after"),
+    Field("period_error_s", "s", "osculating period less the sidereal day at the end of the transfer"),
+    Field("actual_period_error_s", "s", "the same by the actual drift"),
+    Field("eccentricity", "", "osculating eccentricity at the end of the transfer"),
+    Field("peak_eccentricity", "", "largest osculating eccentricity of the flight"),
+    Field("inclination_deg", "deg", "osculating inclination at the end of the transfer"),
+    Field("delta_v_m_s", "m/s", "characteristic velocity"),
+    Field("transfer_time_s", "s", "end of the last burn of the phasing"),
+    Field("corrections", "", "burns"),
+    Field("final_longitude_deviation_deg", "deg", "longitude less the required one at the end of the flight"),
+    Field("final_eccentricity", "", "osculating eccentricity at the end of the flight"),
+    Field("min_range_m", "m", "smallest range"),
+    Field("max_range_m", "m", "largest range"),
+    Field("settled_min_range_m", "m", "smallest range after settle_time_days"),
+    Field("settled_max_range_m", "m", "largest range after settle_time_days"),
+    Field("relative_eccentricity", "", "length of the difference of the eccentricity vectors at the end"),
+    Field("relative_drift_m", "m", "drift of the module past the target in a revolution, at the end"),
+    Field("steady", "", "1 if the settled range stayed within range_low_m and range_high_m"),
+)
+Quantities = namedtuple("Quantities", [field.symbol for field in QUANTITIES])  # type: ignore[misc]
+Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]
+Pair = namedtuple("Pair", "along radial range drift e")
+Error = namedtuple("Error", "r s u w")
+EXACT = Error(0.0, 0.0, 0.0, 0.0)  # what navigation would be without its errors
+
+
+@physics
+def period_error(drift):
+    """Period less the sidereal day [s] of a drift [rad/rev]."""
+    return SIDEREAL_DAY / (1.0 + drift / TURN) - SIDEREAL_DAY
+
+
+@physics
+def pair_of(s, m, p, o):
+    """The module seen from the target; nothing in the other phases, which have none."""
+    zero = 0.0 * s.x
+    along, radial, distance, drift, e = zero + float("nan"), zero + float("nan"), zero, zero, zero
+    if o.phase == INSPECTION:
+        rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz)
+        dx, dy, dz = s.x - s.tx, s.y - s.ty, s.z - s.tz
+        along, radial = dx * ax + dy * ay + dz * az, dx * rx + dy * ry + dz * rz
+        distance = sqrt(dx * dx + dy * dy + dz * dz)
+        true = relative_orbit(s, EXACT)
+        drift, e = true.drift, true.e
+    return Pair(along, radial, distance, drift, e)
+
+
+@physics
+def observe(t, s, m, p, o):
+    """The quantities in the order of QUANTITIES."""
+    true, mean, x = longitudes(t, s, p)
+    drift = drift_of(x.a)
+    pair = pair_of(s, m, p, o)
+    settled = m.settled > 0.5
+    return Quantities(
+        true,
+        mean,
+        drift,
+        period_error(drift),
+        sqrt(x.k * x.k + x.h * x.h),
+        2.0 * atan(sqrt(x.q * x.q + x.p * x.p)),
+        m.ahead,
+        p.exhaust * log(p.mass / s.mass),
+        pair.along,
+        pair.radial,
+        pair.range,
+        where(settled, pair.range, 0.0),
+        where(settled, -pair.range, -FAR),
+        pair.drift,
+        pair.e,
+        m.burns,
+    )
+
+
+@physics
+def evaluate(t, s, m, p, o, best, when):
+    """The metrics in the order of METRICS, at the end."""
+    gone = float("nan")
+    true, _, x = longitudes(t, s, p)
+    pair = pair_of(s, m, p, o)
+    phasing, two = o.phase == PHASING, o.phase == INSPECTION
+    settled_near, settled_far = -best.settled_near, best.settled_far
+    steady = (m.settled > 0.5) & (settled_near >= o.range_low) & (settled_far <= o.range_high)
+    return Metrics(
+        m.end_true,
+        m.end_mean,
+        m.day_mean,
+        m.end_drift,
+        m.day_drift,
+        period_error(m.end_drift),
+        period_error(m.day_drift),
+        m.end_e,
+        best.eccentricity,
+        m.end_inclination,
+        p.exhaust * log(p.mass / s.mass),
+        m.end_time,
+        m.burns if phasing or two else gone + m.burns,
+        true,
+        sqrt(x.k * x.k + x.h * x.h),
+        best.near if two else gone + true,
+        best.far if two else gone + true,
+        settled_near if two else gone + true,
+        settled_far if two else gone + true,
+        pair.e if two else gone + true,
+        pair.drift if two else gone + true,
+        where(steady, 1.0, 0.0) if two else gone + true,
+    )

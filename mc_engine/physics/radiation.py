@@ -1,0 +1,54 @@
+"""Pressure of sunlight on a satellite that is the same from all sides, with the Earth's shadow.
+
+The shadow is that of a round Earth without air, umbra and penumbra; the Moon's is left out, and so is light that the
+Earth sends back.  A craft with large panels that do not face the Sun wants a model of its panels instead.
+"""
+
+from mc_engine.lanes import acos, asin, maximum, minimum, physics, sqrt, where
+
+PRESSURE = 4.56e-6  # N/m^2 on a black surface at one astronomical unit: Montenbruck, Gill, section 3.4
+AU = 149_597_870_700.0
+RADIUS_SUN, RADIUS_EARTH = 6.96e8, 6_378_137.0
+PI = 3.141592653589793
+
+
+@physics
+def discs(x, y, z, sx, sy, sz):
+    """Angles [rad] seen from (x, y, z) [m]: radius of the Sun's disc, radius of the Earth's, distance of their centres.
+
+    s : place of the Sun [m], both from the Earth's centre
+    """
+    dx, dy, dz = sx - x, sy - y, sz - z
+    r, d = sqrt(x * x + y * y + z * z), sqrt(dx * dx + dy * dy + dz * dz)
+    a, b = asin(RADIUS_SUN / d), asin(minimum(RADIUS_EARTH / r, 1.0))
+    return a, b, acos(minimum(maximum(-(x * dx + y * dy + z * dz) / (r * d), -1.0), 1.0))
+
+
+@physics
+def sunlit(x, y, z, sx, sy, sz):
+    """Share of the Sun's disc seen from (x, y, z) [m], 0 to 1; s: place of the Sun [m], both from the Earth's centre.
+
+    Within a million kilometres of the Earth, whose disc is then the larger.  The share has corners where penumbra and
+    umbra begin and end: flights that must be exact end their steps there, at the zeros of c - b - a and c - b + a of
+    `discs`.  Montenbruck, Gill, Satellite Orbits, section 3.4.2, eqs (3.85)-(3.94).
+    """
+    a, b, c = discs(x, y, z, sx, sy, sz)
+    partly = (c < a + b) & (c > b - a)
+    safe = where(partly, c, a + b)  # keeps the arguments below in range
+    x1 = (safe * safe + a * a - b * b) / (2.0 * safe)
+    y1 = sqrt(maximum(a * a - x1 * x1, 0.0))
+    first = a * a * acos(minimum(maximum(x1 / a, -1.0), 1.0))
+    second = b * b * acos(minimum(maximum((safe - x1) / b, -1.0), 1.0))
+    return where(partly, 1.0 - (first + second - safe * y1) / (PI * a * a), where(c >= a + b, 1.0, 0.0))
+
+
+@physics
+def solar_pressure(x, y, z, sx, sy, sz, area_to_mass, reflectivity):
+    """Acceleration [m/s^2] at (x, y, z) [m] by light from s [m]: P C_R (A/m) (AU/d)^2, away from the Sun.
+
+    area_to_mass : m^2/kg;  reflectivity : C_R, 1 for a black body, 2 for a mirror that faces the Sun
+    """
+    dx, dy, dz = x - sx, y - sy, z - sz
+    d2 = dx * dx + dy * dy + dz * dz
+    k = PRESSURE * area_to_mass * reflectivity * (AU * AU) * sunlit(x, y, z, sx, sy, sz) / (d2 * sqrt(d2))
+    return k * dx, k * dy, k * dz

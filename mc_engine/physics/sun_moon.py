@@ -1,0 +1,102 @@
+"""Sun and Moon as seen from the Earth's centre, and what they do to a satellite's motion.
+
+Positions come from pyerfa and stand in a table that compiled flights interpolate: the Sun by the Earth's motion of
+`erfa.epv00` (better than 0.1"), the Moon by `erfa.moon98` (a few arc seconds, J. Meeus, Astronomical Algorithms, 2nd
+ed., chapter 47, after ELP 2000-82).  Interpolation adds less than 0.02" to the Moon.
+
+Axes: mean equator and equinox of date, z to the pole.  Within 30 days they turn by 4", which flights leave out; UT1 is
+taken as UTC, within 0.9 s or 14".
+"""
+
+import erfa
+import numpy as np
+
+from mc_engine.lanes import floor, look_up, physics, sqrt
+
+# Gravitational parameters [m^3/s^2]: IERS Conventions (2010), table 1.1, and the Moon's by its mass ratio there.
+MU_SUN, MU_MOON = 1.32712440041e20, 4.902800e12
+AU = 149_597_870_700.0  # m, IAU 2012 resolution B2
+SPACING = 0.25  # days between the nodes of a table
+COLUMNS = 12  # of a node: place of the Sun [m] and its change over SPACING, then the same of the Moon
+_MJD = 2_400_000.5
+_DAY = 86_400.0
+
+
+def terrestrial_time(mjd_utc: np.ndarray) -> np.ndarray:
+    """Modified Julian date in terrestrial time of one in UTC."""
+    tai = erfa.utctai(_MJD, np.asarray(mjd_utc, dtype=np.float64))
+    tt = erfa.taitt(*tai)
+    return (tt[0] - _MJD) + tt[1]
+
+
+def sidereal_angle(mjd_utc: np.ndarray) -> np.ndarray:
+    """Greenwich mean sidereal time [rad], 0 to 2 pi, by `erfa.gmst06`: from the mean equinox of date to longitude 0."""
+    utc = np.asarray(mjd_utc, dtype=np.float64)
+    return np.asarray(erfa.gmst06(_MJD, utc, _MJD, terrestrial_time(utc)))
+
+
+def sun_and_moon(mjd_tt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(place, velocity) [m, m/s] of Sun and Moon, float64[n, 2, 3] each, mean equator and equinox of their own date.
+
+    Geometric: the light's time of flight, 20" of the Sun's longitude, changes neither gravity nor pressure noticeably.
+    """
+    tt = np.atleast_1d(np.asarray(mjd_tt, dtype=np.float64))
+    earth = erfa.epv00(_MJD, tt)[0]
+    moon = erfa.moon98(_MJD, tt)
+    turn = erfa.pmat06(_MJD, tt)[:, None]
+    place = AU * np.stack([-earth["p"], moon["p"]], axis=1)
+    velocity = AU / _DAY * np.stack([-earth["v"], moon["v"]], axis=1)
+    return (turn @ place[..., None])[..., 0], (turn @ velocity[..., None])[..., 0]
+
+
+def node_before(mjd_utc: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(number of the last node of the grid before a UTC date, time [s] from that node to it).
+
+    The grid is the same for all dates, so a case reads the same numbers whatever others are flown with it.
+    """
+    since = terrestrial_time(mjd_utc) / SPACING
+    number = np.floor(since)
+    return number, (since - number) * SPACING * _DAY
+
+
+def ephemeris_table(first: int, last: int) -> np.ndarray:
+    """What `ephemeris` reads: float64[last - first + 1, COLUMNS], a row for every node of the grid."""
+    place, velocity = sun_and_moon(SPACING * np.arange(first, last + 1))
+    return np.concatenate([place, SPACING * _DAY * velocity], axis=2).reshape(-1, COLUMNS)
+
+
+@physics
+def _between(tables, at, u):
+    """Cubic through places and changes at two nodes, at the share u of the way."""
+    a, da = look_up(tables, at), look_up(tables, at + 3.0)
+    b, db = look_up(tables, at + 12.0), look_up(tables, at + 15.0)
+    w = 1.0 - u
+    return w * w * ((1.0 + 2.0 * u) * a + u * da) + u * u * ((1.0 + 2.0 * w) * b - w * db)
+
+
+@physics
+def ephemeris(t, tables, first):
+    """Places of the Sun and the Moon [m], six numbers, at t [s] after the node whose row begins at `first`."""
+    since = t * (1.0 / (SPACING * _DAY))
+    node = floor(since)
+    u, at = since - node, first + COLUMNS * node
+    return (
+        _between(tables, at, u), _between(tables, at + 1.0, u), _between(tables, at + 2.0, u),
+        _between(tables, at + 6.0, u), _between(tables, at + 7.0, u), _between(tables, at + 8.0, u),
+    )  # fmt: skip
+
+
+@physics
+def third_body(x, y, z, bx, by, bz, mu):
+    """Acceleration [m/s^2] at (x, y, z) by a body at b [m] of parameter mu, less that of the Earth's centre.
+
+    With q = r.(r - 2 b)/b^2 the difference of the two pulls loses no digits: R. H. Battin, An Introduction to the
+    Mathematics and Methods of Astrodynamics, revised ed. (1999), eqs (8.60)-(8.62).
+    """
+    b2 = bx * bx + by * by + bz * bz
+    inverse2 = 1.0 / b2
+    q = (x * (x - 2.0 * bx) + y * (y - 2.0 * by) + z * (z - 2.0 * bz)) * inverse2
+    w = sqrt(1.0 + q)
+    f = q * (3.0 + q * (3.0 + q)) / (1.0 + (1.0 + q) * w)
+    g = -mu * inverse2 * (sqrt(b2) * inverse2) / ((1.0 + q) * w)
+    return g * (x + f * bx), g * (y + f * by), g * (z + f * bz)

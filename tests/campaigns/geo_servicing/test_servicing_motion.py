@@ -1,0 +1,136 @@
+"""The motion against a second formulation flown by scipy, and what is known of the geostationary orbit."""
+
+import numpy as np
+import pytest
+from servicing_flights import KEPLER, MODEL, NOMINAL, PUBLISHED, fly_cases, fly_one, history
+from servicing_twin import R0, RATE, SIDEREAL_DAY, Twin, elements, sidereal
+
+from campaigns.geo_servicing import dynamics
+from mc_engine.flight import prepare
+from mc_engine.model import load_model
+
+FREE = {"phase": "free", "navigation": "perfect"}
+SYNCHRONOUS = {"initial_period_s": SIDEREAL_DAY, "initial_eccentricity": 0.0, "initial_longitude_deg": 95.0}
+SOURCE_BURNS = ((123_753.6, 7_726.3, 1.0), (37_692.0, 4_569.1, 1.0), (24_264.7, 1_290.3, -1.0))
+EPOCH, EQUINOX = 58484.5, 58560.5
+
+
+def first_state(**inputs):
+    return prepare(MODEL, NOMINAL | inputs, 1).parameters[:7, 0]
+
+
+def place(row):
+    return np.array([row[f"end_{axis}_m"] for axis in "xyz"])
+
+
+def test_thirty_free_days_agree_with_the_twin_to_a_metre():
+    inputs = FREE | {"duration_days": 30.0, "sunlight": False}
+    end = Twin(EPOCH).fly(0.0, first_state(**inputs), 30.0 * 86_400.0, rtol=1e-13)
+    assert np.linalg.norm(place(fly_one(**inputs)) - end[:3]) < 1.0
+
+
+def test_sunlight_and_shadow_agree_with_the_twin_to_a_metre_in_the_season_of_eclipses():
+    """The twin knows nothing of the shadow's edges and goes over them in steps of two minutes."""
+    inputs = FREE | {"duration_days": 2.0, "sunlight": True, "epoch_utc": EQUINOX, "tolerance": 1e-12}
+    y, twin = first_state(**inputs), Twin(EQUINOX, light=1.3 * 50.0 / 2500.0)
+    for k in range(2 * 720):
+        y = twin.fly(120.0 * k, y, 120.0, rtol=1e-11)
+    assert np.linalg.norm(place(fly_one(**inputs)) - y[:3]) < 1.0
+    dark = place(fly_one(**inputs | {"sunlight": False}))
+    assert np.linalg.norm(dark - y[:3]) > 100.0
+
+
+def test_steps_that_end_at_the_edges_of_the_shadow_make_the_tolerance_unimportant():
+    inputs = FREE | {"duration_days": 30.0, "epoch_utc": EQUINOX}
+    exact = place(fly_one(**inputs, tolerance=1e-13))
+    assert np.linalg.norm(place(fly_one(**inputs)) - exact) < 1.0
+    assert np.linalg.norm(place(fly_one(**inputs, tolerance=1e-10)) - exact) < 2.0
+
+
+def test_the_sources_burns_agree_with_the_twin():
+    twin, t, y = Twin(EPOCH), 0.0, first_state(**PUBLISHED)
+    for coast, burn, sign in SOURCE_BURNS:
+        y = twin.fly(t, y, coast)
+        y = twin.fly(t + coast, y, burn, sign)
+        t += coast + burn
+    a, e, mean = elements(y)
+    row = fly_one(**PUBLISHED)
+    aim = sidereal(EPOCH) + np.radians(95.0) + RATE * t
+    deviation = np.degrees(np.angle(np.exp(1j * (mean - aim))))
+    assert row["mean_longitude_deviation_deg"] == pytest.approx(deviation, abs=0.2 / 3600.0)
+    period = 2.0 * np.pi * a**1.5 / np.sqrt(3.986004415e14)
+    assert row["period_error_s"] == pytest.approx(period - SIDEREAL_DAY, abs=1e-3)
+    assert row["eccentricity"] == pytest.approx(abs(e), abs=1e-9)
+    assert row["transfer_time_s"] == pytest.approx(t, abs=1e-6)
+    assert row["end_mass_left_kg"] == pytest.approx(y[6], abs=1e-6)
+
+
+def test_the_flattened_earth_makes_a_craft_of_the_sidereal_period_drift_east():
+    """Digest: osculating period T0, J2 alone: +0.0265 deg/rev."""
+    inputs = (
+        FREE | SYNCHRONOUS | {"gravity_degree": 2.0, "gravity_order": 0.0, "sun_and_moon": False, "sunlight": False}
+    )
+    inputs |= {"initial_inclination_deg": 0.0, "target_longitude_deg": 95.0}
+    seen = history(**inputs, duration_days=20.0 * SIDEREAL_DAY / 86_400.0)
+    drift = np.polyfit(seen["t_s"] / SIDEREAL_DAY, seen["longitude_deviation_deg"], 1)[0]
+    assert drift == pytest.approx(0.0265, abs=3e-4)
+
+
+def test_a_point_mass_and_nothing_else_keeps_the_orbit_and_the_longitude():
+    row = fly_one(**FREE | KEPLER | SYNCHRONOUS, duration_days=30.0, initial_inclination_deg=0.0)
+    assert row["final_longitude_deviation_deg"] == pytest.approx(0.0, abs=1e-6)
+    assert row["final_eccentricity"] < 1e-10
+    assert fly_one(**FREE | KEPLER)["final_eccentricity"] == pytest.approx(5e-4, abs=1e-10)
+
+
+def test_the_longitude_accelerates_as_the_transverse_pull_says():
+    """d2(longitude)/dt2 = -3 g/r: at 95 E by 2 b_s = -1.34e-3 deg/rev^2 with degree 4."""
+    inputs = FREE | SYNCHRONOUS | {"sun_and_moon": False, "sunlight": False, "initial_inclination_deg": 0.0}
+    days = 20.0 * SIDEREAL_DAY / 86_400.0
+    seen = history(**inputs, duration_days=days)
+    revolutions, longitude = seen["t_s"] / SIDEREAL_DAY, seen["longitude_deviation_deg"]
+    # the sample stays near 95 E: within half a degree the pull changes by 2 %
+    assert 2.0 * np.polyfit(revolutions, longitude, 2)[0] == pytest.approx(-1.34e-3, rel=0.05)
+
+
+def test_the_epochs_of_the_other_cases_do_not_matter():
+    """A case has the same bits alone and among cases of other epochs."""
+    errors = np.array([0.0, -3.7, 11.2, 0.4])
+    together = fly_cases(**FREE, epoch_error_days=errors)
+    for case, error in enumerate(errors):
+        alone = fly_cases(**FREE, epoch_error_days=error, ids=np.array([case]))
+        assert alone["end_x_m"][0] == together["end_x_m"][case]
+
+
+@pytest.mark.parametrize("duration", [0.01, 0.25, 2.0, 7.25])
+def test_a_flight_finds_sun_and_moon_until_its_end_whenever_it_begins(duration):
+    """The tables reach as far as the flight: a step more or less of it changes nothing at any hour of the day."""
+    errors = np.arange(0.0, 0.75, 0.0625)
+    row = fly_cases(**FREE, duration_days=duration, epoch_error_days=errors)
+    longer = fly_cases(**FREE, duration_days=duration, epoch_error_days=np.append(errors, 500.0))
+    assert (row["status"] == "ok").all()
+    assert (row["end_x_m"] == longer["end_x_m"][:-1]).all()
+
+
+@pytest.mark.parametrize("width", [1, 16])
+def test_lanes_do_not_matter(width):
+    inputs = {"phase": "inspection", "duration_days": 3.0, "epoch_utc": 58828.0, "thrust_noise_pct": np.full(5, 0.5)}
+    wide, other = fly_cases(**inputs), fly_cases(**inputs, width=width)
+    for name in ("end_x_m", "end_vy_m_s", "min_range_m", "delta_v_m_s"):
+        assert (wide[name] == other[name]).all()
+
+
+def test_the_constants_belong_together():
+    assert dynamics.R0 == pytest.approx(R0, rel=1e-14)
+    assert dynamics.RATE == pytest.approx(RATE, rel=1e-15)
+    assert dynamics.V0 == pytest.approx(3074.66, abs=5e-3)
+
+
+def test_what_contradicts_itself_is_refused_with_a_sentence():
+    order = fly_one(gravity_degree=2.0, gravity_order=3.0, phase="free")
+    degree = fly_one(gravity_degree=1.0, gravity_order=0.0, phase="free")
+    assert (order["status"], degree["status"]) == ("refused", "refused")
+    assert "gravity_order" in order["reason"]
+    assert "degree 1" in degree["reason"]
+    assert fly_one(phase="free", mass_error_kg=-2500.0)["status"] == "refused"
+    assert load_model("campaigns.geo_servicing") is MODEL
