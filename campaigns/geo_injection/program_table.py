@@ -19,7 +19,7 @@ _FIRST_SEGMENT = _FIRST_BURN + BURNS * _BURN_ROW
 # first: number of the burn's first segment;  segments: how many it has
 BurnRow = namedtuple("BurnRow", "ignition duration sensed end_mass first segments")
 # start, length: of the time since ignition;  more: 1.0 if another segment of the same burn follows
-SegmentRow = namedtuple("SegmentRow", "start length more unused")
+SegmentRow = namedtuple("SegmentRow", "start length more")
 # coefficients of the three components of the primer vector, powers of s rising
 TERM_NAMES = tuple(f"{axis}{power}" for axis in "xyz" for power in range(DEGREE + 1))
 
@@ -48,7 +48,7 @@ def burn_row(tables, burn):
 def segment_row(tables, segment):
     """The row of a segment, counted from 0 over all burns, without its steering."""
     at = _FIRST_SEGMENT + _SEGMENT_ROW * segment
-    return SegmentRow(look_up(tables, at), look_up(tables, at + 1.0), look_up(tables, at + 2.0), 0.0 * segment)
+    return SegmentRow(look_up(tables, at), look_up(tables, at + 1.0), look_up(tables, at + 2.0))
 
 
 @physics

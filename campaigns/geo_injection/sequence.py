@@ -34,7 +34,7 @@ class Sequence:
 
     @property
     def speed_unit(self) -> float:
-        """Circular speed of the parking orbit [m/s]; section 1.2 of the digest of units: mu = radius = mass = 1."""
+        """Circular speed of the parking orbit [m/s]: the unit that goes with mu = radius = mass = 1."""
         return float(np.sqrt(MU_EARTH / self.parking_radius))
 
     @property

@@ -17,7 +17,6 @@ from mc_engine.errors import ModelError
 Conditions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of place and velocity [n, 3], complex too: [n, m]
 _STEP = 1e-6
 _IMAGINARY = 1e-40
-PLACINGS = ("fixed", "centred", "free")
 
 
 @dataclass(frozen=True)

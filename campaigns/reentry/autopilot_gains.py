@@ -5,13 +5,12 @@ pitch loop at equal steps of dynamic pressure, and the one of the bank loop.  Nu
 """
 
 from collections.abc import Mapping
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from campaigns.reentry.inputs import SETTINGS as ENTRY_SETTINGS
 from campaigns.reentry.lead_compensator import Lead, Response, design_lead, short_period
+from campaigns.reentry.plan import default_plan
 from campaigns.reentry.reference import Planner, fly_reference
 
 SECONDS, STEPS, STEEPEST = 900, 48, 24e3  # rows of the profile; rows of the schedule, up to this pressure [Pa]
@@ -40,10 +39,10 @@ def bank_design(o: Mapping[str, float]) -> Lead:
 
 def planned_profile() -> np.ndarray:
     """float64[n, 2]: dynamic pressure [Pa] and speed [m/s] of the planned entry at whole seconds."""
-    planner = Planner(SimpleNamespace(**{setting.symbol: setting.code(setting.default) for setting in ENTRY_SETTINGS}))
+    planner = Planner(default_plan())
     path = fly_reference(planner)
     t = np.arange(0.0, path.t[-1])
-    return np.array([np.interp(t, path.t, path.drag) / planner.drag_area, np.interp(t, path.t, path.speed)]).T
+    return np.array([np.interp(t, path.t, path.drag) / planner.plan.drag, np.interp(t, path.t, path.speed)]).T
 
 
 def autopilot_tables(o: Any) -> np.ndarray:

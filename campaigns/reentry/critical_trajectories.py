@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from campaigns.reentry.planets import PLANETS
 from mc_engine.campaign import load_campaign
 from mc_engine.flight import fly
 from mc_engine.model import Parameter, Setting, load_model
@@ -53,13 +54,24 @@ def boundary(inputs: Inputs, name: str, low: float, high: float, holds: Callable
     return 0.5 * (low + high)
 
 
-def critical_periapses(inputs: Inputs, low_km: float = 30.0, high_km: float = 110.0) -> CriticalPeriapses:
+def interface_km(planet: str) -> float:
+    """Altitude at which the planet's exponential atmosphere is as thin as that of the Earth at 120 km."""
+    thin = PLANETS["earth"].air[0] * np.exp(-120e3 / PLANETS["earth"].air[1])
+    density, scale = PLANETS[planet].air
+    return float(1e-3 * scale * np.log(density / thin))
+
+
+def critical_periapses(inputs: Inputs) -> CriticalPeriapses:
     """Vacuum periapses of the first and the second critical trajectory of an arrival on a hyperbola.
 
-    On the first the vehicle leaves the atmosphere at escape speed: higher, and it is lost.  On the second it just
-    still leaves: lower, and it comes down at once.  Drag only, no gravity but that of the point mass.
+    The entry altitude is that of the inputs, else where the planet's air begins, and the periapses are looked for
+    from a quarter of it up to eleven twelfths.  On the first the vehicle leaves the atmosphere at escape speed: higher,
+    and it is lost.  On the second it just still leaves: lower, and it comes down at once.  Drag only, no gravity but
+    that of the point mass.
     """
-    asked = {**inputs, "arrival": "hyperbola", "on_exit": "stop"}
+    top = {"entry_altitude_km": interface_km(inputs.get("planet", "earth"))}
+    asked = {**top, **inputs, "arrival": "hyperbola", "on_exit": "stop"}
+    low_km, high_km = (share * float(asked["entry_altitude_km"]) for share in (1.0 / 4.0, 11.0 / 12.0))
     # a hyperbola has no apoapsis
     capture = boundary(
         asked, "vacuum_periapsis_km", low_km, high_km, lambda c: (c["exits"] > 0) & np.isnan(c[APOAPSIS]), 1e-5

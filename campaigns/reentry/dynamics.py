@@ -7,22 +7,23 @@ On a flat Earth x points ahead, y to the left and z up.
 
 from collections import namedtuple
 
-from campaigns.reentry.air import logarithm_of_density
+from campaigns.reentry.air import logarithm_of_density, sound_speed
 from campaigns.reentry.bank import angle_at
 from campaigns.reentry.weather import weather_at
 from mc_engine.lanes import any_lane, atan2, exp, maximum, physics, sincos, sqrt, where
-from mc_engine.physics.aerodynamics import lift_direction
+from mc_engine.physics.aerodynamics import axial_coefficient, lift_direction, over_mach
 from mc_engine.physics.frames import over_ellipsoid, velocity_angles
 from mc_engine.physics.gravity import j2_perturbation, point_mass
 from mc_engine.physics.heating import DKR_EXPONENT, detra_kemp_riddell, sutton_graves
 
 State = namedtuple("State", "x y z vx vy vz heat")  # place [m], velocity [m/s] over ground, heat load [J/m^2]
-# largest dynamic pressure and heat rate so far, with time, altitude and speed; first pull-out; present lift direction
+# largest dynamic pressure so far with the areas over mass of the load there, and largest heat rate, each with time,
+# altitude and speed; first pull-out; present lift direction
 # and how often it was changed; first exit from the atmosphere; of a guided flight, time of the last sample, bank
 # there and at the next, and what the laws keep
 Memory = namedtuple(
     "Memory",
-    "pressure pressure_time pressure_altitude pressure_speed "
+    "pressure pressure_time pressure_altitude pressure_speed pressure_total pressure_axial "
     "flux flux_time flux_altitude flux_speed "
     "low low_time cos_bank sin_bank rolls "
     "exits exit_time exit_speed exit_angle exit_inertial exit_apoapsis "
@@ -35,12 +36,14 @@ Parameters = namedtuple(
     "mu rate polar_radius e2 gravity "  # planet; gravity: of a flat Earth
     "log_density inverse_scale temperature density deviation "  # exponential atmosphere; dispersions of the density
     "drag lift total axial heating "  # areas over mass [m^2/kg]; coefficient of the heating correlation
+    "coefficients cos_trim sin_trim cos_tilted sin_tilted "  # place of the table over Mach, or -1; of body axes
     "cos_bank sin_bank cos_rolled sin_rolled roll_at roll_back_at "  # lift directions; sines of flight-path angles
     "stop exit stop_time "
     "ex ey ez fx fy fz nx ny nz "  # unit vectors to the planned entry place, ahead and to the right of it
     "radius heading speed path aim_down aim_cross aimed tx ty tz "  # of the ground; entry over ground; target
     "first_bank bank_error bank_lag bank_rate_limit reversal_floor reversal_width load_limit "
-    "planned_share planned_lift_to_drag sensed accelerometer_bias accelerometer_scale accelerometer_noise "
+    "reference planned_range planned_share planned_lift_to_drag "  # place in the tables; what the laws know
+    "sensed accelerometer_bias accelerometer_scale accelerometer_noise "
     "weather corridor_load corridor_heat_rate corridor_heat_load corridor_pressure "
     "nav_range nav_altitude nav_speed nav_path nav_climb",
 )
@@ -49,6 +52,10 @@ Place = namedtuple("Place", "altitude climb ux uy uz")  # climb: rate of the alt
 # slope: of the logarithm of the density, by altitude [1/m]; v..: velocity through the air [m/s]; shear: rate of the
 # speed through the air, times it, per metre climbed, that a wind which changes with altitude brings [m/s^2]
 Air = namedtuple("Air", "density slope temperature vx vy vz shear")
+# areas over mass [m^2/kg] of drag, lift, total load, load along the body axis and along the accelerometer's
+Force = namedtuple("Force", "drag lift total axial sensed")
+# what peaks, and where: dynamic pressure [Pa], heat rate [W/m^2], altitude [m], speed over ground [m/s], `Force`
+Exposure = namedtuple("Exposure", "pressure flux altitude speed force")
 
 # settings arrive as numbers: places in the lists of words of `model.py`
 FLAT = 2.0
@@ -103,6 +110,19 @@ def air_of(s, place, p, o):
 
 
 @physics
+def force_of(air, speed, p, o):
+    """Areas over mass at a speed [m/s] through the air; by the Mach number if the vehicle has a table of it."""
+    drag, lift, total, axial, sensed = p.drag, p.lift, p.total, p.axial, p.sensed
+    if any_lane(p.coefficients >= 0.0):
+        of_drag, of_lift = over_mach(o.tables, p.coefficients, speed / sound_speed(air.temperature))
+        drag, lift = of_drag * p.drag, of_lift * p.lift
+        total = sqrt(drag * drag + lift * lift)
+        axial = axial_coefficient(drag, lift, p.cos_trim, p.sin_trim)
+        sensed = axial_coefficient(drag, lift, p.cos_tilted, p.sin_tilted)
+    return Force(drag, lift, total, axial, sensed)
+
+
+@physics
 def field(s, p, o):
     """Acceleration [m/s^2] by gravity and, on a turning planet, the centrifugal force."""
     if o.gravity == NO_GRAVITY:
@@ -153,12 +173,13 @@ def rhs(t, s, m, p, o):
     v = sqrt(speed2(air))
     push = 0.5 * air.density * v  # dynamic pressure over speed
     gx, gy, gz = field(s, p, o)
-    k, twice = push * p.drag, 2.0 * p.rate
+    force = force_of(air, v, p, o)
+    k, twice = push * force.drag, 2.0 * p.rate
     ax, ay, az = gx + twice * s.vy - k * air.vx, gy - twice * s.vx - k * air.vy, gz - k * air.vz
     if any_lane(abs(p.lift) > 0.0):
         cos_bank, sin_bank = bank_of(t, m, o)
         lx, ly, lz = lift_direction(air.vx, air.vy, air.vz, place.ux, place.uy, place.uz, v, cos_bank, sin_bank)
-        lift = push * v * p.lift
+        lift = push * v * force.lift
         ax, ay, az = ax + lift * lx, ay + lift * ly, az + lift * lz
     return State(s.vx, s.vy, s.vz, ax, ay, az, heat_rate(air.density, v, p, o))
 
@@ -176,7 +197,8 @@ def events(t, s, m, p, o):
     v = sqrt(v2)
     gx, gy, gz = field(s, p, o)
     # v.a through the air: lift does no work, and the Coriolis force of a wind is left out
-    gain = (air.vx * gx + air.vy * gy + air.vz * gz) - 0.5 * air.density * p.drag * (v2 * v) + air.shear * place.climb
+    braking = 0.5 * air.density * force_of(air, v, p, o).drag * (v2 * v)
+    gain = (air.vx * gx + air.vy * gy + air.vz * gz) - braking + air.shear * place.climb
     thicker = air.slope * place.climb * v2
     power = 3.0 if o.heating == SUTTON_GRAVES else DKR_EXPONENT
     sine = (s.vx * place.ux + s.vy * place.uy + s.vz * place.uz) / where(v > 0.0, v, 1.0)  # winds are level
@@ -196,22 +218,25 @@ def events(t, s, m, p, o):
 
 
 @physics
-def pressure_of(s, p, o):
-    """(dynamic pressure [Pa], heat rate [W/m^2], altitude [m], speed over ground [m/s])."""
+def exposure_of(s, p, o):
+    """The `Exposure` of a state."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
     v2 = speed2(air)
-    return 0.5 * air.density * v2, heat_rate(air.density, sqrt(v2), p, o), place.altitude, sqrt(speed2(s))
+    v = sqrt(v2)
+    flux, force = heat_rate(air.density, v, p, o), force_of(air, v, p, o)
+    return Exposure(0.5 * air.density * v2, flux, place.altitude, sqrt(speed2(s)), force)
 
 
 @physics
 def start(p, o):
     """Peaks begin with the values at entry."""
-    pressure, flux, altitude, v = pressure_of(initial(p, o), p, o)
+    pressure, flux, altitude, v, force = exposure_of(initial(p, o), p, o)
     zero = 0.0 * v
     unknown = zero + UNKNOWN
     return Memory(
-        pressure, zero, altitude, v, flux, zero, altitude, v, unknown, unknown, p.cos_bank, p.sin_bank,
+        pressure, zero, altitude, v, force.total, force.axial, flux, zero, altitude, v,
+        unknown, unknown, p.cos_bank, p.sin_bank,
         zero, zero, unknown, unknown, unknown, unknown, unknown,
         zero, p.first_bank, zero, p.first_bank, zero, where(p.first_bank < 0.0, -1.0, 1.0), zero,
         zero, zero, zero, zero, zero, zero, zero, zero,
@@ -245,7 +270,7 @@ def exit_of(s, p, o):
 @physics
 def switch(t, s, m, p, o, hit):
     """Keep the larger of each peak, the first pull-out and the first exit; change the bank where a roll is due."""
-    pressure, flux, altitude, v = pressure_of(s, p, o)
+    pressure, flux, altitude, v, force = exposure_of(s, p, o)
     push = (hit.pressure_peak > 0.5) & (pressure > m.pressure)
     heat = (hit.heat_peak > 0.5) & (flux > m.flux)
     low = hit.pull_out > 0.5
@@ -259,6 +284,8 @@ def switch(t, s, m, p, o, hit):
         where(push, t, m.pressure_time),
         where(push, altitude, m.pressure_altitude),
         where(push, v, m.pressure_speed),
+        where(push, force.total, m.pressure_total),
+        where(push, force.axial, m.pressure_axial),
         where(heat, flux, m.flux),
         where(heat, t, m.flux_time),
         where(heat, altitude, m.flux_altitude),

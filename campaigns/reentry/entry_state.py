@@ -5,6 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from campaigns.reentry.inputs import SHAPES
+from campaigns.reentry.planets import of_planets
 from mc_engine.model import Refusals
 from mc_engine.physics.frames import (
     carried_along,
@@ -14,6 +16,7 @@ from mc_engine.physics.frames import (
     velocity_components,
 )
 
+ELLIPSOID, FLAT = float(SHAPES.index("ellipsoid")), float(SHAPES.index("flat"))
 INERTIAL = 0.0
 HYPERBOLA = 1.0
 
@@ -35,8 +38,10 @@ class Entry:
     """The entry of each case; float64[n], SI.
 
     position, velocity : [3, n], planet-fixed, over ground (flat: ahead, left, up)
-    place, ahead, right : unit vectors [3, n] of the planned entry: to it, along its great circle, to its right
-    altitude : of entry;  speed, path : over ground;  heading : planned, over ground
+    speed, path : over ground
+    all others are those of the planned entry, without errors:
+    place, ahead, right : unit vectors [3, n], to it, along its great circle, to its right
+    altitude, radius, latitude : where;  heading, planned_speed, planned_path : over ground
     """
 
     position: np.ndarray
@@ -48,6 +53,19 @@ class Entry:
     speed: np.ndarray
     path: np.ndarray
     heading: np.ndarray
+    radius: np.ndarray
+    latitude: np.ndarray
+    planned_speed: np.ndarray
+    planned_path: np.ndarray
+
+
+def world_of(i: SimpleNamespace, settings: SimpleNamespace) -> World:
+    """The planet of each case as its settings ask for it; one without an ellipsoid is its sphere."""
+    radius = np.where(i.surface_radius > 0.0, i.surface_radius, of_planets(settings.planet, "radius"))
+    e2 = np.where(settings.shape == ELLIPSOID, of_planets(settings.planet, "e2"), 0.0)
+    rate = np.where(settings.rotating > 0.5, of_planets(settings.planet, "rate"), 0.0)
+    mu = of_planets(settings.planet, "mu")
+    return World(mu, radius, radius * np.sqrt(1.0 - e2), e2, rate, settings.shape == FLAT)
 
 
 def hyperbolic_arrival(excess_speed, periapsis, radius, mu, refusals: Refusals, asked):
@@ -88,6 +106,7 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
         velocity_components(speed, path, i.entry_heading), radius, latitude, world, settings.speed_frame
     )
     level = np.hypot(planned[0], planned[1])
+    planned_radius, planned_latitude = radius, latitude
     heading = np.where(level > 0.0, np.arctan2(planned[1], planned[0]), i.entry_heading)
     north, east, place = local_axes(latitude, longitude)
     ahead = np.cos(heading) * north + np.sin(heading) * east
@@ -113,6 +132,10 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
         np.sqrt((components**2).sum(axis=0)),
         np.arctan2(components[2], np.hypot(components[0], components[1])),
         heading,
+        planned_radius,
+        planned_latitude,
+        np.sqrt((planned**2).sum(axis=0)),
+        np.arctan2(planned[2], level),
     )
 
 

@@ -32,6 +32,7 @@ FIGURES = (
         "Where the flights end",
         ends_below=("final_altitude_km", HIGHEST_LANDING_KM),
         planet="planet",
+        target=("target_latitude_deg", "target_longitude_deg"),
     ),
     ProfileFigure("speed_m_s", "altitude_km", "Altitude against speed"),
     MapFigure("exit_speed_m_s", "vacuum_periapsis_km", "density_factor", "Speed that a pass leaves"),

@@ -10,7 +10,7 @@ from collections import namedtuple
 
 from campaigns.reentry.apollo_final_phase import OVERCONTROL, REFERENCE_LIFT_TO_DRAG
 from campaigns.reentry.bank import followed, lateral_miss, side_of
-from campaigns.reentry.dynamics import Memory, place_of, pressure_of, speed2
+from campaigns.reentry.dynamics import Memory, exposure_of, place_of, speed2
 from campaigns.reentry.inputs import GUIDANCE
 from campaigns.reentry.reference_table import (
     FELT,
@@ -21,7 +21,6 @@ from campaigns.reentry.reference_table import (
     by_loss,
     by_speed,
     clocked_range,
-    whole_range,
 )
 from mc_engine.lanes import acos, any_lane, asin, atan2, log, maximum, minimum, physics, sqrt, where
 from mc_engine.lanes.noise import normal_pair
@@ -31,8 +30,9 @@ LEAST_SHARE = -0.9659258262890683  # cos 165 deg: never quite lift down
 SCALE_HEIGHT = 7000.0  # m, by which drag is read as altitude
 LARGEST_CLIMB, LARGEST_TILT = 6000.0, 0.03490658503988659  # 6 km and 2 deg: bounds of what drag is read as
 
-# speed, altitude, flight-path angle, range, altitude rate: as navigated; drag, axial: decelerations as measured
-Sensed = namedtuple("Sensed", "speed altitude path along climb drag axial")
+# speed, altitude, flight-path angle, range, altitude rate: as navigated; drag, axial: decelerations as measured;
+# load: total over axial load of the present trim, and total load over drag
+Sensed = namedtuple("Sensed", "speed altitude path along climb drag axial load_by_axial load_by_drag")
 # what law 3 keeps: speed lost W, reckoned range, present rate of it, measured deceleration, its logarithm over the
 # stored one
 Reckoning = namedtuple("Reckoning", "lost range rate axial excess")
@@ -47,7 +47,7 @@ def bounded(x, size):
 @physics
 def sensed(s, p, o, draws):
     """What navigation and accelerometer tell, with their errors."""
-    pressure, _, altitude, v = pressure_of(s, p, o)
+    pressure, _, altitude, v, force = exposure_of(s, p, o)
     place = place_of(s, p, o)
     up = s.x * p.ex + s.y * p.ey + s.z * p.ez
     ahead = s.x * p.fx + s.y * p.fy + s.z * p.fz
@@ -61,22 +61,24 @@ def sensed(s, p, o, draws):
         asin(bounded(sine, 1.0)) + p.nav_path,
         p.radius * atan2(ahead, up) + p.nav_range,
         place.climb + p.nav_climb,
-        stretch * (pressure * p.drag) + wrong,
-        stretch * (pressure * p.sensed) + wrong,
+        stretch * (pressure * force.drag) + wrong,
+        stretch * (pressure * force.sensed) + wrong,
+        force.total / force.axial,
+        force.total / force.drag,
     )
 
 
 @physics
-def target_shift(p, o):
+def target_shift(p):
     """Distance [m] by which the target lies beyond the end of the reference."""
-    return where(p.aimed > 0.5, p.aim_down - whole_range(o.tables), 0.0)
+    return p.aim_down - p.planned_range
 
 
 @physics
 def navigated_share(x, p, o):
     """Laws 1 and 2: vertical share of the lift less that of the reference."""
-    row = BySpeed(*by_speed(o.tables, x.speed))
-    along = x.along - row.range - target_shift(p, o)
+    row = BySpeed(*by_speed(o.tables, p.reference, x.speed))
+    along = x.along - row.range - target_shift(p)
     if o.guidance == LAW1:
         high, tilt = x.altitude - row.altitude, x.path - row.path
     else:
@@ -90,9 +92,9 @@ def navigated_share(x, p, o):
 @physics
 def apollo_share(x, p, o):
     """Vertical share of the lift by the range that the flown influence coefficients predict."""
-    row = Influence(*by_speed(o.tables, x.speed))
+    row = Influence(*by_speed(o.tables, p.reference, x.speed))
     predicted = row.range + row.by_drag * (x.drag - row.drag) + row.by_climb * (x.climb - row.climb)
-    to_go = where(p.aimed > 0.5, p.aim_down, whole_range(o.tables)) - x.along
+    to_go = p.aim_down - x.along
     wanted = REFERENCE_LIFT_TO_DRAG + OVERCONTROL * (to_go - predicted) / row.by_lift
     return wanted / p.planned_lift_to_drag
 
@@ -107,22 +109,23 @@ def reckoned(t, m, x, p, o):
     part = (x.axial - FELT) / where(x.axial > m.axial, x.axial - m.axial, 1.0)
     first = 0.5 * (x.axial + FELT) * bounded(part, 1.0) * period
     lost = where(before, where(felt, first, 0.0), m.lost + 0.5 * (x.axial + m.axial) * period)
-    row = by_loss(o.tables, lost)
-    along = where(before, clocked_range(o.tables, t), m.reckoned + 0.5 * (row.range_rate + m.range_rate) * period)
+    row = by_loss(o.tables, p.reference, lost)
+    by_clock = clocked_range(o.tables, p.reference, t)
+    along = where(before, by_clock, m.reckoned + 0.5 * (row.range_rate + m.range_rate) * period)
     excess = log(maximum(x.axial, 1e-6)) - row.log_axial
     return Reckoning(lost, along, row.range_rate, x.axial, excess)
 
 
 @physics
-def accelerometer_share(now, m, o):
+def accelerometer_share(now, m, p, o):
     """Law 3: vertical share of the lift less that of the reference."""
-    row = by_loss(o.tables, now.lost)
+    row = by_loss(o.tables, p.reference, now.lost)
     share = now.axial / row.axial - 1.0
     high = bounded(-SCALE_HEIGHT * share, LARGEST_CLIMB)
     growth = (now.excess - m.excess) / o.guidance_period
     climb = -SCALE_HEIGHT * (growth + 2.0 * (now.axial - row.axial) / row.speed)
     tilt = bounded(climb / row.speed, LARGEST_TILT)
-    along = now.range - row.range
+    along = now.range - row.range - target_shift(p)
     if o.guidance == LAW3:
         along = 0.0 * along
     return -(row.k_altitude * high + row.k_path * tilt + row.k_range * along), row.speed
@@ -135,7 +138,7 @@ def commanded_share(t, s, m, x, p, o):
     kept = Reckoning(m.lost, m.reckoned, m.range_rate, m.axial, m.excess)
     if o.guidance == LAW3 or o.guidance == LAW3R:
         kept = reckoned(t, m, x, p, o)
-        change, speed = accelerometer_share(kept, m, o)
+        change, speed = accelerometer_share(kept, m, p, o)
         share = p.planned_share + change
     elif o.guidance == APOLLO:
         share, speed = apollo_share(x, p, o), x.speed + zero
@@ -150,9 +153,9 @@ def steer(t, s, m, p, o, draws):
     x = sensed(s, p, o, draws)
     share, speed, kept = commanded_share(t, s, m, x, p, o)
     if o.guidance == LAW3 or o.guidance == LAW3R:
-        felt, load = x.axial, x.axial * (p.total / p.axial)
+        felt, load = x.axial, x.axial * x.load_by_axial
     else:
-        felt, load = x.drag, x.drag * (p.total / p.drag)
+        felt, load = x.drag, x.drag * x.load_by_drag
     active = where((m.active > 0.5) | (felt > STEERED), 1.0, 0.0)
     working = (active > 0.5) & (speed > LAST_SPEED)
     share = where(working, share, p.planned_share)
@@ -165,7 +168,7 @@ def steer(t, s, m, p, o, draws):
     next_bank, next_rate = followed(bank, rate, command, p.bank_lag, p.bank_rate_limit, o.guidance_period)
     bank = where(p.bank_lag > 0.0, bank, next_bank)  # at once
     return Memory(
-        m.pressure, m.pressure_time, m.pressure_altitude, m.pressure_speed,
+        m.pressure, m.pressure_time, m.pressure_altitude, m.pressure_speed, m.pressure_total, m.pressure_axial,
         m.flux, m.flux_time, m.flux_altitude, m.flux_speed,
         m.low, m.low_time, m.cos_bank, m.sin_bank, m.rolls,
         m.exits, m.exit_time, m.exit_speed, m.exit_angle, m.exit_inertial, m.exit_apoapsis,

@@ -58,7 +58,11 @@ PARAMETERS = (
     ),
     Parameter("stop_time_s", "s", "time at which the flight ends, wherever it is", 1e9, low=0.0),
     Parameter(
-        "target_downrange_km", "km", "planned distance to the end; 0 means that there is no target", 0.0, low=0.0
+        "target_downrange_km",
+        "km",
+        "planned distance to the end; 0: of a law's reference path, without a law no target",
+        0.0,
+        low=0.0,
     ),
     Parameter("target_crossrange_km", "km", "planned distance to the right", 0.0),
     Parameter("corridor_load_g", "g", "limit of the load", 10.0, low=0.0),
@@ -85,7 +89,13 @@ PARAMETERS = (
 )
 SETTINGS = (
     Setting("planet", "", "planet", "earth", tuple(PLANETS)),
-    Setting("shape", "", "shape of the planet", "ellipsoid", SHAPES),
+    Setting(
+        "shape",
+        "",
+        "shape of the planet; one without an ellipsoid of its own, as Mars, is a sphere",
+        "ellipsoid",
+        SHAPES,
+    ),
     Setting("planar", "", "no lift to the side: banking takes lift out of the vertical plane, and that is all", False),
     Setting("gravity", "", "gravity", "j2", ("j2", "point", "none")),
     Setting("rotating", "", "the planet turns", True),
@@ -103,7 +113,7 @@ SETTINGS = (
     Setting(
         "plan",
         "",
-        "what target and reference path are planned from: each case's own entry, or plan_...",
+        "what distances and reference path count from: each case's own entry without errors, or plan_...",
         "entry",
         PLANS,
     ),

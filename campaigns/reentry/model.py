@@ -1,21 +1,20 @@
 """The entry model as the engine sees it: inputs, settings, what each case starts from, and the MODEL record."""
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from campaigns.reentry import dynamics, figures, guidance, outcome, reference_table, weather
+from campaigns.reentry import dynamics, figures, guidance, outcome, weather
 from campaigns.reentry.air import GAS_CONSTANT
-from campaigns.reentry.entry_state import Entry, World, entry_of
-from campaigns.reentry.inputs import PARAMETERS, PLANS, SETTINGS, SHAPES
-from campaigns.reentry.planets import PLANETS
-from campaigns.reentry.reference import planned_inputs, reference_tables
-from campaigns.reentry.vehicles import VEHICLES, Vehicle
+from campaigns.reentry.airframe import COEFFICIENTS, DETRA_KEMP_RIDDELL, airframe_of, airframe_rows
+from campaigns.reentry.entry_state import FLAT, Entry, World, entry_of, world_of
+from campaigns.reentry.inputs import PARAMETERS, SETTINGS
+from campaigns.reentry.plan import planned_entry, plans_of
+from campaigns.reentry.planets import of_planets
+from campaigns.reentry.reference import stored_references
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
-from mc_engine.physics.aerodynamics import axial_coefficient
-from mc_engine.physics.heating import detra_kemp_riddell_coefficient
 from mc_engine.published import read_published
 
 SOURCE = (
@@ -28,11 +27,8 @@ STATES = (
     Field("heat_load_j_m2", "J/m^2", "convective heat load at the stagnation point"),
 )
 EARTH = 0.0
-ELLIPSOID, FLAT = float(SHAPES.index("ellipsoid")), float(SHAPES.index("flat"))
 J2 = 0.0
 US76 = 0.0
-DETRA_KEMP_RIDDELL = 1.0
-_OF_A_VEHICLE = ("mass", "reference_area", "drag_coefficient", "lift_coefficient", "trim_angle", "nose_radius")
 
 
 def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
@@ -41,26 +37,30 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     inputs : float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
     """
     _refuse_what_does_not_fit(settings, refusals)
-    refusals.add(
-        (settings.guidance > 0.5) & (settings.planar < 0.5) & (inputs.target_downrange == 0.0),
-        "a guidance law that turns to the side needs target_downrange_km, or planar = true",
-    )
-    world = _world(inputs, settings)
+    world = world_of(inputs, settings)
     entry = entry_of(inputs, settings, world, refusals)
-    planned = _planned(settings, world, entry, refusals)
+    planned = planned_entry(settings, world, entry, refusals)
+    airframe = airframe_of(inputs, settings, refusals)
     exit_altitude = np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, entry.altitude)
     refusals.add(entry.altitude <= inputs.stop_altitude, "the entry is not above stop_altitude_km")
     names = ("x", "y", "z", "vx", "vy", "vz")
     rows = dict(zip(names, (*entry.position, *entry.velocity), strict=True))
     rows |= {"stop": inputs.stop_altitude, "exit": exit_altitude, "stop_time": inputs.stop_time}
-    rows |= _target(inputs, world, planned) | {"speed": entry.speed, "path": entry.path}
-    rows |= _guidance_rows(inputs, settings) | _weather_rows(inputs, settings)
-    return (
-        rows
-        | _planet_rows(inputs, settings, world)
-        | _vehicle_rows(inputs, settings, refusals)
-        | _bank_rows(inputs, settings)
-    )
+    rows |= {"speed": entry.speed, "path": entry.path} | _planet_rows(inputs, settings, world)
+    rows |= airframe_rows(inputs, settings, airframe) | _bank_rows(inputs, settings) | _sensor_rows(inputs)
+    plan = plans_of(inputs, settings, world, planned, airframe)
+    guided = settings.guidance > 0.5
+    refusals.add(guided & ~(plan.lift_to_drag > 0.0), "a guidance law needs a vehicle with lift")
+    references = stored_references(plan, guided, COEFFICIENTS.size, refusals)
+    rows |= _target(inputs, world, planned, np.where(guided, references.range, inputs.target_downrange))
+    rows |= {"reference": references.place, "planned_range": references.range, "planned_share": plan.share}
+    rows |= {"planned_lift_to_drag": plan.lift_to_drag}
+    return rows | _case_tables(inputs, settings, references.tables)
+
+
+def shared_tables(_: Any) -> np.ndarray:
+    """What all cases share: coefficients over the Mach number.  Those of `prepare` lie behind them."""
+    return COEFFICIENTS
 
 
 def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> None:
@@ -68,33 +68,19 @@ def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> 
     other = settings.planet != EARTH
     refusals.add(other & (settings.atmosphere == US76), 'the atmosphere "us76" is that of the Earth')
     refusals.add(other & (settings.gravity == J2), 'the gravity "j2" is that of the Earth; take "point"')
-    refusals.add(other & (settings.shape == ELLIPSOID), 'only the Earth is an "ellipsoid" here; take "sphere"')
+    refusals.add(other & (settings.weather > 0.5), "the random air of weather = true is that of the Earth")
     refusals.add(
         other & (settings.heating == DETRA_KEMP_RIDDELL), 'the heating "detra_kemp_riddell" is that of the Earth\'s air'
     )
-    guided = settings.guidance > 0.5
-    refusals.add(guided & (settings.plan == PLANS.index("entry")), 'a guidance law needs its plan; set plan = "given"')
     flat = settings.shape == FLAT
     refusals.add(flat & (settings.weather > 0.5), "a flat Earth has no weather")
-    refusals.add(guided & flat, "the guidance laws want a round planet")
+    refusals.add((settings.guidance > 0.5) & flat, "the guidance laws want a round planet")
     refusals.add(flat & (settings.rotating > 0.5), "a flat Earth does not turn; set rotating = false")
     refusals.add(flat & (settings.gravity == J2), 'a flat Earth has the gravity "point", which is uniform, or "none"')
 
 
-def _of_planets(settings: SimpleNamespace, name: str) -> np.ndarray:
-    """One number of each case's planet."""
-    return np.array([getattr(planet, name) for planet in PLANETS.values()])[settings.planet.astype(int)]
-
-
-def _world(i: SimpleNamespace, settings: SimpleNamespace) -> World:
-    radius = np.where(i.surface_radius > 0.0, i.surface_radius, _of_planets(settings, "radius"))
-    e2 = np.where(settings.shape == ELLIPSOID, _of_planets(settings, "e2"), 0.0)
-    rate = np.where(settings.rotating > 0.5, _of_planets(settings, "rate"), 0.0)
-    return World(_of_planets(settings, "mu"), radius, radius * np.sqrt(1.0 - e2), e2, rate, settings.shape == FLAT)
-
-
 def _planet_rows(i: SimpleNamespace, settings: SimpleNamespace, world: World) -> dict[str, np.ndarray]:
-    air = _of_planets(settings, "air")
+    air = of_planets(settings.planet, "air")
     gravity = world.mu / world.radius**2
     return {
         "mu": world.mu,
@@ -115,65 +101,6 @@ def _planet_rows(i: SimpleNamespace, settings: SimpleNamespace, world: World) ->
     }
 
 
-def _numbers_of(vehicle: Vehicle) -> tuple[float, ...]:
-    """SI numbers of a vehicle in the order of _OF_A_VEHICLE."""
-    trim = float(np.radians(vehicle.trim_angle))
-    return (
-        vehicle.mass,
-        vehicle.area,
-        vehicle.drag_coefficient,
-        vehicle.lift_coefficient,
-        trim,
-        vehicle.nose_radius,
-    )
-
-
-def _chosen_vehicle(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> list[np.ndarray]:
-    """Numbers of each case's vehicle; one that is named and given other numbers besides is refused."""
-    numbers = [getattr(i, symbol) for symbol in _OF_A_VEHICLE]
-    items = {parameter.symbol: parameter for parameter in PARAMETERS}
-    for k, (name, vehicle) in enumerate(VEHICLES.items(), start=1):
-        chosen = settings.vehicle == k
-        for symbol, number in zip(_OF_A_VEHICLE, numbers, strict=True):
-            item = items[symbol]
-            refusals.add(
-                chosen & (number != item.default * item.si_factor),
-                f'{item.name} is that of the vehicle "{name}"; for another, set vehicle = "given"',
-            )
-        own = _numbers_of(vehicle)
-        numbers = [np.where(chosen, value, number) for value, number in zip(own, numbers, strict=True)]
-    return numbers
-
-
-def _planned_lift_to_drag(settings: SimpleNamespace) -> np.ndarray:
-    """Lift-to-drag ratio that the laws know of."""
-    own = [vehicle.lift_coefficient / vehicle.drag_coefficient for vehicle in VEHICLES.values()]
-    ratios = np.array([0.0, *own])[settings.vehicle.astype(int)]
-    ratio = np.where(settings.vehicle > 0.5, ratios, settings.plan_lift_to_drag)
-    return np.where(ratio > 0.0, ratio, 1.0)  # a vehicle without lift is not guided
-
-
-def _vehicle_rows(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Areas over mass of the four forces, and the coefficient of the heating."""
-    mass, area, drag, lift, trim, nose = _chosen_vehicle(i, settings, refusals)
-    drag = drag * i.cd_factor
-    lift = lift * i.cd_factor * i.ld_factor
-    per_mass = area / (mass * i.mass_factor)
-    nose = nose * i.nose_radius_factor
-    tilted = trim + i.accelerometer_misalignment
-    sutton_graves = _of_planets(settings, "heating") / np.sqrt(nose)
-    heating = np.where(settings.heating == DETRA_KEMP_RIDDELL, detra_kemp_riddell_coefficient(nose), sutton_graves)
-    return {
-        "drag": drag * per_mass,
-        "lift": lift * per_mass,
-        "total": np.hypot(drag, lift) * per_mass,
-        "axial": axial_coefficient(drag, lift, np.cos(trim), np.sin(trim)) * per_mass,
-        "sensed": axial_coefficient(drag, lift, np.cos(tilted), np.sin(tilted)) * per_mass,
-        "planned_lift_to_drag": _planned_lift_to_drag(settings),
-        "heating": heating * i.heating_factor,
-    }
-
-
 def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.ndarray]:
     """Directions of the lift; a planar flight knows nothing of the side."""
     side = np.where(settings.planar > 0.5, 0.0, 1.0)
@@ -189,32 +116,8 @@ def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.nd
     }
 
 
-def _weather_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.ndarray]:
-    """The profiles of the cases, behind the tables of the guidance, and where each begins."""
-    asked = settings.weather > 0.5
-    if not asked.any():
-        return {"weather": np.zeros(asked.size)}
-    nodes = weather.weather_nodes(i.weather_draw, i.density_random_size, i.wind_random_size, i.wind_mean_size)
-    guidance_tables = np.where(settings.guidance > 0.5, float(reference_table.LENGTH), 0.0)
-    return {"weather": guidance_tables + weather.LENGTH * np.arange(asked.size), "tables": nodes}
-
-
-def _planned(settings: SimpleNamespace, world: World, entry: Entry, refusals: Refusals) -> Entry:
-    """The entry that distances are counted from: each case's own without errors, or that of the plan."""
-    given = settings.plan == PLANS.index("given")
-    if not given.any():
-        return entry
-    plain = SimpleNamespace(arrival=np.zeros_like(world.mu), speed_frame=settings.speed_frame)
-    plan = entry_of(planned_inputs(settings), plain, world, refusals)
-    mixed = {
-        name: np.where(given, getattr(plan, name), getattr(entry, name))
-        for name in ("place", "ahead", "right", "heading")
-    }
-    return replace(entry, **mixed)
-
-
-def _guidance_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Bank execution, reversals, sensor errors, and what the laws know of the planned vehicle."""
+def _sensor_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
+    """Bank execution, reversals and sensor errors."""
     return {
         "first_bank": i.bank + i.bank_error,
         "bank_error": i.bank_error,
@@ -223,7 +126,6 @@ def _guidance_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, n
         "reversal_floor": i.reversal_floor,
         "reversal_width": i.reversal_width,
         "load_limit": i.load_limit,
-        "planned_share": np.cos(settings.plan_bank),
         "accelerometer_bias": i.accelerometer_bias,
         "accelerometer_scale": i.accelerometer_scale_error,
         "accelerometer_noise": i.accelerometer_noise,
@@ -235,20 +137,32 @@ def _guidance_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, n
     }
 
 
-def _target(i: SimpleNamespace, world: World, entry: Entry) -> dict[str, np.ndarray]:
+def _target(i: SimpleNamespace, world: World, entry: Entry, end: np.ndarray) -> dict[str, np.ndarray]:
+    """Axes of the distances, and the target; end : downrange of the target where the inputs name none, 0 for none."""
     rows: dict[str, np.ndarray] = {}
     for letter, vectors in (("e", entry.place), ("f", entry.ahead), ("n", entry.right)):
         rows |= {f"{letter}{axis}": vectors[k] for k, axis in enumerate("xyz")}
-    along, across = i.target_downrange / world.radius, i.target_crossrange / world.radius
+    downrange = np.where(i.target_downrange > 0.0, i.target_downrange, end)
+    along, across = downrange / world.radius, i.target_crossrange / world.radius
     ahead = np.cos(along) * entry.place + np.sin(along) * entry.ahead
     target = np.cos(across) * ahead + np.sin(across) * entry.right
     rows |= {f"t{axis}": target[k] for k, axis in enumerate("xyz")}
     return rows | {
         "heading": entry.heading,
-        "aim_down": i.target_downrange,
+        "aim_down": downrange,
         "aim_cross": i.target_crossrange,
-        "aimed": np.where(i.target_downrange > 0.0, 1.0, 0.0),
+        "aimed": np.where(downrange > 0.0, 1.0, 0.0),
     }
+
+
+def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.ndarray) -> dict[str, np.ndarray]:
+    """Reference paths, behind them the air of each case, and where that begins."""
+    asked = settings.weather > 0.5
+    if not asked.any():
+        return {"weather": np.zeros(asked.size), "tables": references}
+    nodes = weather.weather_nodes(i.weather_draw, i.density_random_size, i.wind_random_size, i.wind_mean_size)
+    start = COEFFICIENTS.size + references.size + weather.LENGTH * np.arange(asked.size)
+    return {"weather": start, "tables": np.concatenate([references, nodes.ravel()])}
 
 
 MODEL = Model(
@@ -273,7 +187,7 @@ MODEL = Model(
     initial=dynamics.initial,
     start=dynamics.start,
     control=guidance.control,
-    tables=reference_tables,
+    tables=shared_tables,
     rhs=dynamics.rhs,
     events=dynamics.events,
     switch=dynamics.switch,

@@ -11,12 +11,12 @@ from campaigns.reentry.dynamics import (
     UNKNOWN,
     air_of,
     exit_of,
+    exposure_of,
+    force_of,
     heat_rate,
     place_of,
-    pressure_of,
     speed2,
 )
-from campaigns.reentry.reference_table import whole_range
 from mc_engine.lanes import atan2, floor, physics, rint, sqrt, where
 from mc_engine.model import Field
 from mc_engine.physics.frames import geodetic_latitude, spherical, velocity_angles
@@ -82,12 +82,14 @@ METRICS = (
     Field("downrange_km", "km", "distance over ground to the end, along the planned great circle"),
     Field("crossrange_km", "km", "distance over ground to the end, to the right of the planned great circle"),
     Field("miss_km", "km", "distance of the end from the target"),
+    Field("target_latitude_deg", "deg", "geodetic latitude of the target"),
+    Field("target_longitude_deg", "deg", "longitude of the target, east"),
     Field("reference_range_km", "km", "distance over ground to the end of the reference path"),
     Field("saturated_share", "", "share of the guidance's samples at which its command was at a limit"),
     Field("reversals", "", "how often the guidance changed the side of the lift"),
     Field("relative_speed_m_s", "m/s", "speed over ground at entry"),
     Field("relative_flight_path_angle_deg", "deg", "flight-path angle over ground at entry"),
-    Field("ballistic_coefficient_kg_m2", "kg/m^2", "mass over drag area, dispersions included"),
+    Field("ballistic_coefficient_kg_m2", "kg/m^2", "mass over drag area in hypersonic flow, dispersions included"),
 )
 Quantities = namedtuple(
     "Quantities",
@@ -141,6 +143,7 @@ def observe(t, s, m, p, o):
     v2 = speed2(air)
     through = sqrt(v2)
     pressure = 0.5 * air.density * v2
+    force = force_of(air, through, p, o)
     ground = ground_of(s, place.altitude, p, o)
     if o.guidance == UNGUIDED:
         bank = atan2(m.sin_bank, m.cos_bank)
@@ -155,8 +158,8 @@ def observe(t, s, m, p, o):
         ground.longitude,
         ground.downrange,
         ground.crossrange,
-        pressure * p.total,
-        pressure * p.axial,
+        pressure * force.total,
+        pressure * force.axial,
         pressure,
         heat_rate(air.density, through, p, o),
         s.heat,
@@ -173,10 +176,10 @@ def known(value):
 
 
 @physics
-def violations(pressure, flux, heat, p):
+def violations(load, pressure, flux, heat, p):
     """How many of load, heat rate, heat load and dynamic pressure were above their limits."""
     return (
-        where(pressure * p.total > p.corridor_load, 1.0, 0.0)
+        where(load > p.corridor_load, 1.0, 0.0)
         + where(flux > p.corridor_heat_rate, 1.0, 0.0)
         + where(heat > p.corridor_heat_load, 1.0, 0.0)
         + where(pressure > p.corridor_pressure, 1.0, 0.0)
@@ -184,22 +187,38 @@ def violations(pressure, flux, heat, p):
 
 
 @physics
-def planned_range(t, o):
+def target_of(t, p, o):
+    """(geodetic latitude, longitude) of the target, not numbers without one or over a flat Earth."""
+    if o.shape == FLAT:
+        latitude, longitude = float("nan") + t, float("nan") + t
+    else:
+        # at the altitude where the flight ends, so that a hit lies no distance from it
+        r = p.polar_radius / sqrt(1.0 - p.e2 * (1.0 - p.tz * p.tz)) + p.stop
+        aimed = p.aimed > 0.5
+        latitude = geodetic_latitude(r * p.tx, r * p.ty, r * p.tz, p.stop, p.polar_radius, p.e2)
+        latitude = where(aimed, latitude, float("nan")) + 0.0 * t
+        longitude = where(aimed, spherical(p.tx, p.ty, p.tz)[1], float("nan")) + 0.0 * t
+    return latitude, longitude
+
+
+@physics
+def planned_range(t, p, o):
     """Range [m] of the reference path, not a number without one."""
     if o.guidance == UNGUIDED:
         value = float("nan") + t
     else:
-        value = whole_range(o.tables) + 0.0 * t
+        value = p.planned_range + 0.0 * t
     return value
 
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
     """The metrics in the order of METRICS, at the end of the flight."""
-    pressure, flux, altitude, v = pressure_of(s, p, o)
+    pressure, flux, altitude, v, force = exposure_of(s, p, o)
     ground = ground_of(s, altitude, p, o)
     push, heat = pressure > m.pressure, flux > m.flux  # the flight may end before a peak
     pressure, flux = where(push, pressure, m.pressure), where(heat, flux, m.flux)
+    load = pressure * where(push, force.total, m.pressure_total)
     pressure_when = (
         where(push, t, m.pressure_time),
         where(push, altitude, m.pressure_altitude),
@@ -212,16 +231,16 @@ def evaluate(t, s, m, p, o, best, when):
     air = air_of(s, place_of(s, p, o), p, o)
     miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.aim_cross
     return Metrics(
-        pressure * p.total,
+        load,
         *pressure_when,
-        pressure * p.axial,
+        pressure * where(push, force.axial, m.pressure_axial),
         *pressure_when,
         pressure,
         *pressure_when,
         flux,
         *heat_when,
         s.heat,
-        violations(pressure, flux, s.heat, p),
+        violations(load, pressure, flux, s.heat, p),
         where(pulled, m.low, altitude),
         where(pulled, m.low_time, t),
         where(leaves, 1.0, m.exits),
@@ -240,7 +259,8 @@ def evaluate(t, s, m, p, o, best, when):
         ground.downrange,
         ground.crossrange,
         where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), float("nan")),
-        planned_range(t, o),
+        *target_of(t, p, o),
+        planned_range(t, p, o),
         where(m.samples > 0.0, m.saturated / where(m.samples > 0.0, m.samples, 1.0), float("nan")),
         m.reversals,
         p.speed,

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from mc_engine.physics.atmosphere import EXPONENTIALS
 from mc_engine.physics.constants import EARTH_RATE, MU_EARTH
 from mc_engine.physics.frames import WGS84_ECCENTRICITY2, WGS84_RADIUS
@@ -32,3 +34,8 @@ PLANETS = {
     "mars": Planet(4.2828372e13, 3_396_190.0, 0.0, 7.088218e-5, EXPONENTIALS["mars"], SUTTON_GRAVES["mars"]),
     "venus": Planet(3.24858592e14, 6_051_800.0, 0.0, -2.99245e-7, EXPONENTIALS["venus"], SUTTON_GRAVES["venus"]),
 }
+
+
+def of_planets(codes: np.ndarray, name: str) -> np.ndarray:
+    """One number of each case's planet; codes : float64[n], places in PLANETS."""
+    return np.array([getattr(planet, name) for planet in PLANETS.values()])[codes.astype(int)]

@@ -6,27 +6,31 @@ the speed lost, and a backward Riccati equation gives the gains of the vertical 
 """
 
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 from campaigns.reentry import reference_table as table
+from campaigns.reentry.air import GAS_CONSTANT, sound_speed
 from campaigns.reentry.apollo_final_phase import influence_rows
-from campaigns.reentry.entry_state import World, entry_of
+from campaigns.reentry.entry_state import ELLIPSOID
 from campaigns.reentry.inputs import GUIDANCE
+from campaigns.reentry.plan import Plan
 from campaigns.reentry.planets import PLANETS
 from campaigns.reentry.reference_table import FELT, LAST_SPEED, STEERED
-from campaigns.reentry.vehicles import VEHICLES, Vehicle
+from campaigns.reentry.vehicles import VEHICLES
 from campaigns.reentry.vinh import gravity, rates
 from mc_engine.errors import ModelError
 from mc_engine.model import Refusals
-from mc_engine.physics.atmosphere import us76_of_array
+from mc_engine.physics.aerodynamics import axial_coefficient
+from mc_engine.physics.atmosphere import us76_logarithm, us76_of_array
 from mc_engine.physics.constants import J2_EARTH
 from mc_engine.physics.frames import over_ellipsoid
 
-ELLIPSOID, US76, J2 = 0.0, 0.0, 0.0  # codes of settings
+US76, J2, NO_GRAVITY = 0.0, 0.0, 2.0  # codes of settings
+MOST_PLANS = 16  # different plans among the cases prepared at once: a grid, but no random draws
 _KILOMETRE, _DEGREE = 1e3, np.pi / 180.0
 _SCALES = np.array([_KILOMETRE, _DEGREE, _KILOMETRE])
 
@@ -43,7 +47,6 @@ class Weights:
 # with and without a term in the range
 RANGE_SET = Weights((1.0 / 5.0**2, 1.0 / 3.0**2, 1.0 / 2.0**2), 0.0, 4e-4)
 PROFILE_SET = Weights((1.0 / 5.0**2, 1.0 / 3.0**2, 0.0), 1e-11 * _KILOMETRE**2, 2e-3)
-WITHOUT_RANGE = ("law2", "law3")
 
 
 @dataclass(frozen=True)
@@ -68,76 +71,52 @@ class Reference:
 
 
 class Planner:
-    """Motion of the planned vehicle about the planned world; o: the settings by symbol."""
+    """Motion of the planned vehicle about the planned world."""
 
-    def __init__(self, o: Any):
-        self.o = o
-        planet = list(PLANETS.values())[int(o.planet)]
-        e2 = planet.e2 if o.shape == ELLIPSOID else 0.0
-        self.radius, self.e2, self.mu, self.air = planet.radius, e2, planet.mu, planet.air
-        self.polar_radius = planet.radius * np.sqrt(1.0 - e2)
-        self.rate = planet.rate if o.rotating > 0.5 else 0.0
-        self.j2 = J2_EARTH if o.gravity == J2 else 0.0
-        vehicle = planned_vehicle(o)
-        self.drag_area = vehicle.area * vehicle.drag_coefficient / vehicle.mass
-        self.lift_to_drag = vehicle.lift_coefficient / vehicle.drag_coefficient
-        trim = np.radians(vehicle.trim_angle)
-        self.axial_to_drag = np.cos(trim) + self.lift_to_drag * np.sin(trim)
-        self.share = np.cos(o.plan_bank)
+    def __init__(self, plan: Plan):
+        self.plan = plan
+        planet = list(PLANETS.values())[int(plan.planet)]
+        e2 = planet.e2 if plan.shape == ELLIPSOID else 0.0
+        self.radius, self.e2, self.mu, self.air = plan.ground, e2, planet.mu, planet.air
+        self.polar_radius = plan.ground * np.sqrt(1.0 - e2)
+        self.rate = planet.rate if plan.rotating > 0.5 else 0.0
+        self.j2 = J2_EARTH if plan.gravity == J2 else 0.0
+        self.free = plan.gravity == NO_GRAVITY
+        self.over_mach = np.array([(), *(vehicle.over_mach for vehicle in VEHICLES.values())][int(plan.vehicle)]).T
+        self.temperature = planet.mu / plan.ground**2 * planet.air[1] / GAS_CONSTANT
 
     def height(self, r, latitude):
         """(altitude [m], slope of the ellipsoid's radius by the squared sine of latitude)."""
         return over_ellipsoid(r, 1.0 / r, np.sin(latitude) ** 2, self.polar_radius, self.e2)
 
-    def drag(self, r, latitude, v):
-        """Drag acceleration [m/s^2]."""
+    def forces(self, r, latitude, v):
+        """(drag, whole lift), accelerations [m/s^2]."""
         h = self.height(r, latitude)[0]
-        density = us76_of_array(h) if self.o.atmosphere == US76 else self.air[0] * np.exp(-h / self.air[1])
-        return 0.5 * density * v * v * self.drag_area
+        standard = self.plan.atmosphere == US76
+        density = us76_of_array(h) if standard else self.air[0] * np.exp(-h / self.air[1])
+        drag = 0.5 * density * v * v * self.plan.drag
+        lift = drag * self.plan.lift_to_drag
+        if self.over_mach.size:
+            mach = v / sound_speed(us76_logarithm(h)[2] if standard else self.temperature)
+            of_drag, of_lift = (np.interp(mach, self.over_mach[0], c) / c[-1] for c in self.over_mach[1:])
+            drag, lift = of_drag * drag, of_lift * lift
+        return drag, lift
+
+    def axial(self, r, latitude, v):
+        """Deceleration along the body axis [m/s^2]."""
+        return axial_coefficient(*self.forces(r, latitude, v), np.cos(self.plan.trim), np.sin(self.plan.trim))
 
     def motion(self, r, latitude, v, path, heading, share):
         """Vinh's rates with a share of the lift in the vertical plane, the rate of the range, and the drag."""
-        drag = self.drag(r, latitude, v)
-        g_in, g_north = gravity(r, latitude, self.mu, self.j2)
-        lift = drag * self.lift_to_drag * share
-        six = rates(r, latitude, v, path, heading, drag, lift, 0.0, g_in, g_north, self.rate)
+        drag, lift = self.forces(r, latitude, v)
+        g_in, g_north = (0.0 * r, 0.0 * r) if self.free else gravity(r, latitude, self.mu, self.j2)
+        six = rates(r, latitude, v, path, heading, drag, lift * share, 0.0, g_in, g_north, self.rate)
         return six, v * np.cos(path) * self.radius / r, drag
 
     def start(self) -> np.ndarray:
         """(r, longitude, latitude, v, path, heading, range, speed lost) of the planned entry."""
-        entry = entry_of(planned_inputs(self.o), _one_case(self.o), self._world(), Refusals.none(1))
-        r = np.sqrt((entry.position[:, 0] ** 2).sum())
-        return np.array(
-            [r, 0.0, self.o.plan_latitude, entry.speed[0], entry.path[0], entry.heading[0], 0.0, 0.0], dtype=float
-        )
-
-    def _world(self) -> World:
-        one = np.ones(1)
-        return World(
-            self.mu * one, self.radius * one, self.polar_radius * one, self.e2 * one, self.rate * one, one < 0.0
-        )
-
-
-def planned_vehicle(o: Any) -> Vehicle:
-    """The vehicle that is named, or one of the planned ballistic coefficient and lift-to-drag ratio."""
-    chosen = int(o.vehicle)
-    if chosen > 0:
-        return list(VEHICLES.values())[chosen - 1]
-    trim = float(np.degrees(o.plan_trim_angle))
-    return Vehicle(o.plan_ballistic_coefficient, 1.0, 1.0, o.plan_lift_to_drag, trim, 1.0, "settings of the campaign")
-
-
-def planned_inputs(o: Any) -> SimpleNamespace:
-    """The entry inputs of the plan, without errors; float64[n] by symbol."""
-    names = ("speed", "flight_path_angle", "heading", "latitude", "longitude", "altitude", "radius")
-    given = {f"entry_{name}": np.atleast_1d(np.asarray(getattr(o, f"plan_{name}"), dtype=float)) for name in names}
-    zero = np.zeros_like(given["entry_speed"])
-    errors = {f"entry_{name}_error": zero for name in names if name != "radius"}
-    return SimpleNamespace(**given, **errors, excess_speed=zero, vacuum_periapsis=zero)
-
-
-def _one_case(o: Any) -> SimpleNamespace:
-    return SimpleNamespace(arrival=np.zeros(1), speed_frame=np.atleast_1d(o.speed_frame))
+        p = self.plan
+        return np.array([p.radius, 0.0, p.latitude, p.speed, p.path, p.heading, 0.0, 0.0])
 
 
 def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
@@ -145,26 +124,28 @@ def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
 
     def derivative(t, y):
         r, _, latitude, v, path, heading, _, _ = y
-        six, along, drag = planner.motion(r, latitude, v, path, heading, planner.share)
-        axial = drag * planner.axial_to_drag
+        six, along, _ = planner.motion(r, latitude, v, path, heading, planner.plan.share)
+        axial = planner.axial(r, latitude, v)
         return [*six, along, axial if axial > FELT else 0.0]
 
     def low(t, y):
-        return planner.height(y[0], y[2])[0] - planner.o.plan_stop_altitude
+        return planner.height(y[0], y[2])[0] - planner.plan.end
 
     low.terminal, low.direction = True, -1.0  # type: ignore[attr-defined]
     path = solve_ivp(
         derivative, (0.0, 5000.0), planner.start(), "DOP853", rtol=1e-10, atol=1e-9, events=low, dense_output=True
     )
     if path.t_events[0].size == 0:
-        raise ModelError("the planned entry does not come down to plan_stop_altitude_km, so there is no reference path")
+        raise ModelError(
+            "the planned entry does not come down to plan_stop_altitude_km, so that there is no reference path"
+        )
     t = np.linspace(0.0, path.t[-1], rows)
     r, _, latitude, v, angle, heading, along, lost = path.sol(t)
-    six, _, drag = planner.motion(r, latitude, v, angle, heading, planner.share)
+    six, _, drag = planner.motion(r, latitude, v, angle, heading, planner.plan.share)
     altitude, slope = planner.height(r, latitude)
     climb = six[0] - slope * np.sin(2.0 * latitude) * six[2]
     return Reference(
-        t, r, latitude, v, angle, heading, along, lost, altitude, climb, drag, drag * planner.axial_to_drag
+        t, r, latitude, v, angle, heading, along, lost, altitude, climb, drag, planner.axial(r, latitude, v)
     )
 
 
@@ -182,7 +163,7 @@ def linear_system(planner: Planner, path: Reference) -> tuple[np.ndarray, np.nda
 
     def slopes(dh, dpath, dshare):
         six, along, _ = planner.motion(
-            path.r + dh, path.latitude, path.speed, path.path + dpath, path.heading, planner.share + dshare
+            path.r + dh, path.latitude, path.speed, path.path + dpath, path.heading, planner.plan.share + dshare
         )
         return -np.array([six[0], six[4], along]) / six[3]
 
@@ -214,13 +195,57 @@ def riccati_gains(lost: np.ndarray, a: np.ndarray, b: np.ndarray, weights: Weigh
     return np.einsum("ni,nij->nj", b, p) / weights.control / _SCALES
 
 
-def reference_tables(o: Any) -> np.ndarray:
-    """What `reference_table` reads: designed for the settings o, or nothing where no law is asked for."""
-    law = GUIDANCE[int(o.guidance)]
-    if law == "none":
-        return np.empty(0)
+class StoredReferences(NamedTuple):
+    """Where each case finds its reference path in the tables, and its range [m]; both 0 without one."""
+
+    place: np.ndarray
+    range: np.ndarray
+    tables: np.ndarray
+
+
+def stored_references(plans: Plan, asked: np.ndarray, first: int, refusals: Refusals) -> StoredReferences:
+    """The reference paths of the plans (float64[n] each), one for all cases of the same plan.
+
+    asked : bool[n], cases with a law;  first : place of the first reference.  Cases whose plan has no reference path
+    join `refusals`.
+    """
+    columns = np.array([np.broadcast_to(column, asked.shape) for column in plans])
+    place, along, tables = np.zeros(asked.size), np.zeros(asked.size), [np.empty(0)]
+    asked = asked & ~refusals.mask
+    if not asked.any():
+        return StoredReferences(place, along, tables[0])
+    distinct, which = np.unique(columns[:, asked], axis=1, return_inverse=True)
+    # an error and not a refusal: what a case comes to must not depend on the cases it is prepared with
+    if distinct.shape[1] > MOST_PLANS:
+        raise ModelError(
+            f"the cases plan more than {MOST_PLANS} different entries, vehicles or banks, and each would need a "
+            'reference path of its own; disperse the errors and factors instead, or set plan = "given" with plan_...'
+        )
+    for k, numbers in enumerate(distinct.T):
+        mine = np.flatnonzero(asked)[which.ravel() == k]
+        found = reference_table_of(Plan(*(float(number) for number in numbers)))
+        if isinstance(found, str):
+            refusals.reason[mine] = found
+        else:
+            place[mine], along[mine] = first + sum(one.size for one in tables), found[table.RANGE]
+            tables.append(found)
+    return StoredReferences(place, along, np.concatenate(tables))
+
+
+@lru_cache(maxsize=64)
+def reference_table_of(plan: Plan) -> np.ndarray | str:
+    """What `reference_table` reads, designed for one plan; or the sentence that says why there is no reference."""
+    try:
+        return _designed(plan)
+    except ModelError as error:
+        return str(error)
+
+
+def _designed(plan: Plan) -> np.ndarray:
+    """The table of one plan; ModelError if its path does not come down, or never meets air enough."""
+    law = GUIDANCE[int(plan.law)]
     out = np.zeros(table.LENGTH)
-    planner = Planner(o)
+    planner = Planner(plan)
     path = fly_reference(planner)
     out[table.RANGE] = path.along[-1]
     _write_clock(out, path)
@@ -229,7 +254,7 @@ def reference_tables(o: Any) -> np.ndarray:
         out[table.FIRST_SPEED] = speed[0]
         out[table.SPEED_DENSITY] = _write_rows(out, table.SPEED_TABLE, speed[0] - speed, columns)
     else:
-        _write_path(out, planner, path, PROFILE_SET if law in WITHOUT_RANGE else RANGE_SET)
+        _write_path(out, planner, path, PROFILE_SET if law == "law2" else RANGE_SET)
     return out
 
 

@@ -1,4 +1,4 @@
-"""The stored reference path: how it lies in the tables that all cases share, and how a flight reads it.
+"""The stored reference path: how it lies in the tables, one for all cases of a plan, and how a flight reads it.
 
 Two tables of eight columns, one over the speed, one over the speed lost W that an accelerometer has counted.  Rows
 are equally spaced in ln(1 + x / SPREAD) with x the speed lost since the first row: close where the air is thin and
@@ -55,30 +55,25 @@ def _row(tables, start, density, x):
 
 
 @physics
-def by_speed(tables, speed):
-    """The row of the speed table at a speed [m/s]."""
-    return _row(tables, SPEED_TABLE, look_up(tables, SPEED_DENSITY), look_up(tables, FIRST_SPEED) - speed)
+def by_speed(tables, first, speed):
+    """The row of the speed table at a speed [m/s]; here and below, first : place where the reference begins."""
+    lost = look_up(tables, first + FIRST_SPEED) - speed
+    return _row(tables, first + SPEED_TABLE, look_up(tables, first + SPEED_DENSITY), lost)
 
 
 @physics
-def by_loss(tables, lost):
+def by_loss(tables, first, lost):
     """The row of the other table at a speed lost W [m/s]."""
-    return ByLoss(*_row(tables, LOST_TABLE, look_up(tables, LOST_DENSITY), lost))
+    return ByLoss(*_row(tables, first + LOST_TABLE, look_up(tables, first + LOST_DENSITY), lost))
 
 
 @physics
-def whole_range(tables):
-    """Range [m] of the whole reference."""
-    return look_up(tables, RANGE)
-
-
-@physics
-def clocked_range(tables, t):
+def clocked_range(tables, first, t):
     """Range [m] of the reference at a time t [s] after entry, before the air is felt; then on at the last rate."""
-    end = look_up(tables, CLOCK_TIME)
+    end = look_up(tables, first + CLOCK_TIME)
     early = minimum(t, end) - end
     return (
-        look_up(tables, CLOCK_RANGE)
-        + look_up(tables, CLOCK_RATE) * (t - end)
-        + look_up(tables, CLOCK_BEND) * (early * early)
+        look_up(tables, first + CLOCK_RANGE)
+        + look_up(tables, first + CLOCK_RATE) * (t - end)
+        + look_up(tables, first + CLOCK_BEND) * (early * early)
     )

@@ -4,6 +4,7 @@ Each function here is its own interpreted meaning, on floats and NumPy arrays.  
 vector instruction of the same name (see `lowering`), with the same result to the last bit.
 """
 
+import ctypes
 import math
 from fractions import Fraction
 
@@ -18,7 +19,7 @@ def sqrt(x):
 
 def fma(x, y, z):
     """x y + z with one rounding."""
-    with np.errstate(invalid="ignore"):
+    with np.errstate(all="ignore"):
         return _plain(np.asarray(_exact_fma(x, y, z), dtype=np.float64))
 
 
@@ -98,12 +99,14 @@ def _fma_of_floats(x, y, z):
         return math.inf if exact > 0 else -math.inf
 
 
-def _fused(x, y, z):
-    """Python's own fma where there is one (3.13), which raises instead of going to infinity or NaN."""
+def _fma_of_the_library():
+    """The C library's fma, which Python has of its own from 3.13 on only; exact rational arithmetic without it."""
     try:
-        return math.fma(x, y, z)  # type: ignore[attr-defined,unused-ignore]
-    except (AttributeError, OverflowError, ValueError):
-        return _fma_of_floats(x, y, z)  # exact rational arithmetic: the same bits, slowly
+        function = ctypes.CDLL(None).fma
+    except (AttributeError, OSError, TypeError):
+        return _fma_of_floats  # the same bits, slowly
+    function.argtypes, function.restype = [ctypes.c_double] * 3, ctypes.c_double
+    return function
 
 
-_exact_fma = np.frompyfunc(_fused, 3, 1)
+_exact_fma = np.frompyfunc(_fma_of_the_library(), 3, 1)

@@ -10,7 +10,7 @@ EXACT = {"rtol": 1e-12, "atol": 1e-9, "method": "DOP853"}
 
 
 def _direction(burn, since, pitch_deg, yaw_deg):
-    """Thrust direction a time after ignition, with pointing errors as the digest defines them."""
+    """Thrust direction a time after ignition, with pointing errors as the README defines them."""
     segment = next((one for one in burn.segments if since <= one.start + one.length), burn.segments[-1])
     s = 2.0 * (since - segment.start) / segment.length - 1.0
     d = polynomial.polyval(s, segment.steering.T)

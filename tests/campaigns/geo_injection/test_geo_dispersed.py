@@ -132,7 +132,7 @@ SIGMAS = {
 
 
 def drawn(n, **inputs):
-    """n cases of the review's spreads."""
+    """n cases of the spreads of campaign.toml."""
     random = np.random.default_rng(2017)
     return fly_cases(
         **{name: NOMINAL[name] + sigma * random.standard_normal(n) for name, sigma in SIGMAS.items()}, **inputs

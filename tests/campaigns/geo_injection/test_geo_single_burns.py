@@ -57,7 +57,7 @@ def test_the_published_apogee_burns_of_two_burns_are_above_the_least_time_of_the
     assert apogee_burn_s(24_588, 0.7142, 52.0, 12_772.0, "free") == pytest.approx(806.25, abs=0.1)
 
 
-# [s] of the digest's own solutions, and as the source prints them: its three-dimensional ones begin on the node
+# [s] of independent solutions, and as the source prints them: its three-dimensional ones begin on the node
 FIRST_BURNS = [
     ("planar, 2 burns", 2027.9, 2033.0),
     ("planar, 3 burns", 904.3, 905.0),
@@ -113,7 +113,7 @@ def test_table_1_converged_row_is_only_loosely_converged_in_the_source():
 
 
 def test_table_1_costates_keep_the_symmetry_of_a_free_longitude():
-    """l_y = l_vx at the start: digest, section 1.8."""
+    """l_y = l_vx at the start, as the source takes it."""
     from campaigns.geo_injection.avoidance import burn_of
 
     start = burn_of(AVOIDANCE).start
@@ -121,5 +121,5 @@ def test_table_1_costates_keep_the_symmetry_of_a_free_longitude():
 
 
 def test_the_engine_that_the_tables_identify_has_332_seconds():
-    """Section 5 of the digest: 20 kN and 6.14 kg/s."""
+    """20 kN and 6.14 kg/s."""
     assert THRUST / FLOW / 9.80665 == pytest.approx(332.16, abs=0.01)

@@ -10,7 +10,6 @@ from geo_twin import fly_twin
 from campaigns.geo_injection.coast import coast, kepler
 from campaigns.geo_injection.design import program_for
 from campaigns.geo_injection.dynamics import direction, start
-from campaigns.geo_injection.inputs import METHODS
 from campaigns.geo_injection.kept_programs import SEQUENCES
 from campaigns.geo_injection.powered_arc import fly_burns
 
@@ -127,7 +126,3 @@ def test_a_circle_coasts_though_it_has_no_perigee():
     place, velocity = kepler(r, v, np.array([2.0]))
     assert place[0] == pytest.approx([np.cos(2.0), np.sin(2.0), 0.0], abs=1e-14)
     assert velocity[0] == pytest.approx([-np.sin(2.0), np.cos(2.0), 0.0], abs=1e-14)
-
-
-def test_methods_are_those_that_the_design_knows():
-    assert METHODS == ("optimal", "staged")

@@ -14,8 +14,8 @@ TRIGGER, LAST, SCALE_HEIGHT, FELT = 0.15 * G0, 400.0, 7000.0, 0.05 * G0
 class Stored:
     """The reference over the speed, its steered part, as the laws know it."""
 
-    def __init__(self, o):
-        planner = Planner(o)
+    def __init__(self, plan):
+        planner = Planner(plan)
         self.whole = whole = fly_reference(planner)
         part = steered_part(whole)
         self.path = type(whole)(**{name: value[part] for name, value in vars(whole).items()})

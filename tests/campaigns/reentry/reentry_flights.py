@@ -1,9 +1,14 @@
 """Short ways to fly the entry model: inputs and results by column name, in declared units."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
+from campaigns.reentry.airframe import airframe_of
+from campaigns.reentry.entry_state import entry_of, world_of
+from campaigns.reentry.plan import Plan, planned_entry, plans_of
 from mc_engine.flight import fly, fly_history
-from mc_engine.model import load_model
+from mc_engine.model import Refusals, load_model
 
 MODEL = load_model("campaigns.reentry")
 NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settings)}
@@ -43,6 +48,17 @@ def fly_cases(width=8, ids=None, **inputs):
 def fly_one(**inputs):
     """The row of one case: a number or a word by column name."""
     return {name: column[0] for name, column in fly_cases(**inputs).items()}
+
+
+def plan_of(**inputs):
+    """The plan of one case, as plain numbers."""
+    inputs = NOMINAL | inputs
+    i = SimpleNamespace(**{one.symbol: np.array([inputs[one.name] * one.si_factor]) for one in MODEL.parameters})
+    o = SimpleNamespace(**{one.symbol: np.array([one.code(inputs[one.name])]) for one in MODEL.settings})
+    refusals = Refusals.none(1)
+    world = world_of(i, o)
+    planned = planned_entry(o, world, entry_of(i, o, world, refusals), refusals)
+    return Plan(*(float(row[0]) for row in plans_of(i, o, world, planned, airframe_of(i, o, refusals))))
 
 
 def history(rows=2001, **inputs):

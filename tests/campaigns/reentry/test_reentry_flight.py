@@ -182,3 +182,14 @@ def test_the_slow_density_error_is_the_digests_share_at_three_sigma():
     for altitude, share in ((115.0, 1.60), (90.0, 1.45), (70.0, 1.30), (45.0, 1.15), (12.0, 1.10)):
         ratio = [np.exp(np.interp(-altitude, -h["altitude_km"], np.log(h["density_kg_m3"]))) for h in (plain, thick)]
         assert ratio[1] / ratio[0] == pytest.approx(share, rel=2e-3)
+
+
+def test_the_target_lies_where_a_flight_that_hits_it_ends():
+    """Over the ellipsoid, to the side; 1e-5 degrees are a metre."""
+    entry = {"entry_latitude_deg": 45.5, "entry_longitude_deg": 170.0, "entry_heading_deg": 50.0, "bank_deg": 60.0}
+    free = fly_one(**entry)
+    hit = fly_one(**entry, target_downrange_km=free["downrange_km"], target_crossrange_km=free["crossrange_km"])
+    assert hit["miss_km"] < 1e-6
+    for name in ("latitude_deg", "longitude_deg"):
+        assert hit[f"target_{name}"] == pytest.approx(hit[f"final_{name}"], abs=1e-5)
+        assert np.isnan(free[f"target_{name}"])

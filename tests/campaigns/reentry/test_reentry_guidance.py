@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from guidance_twin import Stored, fly_guided
-from reentry_flights import MODEL, NOMINAL, PLANAR, fly_cases, fly_one, history
+from reentry_flights import MODEL, NOMINAL, PLANAR, fly_cases, fly_one, history, plan_of
 
-from mc_engine.flight import prepare, settings_of
+from mc_engine.errors import ModelError
+from mc_engine.flight import prepare
 
 PLANNED = PLANAR | {"plan": "given"}
 REFERENCE_KM = 2548.676
@@ -107,8 +108,7 @@ def test_without_a_law_there_is_no_reference_and_no_saturation():
 
 @pytest.mark.parametrize("law", ["law1", "law2r", "law3r"])
 def test_a_guided_flight_is_that_of_an_independent_one_second_by_second(law):
-    inputs = NOMINAL | PLANNED | {"guidance": law}
-    stored = Stored(settings_of(MODEL, prepare(MODEL, inputs, 1).settings[0]))
+    stored = Stored(plan_of(**PLANNED, guidance=law))
     # law 2 above its altitude bounds; both in thin and thick air
     for angle, density, drag in ((0.1, 1.0, 1.0), (-0.08, 1.2, 0.97), (0.02, 0.85, 1.05)):
         area = 1.2569 * 12.017 / 5498.22 * drag * density
@@ -128,10 +128,12 @@ def test_a_navigation_error_of_the_range_is_the_miss():
     assert wrong["downrange_km"] - right["downrange_km"] == pytest.approx(-3.0, abs=0.2)
 
 
-def test_a_farther_target_moves_the_landing():
-    row = fly_one(**PLANNED, guidance="law1", target_downrange_km=REFERENCE_KM + 40.0)
+@pytest.mark.parametrize("law", ["law1", "law2r", "law3r", "apollo"])
+@pytest.mark.parametrize("farther", [-60.0, 40.0])
+def test_another_target_moves_the_landing(law, farther):
+    row = fly_one(**PLANNED, guidance=law, target_downrange_km=REFERENCE_KM + farther)
     assert row["miss_km"] < 1.5
-    assert row["downrange_km"] == pytest.approx(REFERENCE_KM + 40.0, abs=1.5)
+    assert row["downrange_km"] == pytest.approx(REFERENCE_KM + farther, abs=1.5)
 
 
 def test_a_scale_error_of_the_accelerometer_costs_law_3_its_range_and_law_1_nothing():
@@ -215,11 +217,15 @@ def test_the_bank_is_late_and_not_faster_than_its_limit():
 @pytest.mark.parametrize(
     ("inputs", "sentence"),
     [
+        ({"guidance": "law1", "vehicle": "soyuz"}, "a guidance law needs a vehicle with lift"),
         (
-            {"guidance": "law1", "plan": "given"},
-            "a guidance law that turns to the side needs target_downrange_km, or planar = true",
+            {"guidance": "law1", "entry_speed_m_s": 11_500.0, "entry_flight_path_angle_deg": -4.0},
+            "the planned entry does not come down to plan_stop_altitude_km, so that there is no reference path",
         ),
-        ({"guidance": "law1", "planar": True}, 'a guidance law needs its plan; set plan = "given"'),
+        (
+            {"guidance": "law1", "plan_stop_altitude_km": 100.0},
+            "the planned entry never has 0.15 g of drag, so that no law could steer",
+        ),
         (
             {
                 "guidance": "law1",
@@ -247,3 +253,80 @@ def test_the_plan_gives_the_frame_of_the_distances_to_cases_that_enter_elsewhere
         -0.05 * 111.2 * np.sin(np.radians(54.0)), abs=1.0
     )
     assert given["final_latitude_deg"] == own["final_latitude_deg"]
+
+
+# ---- the plan
+
+NAMED = {name: value for name, value in TURNING.items() if name.startswith("entry_")}  # what a file need say, no more
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_law_plans_from_the_entry_the_vehicle_and_the_bank_of_the_case_unless_told(law):
+    row = fly_one(**NAMED, guidance=law)
+    assert row["status"] == "ok"
+    assert row["reference_range_km"] == pytest.approx(TURNING["target_downrange_km"], abs=1e-3)
+    # laws without range leave it to the reference, which knows no reversals
+    assert row["miss_km"] < (20.0 if law in ("law2", "law3") else 1.5)
+
+
+def test_the_plan_knows_no_errors_and_no_factors():
+    errors = {
+        "entry_speed_error_m_s": 5.0, "entry_flight_path_angle_error_deg": 0.1, "entry_heading_error_deg": 0.1,
+        "entry_latitude_error_deg": 0.1, "entry_longitude_error_deg": 0.1, "entry_altitude_error_km": 1.0,
+        "cd_factor": 1.1, "ld_factor": 0.9, "mass_factor": 1.02, "density_factor": 1.2, "bank_error_deg": 2.0,
+        "stop_altitude_km": 9.0,
+    }  # fmt: skip
+    assert plan_of(**NAMED, guidance="law1", **errors) == plan_of(**NAMED, guidance="law1")
+
+
+@pytest.mark.parametrize(
+    ("name", "inputs"),
+    [
+        ("speed", {"entry_speed_m_s": 7900.0}), ("path", {"entry_flight_path_angle_deg": -2.5}),
+        ("latitude", {"entry_latitude_deg": 10.0}), ("radius", {"entry_radius_km": 6495.0}),
+        ("drag", {"mass_kg": 5000.0}), ("lift_to_drag", {"lift_coefficient": 0.3}), ("share", {"bank_deg": 50.0}),
+        ("trim", {"trim_angle_deg": 20.0}), ("lift_to_drag", {"vehicle": "apollo"}),
+        ("end", {"plan_stop_altitude_km": 12.0}),
+    ],
+)  # fmt: skip
+def test_another_entry_vehicle_or_bank_is_another_plan(name, inputs):
+    plain, other = (plan_of(**NAMED | more, guidance="law1") for more in ({}, inputs))
+    assert getattr(plain, name) != getattr(other, name)
+
+
+def test_a_planned_arrival_on_a_hyperbola_is_that_of_its_periapsis():
+    arrival = {"arrival": "hyperbola", "excess_speed_m_s": 3000.0, "vacuum_periapsis_km": 60.0, "rotating": False}
+    plan, row = plan_of(**arrival, guidance="law1"), fly_one(**arrival)
+    assert plan.speed == pytest.approx(row["relative_speed_m_s"], rel=1e-12)
+    assert np.degrees(plan.path) == pytest.approx(row["relative_flight_path_angle_deg"], rel=1e-12)
+
+
+def test_cases_of_several_plans_have_the_bits_of_each_alone():
+    bank = np.array([60.0, 55.0, 65.0, 55.0, 60.0, 65.0, 60.0])
+    law = np.array(["law1", "law1", "none", "law3r", "law3r", "law1", "law2"], dtype=object)
+    angle = np.linspace(-0.1, 0.1, 7)
+    cases = {"bank_deg": bank, "guidance": law, "entry_flight_path_angle_error_deg": angle}
+    together = fly_cases(**PLANAR, **cases, weather=True, weather_draw=np.linspace(0.1, 0.9, 7))
+    assert set(together["status"]) == {"ok"}
+    assert len(set(together["reference_range_km"][[0, 1, 5]])) == 3
+    for i in range(7):
+        one = {name: values[i] for name, values in cases.items()}
+        alone = fly_cases(
+            width=1, ids=np.array([i]), **PLANAR, **one, weather=True, weather_draw=np.linspace(0.1, 0.9, 7)[i]
+        )
+        for name, column in together.items():
+            assert column[i : i + 1].tolist() == alone[name].tolist() or np.isnan(column[i]), name
+
+
+def test_a_plan_of_its_own_for_each_of_many_cases_is_refused_as_a_whole_with_a_way_out():
+    with pytest.raises(ModelError, match='disperse the errors and factors instead, or set plan = "given"'):
+        fly_cases(**PLANAR, guidance="law1", entry_speed_m_s=7800.0 + np.arange(17.0))
+    many = fly_cases(**PLANNED, guidance="law1", entry_speed_m_s=7800.0 + 0.1 * np.arange(17.0))
+    assert set(many["status"]) == {"ok"}
+
+
+def test_one_case_without_a_reference_path_leaves_the_others_theirs():
+    flown = fly_cases(**PLANAR, guidance="law1", entry_speed_m_s=np.array([7800.0, 11_500.0, 7750.0]))
+    assert list(flown["status"]) == ["ok", "refused", "ok"]
+    assert "no reference path" in flown["reason"][1]
+    assert flown["reference_range_km"][0] > flown["reference_range_km"][2] + 50.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reentry_flights import MODEL, NOMINAL, PLANAR, fly_one, history
+from reentry_flights import PLANAR, fly_one, history, plan_of
 from scipy.integrate import solve_ivp
 
 from campaigns.reentry.apollo_final_phase import FLOWN
@@ -13,39 +13,37 @@ from campaigns.reentry.reference import (
     Weights,
     fly_reference,
     linear_system,
+    reference_table_of,
     riccati_gains,
     steered_part,
 )
 from campaigns.reentry.reference_table import (
     LENGTH,
+    RANGE,
     BySpeed,
     Influence,
     by_loss,
     by_speed,
     clocked_range,
-    whole_range,
 )
 from mc_engine.errors import ModelError
-from mc_engine.flight import prepare, settings_of
 
 PLANNED = PLANAR | {"plan": "given"}
 
 
-def settings(**inputs):
-    """Settings by symbol, tables included."""
-    ready = prepare(MODEL, NOMINAL | inputs, 1)
-    assert ready.refusals.reason[0] == ""
-    return settings_of(MODEL, ready.settings[0])
+@pytest.fixture(scope="module")
+def plan():
+    return plan_of(**PLANNED, guidance="law1")
 
 
 @pytest.fixture(scope="module")
-def o():
-    return settings(**PLANNED, guidance="law1")
+def table(plan):
+    return reference_table_of(plan)
 
 
 @pytest.fixture(scope="module")
-def path(o):
-    return fly_reference(Planner(o))
+def path(plan):
+    return fly_reference(Planner(plan))
 
 
 def part_of(path):
@@ -79,7 +77,7 @@ SCENARIOS = {
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_reference_is_the_flight_of_the_planned_vehicle(name):
     inputs = SCENARIOS[name]
-    path = fly_reference(Planner(settings(**inputs)))
+    path = fly_reference(Planner(plan_of(**inputs)))
     row, seen = fly_one(**inputs, tolerance=1e-10), history(rows=801, **inputs, tolerance=1e-10)
     # Coriolis force takes the flight off the great circle along which its downrange counts
     a_kilometre, ten_metres = 1.0, 0.01
@@ -94,13 +92,13 @@ def test_the_reference_is_the_flight_of_the_planned_vehicle(name):
 
 
 def test_the_climb_of_the_reference_is_the_rate_of_its_altitude():
-    path = fly_reference(Planner(settings(**SCENARIOS["turning"])))
+    path = fly_reference(Planner(plan_of(**SCENARIOS["turning"])))
     assert np.gradient(path.altitude, path.t)[1:-1] == pytest.approx(path.climb[1:-1], abs=0.05)
 
 
-def test_the_linear_system_carries_small_differences_along(o, path):
+def test_the_linear_system_carries_small_differences_along(plan, path):
     """A neighbouring flight, differences taken at equal speed."""
-    planner, part = Planner(o), part_of(path)
+    planner, part = Planner(plan), part_of(path)
     a, b = linear_system(planner, part)
     lost = part.speed[0] - part.speed
     first, change = np.array([0.05, 0.005, 0.1]), 0.002  # km, deg, km; of the share of the lift
@@ -124,7 +122,7 @@ def test_the_linear_system_carries_small_differences_along(o, path):
 
     start = np.array([part.r[0], part.along[0], part.path[0]])
     moved = start + np.array([1e3 * first[0], 1e3 * first[2], np.radians(first[1])])
-    found = flown(moved, planner.share + change) - flown(start, planner.share)
+    found = flown(moved, planner.plan.share + change) - flown(start, planner.plan.share)
     assert np.array([found[0] / 1e3, np.degrees(found[2]), found[1] / 1e3]) == pytest.approx(
         expected, rel=0.03, abs=0.003
     )
@@ -140,10 +138,10 @@ def test_the_gain_on_an_integrator_is_its_closed_form():
     assert np.abs(gains[:, :2]).max() == 0.0
 
 
-def cost(o, path, gains, weights, first):
+def cost(plan, path, gains, weights, first):
     """Final and running cost of the linear system under gains, from first differences in km, deg, km."""
     part = part_of(path)
-    a, b = linear_system(Planner(o), part)
+    a, b = linear_system(Planner(plan), part)
     lost = part.speed[0] - part.speed
     k = gains * np.array([1e3, np.pi / 180.0, 1e3])
 
@@ -158,67 +156,79 @@ def cost(o, path, gains, weights, first):
 
 
 @pytest.mark.parametrize("weights", [RANGE_SET, PROFILE_SET], ids=["range set", "profile set"])
-def test_the_stored_gains_are_a_minimum_of_their_cost(o, path, weights):
+def test_the_stored_gains_are_a_minimum_of_their_cost(plan, path, weights):
     part = part_of(path)
-    best = riccati_gains(part.speed[0] - part.speed, *linear_system(Planner(o), part), weights)
+    best = riccati_gains(part.speed[0] - part.speed, *linear_system(Planner(plan), part), weights)
     first = (0.5, 0.05, 5.0)
-    least = cost(o, path, best, weights, first)
+    least = cost(plan, path, best, weights, first)
     for factor in (0.9, 1.1):
-        assert cost(o, path, factor * best, weights, first) > least
+        assert cost(plan, path, factor * best, weights, first) > least
         for one in (0, 1) if weights is PROFILE_SET else (0, 1, 2):
             other = best.copy()
             other[:, one] *= factor
-            assert cost(o, path, other, weights, first) > least
+            assert cost(plan, path, other, weights, first) > least
 
 
-def test_the_tables_hold_the_path_over_the_speed_and_over_the_speed_lost(o, path):
+def test_the_tables_hold_the_path_over_the_speed_and_over_the_speed_lost(table, path):
     part = part_of(path)
-    assert len(o.tables) == LENGTH
+    assert len(table) == LENGTH
     at = slice(None, None, 37)
-    row = BySpeed(*by_speed(o.tables, part.speed[at]))
+    row = BySpeed(*by_speed(table, 0.0, part.speed[at]))
     assert np.abs(row.altitude - part.altitude[at]).max() < 40.0
     assert np.abs(row.range - part.along[at]).max() < 60.0
     assert np.abs(row.path - part.path[at]).max() < 5e-3
     assert row.drag == pytest.approx(part.drag[at], rel=5e-3)
-    lost = by_loss(o.tables, part.lost[at])
+    lost = by_loss(table, 0.0, part.lost[at])
     assert np.abs(lost.speed - part.speed[at]).max() < 1.0
     assert lost.axial == pytest.approx(part.axial[at], rel=5e-3)
     assert np.exp(lost.log_axial) == pytest.approx(part.axial[at], rel=5e-3)
     assert np.abs(lost.range - part.along[at]).max() < 60.0
-    assert whole_range(o.tables) == path.along[-1]
+    assert table[RANGE] == path.along[-1]
 
 
-def test_beyond_the_tables_their_first_and_last_rows_stand(o):
-    first, last = by_speed(o.tables, 7816.6), by_speed(o.tables, 401.0)
-    assert by_speed(o.tables, 9000.0)[0] == pytest.approx(first[0], abs=30.0)
-    assert by_speed(o.tables, 1.0)[2] == pytest.approx(last[2], abs=100.0)
-    assert np.isfinite(by_speed(o.tables, float("nan"))).all()
+def test_beyond_the_tables_their_first_and_last_rows_stand(table):
+    first, last = by_speed(table, 0.0, 7816.6), by_speed(table, 0.0, 401.0)
+    assert by_speed(table, 0.0, 9000.0)[0] == pytest.approx(first[0], abs=30.0)
+    assert by_speed(table, 0.0, 1.0)[2] == pytest.approx(last[2], abs=100.0)
+    assert np.isfinite(by_speed(table, 0.0, float("nan"))).all()
 
 
-def test_the_clock_tells_the_range_until_the_air_is_felt(o, path):
+def test_the_clock_tells_the_range_until_the_air_is_felt(table, path):
     early = path.lost == 0.0
-    assert np.abs(clocked_range(o.tables, path.t[early]) - path.along[early]).max() < 500.0
+    assert np.abs(clocked_range(table, 0.0, path.t[early]) - path.along[early]).max() < 500.0
     after = path.t[early][-1] + 10.0
-    assert clocked_range(o.tables, after) - clocked_range(o.tables, after - 10.0) == pytest.approx(77_200.0, rel=0.01)
+    assert clocked_range(table, 0.0, after) - clocked_range(table, 0.0, after - 10.0) == pytest.approx(
+        77_200.0, rel=0.01
+    )
 
 
 def test_a_plan_that_does_not_come_down_is_said_so():
-    with pytest.raises(ModelError, match="does not come down"):
-        settings(**PLANNED, guidance="law1", plan_speed_m_s=11_500.0, plan_flight_path_angle_deg=-4.0)
+    high = plan_of(**PLANNED, guidance="law1", plan_speed_m_s=11_500.0, plan_flight_path_angle_deg=-4.0)
+    assert "does not come down" in reference_table_of(high)
     with pytest.raises(ModelError, match="no law could steer"):
-        settings(**PLANNED, guidance="law1", plan_stop_altitude_km=100.0)
+        steered_part(fly_reference(Planner(plan_of(**PLANNED, guidance="law1", plan_stop_altitude_km=100.0))))
+
+
+def test_a_reference_is_found_wherever_it_lies_in_the_tables(table):
+    behind = np.concatenate([np.full(17, np.nan), table])
+    speed = np.linspace(500.0, 7700.0, 9)
+    assert np.array_equal(by_speed(behind, 17.0, speed), by_speed(table, 0.0, speed))
+    assert np.array_equal(by_loss(behind, 17.0, speed), by_loss(table, 0.0, speed))
+    assert np.array_equal(clocked_range(behind, 17.0, speed), clocked_range(table, 0.0, speed))
 
 
 def test_a_law_without_range_has_no_gain_on_it():
     for law, least, most in (("law2", 0.0, 0.0), ("law2r", 1e-7, 2e-3)):
-        rows = BySpeed(*by_speed(settings(**PLANNED, guidance=law).tables, np.linspace(800.0, 7700.0, 20)))
+        rows = BySpeed(
+            *by_speed(reference_table_of(plan_of(**PLANNED, guidance=law)), 0.0, np.linspace(800.0, 7700.0, 20))
+        )
         assert (rows.k_range >= least).all()
         assert (rows.k_range <= most).all()
 
 
 @pytest.mark.parametrize("row", FLOWN, ids=lambda row: f"{row[0]:g} m/s")
 def test_the_apollo_table_is_the_flown_one_at_its_own_speeds(row):
-    found = Influence(*by_speed(settings(**PLANNED, guidance="apollo").tables, row[0]))
+    found = Influence(*by_speed(reference_table_of(plan_of(**PLANNED, guidance="apollo")), 0.0, row[0]))
     scaled = (
         found.climb,
         found.drag,
