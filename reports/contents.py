@@ -15,6 +15,7 @@ from reports.profiles import profile_blocks
 from reports.provenance import campaign_facts, provenance_table
 from reports.published import published_table
 from reports.published_statistics import statistics_tables
+from reports.sensitivity import sensitivity_blocks
 from reports.tables import (
     fixed_table,
     input_table,
@@ -50,6 +51,7 @@ def _sections(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
     yield Section("corridor", "Corridor", blocks(corridor_blocks(flown)))
     yield Section("footprint", "Footprint", blocks(landing.blocks))
     yield Section("levels", "Choices compared", blocks(level_blocks(flown)))
+    yield Section("drivers", "What drives it", blocks(sensitivity_blocks(flown)))
     yield Section("maps", "Maps", blocks(map_blocks(flown)))
     yield Section("distributions", "Distributions", blocks(distribution_blocks(flown)))
     yield Section("metrics", "Metrics in numbers", _metrics(flown))

@@ -8,6 +8,7 @@ import numpy as np
 
 from mc_engine.figures import CorridorFigure
 from mc_engine.statistics import SurfaceMap, Verdict, clopper_pearson, map_metric
+from mc_engine.statistics.requirements import inside_limits
 from reports.document import Cell, Column, FigureBlock, Table
 from reports.drawings import nominal_point, thinned_rows
 from reports.figures import CorridorDrawing, LimitLine
@@ -34,12 +35,7 @@ def corridor_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
 
 def _violated(flown: Flown, verdict: Verdict) -> np.ndarray:
     """bool[n_tried]: not inside the limit; a case without a number is not inside."""
-    values = flown.values(verdict.metric)
-    with np.errstate(invalid="ignore"):
-        inside = np.isfinite(values)
-        inside &= values <= verdict.at_most if verdict.at_most is not None else True
-        inside &= values >= verdict.at_least if verdict.at_least is not None else True
-    return ~inside
+    return ~inside_limits(flown.values(verdict.metric), verdict.at_most, verdict.at_least)
 
 
 def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray) -> FigureBlock | str:

@@ -68,6 +68,16 @@ GLOSSARY = Terms(
             "the scatter of the draws.",
         ),
         (
+            "first-order index",
+            "The share of a metric’s variance that would go if the input were known: from bins of the flown cases, of "
+            "any shape of the dependence. SRC, PRCC and Spearman see trends only, and tell their direction.",
+        ),
+        (
+            "driver",
+            "An input, or a pair of them, whose values differ between failed and passed cases by more than chance "
+            "among all that were looked at. A difference, not a proof of a cause.",
+        ),
+        (
             "map",
             "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by a local "
             "quadratic regression, with the standard error given, and left blank outside the cases.",

@@ -83,7 +83,7 @@ def judge(requirement: Mapping[str, Any], values: np.ndarray, ok: np.ndarray, de
     at_most, at_least = _limit(requirement, "at_most"), _limit(requirement, "at_least")
     share, confidence = float(requirement["share"]), float(requirement["confidence"])
     usable = np.asarray(ok, dtype=bool) & np.isfinite(values)
-    inside = usable & _within(values, at_most, at_least)
+    inside = usable & inside_limits(values, at_most, at_least)
     passed, tried = int(inside.sum()), int(values.size)
     random = design in SAMPLING_DESIGNS
     known = random and tried > 0
@@ -115,12 +115,14 @@ def _limit(requirement: Mapping[str, Any], key: str) -> float | None:
     return None if value is None else float(value)
 
 
-def _within(values: np.ndarray, at_most: float | None, at_least: float | None) -> np.ndarray:
-    inside = np.ones(values.shape, dtype=bool)
-    if at_most is not None:
-        inside &= values <= at_most
-    if at_least is not None:
-        inside &= values >= at_least
+def inside_limits(values: np.ndarray, at_most: float | None, at_least: float | None) -> np.ndarray:
+    """bool[n]: inside the limits that there are; a value that is not a number, or infinite, is not."""
+    inside = np.isfinite(values)
+    with np.errstate(invalid="ignore"):
+        if at_most is not None:
+            inside &= values <= at_most
+        if at_least is not None:
+            inside &= values >= at_least
     return inside
 
 

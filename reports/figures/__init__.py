@@ -6,10 +6,12 @@ from reports.figures.distributions import DistributionPanel, Distributions
 from reports.figures.footprints import FootprintCurve, FootprintDrawing
 from reports.figures.fronts import FrontDrawing
 from reports.figures.histories import Histories, HistoryBand, HistoryLine
+from reports.figures.indices import IndexMap
 from reports.figures.levels import LevelPanel, LevelsDrawing
 from reports.figures.maps import MapDrawing
 from reports.figures.profiles import ProfileBand, ProfileDrawing
 from reports.figures.scatter import ScatterDrawing
+from reports.figures.success import SuccessDrawing, SuccessPanel
 
 __all__ = [
     "Convergence",
@@ -22,6 +24,7 @@ __all__ = [
     "Histories",
     "HistoryBand",
     "HistoryLine",
+    "IndexMap",
     "LevelPanel",
     "LevelsDrawing",
     "LimitLine",
@@ -29,4 +32,6 @@ __all__ = [
     "ProfileBand",
     "ProfileDrawing",
     "ScatterDrawing",
+    "SuccessDrawing",
+    "SuccessPanel",
 ]

@@ -5,6 +5,7 @@ from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document import FigureBlock, Table, blocks_of
+from reports.figures import MapDrawing
 
 RUN = "deorbit-20260421-101500"
 
@@ -29,8 +30,8 @@ def said(document):
 
 def test_the_sections_come_in_the_order_of_a_review(document):
     assert [section.anchor for section in document.sections] == [
-        "requirements", "maps", "distributions", "metrics", "histories", "scatter", "worst", "status", "published",
-        "inputs", "provenance", "reading",
+        "requirements", "drivers", "maps", "distributions", "metrics", "histories", "scatter", "worst", "status",
+        "published", "inputs", "provenance", "reading",
     ]  # fmt: skip
 
 
@@ -77,7 +78,8 @@ def test_the_worst_case_comes_with_the_command_that_repeats_it(document):
 
 
 def test_the_map_says_that_it_is_smoothed_and_from_how_many_cases(document):
-    key = " ".join(entry.text for entry in next(blocks_of(document, FigureBlock)).drawing.key)
+    drawing = next(block.drawing for block in blocks_of(document, FigureBlock) if isinstance(block.drawing, MapDrawing))
+    key = " ".join(entry.text for entry in drawing.key)
     assert "local quadratic regression on the 60 nearest of 9\u202f988 of 10\u202f000 cases" in key
     assert "standard error" in key
     assert "of 9\u202f988 shown" in key

@@ -66,7 +66,7 @@ def test_every_panel_of_every_figure_has_its_place_and_its_data(page):
 
 def test_every_figure_has_an_alternative_text(page):
     images = [attributes for _, attributes in Elements(page).found if attributes.get("role") == "img"]
-    assert len(images) == 6
+    assert len(images) == 8
     assert all(len(attributes["aria-label"]) > 40 for attributes in images)
 
 

@@ -1,0 +1,290 @@
+"""Which inputs, and which pairs of them, tell the failed cases from the passed ones.
+
+For a single input of numbers two rank tests: are failed cases at one end of it, are they at both ends (or in its
+middle).  For a word or a switch: does a level hold more failed cases than its share.  For a pair: does the product of
+the two rank scores tell more than each of the two alone; "more" is meant of the share of failed cases, to which
+single inputs may add as a straight line and a parabola.  Of all tests of a kind, over all inputs and requirements,
+those are reported whose false-discovery rate is held.
+
+A driver is a difference between two groups of cases, not a cause: an input that is correlated with one is one as well.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import false_discovery_control, hypergeom, norm, rankdata
+
+from mc_engine.statistics.binomial import clopper_pearson
+from mc_engine.statistics.input_columns import InputColumn, equal_bins, finite_rows, input_columns
+
+FALSE_DISCOVERIES = 0.05  # at most this share of what is reported, on average
+FEWEST = 5  # failed, and passed, cases for a single driver
+FEWEST_FOR_PAIRS = 10
+MOST_LEVELS = 20  # of a group that enters pairs
+MOST_ROWS = 20_000  # above: all failed cases up to half of it, the others picked evenly
+BINS = 10  # of the success probability along an input
+
+
+@dataclass(frozen=True)
+class Driver:
+    """An input, or a pair, that separates failed from passed cases.
+
+    where : at what values cases fail, one text an input: "high", "low", "at both ends", "in the middle", or a level.
+    effect : Cliff's delta, 2 P(a failed case ranks above a passed one) - 1, in the direction of `where`; 1 separates
+        all, 0 none.  adjusted : p-value after Benjamini & Hochberg.
+    inside_failed of inside_tried : of a pair, cases in the cell `where` (outer thirds of numbers); 0 of a single one.
+    """
+
+    requirement: str
+    inputs: tuple[str, ...]
+    where: tuple[str, ...]
+    effect: float
+    p_value: float
+    adjusted: float
+    inside_failed: int = 0
+    inside_tried: int = 0
+
+
+@dataclass(frozen=True)
+class Drivers:
+    """singles and pairs found, strongest evidence first; how many were tested; which requirements could not be.
+
+    undecided : requirements with fewer than FEWEST failed or passed cases.
+    """
+
+    singles: tuple[Driver, ...]
+    pairs: tuple[Driver, ...]
+    singles_tested: int
+    pairs_tested: int
+    undecided: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class SuccessCurve:
+    """Success probability in bins of an input, with Clopper-Pearson limits; all float64[n_bins] or int64[n_bins].
+
+    middle, low, high : of the input's values in the bin (of a group: its level's index).
+    """
+
+    middle: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    passed: np.ndarray
+    tried: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    levels: tuple[str, ...]
+
+
+def failure_drivers(
+    inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray], rate: float = FALSE_DISCOVERIES
+) -> Drivers:
+    """Drivers of each requirement.  failed : bool[n] by requirement, True also for a case without a number.
+
+    Benjamini & Hochberg, J. R. Stat. Soc. B 57 (1995), 289-300, over all tests of singles, and over all of pairs.
+    """
+    every = np.array([np.asarray(one, dtype=bool) for one in failed.values()])
+    decided = [k for k, one in enumerate(every) if min(one.sum(), (~one).sum()) >= FEWEST]
+    names = list(failed)
+    undecided = tuple(name for k, name in enumerate(names) if k not in decided)
+    if not decided:
+        return Drivers((), (), 0, 0, undecided)
+    columns = input_columns(inputs)
+    rows = _tested_rows(every[decided], finite_rows(columns, every.shape[1]))
+    columns = [one for one in (column.at(rows) for column in columns) if one.varies]
+    # rows without an input may have taken failed cases away
+    tested = {names[k]: every[k, rows] for k in decided if _fewer_group(every[k, rows]) >= FEWEST}
+    singles = [_single(name, column, lost) for name, lost in tested.items() for column in columns]
+    rich = {name: lost for name, lost in tested.items() if _fewer_group(lost) >= FEWEST_FOR_PAIRS}
+    pairs = list(_pairs(columns, rich)) if rich and len(columns) > 1 else []
+    by_name = {column.name: column for column in columns}
+    located = tuple(
+        _located(one, by_name[one.inputs[0]], by_name[one.inputs[1]], rich[one.requirement])
+        for one in _discovered(pairs, rate)
+    )
+    return Drivers(_discovered(singles, rate), located, len(singles), len(pairs), undecided)
+
+
+def _fewer_group(failed: np.ndarray) -> int:
+    return int(min(failed.sum(), (~failed).sum()))
+
+
+def success_along(values: Any, passed: np.ndarray, confidence: float = 0.95, bins: int = BINS) -> SuccessCurve | None:
+    """Success probability along one input; None without a case.  passed : bool[n]."""
+    (column,) = input_columns({"": values})
+    rows = np.flatnonzero(np.isfinite(column.values))
+    if not rows.size:
+        return None
+    column, passed = column.at(rows), np.asarray(passed, dtype=bool)[rows]
+    index, count = equal_bins(column, bins)
+    order = np.argsort(index, kind="stable")
+    starts = np.searchsorted(index[order], np.arange(count))
+    tried = np.bincount(index, minlength=count)
+    good = np.bincount(index[passed], minlength=count)
+    limits = np.array([clopper_pearson(int(k), int(n), confidence) for k, n in zip(good, tried, strict=True)])
+    ordered = column.values[order]
+    return SuccessCurve(
+        middle=np.array([np.median(part) for part in np.split(ordered, starts[1:])]),
+        low=np.minimum.reduceat(ordered, starts),
+        high=np.maximum.reduceat(ordered, starts),
+        passed=good,
+        tried=tried,
+        lower=limits[:, 0],
+        upper=limits[:, 1],
+        levels=column.levels,
+    )
+
+
+def _tested_rows(failed: np.ndarray, usable: np.ndarray) -> np.ndarray:
+    """Rows of the cases that are tested: all, or of very many the failed ones and some of the others.
+
+    A test between two groups does not mind how large each of them is.
+    """
+    rows = np.flatnonzero(usable)
+    if rows.size <= MOST_ROWS:
+        return rows
+    lost = failed[:, rows].any(axis=0)
+    return np.sort(np.concatenate([_evenly(rows[lost], MOST_ROWS // 2), _evenly(rows[~lost], MOST_ROWS // 2)]))
+
+
+def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
+    return rows if rows.size <= most else rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
+
+
+def _discovered(tested: list[Driver], rate: float) -> tuple[Driver, ...]:
+    if not tested:
+        return ()
+    adjusted = false_discovery_control([one.p_value for one in tested], method="bh")
+    found = [replace(one, adjusted=float(value)) for one, value in zip(tested, adjusted, strict=True) if value <= rate]
+    return tuple(sorted(found, key=lambda one: (one.p_value, -one.effect)))
+
+
+def _single(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
+    if column.levels:
+        return _group(requirement, column, failed)
+    ranks = rankdata(column.values)
+    ends = rankdata(np.abs(ranks - 0.5 * (ranks.size + 1)))
+    (trend, p_trend), (spread, p_spread) = _separation(ranks, failed), _separation(ends, failed)
+    if p_trend <= p_spread:
+        where, effect = ("high" if trend > 0.0 else "low"), abs(trend)
+    else:
+        where, effect = ("at both ends" if spread > 0.0 else "in the middle"), abs(spread)
+    p_value = min(1.0, 2.0 * min(p_trend, p_spread))  # two were tried
+    return Driver(requirement, (column.name,), (where,), effect, p_value, p_value)
+
+
+def _separation(ranks: np.ndarray, failed: np.ndarray) -> tuple[float, float]:
+    """Cliff's delta of failed against passed cases and its two-sided p-value, from average ranks.
+
+    Mann & Whitney, Ann. Math. Stat. 18 (1947), 50-60, with the permutation variance, which ties are part of; Cliff,
+    Psychol. Bull. 114 (1993), 494-509.  With few failed cases the normal tail is wider than the exact one.
+    """
+    n, n_failed = failed.size, int(failed.sum())
+    n_passed = n - n_failed
+    excess = float(ranks[failed].sum()) - 0.5 * n_failed * (n + 1)
+    variance = n_failed * n_passed / (n * (n - 1.0)) * float(((ranks - 0.5 * (n + 1)) ** 2).sum())
+    if variance == 0.0:
+        return 0.0, 1.0
+    return 2.0 * excess / (n_failed * n_passed), float(2.0 * norm.sf(abs(excess) / np.sqrt(variance)))
+
+
+def _group(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
+    """The level that failed cases prefer or avoid most: Fisher's exact test of each level against all others."""
+    levels = np.unique(column.values).astype(np.int64)
+    n, n_failed = failed.size, int(failed.sum())
+    size = np.array([np.count_nonzero(column.values == level) for level in levels])
+    hits = np.array([np.count_nonzero(failed & (column.values == level)) for level in levels])
+    tail = np.minimum(hypergeom.cdf(hits, n, n_failed, size), hypergeom.sf(hits - 1, n, n_failed, size))
+    effects = hits / n_failed - (size - hits) / (n - n_failed)
+    best = int(np.lexsort((-effects, tail))[0])
+    # of two levels one test says all
+    p_value = float(min(1.0, 2.0 * tail[best] * (1 if len(levels) == 2 else len(levels))))
+    if len(levels) == 2:
+        best = int(effects.argmax())
+    where = column.levels[levels[best]]
+    return Driver(
+        requirement,
+        (column.name,),
+        (where if effects[best] >= 0.0 else f"not {where}",),
+        float(abs(effects[best])),
+        p_value,
+        p_value,
+    )
+
+
+def _scores(column: InputColumn) -> list[np.ndarray]:
+    """Centred scores of a column that products are made of: the rank, or a column for each level of a group."""
+    if column.ordered:
+        ranks = rankdata(column.values)
+        return [2.0 * ranks / (ranks.size + 1) - 1.0]
+    indicators = [(column.values == level).astype(np.float64) for level in np.unique(column.values)]
+    return [one - one.mean() for one in indicators]
+
+
+def _pairs(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> Iterator[Driver]:
+    """The test of every pair of inputs, for each requirement; where its cases fail is not yet looked for.
+
+    The score of a pair and the failures are both freed from what the single inputs give (regression on scores and
+    their squares); what is left of the two must not correlate.  Of the variance with and without equal spread over the
+    cases (White, Econometrica 48 (1980), 817-838) the larger is taken.
+    """
+    scored = [
+        (column.name, score) for column in columns if len(column.levels) <= MOST_LEVELS for score in _scores(column)
+    ]
+    table = np.column_stack([score for _, score in scored])
+    owner = np.array([name for name, _ in scored])
+    n = len(table)
+    basis, sizes, _ = np.linalg.svd(np.column_stack([np.ones(n), table, table**2 - 1.0 / 3.0]), full_matrices=False)
+    basis = basis[:, sizes > 1e-9 * sizes[0]]
+    if n < 3 * basis.shape[1]:
+        return
+    lost = np.column_stack([one.astype(np.float64) for one in failed.values()])
+    freed = lost - basis @ (basis.T @ lost)
+    z: dict[tuple[str, str], list[np.ndarray]] = {}
+    for k, (name, score) in enumerate(scored):
+        others = np.flatnonzero(owner[k:] != name) + k  # the scores of one input stand together
+        product = table[:, others] * score[:, None]
+        product -= basis @ (basis.T @ product)
+        for m, row in zip(others, _studentised(product, freed, n / (n - basis.shape[1])), strict=True):
+            z.setdefault((name, scored[m][0]), []).append(np.abs(row))
+    for pair, rows in z.items():
+        for requirement, largest in zip(failed, np.max(rows, axis=0), strict=True):
+            p_value = float(min(1.0, 2.0 * norm.sf(largest) * len(rows)))
+            yield Driver(requirement, pair, ("", ""), 0.0, p_value, p_value)
+
+
+def _studentised(product: np.ndarray, freed: np.ndarray, factor: float) -> np.ndarray:
+    """Sum of product times what is left of the failures over its standard error, float64[n_products, n_requirements].
+
+    A product that the single inputs give exactly tells nothing: 0.
+    """
+    square, left = product**2, freed**2
+    equal = square.sum(axis=0)[:, None] * left.mean(axis=0)
+    variance = factor * np.maximum(equal, square.T @ left)
+    usable = (square.sum(axis=0) > 1e-12 * len(product))[:, None] & (variance > 0.0)
+    return np.where(usable, product.T @ freed / np.sqrt(np.where(usable, variance, 1.0)), 0.0)
+
+
+def _located(driver: Driver, first: InputColumn, second: InputColumn, failed: np.ndarray) -> Driver:
+    """The driver with the cell of the two inputs where the largest share of cases fails, and how far it separates."""
+    (row, n_rows), (place, n_places) = equal_bins(first, 3), equal_bins(second, 3)
+    cell = row * n_places + place
+    tried = np.bincount(cell, minlength=n_rows * n_places)
+    lost = np.bincount(cell[failed], minlength=n_rows * n_places)
+    worst = int(np.argmax(lost / np.maximum(tried, 1)))
+    inside, outside = int(lost[worst]), int(tried[worst] - lost[worst])
+    return replace(
+        driver,
+        where=(_third(first, worst // n_places, n_rows), _third(second, worst % n_places, n_places)),
+        effect=inside / int(failed.sum()) - outside / int((~failed).sum()),
+        inside_failed=inside,
+        inside_tried=int(tried[worst]),
+    )
+
+
+def _third(column: InputColumn, index: int, count: int) -> str:
+    if column.levels:
+        return column.levels[int(np.unique(column.values)[index])]
+    return ("low", "high")[index] if count == 2 else ("low", "middle", "high")[index]

@@ -1,0 +1,65 @@
+"""Dispersed inputs as statistics take them: numbers as they are, words and switches as levels of a group."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import rankdata
+
+
+@dataclass(frozen=True)
+class InputColumn:
+    """values : float64[n], the numbers, or the index of each case's level.  levels : empty for numbers."""
+
+    name: str
+    values: np.ndarray
+    levels: tuple[str, ...] = ()
+
+    @property
+    def ordered(self) -> bool:
+        """Whether larger and smaller mean something: numbers, and groups of two."""
+        return len(self.levels) in (0, 2)
+
+    @property
+    def varies(self) -> bool:
+        finite = self.values[np.isfinite(self.values)]
+        return bool(finite.size and finite.min() < finite.max())
+
+    def at(self, rows: np.ndarray) -> "InputColumn":
+        return InputColumn(self.name, self.values[rows], self.levels)
+
+
+def input_columns(inputs: Mapping[str, Any]) -> list[InputColumn]:
+    """One column per input: of numbers, of switches (levels "no" and "yes"), or of words (levels in their order)."""
+    columns = []
+    for name, values in inputs.items():
+        array = np.asarray(values)
+        if array.dtype.kind in "fiu":
+            columns.append(InputColumn(name, array.astype(np.float64)))
+        elif array.dtype.kind == "b":
+            columns.append(InputColumn(name, array.astype(np.float64), ("no", "yes")))
+        else:
+            levels, index = np.unique(array.astype(str), return_inverse=True)
+            columns.append(InputColumn(name, index.astype(np.float64), tuple(str(level) for level in levels)))
+    return columns
+
+
+def finite_rows(columns: Sequence[InputColumn], n: int) -> np.ndarray:
+    """bool[n]: cases with a number, or a level, in every column."""
+    rows = np.ones(n, dtype=bool)
+    for column in columns:
+        rows &= np.isfinite(column.values)
+    return rows
+
+
+def equal_bins(column: InputColumn, bins: int) -> tuple[np.ndarray, int]:
+    """Bin of each case (int64[n]) and the number of bins: about equally full, ties together, no bin empty.
+
+    A group, and a number with no more than `bins` values, has a bin for each level or value.
+    """
+    distinct, index = np.unique(column.values, return_inverse=True)
+    if not column.levels and distinct.size > bins:
+        place = ((rankdata(column.values) - 0.5) * bins / column.values.size).astype(np.int64)
+        distinct, index = np.unique(place, return_inverse=True)
+    return index.astype(np.int64), int(distinct.size)

@@ -1,0 +1,226 @@
+"""What a metric depends on, from the cases at hand: no further flights, any random design, any number of inputs.
+
+spearman     rank correlation: a monotonic trend, whatever its shape
+src          standardised regression coefficient: the standard deviations that the metric moves per standard deviation
+             of the input, the others held; for independent inputs and r_squared near 1, src**2 is the share of variance
+prcc         partial rank correlation: the monotonic trend with the (linear) effect of the other ranks taken out
+first_order  Var(E[metric | input]) / Var(metric): the share of the variance that goes when the input becomes known,
+             of any shape; what is missing to 1 in the sum over independent inputs is due to interactions
+
+For inputs that are correlated with each other src and prcc tell them apart as far as the cases do, while spearman and
+first_order also hold what an input owes to its partners.  Errors are standard errors for independent cases (`mc`);
+`lhs`, `sobol` and `halton` scatter less.  NaN: not defined, or too few cases.
+
+Saltelli et al., Global Sensitivity Analysis: The Primer (2008), ch. 1 (SRC, first-order index); Marino et al.,
+J. Theor. Biol. 254 (2008), 178-196 (PRCC).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.stats import rankdata
+
+from mc_engine.statistics.input_columns import InputColumn, equal_bins, finite_rows, input_columns
+
+FEWEST_CASES = 20
+MOST_BINS = 100
+_INDICES = ("spearman", "src", "prcc", "first_order")
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Indices and their standard errors, float64[n_inputs, n_metrics]; n_used int64[n_metrics] of n_tried cases.
+
+    r_squared : float64[n_metrics], the share of variance that the linear regression behind `src` explains.
+    correlated : the two inputs with the strongest rank correlation and that number; None below two inputs of order.
+    """
+
+    inputs: tuple[str, ...]
+    metrics: tuple[str, ...]
+    n_used: np.ndarray
+    n_tried: int
+    spearman: np.ndarray
+    spearman_error: np.ndarray
+    src: np.ndarray
+    src_error: np.ndarray
+    prcc: np.ndarray
+    prcc_error: np.ndarray
+    first_order: np.ndarray
+    first_order_error: np.ndarray
+    r_squared: np.ndarray
+    correlated: tuple[str, str, float] | None
+
+
+class _Fit(NamedTuple):
+    """A regression of standardised metrics y on standardised columns x; coefficients [column, metric]."""
+
+    x: np.ndarray
+    y: np.ndarray
+    alone: np.ndarray  # what the other columns leave of each column, divided by its variance
+    left: np.ndarray  # what all columns leave of y
+    coefficient: np.ndarray
+    partial: np.ndarray  # partial correlation
+    r_squared: np.ndarray
+    freedom: int
+
+
+def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) -> Sensitivity:
+    """Indices of every input and metric.  inputs : numbers, switches or words; metrics : float64[n], NaN where none.
+
+    A case counts for a metric if it has a number there and in all inputs.  A group of more than two words has only a
+    first-order index, and is held constant in the regressions.
+    """
+    columns = input_columns(inputs)
+    names = tuple(metrics)
+    table = np.column_stack([np.asarray(metrics[name], dtype=np.float64) for name in names]) if names else None
+    tried = len(next(iter([*metrics.values(), *inputs.values()]), ()))
+    shape = (len(columns), len(names))
+    found = {f"{index}{end}": np.full(shape, np.nan) for index in _INDICES for end in ("", "_error")}
+    r_squared, n_used = np.full(len(names), np.nan), np.zeros(len(names), dtype=np.int64)
+    if table is not None and columns:
+        used = np.isfinite(table) & finite_rows(columns, tried)[:, None]
+        n_used[:] = used.sum(axis=0)
+        # Most metrics are numbers in the same cases, so that inputs are ranked and sorted once for all of them.
+        _, pattern = np.unique(used, axis=1, return_inverse=True)
+        for one in np.unique(pattern):
+            where = np.flatnonzero(pattern == one)
+            rows = np.flatnonzero(used[:, where[0]])
+            _fill(found, r_squared, [column.at(rows) for column in columns], table[np.ix_(rows, where)], where)
+    strongest = _strongest_correlation(columns, tried)
+    return Sensitivity(
+        tuple(inputs), names, n_used, int(tried), r_squared=r_squared, correlated=strongest, **found
+    )  # fmt: skip
+
+
+def _fill(
+    found: dict[str, np.ndarray],
+    r_squared: np.ndarray,
+    columns: Sequence[InputColumn],
+    table: np.ndarray,
+    where: np.ndarray,
+) -> None:
+    """The indices of the metrics at `where`, whose numbers `table` (float64[n_used, len(where)]) holds, all finite."""
+    n = len(table)
+    live = [k for k, column in enumerate(columns) if column.varies]
+    moving = np.ptp(table, axis=0) > 1e-12 * np.abs(table).max(axis=0) if n >= FEWEST_CASES else np.zeros(0, dtype=bool)
+    if not live or not moving.any():
+        return
+    varying, where = table[:, moving], where[moving]
+    for k in live:
+        found["first_order"][k, where], found["first_order_error"][k, where] = first_order(columns[k], varying)
+    ordered = [k for k in live if columns[k].ordered]
+    if not ordered:
+        return
+    groups = _indicators([columns[k] for k in live if not columns[k].ordered])
+    place = np.ix_(np.array(ordered), where)
+    plain = np.column_stack([columns[k].values for k in ordered])
+    ranks, metric_ranks = rankdata(plain, axis=0), rankdata(varying, axis=0)
+    rho = _standard(ranks).T @ _standard(metric_ranks) / n
+    found["spearman"][place] = rho
+    # Bonett & Wright, Psychometrika 65 (2000), 23-28, carried from Fisher's z to the correlation.
+    found["spearman_error"][place] = (1.0 - rho**2) * np.sqrt((1.0 + 0.5 * rho**2) / (n - 3))
+    fit = _regression(np.column_stack([plain, *groups]), varying)
+    if fit is not None:
+        found["src"][place] = fit.coefficient[: len(ordered)]
+        found["src_error"][place] = _coefficient_error(fit, len(ordered))
+        r_squared[where] = fit.r_squared
+    fit = _regression(np.column_stack([ranks, *groups]), metric_ranks)
+    if fit is not None:
+        found["prcc"][place] = fit.partial[: len(ordered)]
+        found["prcc_error"][place] = _partial_error(fit, len(ordered))
+
+
+def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """First-order index and its standard error per metric (columns of `table`, float64[n, n_metrics], finite).
+
+    The variance between bins of the input, or between the levels of a group, with the part that chance alone puts
+    between them taken off (Kelley's ε², Proc. Natl. Acad. Sci. 21 (1935), 554-559; hence it may come out below 0);
+    bins after Plischke, Borgonovo & Smith, Eur. J. Oper. Res. 226 (2013), 536-550, with 0.7 sqrt(n) of them.
+    The error is that of the influence function of the ratio of the two variances; at an index of 0 it is
+    sqrt(2) too large.
+    """
+    n = len(table)
+    index, bins = equal_bins(column, min(max(int(0.7 * np.sqrt(n)), 2), MOST_BINS))
+    if n <= 2 * bins or bins < 2:
+        return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)
+    centred = _standard(table)
+    members = csr_array((np.ones(n), (index, np.arange(n))), shape=(bins, n))
+    mean = ((members @ centred) / members.sum(axis=1)[:, None])[index]
+    inside = centred - mean
+    share = 1.0 - (inside**2).sum(axis=0) / (n - bins) * (n - 1) / n
+    influence = mean**2 + 2.0 * mean * inside - share * centred**2
+    return share, influence.std(axis=0) / np.sqrt(n)
+
+
+def _standard(table: np.ndarray) -> np.ndarray:
+    """Columns with mean 0 and standard deviation 1 (n in its denominator), safe from overflow."""
+    scaled = table / np.abs(table).max(axis=0)
+    centred = scaled - scaled.mean(axis=0)
+    return centred / centred.std(axis=0)
+
+
+def _indicators(groups: Sequence[InputColumn]) -> list[np.ndarray]:
+    """0 and 1 for all levels that occur but the first, of each group."""
+    return [(group.values == level).astype(np.float64) for group in groups for level in np.unique(group.values)[1:]]
+
+
+def _regression(columns: np.ndarray, table: np.ndarray) -> _Fit | None:
+    """Least squares of each metric on all columns; None where the cases are too few for it.
+
+    A column that the others give exactly has no coefficient of its own: NaN.
+    """
+    n = len(columns)
+    x, y = _standard(columns), _standard(table)
+    value, vector = np.linalg.eigh(x.T @ x / n)
+    null = value < 1e-10 * value[-1]
+    freedom = n - 1 - int(np.count_nonzero(~null))
+    if freedom < 2:
+        return None
+    tied = (np.abs(vector[:, null]) > 1e-6).any(axis=1)
+    inverse = (vector[:, ~null] / value[~null]) @ vector[:, ~null].T
+    correlation = x.T @ y / n
+    coefficient = inverse @ correlation
+    r_squared = np.clip((coefficient * correlation).sum(axis=0), 0.0, 1.0)
+    # Above 0: else rounding would be the whole trend of an input that an exact model does not hold.
+    spread = np.maximum(1.0 - r_squared, 1e-12) * np.diag(inverse)[:, None]
+    partial = coefficient / np.sqrt(coefficient**2 + spread)
+    alone, left = x @ inverse, y - x @ coefficient
+    coefficient[tied] = partial[tied] = np.nan
+    return _Fit(x, y, alone, left, coefficient, partial, r_squared, freedom)
+
+
+def _coefficient_error(fit: _Fit, count: int) -> np.ndarray:
+    """Standard errors of the first `count` coefficients, by their influence function: of the regression, whatever the
+    spread of its residuals, and of the two standard deviations that a coefficient is scaled with.
+    """
+    error = np.empty((count, fit.y.shape[1]))
+    for k in range(count):
+        scales = 0.5 * fit.coefficient[k] * (fit.x[:, k : k + 1] ** 2 - fit.y**2)
+        error[k] = (fit.alone[:, k : k + 1] * fit.left + scales).std(axis=0)
+    return error / np.sqrt(fit.freedom)
+
+
+def _partial_error(fit: _Fit, count: int) -> np.ndarray:
+    """Standard errors of the first `count` partial correlations: those of a correlation of two sets of residuals."""
+    error = np.full((count, fit.y.shape[1]), np.nan)
+    for k in np.flatnonzero(np.isfinite(fit.partial[:count]).all(axis=1)):
+        x = fit.alone[:, k : k + 1]
+        y = fit.left + fit.coefficient[k] * x / np.mean(x**2)
+        x, y = x / x.std(), y / np.maximum(y.std(axis=0), 1e-12)
+        error[k] = (x * y - 0.5 * fit.partial[k] * (x**2 + y**2)).std(axis=0)
+    return error / np.sqrt(fit.freedom)
+
+
+def _strongest_correlation(columns: Sequence[InputColumn], n: int) -> tuple[str, str, float] | None:
+    rows = np.flatnonzero(finite_rows(columns, n)) if columns else np.zeros(0, dtype=np.int64)
+    usable = [one for one in (column.at(rows) for column in columns) if one.ordered and one.varies]
+    if len(usable) < 2 or rows.size < FEWEST_CASES:
+        return None
+    ranks = _standard(rankdata(np.column_stack([column.values for column in usable]), axis=0))
+    rho = ranks.T @ ranks / rows.size
+    np.fill_diagonal(rho, 0.0)
+    first, second = np.unravel_index(np.abs(rho).argmax(), rho.shape)
+    return usable[first].name, usable[second].name, float(rho[first, second])
