@@ -89,13 +89,14 @@ class Sections:
 
 @dataclass(frozen=True)
 class TuningSections:
-    """What could be read of [tuning]; `head` has its plain keys alone."""
+    """What could be read of [tuning]; `head` has its plain keys alone, `objective_names` all that are there."""
 
     head: TuningSection | None
     parameters: dict[str, TunedSection]
     objectives: dict[str, ObjectiveSection]
     constraints: dict[str, ConstraintSection]
     published: dict[str, PublishedPointSection]  # by place: "published 1", "published 2", ...
+    objective_names: tuple[str, ...]
 
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
@@ -200,12 +201,14 @@ def _tuning(raw: Any, found: Findings) -> TuningSections | None:
         found.add("", f"{shown(raw)} is not a table; write [tuning]")
         return None
     tables = ("parameter", "objective", "constraint", "published")
+    objectives = raw.get("objective")
     return TuningSections(
         head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, found),
         parameters=_read_each(partial(read, TunedSection), _named(raw, "parameter", found)),
         objectives=_read_each(partial(read, ObjectiveSection), _named(raw, "objective", found)),
         constraints=_read_each(partial(read, ConstraintSection), _named(raw, "constraint", found)),
         published=_read_each(partial(read, PublishedPointSection), _listed(raw, "published", found)),
+        objective_names=tuple(objectives) if isinstance(objectives, dict) else (),
     )
 
 

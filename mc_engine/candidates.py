@@ -4,6 +4,8 @@ A generation of candidates, times the dispersed cases where a quantile is wanted
 engine.  Every candidate flies the same cases with the same noise, so that two candidates differ by their choice alone.
 """
 
+from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,11 +15,13 @@ from mc_engine.campaign import Campaign
 from mc_engine.cases import case_table, full_inputs
 from mc_engine.distributions import column
 from mc_engine.flight import fly
-from mc_engine.kernel import usual_width
+from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.model_faults import naming_faults
 from mc_engine.runner import NOMINAL_NOISE
-from mc_engine.status import OK, STATUS_NAME
+from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 from mc_engine.tuning_parts import Constraint, Tuning
+
+_MEANING = {name: STATUS_TEXT[code] for code, name in STATUS_NAME.items()}
 
 
 @dataclass(frozen=True)
@@ -26,13 +30,15 @@ class Scores:
 
     objectives : float64[n, n_objectives];  limited : float64[n, n_constraints], the metrics under constraints
     excess : float64[n, n_constraints], how far each is beyond its limit, in shares of that limit; 0 inside
-    failed : int64[n], cases that did not fly to their end
+    failed : int64[n], cases that did not fly to their end;  reasons : object[n], how and why most of these ended, in
+        words, empty where none failed
     """
 
     objectives: np.ndarray
     limited: np.ndarray
     excess: np.ndarray
     failed: np.ndarray
+    reasons: np.ndarray
 
     @property
     def violation(self) -> np.ndarray:
@@ -56,17 +62,34 @@ def fly_candidates(campaign: Campaign, tuning: Tuning, candidates: np.ndarray, w
     ids, table = _shared_cases(campaign, tuning)
     inputs = {name: np.tile(values, n) for name, values in table.items()}
     inputs |= {one.name: np.repeat(candidates[:, k], per) for k, one in enumerate(tuning.parameters)}
-    wanted = ["status", *dict.fromkeys(one.metric for one in tuning.measures)]
+    names = list(dict.fromkeys(one.metric for one in tuning.measures))
     with naming_faults(campaign.model_reference, "a candidate"):
-        flown = _fly(campaign, inputs, np.tile(ids, n), wanted, workers)
+        flown = _fly(campaign, inputs, np.tile(ids, n), ["status", "reason", *names], workers)
     ok = (flown["status"] == STATUS_NAME[OK]).reshape(n, per)
-    metrics = {name: np.where(ok, flown[name].reshape(n, per), np.nan) for name in wanted[1:]}
+    metrics = {name: np.where(ok, flown[name].reshape(n, per), np.nan) for name in names}
     measured = [
         _measured(metrics[one.metric], one.quantile, one.large_is_bad, tuning.nominal) for one in tuning.measures
     ]
     objectives, limited = measured[: len(tuning.objectives)], measured[len(tuning.objectives) :]
     excess = [_excess(values, one) for values, one in zip(limited, tuning.constraints, strict=True)]
-    return Scores(_columns(objectives, n), _columns(limited, n), _columns(excess, n), np.count_nonzero(~ok, axis=1))
+    status, reason = (flown[name].reshape(n, per) for name in ("status", "reason"))
+    reasons = [commonest_failure(status[one][~ok[one]], reason[one][~ok[one]]) for one in range(n)]
+    return Scores(
+        _columns(objectives, n),
+        _columns(limited, n),
+        _columns(excess, n),
+        np.count_nonzero(~ok, axis=1),
+        np.array(reasons, dtype=object),
+    )
+
+
+def commonest_failure(status: Iterable[str], reason: Iterable[str]) -> str:
+    """How and why most of some failed cases ended, as "refused: ..."; of equally many the first, empty without any.
+
+    status, reason : of each failed case; without a reason of its own, what the status means.
+    """
+    ends = Counter(f"{how}: {why or _MEANING[how]}" for how, why in zip(status, reason, strict=True))
+    return ends.most_common(1)[0][0] if ends else ""
 
 
 def _columns(values: list[np.ndarray], n: int) -> np.ndarray:
@@ -97,6 +120,7 @@ def _fly(
         return {name: flown[name] for name in wanted}
 
     width = usual_width(campaign.model)
+    build_kernel(campaign.model, campaign.directory, width)  # once, before several threads ask for it together
     size = width * -(-len(ids) // (width * workers))
     pieces = [slice(first, first + size) for first in range(0, len(ids), size)]
     if len(pieces) == 1:

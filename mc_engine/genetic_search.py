@@ -43,8 +43,10 @@ class GeneticSearch:
         self._asked: Any = None
 
     def ask(self) -> np.ndarray:
-        """The next generation, float64[n, n_tuned]."""
+        """The next generation, float64[n, n_tuned]; no rows where the search makes no child that is new to it."""
         self._asked = self._algorithm.ask()
+        if self._asked is None or not len(self._asked):
+            return np.empty((0, self._problem.n_var))
         return np.array(self._asked.get("X"), dtype=np.float64)
 
     def tell(self, scores: Scores) -> None:

@@ -5,7 +5,7 @@ front is taken from all of them, not from the last generation alone.
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -24,7 +24,7 @@ from mc_engine.parts import Column
 from mc_engine.run_folder import default_folder
 from mc_engine.runner import ProgressCall
 from mc_engine.store import refuse_occupied
-from mc_engine.tuning_folder import TuningRecord, open_tuning, write_tuning
+from mc_engine.tuning_folder import UNFINISHED, TuningRecord, open_tuning, write_tuning
 from mc_engine.tuning_parts import Constraint, Objective, Tuning
 
 _SEED_RANGE = 2**32  # what the search takes
@@ -56,7 +56,8 @@ def tune(
     """Search as the campaign's [tuning] says and leave the result in the new directory `out`.
 
     seed, generations, population : in place of the file's.  workers : threads, all cores by default.
-    Raises RunInterrupted on Ctrl-C, after the generation in flight; what was found till then is in the directory.
+    Raises RunInterrupted on Ctrl-C, after the generation in flight; what was found till then is in the directory, as
+    it is after each generation: a search that is killed loses the one in flight.
     """
     tuning = campaign.tuning
     if tuning is None:
@@ -71,27 +72,42 @@ def tune(
         "generations": generations or tuning.generations,
         "patience": tuning.patience,
     }
-    flown, end = _search(campaign, tuning, plan, workers or os.cpu_count() or 1, progress)
-    _write(path, campaign, tuning, flown, {**plan, "flown": len(flown), "end": end})
+    manifest = manifest_of(campaign)
+    manifest["provenance"]["packages"]["pymoo"] = version("pymoo")
+
+    def keep(flown: list[Generation], end: str) -> None:
+        about = {**plan, "flown": len(flown), "end": end, **_wording(campaign, tuning)}
+        _write(path, campaign, tuning, flown, {**manifest, "tuning": about})
+
+    flown, end = _search(campaign, tuning, plan, workers or os.cpu_count() or 1, keep, progress)
+    keep(flown, end)
     if end == "interrupted":
         raise RunInterrupted(f"interrupted after {len(flown)} of {plan['generations']} generations; they are in {path}")
     return open_tuning(path)
 
 
 def _search(
-    campaign: Campaign, tuning: Tuning, plan: dict[str, Any], workers: int, progress: ProgressCall | None
+    campaign: Campaign,
+    tuning: Tuning,
+    plan: dict[str, Any],
+    workers: int,
+    keep: Callable[[list[Generation], str], None],
+    progress: ProgressCall | None,
 ) -> tuple[list[Generation], str]:
-    """All generations, and why there are no more of them."""
+    """All generations, and why there are no more of them; `keep` stores what there is after each."""
     search = GeneticSearch(tuning, plan["population"], plan["seed"])
     per, flown = cases_per_candidate(campaign, tuning), list[Generation]()
     signs = _signs(tuning)
     with stop_signal() as stop:
         for number in range(plan["generations"]):
             candidates = search.ask()
+            if not len(candidates):
+                return flown, "no new candidate"
             scores = fly_candidates(campaign, tuning, candidates, workers)
             search.tell(scores)
             before = flown[-1] if flown else None
             flown.append(_generation(candidates, scores, before, signs))
+            keep(flown, UNFINISHED)
             if progress is not None:
                 failed = sum(int(one.scores.failed.sum()) for one in flown)
                 progress(
@@ -145,19 +161,18 @@ def dominated_shares(fronts: Sequence[np.ndarray]) -> np.ndarray:
 # ---- the tables
 
 
-def _write(path: Path, campaign: Campaign, tuning: Tuning, flown: list[Generation], plan: dict[str, Any]) -> None:
+def _write(path: Path, campaign: Campaign, tuning: Tuning, flown: list[Generation], manifest: dict[str, Any]) -> None:
     columns, arrays = _evaluations(campaign, tuning, flown)
     small = _signs(tuning) * np.column_stack([arrays[one.name] for one in tuning.objectives])
     front = np.flatnonzero(non_dominated(np.where(arrays["feasible"][:, None], small, np.nan)))
     front = front[np.argsort(small[front, 0], kind="stable")]
-    manifest = manifest_of(campaign) | {"tuning": plan | _wording(campaign, tuning)}
-    manifest["provenance"]["packages"]["pymoo"] = version("pymoo")
+    ended = manifest["tuning"]["end"] != UNFINISHED
     tables = {
         "evaluations": (columns, arrays),
-        "generations": _generations(tuning, flown),
+        "generations": _generations(flown, ended),
         "front": (columns, {name: values[front] for name, values in arrays.items()}),
     }
-    write_tuning(path, campaign.text, manifest, tables)
+    write_tuning(path, campaign.text, manifest, tables, "" if ended else f"-{len(flown)}")
 
 
 def _evaluations(
@@ -174,15 +189,17 @@ def _evaluations(
         Column("violation", "", "candidate", "how far beyond the limits, in shares of them, added up"),
         Column("feasible", "", "candidate", "whether it is inside all limits", "switch"),
         Column("failed_cases", "", "candidate", "its cases that did not fly to their end", "integer"),
+        Column("commonest_failure", "", "candidate", "how and why most of these ended", "word"),
     ]
     numbers = np.vstack([np.hstack([one.candidates, one.scores.objectives, one.scores.limited]) for one in flown])
     arrays = {
         "candidate": np.arange(len(numbers)),
         "generation": np.repeat(np.arange(len(flown)), [len(one.candidates) for one in flown]),
-        **{column.name: numbers[:, k] for k, column in enumerate(columns[2:-3])},
+        **{column.name: numbers[:, k] for k, column in enumerate(columns[2:-4])},
         "violation": violation,
         "feasible": violation == 0.0,
         "failed_cases": np.concatenate([one.scores.failed for one in flown]),
+        "commonest_failure": np.concatenate([one.scores.reasons for one in flown]),
     }
     return columns, arrays
 
@@ -195,7 +212,8 @@ def _measure_column(campaign: Campaign, one: Objective | Constraint, role: str) 
     return Column(one.name, metric.unit, role, f"{metric.description}; {of}")
 
 
-def _generations(tuning: Tuning, flown: list[Generation]) -> tuple[list[Column], dict[str, np.ndarray]]:
+def _generations(flown: list[Generation], ended: bool) -> tuple[list[Column], dict[str, np.ndarray]]:
+    """How the search went on; the shares, which take time and change with every front, once it has ended."""
     columns = [
         Column("generation", "", "generation", "number of the generation, from 0", "integer"),
         Column("evaluations", "", "generation", "candidates flown so far", "integer"),
@@ -210,7 +228,7 @@ def _generations(tuning: Tuning, flown: list[Generation]) -> tuple[list[Column],
         "feasible_so_far": np.cumsum([np.count_nonzero(one.scores.violation == 0.0) for one in flown]),
         "front_size": np.array([len(one.front) for one in flown]),
         "least_violation": np.array([one.least_violation for one in flown]),
-        "dominated_share": dominated_shares([one.front for one in flown]),
+        "dominated_share": dominated_shares([one.front for one in flown]) if ended else np.full(len(flown), np.nan),
     }
     return columns, arrays
 

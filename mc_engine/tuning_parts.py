@@ -11,7 +11,7 @@ from mc_engine.model import Model, Setting
 from mc_engine.suggestions import hint, listed
 
 # columns of a tuning's tables beside those named by parameters, objectives and constraints
-OWN_COLUMNS = ("generation", "candidate", "violation", "feasible", "failed_cases")
+OWN_COLUMNS = ("generation", "candidate", "violation", "feasible", "failed_cases", "commonest_failure")
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def check_tuning(
         _check_limits(constraint, found.under("constraint", name))
     _check_names(sections, found)
     for place, point in sections.published.items():
-        _check_values(point.values, sections.objectives, found.under(place, "values"))
+        _check_values(point.values, sections.objective_names, found.under(place, "values"))
     head = sections.head
     if head is None:
         return None

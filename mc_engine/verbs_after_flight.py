@@ -37,10 +37,16 @@ def report(
 @app.command()
 @exit_status()
 def status(folder: RunFolder) -> None:
-    """How far a run is, and how its cases ended."""
+    """How far a run is, and how its cases ended; of a tuning, what it has found."""
     from mc_engine.run_summary import case_line
+    from mc_engine.tuning_folder import is_tuning_directory, open_tuning, outcome_lines
     from mc_engine.writer_lock import described, holder
 
+    if is_tuning_directory(folder):
+        record = open_tuning(folder)
+        typer.echo(f"tuning       {folder}\ncampaign     {record.manifest['campaign']['name']}")
+        typer.echo("\n".join(outcome_lines(record)))
+        return
     store = existing_run(folder)
     typer.echo(f"run       {folder}")
     typer.echo(f"campaign  {store.manifest['campaign'].get('name', '')}")
@@ -60,9 +66,15 @@ def status(folder: RunFolder) -> None:
 @app.command()
 @exit_status()
 def verify(folder: RunFolder) -> None:
-    """Hold every byte of a run against its journal."""
+    """Hold every byte of a run against its journal, or of a tuning against its manifest."""
     from mc_engine.store import is_run_directory
+    from mc_engine.tuning_folder import is_tuning_directory, open_tuning
     from mc_engine.verification import damage
+
+    if is_tuning_directory(folder):
+        open_tuning(folder)  # which reads every byte
+        typer.echo(f"{folder}: every byte is as it was written")
+        return
 
     if not is_run_directory(folder):
         existing_run(folder)

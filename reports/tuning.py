@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mc_engine.tuning_folder import TuningRecord, infeasibility
+from mc_engine.tuning_folder import UNFINISHED, TuningRecord, infeasibility
 from reports.contents import blocks
 from reports.document import Block, Card, Document, FigureBlock, Section, Table, Terms, Text, numbered
 from reports.drawings import POINTS_SHOWN, thinned_rows
@@ -82,7 +82,8 @@ def _sentence(tuned: Tuned) -> str:
     if tuned.record.feasible:
         n = len(tuned.front)
         return f"{count(n)} candidate{'s are' if n > 1 else ' is'} inside all limits and not beaten by any other."
-    sentence = re.sub(r"(?<=\d),(?=\d{3})", SPACE, infeasibility(tuned.record)).replace("-", "−")
+    sentence = re.sub(r"(?<=\d),(?=\d{3})", SPACE, infeasibility(tuned.record))
+    sentence = re.sub(r"-(?=\d)", "−", sentence)
     return f"{sentence[:1].upper()}{sentence[1:]}."
 
 
@@ -135,9 +136,14 @@ def _warnings(tuned: Tuned) -> Iterator[str]:
         yield "There is no front: no candidate is inside all limits. What is drawn and listed leaves them out."
     failed = int((tuned.evaluations["failed_cases"] > 0).sum())
     if failed:
-        yield f"{count(failed)} candidates had cases that failed; each of these takes the worst rank."
-    if tuned.plan["end"] == "interrupted":
-        yield f"The search was interrupted after {tuned.plan['flown']} of {tuned.plan['generations']} generations."
+        ends = tuned.evaluations["commonest_failure"][tuned.evaluations["failed_cases"] > 0].value_counts(sort=False)
+        yield (
+            f"{count(failed)} candidates had cases that failed; each of these takes the worst rank. Most often, with "
+            f"{count(int(ends.max()))} candidates: {ends.idxmax()}."
+        )
+    if tuned.plan["end"] in ("interrupted", UNFINISHED):
+        how = "was interrupted" if tuned.plan["end"] == "interrupted" else "had not ended, or was killed,"
+        yield f"The search {how} after {tuned.plan['flown']} of {tuned.plan['generations']} generations."
 
 
 # ---- the front
@@ -185,9 +191,10 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
 
 def _convergence(tuned: Tuned) -> tuple[Block, ...]:
     frame, plan = tuned.record.generations, tuned.plan
-    curves = {"share of the box that the front dominates": frame["dominated_share"].to_numpy()}
-    if not tuned.record.feasible:
-        curves = {}
+    shares = frame["dominated_share"].to_numpy()
+    curves = {}
+    if tuned.record.feasible and np.isfinite(shares).all():
+        curves["share of the box that the front dominates"] = shares
     if tuned.constraints:
         least = frame["least_violation"].to_numpy()
         if least[0] > 0.0:

@@ -91,12 +91,6 @@ def law(q1, q2, q3, wx, wy, wz, ix, iy, iz, p):
 
 
 @physics
-def modulated(pulses, command, p, period):
-    """One axis: the modulator after the sample, and the mean of its output over it."""
-    return sampled_pulses(pulses, command, p.gain, p.level, p.on, p.off, p.time_constant, period, p.decay)
-
-
-@physics
 def late(fired, coming, after, p):
     """(torque now, in the next sample, in the one after it) of an axis whose valves open and close late.
 
@@ -120,9 +114,7 @@ def control(t, s, m, p, o, draws):
     z = Pulses(m.filtered_z, m.output_z, m.age_z, m.pulses_z, m.shortest_z)
     next_x, next_y, next_z, then_x, then_y, then_z = m.next_x, m.next_y, m.next_z, m.then_x, m.then_y, m.then_z
     if o.actuator == PWPF:
-        x, fx = modulated(x, ux, p, period)
-        y, fy = modulated(y, uy, p, period)
-        z, fz = modulated(z, uz, p, period)
+        x, y, z, fx, fy, fz = sampled_pulses(x, y, z, ux, uy, uz, p, period)
         tx, ty, tz = p.torque * fx, p.torque * fy, p.torque * fz
         if any_lane(p.now < 1.0):
             tx, next_x, then_x = late(tx, m.next_x, m.then_x, p)
@@ -131,7 +123,8 @@ def control(t, s, m, p, o, draws):
     tx, ty, tz = p.thrust_x * tx, p.thrust_y * ty, p.thrust_z * tz
     offset = p.disturbance_offset
     if o.disturbance_draw == PER_SAMPLE:
-        offset, _ = uniform_pair(draws, 3)
+        drawn, _ = uniform_pair(draws, 3)
+        offset = (p.disturbance_offset - 0.5) + drawn
     steady = p.disturbance_amplitude * offset
     return Memory(
         m.integral_x + period * nx, m.integral_y + period * ny, m.integral_z + period * nz,

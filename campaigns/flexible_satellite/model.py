@@ -108,11 +108,13 @@ SETTINGS = (
     Setting(
         "disturbance_draw",
         "",
-        "disturbance_offset holds all the run, or is drawn afresh from 0 to 1 every sample",
+        "disturbance_offset holds all the run, or every sample draws afresh, uniform within 0.5 of it",
         "run",
         ("run", "sample"),
     ),
-    Setting("duration_s", "s", "length of the flight", 300.0, low=1e-3, high=1e6),
+    Setting(
+        "duration_s", "s", "length of the flight, up to the end of the step that reaches it", 300.0, low=1e-3, high=1e6
+    ),
     Setting("step_s", "s", "integration step", 0.01, low=1e-4, high=1.0),
     Setting(
         "steps_per_sample", "", "integration steps from one sample of the control to the next", 1.0, low=1, high=1e6

@@ -35,8 +35,8 @@ METRICS = (
     *QUANTITIES[:11],
     Field("peak_rate_rad_s", "rad/s", "largest inertial body rate"),
     Field("peak_modal_displacement", "", f"largest displacement of any mode, {_MODAL}"),
-    Field("settling_time_s", "s", "last time with 1 - q0 above 1e-3"),
-    Field("damping_time_s", "s", "last time with the displacement of any mode above 0.005"),
+    Field("settling_time_s", "s", "last time with 1 - q0 above 1e-3; the length of the flight where it never settles"),
+    Field("damping_time_s", "s", "last time with the displacement of any mode above 0.005; as settling_time_s"),
     Field("control_effort_n_m_s", "N m s", "impulse of all actuators: integral of |u1| + |u2| + |u3|"),
     Field("attitude_effort_s", "s", "integral of |q1| + |q2| + |q3|"),
     Field("scalar_effort_s", "s", "integral of |1 - q0|"),
@@ -49,6 +49,7 @@ METRICS = (
     *(Field(f"min_pulse_{axis}_s", "s", f"shortest pulse about {axis}") for axis in "xyz"),
     *(Field(f"on_time_{axis}_s", "s", f"time that the {axis} thrusters fired") for axis in "xyz"),
     *(Field(f"impulse_{axis}_n_m_s", "N m s", f"impulse of the {axis} actuator, without sign") for axis in "xyz"),
+    *(Field(f"propellant_{axis}_kg", "kg", f"propellant for the impulse of the {axis} actuator") for axis in "xyz"),
     Field("propellant_kg", "kg", "propellant for the impulse of all actuators"),
 )
 Quantities = namedtuple("Quantities", [field.symbol for field in QUANTITIES])  # type: ignore[misc]
@@ -158,5 +159,8 @@ def evaluate(t, s, m, p, o, best, when):
         s.impulse_x,
         s.impulse_y,
         s.impulse_z,
+        s.impulse_x / p.exhaust_arm,
+        s.impulse_y / p.exhaust_arm,
+        s.impulse_z / p.exhaust_arm,
         effort / p.exhaust_arm,
     )

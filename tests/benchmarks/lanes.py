@@ -9,7 +9,7 @@ turns at short flights and the shortest time of each counts, so that other work 
 import platform
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from mc_engine.model import Model, load_model
 
 HERE = Path(__file__).resolve().parent
 WIDTHS = (1, 8, 16)
+LONG = 12  # repeats of the long flights
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,20 @@ def deorbit(n_cases: int = 256) -> Flight:
     inputs: dict[str, Any] = {item.name: item.default for item in (*model.parameters, *model.settings)}
     inputs |= {"ve_pct": rng.normal(size=n_cases) * 20 / 3, "oe_pct": rng.normal(size=n_cases) * 5}
     return Flight("de-orbit campaign", model, None, inputs, n_cases)
+
+
+def flexible(n_cases: int = 16, **changes: Any) -> Flight:
+    """The flexible satellite without thrusters, inertia within ±10 %, 300 s in steps of 10 ms."""
+    rng = np.random.default_rng(1)
+    model = load_model("campaigns.flexible_satellite")
+    inputs: dict[str, Any] = {item.name: item.default for item in (*model.parameters, *model.settings)} | changes
+    inputs |= {f"inertia_{axis}_factor": rng.uniform(0.9, 1.1, n_cases) for axis in "xyz"}
+    return Flight("flexible satellite", model, None, inputs, n_cases)
+
+
+def flexible_pulses(n_cases: int = 16) -> Flight:
+    """The same with the thrusters of Table 8 and their modulators, in steps of 5 ms."""
+    return replace(flexible(n_cases, actuator="pwpf", step_s=0.005), title="flexible satellite, pulses")
 
 
 def caller(cases: Flight, width: int) -> Callable[[], float]:
@@ -112,8 +127,9 @@ def processor() -> str:
 
 def main() -> None:
     print(f"{processor()}, one thread")
-    for cases in (orbit(), deorbit()):
-        timing = measure(cases)
+    for flown, repeats in ((orbit, 60), (deorbit, 60), (flexible, LONG), (flexible_pulses, LONG)):
+        cases = flown()
+        timing = measure(cases, repeats=repeats)
         for width, ns in timing.ns.items():
             print(
                 f"{cases.title}, width {width:2d}: {ns:6.1f} ns per case-step, "

@@ -1,10 +1,13 @@
 """Eight lanes against one in the same run.  A ratio, so that it holds on a slow machine and on a busy one."""
 
 import pytest
-from lanes import deorbit, measure, orbit
+from lanes import LONG, deorbit, flexible, flexible_pulses, measure, orbit
 from llvmlite import binding
 
 ATTEMPTS = 3  # a neighbour on the machine can spoil one measurement
+# of what the registers allow: where thrusters switch, the lanes that do not switch wait for those that do, and a
+# measured 7.0 to 7.1 leaves nothing for a busy machine
+WITH_PULSES = 0.93
 
 
 def least_ratio():
@@ -17,13 +20,25 @@ def least_ratio():
     return None
 
 
-@pytest.mark.benchmark
-@pytest.mark.skipif(least_ratio() is None, reason="this processor has neither AVX-512 nor AVX2")
-@pytest.mark.parametrize("cases", [orbit, deorbit])
-def test_eight_lanes_fly_seven_times_as_fast_as_one_where_registers_hold_eight_doubles(cases):
+def best_ratio(cases, wanted, repeats):
+    """The best of some attempts, ended by the first that is good enough."""
     best = 0.0
     for _ in range(ATTEMPTS):
-        best = max(best, measure(cases(), (1, 8)).ratio())
-        if best >= least_ratio():
+        best = max(best, measure(cases(), (1, 8), repeats).ratio())
+        if best >= wanted:
             break
-    assert best >= least_ratio()
+    return best
+
+
+@pytest.mark.benchmark
+@pytest.mark.skipif(least_ratio() is None, reason="this processor has neither AVX-512 nor AVX2")
+@pytest.mark.parametrize(("cases", "repeats"), [(orbit, 60), (deorbit, 60), (flexible, LONG)])
+def test_eight_lanes_fly_seven_times_as_fast_as_one_where_registers_hold_eight_doubles(cases, repeats):
+    assert best_ratio(cases, least_ratio(), repeats) >= least_ratio()
+
+
+@pytest.mark.benchmark
+@pytest.mark.skipif(least_ratio() is None, reason="this processor has neither AVX-512 nor AVX2")
+def test_and_nearly_so_where_thrusters_switch_at_other_times_in_every_lane():
+    least = WITH_PULSES * least_ratio()
+    assert best_ratio(flexible_pulses, least, LONG) >= least

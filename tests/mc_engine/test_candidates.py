@@ -1,11 +1,15 @@
 """Candidates flown side by side: the same as each alone, nominal or over the same dispersed cases."""
 
+import os
+import time
+
 import numpy as np
 import pytest
 from apogee_tuning import apogee_and_speed, apogee_campaign
 
-from mc_engine.candidates import cases_per_candidate, fly_candidates, quantile_rank
+from mc_engine.candidates import cases_per_candidate, commonest_failure, fly_candidates, quantile_rank
 from mc_engine.cases import case_table
+from mc_engine.kernel import build_kernel
 from mc_engine.runner import fly_chunk
 
 CHOICES = np.array([[300.0, 100.0], [250.0, 60.0], [600.0, 200.0], [400.0, 150.0], [200.0, 50.0]])
@@ -31,6 +35,20 @@ def test_candidates_fly_alike_alone_together_and_by_two_threads():
         rows = [row for row in together.limited.tolist() if row in scores.limited.tolist()]
         assert rows == scores.limited.tolist()
     assert cases_per_candidate(campaign, campaign.tuning) == 11
+
+
+def test_threads_that_find_no_kernel_yet_do_not_write_it_together(tmp_path, monkeypatch):
+    replace = os.replace
+
+    def slowly(source, target):
+        time.sleep(0.3)
+        replace(source, target)
+
+    monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path))
+    monkeypatch.setattr("mc_engine.kernel.os.replace", slowly)
+    build_kernel.cache_clear()
+    choices = np.tile(CHOICES, (8, 1))
+    assert scores_of(apogee_campaign(), choices, workers=2).failed.tolist() == [0] * 40
 
 
 @pytest.mark.parametrize(("limit", "rank"), [("at_least", 2), ("at_most", 1)])
@@ -66,3 +84,12 @@ def test_a_candidate_that_cannot_fly_has_no_number_and_an_infinite_violation():
     assert np.isnan(scores.limited[1]).all()
     assert np.isinf(scores.violation[1])
     assert scores.failed.tolist() == [0, 11]
+    assert scores.reasons.tolist() == ["", "refused: altitude_km is outside 150 to 2000 km"]
+
+
+def test_the_commonest_of_several_failures_is_told():
+    status, reason = ["refused", "no-stop", "refused", "refused"], ["late", "", "early", "early"]
+    assert commonest_failure(status, reason) == "refused: early"
+    assert commonest_failure(status[:2], reason[:2]) == "refused: late"
+    assert commonest_failure(status[1:2], reason[1:2]).startswith("no-stop: the flight reached its time limit")
+    assert commonest_failure([], []) == ""

@@ -1,7 +1,9 @@
 """A search from the file to its directory, on a front in closed form."""
 
 import signal
+import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -9,6 +11,7 @@ import pytest
 from apogee_tuning import CHOICE, apogee_and_speed, apogee_campaign
 from cart import call, fails_with
 
+import mc_engine.tuning_folder
 from mc_engine import load_campaign, open_tuning, tune
 from mc_engine.campaign import SHIPPED
 from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
@@ -102,6 +105,90 @@ def test_a_robust_tuning_leaves_room_for_the_dispersed_burn(tmp_path):
     assert (record.front["apogee"] > low).all()
 
 
+NARROW = """
+[tuning.parameter.burn_dv_m_s]
+lower = 199.99999999999997
+upper = 200.0
+
+[tuning.objective.apogee]
+metric = "apogee_altitude_km"
+"""
+
+
+def test_a_search_without_a_new_candidate_ends_there_and_keeps_what_it_has(tmp_path):
+    """Between two neighbouring numbers there are two candidates."""
+    record = tune(apogee_campaign(choice=NARROW), tmp_path / "out", seed=1)
+    assert record.manifest["tuning"]["end"] == "no new candidate"
+    assert record.manifest["tuning"]["flown"] == record.generations["generation"].iloc[-1] + 1 < 6
+    assert record.evaluations["burn_dv_m_s"].between(199.99999999999997, 200.0).all()
+    assert len(record.front) == 1
+
+
+def test_the_same_when_children_never_differ_from_their_parents(tmp_path):
+    text = apogee_campaign().text.replace("generations = 6", "generations = 6\ncrossover = 0.0\nmutation = 1e-9")
+    record = tune(load_campaign("apogee.toml", text=text, directory=SHIPPED / "minimal"), tmp_path / "out", seed=1)
+    assert record.manifest["tuning"]["end"] == "no new candidate"
+    assert len(record.evaluations) == 12
+
+
+KILLED = """
+import os, signal, sys
+sys.path[:0] = {paths!r}
+from pathlib import Path
+from apogee_tuning import apogee_campaign
+from mc_engine import tune
+
+def progress(done, total, failed):
+    if done >= 36:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+tune(apogee_campaign(), Path({out!r}), seed=1, workers=1, progress=progress)
+"""
+
+
+def test_a_killed_search_leaves_the_generations_that_were_flown(tmp_path):
+    paths, out = [str(Path(__file__).parent), str(SHIPPED.parent)], tmp_path / "out"
+    killed = subprocess.run([sys.executable, "-c", KILLED.format(paths=paths, out=str(out))], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    record = open_tuning(out)
+    assert record.manifest["tuning"]["end"] == "not ended"
+    assert len(record.evaluations) == 36
+    whole = tune(apogee_campaign(), tmp_path / "whole", seed=1, workers=1)
+    pd.testing.assert_frame_equal(record.evaluations, whole.evaluations.iloc[:36])
+    assert sorted(path.name for path in whole.path.iterdir()) == [
+        "evaluations.parquet", "front.parquet", "generations.parquet", "tuning.json", "tuning.toml"
+    ]  # fmt: skip
+
+
+def test_a_search_killed_while_it_writes_still_has_the_generation_before(tmp_path, monkeypatch):
+    """Whichever of the files of the second generation is the last one to get to the disk."""
+    write, names = mc_engine.tuning_folder.write_durably, []
+
+    def watched(path, content):
+        names.append(path.name)
+        if len(names) == stop:
+            raise KeyboardInterrupt
+        write(path, content)
+
+    monkeypatch.setattr("mc_engine.tuning_folder.write_durably", watched)
+    for stop in range(6, 11):
+        names.clear()
+        with pytest.raises(KeyboardInterrupt):
+            tune(apogee_campaign(), tmp_path / str(stop), seed=1)
+        assert len(open_tuning(tmp_path / str(stop)).evaluations) == 12
+    assert names[-1] == "tuning.json"
+
+
+def test_a_search_in_which_nothing_flies_to_its_end_says_why(tmp_path):
+    escape = CHOICE.replace("lower = 50.0\nupper = 200.0", "lower = 4000.0\nupper = 5000.0")
+    record = tune(apogee_campaign(choice=escape), tmp_path / "out", seed=1, generations=1)
+    assert not record.feasible
+    assert infeasibility(record) == (
+        "no feasible point among 12 candidates; none of them has a number for every metric, most often (12 candidates) "
+        "no-stop: the flight reached its time limit before the event that should end it"
+    )
+
+
 def test_ctrl_c_keeps_the_generations_flown(tmp_path):
     def progress(done, total, failed):
         if done >= 24:
@@ -174,7 +261,11 @@ def test_tune_writes_the_result_and_says_what_it_found(tmp_path):
     assert (tmp_path / "out" / "report.pdf").read_bytes().startswith(b"%PDF")
     assert call("report", tmp_path / "out", "--format", "html").exit_code == 0
     fails_with(2, call("tune", tmp_path / "apogee.toml", "--out", tmp_path / "out"), "is not empty")
-    fails_with(2, call("status", tmp_path / "out"), "is no run directory")
+    assert call("status", tmp_path / "out").stdout.splitlines()[2:] == result.stdout.splitlines()[1:-2]
+    assert "every byte is as it was written" in call("verify", tmp_path / "out").stdout
+    (tmp_path / "out" / "tuning.toml").write_text("another question")
+    fails_with(5, call("verify", tmp_path / "out"), "tuning.toml: damaged")
+    fails_with(5, call("status", tmp_path / "out"), "tuning.toml: damaged")
 
 
 def test_tune_without_a_tuning_gets_a_sentence():

@@ -33,6 +33,11 @@ metric = "range_m"
 at_most = 5.0
 """
 GOOD = DISPERSED + TUNING
+POINT = """
+[[tuning.published]]
+name = "Table 8"
+values = { far = 1.0, fuel = 2.0 }
+"""
 
 
 def test_a_good_tuning_is_read_and_what_is_not_said_has_its_default():
@@ -148,6 +153,11 @@ def test_a_tuning_needs_something_to_tune_and_something_to_tune_for():
 def test_a_quantile_needs_cases_drawn_at_random():
     body = GOOD.replace('dist = "normal"\nsigma = 1.0', "values = [99.0, 101.0]")
     assert "draws no cases at random" in problems(body, design="grid")["tuning.objective.fuel.quantile"]
+
+
+def test_a_mistake_in_an_objective_is_none_of_the_points_that_have_a_number_for_it():
+    body = GOOD.replace('goal = "maximise"', 'goal = "up"') + POINT
+    assert list(problems(body)) == ["tuning.objective.far.goal"]
 
 
 def test_a_published_point_has_a_number_for_every_objective():

@@ -4,12 +4,12 @@ import numpy as np
 
 from mc_engine.pareto import non_dominated
 from mc_engine.parts import Column
-from mc_engine.tuning_folder import TABLES, open_tuning, write_tuning
+from mc_engine.tuning_folder import TABLES, UNFINISHED, open_tuning, write_tuning
 
 MEASURES = ["cost", "error", "limited"]
 
 
-def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False):
+def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False, end="all generations"):
     """The record of a search whose constraint allows y up to `limit`; below 0 nothing is feasible."""
     x, y = np.random.Generator(np.random.Philox(key=4)).random((2, n))
     columns = [
@@ -24,12 +24,14 @@ def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False):
         Column("violation", "", "candidate", "excess"),
         Column("feasible", "", "candidate", "inside", "switch"),
         Column("failed_cases", "", "candidate", "failed", "integer"),
+        Column("commonest_failure", "", "candidate", "why", "word"),
     ]
     excess = np.maximum(0.0, (y - limit) / (abs(limit) or 1.0))
     arrays = {
         "candidate": np.arange(n), "generation": np.arange(n) // 10, "gain": x, "delay_s": y, "cost": x,
         "error": 1.0 - x + y, "limited": y, "violation": excess, "feasible": excess == 0.0,
         "failed_cases": np.arange(n) % 10 < failed,
+        "commonest_failure": np.where(np.arange(n) % 10 < failed, "refused: too far", ""),
     }  # fmt: skip
     arrays |= {"spread": x * y} if third else {}
     objectives = ["cost", "error", *(["spread"] if third else [])]
@@ -39,7 +41,8 @@ def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False):
     steps = np.arange(n // 10)
     generations = {
         "generation": steps, "evaluations": 10 * (steps + 1), "feasible_so_far": np.cumsum(excess == 0.0)[9::10],
-        "front_size": steps, "least_violation": np.minimum.accumulate(excess)[9::10], "dominated_share": steps / n,
+        "front_size": steps, "least_violation": np.minimum.accumulate(excess)[9::10],
+        "dominated_share": steps / (np.nan if end == UNFINISHED else n),
     }  # fmt: skip
     tables = {
         "evaluations": (columns, arrays),
@@ -47,11 +50,11 @@ def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False):
         "front": (columns, {name: values[front] for name, values in arrays.items()}),
     }
     assert set(tables) == set(TABLES)
-    write_tuning(path, "", manifest(objectives, limit, n), tables)
+    write_tuning(path, "", manifest(objectives, limit, n, end), tables)
     return open_tuning(path)
 
 
-def manifest(objectives, limit, n):
+def manifest(objectives, limit, n, end):
     """What the engine knows of the search."""
     measured = {"quantile": None}
     return {
@@ -60,7 +63,7 @@ def manifest(objectives, limit, n):
         "model": {"name": "m", "title": "M", "source": "nobody", "digest": "e"},
         "tuning": {
             "seed": 1, "population": 10, "generations": n // 10, "flown": n // 10, "patience": None,
-            "end": "all generations", "cases": 1, "crossover": 0.9, "mutation": 0.5,
+            "end": end, "cases": 1, "crossover": 0.9, "mutation": 0.5,
             "parameters": [
                 {"name": name, "lower": 0.0, "upper": 1.0, "nominal": 0.3, "source": "Table 2"}
                 for name in ("gain", "delay_s")

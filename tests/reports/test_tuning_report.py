@@ -7,8 +7,9 @@ import pytest
 from synthetic_tuning import synthetic_tuning
 
 import reports
+from mc_engine.tuning_folder import UNFINISHED
 from reports.document import FigureBlock, Table, blocks_of
-from reports.figures import FrontDrawing, paper
+from reports.figures import Convergence, FrontDrawing, paper
 from reports.html import render_html
 from reports.pdf import render_pdf
 from reports.tuning import build_tuning
@@ -92,7 +93,18 @@ def test_three_objectives_have_a_panel_for_each_pair(tmp_path):
 
 def test_failed_cases_are_told(tmp_path):
     found = build_tuning(synthetic_tuning(tmp_path / "out", failed=3), "out")
-    assert found.warnings == ("90 candidates had cases that failed; each of these takes the worst rank.",)
+    assert found.warnings == (
+        "90 candidates had cases that failed; each of these takes the worst rank. Most often, with 90 candidates: "
+        "refused: too far.",
+    )
+
+
+def test_a_search_that_was_killed_is_reported_with_what_it_has(tmp_path):
+    found = build_tuning(synthetic_tuning(tmp_path / "out", end=UNFINISHED), "out")
+    assert found.warnings == ("The search had not ended, or was killed, after 30 of 30 generations.",)
+    curves = [block.drawing for block in blocks_of(found, FigureBlock) if isinstance(block.drawing, Convergence)]
+    assert [list(one.curves) for one in curves] == [["feasible candidates so far"]]
+    assert render_pdf(found).startswith(b"%PDF")
 
 
 def test_both_renderers_take_it_and_give_the_same_bytes_twice(document, infeasible):

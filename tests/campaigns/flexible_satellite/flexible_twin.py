@@ -192,6 +192,8 @@ def results(i, craft, s, impulse, effort, modulators):
     columns |= {f"impulse_{axis}_n_m_s": impulse[k] for k, axis in enumerate("xyz")}
     columns |= {"control_effort_n_m_s": impulse.sum(), "attitude_effort_s": effort}
     columns["propellant_kg"] = impulse.sum() / (i["arm_m"] * i["isp_s"] * 9.80665)
+    for axis, one in zip("xyz", impulse, strict=True):
+        columns[f"propellant_{axis}_kg"] = one / (i["arm_m"] * i["isp_s"] * 9.80665)
     h = craft.j @ w + craft.c0 @ s[11:15]
     columns |= {f"end_momentum_{axis}_n_m_s": h[k] for k, axis in enumerate("xyz")}
     if i["actuator"] == "pwpf":

@@ -130,6 +130,13 @@ def test_the_disturbance_is_one_torque_on_all_three_axes():
     np.testing.assert_allclose([flown[f"end_momentum_{axis}_n_m_s"] for axis in "xyz"], wanted, rtol=1e-4)
 
 
+@pytest.mark.parametrize(("duration", "step", "end"), [(0.005, 0.01, 0.01), (1.0, 0.3, 1.2), (3.0, 0.01, 3.0)])
+def test_a_flight_ends_with_the_step_that_reaches_its_length(duration, step, end):
+    row = fly_one(duration_s=duration, step_s=step)
+    assert row["end_time_s"] == pytest.approx(end, rel=1e-12)
+    assert row["settling_time_s"] == row["end_time_s"]  # it has not settled
+
+
 # ---- noise
 
 
@@ -162,14 +169,15 @@ def test_every_case_draws_its_own_noise_and_the_same_one_again():
     assert len(np.unique(one["q1"])) == 9
 
 
-def test_a_fresh_offset_is_uniform_from_0_to_1():
-    """Of sample means over 100 s the craft feels the sum: a mean of a half, a spread of sqrt(1/12)."""
+@pytest.mark.parametrize("offset", [0.5, 2.0])
+def test_a_fresh_offset_is_uniform_within_a_half_of_the_one_given(offset):
+    """Of sample means over 100 s the craft feels the sum: that of the offset, a spread of sqrt(1/12)."""
     n_cases = 200
     flown = fly_cases(
         **WAVE | {"disturbance_amplitude_n_m": 1e-5, "disturbance_frequency_rad_s": 0.0, "duration_s": 10.0},
         disturbance_draw="sample",
-        disturbance_offset=np.zeros(n_cases),
+        disturbance_offset=np.full(n_cases, offset),
     )
     momentum = flown["end_momentum_x_n_m_s"] / 1e-5  # sum of 1000 draws times 0.01 s
-    assert momentum.mean() == pytest.approx(5.0, abs=4.0 * np.sqrt(1000.0 / 12.0) * 0.01 / np.sqrt(n_cases))
+    assert momentum.mean() == pytest.approx(10.0 * offset, abs=4.0 * np.sqrt(1000.0 / 12.0) * 0.01 / np.sqrt(n_cases))
     assert momentum.std() == pytest.approx(np.sqrt(1000.0 / 12.0) * 0.01, rel=0.2)

@@ -1,10 +1,13 @@
 """The pulse modulator: closed forms, the campaign's flight of them under a constant torque, and any held command."""
 
+from collections import namedtuple
+
 import numpy as np
 import pytest
-from flexible_flights import TABLE_4, TABLE_8, TABLE_9, fly_cases, fly_one, history
+from flexible_flights import MODEL, NOMINAL, SEED, TABLE_4, TABLE_8, TABLE_9, fly_cases, fly_one, history
 from scipy.integrate import solve_ivp
 
+from mc_engine.flight import fly
 from mc_engine.physics.pulse_modulators import (
     at_rest,
     dead_band,
@@ -15,6 +18,7 @@ from mc_engine.physics.pulse_modulators import (
     shortest_pulse,
 )
 
+_BOUNDS = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
 GAIN, TAU, OFF, HYSTERESIS, LEVEL = 7.39, 0.713, 0.117, 0.225, 1.07  # Table 8
 ON = OFF + HYSTERESIS
 
@@ -142,6 +146,13 @@ def test_late_valves_do_not_change_what_the_modulator_counts():
 
 # ---- any command that is held from sample to sample
 
+Modulator = namedtuple("Modulator", "gain level on off time_constant decay")
+
+
+def modulator(period):
+    """The thrusters of Table 8 sampled with `period`."""
+    return Modulator(GAIN, LEVEL, ON, OFF, TAU, np.exp(-period / TAU))
+
 
 def followed(commands, period):
     """(lag, mean outputs, pulses, shortest): the lag integrated by SciPy from switch to switch."""
@@ -173,28 +184,52 @@ def followed(commands, period):
     return f, np.array(means), len(begins), shortest
 
 
-@pytest.mark.parametrize("period", [0.005, 0.03, 0.2])
-def test_under_any_held_command_the_samples_are_those_of_the_integrated_lag(period):
-    draw = np.random.default_rng([20221012, int(1000 * period)])
-    commands = np.clip(np.cumsum(draw.normal(0.0, 0.15, 40)), -0.9, 0.9)
-    pulses, means = at_rest(), []
-    for command in commands:
-        pulses, mean = sampled_pulses(pulses, command, GAIN, LEVEL, ON, OFF, TAU, period, np.exp(-period / TAU))
-        means.append(mean)
-    lag, wanted, count, shortest = followed(commands, period)
-    np.testing.assert_allclose(means, wanted, rtol=0.0, atol=1e-8)
-    assert pulses.filtered == pytest.approx(lag, abs=1e-8)
-    assert pulses.pulses == count
-    assert pulses.shortest == pytest.approx(shortest, abs=1e-8)
-    assert period < 0.01 or count > 3
+def wandering(n, seed):
+    """Commands that wander from sample to sample, some of them beyond the level less the switch-off."""
+    return np.clip(np.cumsum(np.random.default_rng([20221012, seed]).normal(0.0, 0.15, n)), -0.9, 0.9)
 
 
-def test_a_sample_with_more_switches_than_are_followed_goes_on_with_the_next():
-    """0.5 s hold four pulses and pauses of 0.108 s, eight switches: the ninth waits for the next sample."""
-    pulses, fired = at_rest(), 0.0
-    for _ in range(20):
-        pulses, mean = sampled_pulses(pulses, 0.3, GAIN, LEVEL, ON, OFF, TAU, 1.0, np.exp(-1.0 / TAU))
-        fired += mean
-        assert abs(mean) <= 1.0
-        assert np.isfinite(pulses.filtered)
-    assert 0.1 < fired / 20.0 < 0.5
+@pytest.mark.parametrize(("period", "n"), [(0.005, 40), (0.03, 40), (0.2, 40), (0.5, 16), (2.0, 8)])
+def test_under_any_held_command_the_samples_are_those_of_the_integrated_lag(period, n):
+    """Up to 37 switches in a sample; each axis for itself."""
+    commands = np.array([wandering(n, int(1000 * period)), wandering(n, 7), np.full(n, 0.53)])
+    axes, means = [at_rest()] * 3, []
+    for held in commands.T:
+        *axes, x, y, z = sampled_pulses(*axes, *held, modulator(period), period)
+        means.append((x, y, z))
+    for axis, pulses in enumerate(axes):
+        lag, wanted, count, shortest = followed(commands[axis], period)
+        np.testing.assert_allclose(np.array(means)[:, axis], wanted, rtol=0.0, atol=1e-8)
+        assert pulses.filtered == pytest.approx(lag, abs=1e-8)
+        assert pulses.pulses == count
+        assert pulses.shortest == pytest.approx(shortest, abs=1e-8)
+    assert period < 0.01 or axes[2].pulses > 3
+
+
+@pytest.mark.parametrize("period", [0.5, 1.0, 2.0])
+def test_flown_with_samples_of_many_pulses_the_mean_output_is_that_of_the_closed_forms(period):
+    row = fly_one(**asking(0.3), steps_per_sample=period / 0.005)
+    first, cycle = first_on_time(0.3, GAIN, TAU, ON), 0.027103 + 0.080803
+    assert row["pulse_count_x"] == np.floor((120.0 - first) / cycle) + 1.0
+    assert LEVEL * row["on_time_x_s"] / 120.0 == pytest.approx(0.26875, rel=0.002)
+    assert row["min_pulse_x_s"] == pytest.approx(0.027103, abs=1e-6)
+
+
+def test_cases_with_many_pulses_in_a_sample_have_the_same_bits_alone_and_among_others():
+    """Their neighbours have none, one or some."""
+    inputs = asking(np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.49, -0.4])) | {"steps_per_sample": 100.0}
+    together = fly_cases(**inputs)
+    assert set(np.sign(together["pulse_count_x"] - 100.0)) == {-1.0, 1.0}
+    for width in (1, 16):
+        alone = fly(MODEL, NOMINAL | inputs, np.arange(8), SEED, width=width)
+        for name in ("impulse_x_n_m_s", "pulse_count_x", "min_pulse_x_s", "q1"):
+            np.testing.assert_array_equal(alone[name], together[name])
+
+
+def test_the_fastest_modulator_of_table_2_flies_alike_with_steps_of_5_ms_and_of_a_half():
+    """Pulses and pauses of a millisecond: settled after 153 s with 121 s of attitude error, whatever the sample."""
+    fastest = dict(zip(_BOUNDS, (10.0, 0.05, 0.05, 0.05, 2.0), strict=True))
+    coarse, fine = (fly_one(**TABLE_8 | fastest | {"step_s": step}) for step in (0.005, 0.0005))
+    for name, share in (("settling_time_s", 0.002), ("attitude_effort_s", 0.002), ("control_effort_n_m_s", 0.005)):
+        assert coarse[name] == pytest.approx(fine[name], rel=share)
+    assert coarse["settling_time_s"] == pytest.approx(153.4, abs=0.5)

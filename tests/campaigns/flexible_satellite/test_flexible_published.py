@@ -17,6 +17,9 @@ COLUMNS = {f"q{i}": f"q{i}" for i in range(4)} | {f"η_{i}": f"eta_{i}" for i in
 COLUMNS |= {f"ω_{axis}": f"omega_{axis}_rad_s" for axis in "xyz"}
 
 
+_DIGITS = str.maketrans("₀₁₂₃₄", "01234")
+
+
 def farthest(values):
     """Of the first hundred cases, the value that is farthest from their mean."""
     hundred = values[:100]
@@ -109,6 +112,16 @@ def test_words_in_the_print_are_true_of_our_number():
 def test_the_model_carries_the_records_into_its_reports():
     assert MODEL.published == tuple(RECORDS)
     assert len(set(IDS)) == len(IDS)
+
+
+def test_the_readme_marks_the_means_and_deviations_of_table_12_as_the_records_do():
+    statuses = {(record["of"], record["statistic"]): record["status"] for record in RECORDS if "of" in record}
+    rows = [line.split("|") for line in (FOLDER / "README.md").read_text(encoding="utf-8").splitlines()]
+    table = {row[1].strip().split(",")[0].translate(_DIGITS): row for row in rows if len(row) == 9}
+    for symbol, name in COLUMNS.items():
+        for statistic, place in (("mean", 3), ("standard deviation", 5)):
+            mark = {"near": "near", "not reproduced": "**no**"}.get(statuses[name, statistic], "")
+            assert table[symbol.replace("_", "") if symbol[0] == "η" else symbol][place].split()[1:] == mark.split()
 
 
 def test_what_is_not_reproduced_is_said_openly():

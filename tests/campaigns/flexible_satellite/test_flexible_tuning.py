@@ -81,6 +81,18 @@ def test_it_is_the_integral_that_keeps_the_attitude_out_of_reach():
     assert fly_one()["q_vector_norm"] == pytest.approx(0.027, abs=0.001)
 
 
+def test_the_points_beside_the_robust_front_are_the_tables_flown_by_the_same_craft():
+    campaign = stage("stage_3_robust")
+    named = campaign.tuning.parameters
+    choices = np.array(
+        [[table.get(one.name, campaign.nominal[one.name]) for one in named] for table in (TABLE_8, TABLE_9)]
+    )
+    scores = fly_candidates(campaign, campaign.tuning, choices)
+    points = [list(one.values.values()) for one in campaign.tuning.published]
+    np.testing.assert_allclose(scores.objectives, points, rtol=2e-4)
+    np.testing.assert_allclose(scores.limited[:, 0], [0.038, 0.018], atol=5e-4)
+
+
 def test_a_robust_candidate_is_judged_by_the_dispersed_craft():
     campaign = stage("stage_3_robust")
     choice = np.array([[TABLE_9.get(one.name, 0.0) for one in campaign.tuning.parameters]])
