@@ -81,13 +81,15 @@ def _rows_to_come(first: "Campaign") -> "Rows":
 
 def check_taken(sections: Sections, upstream: "Upstream | None", design: str | None, found: Findings) -> None:
     """Inputs that come from upstream and from this file too."""
-    if upstream is not None and design == "table":
+    if upstream is None:
+        return
+    if design == "table":
         for name in sections.dispersions:
             message = 'the design "table" takes all cases from the run upstream; write design = "mc" to disperse more'
             found.under("dispersion").add(name, message)
-    for name in upstream.links if upstream is not None else ():
+    for name in upstream.links:
         for place, names in (("parameters", sections.parameters), ("dispersion", sections.dispersions)):
-            if name in names and upstream is not None:
+            if name in names:
                 found.under(place).add(name, f"comes from the run of {upstream.name}; leave it out here")
 
 

@@ -79,7 +79,7 @@ def _companions(campaign: Campaign) -> dict[str, bytes]:
         paths.update((campaign.directory / campaign.model_reference).resolve().parent.glob("*.py"))
     base = campaign.directory.resolve()
     contents = {path.resolve().relative_to(base).as_posix(): path.read_bytes() for path in sorted(paths)}
-    return contents if campaign.upstream is None else {**contents, COMPANION: campaign.upstream.rows.to_bytes()}
+    return contents if campaign.upstream is None else {**contents, COMPANION: campaign.upstream.rows.content}
 
 
 def _after_first(
@@ -203,7 +203,7 @@ def _complete(
     with store.lock(), stop_signal() as stop:
         missing = store.missing()
         wanted = sum(last - first for first, last in missing)
-        size = chunk or min(max(-(-wanted // (CHUNKS_PER_WORKER * workers)), SMALLEST_CHUNK), LARGEST_CHUNK)
+        size = chunk or chunk_size(wanted, workers)
         store.note("started", workers=workers, chunk=size, missing=wanted)
         begin = time.perf_counter()
         store.write_nominal(_nominal(campaign))  # also compiles the kernel
@@ -229,6 +229,11 @@ def _complete(
         _write_histories(store, campaign, workers)
         store.note("finished", prepare_s=round(compiled - begin, 3), fly_s=round(flown - compiled, 3))
     return store
+
+
+def chunk_size(cases: int, workers: int) -> int:
+    """How many cases a thread flies at a time, and a part holds, unless said."""
+    return min(max(-(-cases // (CHUNKS_PER_WORKER * workers)), SMALLEST_CHUNK), LARGEST_CHUNK)
 
 
 def _chunks(missing: list[Chunk], size: int) -> Iterator[Chunk]:

@@ -8,6 +8,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -48,8 +49,9 @@ class Rows:
         """How many cases the run has."""
         return len(self.table["case_id"])
 
-    def to_bytes(self) -> bytes:
-        """A Parquet file of all this."""
+    @cached_property
+    def content(self) -> bytes:
+        """A Parquet file of all this: what a run directory keeps, and what digests are taken of."""
         table = arrow_table(self.columns, self.table, self.n_cases, Path(COMPANION))
         more = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
         return parquet_bytes(table.replace_schema_metadata({_FACTS: json.dumps(more, sort_keys=True, default=float)}))
@@ -81,7 +83,7 @@ class Upstream:
     @property
     def digest(self) -> str:
         """SHA-256 of all that is taken."""
-        return sha256(self.rows.to_bytes()).hexdigest()
+        return sha256(self.rows.content).hexdigest()
 
     def nominal_row(self) -> dict[str, Any]:
         """What the row of the nominal case keeps: the nominal case upstream, and the linked inputs."""

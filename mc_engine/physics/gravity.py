@@ -32,7 +32,10 @@ def j2_perturbation(x, y, z, mu):
 
 @physics
 def oblate(x, y, z, mu):
-    """Acceleration [m/s^2] by a point and the second zonal harmonic together: a few products less than their sum."""
+    """Acceleration [m/s^2] by a point and the second zonal harmonic together: a few products less than their sum.
+
+    Curtis, Orbital Mechanics for Engineering Students, 3rd ed., eq. (12.30) added to the point's.
+    """
     r2 = fma(x, x, fma(y, y, z * z))
     u2 = 1.0 / r2
     r = sqrt(r2)
