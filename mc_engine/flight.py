@@ -130,8 +130,14 @@ def _settings_of(model: Model, codes: tuple[float, ...]) -> Any:
 
 
 def _kernel_settings(model: Model, codes: np.ndarray, tables: np.ndarray) -> np.ndarray:
-    """The same as one array, as kernels take it; `tables` : of the cases, behind those of the model."""
-    return codes if model.tables is None else np.concatenate([codes, settings_of(model, codes).tables, tables])
+    """The same as one array, as kernels take it: codes, then the last place of the tables, then the tables.
+
+    tables : of the cases, behind those of the model.
+    """
+    if model.tables is None:
+        return codes
+    shared = settings_of(model, codes).tables
+    return np.concatenate([codes, [shared.size + tables.size - 1.0], shared, tables])
 
 
 def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:

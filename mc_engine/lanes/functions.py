@@ -73,8 +73,13 @@ TABLES = "tables"  # name of the settings' field that holds a model's tables
 
 
 def look_up(tables, place):
-    """The number at `place` of the model's tables: a whole number as a float, 0 or more and inside them."""
-    return _plain(tables[np.asarray(place).astype(int)])
+    """The number at `place` of the model's tables: a whole number as a float.
+
+    Below the first place, and where the place is not a number, the first; above the last, the last: a flight that has
+    gone astray reads nothing foreign.
+    """
+    inside = np.clip(np.nan_to_num(np.asarray(place, dtype=np.float64)), 0.0, len(tables) - 1.0)
+    return _plain(tables[inside.astype(int)])
 
 
 def any_lane(mask):

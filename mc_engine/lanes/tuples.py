@@ -227,7 +227,7 @@ def scalars_like(typingctx, like, array):
 def load_scalars(typingctx, cls, array):
     """Named tuple of class `cls` with one plain float64 per field from a 1-D array.
 
-    A last field called `tables` becomes the address of what follows in the array.
+    A last field called `tables` becomes the address of what follows in the array after its last place.
     """
     names = cls.instance_class._fields
     count = len(names) - (names[-1] == TABLES)
@@ -235,7 +235,7 @@ def load_scalars(typingctx, cls, array):
     result = _tuple_type([types.float64] * count + extra, cls)
 
     def codegen(context, builder, sig, args):
-        places = [ir.Constant(ir.IntType(64), i) for i in range(len(names))]
+        places = [ir.Constant(ir.IntType(64), i + (i == count)) for i in range(len(names))]
         at = [_pointer(context, builder, array, args[1], None, place, 1) for place in places]
         return _pack(context, builder, result, [_read(builder, pointer) for pointer in at[:count]] + at[count:])
 
