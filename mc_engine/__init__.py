@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from mc_engine.cases import case_table
     from mc_engine.errors import CampaignError, EngineError, ModelError, RunInterrupted, StoreError
     from mc_engine.model import AdaptiveStep, Event, Extremum, Field, FixedStep, Model, Parameter, Refusals, Setting
+    from mc_engine.opened_run import Case, Run, open_run
     from mc_engine.runner import Replay, extend, replay, resume, run
     from mc_engine.store import Store, open_store
     from mc_engine.tuning import tune
@@ -21,6 +22,7 @@ _HOME = {
     "cases": ("case_table",),
     "errors": ("CampaignError", "EngineError", "ModelError", "RunInterrupted", "StoreError"),
     "model": ("AdaptiveStep", "Event", "Extremum", "Field", "FixedStep", "Model", "Parameter", "Refusals", "Setting"),
+    "opened_run": ("Case", "Run", "open_run"),
     "runner": ("Replay", "extend", "replay", "resume", "run"),
     "store": ("Store", "open_store"),
     "tuning": ("tune",),
@@ -47,6 +49,9 @@ __all__ = [  # noqa: RUF022 - by module, as above
     "Parameter",
     "Refusals",
     "Setting",
+    "Case",
+    "Run",
+    "open_run",
     "Replay",
     "extend",
     "replay",

@@ -6,7 +6,7 @@ by itself.  What the file may say is in `mc_engine.campaign_file`.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,12 +32,13 @@ from mc_engine.campaign_search import SHIPPED, ShippedCampaign, campaign_name, f
 from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.case_table_file import read_case_table, table_dispersions
 from mc_engine.chain import chained_count, check_taken, take_inputs
-from mc_engine.designs import BY_LEVELS, DESIGNS, RANDOM, level_count
+from mc_engine.covariances import spread_covariances
+from mc_engine.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, block_problem, level_count
 from mc_engine.dispersions import Dispersion, build_dispersion
 from mc_engine.distributions import Scalar
 from mc_engine.errors import CampaignError, ModelError, Problem
 from mc_engine.input_values import inputs_of
-from mc_engine.model import Model, load_model
+from mc_engine.model import AdaptiveStep, Model, load_model
 from mc_engine.sobol import MAX_DIMENSIONS
 from mc_engine.suggestions import hint
 from mc_engine.tuning_parts import Tuning, check_tuning
@@ -61,7 +62,7 @@ __all__ = [
     "schema",
 ]
 
-_LARGEST_FILE = 5_000_000  # bytes
+_LARGEST_FILE = 250_000  # bytes; more of them could take the reader of TOML longer than a second
 _LARGEST_HYPERCUBE = 10_000_000  # cases; a Latin hypercube is held in memory as a whole
 
 
@@ -73,6 +74,8 @@ class Campaign:
     parameters : what [parameters] says.  nominal : every parameter and setting of the model.
     upstream : what is taken from another run.  first : that run's campaign, where it has yet to be flown.
     table : the columns of the design "table", else empty.  tuning : what [tuning] says, if it is there.
+    looks : numbers of cases at which a run that ends with its verdicts is judged; empty where all cases fly.
+    messages : orbit messages beside the file that covariances were read from.
     digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
         cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
     """
@@ -98,6 +101,8 @@ class Campaign:
     tuning: Tuning | None = None
     upstream: "Upstream | None" = field(default=None, compare=False, repr=False)
     first: "Campaign | None" = field(default=None, compare=False, repr=False)
+    looks: tuple[int, ...] = ()
+    messages: tuple[str, ...] = ()
 
 
 def load_campaign(
@@ -138,7 +143,7 @@ def _read(path: Path) -> str:
         raise CampaignError(path.name, [Problem("", f"cannot be read: {error.strerror}")]) from None
     if data is None:
         raise CampaignError(
-            path.name, [Problem("", "is larger than 5 MB; a long table of cases belongs into a CSV file")]
+            path.name, [Problem("", "is larger than 250 kB; a long table of cases belongs into a CSV file")]
         )
     try:
         return data.decode("utf-8-sig")
@@ -163,12 +168,14 @@ def _assemble(
     found: Findings,
 ) -> Campaign | None:
     """The campaign, or None where it lacks a section or a model to hold the rest against."""
+    messages = spread_covariances(document, directory, found)
     sections = read_sections(document, found)
     model = _model(document, directory, found)
     if model is None:
         return None
     inside = found.under("campaign")
     section = sections.campaign
+    model = _within_budget(model, section, inside)
     design = section.design if section is not None else _named_design(document)
     upstream, first = take_inputs(sections, model, directory, run, design, load_campaign, found)
     nominal = _nominal(model, sections, {} if upstream is None or first is not None else upstream.nominal, found)
@@ -217,6 +224,7 @@ def _assemble(
         tuning=tuning,
         upstream=upstream,
         first=first,
+        messages=messages,
     )
 
 
@@ -236,10 +244,21 @@ def _model(document: dict[str, Any], directory: Path, found: Findings) -> Model 
     try:
         return load_model(reference, directory)
     except ModelError as error:
-        shipped = [f"campaigns.{folder.parent.name}" for folder in SHIPPED.glob("*/campaign.toml")]
-        near = "" if reference in shipped or reference.endswith(".py") else hint(reference, shipped)
+        known = [f"campaigns.{folder.parent.name}" for folder in SHIPPED.glob("*/campaign.toml")]
+        known += [file.name for file in directory.glob("*.py")]
+        near = "" if reference in known else hint(reference, known)
         found.under("campaign").add("model", f"{error}{near if 'did you mean' in near else ''}")
         return None
+
+
+def _within_budget(model: Model, section: CampaignSection | None, found: Findings) -> Model:
+    """The model with the file's own cap on integration steps."""
+    if section is None or section.max_steps is None:
+        return model
+    if not isinstance(model.clock, AdaptiveStep):
+        found.add("max_steps", f"is for models that choose their steps; {model.name} steps on a fixed grid")
+        return model
+    return replace(model, clock=replace(model.clock, attempts=section.max_steps))
 
 
 def _nominal(model: Model, sections: Sections, taken: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
@@ -247,9 +266,13 @@ def _nominal(model: Model, sections: Sections, taken: Mapping[str, Scalar], foun
     before = len(found.problems)
     nominal = {**nominal_values(model, sections.parameters, spot), **taken}
     if len(found.problems) == before:
-        sentence = refusal(model, nominal)
-        if sentence:
-            spot.add("", f"the nominal case cannot be flown: {sentence}")
+        try:
+            sentence = refusal(model, nominal)
+        except ModelError as error:
+            found.under("campaign").add("model", str(error))
+        else:
+            if sentence:
+                spot.add("", f"the nominal case cannot be flown: {sentence}")
     return nominal
 
 
@@ -314,7 +337,7 @@ def _case_count(
     section: CampaignSection, dispersions: tuple[Dispersion, ...], table: Mapping[str, np.ndarray], found: Findings
 ) -> int | None:
     """How many cases the design has; None where that is unknown."""
-    if section.design in RANDOM:
+    if section.design in (*RANDOM, *IN_BLOCKS):
         for key, value in (("cases", section.cases), ("seed", section.seed)):
             if value is None:
                 found.add(key, f"is missing: {CampaignSection.model_fields[key].description}")
@@ -340,8 +363,13 @@ def _check_size(
         check_room_for_correlations(count, correlations, found)
         if count > _LARGEST_HYPERCUBE:
             found.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
-    if design == "sobol" and len(dispersions) > MAX_DIMENSIONS:
-        found.add("design", f'"sobol" has at most {MAX_DIMENSIONS} dispersions, here are {len(dispersions)}; use "mc"')
+    most = {"sobol": MAX_DIMENSIONS, "saltelli": MAX_DIMENSIONS // 2}.get(design, len(dispersions))
+    if len(dispersions) > most:
+        found.add("design", f'"{design}" has at most {most} dispersions, here are {len(dispersions)}; use "mc"')
+    if design in IN_BLOCKS and not dispersions:
+        found.add("design", f'"{design}" needs a dispersion to find the effect of')
+    if sentence := block_problem(design, len(dispersions), count):
+        found.add("cases", sentence)
 
 
 def _digest(
@@ -352,9 +380,10 @@ def _digest(
     table_path: Path | None,
     upstream: "Upstream | None",
 ) -> str:
-    content = json.loads(json.dumps(document))
+    content = json.loads(json.dumps(document, default=str))  # TOML has dates, JSON has none
     if section.design != "lhs":
         content["campaign"].pop("cases", None)
+    content["campaign"]["seed"] = section.seed or 0  # a grid may do without one, and is resumed with 0
     order = [one.name for one in dispersions]
     digest = sha256(json.dumps([content, order], sort_keys=True).encode())
     files = [directory / one.spec["file"] for one in dispersions if one.dist == "empirical"]

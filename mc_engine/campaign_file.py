@@ -4,6 +4,7 @@ These classes know nothing of a model; `mc_engine.campaign` holds the file again
 """
 
 import math
+from datetime import date
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
@@ -13,19 +14,22 @@ from mc_engine.distributions import Scalar
 
 MOST_CASES = 1_000_000_000
 MOST_LEVELS = 1_000_000
+MOST_STEPS = 10**12
 LARGEST = 1e50  # beyond it, squares and quotients of numbers leave the range of float64
 
-DesignName = Literal["mc", "lhs", "sobol", "halton", "grid", "one_at_a_time", "table"]
+DesignName = Literal["mc", "lhs", "sobol", "halton", "saltelli", "morris", "grid", "one_at_a_time", "table"]
 
 
 def _scalar(value: Any) -> Scalar:
     if isinstance(value, bool | str):
         return value
+    if isinstance(value, date):  # TOML has dates of its own, with and without time
+        return value.isoformat()
     if not isinstance(value, int | float):
         raise PydanticCustomError("scalar", "{shown} is neither a number, nor true or false, nor a word")
-    if math.isnan(value) or math.isinf(value):
+    if value != value or abs(value) == math.inf:
         raise PydanticCustomError("finite_number", "not a finite number")
-    if abs(value) > LARGEST:
+    if abs(value) > LARGEST:  # also of a whole number that no float64 can hold
         raise PydanticCustomError("less_than_equal", "too large", {"le": LARGEST})
     return float(value)
 
@@ -55,12 +59,15 @@ class CampaignSection(Section):
 
     model: str = Field(min_length=1, description='a module such as "campaigns.deorbit", or "model.py" beside this file')
     cases: int | None = Field(default=None, ge=1, le=MOST_CASES, description="number of cases; random designs only")
-    design: DesignName = Field(description="how the cases are laid out: mc, lhs, sobol, halton, grid, ...")
+    design: DesignName = Field(description="how the cases are laid out: mc, lhs, sobol, halton, saltelli, grid, ...")
     seed: int | None = Field(
         default=None, ge=0, le=2**63 - 1, description="any whole number from 0 on; random designs only"
     )
     table: str | None = Field(
         default=None, min_length=1, description='CSV or Parquet beside this file, with design = "table"'
+    )
+    max_steps: int | None = Field(
+        default=None, ge=1, le=MOST_STEPS, description="integration steps of a case, then it ends as step-limit"
     )
     title: str = Field(default="", description="one line for the report")
     note: str = ""
@@ -190,6 +197,21 @@ class CorrelationSection(Section):
 
     between: list[str] = Field(min_length=2, max_length=2, description="the names of two dispersions")
     rank: float = Field(gt=-1.0, lt=1.0, description="Spearman rank correlation, between -1 and 1")
+    source: str = ""
+    note: str = ""
+
+
+class CovarianceSection(Section):
+    """[covariance.NAME]: the covariance of an orbit message as the spread of six parameters."""
+
+    file: str = Field(min_length=1, description="a CCSDS OPM or OEM (KVN) beside this file")
+    parameters: list[str] = Field(
+        min_length=6, max_length=6, description="the parameters of position and velocity, in the order of the axes"
+    )
+    frame: str = Field(
+        min_length=1, description="axes of the parameters: RTN, TNW, or the frame of the message's state"
+    )
+    epoch: str | None = Field(default=None, description="which covariance, where an OEM has more than one")
     source: str = ""
     note: str = ""
 
@@ -333,6 +355,7 @@ class CampaignFile(Section):
     parameters: dict[str, Value] = Field(default_factory=dict, description="other nominal values and settings")
     dispersion: dict[str, AnyDispersion] = Field(default_factory=dict)
     correlation: list[CorrelationSection] = Field(default_factory=list)
+    covariance: dict[str, CovarianceSection] = Field(default_factory=dict)
     inputs: InputsSection | None = Field(default=None, description="what is taken from another run, case by case")
     requirement: dict[str, RequirementSection] = Field(default_factory=dict)
     retention: RetentionSection = Field(default_factory=RetentionSection)

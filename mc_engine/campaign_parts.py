@@ -10,11 +10,13 @@ import numpy as np
 from mc_engine.campaign_file import CorrelationSection, RequirementSection, RetentionSection, WorstSection
 from mc_engine.campaign_problems import Findings
 from mc_engine.correlation import group_matrix, is_positive_definite
-from mc_engine.designs import RANDOM
+from mc_engine.designs import IN_BLOCKS, RANDOM
 from mc_engine.dispersions import Dispersion
 from mc_engine.distributions import Scalar
+from mc_engine.errors import MOST_SHOWN
 from mc_engine.input_values import accepted_range, check_value, inputs_of, number
 from mc_engine.model import Model, Parameter, Refusals, Setting
+from mc_engine.model_faults import naming_faults
 from mc_engine.suggestions import hint, listed
 
 _CASES_PER_CORRELATED = 10  # a Latin hypercube with fewer may not have room for the correlations asked for
@@ -64,11 +66,13 @@ class Retention:
 
 def nominal_values(model: Model, overrides: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
     """Every parameter and setting at its nominal value: what [parameters] says, else the model's default."""
+    inputs = inputs_of(model)
     for name in overrides:
-        if name not in inputs_of(model):
-            found.add(name, f"is not a parameter of {model.name}{hint(name, inputs_of(model))}")
+        if name not in inputs:
+            near = hint(name, inputs) if len(found.problems) < MOST_SHOWN else ""  # a search takes its time
+            found.add(name, f"is not a parameter of {model.name}{near}")
     values: dict[str, Scalar] = {}
-    for item in inputs_of(model).values():
+    for item in inputs.values():
         default = item.default if isinstance(item, Setting) else float(item.default)
         if item.name in overrides:
             checked = check_value(overrides[item.name], item, found, item.name)
@@ -85,13 +89,17 @@ def _check_default(default: Scalar, item: Parameter | Setting, found: Findings) 
 
 
 def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
-    """Why the model cannot start from these values, as one sentence; empty if it can."""
+    """Why the model cannot start from these values, as one sentence; empty if it can.
+
+    Raises ModelError if `prepare` itself breaks.
+    """
     if model.prepare is None:
         return ""
     inputs = {p.symbol: np.array([float(values[p.name]) * p.si_factor]) for p in model.parameters}
     settings = {s.symbol: np.array([s.code(values[s.name])]) for s in model.settings}
     refusals = Refusals.none(1)
-    with np.errstate(all="ignore"):  # a refused case may divide by zero on its way
+    # a refused case may divide by zero on its way
+    with np.errstate(all="ignore"), naming_faults(model.reference, "the nominal case"):
         model.prepare(SimpleNamespace(**inputs), SimpleNamespace(**settings), refusals)
     return str(refusals.reason[0])
 
@@ -105,7 +113,8 @@ def check_correlations(
 ) -> tuple[Correlation, ...]:
     """The correlations; `sections` by place in the file."""
     if sections and design not in RANDOM:
-        found.add("correlation", f'the design "{design}" has no chance in it; correlations are for {listed(RANDOM)}')
+        why = "is for independent inputs" if design in IN_BLOCKS else "has no chance in it"
+        found.add("correlation", f'the design "{design}" {why}; correlations are for {listed(RANDOM)}')
         return ()
     by_name = {dispersion.name: dispersion for dispersion in dispersions}
     kept: list[Correlation] = []

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from mc_engine.campaign_file import (
@@ -31,10 +32,14 @@ from mc_engine.campaign_file import (
 )
 from mc_engine.distributions import Scalar
 from mc_engine.errors import CampaignError, Problem
-from mc_engine.suggestions import hint, listed
+from mc_engine.suggestions import hint, listed, nearest
 
+_VALUE: TypeAdapter[Scalar] = TypeAdapter(Value)
 _TAGS = ("one", "many")  # pydantic puts the tag of a union into the place
 _AnySection = TypeVar("_AnySection", bound=Section)
+
+# tomllib takes a time that grows with the square of the parts of a dotted key; a campaign file has keys of three.
+_LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
 
 _MESSAGES = {
     "int_type": "{shown} is not a whole number{whole}",
@@ -101,6 +106,9 @@ class TuningSections:
 
 def parse_toml(text: str, source: str) -> dict[str, Any]:
     """The text as a document; CampaignError with line and column where it is not TOML."""
+    if match := _LONG_KEY.search(text):
+        line = text.count("\n", 0, match.start()) + 1
+        raise CampaignError(source, [Problem(f"line {line}", "a name of so many parts is none of a campaign file's")])
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -220,7 +228,7 @@ def _parameters(document: dict[str, Any], found: Findings) -> dict[str, Scalar]:
     values: dict[str, Scalar] = {}
     for name, value in raw.items():
         try:
-            values[name] = TypeAdapter(Value).validate_python(value)
+            values[name] = _VALUE.validate_python(value)
         except ValidationError as error:
             found.add(name, _sentence(None, error.errors(include_url=False)[0]))
     return values
@@ -230,7 +238,12 @@ def _dispersion(raw: Any, found: Findings) -> DispersionSection | None:
     """The section of the distribution that `dist` names; the keys allowed depend on it."""
     dist = raw.get("dist") if isinstance(raw, dict) else None
     if dist is None:
-        return read(LevelsDispersion, raw, found)
+        slip = _slip_of_dist(raw) if isinstance(raw, dict) else None
+        if slip is None:
+            return read(LevelsDispersion, raw, found)
+        found.add(slip, 'is not a known key; did you mean "dist"?')
+        dist = raw[slip]
+        raw = {"dist": dist, **{key: value for key, value in raw.items() if key != slip}}
     if not isinstance(dist, str):
         found.add("dist", f"{shown(dist)} is not text in quotes; known are {listed(DISTRIBUTIONS)}")
         return None
@@ -238,6 +251,13 @@ def _dispersion(raw: Any, found: Findings) -> DispersionSection | None:
         found.add("dist", f'"{dist}" is not known{hint(dist, DISTRIBUTIONS)}')
         return None
     return read(DISTRIBUTIONS[dist], raw, found)
+
+
+def _slip_of_dist(raw: dict[str, Any]) -> str | None:
+    """The key that was to be `dist`, without which no other key of a dispersion could be judged."""
+    known = [*LevelsDispersion.model_fields, "dist"]
+    others = [key for key in raw if not any(key in section.model_fields for section in DISTRIBUTIONS.values())]
+    return next((key for key in others if nearest(key, known) == "dist"), None)
 
 
 def _place(raw: Any, location: tuple[int | str, ...]) -> str:
@@ -257,9 +277,9 @@ def _sentence(section: type[Section] | None, details: ErrorDetails) -> str:
     kind, context, location = details["type"], details.get("ctx", {}), details["loc"]
     value = details["input"]
     if kind == "missing" and section is not None:
-        return f"is missing: {_class_at(section, location).model_fields[str(location[-1])].description}"
+        return f"is missing: {_keys(_class_at(section, location))[str(location[-1])].description}"
     if kind == "extra_forbidden" and section is not None:
-        return f"is not a known key{hint(str(location[-1]), _class_at(section, location).model_fields)}"
+        return f"is not a known key{hint(str(location[-1]), _keys(_class_at(section, location)))}"
     if kind == "literal_error":
         allowed = re.findall(r"'([^']*)'", context["expected"])
         if isinstance(value, str):
@@ -275,6 +295,11 @@ def _sentence(section: type[Section] | None, details: ErrorDetails) -> str:
 
 def _plain(limit: Any) -> Any:
     return f"{limit:g}" if isinstance(limit, float) else limit
+
+
+def _keys(section: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The keys as the file writes them: `from` is a word of Python, and has another name inside."""
+    return {field.alias or name: field for name, field in section.model_fields.items()}
 
 
 def _class_at(section: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel]:

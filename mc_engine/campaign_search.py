@@ -5,7 +5,7 @@ import tomllib
 from pathlib import Path
 from typing import NamedTuple
 
-from mc_engine.errors import CampaignError, Problem
+from mc_engine.errors import CampaignError, ModelError, Problem
 from mc_engine.suggestions import hint
 
 SHIPPED = Path(__file__).resolve().parents[1] / "campaigns"
@@ -22,6 +22,44 @@ class ShippedCampaign(NamedTuple):
 def list_campaigns() -> list[ShippedCampaign]:
     """Every shipped campaign file: "deorbit" is campaigns/deorbit/campaign.toml, "deorbit/map" its map.toml."""
     return [ShippedCampaign(name, path, _title(path)) for name, path in sorted(_shipped().items())]
+
+
+def campaign_names() -> list[str]:
+    """The names of all shipped campaigns, without opening a file."""
+    return sorted(_shipped())
+
+
+def campaign_paths(begun: str) -> list[str]:
+    """Folders, and .toml files, whose path begins with `begun`; a folder ends in a slash."""
+    folder, _, name = begun.rpartition("/")
+    try:
+        entries = sorted(Path(f"{folder}/" if "/" in begun else ".").iterdir())
+    except (OSError, ValueError):
+        return []
+    before = f"{folder}/" if "/" in begun else ""
+    fitting = [one for one in entries if one.name.startswith(name) and (name or not one.name.startswith("."))]
+    return [
+        f"{before}{one.name}{'/' if one.is_dir() else ''}" for one in fitting if one.is_dir() or one.suffix == ".toml"
+    ]
+
+
+def model_sources() -> dict[str, str]:
+    """Where the model of each folder of shipped campaigns comes from; this loads the models.
+
+    A model that cannot be loaded, or has no source, is left out.
+    """
+    from mc_engine.model import load_model
+
+    found = {}
+    for folder in sorted(path.parent for path in SHIPPED.glob("*/campaign.toml")):
+        try:
+            reference = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8"))["campaign"]["model"]
+            source = load_model(reference, folder).source
+        except (ModelError, OSError, ValueError, LookupError, TypeError):
+            continue
+        if source:
+            found[folder.name] = source
+    return found
 
 
 def find_campaign(reference: str | Path) -> Path:
@@ -75,6 +113,12 @@ def _not_found(text: str, path: Path, names: list[str]) -> str:
     if path.suffix == ".toml":
         return "there is no such file"
     if "/" not in text and not text.startswith("."):
-        return f"there is no campaign of that name, and no such path{hint(text, names)}"
+        near = hint(text, names)
+        known = near if "did you mean" in near else "; `mc-engine list` names the campaigns"
+        return f"there is no campaign of that name, and no such path{known}"
     near = hint(text, names)
-    return f"there is no such path{near}" if "did you mean" in near else "there is no such path with a campaign.toml"
+    return (
+        f"there is no such path{near}"
+        if "did you mean" in near
+        else "there is no such path with a campaign.toml; `mc-engine init` makes one"
+    )

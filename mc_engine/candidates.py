@@ -13,11 +13,11 @@ import numpy as np
 
 from mc_engine.campaign import Campaign
 from mc_engine.cases import case_table, full_inputs
+from mc_engine.chunks import NOMINAL_NOISE
 from mc_engine.distributions import column
 from mc_engine.flight import fly
 from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.model_faults import naming_faults
-from mc_engine.runner import NOMINAL_NOISE
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 from mc_engine.tuning_parts import Constraint, Tuning
 

@@ -12,7 +12,7 @@ END_TIME = "end_time_s"
 def input_column(item: Parameter | Setting) -> Column:
     """The column of an input that differs from case to case."""
     kind = "number"
-    if isinstance(item, Setting) and item.choices:
+    if isinstance(item, Setting) and (item.choices or item.date):
         kind = "word"
     elif isinstance(item.default, bool):
         kind = "switch"

@@ -5,13 +5,23 @@ CSV (comma, first line the names) or Parquet.  Every fault is a sentence with fi
 
 import csv
 import io
+import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 _MOST_LINES = 5  # named in one sentence
+_LONGEST_NAME = 60  # written out in one
+
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet calculates a cell that begins so
+_GUARD = "'"  # which makes it text
 
 
 class FileFault(Exception):
@@ -20,11 +30,16 @@ class FileFault(Exception):
 
 def resolve_beside(directory: Path, reference: str) -> Path:
     """The file `reference`, which must stand in `directory` or below it."""
-    path = (directory / reference).resolve()
+    name = json.dumps(reference if len(reference) <= _LONGEST_NAME else f"{reference[:57]}...", ensure_ascii=False)
+    try:
+        path = (directory / reference).resolve()
+        is_file = path.is_file()
+    except (OSError, ValueError, RuntimeError):  # too long, with a zero byte, links that go round
+        raise FileFault(f"{name} is no name that a file can have") from None
     if not path.is_relative_to(directory.resolve()):
-        raise FileFault(f'"{reference}" lies outside the folder of the campaign file; put it beside that file')
-    if not path.is_file():
-        raise FileFault(f'there is no file "{reference}" beside the campaign file')
+        raise FileFault(f"{name} lies outside the folder of the campaign file; put it beside that file")
+    if not is_file:
+        raise FileFault(f"there is no file {name} beside the campaign file")
     return path
 
 
@@ -60,14 +75,16 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
     numbered = [(line, row) for line, row in enumerate(rows, start=1) if any(cell.strip() for cell in row)]
     if not numbered:
         raise FileFault(f'"{path.name}" is empty')
-    names = [cell.strip() for cell in numbered[0][1]]
+    names = [_as_meant(cell) for cell in numbered[0][1]]
     _check_names(path, names)
     ragged = [(line, len(row)) for line, row in numbered[1:] if len(row) != len(names)]
     if ragged:
         lines = ", ".join(f"line {line}: {count} fields" for line, count in ragged[:_MOST_LINES])
         more = f" and {len(ragged) - _MOST_LINES} lines more" if len(ragged) > _MOST_LINES else ""
         raise FileFault(f'"{path.name}", {lines}{more} where {len(names)} columns are named')
-    return {name: np.array([row[k].strip() for _, row in numbered[1:]], dtype=object) for k, name in enumerate(names)}
+    return {
+        name: np.array([_as_meant(row[k]) for _, row in numbered[1:]], dtype=object) for k, name in enumerate(names)
+    }
 
 
 def _check_names(path: Path, names: list[str]) -> None:
@@ -76,6 +93,34 @@ def _check_names(path: Path, names: list[str]) -> None:
             raise FileFault(f'"{path.name}" has a column without a name in its first line')
         if names.count(name) > 1:
             raise FileFault(f'"{path.name}" has the column "{name}" twice')
+
+
+def csv_text(frame: "pd.DataFrame") -> str:
+    """The table as CSV; text in which a spreadsheet would find a formula is guarded by an apostrophe.
+
+    Numbers stay numbers, with all their digits.  `read_columns` takes the apostrophes away again.
+    OWASP, "CSV Injection".
+    """
+    words = {name: frame[name].map(_without_formula) for name in frame.select_dtypes(exclude=["number", "bool"])}
+    guarded = frame.assign(**words).rename(columns=_without_formula)
+    # A carriage return ends a line for a reader, though not for this writer: it must stand in quotes.
+    broken = any("\r" in str(cell) for name in words for cell in words[name])
+    quoting = csv.QUOTE_NONNUMERIC if broken else csv.QUOTE_MINIMAL
+    return str(guarded.to_csv(index=False, lineterminator="\n", quoting=quoting))
+
+
+def _without_formula(cell: Any) -> Any:
+    text = isinstance(cell, str) and (cell.startswith(_FORMULA) or _is_guarded(cell))
+    return _GUARD + cell if text else cell
+
+
+def _is_guarded(cell: str) -> bool:
+    return cell.startswith(_GUARD) and cell.lstrip(_GUARD).startswith(_FORMULA)
+
+
+def _as_meant(cell: str) -> str:
+    cell = cell.strip()
+    return cell[1:] if _is_guarded(cell) else cell
 
 
 def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:

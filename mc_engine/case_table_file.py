@@ -8,7 +8,7 @@ import numpy as np
 from mc_engine.campaign_problems import Findings
 from mc_engine.case_files import FileFault, numbers, read_columns, switches, words
 from mc_engine.dispersions import Dispersion
-from mc_engine.input_values import accepted_range, inputs_of, number
+from mc_engine.input_values import accepted_range, check_value, inputs_of, number
 from mc_engine.model import Model, Parameter, Setting
 from mc_engine.suggestions import hint
 from mc_engine.units import convert
@@ -58,6 +58,8 @@ def _values(path: Path, item: Parameter | Setting, cells: np.ndarray, unit: str 
         return words(path, item.name, cells, item.choices)
     if isinstance(item, Setting) and isinstance(item.default, bool):
         return switches(path, item.name, cells)
+    if isinstance(item, Setting) and item.date:
+        return _dates(path, item, cells)
     values = numbers(path, item.name, cells)
     if unit is not None:
         values = convert(values, unit, item.unit)
@@ -66,6 +68,16 @@ def _values(path: Path, item: Parameter | Setting, cells: np.ndarray, unit: str 
         where = f'"{path.name}", row {wrong[0] + 1}, column "{item.name}"'
         raise FileFault(f"{where}: {number(values[wrong[0]])} is not within {accepted_range(item)}")
     return values
+
+
+def _dates(path: Path, item: Setting, cells: np.ndarray) -> np.ndarray:
+    """object[n]: the cells as dates of the setting."""
+    found = Findings()
+    dates = [check_value(str(cell), item, found, "") for cell in cells]
+    if found.problems:
+        row = dates.index(None)
+        raise FileFault(f'"{path.name}", row {row + 1}, column "{item.name}": {found.problems[0].message}')
+    return np.array(dates, dtype=object)
 
 
 def table_dispersions(

@@ -1,6 +1,8 @@
 """Campaigns that take inputs from another run: [inputs] held against that run, or against the one to be flown first."""
 
+import os
 from collections.abc import Callable
+from contextvars import ContextVar, copy_context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,13 +10,16 @@ import numpy as np
 
 from mc_engine.campaign_file import CampaignSection
 from mc_engine.campaign_problems import Findings, Sections
-from mc_engine.designs import BY_LEVELS, RANDOM
+from mc_engine.designs import BY_LEVELS, IN_BLOCKS, RANDOM
 from mc_engine.errors import CampaignError, StoreError
 from mc_engine.model import Model
 
 if TYPE_CHECKING:
     from mc_engine.campaign import Campaign
     from mc_engine.upstream import Rows, Upstream
+
+_LONGEST_CHAIN = 5  # campaigns, each flown for the next
+_waiting: ContextVar[int] = ContextVar("_waiting", default=0)  # campaigns of the chain that is being read
 
 
 def take_inputs(
@@ -46,7 +51,14 @@ def take_inputs(
         else:
             cases = sections.campaign.cases if sections.campaign is not None else None
             beside = directory / source
-            first = load(beside if beside.exists() else source, cases=cases)
+            if _waiting.get() == _LONGEST_CHAIN:
+                spot.add("from", "the campaigns take their inputs from one another, round and round")
+                return None, None
+            below = copy_context()
+            below.run(_waiting.set, _waiting.get() + 1)
+            first = below.run(
+                load, beside if os.path.exists(beside) else source, cases=cases
+            )  # not Path.exists: a name may be too long
             rows = _rows_to_come(first)
     except StoreError as error:
         spot.add("from", str(error))
@@ -55,7 +67,7 @@ def take_inputs(
         spot.add("from", f'"{source}" is neither a run nor a campaign that can be flown: {error.problems[0]}')
         return None, None
     random = rows.facts["design"] in RANDOM
-    if design is not None and (design in BY_LEVELS or (design != "table" and not random)):
+    if design is not None and (design in (*BY_LEVELS, *IN_BLOCKS) or (design != "table" and not random)):
         spot.add("from", f'its design "{rows.facts["design"]}" does not go with "{design}"; write design = "table"')
     return link(rows, sections.inputs, model, taken, spot), first
 

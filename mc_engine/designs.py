@@ -1,7 +1,8 @@
 """Designs: where the cases of a campaign lie in the unit cube, or on the axes of a grid.
 
 Random designs give one uniform number per (dispersion, case); a dispersion's place in the file is its
-dimension.  Designs by levels give, per dispersion, the level that each case takes.
+dimension.  Designs in blocks do so too, but their cases belong together: Saltelli's blocks for Sobol' indices, Morris's
+trajectories for elementary effects.  Designs by levels give, per dispersion, the level that each case takes.
 """
 
 from collections.abc import Sequence
@@ -17,9 +18,11 @@ from mc_engine.sobol import scrambled_sobol
 from mc_engine.streams import uniforms
 
 RANDOM = ("mc", "lhs", "sobol", "halton")
+IN_BLOCKS = ("saltelli", "morris")
 BY_LEVELS = ("grid", "one_at_a_time")
-DESIGNS = (*RANDOM, *BY_LEVELS, "table")
-EXTENSIBLE = ("mc", "sobol", "halton")  # the first 1000 cases of 2000 are the 1000 flown before
+DESIGNS = (*RANDOM, *IN_BLOCKS, *BY_LEVELS, "table")
+EXTENSIBLE = ("mc", "sobol", "halton", *IN_BLOCKS)  # the first 1000 cases of 2000 are the 1000 flown before
+MORRIS_LEVELS = 4
 
 Pairs = tuple[tuple[str, str, float], ...]
 
@@ -34,6 +37,9 @@ def unit_cube(
     """
     if design == "lhs":  # kept for the next chunk, and indexed by an array, which copies
         return [column[case_ids] for column in _latin_hypercube(seed, tuple(names), n_cases, pairs)]
+    if design in IN_BLOCKS:
+        block, row = np.divmod(np.asarray(case_ids, dtype=np.int64), block_size(design, len(names)))
+        return _saltelli(seed, names, block, row) if design == "saltelli" else _morris(seed, names, block, row)
     columns = [_column(design, seed, name, dimension, case_ids) for dimension, name in enumerate(names)]
     return _correlated(correlation.gaussian_copula, columns, names, pairs)
 
@@ -42,9 +48,12 @@ def _column(design: str, seed: int, name: str, dimension: int, case_ids: np.ndar
     if design == "mc":
         return uniforms(seed, name, case_ids)
     if design == "sobol":
-        key = sha256(f"{seed}/{name}/sobol".encode()).digest()[:8]
-        return scrambled_sobol(int.from_bytes(key, "little"), dimension, case_ids)
+        return scrambled_sobol(_key(f"{seed}/{name}/sobol"), dimension, case_ids)
     return scrambled_halton(seed, name, dimension, case_ids)
+
+
+def _key(words: str) -> int:
+    return int.from_bytes(sha256(words.encode()).digest()[:8], "little")
 
 
 def _correlated(method, columns: list[np.ndarray], names: Sequence[str], pairs: Pairs) -> list[np.ndarray]:
@@ -52,6 +61,56 @@ def _correlated(method, columns: list[np.ndarray], names: Sequence[str], pairs: 
     if members:
         for place, column in zip(members, method([columns[place] for place in members], matrix), strict=True):
             columns[place] = column
+    return columns
+
+
+def block_size(design: str, n_dispersions: int) -> int:
+    """Cases of one block of a design in blocks; the number of cases must be a multiple of it."""
+    return n_dispersions + (2 if design == "saltelli" else 1)
+
+
+def block_problem(design: str, n_dispersions: int, n_cases: int) -> str:
+    """Why a design cannot have so many cases, as a sentence; empty if it can."""
+    if design not in IN_BLOCKS or not n_dispersions or n_cases % block_size(design, n_dispersions) == 0:
+        return ""
+    size = block_size(design, n_dispersions)
+    below = n_cases // size * size
+    nearest = f"{below} or {below + size} would fit" if below else f"{size} would fit"
+    return (
+        f'{n_cases} is not allowed; "{design}" with {n_dispersions} dispersions has blocks of {size} cases: {nearest}'
+    )
+
+
+def _saltelli(seed: int, names: Sequence[str], block: np.ndarray, row: np.ndarray) -> list[np.ndarray]:
+    """Row 0 of a block is a point A, the last one an independent point B, and row k + 1 is A with input k from B.
+
+    A and B are one point of a scrambled Sobol' sequence of twice the dimensions.  Saltelli et al., Comput. Phys.
+    Commun. 181 (2010), 259-270, matrices A, A_B and B, in the order in which SALib analyses them.
+    """
+    columns = []
+    for k, name in enumerate(names):
+        a, b = (
+            # Each with a key of its own: under one key the first points of all dimensions are the same.
+            scrambled_sobol(_key(f"{seed}/{name}/saltelli {which}"), 2 * k + place, block)
+            for place, which in enumerate("ab")
+        )
+        columns.append(np.where((row == len(names) + 1) | (row == k + 1), b, a))
+    return columns
+
+
+def _morris(seed: int, names: Sequence[str], block: np.ndarray, row: np.ndarray) -> list[np.ndarray]:
+    """Trajectories: from a random point of a grid one input after the other, in random order, moves by half the levels.
+
+    The levels are the middles of MORRIS_LEVELS equal parts of the unit interval, so that none is infinite.
+    Morris, Technometrics 33 (1991), 161-174, with 4 levels and steps of 2, up or down.
+    """
+    draws = [uniforms(seed, f"{name}/morris order", block) for name in names]
+    place = np.argsort(np.argsort(np.array(draws).reshape(len(names), -1), axis=0, kind="stable"), axis=0)
+    columns = []
+    for name, before in zip(names, place, strict=True):
+        level = (MORRIS_LEVELS * uniforms(seed, f"{name}/morris", block)).astype(np.int64)
+        level = np.where(row > before, (level + MORRIS_LEVELS // 2) % MORRIS_LEVELS, level)
+        columns.append((level + 0.5) / MORRIS_LEVELS)
     return columns
 
 

@@ -102,7 +102,8 @@ def _check_keys_fit(spec: Mapping[str, Any], design: str, desk: Desk) -> None:
             other = ', and values for dist = "discrete"' if key == "values" else ""
             found.add(key, f'the design "{design}" has no levels; they are for grid and one_at_a_time{other}')
     if isinstance(desk.item, Setting) and dist not in (None, "discrete", "constant"):
-        found.add("dist", f'"{dist}" does not fit a setting, which all cases of a batch share; use "discrete"')
+        own = f", or disperse {desk.item.dispersed_by}" if desk.item.dispersed_by else ""
+        found.add("dist", f'"{dist}" does not fit a setting, which all cases of a batch share; use "discrete"{own}')
 
 
 def _levels(desk: Desk, distribution: Distribution | None) -> tuple[Scalar, ...]:

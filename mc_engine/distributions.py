@@ -61,6 +61,8 @@ class Continuous(Distribution):
 
 @dataclass(frozen=True)
 class Normal(Continuous):
+    """Normal, without bounds; its `span` is three sigma either way."""
+
     mean: float
     sigma: float
 
@@ -193,6 +195,8 @@ class Truncated(Distribution):
 
 @dataclass(frozen=True)
 class Uniform(Distribution):
+    """The same density everywhere from lower to upper."""
+
     lower: float
     upper: float
 
@@ -206,6 +210,8 @@ class Uniform(Distribution):
 
 @dataclass(frozen=True)
 class Triangular(Distribution):
+    """Density that rises in a straight line from lower to mode, and falls in one to upper."""
+
     lower: float
     mode: float
     upper: float
@@ -284,6 +290,8 @@ class Empirical(Distribution):
 
 @dataclass(frozen=True)
 class Constant(Distribution):
+    """One value, number or word, for every case."""
+
     value: Scalar
 
     @property

@@ -2,7 +2,7 @@
 
 Content goes to a temporary name, is synced and renamed, and the folder is synced.  Temporary names start with a
 dot and end in `.tmp`, so that neither Arrow's nor DuckDB's reading of a folder takes them for parts.
-Every OSError leaves here as a StoreError that names the path.
+Every OSError leaves here as a DiskError that names the path, or as a StoreError where a file is gone.
 """
 
 import os
@@ -10,16 +10,18 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from mc_engine.errors import StoreError
+from mc_engine.errors import DiskError, StoreError
 
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Turn an OSError of the block into a StoreError whose text begins with `path`."""
+    """Turn an OSError of the block into a DiskError whose text begins with `path`; a StoreError if it is not there."""
     try:
         yield
-    except OSError as error:
+    except FileNotFoundError as error:
         raise StoreError(f"{path}: {error.strerror or error}") from error
+    except OSError as error:
+        raise DiskError(f"{path}: {error.strerror or error}") from error
 
 
 def temporary_name(path: Path) -> Path:
@@ -35,20 +37,47 @@ def is_temporary(name: str) -> bool:
 def write_durably(path: Path, content: bytes) -> None:
     """Replace `path` by `content`; on return both the bytes and the name are on the disk."""
     temporary = temporary_name(path)
+    write_synced(temporary, content, path)
+    publish(temporary, path)
+
+
+def write_synced(path: Path, content: bytes, place: Path | None = None) -> None:
+    """Write a new file whose bytes, but not yet whose name, are on the disk.  `place` is for messages."""
+    with naming(place or path):
+        try:
+            with open(path, "wb", buffering=0) as file:
+                write_all(file.fileno(), content)
+                os.fsync(file.fileno())
+        except OSError:
+            _discard(path)
+            raise
+
+
+def sync_file(path: Path) -> None:
+    """On return the bytes of `path` are on the disk."""
+    with naming(path), open(path, "r+b", buffering=0) as file:
+        os.fsync(file.fileno())
+
+
+def publish(temporary: Path, path: Path) -> None:
+    """Give a synced file its name, in place of what had it; on return the name is on the disk."""
     with naming(path):
         try:
-            with open(temporary, "wb", buffering=0) as file:
-                _write_all(file.fileno(), content)
-                os.fsync(file.fileno())
             os.replace(temporary, path)
         except OSError:
-            with suppress(OSError):  # a full disk gets its space back; the first error is the one to report
-                os.unlink(temporary)
+            _discard(temporary)
             raise
     sync_folder(path.parent)
 
 
-def _write_all(descriptor: int, content: bytes) -> None:
+def _discard(path: Path) -> None:
+    """A full disk gets its space back; the first error is the one to report."""
+    with suppress(OSError):
+        os.unlink(path)
+
+
+def write_all(descriptor: int, content: bytes) -> None:
+    """Write every byte; the system may take fewer at a time."""
     view = memoryview(content)
     while view:
         view = view[os.write(descriptor, view) :]

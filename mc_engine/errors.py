@@ -4,11 +4,17 @@ EngineError
   CampaignError     the campaign file, or a number in it, is wrong; lists every problem, not the first
   ModelError        the model behind the campaign does not keep its contract
   StoreError        the run directory is damaged, busy, or belongs to another campaign
+    DiskError       the disk refused: full, forbidden or broken; what was committed before is safe
   RunInterrupted    the run was stopped from outside; what was committed is safe and `resume` completes it
+  WorkersLost       there is nobody to fly cases: workers that cannot be reached, or die whatever they do
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+_LONGEST = 2000  # letters of one sentence
+MOST_SHOWN = 100  # problems of one campaign file; a reader mends the first ones first
 
 
 class EngineError(Exception):
@@ -23,7 +29,14 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.message}" if self.place else self.message
+        return _for_a_terminal(f"{self.place}: {self.message}" if self.place else self.message)
+
+
+def _for_a_terminal(text: str) -> str:
+    """The text without letters that steer a terminal, and of a length that a person reads."""
+    if len(text) > _LONGEST:
+        text = f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
+    return "".join(letter if letter.isprintable() or letter == "\n" else json.dumps(letter)[1:-1] for letter in text)
 
 
 class CampaignError(EngineError):
@@ -33,7 +46,10 @@ class CampaignError(EngineError):
         self.source = source
         self.problems = tuple(problems)
         count = f"{len(self.problems)} problem{'s' if len(self.problems) != 1 else ''}"
-        super().__init__("\n".join([f"{source}: {count}", *(f"  {problem}" for problem in self.problems)]))
+        lines = [f"  {problem}" for problem in self.problems[:MOST_SHOWN]]
+        if len(self.problems) > MOST_SHOWN:
+            lines.append(f"  and {len(self.problems) - MOST_SHOWN} more")
+        super().__init__("\n".join([f"{source}: {count}", *lines]))
 
 
 class ModelError(EngineError):
@@ -44,5 +60,13 @@ class StoreError(EngineError):
     """The run directory cannot be read or written as it stands; the text names the path."""
 
 
+class DiskError(StoreError):
+    """The disk refused an operation; the text names the path.  What was committed before is safe."""
+
+
 class RunInterrupted(EngineError):
     """The run was stopped; the text holds the command that completes it."""
+
+
+class WorkersLost(EngineError):
+    """The workers of a run cannot be reached or kept alive; the run turns it into RunInterrupted."""

@@ -1,6 +1,7 @@
-"""Single values held against the model's inputs: is it a number, in range, one of the words?"""
+"""Single values held against the model's inputs: is it a number, in range, one of the words, a date?"""
 
 from mc_engine.campaign_problems import Findings, shown
+from mc_engine.dates import EXAMPLE, date_text, modified_julian_date
 from mc_engine.distributions import Scalar
 from mc_engine.model import Model, Parameter, Setting
 from mc_engine.suggestions import hint, listed
@@ -27,6 +28,8 @@ def check_value(value: Scalar, item: Parameter | Setting, found: Findings, key: 
             return value
         found.add(key, f"{shown(value)} is neither true nor false")
         return None
+    if isinstance(item, Setting) and item.date:
+        return _checked_date(value, item, found, key)
     if isinstance(value, bool | str):
         found.add(key, f"{shown(value)} is not a number; {item.name} is {described(item)}")
         return None
@@ -39,8 +42,25 @@ def check_value(value: Scalar, item: Parameter | Setting, found: Findings, key: 
     return float(value)
 
 
+def _checked_date(value: Scalar, item: Setting, found: Findings, key: str) -> str | None:
+    """The date as text; a number counts as a modified Julian date."""
+    try:
+        date = modified_julian_date(value) if isinstance(value, str) else float(value)
+    except (ValueError, OverflowError):
+        date = float("nan")
+    if isinstance(value, bool) or date != date:
+        found.add(key, f"{shown(value)} is not a date; write it in UTC as {EXAMPLE}")
+        return None
+    if not item.low <= date <= item.high:
+        found.add(key, f"{shown(value)} is not allowed; the model accepts {accepted_range(item)}")
+        return None
+    return date_text(date)
+
+
 def accepted_range(item: Parameter | Setting) -> str:
-    """The range of numbers that the input accepts, with its unit."""
+    """The range of numbers, or dates, that the input accepts, with its unit."""
+    if isinstance(item, Setting) and item.date:
+        return f"{date_text(item.low)} to {date_text(item.high)}"
     unit = f" {item.unit}" if item.unit else ""
     if item.low == item.high == 0.0 or (item.low > float("-inf") and item.high < float("inf")):
         return f"{number(item.low)} to {number(item.high)}{unit}"

@@ -9,12 +9,13 @@ import json
 import os
 import re
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import naming, read_file
+from mc_engine.durable_file import naming, read_file, write_all
 from mc_engine.errors import StoreError
 
 _TAIL = re.compile(rb',"crc":"([0-9a-f]{8})"}')
@@ -90,27 +91,36 @@ class Journal:
         self.path = path
         found = scan(read_file(path))
         if found.damaged:
-            raise StoreError(f"{path}, line {found.damaged[0]}: damaged, its checksum or its number does not hold")
+            number = found.damaged[0]
+            way_out = f"; `mc-engine resume --repair {path.parent}` drops it and flies again what it told of"
+            raise StoreError(
+                f"{path}, line {number}: damaged, its checksum or its number does not hold{way_out * (number > 1)}"
+            )
         self.entries = list(found.entries)
         self.torn = found.torn
+        self.certain = True  # False from an append that failed on: the file may hold a line that is not in `entries`
         self._length = found.length
 
     def append(self, event: str, facts: dict[str, Any]) -> Entry:
         """Write and sync one line.  After an error the line does not count and `append` may be tried again."""
         number = len(self.entries) + 1
         line = encode(number, utc_now(), event, facts)
+        self.certain = False
         with naming(self.path), open(self.path, "r+b", buffering=0) as file:
             file.truncate(self._length)  # a torn line, here or of an append that failed
             file.seek(self._length)
-            written = file.write(line)
-            if written != len(line):
-                raise OSError(0, f"only {written} of {len(line)} bytes were written")
-            os.fsync(file.fileno())
+            try:
+                write_all(file.fileno(), line)
+                os.fsync(file.fileno())
+            except OSError:
+                with suppress(OSError):  # a whole line whose sync failed must not count for the next reader
+                    file.truncate(self._length)
+                raise
         entry = decode(line[:-1], number)
         assert entry is not None  # just encoded
         self._length += len(line)
         self.entries.append(entry)
-        self.torn = False
+        self.torn, self.certain = False, True
         return entry
 
 

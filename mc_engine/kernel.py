@@ -21,6 +21,7 @@ from mc_engine.model import AdaptiveStep, Model
 
 WIDTH = 8  # one register of eight doubles
 _FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
+_ENGINE = ("kernel.py", "kernel_parts.py", "event_watch.py", "model.py", "dates.py", "units.py", "status.py")
 
 _FIXED = '''"""Kernel of {reference}, {width} cases at a time.  Written by the engine; edit the model instead."""
 
@@ -28,7 +29,7 @@ from mc_engine.kernel_parts import Functions, parts_of
 from mc_engine.lanes.compiler import compile_kernel
 from mc_engine.lanes.fixed_step import fly
 
-_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = parts_of({reference!r}, {folder!r})
+_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = parts_of({reference!r}, {folder!r}, {watching!r})
 {names} = _F
 
 
@@ -46,7 +47,7 @@ from mc_engine.kernel_parts import Functions, parts_of
 from mc_engine.lanes.adaptive_flight import fly
 from mc_engine.lanes.compiler import compile_kernel
 
-_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = parts_of({reference!r}, {folder!r})
+_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = parts_of({reference!r}, {folder!r}, {watching!r})
 {names} = _F
 
 
@@ -82,7 +83,7 @@ def source_digest(model: Model, folder: Path | None) -> str:
     """SHA-256 over the engine's compiled sources and the model's, in a fixed order."""
     engine = Path(__file__).parent
     files = [*sorted(engine.glob("lanes/*.py")), *sorted(engine.glob("physics/*.py"))]
-    files += [engine / name for name in ("kernel.py", "kernel_parts.py", "model.py", "units.py", "status.py")]
+    files += [engine / name for name in _ENGINE]
     digest = sha256()
     for path in [*files, *model_sources(model, folder)]:
         digest.update(f"{path.name}\n".encode() + path.read_bytes())
@@ -131,14 +132,17 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
     import llvmlite
     import numba
 
-    folder = folder if model.reference.endswith(".py") else None  # a module is the same from everywhere
+    # a module is the same from everywhere; a file is not, and a relative folder means another one from elsewhere
+    folder = (folder or Path.cwd()).resolve() if model.reference.endswith(".py") else None
     versions = f"{numba.__version__} {llvmlite.__version__} {platform.machine()} {sys.version_info[:2]} {_processor()}"
-    digest = sha256(f"{model.reference} {source_digest(model, folder)} {versions} {folder}".encode()).hexdigest()
+    what = f"{model.reference} {source_digest(model, folder)} {versions} {folder} {model.watching}"
+    digest = sha256(what.encode()).hexdigest()
     path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
     template = _ADAPTIVE if isinstance(model.clock, AdaptiveStep) else _FIXED
     text = template.format(
         reference=model.reference,
         folder=str(folder) if folder else None,
+        watching=model.watching,
         width=width,
         names=", ".join(Functions._fields),
     )

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from mc_engine.event_watch import watching_events
 from mc_engine.lanes import physics
 from mc_engine.lanes.functions import TABLES
 from mc_engine.model import AdaptiveStep, Extremum, Model, load_model
@@ -59,9 +60,10 @@ def settings_class(model: Model) -> type:
     return namedtuple("Settings", [*names, TABLES] if model.tables else names)
 
 
-def parts_of(reference: str, folder: str | None) -> Parts:
-    """Functions, tuple classes and flags of the model that a kernel file names."""
+def parts_of(reference: str, folder: str | None, watching: bool) -> Parts:
+    """Functions, tuple classes and flags of the model that a kernel file names; `watching` : of its events."""
     model = load_model(reference, Path(folder) if folder else None)
+    model = watching_events(model) if watching else model
     actions = [event.action for event in model.event_list]
     functions = Functions(
         model.initial,

@@ -76,6 +76,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
         **_shared_inputs(campaign),
         "quantities": [_record(one) for one in model.quantities],
         "requirements": [asdict(one) for one in campaign.requirements],
+        "looks": list(campaign.looks),
         "figures": [*(to_record(figure) for figure in model.figures), *_taken_figures(campaign)],
         "published": [dict(record) for record in model.published],
         "upstream": _upstream_facts(campaign),

@@ -17,13 +17,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from traceback import extract_tb
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from mc_engine.case_files import FileFault, resolve_beside
+from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
+from mc_engine.model_faults import place_in_model
 from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_suffix
 
@@ -33,11 +35,15 @@ _USER = "mc_engine_user_"  # names of the modules that come from files
 
 @dataclass(frozen=True)
 class Field:
-    """A named number: column name ending in its unit, the unit, a one-line meaning."""
+    """A named number: column name ending in its unit, the unit, a one-line meaning.
+
+    sometimes : a metric that exists only with some settings; `check` does not miss it.
+    """
 
     name: str
     unit: str
     description: str
+    sometimes: bool = field(default=False, kw_only=True)
 
     @property
     def symbol(self) -> str:
@@ -62,10 +68,13 @@ class Parameter(Field):
 
 @dataclass(frozen=True)
 class Setting(Field):
-    """An input shared by all cases of one kernel call: a choice of words, a switch, or a number.
+    """An input shared by all cases of one kernel call: a choice of words, a switch, a date, or a number.
 
-    In kernels a choice is the index of the word in `choices`, a switch is 0.0 or 1.0, a number is SI.
+    In kernels a choice is the index of the word in `choices`, a switch is 0.0 or 1.0, a date is a modified Julian date
+    in UTC, a number is SI.
     whole : only whole numbers are accepted, as for a count.
+    date : the value is a date as text, "2019-01-01T12:00:00"; low and high are modified Julian dates.
+    dispersed_by : the parameter by which a case deviates from the setting, if there is one.
     """
 
     default: str | bool | float
@@ -73,11 +82,15 @@ class Setting(Field):
     low: float = -np.inf
     high: float = np.inf
     whole: bool = False
+    date: bool = False
+    dispersed_by: str = ""
 
     def code(self, value: str | bool | float) -> float:
         """The number that stands for `value` inside a kernel."""
         if self.choices:
             return float(self.choices.index(str(value)))
+        if self.date and isinstance(value, str):
+            return modified_julian_date(value)
         return float(value) * (1.0 if isinstance(self.default, bool) else self.si_factor)
 
 
@@ -102,11 +115,13 @@ class Event:
     """A zero of one component of `events`.
 
     direction : "rising", "falling" or "either".  action : "stop" ends the case, "switch" calls the model's `switch`.
+    rare : it may never happen in ordinary cases, or only with some settings; `check` does not miss it.
     """
 
     name: str
     direction: str = "falling"
     action: str = "stop"
+    rare: bool = False
 
 
 @dataclass(frozen=True)
@@ -188,6 +203,7 @@ class Model:
     extrema: tuple[Extremum, ...] = ()
     tables: Callable[..., np.ndarray] | None = None
     figures: tuple[Any, ...] = ()
+    watching: bool = False  # see mc_engine.event_watch
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
 
@@ -273,10 +289,10 @@ def _module(reference: str) -> ModuleType:
 
 
 def _model_path(reference: str, beside: Path | None) -> Path:
-    path = ((beside or Path.cwd()) / reference).resolve()
-    if not path.is_file():
-        raise ModelError(f'there is no file "{reference}" beside the campaign file')
-    return path
+    try:
+        return resolve_beside(beside or Path.cwd(), reference)
+    except FileFault as fault:
+        raise ModelError(str(fault)) from None
 
 
 def _module_from_file(path: Path) -> ModuleType:
@@ -319,14 +335,12 @@ def _importable(folder: Path) -> Iterator[None]:
 
 def _fault(reference: str, error: BaseException) -> str:
     """The error of a model's own code in a sentence with its place."""
-    frames = [] if error.__traceback__ is None else extract_tb(error.__traceback__)
-    ours = [frame for frame in frames if "importlib" not in frame.filename and frame.filename != __file__]
-    place = f'"{reference}"'
+    place = place_in_model(error) or f'"{reference}"'
     if isinstance(error, SyntaxError):
-        place = f'"{Path(error.filename or reference).name}", line {error.lineno}'
-    elif ours:
-        place = f'"{Path(ours[-1].filename).name}", line {ours[-1].lineno}'
+        place = f"{Path(error.filename or reference).name}, line {error.lineno}"
     if isinstance(error, SystemExit):
         return f"{place}: ends the program; a model only defines MODEL"
+    if isinstance(error, ModelError):
+        return f"{place}: {error}"
     text = error.msg if isinstance(error, SyntaxError) else str(error)
     return f"{place}: {type(error).__name__}: {text}"

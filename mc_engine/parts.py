@@ -6,6 +6,8 @@ with; every page has a checksum.  A part is read through its SHA-256: damaged by
 """
 
 import json
+import re
+import uuid
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,10 +19,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mc_engine.durable_file import read_file, write_durably
+from mc_engine.durable_file import read_file, temporary_name, write_durably, write_synced
 from mc_engine.errors import StoreError
 from mc_engine.status import STATUS_NAME
 
+PART_FOLDERS = ("cases", "history")  # of a run directory
 ARROW_TYPES = {"number": pa.float64(), "integer": pa.int64(), "word": pa.string(), "switch": pa.bool_()}
 
 
@@ -53,6 +56,14 @@ class Part:
     def stop(self) -> int:
         """One past the last case."""
         return self.first + self.rows
+
+
+@dataclass(frozen=True)
+class Written:
+    """A part whose bytes are on the disk under a temporary name.  Both names are relative to the run directory."""
+
+    part: Part
+    temporary: str
 
 
 CASE_COLUMNS = (
@@ -130,24 +141,60 @@ def parquet_bytes(table: pa.Table) -> bytes:
     return sink.getvalue().to_pybytes()
 
 
+def is_part_file(file: str) -> bool:
+    """True if `file`, relative to the run directory, has the name of a part."""
+    folder, _, name = file.rpartition("/")
+    return folder in PART_FOLDERS and name.startswith("part-") and name.endswith(".parquet")
+
+
 def part_name(first: int, rows: int) -> str:
     """File name of the part of cases first .. first + rows - 1; names sort as the cases do."""
     return f"part-{first:010d}-{first + rows - 1:010d}.parquet"
 
 
-def write_part(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> Part:
-    """Put one range of cases durably into `run`/cases; it counts once its receipt is in the journal.
+def revised_name(file: str) -> str:
+    """The name of a part that takes the place of `file`: part-….parquet, part-….r1.parquet, part-….r2.parquet."""
+    stem, revision = re.fullmatch(r"(.*?)(?:\.r(\d+))?\.parquet", file).groups()  # type: ignore[union-attr]
+    return f"{stem}.r{int(revision or 0) + 1}.parquet"
 
-    Needs no lock and no journal, so that a worker may write and send back the receipt alone.
+
+def write_part(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> Part:
+    """Put one range of cases durably into `run`/cases; it counts once its receipt is in the journal."""
+    table = _part_table(run, columns, first, count, arrays)
+    return write_table(run, f"cases/{part_name(first, count)}", table, first, _status_counts(table))
+
+
+def write_aside(
+    run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any], file: str | None = None
+) -> Written:
+    """Write one range of cases under a temporary name of its own, for the writer of the run to publish.
+
+    Needs no lock and no journal: workers of any kind write their parts so, and send the receipt alone.  The name is
+    new each time, since a chunk may be flown twice at once where a worker is taken for dead; it ends in the SHA-256,
+    by which `finished_parts` knows a part that is whole.
+    file : name of the part, relative to the run directory, if not the usual one.
     """
+    table = _part_table(run, columns, first, count, arrays)
+    content = parquet_bytes(table)
+    file = file or f"cases/{part_name(first, count)}"
+    digest = sha256(content).hexdigest()
+    temporary = temporary_name((run / file).with_name(f"{Path(file).name}.{uuid.uuid4().hex}.{digest}"))
+    write_synced(temporary, content, run / file)
+    part = Part(file, first, count, len(content), digest, _status_counts(table))
+    return Written(part, f"cases/{temporary.name}")
+
+
+def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> pa.Table:
     if first < 0 or count < 1:
         raise StoreError(f"{run}: a part of {count} cases from {first} cannot be")
     case_ids = np.arange(first, first + count, dtype=np.int64)
     if "case_id" in arrays and not np.array_equal(arrays["case_id"], case_ids):
         raise StoreError(f"{run}: case_id does not count from {first} to {first + count - 1}")
-    table = arrow_table(columns, {**arrays, "case_id": case_ids}, count, run)
-    counts = Counter(table.column("status").to_pylist())
-    return write_table(run, f"cases/{part_name(first, count)}", table, first, dict(sorted(counts.items())))
+    return arrow_table(columns, {**arrays, "case_id": case_ids}, count, run)
+
+
+def _status_counts(table: pa.Table) -> dict[str, int]:
+    return dict(sorted(Counter(table.column("status").to_pylist()).items()))
 
 
 def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: dict[str, int] | None = None) -> Part:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, TextIO
 
+ProgressCall = Callable[[int, int, int], None]  # cases done, wanted, failed
 SECONDS_BETWEEN_LINES = 5.0
 
 

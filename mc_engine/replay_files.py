@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from mc_engine.durable_file import make_folder, write_durably
-from mc_engine.store import Store, history_bytes, history_columns
+from mc_engine.history_tables import history_bytes, history_columns
+from mc_engine.store import Store
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

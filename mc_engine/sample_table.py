@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.campaign import Campaign
+from mc_engine.case_files import csv_text
 from mc_engine.cases import case_table
 from mc_engine.durable_file import write_durably
 from mc_engine.parts import CASE_COLUMNS, Column, arrow_table, parquet_bytes
@@ -24,7 +25,7 @@ def drawn_inputs(campaign: Campaign) -> dict[str, np.ndarray]:
 def write_sample(campaign: Campaign, table: Mapping[str, np.ndarray], path: Path) -> None:
     """Write the table as `path`'s ending says, one of SUFFIXES; either serves as a campaign's `table`."""
     if path.suffix == ".csv":
-        write_durably(path, pd.DataFrame(table).to_csv(index=False).encode())
+        write_durably(path, csv_text(pd.DataFrame(table)).encode())
         return
     columns = [CASE_COLUMNS[0]]
     for name, values in table.items():

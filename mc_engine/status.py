@@ -10,6 +10,7 @@ EVENT_LIMIT = 3
 NO_STOP = 4
 REFUSED = 5
 WORKER_DIED = 6
+TIME_LIMIT = 7
 
 STATUS_NAME = {
     OK: "ok",
@@ -19,6 +20,7 @@ STATUS_NAME = {
     NO_STOP: "no-stop",
     REFUSED: "refused",
     WORKER_DIED: "worker-died",
+    TIME_LIMIT: "time-limit",
 }
 
 STATUS_TEXT = {
@@ -28,5 +30,6 @@ STATUS_TEXT = {
     EVENT_LIMIT: "more events in one step than the engine follows; the control chatters",
     NO_STOP: "the flight reached its time limit before the event that should end it",
     REFUSED: "the model cannot start from these inputs; the column `reason` says why",
-    WORKER_DIED: "the process flying this case died",
+    WORKER_DIED: "the process flying this case died, or had too little memory for it",
+    TIME_LIMIT: "the case took longer than it was allowed to; `mc-engine rerun` can give it more",
 }

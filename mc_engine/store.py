@@ -21,16 +21,19 @@ import pandas as pd
 import pyarrow as pa
 
 from mc_engine import parts
-from mc_engine.durable_file import is_temporary, make_folder, naming, read_file, write_durably
+from mc_engine.companions import companion_problems
+from mc_engine.durable_file import is_temporary, make_folder, naming, publish, read_file, write_durably
 from mc_engine.errors import StoreError
+from mc_engine.finished_parts import count_finished, leave_receipt
+from mc_engine.history_tables import history_columns, history_table
 from mc_engine.journal import Entry, Journal, encode, plain, utc_now
-from mc_engine.parts import CASE_COLUMNS, Column, Part
+from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
+from mc_engine.receipts import counted_nominal, counted_parts, history_receipts
 from mc_engine.writer_lock import LOCK_NAME, WriterLock
 
 __all__ = ["Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
 
 CAMPAIGN, MANIFEST, JOURNAL, NOMINAL = "campaign.toml", "manifest.json", "journal.jsonl", "nominal.parquet"
-PART_FOLDERS = ("cases", "history")
 FORMAT = 1  # of the directory; the manifest's "format"
 _OURS_BEFORE_THE_JOURNAL = {LOCK_NAME, CAMPAIGN, MANIFEST, *PART_FOLDERS}
 
@@ -100,8 +103,10 @@ def is_run_directory(path: str | Path) -> bool:
 
 
 def open_store(path: str | Path) -> "Store":
-    """The run in directory `path`, for reading; its writing methods take the lock themselves."""
-    return Store(Path(path))
+    """The run in directory `path`, or a copy of the one at that URL, for reading; writing methods take the lock."""
+    from mc_engine.object_store import local_copy  # which reads and writes through this module
+
+    return Store(local_copy(path))
 
 
 class Store:
@@ -126,6 +131,8 @@ class Store:
         )
 
     def _read_journal(self) -> None:
+        if not (self.path / JOURNAL).exists():
+            raise StoreError(f"{self.path}: has no {JOURNAL}, and so no case that counts; `run` the campaign anew")
         self._journal = Journal(self.path / JOURNAL)
         if not self._journal.entries or self._journal.entries[0].event != "created":
             raise StoreError(f"{self.path / JOURNAL}, line 1: damaged, a journal begins with its creation")
@@ -149,21 +156,17 @@ class Store:
     @property
     def parts(self) -> list[Part]:
         """Receipts of all committed parts, by their first case."""
-        return sorted(self._receipts("part"), key=lambda part: part.first)
-
-    def _receipts(self, event: str) -> list[Part]:
-        return [Part(**entry.facts) for entry in self._journal.entries if entry.event == event]
+        return sorted(counted_parts(self._journal.entries), key=lambda part: part.first)
 
     @property
     def nominal_part(self) -> Part | None:
         """Receipt of the nominal case, if it was written."""
-        entries = [entry for entry in self._journal.entries if entry.event in ("nominal", "nominal-withdrawn")]
-        return Part(**entries[-1].facts) if entries and entries[-1].event == "nominal" else None
+        return counted_nominal(self._journal.entries)
 
     @property
     def history_part(self) -> Part | None:
         """Receipt of the retained histories, if any were written."""
-        return next(reversed(self._receipts("history")), None)
+        return next(reversed(history_receipts(self._journal.entries)), None)
 
     def notes(self, event: str | None = None) -> list[Entry]:
         """Journal entries in order, all or those of one event."""
@@ -174,6 +177,12 @@ class Store:
         """How many cases are wanted, after all extensions."""
         extended = self.notes("extended")
         return int(extended[-1].facts["cases"] if extended else self.manifest["campaign"]["cases"])
+
+    @property
+    def wanted(self) -> range:
+        """The cases that this directory is to hold: all of the campaign's, or those of a shard."""
+        shard = self.manifest.get("shard")
+        return range(shard["first"], shard["stop"]) if shard else range(self.n_cases)
 
     def committed(self) -> list[Range]:
         """The cases on the disk, as merged ranges in order."""
@@ -187,7 +196,7 @@ class Store:
 
     def missing(self, cases: int | range | None = None) -> list[Range]:
         """The ranges not committed among `cases`: the first so many, a range, or all wanted ones."""
-        wanted = cases if isinstance(cases, range) else range(self.n_cases if cases is None else cases)
+        wanted = self.wanted if cases is None else cases if isinstance(cases, range) else range(cases)
         gaps, begin = [], wanted.start
         for first, stop in self.committed():
             if min(first, wanted.stop) > begin:
@@ -227,9 +236,8 @@ class Store:
         return _frame(tables, wanted)
 
     def _column(self, name: str) -> Column:
-        for column in self.columns:
-            if column.name == name:
-                return column
+        if named := [column for column in self.columns if column.name == name]:
+            return named[0]
         raise StoreError(f'{self.path}: there is no column "{name}"; there are {", ".join(self.units)}')
 
     def row(self, case_id: int) -> dict[str, Any]:
@@ -246,8 +254,7 @@ class Store:
 
     def histories(self) -> pd.DataFrame:
         """The retained histories: case_id, t_s and the quantities; no rows if none were written."""
-        quantities = self.manifest.get("quantities", [])
-        receipt = self.history_part
+        quantities, receipt = self.manifest.get("quantities", []), self.history_part
         tables = [parts.read_part(self.path, receipt)] if receipt else []
         names = tables[0].column_names if tables else [quantity["name"] for quantity in quantities]
         return _frame(tables, history_columns(names, quantities))
@@ -264,7 +271,8 @@ class Store:
     def lock(self) -> Iterator["Store"]:
         """Be the one writer of this directory for the length of the block; may be nested.
 
-        On the way in, what a killed writer left is removed; StoreError if another writer is at work.
+        On the way in, parts that a killed writer's workers had finished are counted, and all else that it left is
+        removed; StoreError if another writer is at work.
         """
         if self._lock.held:
             yield self
@@ -272,16 +280,19 @@ class Store:
         dead = self._lock.acquire()
         try:
             self._read_journal()  # another writer may have been here since this object was made
-            self._sweep()
             if dead is not None:
                 self._journal.append("lock-taken-over", {"from": dead})
+                count_finished(self)
+            self.sweep()
             yield self
         finally:
             self._lock.release()
 
-    def _sweep(self) -> None:
-        """Remove temporary files and parts without a journal line."""
-        counted = {part.file for part in (*self._receipts("part"), *self._receipts("history")[-1:])}
+    def sweep(self) -> None:
+        """Remove temporary files and parts without a journal line; for the holder of the lock."""
+        if not self._journal.certain:
+            self._read_journal()  # what an append that failed left there decides what counts
+        counted = {part.file for part in (*self.parts, *history_receipts(self._journal.entries)[-1:])}
         for folder in (self.path, *(self.path / name for name in PART_FOLDERS)):
             with naming(folder):
                 stray = [path for path in folder.iterdir() if self._is_stray(path, counted)]
@@ -308,6 +319,37 @@ class Store:
             self._refuse_overlap(part.first, part.rows)
             self._journal.append("part", asdict(part))
 
+    def publish(self, written: Written) -> None:
+        """Commit a part that a worker wrote aside in this directory; on return it survives a power cut."""
+        with self.lock():
+            self._refuse_overlap(written.part.first, written.part.rows)
+            leave_receipt(self.path, written.part)
+            self._name(written)
+            self._journal.append("part", asdict(written.part))
+
+    def replace(self, before: Part, written: Written) -> None:
+        """Let a part written aside, of the same cases and another name, count in place of `before`."""
+        with self.lock():
+            self._name(written)
+            self._journal.append("part-replaced", {**asdict(written.part), "replaces": before.file})
+            with suppress(OSError):  # it no longer counts, and the next writer tries again
+                (self.path / before.file).unlink(missing_ok=True)
+
+    def _name(self, written: Written) -> None:
+        if not (self.path / written.temporary).exists():
+            raise StoreError(
+                f"{self.path / written.part.file}: a worker has written it, and it is not here; all workers must see "
+                "the run directory under the same path"
+            )
+        publish(self.path / written.temporary, self.path / written.part.file)
+
+    def withdraw(self, part: Part) -> None:
+        """Count a part no more, so that its cases are missing again."""
+        with self.lock():
+            self._journal.append("part-withdrawn", {"file": part.file})
+            with suppress(OSError):
+                (self.path / part.file).unlink(missing_ok=True)
+
     def _refuse_overlap(self, first: int, count: int) -> None:
         if count > 0 and self.missing(range(first, first + count)) != [(first, first + count)]:
             raise StoreError(f"{self.path}: some of the cases {first} to {first + count - 1} are committed already")
@@ -329,63 +371,18 @@ class Store:
 
     def write_histories(self, table: "pd.DataFrame | Mapping[str, Any]") -> None:
         """Keep these histories (case_id, t_s and quantities, one row per sample) in place of any kept before."""
-        arrow = _history_table(table, self.manifest.get("quantities", []), self.path / "history")
+        arrow = history_table(table, self.manifest.get("quantities", []), self.path / "history")
         with self.lock():
             before = self.history_part
-            file = f"history/part-{len(self._receipts('history')):05d}.parquet"
+            file = f"history/part-{int(Path(before.file).stem[5:]) + 1 if before else 0:05d}.parquet"
             self._journal.append("history", asdict(parts.write_table(self.path, file, arrow)))
             if before is not None:
                 with suppress(OSError):  # it no longer counts, and the next writer tries again
                     (self.path / before.file).unlink(missing_ok=True)
 
 
-def companion_problems(run: Path, created: Mapping[str, Any]) -> list[str]:
-    """A sentence for every file beside the campaign that is gone or edited; `created` are the facts of the creation."""
-    problems = []
-    for name, digest in created.get("companions", {}).items():
-        try:
-            if sha256((run / name).read_bytes()).hexdigest() != digest:
-                problems.append(f"{name}: damaged or edited, its SHA-256 is not the one in the journal")
-        except OSError as error:
-            problems.append(f"{name}: {error.strerror}")
-    return problems
-
-
-def is_part_file(file: str) -> bool:
-    """True if `file`, relative to the run directory, has the name of a part."""
-    folder, _, name = file.rpartition("/")
-    return folder in PART_FOLDERS and name.startswith("part-") and name.endswith(".parquet")
-
-
-def history_columns(names: Sequence[str], quantities: Sequence[Mapping[str, str]]) -> tuple[Column, ...]:
-    """Columns of a history table with these names: case_id and t_s first, units from the model's quantities."""
-    known = {quantity["name"]: quantity for quantity in quantities}
-    columns = [CASE_COLUMNS[0], Column("t_s", "s", "time", "time since the start of the case")]
-    for name in names:
-        if name not in ("case_id", "t_s"):
-            quantity = known.get(name, {"unit": "", "description": ""})
-            columns.append(Column(name, quantity["unit"], "quantity", quantity["description"]))
-    return tuple(columns)
-
-
-def _history_table(
-    table: "pd.DataFrame | Mapping[str, Any]", quantities: Sequence[Mapping[str, str]], place: Path
-) -> pa.Table:
-    arrays = {name: np.asarray(table[name]) for name in table}
-    columns = history_columns(list(arrays), quantities)
-    return parts.arrow_table(columns, arrays, len(arrays.get("t_s", ())), place)
-
-
-def history_bytes(
-    table: "pd.DataFrame | Mapping[str, Any]", quantities: Sequence[Mapping[str, str]], place: Path
-) -> bytes:
-    """A Parquet file of histories that are kept outside the run's own; `place` is for messages."""
-    return parts.parquet_bytes(_history_table(table, quantities, place))
-
-
 def _frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> pd.DataFrame:
-    schema = parts.arrow_schema(columns)
-    table = pa.concat_tables(tables) if tables else schema.empty_table()
+    table = pa.concat_tables(tables) if tables else parts.arrow_schema(columns).empty_table()
     frame = table.to_pandas()
     frame.attrs.update(parts.attributes(columns))
     return frame

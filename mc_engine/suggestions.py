@@ -32,8 +32,21 @@ _OTHER_NAMES = {
     "std": "sigma",
     "stddev": "sigma",
     "3sigma": "three_sigma",
+    "degree": "deg",
+    "degrees": "deg",
+    "hours": "h",
+    "kilograms": "kg",
+    "kilometers": "km",
+    "kilometres": "km",
+    "meters": "m",
+    "metres": "m",
+    "newton": "N",
+    "percent": "%",
+    "radians": "rad",
+    "seconds": "s",
 }
 _FEW = 12
+_SHORTEST = 3  # letters; of two-letter words, such as kg and km, too many are one slip apart
 
 
 def nearest(word: str, allowed: Iterable[str]) -> str | None:
@@ -41,10 +54,26 @@ def nearest(word: str, allowed: Iterable[str]) -> str | None:
     plain = {name.lower().replace("-", "_"): name for name in allowed}
     wanted = word.lower().replace("-", "_").replace(" ", "_")
     other = _OTHER_NAMES.get(wanted, "")
-    if other in plain:
+    if other and other in plain:
         return plain[other]
-    matches = get_close_matches(wanted, plain, n=1, cutoff=0.6)
+    if wanted in plain:
+        return plain[wanted]
+    slips = [name for name in plain if _one_slip_apart(wanted, name)]
+    matches = get_close_matches(wanted, slips or plain, n=1, cutoff=0.0 if slips else 0.6)
     return plain[matches[0]] if matches else None
+
+
+def _one_slip_apart(one: str, other: str) -> bool:
+    """True where a letter too many, too few or changed, or two neighbours swapped, makes one word of the other.
+
+    Damerau, Communications of the ACM 7 (1964), 171-176: four in five slips of a keyboard are one of these.
+    """
+    if abs(len(one) - len(other)) > 1 or one == other or max(len(one), len(other)) < _SHORTEST:
+        return False
+    same = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
+    rest, its = one[same:], other[same:]
+    swapped = rest[:2] == its[:2][::-1] and rest[2:] == its[2:]
+    return rest[1:] == its[1:] or rest[1:] == its or rest == its[1:] or swapped
 
 
 def hint(word: str, allowed: Iterable[str]) -> str:

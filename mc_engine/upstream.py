@@ -103,6 +103,8 @@ def read_rows(path: Path) -> Rows:
 
 def _rows_of_run(path: Path) -> Rows:
     store = open_store(path)
+    if store.manifest.get("shard") is not None:
+        raise StoreError(f"{path}: is a shard; `mc-engine merge` makes a run of all shards")
     if store.missing():
         raise StoreError(f"{path}: is not complete; `mc-engine resume {path}` flies the rest")
     frame = store.cases()
@@ -128,7 +130,10 @@ def _rows_of_copy(path: Path) -> Rows:
 
 def find_run(reference: str, directory: Path) -> Path | None:
     """The run directory that `reference` names: beside the campaign file, or from the working folder."""
-    return next((path for path in (directory / reference, Path(reference)) if is_run_directory(path)), None)
+    try:
+        return next((path for path in (directory / reference, Path(reference)) if is_run_directory(path)), None)
+    except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
+        return None
 
 
 def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str], found: Findings) -> Upstream:

@@ -1,6 +1,7 @@
 """The verbs that read a run: report, status, verify."""
 
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -16,28 +17,53 @@ from mc_engine.command_line import (
     ranges,
     write_reports,
 )
+from mc_engine.verbs_of_object_stores import echo_publication
+
+REPORT_FORMATS = ("html", "pdf", "md")
 
 
 @app.command()
 @exit_status()
 def report(
-    folder: RunFolder,
-    kind: Annotated[str | None, typer.Option("--format", help="html or pdf; both by default.")] = None,
+    folders: Annotated[
+        list[str], typer.Argument(metavar="RUN...", help="Directories of runs, or URLs of published ones.")
+    ],
+    kind: Annotated[str | None, typer.Option("--format", help="html, pdf or md; html and pdf by default.")] = None,
+    template: Annotated[
+        Path | None,
+        typer.Option(help="Markdown with Jinja expressions: sections of your own, before the others of each report."),
+    ] = None,
 ) -> None:
-    """Write the reports of a run, or of a tuning, anew."""
+    """Write the reports of runs, tunings or rare events anew."""
+    from mc_engine.object_store import local_copy
+    from mc_engine.rare_event_folder import is_rare_event_directory
     from mc_engine.tuning_folder import is_tuning_directory
 
-    if kind not in (None, "html", "pdf"):
-        leave(USAGE, f'--format "{kind}" is not known; html or pdf')
-    path = folder if is_tuning_directory(folder) else existing_run(folder).path
-    for written in write_reports(path, ("html", "pdf") if kind is None else (kind,)):
-        typer.echo(str(written))
+    if kind not in (None, *REPORT_FORMATS):
+        leave(USAGE, f'--format "{kind}" is not known; {", ".join(REPORT_FORMATS)}')
+    if template is not None and not template.is_file():
+        leave(USAGE, f"--template {template}: there is no such file")
+    paths, published = [], {}
+    for named in folders:
+        folder = local_copy(named)
+        if folder != Path(named):
+            published[folder] = named
+        kept_apart = is_tuning_directory(folder) or is_rare_event_directory(folder)
+        paths.append(folder if kept_apart else existing_run(folder).path)
+    more: dict[str, Any] = {} if template is None else {"template": template, "beside": paths}
+    for path in paths:
+        for written in write_reports(path, ("html", "pdf") if kind is None else (kind,), **more):
+            typer.echo(f"{published[path]}/{written.name}" if path in published else str(written))
+        if path in published:
+            echo_publication(path, published[path])
 
 
 @app.command()
 @exit_status()
 def status(folder: RunFolder) -> None:
-    """How far a run is, and how its cases ended; of a tuning, what it has found."""
+    """How far a run is, and how its cases ended; of a tuning or a rare event, what was found."""
+    from mc_engine.rare_event_folder import is_rare_event_directory, open_rare_event
+    from mc_engine.rare_event_lines import outcome_lines as rare_lines
     from mc_engine.run_summary import case_line
     from mc_engine.tuning_folder import is_tuning_directory, open_tuning, outcome_lines
     from mc_engine.writer_lock import described, holder
@@ -46,6 +72,11 @@ def status(folder: RunFolder) -> None:
         record = open_tuning(folder)
         typer.echo(f"tuning       {folder}\ncampaign     {record.manifest['campaign']['name']}")
         typer.echo("\n".join(outcome_lines(record)))
+        return
+    if is_rare_event_directory(folder):
+        estimate = open_rare_event(folder)
+        typer.echo(f"rare event   {folder}\ncampaign     {estimate.record['campaign']['name']}")
+        typer.echo("\n".join(rare_lines(estimate.result)))
         return
     store = existing_run(folder)
     typer.echo(f"run       {folder}")
@@ -65,14 +96,41 @@ def status(folder: RunFolder) -> None:
 
 @app.command()
 @exit_status()
+def summary(
+    folder: RunFolder,
+    metric: Annotated[list[str] | None, typer.Option(help="Only this metric; may be given several times.")] = None,
+) -> None:
+    """Moments and quantiles of the metrics of a run of any size, read part by part."""
+    from mc_engine.run_summary import summaries, summary_lines
+    from mc_engine.statistics import SAMPLING_DESIGNS
+
+    store = existing_run(folder)
+    known = [column.name for column in store.columns if column.role == "metric"]
+    for name in metric or ():
+        if name not in known:
+            leave(USAGE, f'--metric "{name}" is no metric of this run; it has {", ".join(known) or "none"}')
+    random = store.manifest["campaign"].get("design", "mc") in SAMPLING_DESIGNS
+    for name, found in summaries(store, metric or None).items():
+        typer.echo("\n".join(summary_lines(name, found, store.units[name], random)))
+    if random:
+        typer.echo("in brackets: distribution-free limits, each holding with 95 % for independent cases")
+
+
+@app.command()
+@exit_status()
 def verify(folder: RunFolder) -> None:
-    """Hold every byte of a run against its journal, or of a tuning against its manifest."""
+    """Hold every byte of a run against its journal, or of a tuning or rare event against its manifest."""
+    from mc_engine.rare_event_folder import is_rare_event_directory, open_rare_event
     from mc_engine.store import is_run_directory
     from mc_engine.tuning_folder import is_tuning_directory, open_tuning
     from mc_engine.verification import damage
 
     if is_tuning_directory(folder):
         open_tuning(folder)  # which reads every byte
+        typer.echo(f"{folder}: every byte is as it was written")
+        return
+    if is_rare_event_directory(folder):
+        open_rare_event(folder)
         typer.echo(f"{folder}: every byte is as it was written")
         return
 
@@ -82,5 +140,8 @@ def verify(folder: RunFolder) -> None:
     for problem in problems:
         typer.echo(f"{folder}/{problem}", err=True)
     if problems:
-        leave(DAMAGED, f"{folder}: {counted(problems, 'problem')}")
+        leave(
+            DAMAGED,
+            f"{folder}: {counted(problems, 'problem')}; `mc-engine resume {folder} --repair` flies bad parts again",
+        )
     typer.echo(f"{folder}: every byte is as it was written")

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+from collections.abc import Sequence
+from itertools import groupby
 from pathlib import Path
 from typing import Annotated
 
@@ -34,16 +36,33 @@ def init(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the n
             shutil.copyfile(SHIPPED / "minimal" / name, folder / name)
     except OSError as error:
         leave(USAGE, f"{error.filename or folder}: {error.strerror}")
-    typer.echo(f"{folder}: campaign.toml and model.py; fly them with `mc-engine run {folder}`")
+    typer.echo(
+        f"{folder}: campaign.toml and model.py\nnext: `mc-engine run {folder}` flies them; change them, and "
+        f"`mc-engine check {folder}` says what is wrong"
+    )
 
 
 @app.command()
 @exit_status()
-def check(file: CampaignFile) -> None:
-    """Read a campaign file and report everything that is wrong with it."""
+def check(
+    file: CampaignFile,
+    model: Annotated[bool, typer.Option(help="Hold the model to its contract too; flies a few cases.")] = True,
+) -> None:
+    """Report everything that is wrong with a campaign file, and with its model.
+
+    A few cases are flown in a process of their own: results must be there, be the same in any company, and every
+    declared dispersion, metric and event must matter.
+    """
     from mc_engine.campaign import load_campaign
+    from mc_engine.model_contract import breaches, flight_faults
 
     campaign = load_campaign(file)
+    found = (breaches(campaign) or flight_faults(file)) if model else []
+    if found:
+        leave(
+            USAGE,
+            "\n".join([f"{campaign.model_reference}: {counted(found, 'problem')}", *(f"  {one}" for one in found)]),
+        )
     typer.echo(
         f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}, "
         f"{counted(campaign.dispersions, 'dispersion')}, {counted(campaign.correlations, 'correlation')}, "
@@ -54,25 +73,58 @@ def check(file: CampaignFile) -> None:
 @app.command()
 @exit_status()
 def plan(
-    share: Annotated[float, typer.Option(help="Share of cases to be demonstrated, such as 0.9973.")],
-    confidence: Annotated[float, typer.Option(help="Confidence of the demonstration, such as 0.90.")],
+    file: Annotated[
+        str | None, typer.Argument(metavar="[FILE_OR_NAME]", help="A campaign, for the requirements that it sets.")
+    ] = None,
+    share: Annotated[float | None, typer.Option(help="Share of cases to be demonstrated, such as 0.9973.")] = None,
+    confidence: Annotated[float | None, typer.Option(help="Confidence of the demonstration, such as 0.90.")] = None,
     failures: Annotated[int | None, typer.Option(min=0, help="Only the row for this many failures.")] = None,
+    two_sided: Annotated[
+        bool, typer.Option("--two-sided", help="Also the cases for an interval between order statistics (Wilks).")
+    ] = False,
 ) -> None:
-    """How many cases demonstrate a share of success with a confidence, for 0, 1, 2, ... failures among them."""
-    from mc_engine.plan import PlanRow, demonstrated_share, plan_table, smallest_sample
+    """How many cases demonstrate a share of success with a confidence, for 0, 1, 2, ... failures among them.
 
-    for name, value in (("--share", share), ("--confidence", confidence)):
-        if not 0.0 < value < 1.0:  # also false for NaN
-            leave(USAGE, f"{name} is {value}; it must lie between 0 and 1, without them")
-    if failures is None:
-        rows = plan_table(share, confidence)
-    else:
-        cases = smallest_sample(share, confidence, failures)
-        rows = [PlanRow(failures, cases, demonstrated_share(cases, failures, confidence))]
+    Give --share and --confidence, or a campaign whose requirements are planned for, one by one and together.
+    """
+    from mc_engine.plan import ROWS
+
+    numbers = range(ROWS) if failures is None else [failures]
+    if file is not None:
+        if share is not None or confidence is not None:
+            leave(USAGE, f"{file}: says share and confidence itself; leave --share and --confidence out")
+        _plan_campaign(file, numbers, two_sided)
+        return
+    _plan_share(_probability("--share", share), _probability("--confidence", confidence), numbers, two_sided)
+
+
+def _probability(name: str, value: float | None) -> float:
+    if value is None:
+        leave(USAGE, f"{name} is missing; give --share and --confidence, or a campaign file")
+    if not 0.0 < value < 1.0:  # also false for NaN
+        leave(USAGE, f"{name} is {value}; it must lie between 0 and 1, without them")
+    return value
+
+
+def _plan_campaign(file: str, failures: Sequence[int], two_sided: bool) -> None:
+    from mc_engine.campaign import load_campaign
+    from mc_engine.campaign_plan import plan_lines
+
+    campaign = load_campaign(file)
+    if not campaign.requirements:
+        leave(USAGE, f"{file}: sets no requirement; add [requirement.NAME], or give --share and --confidence")
+    for line in plan_lines(campaign, failures, two_sided):
+        typer.echo(line)
+
+
+def _plan_share(share: float, confidence: float, failures: Sequence[int], two_sided: bool) -> None:
+    from mc_engine.plan import interval_lines, plan_row, table_lines
+
     typer.echo(f"share {share:.10g} with confidence {confidence:.10g}\n")
-    typer.echo(f"{'failures':>8}  {'cases':>9}  demonstrated share")
-    for row in rows:
-        typer.echo(f"{row.failures:>8}  {row.cases:>9}  {row.shown:.6f}")
+    for line in table_lines([plan_row(share, confidence, one) for one in failures], share, confidence):
+        typer.echo(line)
+    for line in ["", *interval_lines(share, confidence)] if two_sided else []:
+        typer.echo(line)
 
 
 @app.command()
@@ -102,13 +154,16 @@ def sample(
 @app.command("list")
 @exit_status()
 def list_() -> None:
-    """The shipped campaigns, by the names that `run` takes."""
-    from mc_engine.campaign import list_campaigns
+    """The shipped campaigns, by the names that `run` takes, and what they are after."""
+    from mc_engine.campaign_search import list_campaigns, model_sources
 
-    campaigns = list_campaigns()
+    campaigns, sources = list_campaigns(), model_sources()
     width = max((len(campaign.name) for campaign in campaigns), default=0)
-    for campaign in campaigns:
-        typer.echo(f"{campaign.name:<{width}}  {campaign.title}".rstrip())
+    for folder, group in groupby(campaigns, key=lambda campaign: campaign.name.partition("/")[0]):
+        for campaign in group:
+            typer.echo(f"{campaign.name:<{width}}  {campaign.title}".rstrip())
+        if folder in sources:
+            typer.echo(f"{'':<{width}}  source: {sources[folder]}")
 
 
 @app.command()

@@ -12,10 +12,14 @@ from mc_engine.command_line import (
     NOT_MET,
     TOO_MANY_FAILED,
     USAGE,
+    BackendName,
     CampaignFile,
     Cases,
+    CaseSeconds,
+    Memory,
     NoReport,
     RunFolder,
+    Scheduler,
     Workers,
     app,
     existing_run,
@@ -25,8 +29,11 @@ from mc_engine.command_line import (
     write_reports,
 )
 from mc_engine.errors import StoreError
+from mc_engine.verbs_of_object_stores import echo_publication, refuse_path
 
 if TYPE_CHECKING:
+    from mc_engine.backends import Backend
+    from mc_engine.shards import Shard
     from mc_engine.store import Store
 
 
@@ -39,11 +46,25 @@ def run(
     seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
     no_report: NoReport = False,
     workers: Workers = None,
+    backend: BackendName = "threading",
+    scheduler: Scheduler = None,
+    case_seconds: CaseSeconds = None,
+    memory: Memory = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="K/N", help="Fly the K-th of N pieces; `merge` joins the pieces.")
+    ] = None,
     upstream: Annotated[
         Path | None, typer.Option("--from", help="Run to take inputs from, in place of the one that [inputs] names.")
     ] = None,
     judge: Annotated[bool, typer.Option("--judge", help="Exit with 1 unless every requirement passes.")] = False,
     max_failed: Annotated[int | None, typer.Option(min=0, help="Exit with 3 if more cases fail.")] = None,
+    publish: Annotated[
+        str | None, typer.Option(metavar="URL", help="Copy the run there when it is complete: s3://bucket/prefix.")
+    ] = None,
+    until: Annotated[
+        str | None,
+        typer.Option(help='"verdict": stop when every requirement passes or fails, at the number of cases at latest.'),
+    ] = None,
 ) -> None:
     """Fly a campaign and write its reports."""
     from mc_engine.campaign import load_campaign
@@ -51,17 +72,60 @@ def run(
 
     if upstream is not None:
         existing_run(upstream)
+    if publish is not None:
+        from mc_engine.object_store import refuse_unreachable
+
+        refuse_path(publish)
+        refuse_unreachable(publish)
+    if until not in (None, "verdict"):
+        leave(USAGE, f'--until "{until}" is not known; the word is verdict')
+    _refuse_with_shard(shard, {"--until": until, "--judge": judge or None, "--out": "missing" if out is None else None})
     campaign = load_campaign(file, cases=cases, seed=seed, upstream=upstream)
     path = out if out is not None else default_folder(campaign.name)
     _refuse_folder(path)
-    store = _fly(lambda runner, progress: runner.run(campaign, path, progress=progress, workers=workers))
-    _finish(store, no_report, judge, max_failed)
+    crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    if until is None:
+        piece = _shard(shard)
+        store = _fly(lambda runner, progress: runner.run(campaign, path, progress=progress, shard=piece, **crew))
+    else:
+        from mc_engine.stopping import fly_until_decided, refuse_undecidable
+
+        refuse_undecidable(campaign)
+        store = _fly(lambda _, progress: fly_until_decided(campaign, path, progress=progress, **crew))
+    _finish(store, no_report, judge, max_failed, publish)
+
+
+def _backend(name: str, scheduler: str | None, case_seconds: float | None, memory: int | None) -> "Backend":
+    from mc_engine.backends import Backend
+
+    return Backend(name, scheduler, case_seconds, memory)
+
+
+def _shard(text: str | None) -> "Shard | None":
+    from mc_engine.shards import Shard
+
+    try:
+        return None if text is None else Shard.parse(text)
+    except ValueError as error:
+        leave(USAGE, f"--shard {error}")
+
+
+def _refuse_with_shard(shard: str | None, others: dict[str, Any]) -> None:
+    if shard is None:
+        return
+    if others["--out"] is not None:
+        leave(USAGE, "--shard needs --out, a folder of each shard's own")
+    for option in ("--until", "--judge"):
+        if others[option] is not None:
+            leave(USAGE, f"--shard and {option}: a shard alone decides nothing; judge the run that `merge` makes")
 
 
 def _refuse_folder(path: Path) -> None:
     """An occupied --out is a slip of the user's; told before anything is compiled."""
-    from mc_engine.store import refuse_occupied
+    from mc_engine.store import JOURNAL, open_store, refuse_occupied
 
+    if (path / JOURNAL).exists() and open_store(path).missing():
+        leave(USAGE, f"--out {path}: holds a run that is not complete; `mc-engine resume {path}` flies the rest")
     try:
         refuse_occupied(path)
     except StoreError as error:
@@ -81,31 +145,75 @@ def _fly(fly: Callable[[Any, Any], "Store"]) -> "Store":
         return fly(runner, progress)
 
 
-def _finish(store: "Store", no_report: bool, judge: bool = False, max_failed: int | None = None) -> None:
+def _finish(
+    store: "Store", no_report: bool, judge: bool = False, max_failed: int | None = None, url: str | None = None
+) -> None:
     """What every flight ends with: reports, a summary, and an exit status where one was asked for."""
-    from mc_engine.run_summary import case_line, failed_cases, verdict_line, verdicts
+    from mc_engine.run_summary import case_line, failed_cases, judgement, look_line, verdict_line
 
+    if store.manifest.get("shard"):
+        if url is not None:
+            echo_publication(store.path, url)
+        _finish_shard(store, max_failed)
+        return
     reports = [] if no_report else write_reports(store.path, ("html", "pdf"))
     typer.echo(f"run          {store.path}")
     typer.echo(f"cases        {case_line(store)}")
-    judged = verdicts(store)
-    for verdict in judged:
+    if looks := look_line(store):
+        typer.echo(f"looks        {looks}")
+    judged, joint = judgement(store)
+    for verdict in (*judged, joint) if joint is not None else judged:
         typer.echo(f"requirement  {verdict_line(verdict, store.units)}")
     for report_path in reports:
         typer.echo(f"report       {report_path}")
+    if url is not None:
+        echo_publication(store.path, url)
     failed = failed_cases(store)
-    if max_failed is not None and failed > max_failed:
-        leave(TOO_MANY_FAILED, f"{failed} cases failed; at most {max_failed} were allowed")
+    _judge_failures(failed, max_failed)
     if judge and any(verdict.outcome != "pass" for verdict in judged):
         leave(NOT_MET, "not every requirement is met")
 
 
+def _finish_shard(store: "Store", max_failed: int | None) -> None:
+    from mc_engine.run_summary import failed_cases
+
+    counts = store.status_counts()
+    typer.echo(f"shard        {store.path}")
+    typer.echo(f"cases        {ranges(store.committed())}: " + ", ".join(f"{n:,} {word}" for word, n in counts.items()))
+    typer.echo("next         `mc-engine merge RUN SHARD...` makes one run of all shards, and its reports")
+    _judge_failures(failed_cases(store), max_failed)
+
+
+def _judge_failures(failed: int, allowed: int | None) -> None:
+    if allowed is not None and failed > allowed:
+        leave(TOO_MANY_FAILED, f"{failed} cases failed; at most {allowed} were allowed")
+
+
 @app.command()
 @exit_status()
-def resume(folder: RunFolder, no_report: NoReport = False, workers: Workers = None) -> None:
+def resume(
+    folder: RunFolder,
+    no_report: NoReport = False,
+    workers: Workers = None,
+    backend: BackendName = "threading",
+    scheduler: Scheduler = None,
+    case_seconds: CaseSeconds = None,
+    memory: Memory = None,
+    repair: Annotated[bool, typer.Option("--repair", help="Fly again what is damaged.")] = False,
+) -> None:
     """Complete a run that was interrupted."""
-    existing_run(folder)
-    store = _fly(lambda runner, progress: runner.resume(folder, progress=progress, workers=workers))
+    crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    crew["repair"] = repair
+    if repair:
+        from mc_engine.repair import mend_journal
+
+        mend_journal(folder)
+    if existing_run(folder).manifest.get("looks"):
+        from mc_engine.stopping import carry_on
+
+        store = _fly(lambda _, progress: carry_on(folder, progress=progress, **crew))
+    else:
+        store = _fly(lambda runner, progress: runner.resume(folder, progress=progress, **crew))
     _finish(store, no_report)
 
 
@@ -116,6 +224,10 @@ def extend(
     cases: Annotated[int, typer.Option(min=1, help="How many cases the run is to have in all.")],
     no_report: NoReport = False,
     workers: Workers = None,
+    backend: BackendName = "threading",
+    scheduler: Scheduler = None,
+    case_seconds: CaseSeconds = None,
+    memory: Memory = None,
 ) -> None:
     """Add cases to a run; 1000 extended to 2000 are the same as 2000 from the start."""
     from mc_engine.designs import EXTENSIBLE
@@ -124,11 +236,55 @@ def extend(
     wanted, design = store.n_cases, store.manifest["campaign"]["design"]
     if store.manifest.get("upstream") is not None:
         leave(USAGE, f"{folder}: takes its inputs from another run; extend that one, and fly this campaign anew")
+    if store.manifest.get("shard"):
+        leave(USAGE, f"{folder}: is a shard; merge the shards, and extend the whole")
     if design not in EXTENSIBLE:
         leave(USAGE, f'{folder}: the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can')
     if cases <= wanted:
         leave(USAGE, f"--cases {cases}: {folder} has {wanted} cases; give the number it is to have in all")
-    store = _fly(lambda runner, progress: runner.extend(folder, cases, progress=progress, workers=workers))
+    crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    store = _fly(lambda runner, progress: runner.extend(folder, cases, progress=progress, **crew))
+    _finish(store, no_report)
+
+
+@app.command()
+@exit_status()
+def rerun(
+    folder: RunFolder,
+    failed: Annotated[bool, typer.Option("--failed", help="The cases that did not come to their end.")] = False,
+    no_report: NoReport = False,
+    workers: Workers = None,
+    backend: BackendName = "loky",
+    scheduler: Scheduler = None,
+    case_seconds: CaseSeconds = None,
+    memory: Memory = None,
+) -> None:
+    """Fly failed cases of a run again, in processes: their worker may have died of something outside."""
+    store = existing_run(folder)
+    if not failed:
+        leave(USAGE, "rerun flies only failed cases again: add --failed; the others would come out with the same bits")
+    if store.missing():
+        leave(USAGE, f"{folder}: is not complete; `mc-engine resume {folder}` flies the rest first")
+    crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    _finish(_fly(lambda runner, progress: runner.rerun(folder, progress=progress, **crew)), no_report)
+
+
+@app.command()
+@exit_status()
+def merge(
+    out: Annotated[Path, typer.Argument(metavar="RUN", help="Directory of the run to be made.")],
+    shards: Annotated[list[Path], typer.Argument(metavar="SHARD...", help="Directories of `run --shard`.")],
+    no_report: NoReport = False,
+    chunk: Annotated[
+        int | None, typer.Option(min=1, help="Cases of a part; as `run` would have it by default.")
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Make one run of the shards of a campaign: the same table as flown by one process."""
+    for shard in shards:
+        existing_run(shard)
+    _refuse_folder(out)
+    store = _fly(lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk))
     _finish(store, no_report)
 
 

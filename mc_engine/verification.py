@@ -12,18 +12,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from mc_engine.companions import companion_problems
 from mc_engine.errors import StoreError
-from mc_engine.journal import Entry, Scan, scan
-from mc_engine.parts import Column, Part, arrow_schema, content_problem
-from mc_engine.store import (
-    CAMPAIGN,
-    JOURNAL,
-    MANIFEST,
-    PART_FOLDERS,
-    companion_problems,
-    is_part_file,
-    is_run_directory,
-)
+from mc_engine.journal import Scan, scan
+from mc_engine.parts import PART_FOLDERS, Column, Part, arrow_schema, content_problem, is_part_file
+from mc_engine.receipts import counted_nominal, counted_parts, history_receipts
+from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, is_run_directory
 from mc_engine.writer_lock import holder
 
 
@@ -44,11 +38,12 @@ def damage(run: Path) -> list[str]:
     head_problems = _head_problems(run, journal)
     problems += head_problems
     columns = None if head_problems else _columns(run)
-    committed = _receipts(journal, "part")
+    committed = counted_parts(journal.entries)
     for part in committed:
         problems += _part_problems(run, part, columns, is_cases=True)
     problems += _overlaps(committed)
-    others = [*_nominal(journal), *_receipts(journal, "history")[-1:]]
+    nominal = counted_nominal(journal.entries)
+    others = [*([nominal] if nominal else []), *history_receipts(journal.entries)[-1:]]
     for part in others:
         problems += _part_problems(run, part, None, is_cases=False)
     if not busy:
@@ -84,15 +79,6 @@ def _head_problems(run: Path, journal: Scan) -> list[str]:
     return problems + companion_problems(run, journal.entries[0].facts)
 
 
-def _receipts(journal: Scan, event: str) -> list[Part]:
-    return [Part(**entry.facts) for entry in journal.entries if entry.event == event]
-
-
-def _nominal(journal: Scan) -> list[Part]:
-    entries: list[Entry] = [entry for entry in journal.entries if entry.event in ("nominal", "nominal-withdrawn")]
-    return [Part(**entries[-1].facts)] if entries and entries[-1].event == "nominal" else []
-
-
 def _columns(run: Path) -> list[Column]:
     """The columns of the case table by an undamaged manifest."""
     known = {field.name for field in fields(Column)}
@@ -100,12 +86,21 @@ def _columns(run: Path) -> list[Column]:
     return [Column(**{key: value for key, value in record.items() if key in known}) for record in records]
 
 
-def _part_problems(run: Path, part: Part, columns: list[Column] | None, is_cases: bool) -> list[str]:
+def part_damage(run: Path, part: Part) -> str:
+    """What is wrong with the file of a part; empty if its bytes are those that were written."""
+    return _content(run, part)[1]
+
+
+def _content(run: Path, part: Part) -> tuple[bytes, str]:
     try:
         content = (run / part.file).read_bytes()
     except OSError as error:
-        return [f"{part.file}: {error.strerror}"]
-    problem = content_problem(content, part)
+        return b"", error.strerror or str(error)
+    return content, content_problem(content, part)
+
+
+def _part_problems(run: Path, part: Part, columns: list[Column] | None, is_cases: bool) -> list[str]:
+    content, problem = _content(run, part)
     if problem:
         return [f"{part.file}: {problem}"]
     # From here on only a faulty writer can have done it: the bytes are those that were written.

@@ -32,7 +32,7 @@ def case_table(flown: Flown) -> Table | None:
     values = [flown.values(fact.name) for fact in metrics]
     rows = tuple(
         (
-            Cell(str(case), int(case)),
+            Cell(str(case), int(case), case=int(case)),
             *(_input_cell(flown.cases[fact.name].iloc[row]) for fact in inputs),
             *(Cell(number(column[row]), _sortable(column[row])) for column in values),
             Cell(str(flown.cases["status"].iloc[row])),
@@ -97,7 +97,9 @@ def _case_table(flown: Flown, caption: str, metric: str | None, rows: np.ndarray
             else Cell(number(values[row]), float(values[row]))
         )
         drawn = (_input_cell(flown.cases[fact.name].iloc[row]) for fact in shown)
-        cells.append((Cell(count(case), case), outcome, *drawn, Cell(f"mc-engine replay {flown.name} {case}")))
+        cells.append(
+            (Cell(count(case), case, case=case), outcome, *drawn, Cell(f"mc-engine replay {flown.name} {case}"))
+        )
     hidden = len(inputs) - len(shown)
     note = f"{hidden} more dispersed inputs stand in the case table." if hidden > 0 else ""
     return Table(caption, columns, tuple(cells), note)

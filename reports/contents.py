@@ -3,8 +3,9 @@
 from collections.abc import Iterable, Iterator
 
 from reports.case_tables import case_table, worst_tables
+from reports.convergence import convergence_blocks
 from reports.corridors import corridor_blocks
-from reports.document import Block, Document, FigureBlock, Section, Table, Text, numbered
+from reports.document import Block, Document, Section, Table, Text, numbered
 from reports.drawings import distribution_blocks, history_blocks, map_blocks, scatter_blocks
 from reports.flown import Flown, Run
 from reports.footprints import FootprintContents, footprint_contents
@@ -15,12 +16,14 @@ from reports.profiles import profile_blocks
 from reports.provenance import campaign_facts, provenance_table
 from reports.published import published_table
 from reports.published_statistics import statistics_tables
+from reports.requirement_tables import requirement_table, risk_table
 from reports.sensitivity import sensitivity_blocks
+from reports.single_cases import ANCHOR as CASES
+from reports.single_cases import case_blocks, case_data
 from reports.tables import (
     fixed_table,
     input_table,
     quantile_table,
-    requirement_table,
     status_table,
     summary_table,
 )
@@ -30,20 +33,26 @@ def build(run: Run, name: str) -> Document:
     """The report of a run; `name` is its directory's name, as commands in the report spell it."""
     flown = Flown(run, name)
     landing = footprint_contents(flown)
-    title = str(flown.campaign.get("title") or flown.manifest.get("model", {}).get("title") or name)
+    sections = tuple(section for section in _sections(flown, landing) if section.blocks)
     return numbered(
         Document(
-            title=title,
+            title=titled(flown),
             subtitle=summary_sentence(flown),
             created=str(flown.manifest.get("created_utc", "")),
             facts=campaign_facts(flown),
             verdicts=verdict_cards(flown),
             costs=cost_cards(flown),
             warnings=warnings(flown),
-            sections=tuple(section for section in _sections(flown, landing) if section.blocks),
+            sections=sections,
             files=tuple(landing.files),
+            cases=case_data(flown, sections),
         )
     )
+
+
+def titled(flown: Flown) -> str:
+    """The title of a run's report."""
+    return str(flown.campaign.get("title") or flown.manifest.get("model", {}).get("title") or flown.name)
 
 
 def _sections(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
@@ -55,8 +64,10 @@ def _sections(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
     yield Section("maps", "Maps", blocks(map_blocks(flown)))
     yield Section("distributions", "Distributions", blocks(distribution_blocks(flown)))
     yield Section("metrics", "Metrics in numbers", _metrics(flown))
+    yield Section("convergence", "Convergence", blocks(convergence_blocks(flown)))
     yield Section("histories", "Time histories", blocks([*profile_blocks(flown), *history_blocks(flown)]))
     yield Section("scatter", "One against another", blocks(scatter_blocks(flown)))
+    yield Section(CASES, "Cases by outcome", blocks(case_blocks(flown)))
     yield Section("worst", "Worst and failed cases", blocks(worst_tables(flown)))
     yield Section("status", "How the cases ended", (status_table(flown),))
     yield Section("published", "Published and ours", blocks([*statistics_tables(flown), published_table(flown)]))
@@ -65,14 +76,14 @@ def _sections(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
     yield Section("reading", "How to read this report", (GLOSSARY,))
 
 
-def blocks(found: Iterable[FigureBlock | Table | str | None]) -> tuple[Block, ...]:
+def blocks(found: Iterable[Block | str | None]) -> tuple[Block, ...]:
     """Blocks without the absent ones; a sentence becomes a paragraph."""
     return tuple(Text((item,)) if isinstance(item, str) else item for item in found if item is not None)
 
 
 def _requirements(flown: Flown) -> tuple[Block, ...]:
     if flown.verdicts:
-        return (requirement_table(flown),)
+        return blocks([requirement_table(flown), risk_table(flown)])
     return (Text(("The campaign file sets no requirement; [requirement.NAME] with a metric and a limit adds one.",)),)
 
 

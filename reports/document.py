@@ -14,11 +14,15 @@ from matplotlib.figure import Figure
 
 @dataclass(frozen=True)
 class Key:
-    """One entry of a figure's key.  mark: "line", "dash", "dot", "band", "bar", "field", "point" or "ring"."""
+    """One entry of a figure's key.  mark: "line", "dash", "dot", "band", "bar", "field", "point" or "ring".
+
+    sign : the shape of a point, as plotly names it.
+    """
 
     mark: str
     colour: str
     text: str
+    sign: str = "circle"
 
 
 class Drawing(ABC):
@@ -45,7 +49,7 @@ class Drawing(ABC):
 
 @dataclass(frozen=True)
 class Text:
-    """Paragraphs; kind "plain" or "warning"."""
+    """Paragraphs; kind "plain", "warning", "heading" (within a section), "list" (its points) or "code" (its lines)."""
 
     paragraphs: tuple[str, ...]
     kind: str = "plain"
@@ -60,12 +64,16 @@ class Terms:
 
 @dataclass(frozen=True)
 class Cell:
-    """text, with a number to sort by; small stands under it; tone: "", "good", "bad" or "open"."""
+    """text, with a number to sort by; small stands under it; tone: "", "good", "bad" or "open".
+
+    case : number of the case that the cell names; a page that holds its history links to it.
+    """
 
     text: str
     value: float | None = None
     small: str = ""
     tone: str = ""
+    case: int | None = None
 
 
 @dataclass(frozen=True)
@@ -121,6 +129,35 @@ class Card:
 
 
 @dataclass(frozen=True)
+class CaseColumn:
+    """One column of `CaseData`: a number or None per case, or a word."""
+
+    name: str
+    label: str
+    role: str
+    values: tuple[float | str | None, ...]
+
+
+@dataclass(frozen=True)
+class CaseData:
+    """Single cases that an interactive page can look up: those drawn, the worst, and those that did not pass.
+
+    outcome : per case an index into `outcomes`.  axes : names of the two columns that the figure of cases starts with.
+    histories : by case, then quantity, its times [s] and values; quantities : label by name; the nominal is case -1.
+    """
+
+    n_tried: int
+    ids: tuple[int, ...]
+    outcome: tuple[int, ...]
+    outcomes: tuple[str, ...]
+    columns: tuple[CaseColumn, ...]
+    axes: tuple[str, str] | None
+    quantities: dict[str, str]
+    histories: dict[int, dict[str, tuple[Any, Any]]]
+    histories_left_out: int = 0
+
+
+@dataclass(frozen=True)
 class Attachment:
     """A file that is written beside the report."""
 
@@ -141,7 +178,9 @@ class Document:
     warnings: tuple[str, ...]
     sections: tuple[Section, ...] = field(default=())
     kind: str = "Monte Carlo dispersion report"
+    question: str = "Will it work?"
     files: tuple[Attachment, ...] = ()
+    cases: CaseData | None = None
 
 
 def numbered(document: Document) -> Document:

@@ -7,11 +7,14 @@ import numpy as np
 from mc_engine.figures import HistoryFigure, MapFigure, ScatterFigure
 from mc_engine.statistics import map_metric
 from reports.case_tables import FEW_CASES, input_words
+from reports.cloud_regions import cloud_regions
 from reports.document import FigureBlock
 from reports.figures import DistributionPanel, Distributions, Histories, HistoryLine, MapDrawing, ScatterDrawing
 from reports.flown import Flown
 from reports.history_bands import fair_cases, history_bands
 from reports.numbers import axis_label, number, words
+from reports.outcomes import INSIDE, case_outcomes, outcome_names
+from reports.published import published_law
 
 POINTS_SHOWN = 2000
 PANELS_IN_A_FIGURE = 12
@@ -24,11 +27,12 @@ NOMINAL = -1
 
 
 def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN) -> np.ndarray:
-    """At most about `most` of the row numbers: evenly through the table, and those of `always` among them."""
+    """At most about `most` of the ascending row numbers: evenly through the table, those of `always` among them."""
     if rows.size <= most:
         return rows
     even = rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
-    return np.union1d(even, np.intersect1d(always, rows))
+    place = np.minimum(np.searchsorted(rows, always), rows.size - 1)
+    return np.union1d(even, always[rows[place] == always])
 
 
 def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
@@ -81,7 +85,8 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
     if not used.size:
         return f"{figure.title}: not drawn; no case has both {figure.x} and {figure.y}."
     ends = [int(used[pick(values[used])]) for values in (x, y) for pick in (np.argmin, np.argmax)]
-    rows = thinned_rows(used, np.array(ends))
+    outcome = case_outcomes(flown)
+    rows = thinned_rows(used, np.union1d(ends, np.flatnonzero(outcome != INSIDE)[:POINTS_SHOWN]))
     drawing = ScatterDrawing(
         x=x[rows],
         y=y[rows],
@@ -91,6 +96,9 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
         n_used=int(used.size),
         n_tried=flown.n_tried,
         nominal=nominal_point(flown, figure.x, figure.y),
+        outcome=outcome[rows],
+        outcomes=tuple(zip(outcome_names(flown), np.bincount(outcome[used], minlength=3).tolist(), strict=True)),
+        regions=cloud_regions(flown, (figure.x, figure.y), x[used], y[used]),
     )
     return FigureBlock(figure.title, drawing, "wide")
 
@@ -141,6 +149,7 @@ def _distribution_panel(flown: Flown, name: str) -> DistributionPanel:
         summary=summary,
         nominal=flown.nominal_value(name),
         limits=tuple(sorted(limits)),
+        law=published_law(flown, name),
     )
 
 

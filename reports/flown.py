@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.figures import KINDS, MapFigure, ScatterFigure, from_record
-from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, judge, summarize, worst_cases
+from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 from reports.numbers import axis_label, words
 
@@ -135,11 +135,24 @@ class Flown:
             fact.name: summarize(self.values(fact.name), confidence=CONFIDENCE) for fact in self.with_role("metric")
         }
 
-    @cached_property
+    @property
     def verdicts(self) -> list[Verdict]:
         """One verdict per requirement, in the order of the campaign file."""
-        records = self.manifest.get("requirements", [])
-        return [judge(record, self.values(record["metric"]), self.ok, self.design) for record in records]
+        return self._judgement[0]
+
+    @property
+    def joint(self) -> Verdict | None:
+        """The verdict on all requirements at once; None unless there are several."""
+        return self._judgement[1]
+
+    @cached_property
+    def _judgement(self) -> tuple[list[Verdict], Verdict | None]:
+        return judge_all(self.manifest.get("requirements", []), self.values, self.ok, self.design, self.looked)
+
+    @property
+    def looked(self) -> bool:
+        """Whether the number of cases was decided by looking at them."""
+        return was_looked_at(self.manifest, self.n_wanted)
 
     @cached_property
     def key_metrics(self) -> list[str]:

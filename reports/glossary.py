@@ -24,7 +24,9 @@ GLOSSARY = Terms(
         ),
         (
             "pass",
-            "The Clopper–Pearson lower bound on the share, at the confidence required, reaches that share.",
+            "The lower confidence bound on the share, at the confidence required, reaches that share. The bound is "
+            "Clopper and Pearson’s where the number of cases was fixed in advance; where it was decided on the way, "
+            "one that holds at every number of cases at once.",
         ),
         ("fail", "Even the upper bound, at the same confidence, stays below the share required."),
         (
@@ -34,7 +36,13 @@ GLOSSARY = Terms(
         (
             "limit shown",
             "The value that the wanted share of cases lies inside, with the wanted confidence: an order "
-            "statistic (Wilks), whatever the distribution. Cases without a number take the worst ranks.",
+            "statistic (Wilks), whatever the distribution; two of them where a requirement has two limits. Cases "
+            "without a number take the worst ranks.",
+        ),
+        (
+            "consumer’s risk",
+            "The probability that the cases pass a system that just misses the share required. The producer’s risk is "
+            "the reverse: that they do not pass one that fails only half as often as it may. More cases lower it.",
         ),
         (
             "quantile",
@@ -48,7 +56,8 @@ GLOSSARY = Terms(
         ),
         (
             "exactness of the bounds",
-            "Bounds and intervals are exact for independent draws (mc). Latin hypercube, "
+            "Bounds and intervals are exact for independent draws (mc), in a number that was fixed in advance unless "
+            "the report says otherwise. Latin hypercube, "
             "Sobol and Halton designs scatter less, so the same bounds are then on the safe side. Nothing is said "
             "of the correctness of the model.",
         ),
@@ -80,7 +89,8 @@ GLOSSARY = Terms(
         (
             "map",
             "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by a local "
-            "quadratic regression, with the standard error given, and left blank outside the cases.",
+            "quadratic regression. Its error, which holds the true surface in about 95 % of the places within twice "
+            "its size, adds the scatter of the cases and the bias where the surface bends. Blank outside the cases.",
         ),
     )
 )

@@ -17,26 +17,32 @@ def verdict_cards(flown: Flown) -> tuple[Card, ...]:
     """One card per requirement, failed ones first."""
     order = {"fail": 0, "not demonstrable": 1, "pass": 2}
     verdicts = sorted(flown.verdicts, key=lambda verdict: order[verdict.outcome])
-    return tuple(_verdict_card(flown, verdict) for verdict in verdicts)
+    joint = [] if flown.joint is None else [flown.joint]
+    return tuple(_verdict_card(flown, verdict) for verdict in [*verdicts, *joint])
 
 
 def _verdict_card(flown: Flown, verdict: Verdict) -> Card:
-    words, limit = flown.words(verdict.metric), limit_text(verdict, flown.unit(verdict.metric))
+    asked = "every limit kept"
+    if verdict.metric:
+        asked = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
     wanted = f"{percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
     counted = f"{count(verdict.passed)} of {count(verdict.tried)} cases inside"
     return Card(
         label=verdict.name,
         answer=verdict.outcome,
-        detail=f"{words} {limit} for {wanted}: {counted}{_because(verdict)}.",
+        detail=f"{asked} for {wanted}: {counted}{_because(flown, verdict)}.",
         tone=TONES[verdict.outcome],
     )
 
 
-def _because(verdict: Verdict) -> str:
+def _because(flown: Flown, verdict: Verdict) -> str:
     """What the counts show, as the end of a sentence."""
     lost = f", {count(verdict.no_number)} of the others without a number" if verdict.no_number else ""
     if verdict.lower is None or verdict.upper is None:
         return f"{lost}; " + ("no case was flown" if not verdict.tried else "cases of this design are no random sample")
+    if verdict.outcome == "fail" and verdict.upper >= verdict.share:  # the joint one, for another's failing
+        failing = [one.name for one in flown.verdicts if one.shared_outcome == "fail"]
+        return f"{lost}; {' and '.join(failing)} {'fails' if len(failing) == 1 else 'fail'} with confidence shared"
     if verdict.outcome == "fail":
         return f"{lost}; the true share is at most {percent(verdict.upper)}"
     more = f", {count(verdict.needed)} cases would be needed without a further failure" if verdict.needed else ""
@@ -91,6 +97,8 @@ def warnings(flown: Flown) -> tuple[str, ...]:
     elif not flown.ok.all():
         failed = int((~flown.ok).sum())
         found.append(f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement.")
+    if flown.looked and flown.n_tried and flown.verdicts:
+        found.append(_how_looked_at(flown))
     if flown.n_tried == 0:
         found.append("No case was flown.")
     if not flown.random:
@@ -99,6 +107,23 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             "describe these cases and are no probabilities."
         )
     return tuple(found)
+
+
+def _how_looked_at(flown: Flown) -> str:
+    """Why the bounds are wider than those of a number of cases that was fixed in advance."""
+    looks = [int(look) for look in flown.manifest.get("looks", [])]
+    flown_so_far = count(flown.n_wanted)
+    if looks:
+        steps = ", ".join(count(look) for look in looks)
+        story = f"Flying was to end once every requirement passes or fails, looked at after {steps} cases; "
+        story += f"it went on to {flown_so_far}."
+    else:
+        begun = count(int(flown.campaign.get("cases", 0)))
+        story = f"The run was begun with {begun} cases and extended to {flown_so_far} when those could be seen."
+    return (
+        f"{story} The bounds on shares hold at every number of cases at once (Robbins’ mixture, Ville’s inequality) "
+        "and are wider for it; quantiles and other intervals are those of a number fixed in advance."
+    )
 
 
 def summary_sentence(flown: Flown) -> str:

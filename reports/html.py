@@ -1,13 +1,19 @@
 """The report as one HTML file: nothing is loaded from anywhere, so it works from a disk without a network."""
 
 import re
+from collections import Counter
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from reports.document import Document, FigureBlock, blocks_of
+from reports.document import CaseData, Document, FigureBlock, blocks_of
+from reports.figures import screen
+from reports.figures.scatter import screen_cloud
+
+SCRIPTS = ("tables.js", "figures.js", "cases.js", "histories.js")
 
 
 @cache
@@ -48,7 +54,7 @@ def _own_file(name: str) -> Markup:
 def render_html(document: Document) -> bytes:
     """The page, UTF-8."""
     figures = [
-        {"id": f"figure-{block.number}-{index}", **panel}
+        {"id": f"figure-{block.number}-{index}", "number": block.number, **panel}
         for block in blocks_of(document, FigureBlock)
         for index, panel in enumerate(block.drawing.interactive())
     ]
@@ -56,9 +62,36 @@ def render_html(document: Document) -> bytes:
     text = page.render(
         document=document,
         figures=figures,
-        panels={block.number: len(block.drawing.interactive()) for block in blocks_of(document, FigureBlock)},
+        panels=Counter(figure["number"] for figure in figures),
+        cases=case_record(document.cases),
+        held=frozenset(document.cases.histories if document.cases else ()),
         style=_own_file("report.css"),
-        script=_own_file("report.js"),
+        scripts=[_own_file(name) for name in SCRIPTS],
         plotly=Markup(plotly_script() if figures else ""),
     )
     return text.encode("utf-8")
+
+
+def case_record(cases: CaseData | None) -> dict[str, Any] | None:
+    """What the page's scripts look single cases up in, as plain data."""
+    if cases is None:
+        return None
+    time_axis = screen.axis("time [s]", zeroline=False)
+    return {
+        "tried": cases.n_tried,
+        "ids": cases.ids,
+        "outcome": cases.outcome,
+        "outcomes": cases.outcomes,
+        "columns": [
+            {"name": column.name, "label": column.label, "role": column.role, "values": column.values}
+            for column in cases.columns
+        ],
+        "axes": cases.axes,
+        "clouds": [screen_cloud(k, name) for k, name in enumerate(cases.outcomes)],
+        "quantities": [{"name": name, "label": label} for name, label in cases.quantities.items()],
+        "histories": {
+            str(case): {name: [screen.rounded(t), screen.rounded(y)] for name, (t, y) in curves.items()}
+            for case, curves in cases.histories.items()
+        },
+        "panel": screen.layout(time_axis, screen.axis("", nticks=6), 240, " ", hovermode="closest"),
+    }

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 import numpy as np
+from pandas.api.types import infer_dtype
 
 from mc_engine.statistics import summarize
 from mc_engine.statistics.paired import matching_rows, paired_difference
@@ -29,7 +30,7 @@ def level_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
 def _levels(flown: Flown, name: str) -> list[str]:
     """The nominal level first, then the others as they come in the table; none for numbers."""
     column = flown.cases[name]
-    if not column.map(lambda value: isinstance(value, str)).all():
+    if infer_dtype(column, skipna=False) != "string":
         return []
     levels = list(dict.fromkeys(column))
     nominal = str(flown.nominal.get(name))

@@ -10,17 +10,17 @@ import matplotlib
 import typst
 
 from reports.document import Block, Document, FigureBlock, Table, Terms, Text
-from reports.figures import paper
+from reports.pictures import Pictures
 
 KINDS = {Text: "text", Terms: "terms", Table: "table", FigureBlock: "figure"}
 
 
-def render_pdf(document: Document) -> bytes:
+def render_pdf(document: Document, pictures: Pictures | None = None) -> bytes:
     """The PDF.  Its creation date is that of the run.
 
     All text reaches typst as JSON strings, which it never reads as markup.
     """
-    content = json.dumps(_plain(document), ensure_ascii=False, allow_nan=False)
+    content = json.dumps(_plain(document, pictures or Pictures()), ensure_ascii=False, allow_nan=False)
     with as_file(files("reports").joinpath("templates")) as templates:
         return typst.compile(
             str(templates / "report.typ"),
@@ -32,10 +32,11 @@ def render_pdf(document: Document) -> bytes:
         )
 
 
-def _plain(document: Document) -> dict[str, Any]:
+def _plain(document: Document, pictures: Pictures) -> dict[str, Any]:
     """The document as plain data, figures as SVG."""
     return {
         "kind": document.kind,
+        "question": document.question,
         "title": document.title,
         "subtitle": document.subtitle,
         "date": _date(document.created),
@@ -44,22 +45,27 @@ def _plain(document: Document) -> dict[str, Any]:
         "costs": [asdict(card) for card in document.costs],
         "warnings": list(document.warnings),
         "sections": [
-            {"title": section.title, "anchor": section.anchor, "blocks": [_block(block) for block in section.blocks]}
+            {
+                "title": section.title,
+                "anchor": section.anchor,
+                "blocks": [_block(block, pictures) for block in section.blocks],
+            }
             for section in document.sections
         ],
     }
 
 
-def _block(block: Block) -> dict[str, Any]:
+def _block(block: Block, pictures: Pictures) -> dict[str, Any]:
     if isinstance(block, FigureBlock):
         drawing = block.drawing
         body: dict[str, Any] = {
             "caption": block.caption,
             "alternative": drawing.alternative,
-            "svg": paper.svg(drawing.printed),
+            "svg": pictures.svg(block),
         }
     else:
         body = asdict(block)
+        body["style"] = body.pop("kind", "")  # of a text; "kind" says which block it is
     return {"kind": KINDS[type(block)], **body}
 
 

@@ -39,11 +39,11 @@ def published_table(flown: Flown) -> Table | None:
     if not records:
         return None
     columns = (
-        Column("Quantity", "text", 2.6),
-        Column("Published", "number", 1.4),
-        Column("Ours", "number", 1.5),
-        Column("Difference", "number", 1.3),
-        Column("Remark", "text", 3.2),
+        Column("Quantity", "text", 2.4),
+        Column("Published", "number", 1.6),
+        Column("Ours", "number", 2.0),
+        Column("Difference", "number", 1.7),
+        Column("Remark", "text", 2.5),
     )
     note = (
         "Ours is the nominal case of this run unless a case is named; “fixed” is a number that the campaign’s tests "
@@ -91,6 +91,16 @@ def own_statistic(flown: Flown, record: Mapping[str, Any]) -> float | None:
     values = flown.values(record["of"])[: record.get("cases")]
     values = values[np.isfinite(values)]
     return float(STATISTICS[statistic](values)) if values.size > 1 else None
+
+
+def published_law(flown: Flown, name: str) -> tuple[float, float] | None:
+    """(mean, standard deviation) that the source prints of a metric for cases with this run's dispersions."""
+    found = {}
+    for record in flown.manifest.get("published", []):
+        if record.get("of") == name and own_statistic(flown, record) is not None:
+            found[record["statistic"]] = float(record["published"])
+    mean, deviation = found.get("mean"), found.get("standard deviation", 0.0)
+    return None if mean is None or deviation <= 0.0 else (mean, deviation)
 
 
 def _farthest(values: np.ndarray) -> float:

@@ -7,7 +7,8 @@ import numpy as np
 
 from mc_engine.statistics.drivers import FALSE_DISCOVERIES, FEWEST, Driver, failure_drivers, success_along
 from mc_engine.statistics.requirements import inside_limits
-from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, sensitivity
+from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_chance, sensitivity
+from reports.designed_indices import designed_blocks
 from reports.document import Cell, Column, FigureBlock, Table
 from reports.figures import IndexMap, SuccessDrawing, SuccessPanel
 from reports.flown import Flown
@@ -20,7 +21,7 @@ STRONGEST = 4  # inputs a metric in the table
 SURELY = 2.0  # standard errors
 MOST_DRIVERS = 12
 MOST_PANELS = 6
-MOST_CASES = 50_000  # above, the indices rest on cases picked evenly
+MOST_CASES = 20_000  # above, the indices rest on cases picked evenly
 ALL_LIMITS = "inside all limits"
 FLOWN = "flown to its end"
 
@@ -29,6 +30,9 @@ def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     """Indices of the metrics that matter, then the drivers of the failures; nothing without a dispersed input."""
     inputs = {fact.name: flown.cases[fact.name].to_numpy() for fact in flown.with_role("dispersion")}
     if not inputs or not flown.n_tried:
+        return
+    if flown.design in ("saltelli", "morris"):
+        yield from designed_blocks(flown, inputs, _failed(flown))
         return
     if not flown.random:
         yield (
@@ -102,7 +106,8 @@ def _index_table(flown: Flown, found: Sensitivity, shown: np.ndarray, names: Map
     columns = (
         Column("Metric", "text", 2.2),
         Column("Input", "text", 2.4),
-        Column("First-order index", "number", 1.5),
+        Column("First-order index", "number", 1.4),
+        Column("Total index", "number", 1.4),
         Column("SRC", "number", 1.4),
         Column("PRCC", "number", 1.4),
         Column("Spearman", "number", 1.4),
@@ -112,10 +117,12 @@ def _index_table(flown: Flown, found: Sensitivity, shown: np.ndarray, names: Map
         small = f"{count(int(found.n_used[k]))} / {count(found.n_tried)}"
         if np.isfinite(found.r_squared[k]):
             small += f", R² {found.r_squared[k]:.2f}"
+        if found.unexplained[k] >= 0.005:
+            small += f", {percent(float(found.unexplained[k]), 0)} unexplained"
         for row in _strongest(found, k):
             cells = [
                 _with_error(getattr(found, index)[row, k], getattr(found, f"{index}_error")[row, k])
-                for index in ("first_order", "src", "prcc", "spearman")
+                for index in ("first_order", "total", "src", "prcc", "spearman")
             ]
             metric = Cell(names[found.metrics[k]], small=small)
             rows.append((metric, Cell(flown.words(found.inputs[row])), *cells))
@@ -129,9 +136,11 @@ def _index_table(flown: Flown, found: Sensitivity, shown: np.ndarray, names: Map
 
 def _strongest(found: Sensitivity, metric: int) -> np.ndarray:
     """Rows of the strongest inputs of a metric; the first one, and those that are surely more than nothing."""
-    order = np.argsort(-np.nan_to_num(found.first_order[:, metric], nan=-1.0), kind="stable")[:STRONGEST]
+    largest = np.fmax(found.first_order[:, metric], found.total[:, metric])
+    order = np.argsort(-np.nan_to_num(largest, nan=-1.0), kind="stable")[:STRONGEST]
     with np.errstate(invalid="ignore"):
         sure = found.first_order[order, metric] > SURELY * found.first_order_error[order, metric]
+        sure |= found.total[order, metric] > SURELY * found.total_error[order, metric]
     sure[0] = True
     return order[sure]
 
@@ -147,16 +156,18 @@ def _with_error(value: float, error: float) -> Cell:
 def _index_note(flown: Flown, found: Sensitivity) -> str:
     note = (
         "± one standard error, for independent draws; further inputs are within two of them of 0, or weaker. R²: the "
-        "share of the variance that the linear regression behind SRC explains. First-order indices that sum to less "
-        "than 1 leave the rest to inputs acting together."
+        "share of the variance that the linear regression behind SRC explains. First-order: the share that goes when "
+        "this input alone becomes known. Total: the share that stays when all others are known; what it has more than "
+        "first-order is due to inputs acting together. Unexplained: the share that the surrogate behind the total "
+        "indices gives to no input (noise in flight, sharp edges); a total index may be larger by up to it."
     )
     if found.correlated is not None:
         first, second, rho = found.correlated
-        # five standard errors of a rank correlation of nothing
-        if abs(rho) > max(5.0 / np.sqrt(found.n_tried), 0.05):
+        if beyond_chance(rho, found.n_tried):
             note += (
                 f" Inputs are correlated, most of all {flown.words(first)} and {flown.words(second)} "
-                f"(rank correlation {number(rho, 2)}): first-order and Spearman hold what an input owes to its partner."
+                f"(rank correlation {number(rho, 2)}): first-order and Spearman hold what an input owes to its "
+                "partner, and total indices, which are for independent inputs, are left out."
             )
     return note
 

@@ -23,46 +23,6 @@ def limit_text(verdict: Verdict, unit: str) -> str:
     return f"at most {at_most}" if at_most else f"at least {at_least}"
 
 
-def requirement_table(flown: Flown) -> Table:
-    """Every requirement with its counts, bounds and verdict."""
-    columns = (
-        Column("Requirement", "text", 2.4),
-        Column("Limit", "text", 1.6),
-        Column("Required", "number", 1.3),
-        Column("Inside / tried", "number", 1.5),
-        Column("Share shown", "number", 2.0),
-        Column("Limit shown", "number", 1.5),
-        Column("Verdict", "text", 1.6),
-    )
-    records = flown.manifest.get("requirements", [])
-    sources = [str(record.get("source") or "") for record in records]
-    rows = tuple(_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True))
-    note = (
-        "Share shown: observed share, below it the Clopper–Pearson bounds, each holding with the confidence required. "
-        "Limit shown: the limit that these cases demonstrate with the share and confidence required (Wilks), below it "
-        "its distance inside the required one. A failed case, or one whose metric is not a number, counts as outside."
-    )
-    return Table("Requirements and their verdicts", columns, rows, note)
-
-
-def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell, ...]:
-    unit = flown.unit(verdict.metric)
-    lost = f"{count(verdict.no_number)} without a number" if verdict.no_number else ""
-    bounds = f"[{percent(verdict.lower)}, {percent(verdict.upper)}]" if verdict.lower is not None else ""
-    margin = "" if verdict.margin is None else f"margin {with_unit(number(verdict.margin, 3), unit)}"
-    needed = f"needs {count(verdict.needed)} cases" if verdict.needed else ""
-    shown = "–" if verdict.demonstrated is None else with_unit(number(verdict.demonstrated), unit)
-    return (
-        Cell(verdict.name, small=verdict.metric),
-        Cell(limit_text(verdict, unit), small=source),
-        Cell(percent(verdict.share, 3), verdict.share, f"with {percent(verdict.confidence)} confidence"),
-        Cell(f"{count(verdict.passed)} / {count(verdict.tried)}", verdict.passed, lost),
-        Cell(percent(verdict.estimate), verdict.estimate, bounds),
-        Cell(shown, verdict.demonstrated, margin),
-        Cell(verdict.outcome, small=needed, tone=TONES[verdict.outcome]),
-    )
-
-
 def summary_table(flown: Flown) -> Table:
     """Moments and range of every metric beside its nominal value."""
     columns = (
@@ -132,7 +92,7 @@ def quantile_table(flown: Flown) -> Table | None:
         rows.append((label, *cells))
     each = percent(0.5 * (1.0 + first.confidence))
     note = (
-        f"In brackets: distribution-free limits from order statistics, each holding with {each}; "
+        f"In brackets: distribution-free limits from order statistics, each holding with {each}{_for_fixed(flown)}; "
         if flown.random
         else ""
     )
@@ -142,6 +102,13 @@ def quantile_table(flown: Flown) -> Table | None:
         else "Levels of the flown cases, not of a population."
     )
     return Table("Quantiles of the metrics", columns, tuple(rows), note)
+
+
+def _for_fixed(flown: Flown) -> str:
+    """What is to be said of such limits where the number of cases was decided on the way."""
+    if not flown.looked:
+        return ""
+    return " for a number of cases fixed in advance (it was decided on the way here, so they hold somewhat less often)"
 
 
 def status_table(flown: Flown) -> Table:

@@ -28,16 +28,28 @@ def test_no_import_points_against_the_arrows(package, forbidden):
 
 
 def test_reports_know_of_the_engine_only_what_a_store_and_its_statistics_are():
-    known = {"store", "statistics", "status", "units", "figures", "errors", "durable_file", "tuning_folder"}
+    known = {
+        "store",
+        "statistics",
+        "status",
+        "units",
+        "figures",
+        "errors",
+        "durable_file",
+        "tuning_folder",
+        "rare_event_folder",
+        "comparison",
+        "run_changes",
+    }
     used = {name.split(".")[1] for _, name in imported("reports") if name.startswith("mc_engine.")}
     assert used <= known
 
 
 def test_the_public_names_are_these():
     names = """
-        AdaptiveStep Campaign CampaignError EngineError Event Extremum Field FixedStep Model ModelError Parameter
-        Refusals Replay RunInterrupted Setting Store StoreError TuningRecord case_table extend list_campaigns
-        load_campaign open_store open_tuning replay resume run tune
+        AdaptiveStep Campaign CampaignError Case EngineError Event Extremum Field FixedStep Model ModelError Parameter
+        Refusals Replay Run RunInterrupted Setting Store StoreError TuningRecord case_table extend list_campaigns
+        load_campaign open_run open_store open_tuning replay resume run tune
     """
     assert sorted(mc_engine.__all__) == names.split()
     for name in mc_engine.__all__:

@@ -198,8 +198,8 @@ MODEL = Model(
     switch=dynamics.switch,
     event_list=(
         Event("entry", "falling", "stop"),
-        Event("pulse_on", "rising", "switch"),
-        Event("pulse_off", "falling", "switch"),
+        Event("pulse_on", "rising", "switch", rare=True),
+        Event("pulse_off", "falling", "switch", rare=True),
     ),
     observe=outcome.observe,
     evaluate=outcome.evaluate,

@@ -52,6 +52,7 @@ METRICS = (
         "settling_time_s",
         "s",
         "last time with the error of a, e or omega above 1 % of its first value; none if so at entry",
+        sometimes=True,
     ),
     Field("overshoot_a_pct", "%", "largest error of a beyond zero, in its first value"),
     Field("overshoot_e_pct", "%", "largest error of e beyond zero, in its first value"),

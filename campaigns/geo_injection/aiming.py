@@ -5,7 +5,7 @@ the nominal burn (planar: from the perigee), and gives the speed that makes the 
 geostationary semi-major axis.  Against the impulse of the nominal flight it tells by how much the stored program is to
 be turned, lengthened and shifted.  So the flight without errors is the stored program itself, and an error is met to
 first order: drift and inclination go to zero, what remains is an eccentricity, which one burn cannot remove.
-Place and velocity are known exactly; mass and engine are taken for nominal.
+Place and velocity are known but for the navigation's errors; mass and engine are taken for nominal.
 """
 
 from collections import namedtuple
@@ -22,7 +22,7 @@ Aim = namedtuple("Aim", "x y z stretch sensed ignition")  # unit vector; of the 
 Impulse = namedtuple("Impulse", "wait x y z size")  # wait: time to it
 Place = namedtuple("Place", "x y z vx vy vz")
 
-PLANAR = 1e-9  # smallest sine of an inclination that has a node
+PLANAR = 1e-3  # sine of a tilt to the final plane below which the orbit before the last burn has no node to speak of
 
 
 @physics
@@ -68,6 +68,25 @@ def impulse_at(s, angle, tilt, radius, planar):
     cx, cy, cz = wanted * lx - k * vx, wanted * ly - k * vy, wanted * lz - k * vz
     size = sqrt(cx * cx + cy * cy + cz * cz)
     return Impulse(_wait(s, dx, dy, dz, u, e, along, r, h), cx / size, cy / size, cz / size, size)
+
+
+@physics
+def known(s, p):
+    """Place and velocity as navigation knows them: the true ones with its errors, along the true local axes."""
+    hx, hy, hz = _cross(s.x, s.y, s.z, s.vx, s.vy, s.vz)
+    h = sqrt(hx * hx + hy * hy + hz * hz)
+    r = sqrt(s.x * s.x + s.y * s.y + s.z * s.z)
+    nx, ny, nz = hx / h, hy / h, hz / h
+    rx, ry, rz = s.x / r, s.y / r, s.z / r
+    tx, ty, tz = _cross(nx, ny, nz, rx, ry, rz)
+    return Place(
+        s.x + p.known_r * rx + p.known_t * tx + p.known_n * nx,
+        s.y + p.known_r * ry + p.known_t * ty + p.known_n * ny,
+        s.z + p.known_r * rz + p.known_t * tz + p.known_n * nz,
+        s.vx + p.known_vr * rx + p.known_vt * tx + p.known_vn * nx,
+        s.vy + p.known_vr * ry + p.known_vt * ty + p.known_vn * ny,
+        s.vz + p.known_vr * rz + p.known_vt * tz + p.known_vn * nz,
+    )
 
 
 @physics
@@ -147,8 +166,9 @@ def nominal_aim(program: Program) -> np.ndarray:
     sequence, last = program.sequence, program.burns[-1]
     state = Place(*(float(number) for number in program.burns[-2].end))
     tilt = sequence.final_inclination
-    planar = float(abs(sequence.initial_inclination - tilt) < PLANAR)
     tilt_sin, tilt_cos = np.sin(tilt), np.cos(tilt)
+    normal = np.cross(state[:3], state[3:]) / np.linalg.norm(np.cross(state[:3], state[3:]))
+    planar = float(np.linalg.norm(np.cross([0.0, -tilt_sin, tilt_cos], normal)) < PLANAR)
     n, q, *_ = _axes(state, tilt_sin, tilt_cos, planar)
     unit, speed = sequence.parking_radius, sequence.speed_unit
     before = program.burns[-2]

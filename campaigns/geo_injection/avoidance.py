@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaigns.geo_injection.single_burn import Burn, Stage, circle, fly_shortest
+from campaigns.geo_injection.single_burn import Burn, Stage, circle, fly_shortest, rise_guess
 from mc_engine.physics.constants import MU_EARTH
 
 # The thrust turns over in the middle of the burn, within a hundredth of the canonical time.
@@ -41,8 +41,7 @@ AVOIDANCE = Rise(42_164_137.0, 2400.0, 1.3, 0.00069, 0.138454)
 
 def analytic_guess(one: Rise) -> tuple[float, float, float]:
     """(burn time, radial and transverse velocity costates): eq. (18), canonical, the radial place costate being 1."""
-    half = float(np.sqrt(one.rise))
-    return 2.0 * half, half, one.rise
+    return rise_guess(one.rise)
 
 
 @lru_cache(maxsize=8)

@@ -1,42 +1,59 @@
 """From the limit of large thrust to the wanted optimum, step by step.
 
-Two burns: impulses give the guess at a large thrust, which is then lowered.  Three burns: a short burn is put one
-revolution ahead of the two-burn optimum and lengthened until the primer vector is as long at the end of the coast
-after it as at its start.  No number here depends on the orbit or on the engine.
+Two burns: impulses give the guess at a large thrust, which is then lowered.  Three burns (`added_burn.py`) grow out of
+two.  An elliptic parking orbit is reached from the circle through its perigee, with the first burn about either node,
+or from the planar sequence, with the first burn about perigee; the cheapest of what is found is the optimum.  No
+number here depends on the orbit or on the engine.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from campaigns.geo_injection.coast import coast
+from campaigns.geo_injection.added_burn import with_burn_ahead
 from campaigns.geo_injection.impulsive import propellant_share, two_impulses
-from campaigns.geo_injection.optimal import (
-    Problem,
-    Solution,
-    first_states,
-    local_axes,
-    solve,
-    switch_states,
-)
+from campaigns.geo_injection.optimal import FIRST_PLACE, Instead, Problem, Solution, local_axes, solve, switch_states
 from mc_engine.errors import ModelError
 
 LARGE_THRUST = 5.0  # over the first weight: burns are then short arcs
+GENTLE_THRUST = 0.1  # over the first weight: burns are still short enough for another one to be put ahead of them
 WIDE = np.radians(20.0)  # plane change at which the search starts, if less is wanted
 _FIRST_STEP, _LONGEST_STEP, _LEAST_STEP = 0.1, 0.25, 1e-5  # of the way
 _FAR = 0.3  # of a step: distance of a solution from what was foreseen
-_SHORT = 0.05  # first length of an added burn, and how it grows, over the burn that it relieves
+_PLACE_STEP = 0.1  # rad, in which the first place is looked for
+_VANISHING = 0.01  # of all burning: a burn that short is about to leave the sequence
 
 
 def optimum(problem: Problem) -> Solution:
     """The optimum of two or three burns; ModelError tells how far the search got."""
     if problem.burns not in (2, 3):
         raise ModelError(f"the optimal sequence has 2 or 3 burns, not {problem.burns}")
-    if problem.burns == 2:
-        x = _two_burns(problem)
-    else:
-        x = _three_burns(problem)
-    return Solution(problem, x, switch_states(problem, x[None])[0])
+    _refuse_descents(problem)
+    x = _two_burns(problem) if problem.burns == 2 else _three_burns(problem)
+    found = Solution(problem, x, switch_states(problem, x[None])[0])
+    _refuse_waiting(found)
+    return found
+
+
+def _refuse_descents(problem: Problem) -> None:
+    """The sequences begin about perigee and end at apogee, so the final circle has to lie outside the parking orbit."""
+    farthest = (1.0 + problem.eccentricity) / (1.0 - problem.eccentricity)
+    if farthest >= problem.ratio:
+        raise ModelError(
+            f"the parking orbit reaches {farthest / problem.ratio:.4g} of the final radius; sequences are designed to "
+            "circles outside of it: lower parking_altitude_km or parking_eccentricity, or raise final_radius_km"
+        )
+
+
+def _refuse_waiting(found: Solution) -> None:
+    """Each coast ends at the first apsis that serves: one that lasts longer belongs to another sequence."""
+    ends = found.states[1:-1:2]
+    a = 1.0 / (2.0 / np.linalg.norm(ends[:, :3], axis=1) - (ends[:, 3:6] ** 2).sum(1))
+    if not (found.coasts < 2.0 * np.pi * a**1.5).all():
+        raise ModelError(
+            f"the search for the optimal {found.problem.burns} burns found only one that lets a revolution pass"
+        )
 
 
 def _impulsive_guess(problem: Problem) -> np.ndarray:
@@ -53,29 +70,110 @@ def _impulsive_guess(problem: Problem) -> np.ndarray:
 
 
 def _two_burns(problem: Problem) -> np.ndarray:
-    """Two-burn unknowns: impulses, then less thrust, then less inclination if it is small.
+    """Two-burn unknowns: from a circle as it comes, from an ellipse the cheapest of all ways."""
+    if problem.eccentricity == 0.0:
+        return _from_circle(problem)
+    ways: list[Callable[[Problem], np.ndarray]] = [_from_perigee]
+    if problem.plane_change > 0.0:
+        ways = [_from_ascending_node, _from_descending_node, _from_perigee]
+    found, failed = [], []
+    for way in ways:
+        try:
+            found.append(way(problem))
+        except ModelError as error:
+            failed.append(error)
+    if not found:
+        raise failed[-1]
+    return min(found, key=lambda x: float(x[7] + x[8]))
 
-    At small plane changes every place on the parking orbit is nearly as good for the first ignition, and the search at
-    a large thrust loses its way; so it goes by a larger plane change.
+
+def _widened(problem: Problem) -> Problem:
+    """The problem with a plane change that is not small.
+
+    At small plane changes every place on a circle is nearly as good for the first ignition, and the search at a large
+    thrust loses its way; so it goes by a larger plane change.
     """
-    wide = problem if problem.plane_change == 0.0 else replace(problem, plane_change=max(problem.plane_change, WIDE))
-    top = wide.with_thrust(max(LARGE_THRUST, problem.thrust))
+    return problem if problem.plane_change == 0.0 else replace(problem, plane_change=max(problem.plane_change, WIDE))
+
+
+def _at_large_thrust(problem: Problem) -> tuple[Problem, np.ndarray]:
+    """(the problem at a large thrust, its unknowns)."""
+    top = problem.with_thrust(max(LARGE_THRUST, problem.thrust))
     x = solve(top, _impulsive_guess(top))
     if x is None:
         raise ModelError("the search for the optimal burns did not start, not even at a large thrust")
+    return top, x
+
+
+def _from_circle(problem: Problem) -> np.ndarray:
+    """Impulses, then less thrust, then less plane change if it is small."""
+    wide = _widened(problem)
+    top, x = _at_large_thrust(wide)
     return _follow(wide, problem, _follow(top, wide, x))
 
 
+def _from_perigee(problem: Problem) -> np.ndarray:
+    """The planar circle, then the eccentricity and the plane change with the first place held, then the best place.
+
+    A planar circle has no place of its own, and an ellipse that is nearly one only a soft one.  Less thrust comes last.
+    """
+    strong = problem.with_thrust(max(problem.thrust, 2.0 * GENTLE_THRUST))
+    circle = replace(strong, plane_change=0.0, eccentricity=0.0)
+    x = _from_circle(circle)
+    x[0] += problem.perigee
+    planar = replace(strong, plane_change=0.0)
+    x = _follow(planar, strong, _follow(circle, planar, x, FIRST_PLACE), FIRST_PLACE)
+    return _follow(strong, problem, _best_place(strong, x))
+
+
+def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
+    """Unknowns with the first place free: it is moved by steps while the burns grow shorter."""
+
+    def moved(x: np.ndarray, by: float) -> np.ndarray | None:
+        return solve(problem, x + by * np.eye(1, x.size)[0], FIRST_PLACE)
+
+    for by in (_PLACE_STEP, -_PLACE_STEP):
+        following = moved(x, by)
+        while following is not None and following[7:9].sum() < x[7:9].sum():
+            x, following = following, moved(following, by)
+    found = solve(problem, x)
+    if found is None or abs(found[0] - x[0]) > 3.0 * _PLACE_STEP:
+        raise ModelError("the search for the optimal burns found no best place of the first one on the parking orbit")
+    return found
+
+
+def _from_ascending_node(problem: Problem) -> np.ndarray:
+    """The circle at a large thrust, then the eccentricity, then less thrust, then less plane change if it is small."""
+    wide = _widened(problem)
+    top, x = _at_large_thrust(replace(wide, eccentricity=0.0))
+    return _stretched(top, x, wide, problem)
+
+
+def _from_descending_node(problem: Problem) -> np.ndarray:
+    """The same from the mirror image about the earth's centre, which a circle allows."""
+    wide = _widened(problem)
+    top, x = _at_large_thrust(replace(wide, eccentricity=0.0))
+    mirrored = x * np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
+    mirrored[0] += np.pi
+    return _stretched(top, mirrored, wide, problem)
+
+
+def _stretched(top: Problem, x: np.ndarray, wide: Problem, problem: Problem) -> np.ndarray:
+    ellipse = replace(top, eccentricity=problem.eccentricity)
+    return _follow(wide, problem, _follow(ellipse, wide, _follow(top, ellipse, x)))
+
+
 def _between(start: Problem, end: Problem, share: float) -> Problem:
-    """On the way from one problem to another: thrust along its logarithm, plane change along a line."""
+    """On the way from one problem to another: thrust along its logarithm, the rest along lines."""
     if share >= 1.0:
         return end
     thrust = start.thrust * (end.thrust / start.thrust) ** share
     change = start.plane_change + share * (end.plane_change - start.plane_change)
-    return replace(start.with_thrust(thrust), plane_change=change)
+    e = start.eccentricity + share * (end.eccentricity - start.eccentricity)
+    return replace(start.with_thrust(thrust), plane_change=change, eccentricity=e)
 
 
-def _follow(start: Problem, end: Problem, x: np.ndarray) -> np.ndarray:
+def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None = None) -> np.ndarray:
     """Unknowns of the problem `end` from those of `start`, each step foreseen from the last two solutions.
 
     A solution far from what was foreseen belongs to another family of extremals, and the step is halved.
@@ -88,23 +186,27 @@ def _follow(start: Problem, end: Problem, x: np.ndarray) -> np.ndarray:
         share = min(1.0, done + step)
         here, there = _between(start, end, done), _between(start, end, share)
         line = x if last is None else x + (share - done) / (done - last[0]) * (x - last[1])
-        found = solve(there, _longer_burns(here, there, x) if last is None else line)
         guess = _longer_burns(here, there, x) if last is None else line
+        found = solve(there, guess, instead)
         if found is None or np.abs(found - guess).max() > _FAR * max(1.0, np.abs(found - x).max()):
             step *= 0.5
             if step < _LEAST_STEP:
-                raise ModelError(_how_far(here, end))
+                raise ModelError(_how_far(here, end, x))
             continue
         last, x, done, step = (done, x), found, share, min(1.5 * step, _LONGEST_STEP)
     return x
 
 
-def _how_far(here: Problem, end: Problem) -> str:
-    return (
-        f"the search for the optimal {end.burns} burns stopped at {here.thrust / end.thrust:.3f} of the wanted thrust "
-        f"and a plane change of {np.degrees(here.plane_change):.3f} of {np.degrees(end.plane_change):.3f} deg; "
-        "more thrust, or more burns, may have a solution"
-    )
+def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
+    where = [f"{here.thrust / end.thrust:.3f} of the wanted thrust"]
+    where.append(f"a plane change of {np.degrees(here.plane_change):.3f} of {np.degrees(end.plane_change):.3f} deg")
+    if end.eccentricity > 0.0:
+        where.append(f"a parking eccentricity of {here.eccentricity:.4f} of {end.eccentricity:.4f}")
+    burns = x[7 : 7 + here.burns]
+    advice = "more thrust, or more burns, may have a solution"
+    if burns.min() < _VANISHING * burns.sum():
+        advice = f"burn {np.argmin(burns) + 1} was vanishing there: one burn less may do"
+    return f"the search for the optimal {end.burns} burns stopped at {', '.join(where[:-1])} and {where[-1]}; {advice}"
 
 
 def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
@@ -112,92 +214,22 @@ def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
     n, guess = here.burns, x.copy()
     longer = here.thrust / there.thrust
     guess[7 : 7 + n] *= longer
-    guess[0] *= longer
     added = guess[7 : 7 + n] - x[7 : 7 + n]
+    guess[0] -= 0.5 * added[0] * np.sqrt(1.0 + here.eccentricity)
     guess[7 + n :] -= 0.5 * (added[:-1] + added[1:])
     return guess
 
 
 def _three_burns(problem: Problem) -> np.ndarray:
-    """Unknowns of three burns: at the wanted thrust, or at the lowest one where the way there is open."""
-    wide = problem if problem.plane_change == 0.0 else replace(problem, plane_change=max(problem.plane_change, WIDE))
-    start = wide
+    """Unknowns of three burns: at the wanted thrust, or at the lowest larger one where the way there is open."""
+    wide = _widened(problem) if problem.eccentricity == 0.0 else problem
+    start = wide.with_thrust(max(wide.thrust, GENTLE_THRUST))
     for _ in range(8):
         try:
-            x = _with_burn_ahead(start, _two_burns(replace(start, burns=2)))
+            x = with_burn_ahead(start, _two_burns(replace(start, burns=2)))
         except ModelError:
             x = None
         if x is not None:
             return _follow(wide, problem, _follow(start, wide, x))
         start = start.with_thrust(1.5 * start.thrust)
     raise ModelError("the search for three optimal burns found no burn to put ahead of the two-burn optimum")
-
-
-def _with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
-    """Three-burn unknowns from those of two burns, or None."""
-    grow = _SHORT * two[7]
-    x = solve(problem, _short_burn_ahead(problem, two, grow), grow)
-    last: tuple[float, np.ndarray] | None = None
-    while x is not None and x[8] > _SHORT * two[7]:
-        here = _gap(problem, x), x
-        if last is not None and here[0] * last[0] < 0.0:
-            return _where_lengths_agree(problem, last, here)
-        longer = None
-        while longer is None and grow > 1e-4 * two[7]:
-            longer = _longer(problem, last, x, grow)
-            grow = grow if longer is not None else 0.5 * grow
-        last, x = here, longer
-    return None
-
-
-def _gap(problem: Problem, x: np.ndarray) -> float:
-    """Length of the primer vector after the first coast less that before it."""
-    size = np.linalg.norm(switch_states(problem, x[None])[0, :, 6:9], axis=1)
-    return float(size[2] - size[1])
-
-
-def _longer(problem: Problem, before: tuple | None, x: np.ndarray, grow: float) -> np.ndarray | None:
-    """The solution with a first burn longer by `grow`."""
-    guess = x.copy()
-    if before is not None:
-        guess = x + (x - before[1]) * grow / (x[7] - before[1][7])
-    else:
-        guess[8] -= grow
-    guess[7] = x[7] + grow
-    return solve(problem, guess, guess[7])
-
-
-def _where_lengths_agree(problem: Problem, low: tuple, high: tuple) -> np.ndarray | None:
-    """Between two solutions of opposite gaps: the Illinois rule, then all conditions at once."""
-    (f0, x0), (f1, x1) = low, high
-    x = x1
-    for _ in range(20):
-        share = f0 / (f0 - f1)
-        guess = x0 + share * (x1 - x0)
-        found = solve(problem, guess, guess[7])
-        if found is None:
-            return None
-        x, f = found, _gap(problem, found)
-        if abs(f) < 1e-9:
-            break
-        if f * f1 < 0.0:
-            f0, x0 = f1, x1
-        else:
-            f0 *= 0.5
-        f1, x1 = f, x
-    return solve(problem, x)
-
-
-def _short_burn_ahead(problem: Problem, two: np.ndarray, length: float) -> np.ndarray:
-    """Guess of three burns: a burn where the primer vector is longest on the parking orbit, one revolution ahead."""
-    start = first_states(problem.plane_change, two[None])
-    times = np.linspace(-0.5, 2.0, 501)
-    sizes = np.linalg.norm(coast(np.repeat(start, times.size, axis=0), times)[:, 6:9], axis=1)
-    after = times[np.argmax(sizes)]
-    y = coast(start, np.array([after - 0.5 * length]))[0]
-    place = two[0] + after - 0.5 * length
-    axes = local_axes(problem.plane_change, np.array([place]))[0]
-    revolution = 2.0 * np.pi - after + 1.5 * length
-    return np.array(
-        [place, *axes @ y[6:9], *axes @ y[9:12], length, two[7] - length, two[8], revolution, two[9]]
-    )  # fmt: skip

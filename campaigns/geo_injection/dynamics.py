@@ -7,7 +7,7 @@ errors; the program runs from the actual ignition of each burn.
 
 from collections import namedtuple
 
-from campaigns.geo_injection.aiming import Aim, aimed, stored, turned
+from campaigns.geo_injection.aiming import Aim, aimed, known, stored, turned
 from campaigns.geo_injection.program_table import TERM_NAMES, burn_row, n_burns, segment_row, steering_row
 from mc_engine.lanes import any_lane, fma, log, maximum, minimum, physics, sqrt, where
 from mc_engine.physics.constants import MU_EARTH
@@ -28,7 +28,8 @@ Memory = namedtuple(  # type: ignore[misc]
 Parameters = namedtuple(
     "Parameters",
     "x y z vx vy vz mass thrust flow ignition_2 ignition_3 delay_2 delay_3 delay_1 "
-    "pitch_1 pitch_2 pitch_3 yaw_1 yaw_2 yaw_3 tail accelerometer",
+    "pitch_1 pitch_2 pitch_3 yaw_1 yaw_2 yaw_3 tail accelerometer "
+    "known_r known_t known_n known_vr known_vt known_vn",
 )
 Events = namedtuple("Events", "ignite next_segment shut_down burn_out injected")
 Forward = namedtuple("Forward", "x y z size")
@@ -172,7 +173,7 @@ def _next_aim(t, s, burn, p, o):
     ignition = where(burn < 1.5, p.ignition_2, p.ignition_3)
     x, y, z, stretch, sensed = kept.x, kept.y, kept.z, kept.stretch, kept.sensed
     if o.guidance > OPEN_LOOP:
-        new = aimed(t, s, burn, o)
+        new = aimed(t, known(s, p), burn, o)
         last = burn + 1.0 >= n_burns(o.tables)
         x, y, z = where(last, new.x, x), where(last, new.y, y), where(last, new.z, z)
         stretch, sensed = where(last, new.stretch, stretch), where(last, new.sensed, sensed)

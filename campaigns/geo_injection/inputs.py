@@ -34,6 +34,28 @@ PARAMETERS = (
     ),
     Parameter("tail_off_factor", "", "duration of the tail-off over its nominal value", 1.0, low=0.0, high=100.0),
     Parameter("accelerometer_scale_error", "", "relative error of the sensed velocity", 0.0, -0.5, 0.5),
+    *(
+        Parameter(
+            f"navigation_position_{axis}_m",
+            "m",
+            f"{word} error of the place that the last burn is aimed from",
+            0.0,
+            -1e6,
+            1e6,
+        )
+        for axis, word in AXES
+    ),
+    *(
+        Parameter(
+            f"navigation_velocity_{axis}_m_s",
+            "m/s",
+            f"{word} error of the velocity that the last burn is aimed from",
+            0.0,
+            -1e3,
+            1e3,
+        )
+        for axis, word in AXES
+    ),
 )
 
 SETTINGS = (
@@ -51,22 +73,61 @@ SETTINGS = (
     Setting(
         "parking_altitude_km",
         "km",
-        "altitude of the circular parking orbit over 6378.137 km",
+        "altitude of the parking orbit's perigee over 6378.137 km",
         200.0,
         low=100.0,
         high=20000.0,
     ),
+    Setting("parking_eccentricity", "", "eccentricity of the parking orbit; 0 is a circle", 0.0, low=0.0, high=0.9),
+    Setting(
+        "parking_argument_of_perigee_deg",
+        "deg",
+        "argument of the parking orbit's perigee, from its ascending node",
+        0.0,
+        low=-360.0,
+        high=360.0,
+    ),
     Setting("final_radius_km", "km", "radius of the final circle", 42164.137, low=10000.0, high=400000.0),
-    Setting("thrust_n", "N", "nominal thrust", 20000.0, low=1.0),
-    Setting("mass_flow_kg_s", "kg/s", "nominal mass flow", 6.14, low=1e-6),
-    Setting("initial_mass_kg", "kg", "nominal mass at the first ignition", 22170.0, low=1.0),
+    Setting("thrust_n", "N", "nominal thrust", 20000.0, low=1.0, dispersed_by="thrust_factor"),
+    Setting("mass_flow_kg_s", "kg/s", "nominal mass flow", 6.14, low=1e-6, dispersed_by="isp_factor"),
+    Setting(
+        "initial_mass_kg",
+        "kg",
+        "nominal mass at the first ignition",
+        22170.0,
+        low=1.0,
+        dispersed_by="initial_mass_factor",
+    ),
     Setting("method", "", "how the burn program is designed", "optimal", choices=METHODS),
-    Setting("transfer_1_semi_major_axis_km", "km", "staged: orbit after the first burn", 24588.0, low=6500.0),
-    Setting("transfer_1_eccentricity", "", "staged: orbit after the first burn", 0.7142, low=0.0, high=0.99),
-    Setting("transfer_1_plane_change_deg", "deg", "staged: plane change by then", 2.5, low=0.0, high=90.0),
-    Setting("transfer_2_semi_major_axis_km", "km", "staged, three burns: orbit after the second", 24438.0, low=6500.0),
-    Setting("transfer_2_eccentricity", "", "staged, three burns: orbit after the second", 0.7247, low=0.0, high=0.99),
-    Setting("transfer_2_plane_change_deg", "deg", "staged, three burns: plane change by then", 3.5, low=0.0, high=90.0),
+    *(
+        setting
+        for k in (1, 2)
+        for setting in (
+            Setting(
+                f"transfer_{k}_semi_major_axis_km",
+                "km",
+                f"staged: orbit after burn {k}; 0: the source's for this number of burns",
+                0.0,
+                low=0.0,
+            ),
+            Setting(
+                f"transfer_{k}_eccentricity",
+                "",
+                f"staged: orbit after burn {k}; below 0: the source's",
+                -1.0,
+                low=-1.0,
+                high=0.99,
+            ),
+            Setting(
+                f"transfer_{k}_plane_change_deg",
+                "deg",
+                f"staged: plane change by the end of burn {k}; below 0: the source's",
+                -1.0,
+                low=-1.0,
+                high=90.0,
+            ),
+        )
+    ),
     Setting("shutdown", "", "what ends a burn", "time", choices=SHUTDOWNS),
     Setting(
         "tail_off_s",

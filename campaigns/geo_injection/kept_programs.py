@@ -7,19 +7,17 @@ import numpy as np
 
 from campaigns.geo_injection.design import KEPT, new_design
 from campaigns.geo_injection.program import to_text
-from campaigns.geo_injection.sequence import Sequence
+from campaigns.geo_injection.sequence import Sequence, source_orbits
 from mc_engine.durable_file import make_folder, write_durably
 
 _ORBITS = 6_578_137.0, 42_164_137.0  # parking and final radius [m]
 _ENGINE = 20_000.0, 6.14, 22_170.0  # thrust [N], mass flow [kg/s], mass [kg]
-# tables 2, 3 and 7: semi-major axis [km], eccentricity, plane change so far [deg]
-_TWO, _THREE = ((24_588.0, 0.7142, 2.5),), ((8733.1, 0.2456, 1.5), (24_438.0, 0.7247, 3.5))
 
 
-def _sequence(burns: int, degrees: float, orbits: tuple[tuple[float, float, float], ...] = ()) -> Sequence:
-    between = tuple((1e3 * a, e, float(np.radians(change))) for a, e, change in orbits)
-    method = "staged" if orbits else "optimal"
-    return Sequence(method, burns, float(np.radians(degrees)), 0.0, *_ORBITS, *_ENGINE, between)
+def _sequence(burns: int, degrees: float, method: str = "optimal") -> Sequence:
+    change = float(np.radians(degrees))
+    between = source_orbits(burns, change) if method == "staged" else ()
+    return Sequence(method, burns, change, 0.0, *_ORBITS, *_ENGINE, between)
 
 
 SEQUENCES = {
@@ -28,8 +26,8 @@ SEQUENCES = {
     "two_burns_planar": _sequence(2, 0.0),
     "three_burns_28_5": _sequence(3, 28.5),
     "three_burns_planar": _sequence(3, 0.0),
-    "two_burns_28_5_staged": _sequence(2, 28.5, _TWO),
-    "three_burns_28_5_staged": _sequence(3, 28.5, _THREE),
+    "two_burns_28_5_staged": _sequence(2, 28.5, "staged"),
+    "three_burns_28_5_staged": _sequence(3, 28.5, "staged"),
 }
 
 

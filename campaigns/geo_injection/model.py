@@ -13,7 +13,7 @@ from campaigns.geo_injection.design import program_for
 from campaigns.geo_injection.inputs import METHODS, PARAMETERS, SETTINGS
 from campaigns.geo_injection.program import Program
 from campaigns.geo_injection.program_table import table_of
-from campaigns.geo_injection.sequence import Sequence
+from campaigns.geo_injection.sequence import Sequence, source_orbits
 from mc_engine.errors import ModelError
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.physics.frames import WGS84_RADIUS
@@ -38,16 +38,24 @@ def sequence_of(o: Any) -> Sequence:
     method = METHODS[int(o.method)]
     between: tuple[tuple[float, float, float], ...] = ()
     if method == "staged":
-        between = tuple(_transfer(o, k) for k in range(1, burns))
+        of_source = source_orbits(burns, abs(initial - final))
+        between = tuple(_transfer(o, k, row) for k, row in enumerate(of_source, start=1))
     radius = WGS84_RADIUS + float(o.parking_altitude)
     engine = float(o.thrust), float(o.mass_flow), float(o.initial_mass)
-    return Sequence(method, burns, initial, final, radius, float(o.final_radius), *engine, between)
+    e = float(o.parking_eccentricity)
+    perigee = float(o.parking_argument_of_perigee) if e > 0.0 else 0.0  # a circle has none
+    return Sequence(method, burns, initial, final, radius, float(o.final_radius), *engine, between, e, perigee)
 
 
-def _transfer(o: Any, k: int) -> tuple[float, float, float]:
-    """(semi-major axis, eccentricity, plane change so far) of the orbit after burn k of the staged procedure."""
-    a, e = getattr(o, f"transfer_{k}_semi_major_axis"), getattr(o, f"transfer_{k}_eccentricity")
-    return float(a), float(e), float(getattr(o, f"transfer_{k}_plane_change"))
+def _transfer(o: Any, k: int, of_source: tuple[float, float, float]) -> tuple[float, float, float]:
+    """(semi-major axis, eccentricity, plane change so far) of the orbit after burn k: as set, or the source's."""
+    a, e = float(getattr(o, f"transfer_{k}_semi_major_axis")), float(getattr(o, f"transfer_{k}_eccentricity"))
+    change = float(getattr(o, f"transfer_{k}_plane_change"))
+    if 0.0 < a < WGS84_RADIUS:
+        raise ModelError(
+            f"transfer_{k}_semi_major_axis_km is below the Earth's radius; an orbit lies above, and 0 is the source's"
+        )
+    return a or of_source[0], of_source[1] if e < 0.0 else e, of_source[2] if change < 0.0 else change
 
 
 def tables(o: Any) -> np.ndarray:
@@ -94,6 +102,9 @@ def _rows(i: SimpleNamespace, o: SimpleNamespace, program: Program) -> tuple[dic
         "tail": o.tail_off * i.tail_off_factor,
         "accelerometer": i.accelerometer_scale_error,
     }
+    for axis in "rtn":
+        rows[f"known_{axis}"] = getattr(i, f"navigation_position_{axis}")
+        rows[f"known_v{axis}"] = getattr(i, f"navigation_velocity_{axis}")
     late = np.zeros(one.size, dtype=bool)
     for k in (1, 2, 3):
         delay = getattr(i, f"ignition_delay_{k}")
@@ -154,7 +165,7 @@ MODEL = Model(
         Event("ignite", "rising", "switch"),
         Event("next_segment", "rising", "switch"),
         Event("shut_down", "rising", "switch"),
-        Event("burn_out", "rising", "switch"),
+        Event("burn_out", "rising", "switch", rare=True),
         Event("injected", "rising", "stop"),
     ),
     observe=outcome.observe,

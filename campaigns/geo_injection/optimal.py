@@ -5,8 +5,8 @@ coasts H = q.v - p.g is zero at the start and end of every burn, and the primer 
 as at its start; so the switching function is zero at every switch.  D. F. Lawden, Optimal Trajectories for Space
 Navigation (1963), chapter 5; the source leaves this out and places its burns by rule (`staged.py`).
 
-Canonical units: radius of the parking orbit, its circular speed, initial mass.  Axes: x to the ascending node of the
-parking orbit, z normal to the final orbit.
+Canonical units: perigee radius of the parking orbit, the circular speed there, initial mass.  Axes: x to the ascending
+node of the parking orbit, z normal to the final orbit.
 """
 
 from dataclasses import dataclass, replace
@@ -22,13 +22,18 @@ _STEP = 1e-6  # of the differences of the Jacobian, over unknowns of about one
 
 @dataclass(frozen=True)
 class Problem:
-    """A sequence of burns.  thrust, flow : per initial mass;  ratio : of the radii;  plane_change [rad]."""
+    """A sequence of burns.  thrust, flow : per initial mass;  ratio : of the radii;  plane_change [rad].
+
+    eccentricity, perigee : of the parking orbit; its argument of perigee [rad], from the ascending node
+    """
 
     burns: int
     plane_change: float
     ratio: float
     thrust: float
     flow: float
+    eccentricity: float = 0.0
+    perigee: float = 0.0
 
     @property
     def exhaust(self) -> float:
@@ -69,7 +74,7 @@ def switch_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     """States [n, 2 burns, 12] at the ignitions and cut-offs of n sets of unknowns [n, 6 + 2 burns]."""
     from campaigns.geo_injection.powered_arc import fly_burns  # imports numba
 
-    y = first_states(problem.plane_change, unknowns)
+    y = first_states(problem, unknowns)
     mass = np.ones(len(unknowns))
     out = []
     for k in range(problem.burns):
@@ -92,12 +97,27 @@ def local_axes(plane_change: float, place: np.ndarray) -> np.ndarray:
     return np.stack([radial, transverse, np.stack([zero, zero - si, zero + ci], axis=1)], axis=1)
 
 
-def first_states(plane_change: float, unknowns: np.ndarray) -> np.ndarray:
+def parking_orbit(problem: Problem, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(places [n, 3], velocities [n, 3]) on the parking orbit at angles [n] from its node.
+
+    Curtis, Orbital Mechanics for Engineering Students, 3rd ed., eqs (2.45), (2.48), (2.49), the perigee radius being 1.
+    """
+    axes = local_axes(problem.plane_change, place)
+    if problem.eccentricity == 0.0:  # no perigee, whose angle would round
+        return axes[:, 0], axes[:, 1]
+    e, anomaly = problem.eccentricity, place - problem.perigee
+    along, across = 1.0 + e * np.cos(anomaly), e * np.sin(anomaly)
+    root = np.sqrt(1.0 + e)  # of the parameter
+    velocity = (across[:, None] * axes[:, 0] + along[:, None] * axes[:, 1]) / root
+    return (1.0 + e) / along[:, None] * axes[:, 0], velocity
+
+
+def first_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     """States [n, 12] at the first ignition, on the parking orbit."""
-    axes = local_axes(plane_change, unknowns[:, 0])
+    axes = local_axes(problem.plane_change, unknowns[:, 0])
     p = np.einsum("nk,nki->ni", unknowns[:, 1:4], axes)
     q = np.einsum("nk,nki->ni", unknowns[:, 4:7], axes)
-    return np.concatenate([axes[:, 0], axes[:, 1], p, q], axis=1)
+    return np.concatenate([*parking_orbit(problem, unknowns[:, 0]), p, q], axis=1)
 
 
 def coast_hamiltonian(y: np.ndarray) -> np.ndarray:
@@ -141,16 +161,26 @@ def _jacobian(problem: Problem, x: np.ndarray) -> np.ndarray:
     return (both[:n] - both[n:]).T / (2.0 * np.diag(steps))
 
 
-def solve(problem: Problem, guess: np.ndarray, first: float | None = None) -> np.ndarray | None:
+Instead = tuple[int, int]  # (condition that is left out, unknown that keeps its guess for it)
+FIRST_PLACE: Instead = (5, 0)  # H at the first ignition may be what it will
+
+
+def first_burn(problem: Problem) -> Instead:
+    """The first burn keeps its duration; the primer vectors around the coast after it may then differ."""
+    return 6 + problem.burns, 7
+
+
+def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -> np.ndarray | None:
     """Unknowns of the optimum near a guess, or None.
 
-    first : duration of the first burn, if it is given; the primer vectors around the coast after it may then differ.
-
-    A planar sequence may begin anywhere on the parking orbit, so its first place is held at the guess; one of its
-    conditions then follows from the others, which Levenberg-Marquardt does not mind.
+    A planar sequence keeps its primer vector in the plane, and may begin anywhere on a circular parking orbit, so that
+    its first place is held at the guess; one of its conditions then follows from the others, which
+    Levenberg-Marquardt does not mind.
     """
-    given = 6 + problem.burns  # the condition on the primer vectors around the first coast
-    held = 1.0 if problem.plane_change == 0.0 else 0.0
+    held = np.zeros((3, guess.size))
+    if problem.plane_change == 0.0:
+        held[[1, 2], [3, 6]] = 1.0
+        held[0, 0] = float(problem.eccentricity == 0.0)
     with np.errstate(all="ignore"):
         start = residuals(problem, guess[None])[0]
         if not np.isfinite(start).all():
@@ -158,15 +188,15 @@ def solve(problem: Problem, guess: np.ndarray, first: float | None = None) -> np
 
         def value(x: np.ndarray) -> np.ndarray:
             found = residuals(problem, x[None])[0]
-            found = np.append(np.where(np.isfinite(found), found, 1e3), held * (x[0] - guess[0]))
-            if first is not None:
-                found[given] = x[7] - first
+            found = np.append(np.where(np.isfinite(found), found, 1e3), held @ (x - guess))
+            if instead is not None:
+                found[instead[0]] = x[instead[1]] - guess[instead[1]]
             return found
 
         def slope(x: np.ndarray) -> np.ndarray:
-            found = np.vstack([np.nan_to_num(_jacobian(problem, x)), held * np.eye(1, x.size)])
-            if first is not None:
-                found[given] = np.eye(1, x.size, 7)
+            found = np.vstack([np.nan_to_num(_jacobian(problem, x)), held])
+            if instead is not None:
+                found[instead[0]] = np.eye(1, x.size, instead[1])
             return found
 
         found = least_squares(value, guess, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)

@@ -81,10 +81,16 @@ def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float)
         series = chebyshev.chebfit(nodes, primer, DEGREE)
         error = np.cross(chebyshev.chebval(nodes, series).T, primer) / (primer**2).sum(1)[:, None]
         worst = max(worst, float(np.abs(error).max()))
-        steering = np.array([chebyshev.cheb2poly(column) for column in series.T])
+        steering = np.array([_powers(column) for column in series.T])
         unit = sequence.time_unit
         found.append(Segment(float(low * unit), float((high - low) * unit), steering))
     return worst, tuple(found)
+
+
+def _powers(column: np.ndarray) -> np.ndarray:
+    """Coefficients of powers from those of a Chebyshev series; numpy drops the zeros at their end."""
+    powers = chebyshev.cheb2poly(column)
+    return np.pad(powers, (0, DEGREE + 1 - powers.size))
 
 
 Flown = tuple[float, float, np.ndarray, np.ndarray]

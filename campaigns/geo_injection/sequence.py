@@ -17,6 +17,8 @@ DESIGN = 1  # of the design's method: another number, and programs designed befo
 class Sequence:
     """radii [m], inclinations [rad], thrust [N], mass flow [kg/s], mass [kg].
 
+    parking_radius : of the parking orbit's perigee
+    parking_perigee : its argument of perigee [rad]
     between : of the staged procedure alone: (semi-major axis [m], eccentricity, plane change so far [rad]) of each
     orbit between two burns
     """
@@ -31,15 +33,17 @@ class Sequence:
     mass_flow: float
     mass: float
     between: tuple[tuple[float, float, float], ...] = ()
+    parking_eccentricity: float = 0.0
+    parking_perigee: float = 0.0
 
     @property
     def speed_unit(self) -> float:
-        """Circular speed of the parking orbit [m/s]: the unit that goes with mu = radius = mass = 1."""
+        """Circular speed at the parking radius [m/s]: the unit that goes with mu = radius = mass = 1."""
         return float(np.sqrt(MU_EARTH / self.parking_radius))
 
     @property
     def time_unit(self) -> float:
-        """Time in which the parking orbit turns by one radian [s]."""
+        """Time in which a circular orbit of the parking radius turns by one radian [s]."""
         return self.parking_radius / self.speed_unit
 
     @property
@@ -61,6 +65,8 @@ class Sequence:
             self.final_radius / self.parking_radius,
             self.thrust / self.mass / acceleration,
             self.mass_flow / self.mass * self.time_unit,
+            self.parking_eccentricity,
+            self.parking_perigee,
         )
 
     def orbits_between(self) -> tuple[Orbit, ...]:
@@ -81,3 +87,16 @@ class Sequence:
     def digest(self) -> str:
         """SHA-256 over the inputs and the design's number."""
         return sha256(json.dumps([DESIGN, self.record()], sort_keys=True).encode()).hexdigest()
+
+
+def source_orbits(burns: int, plane_change: float) -> tuple[tuple[float, float, float], ...]:
+    """Orbits between two burns of tables 2, 3 and 7: (semi-major axis [m], eccentricity, plane change so far [rad]).
+
+    plane_change : of the whole flight [rad].  Two burns change 2.5 deg of 28.5 at first and 3 deg of 55; others are put
+    on the line through both.  With three burns the source has 28.5 deg alone.
+    """
+    if burns == 2:
+        first = np.radians(2.5) + (plane_change - np.radians(28.5)) * (0.5 / 26.5)
+        return ((24_588e3, 0.7142, min(float(first), plane_change)),)
+    changes = [min(float(np.radians(degrees)), plane_change) for degrees in (1.5, 3.5)]
+    return ((8_733.1e3, 0.2456, changes[0]), (24_438e3, 0.7247, changes[1]))

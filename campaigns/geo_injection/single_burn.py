@@ -50,6 +50,20 @@ class Stage:
     step: float = 0.1
 
 
+def rise_guess(rise: float) -> tuple[float, float, float]:
+    """(burn time, radial and transverse velocity costates) of a rise (R_f - R_0) / f: eqs (18), (23) of the source.
+
+    R_f, R_0 : canonical radii at cut-off and ignition, f : thrust acceleration; the radial place costate is 1.  Made
+    for a rise within less than a quarter revolution between circles: eq. (18) has R_0 = 1 and starts the example of
+    table 1.  Eq. (23) takes the same for burns between ellipses.  Of an apogee burn to the geostationary circle, which
+    needs speed and hardly any radius, it gives a third of the time and a thrust along the radius.  The search gets
+    there all the same, but `staged.py` tries an impulse first; and the radius at the end of a burn to an ellipse is
+    not known before.
+    """
+    half = float(np.sqrt(rise))
+    return 2.0 * half, half, rise
+
+
 def circle(radius: float) -> Conditions:
     """The circle in the plane z = 0: eq. (17) for the angular momentum, and the two speeds."""
 

@@ -1,9 +1,9 @@
 """The source's procedure: burn by burn between given orbits, each of least time and centred on an apsis of the old one.
 
 The burns make one continuous flight, which the source's do not (its first burns begin on the node and its last ones
-are computed as if their apogee were there): the first burn leaves its perigee on the node, and may begin where it lasts
-shortest, since a circle has no apsis.  The next ones are centred in time on the apsis that they reach and leave the
-perigee on the node again.  Canonical units, axes as in `optimal.py`.
+are computed as if their apogee were there): the first burn leaves its perigee on the node, and begins where it lasts
+shortest if the parking orbit is a circle, which has no apsis.  The others are centred in time on the apsis that they
+reach and leave the perigee on the node again.  Canonical units, axes as in `optimal.py`.
 """
 
 from dataclasses import dataclass
@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from campaigns.geo_injection.coast import coast
-from campaigns.geo_injection.optimal import Problem
-from campaigns.geo_injection.single_burn import Burn, Stage, circle, fly_shortest, orbit
+from campaigns.geo_injection.optimal import Problem, parking_orbit
+from campaigns.geo_injection.single_burn import Burn, Stage, circle, fly_shortest, orbit, rise_guess
+from mc_engine.errors import ModelError
 
 
 @dataclass(frozen=True)
@@ -35,13 +36,21 @@ class StagedBurn:
 def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
     """The burns over the given intermediate orbits, one fewer than burns; ModelError names the burn that fails."""
     found: list[StagedBurn] = []
-    mass, reference, lead = 1.0, _node(problem.plane_change), 0.0
+    circle_first = problem.eccentricity == 0.0
+    if not circle_first and abs(np.sin(0.5 * problem.perigee)) > 1e-9:
+        raise ModelError(
+            "the staged procedure has all perigees on the ascending node: an elliptic parking orbit needs "
+            'parking_argument_of_perigee_deg = 0, or method = "optimal"'
+        )
+    places, velocities = parking_orbit(problem, np.zeros(1))
+    mass, reference, lead = 1.0, np.concatenate([places[0], velocities[0]]), 0.0
     for k in range(problem.burns):
         last = k == problem.burns - 1
         reached = circle(problem.ratio) if last else orbit(between[k].a, between[k].e, between[k].inclination)
-        stage = Stage(reference, mass, problem.thrust, problem.flow, reached, "free" if k == 0 else "centred")
+        placing = "free" if k == 0 and circle_first else "centred"
+        stage = Stage(reference, mass, problem.thrust, problem.flow, reached, placing)
         wanted = -np.sqrt(1.0 / problem.ratio) if last else _perigee_speed(between[k])
-        burn = _shortest(stage, wanted, 0.0 if last else between[k].inclination)
+        burn = _last(stage, wanted, problem) if last else _shortest(stage, wanted, between[k].inclination)
         ignition = 0.0 if k == 0 else lead + burn.ignition
         found.append(StagedBurn(ignition, burn))
         mass -= problem.flow * burn.duration
@@ -50,11 +59,6 @@ def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
             wait, reference = _next_apsis(burn.end[:6], at_apogee)
             lead = ignition + burn.duration + wait
     return found
-
-
-def _node(plane_change: float) -> np.ndarray:
-    """Place and velocity on the parking orbit at its ascending node."""
-    return np.array([1.0, 0.0, 0.0, 0.0, np.cos(plane_change), np.sin(plane_change)])
 
 
 def _perigee_speed(one: Orbit) -> float:
@@ -70,6 +74,26 @@ def _shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
     primer = change / size
     rate = np.cross(np.cross(r, v) / (r @ r), primer)  # the thrust turns with the local horizon
     return fly_shortest(stage, primer - 0.5 * duration * rate, rate, duration, -0.5 * duration)
+
+
+def _last(stage: Stage, wanted: float, problem: Problem) -> Burn:
+    """The burn into the final circle: guessed as an impulse or, if nothing is found so, by eq. (23)."""
+    try:
+        return _shortest(stage, wanted, 0.0)
+    except ModelError:
+        r, v = stage.reference[:3], stage.reference[3:]
+        r0 = float(np.linalg.norm(r))
+        if r0 >= problem.ratio:  # no rise: eq. (23) has no real root
+            raise
+        return rising(stage, problem.ratio, r / r0, v / np.linalg.norm(v))
+
+
+def rising(stage: Stage, radius: float, up: np.ndarray, along: np.ndarray) -> Burn:
+    """The burn to a radius, guessed by eq. (23) in the radial and transverse directions of the apsis."""
+    acceleration = stage.thrust / stage.mass
+    r0 = float(np.linalg.norm(stage.reference[:3]))
+    duration, radial, transverse = rise_guess((radius - r0) / acceleration)
+    return fly_shortest(stage, radial * up + transverse * along, -up - radial * along, duration, -0.5 * duration)
 
 
 def _next_apsis(state: np.ndarray, apogee: bool) -> tuple[float, np.ndarray]:

@@ -38,21 +38,6 @@ def best_corrections(a, b, c, running, weight, terminal, sigma) -> Corrections:
     return Corrections(gains, offsets, costs)
 
 
-def mean_cost(a, b, c, running, weight, terminal, sigma, corrections, first) -> float:
-    """The mean cost of any such corrections from the state `first`, by its first and second moments."""
-    mean, second, cost = np.array(first, dtype=np.float64), np.outer(first, first), 0.0
-    for k in range(len(a)):
-        gain, offset = corrections.gains[k], corrections.offsets[k]
-        u2 = gain @ second @ gain + 2.0 * offset * gain @ mean + offset**2
-        cost += np.trace(running @ second) + weight * u2
-        closed, push = a[k] - np.outer(b[k], gain), c[k] - b[k] * offset
-        cross = np.outer(closed @ mean, push)
-        second = closed @ second @ closed.T + cross + cross.T + np.outer(push, push)
-        second = second + sigma**2 * u2 * np.outer(b[k], b[k])
-        mean = closed @ mean + push
-    return float(cost + np.trace(terminal @ second))
-
-
 def planned_cost(b, costs, u, sigma) -> float:
     """Mean cost that the execution errors of planned corrections u [n] leave, the later ones answering the earlier."""
     return float(sum(sigma**2 * u[k] ** 2 * b[k] @ costs[k + 1] @ b[k] for k in range(len(u))))

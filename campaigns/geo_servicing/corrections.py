@@ -19,7 +19,7 @@ from campaigns.geo_servicing.dynamics import (
     longitudes,
 )
 from campaigns.geo_servicing.inspection import PAIRS, next_coast, next_pair, relative_orbit, velocity_change
-from campaigns.geo_servicing.navigation import FILTERED, burnt, estimate_of
+from campaigns.geo_servicing.navigation import FILTERED, RAW, Estimate, burnt, estimate_of
 from mc_engine.lanes import any_lane, atan, exp, maximum, physics, rint, sincos, sqrt, where
 from mc_engine.physics.frames import orbital_axes
 from mc_engine.physics.orbital_elements import equinoctial
@@ -53,6 +53,7 @@ def start(p, o):
         due, mode, zero, zero, zero, zero, zero, zero, zero,
         gone, gone, gone, gone, gone, gone, gone, gone, gone,
         zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero,
+        zero, zero, zero, zero,
     )  # fmt: skip
 
 
@@ -160,7 +161,18 @@ def learnt(m, p, o, cut):
         size = where(cut, abs(m.dv), 0.0)
         outward, ahead = size * m.outward / p.thrust, size * m.ahead / p.thrust
         e = burnt(e, outward, ahead - where(cut, m.dv, 0.0), size, o.assumed_thrust, o.assumed_pointing)
+    elif o.navigation == RAW:
+        e = fixed_anew(e, m, cut)
     return e
+
+
+@physics
+def fixed_anew(e, m, cut):
+    """A fix of its own where `cut` holds: what is decided after a burn does not share the errors of its ignition."""
+    return Estimate(
+        where(cut, m.after_r, e.r), where(cut, m.after_s, e.s), where(cut, m.after_u, e.u), where(cut, m.after_w, e.w),
+        e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww,
+    )  # fmt: skip
 
 
 @physics
@@ -169,7 +181,7 @@ def inspection_coast(s, m, e, cut, p, o):
     x = relative_orbit(s, e)
     if o.inspection_law == PAIRS:
         second = where(cut, 1.0 - m.second, 0.0)
-        coast, found = where(second > 0.5, 0.5, next_pair(x, p)), 1.0 + 0.0 * second
+        coast, found = where(second > 0.5, 0.5, next_pair(x, p, o)), 1.0 + 0.0 * second
     else:
         coast, found = next_coast(x, p, o)
         second = 0.0 * coast
@@ -210,7 +222,8 @@ def switch(t, s, m, p, o, hit):
         due, mode, m.burns + where(cut, 1.0, 0.0),
         where(cut, 0.0, outward), where(cut, 0.0, ahead), where(cut, 0.0, across), dv,
         where(hit.settle > 0.5, 1.0, m.settled), second, *end,
-        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww, m.d1, m.d2, m.d3,
+        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww,
+        m.after_r, m.after_s, m.after_u, m.after_w, m.d1, m.d2, m.d3,
     )  # fmt: skip
 
 

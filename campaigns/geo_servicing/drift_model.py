@@ -52,11 +52,6 @@ def two_impulses(y, v, first, second):
     return u1, -v - u1
 
 
-def corrections_for(e_first, e_last, step):
-    """Number of corrections that bring the eccentricity down, each by `step` at most."""
-    return int((e_first - e_last) / step) + 1
-
-
 def largest_last(y_tolerance, v_tolerance, e_change, sigma, rest):
     """Largest last correction [deg/rev] whose execution error leaves the end within its tolerances (3 sigma).
 

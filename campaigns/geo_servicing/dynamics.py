@@ -42,12 +42,14 @@ Parameters = namedtuple(  # type: ignore[misc]
 # make a pair
 # end_...: at the end of the last phasing burn, and a sidereal day later
 # r, s, u, w: error of the estimate, place outward and ahead [m], velocity alike [m/s]; p..: its covariance as the
-# filter knows it; d1, d2, d3: fresh normal deviates for the next burn
+# filter knows it; after_...: error of the single fix that follows the next burn; d1, d2, d3: fresh normal deviates for
+# that burn
 Memory = namedtuple(
     "Memory",
     "due mode burns outward ahead across dv settled second "
     "end_time end_true end_mean end_drift end_e end_inclination end_sum day_mean day_drift "
-    "r s u w prr prs pru prw pss psu psw puu puw pww d1 d2 d3",
+    "r s u w prr prs pru prw pss psu psw puu puw pww "
+    "after_r after_s after_u after_w d1 d2 d3",
 )
 
 # settings arrive as numbers: places in the lists of words of `inputs.py`

@@ -13,7 +13,6 @@ from mc_engine.physics.orbital_elements import equinoctial
 # along: mean distance ahead of the target [m], drift of it [m/rev]; e: length of the difference of the eccentricity
 # vectors, phase: anomaly on the relative ellipse [rad], 0 where the module is lowest
 Relative = namedtuple("Relative", "along drift e phase")
-SHORTEST = 21_600.0 / SIDEREAL_DAY  # rev: coasts last six hours at least
 PAIRS = 1.0
 LAST = 0.25  # rev by which a coast may fall short of its whole revolutions
 
@@ -78,7 +77,7 @@ def wait_until(x, phase, least):
 @physics
 def candidate(x, phase, sign, p, o):
     """(coast [rev], 1 if the law asks there for a correction of this sign)."""
-    least = maximum(SHORTEST, p.coast - LAST)
+    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast - LAST)
     wait = wait_until(x, phase, least)
     u = correction(x.along - p.nominal + x.drift * wait, x.drift, p.coast, p.chi1, p.chi2, p.weight, o.assumed_thrust)
     return wait, where(u * sign > 0.0, 1.0, 0.0)
@@ -100,9 +99,9 @@ def next_coast(x, p, o):
 
 
 @physics
-def next_pair(x, p):
+def next_pair(x, p, o):
     """Coast [rev] to the first burn of a pair: to the next end of the relative ellipse that is far enough away."""
-    least = maximum(SHORTEST, p.coast - LAST)
+    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast - LAST)
     return minimum(wait_until(x, 0.0, least), wait_until(x, 0.5 * TURN, least))
 
 

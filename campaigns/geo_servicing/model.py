@@ -1,5 +1,6 @@
 """The servicing model as the engine sees it: inputs, what each case starts from, tables, and the MODEL record."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,8 +11,10 @@ from campaigns.geo_servicing import corrections, dynamics, figures, navigation, 
 from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, R0
 from campaigns.geo_servicing.first_state import first_states
 from campaigns.geo_servicing.inputs import GEOMETRIES, NAVIGATION, PARAMETERS, SETTINGS
-from campaigns.geo_servicing.phasing_plan import LONGEST, plan_of
+from campaigns.geo_servicing.phasing_plan import plan_of
+from campaigns.geo_servicing.plan_cache import remembered
 from mc_engine.errors import ModelError
+from mc_engine.kernel import source_digest
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.physics.geopotential import COLUMNS, harmonics_rows, harmonics_table
@@ -62,8 +65,9 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
         "aim": sidereal + o.target_longitude,
         "thrust_noise": i.thrust_noise,
         "pointing_noise": i.pointing_noise,
-        "nav_position": i.nav_position,
-        "nav_velocity": i.nav_velocity,
+        # in the inspection both craft's fixes count, in the phasing there is one
+        "nav_position": np.hypot(i.nav_position, np.where(two, i.target_nav_position, 0.0)),
+        "nav_velocity": np.hypot(i.nav_velocity, np.where(two, i.target_nav_velocity, 0.0)),
     }
     for k in range(1, dynamics.BURNS + 1):
         rows[f"thrust_{k}"] = i.thrust_error + getattr(i, f"burn_{k}_thrust_error")
@@ -111,7 +115,10 @@ def tables(o: Any) -> np.ndarray:
     plan = plan_table.no_plan()
     if o.phase == PHASING:
         first, sun_moon = _nominal(o)
-        plan = plan_of(o, np.concatenate([plan, rows, sun_moon.ravel()]), first)
+        behind = np.concatenate([plan, rows, sun_moon.ravel()])
+        inputs = np.concatenate([[getattr(o, one.symbol) for one in SETTINGS], list(vars(first).values()), behind])
+        sources = source_digest(replace(MODEL, reference="campaigns.geo_servicing"), None)
+        plan = remembered(inputs, sources, lambda: plan_of(o, behind, first))
     return np.concatenate([plan, rows])
 
 
@@ -119,7 +126,8 @@ def _nominal(o: Any) -> tuple[SimpleNamespace, np.ndarray]:
     """(kernel parameters of the case without errors, nodes of Sun and Moon for it)."""
     inputs = SimpleNamespace(**{one.symbol: np.array([one.default * one.si_factor]) for one in PARAMETERS})
     settings = SimpleNamespace(**{one.symbol: np.array([getattr(o, one.symbol)]) for one in SETTINGS})
-    settings.duration = np.maximum(settings.duration, LONGEST + 2.0 * _DAY)  # a plan may end after the flight
+    # a plan may end after the flight
+    settings.duration = np.maximum(settings.duration, settings.longest_transfer + 2.0 * _DAY)
     refusals = Refusals.none(1)
     columns = prepare(inputs, settings, refusals)
     if refusals.mask.any():
@@ -159,10 +167,10 @@ MODEL = Model(
     events=corrections.events,
     switch=corrections.switch,
     event_list=(
-        Event("due", "rising", "switch"),
-        Event("settle", "rising", "switch"),
-        Event("penumbra", "either", "switch"),
-        Event("umbra", "either", "switch"),
+        Event("due", "rising", "switch", rare=True),
+        Event("settle", "rising", "switch", rare=True),
+        Event("penumbra", "either", "switch", rare=True),
+        Event("umbra", "either", "switch", rare=True),
     ),
     observe=outcome.observe,
     evaluate=outcome.evaluate,

@@ -116,11 +116,13 @@ def estimate_of(m):
 
 @physics
 def control(t, s, m, p, o, draws):
-    """A fix, if there are any, and fresh deviates for the burn that may come before the next."""
+    """A fix, if there are any, and what a burn before the next needs: fresh deviates, and the single fix behind it."""
     n1, n2 = normal_pair(draws, 0)
     n3, n4 = normal_pair(draws, 1)
     d1, d2 = normal_pair(draws, 2)
     d3, _ = normal_pair(draws, 3)
+    n5, n6 = normal_pair(draws, 4)
+    n7, n8 = normal_pair(draws, 5)
     e = estimate_of(m)
     if o.navigation == RAW:
         e = single_fix(n1, n2, n3, n4, p.nav_position, p.nav_velocity)
@@ -132,7 +134,8 @@ def control(t, s, m, p, o, draws):
     return Memory(
         m.due, m.mode, m.burns, m.outward, m.ahead, m.across, m.dv, m.settled, m.second,
         m.end_time, m.end_true, m.end_mean, m.end_drift, m.end_e, m.end_inclination, m.end_sum, m.day_mean, m.day_drift,
-        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww, d1, d2, d3,
+        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww,
+        p.nav_position * n5, p.nav_position * n6, p.nav_velocity * n7, p.nav_velocity * n8, d1, d2, d3,
     )  # fmt: skip
 
 

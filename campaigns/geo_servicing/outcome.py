@@ -25,6 +25,8 @@ QUANTITIES = (
     Field("range_m", "m", "distance of the two craft"),
     Field("settled_range_m", "m", "the same once settle_time_days have passed; 0 before"),
     Field("settled_nearness_m", "m", "minus the range once settle_time_days have passed; far below before"),
+    Field("settled_along_track_m", "m", "module ahead of the target once settle_time_days have passed"),
+    Field("settled_radial_m", "m", "module above the target once settle_time_days have passed"),
     Field("relative_drift_m", "m", "drift of the module past the target in a revolution, by osculating elements"),
     Field("relative_eccentricity", "", "length of the difference of the eccentricity vectors"),
     Field("corrections", "", "burns so far"),
@@ -36,29 +38,48 @@ EXTREMA = (
     Extremum("settled_far", "settled_range_m"),
     Extremum("settled_near", "settled_nearness_m"),
 )
+
+
+def _some(name: str, unit: str, description: str) -> Field:
+    """A metric that not every phase has."""
+    return Field(name, unit, description, sometimes=True)
+
+
 METRICS = (
-    Field("longitude_deviation_deg", "deg", "longitude less the required one at the end of the transfer"),
-    Field("mean_longitude_deviation_deg", "deg", "the same of the osculating mean longitude"),
-    Field("daily_mean_longitude_deviation_deg", "deg", "mean of the longitude deviation over the sidereal day after"),
-    Field("drift_rate_deg_rev", "deg/rev", "drift by the osculating period at the end of the transfer"),
-    Field("actual_drift_rate_deg_rev", "deg/rev", "what the mean longitude changes in the sidereal day after"),
-    Field("period_error_s", "s", "osculating period less the sidereal day at the end of the transfer"),
-    Field("actual_period_error_s", "s", "the same by the actual drift"),
-    Field("eccentricity", "", "osculating eccentricity at the end of the transfer"),
+    _some(
+        "longitude_deviation_deg",
+        "deg",
+        "longitude less the required one at the end of the transfer, or of a flight without",
+    ),
+    _some("mean_longitude_deviation_deg", "deg", "the same of the osculating mean longitude"),
+    _some("daily_mean_longitude_deviation_deg", "deg", "mean of the longitude deviation over the sidereal day after"),
+    _some(
+        "drift_rate_deg_rev",
+        "deg/rev",
+        "drift by the osculating period at the end of the transfer, or of a flight without",
+    ),
+    _some("actual_drift_rate_deg_rev", "deg/rev", "what the mean longitude changes in the sidereal day after"),
+    _some(
+        "period_error_s",
+        "s",
+        "osculating period less the sidereal day at the end of the transfer, or of a flight without",
+    ),
+    _some("actual_period_error_s", "s", "the same by the actual drift"),
+    _some("eccentricity", "", "osculating eccentricity at the end of the transfer, or of a flight without"),
     Field("peak_eccentricity", "", "largest osculating eccentricity of the flight"),
-    Field("inclination_deg", "deg", "osculating inclination at the end of the transfer"),
+    _some("inclination_deg", "deg", "osculating inclination at the end of the transfer, or of a flight without"),
     Field("delta_v_m_s", "m/s", "characteristic velocity"),
-    Field("transfer_time_s", "s", "end of the last burn of the phasing"),
+    _some("transfer_time_s", "s", "end of the last burn of the phasing"),
     Field("corrections", "", "burns"),
     Field("final_longitude_deviation_deg", "deg", "longitude less the required one at the end of the flight"),
     Field("final_eccentricity", "", "osculating eccentricity at the end of the flight"),
-    Field("min_range_m", "m", "smallest range"),
-    Field("max_range_m", "m", "largest range"),
-    Field("settled_min_range_m", "m", "smallest range after settle_time_days"),
-    Field("settled_max_range_m", "m", "largest range after settle_time_days"),
-    Field("relative_eccentricity", "", "length of the difference of the eccentricity vectors at the end"),
-    Field("relative_drift_m", "m", "drift of the module past the target in a revolution, at the end"),
-    Field("steady", "", "1 if the settled range stayed within range_low_m and range_high_m"),
+    _some("min_range_m", "m", "smallest range"),
+    _some("max_range_m", "m", "largest range"),
+    _some("settled_min_range_m", "m", "smallest range after settle_time_days"),
+    _some("settled_max_range_m", "m", "largest range after settle_time_days"),
+    _some("relative_eccentricity", "", "length of the difference of the eccentricity vectors at the end"),
+    _some("relative_drift_m", "m", "drift of the module past the target in a revolution, at the end"),
+    _some("steady", "", "1 if the settled range stayed within range_low_m and range_high_m"),
 )
 Quantities = namedtuple("Quantities", [field.symbol for field in QUANTITIES])  # type: ignore[misc]
 Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]
@@ -71,6 +92,12 @@ EXACT = Error(0.0, 0.0, 0.0, 0.0)  # what navigation would be without its errors
 def period_error(drift):
     """Period less the sidereal day [s] of a drift [rad/rev]."""
     return SIDEREAL_DAY / (1.0 + drift / TURN) - SIDEREAL_DAY
+
+
+@physics
+def inclination_of(elements):
+    """Inclination [rad] of equinoctial elements."""
+    return 2.0 * atan(sqrt(elements.q * elements.q + elements.p * elements.p))
 
 
 @physics
@@ -101,7 +128,7 @@ def observe(t, s, m, p, o):
         drift,
         period_error(drift),
         sqrt(x.k * x.k + x.h * x.h),
-        2.0 * atan(sqrt(x.q * x.q + x.p * x.p)),
+        inclination_of(x),
         m.ahead,
         p.exhaust * log(p.mass / s.mass),
         pair.along,
@@ -109,6 +136,8 @@ def observe(t, s, m, p, o):
         pair.range,
         where(settled, pair.range, 0.0),
         where(settled, -pair.range, -FAR),
+        where(settled, pair.along, float("nan")),
+        where(settled, pair.radial, float("nan")),
         pair.drift,
         pair.e,
         m.burns,
@@ -119,27 +148,31 @@ def observe(t, s, m, p, o):
 def evaluate(t, s, m, p, o, best, when):
     """The metrics in the order of METRICS, at the end."""
     gone = float("nan")
-    true, _, x = longitudes(t, s, p)
+    true, mean, x = longitudes(t, s, p)
+    final_e = sqrt(x.k * x.k + x.h * x.h)
     pair = pair_of(s, m, p, o)
     phasing, two = o.phase == PHASING, o.phase == INSPECTION
+    end = (m.end_true, m.end_mean, m.end_drift, m.end_e, m.end_inclination)
+    if not phasing:  # no transfer: where the module is at the end of the flight
+        end = (true, mean, drift_of(x.a), final_e, inclination_of(x))
     settled_near, settled_far = -best.settled_near, best.settled_far
     steady = (m.settled > 0.5) & (settled_near >= o.range_low) & (settled_far <= o.range_high)
     return Metrics(
-        m.end_true,
-        m.end_mean,
+        end[0],
+        end[1],
         m.day_mean,
-        m.end_drift,
+        end[2],
         m.day_drift,
-        period_error(m.end_drift),
+        period_error(end[2]),
         period_error(m.day_drift),
-        m.end_e,
+        end[3],
         best.eccentricity,
-        m.end_inclination,
+        end[4],
         p.exhaust * log(p.mass / s.mass),
         m.end_time,
-        m.burns if phasing or two else gone + m.burns,
+        m.burns,
         true,
-        sqrt(x.k * x.k + x.h * x.h),
+        final_e,
         best.near if two else gone + true,
         best.far if two else gone + true,
         settled_near if two else gone + true,

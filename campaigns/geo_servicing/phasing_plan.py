@@ -1,7 +1,7 @@
 """The phasing plan: the source's corrections, or designed ones, with the gains that answer deviations.
 
 Design: corrections and coasts of the drift model that leave the least cost, then the flight with finite burns in the
-full dynamics tells what the model lacks at the end, and so on; four or five passes settle.  NumPy and SciPy, once for
+full dynamics tells what the model lacks at the end, and so on; two or three passes settle.  NumPy and SciPy, once for
 all cases of the same settings.
 """
 
@@ -13,18 +13,15 @@ from scipy.optimize import minimize
 
 from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.bellman import Corrections, best_corrections, planned_cost
-from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, E_PER_DV, braking, fastest, largest_last
+from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, E_PER_DV, after_correction, braking, fastest, largest_last
 from campaigns.geo_servicing.dynamics import SIDEREAL_DAY, TURN
 from campaigns.geo_servicing.inputs import AIMS, SCHEDULES
-from campaigns.geo_servicing.planned_flight import Craft, End, fly_plan
+from campaigns.geo_servicing.planned_flight import Craft, End, Flight, fly_plan
 from mc_engine.errors import ModelError
 
 # Coasts and burns of the source's corrections [s], and the signs that bring the drift to zero.
 PUBLISHED = ((123_753.6, 7_726.3, 1.0), (37_692.0, 4_569.1, 1.0), (24_264.7, 1_290.3, -1.0))
-FIRST_COAST, LEAST_COAST, LONGEST = 43_200.0, 21_600.0, 864_000.0  # s
-Y_TOLERANCE, PERIOD_TOLERANCE, E_TOLERANCE = np.radians(0.05), 5.0, 4e-4
-V_TOLERANCE = TURN * PERIOD_TOLERANCE / SIDEREAL_DAY  # rad/rev
-E_PLANNED = 0.6 * E_TOLERANCE  # leaves the dispersions of thrust and pointing their part
+E_PLANNED = 0.6  # of the tolerance: leaves the dispersions of thrust and pointing their part
 PASSES = 6
 SETTLED = 1e-3  # of the tolerances: a plan is done when its flight ends as near as that to what was aimed at
 DV_OF_COST = 0.1  # m/s that one unit of expected cost is worth: a plan may spend so much to be surer of its end
@@ -36,6 +33,27 @@ class Plan:
 
     coasts: np.ndarray
     dv: np.ndarray
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a plan must keep.
+
+    y, v, e : tolerances of the end [rad, rad/rev, 1];  first, least, longest : coasts and whole transfer [rev]
+    last : largest last correction [rad/rev]
+    """
+
+    y: float
+    v: float
+    e: float
+    first: float
+    least: float
+    longest: float
+    last: float
+
+    def coasts(self, n: int) -> np.ndarray:
+        """Least coasts before n corrections [rev]."""
+        return np.array([self.first, *[self.least] * (n - 1)])
 
 
 @dataclass(frozen=True)
@@ -53,9 +71,12 @@ def plan_of(o: Any, tables: np.ndarray, first: Any) -> np.ndarray:
     tables : of the model behind the plan;  first : the nominal case's kernel parameters
     """
     craft = Craft(o, tables, first)
-    plan = published_plan(craft) if SCHEDULES[int(o.schedule)] == "published" else design(o, craft)
-    flight = fly_plan(craft, plan.coasts, plan.dv)
-    gains = gains_of(craft, plan, flight.ignition, float(o.assumed_thrust)).gains
+    if SCHEDULES[int(o.schedule)] == "published":
+        plan = published_plan(craft)
+        flight = fly_plan(craft, plan.coasts, plan.dv)
+    else:
+        plan, flight = design(o, craft)
+    gains = gains_of(craft, plan, limits_of(o), float(o.assumed_thrust)).gains
     return plan_table.plan_rows(flight.ignition, plan.dv, flight.longitude, flight.drift, gains)
 
 
@@ -73,15 +94,16 @@ def middles(craft: Craft, plan: Plan) -> tuple[np.ndarray, float]:
 
 
 def modelled(craft: Craft, plan: Plan, lacking: Lacking) -> End:
-    """The end of the plan by the drift model: impulses in the middles of the burns."""
+    """The end of the plan by the drift model: impulses in the middles of the burns, the mean pull between them."""
     when, end = middles(craft, plan)
-    u = DRIFT_PER_DV * plan.dv
+    y, v = after_correction(craft.y, craft.v, 0.0, when[0], *craft.pull)
+    e = craft.e
     check = end + 0.5  # the longitude that counts is the mean of the day after
-    y = craft.y + craft.v * check + (u * (check - when)).sum() + lacking.y
-    before = craft.y + craft.v * when + np.array([(u[:k] * (when[k] - when[:k])).sum() for k in range(len(u))])
-    direction = np.exp(1j * (craft.aim + TURN * when + before))
-    e = craft.e + (E_PER_DV * plan.dv * direction).sum() + lacking.e
-    return End(y, craft.v + u.sum() + lacking.v, e, end)
+    for dv, now, following in zip(plan.dv, when, [*when[1:], check], strict=True):
+        e = e + E_PER_DV * dv * np.exp(1j * (craft.aim + TURN * now + y))
+        y, v = after_correction(y, v, DRIFT_PER_DV * dv, following - now, *craft.pull)
+    # what the drift will be is that of the longitude, which the outward pull joins
+    return End(y + lacking.y, v + craft.pull[1] + lacking.v, e + lacking.e, end)
 
 
 def steps(craft: Craft, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
@@ -93,37 +115,36 @@ def steps(craft: Craft, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     return a, np.column_stack([following - when, np.ones(len(when))])
 
 
-def gains_of(craft: Craft, plan: Plan, ignition: np.ndarray, sigma: float) -> Corrections:
+def gains_of(craft: Craft, plan: Plan, limits: Limits, sigma: float) -> Corrections:
     """Gains for deviations from the plan; the end counts in thirds of its tolerances."""
     a, b = steps(craft, plan)
-    terminal = np.diag([(3.0 / Y_TOLERANCE) ** 2, (3.0 / V_TOLERANCE) ** 2])
+    terminal = np.diag([(3.0 / limits.y) ** 2, (3.0 / limits.v) ** 2])
     return best_corrections(a, b, np.zeros_like(b), np.zeros((2, 2)), 1e-6 * terminal[1, 1], terminal, sigma)
 
 
-def design(o: Any, craft: Craft) -> Plan:
-    """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity."""
-    lacking = Lacking()
-    plan = None
+def design(o: Any, craft: Craft) -> tuple[Plan, Flight]:
+    """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity; their flight."""
+    limits, lacking, plan = limits_of(o), Lacking(), None
     for _ in range(PASSES):
-        plan = _best(o, craft, lacking, [plan] if plan else first_approximations(o, craft))
-        flown = fly_plan(craft, plan.coasts, plan.dv).end
+        plan = _best(o, craft, limits, lacking, [plan] if plan else first_approximations(o, craft, limits))
+        flight = fly_plan(craft, plan.coasts, plan.dv)
+        flown = flight.end
         wrong = modelled(craft, plan, lacking)
         lacking = Lacking(lacking.y + flown.y - wrong.y, lacking.v + flown.v - wrong.v, lacking.e + flown.e - wrong.e)
-        if abs(flown.y) < SETTLED * Y_TOLERANCE and abs(flown.v - o.aim_drift) < SETTLED * V_TOLERANCE:
-            return plan
+        if abs(flown.y) < SETTLED * limits.y and abs(flown.v - o.aim_drift) < SETTLED * limits.v:
+            return plan, flight
     raise ModelError("the phasing plan does not settle; another number of corrections, or more time, may do")
 
 
-def first_approximations(o: Any, craft: Craft) -> list[Plan]:
+def first_approximations(o: Any, craft: Craft, limits: Limits) -> list[Plan]:
     """Plans to start the search from: the source's profiles at several lengths of the coasts."""
     n = int(o.planned_corrections)
-    last = np.radians(_last(o))
     plans = []
     for longer in (0.0, 0.25, 0.5):
-        shortest = np.full(n, LEAST_COAST / SIDEREAL_DAY + longer)
-        shortest[0] = FIRST_COAST / SIDEREAL_DAY
+        shortest = limits.coasts(n)
+        shortest[1:] += longer
         profile = braking if AIMS[int(o.aim)] == "fuel" else fastest
-        u, t = profile(craft.y, craft.v, last, shortest)
+        u, t = profile(craft.y, craft.v, limits.last, shortest)
         dv = u / DRIFT_PER_DV
         burns = craft.burn_times(dv)
         coasts = t * SIDEREAL_DAY - 0.5 * (burns + np.concatenate([[0.0], burns[:-1]]))
@@ -131,22 +152,25 @@ def first_approximations(o: Any, craft: Craft) -> list[Plan]:
     return plans
 
 
-def _last(o: Any) -> float:
-    """Largest last correction [deg/rev]."""
-    y, v = np.degrees(Y_TOLERANCE), np.degrees(V_TOLERANCE)
-    return largest_last(y, v, E_TOLERANCE, max(float(o.assumed_thrust), 1e-6), 0.5)
+def limits_of(o: Any) -> Limits:
+    """The limits that the settings ask for."""
+    v = TURN * float(o.period_tolerance) / SIDEREAL_DAY
+    y, e, sigma = float(o.longitude_tolerance), float(o.eccentricity_tolerance), max(float(o.assumed_thrust), 1e-6)
+    last = np.radians(largest_last(np.degrees(y), np.degrees(v), e, sigma, 0.5))
+    first, least, longest = (float(one) / SIDEREAL_DAY for one in (o.first_coast, o.least_coast, o.longest_transfer))
+    return Limits(y, v, e, first, least, longest, float(o.largest_last) or float(last))
 
 
-def _best(o: Any, craft: Craft, lacking: Lacking, starts: list[Plan]) -> Plan:
+def _best(o: Any, craft: Craft, limits: Limits, lacking: Lacking, starts: list[Plan]) -> Plan:
     """The plan of least cost among those that the starts lead to."""
-    found = [_improved(o, craft, lacking, start) for start in starts]
+    found = [_improved(o, craft, limits, lacking, start) for start in starts]
     good = [one for one in found if one is not None]
     if not good:
         raise ModelError("no phasing plan meets the limits on coasts, time, last correction and eccentricity")
     return min(good, key=lambda pair: pair[0])[1]
 
 
-def _improved(o: Any, craft: Craft, lacking: Lacking, start: Plan) -> tuple[float, Plan] | None:
+def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Plan) -> tuple[float, Plan] | None:
     """(cost, plan) of least cost near a start; None where the limits cannot be met from there."""
     n = len(start.dv)
     signs = np.sign(start.dv)
@@ -159,29 +183,27 @@ def _improved(o: Any, craft: Craft, lacking: Lacking, start: Plan) -> tuple[floa
     def cost(z):
         one = plan(z)
         _, b = steps(craft, one)
-        corrections = gains_of(craft, one, np.empty(0), sigma)
+        corrections = gains_of(craft, one, limits, sigma)
         spread = planned_cost(b, corrections.costs, DRIFT_PER_DV * one.dv, sigma)
         spent = (signs * one.dv).sum() + DV_OF_COST * spread
         return modelled(craft, one, lacking).time + 0.02 * spent if sooner else spent
 
     def equal(z):
         end = modelled(craft, plan(z), lacking)
-        return np.array([end.y / Y_TOLERANCE, (end.v - o.aim_drift) / V_TOLERANCE])
+        return np.array([end.y / limits.y, (end.v - o.aim_drift) / limits.v])
 
     def inside(z):
         end = modelled(craft, plan(z), lacking)
-        return np.array([1.0 - abs(end.e) ** 2 / E_PLANNED**2, LONGEST / SIDEREAL_DAY - end.time])
+        return np.array([1.0 - abs(end.e) ** 2 / (E_PLANNED * limits.e) ** 2, limits.longest - end.time])
 
-    least = np.full(n, LEAST_COAST / SIDEREAL_DAY)
-    least[0] = FIRST_COAST / SIDEREAL_DAY
     largest = np.full(n, 20.0)
-    largest[-1] = abs(np.radians(_last(o)) / DRIFT_PER_DV)
-    bounds = [(low, LONGEST / SIDEREAL_DAY) for low in least]
+    largest[-1] = abs(limits.last / DRIFT_PER_DV)
+    bounds = [(low, limits.longest) for low in limits.coasts(n)]
     bounds += [(0.0, size) if sign > 0.0 else (-size, 0.0) for sign, size in zip(signs, largest, strict=True)]
-    limits = ({"type": "eq", "fun": equal}, {"type": "ineq", "fun": inside})
+    conditions = ({"type": "eq", "fun": equal}, {"type": "ineq", "fun": inside})
     first = np.concatenate([start.coasts / SIDEREAL_DAY, start.dv])
     found = minimize(
-        cost, first, method="SLSQP", bounds=bounds, constraints=limits, options={"maxiter": 300, "ftol": 1e-10}
+        cost, first, method="SLSQP", bounds=bounds, constraints=conditions, options={"maxiter": 300, "ftol": 1e-10}
     )
     good = np.abs(equal(found.x)).max() < 1e-6 and inside(found.x).min() > -1e-6
     return (float(found.fun), plan(found.x)) if good else None

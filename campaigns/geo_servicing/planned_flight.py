@@ -10,7 +10,10 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from campaigns.geo_servicing.corrections import drift_of
-from campaigns.geo_servicing.dynamics import SIDEREAL_DAY, State, longitudes, rhs
+from campaigns.geo_servicing.drift_model import perturbation_coefficients
+from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, State, field, longitudes, rhs
+from mc_engine.physics.gravity import point_mass
+from mc_engine.physics.sun_moon import ephemeris
 
 _TOLERANCES = {"rtol": 1e-9, "atol": [*[1e-3] * 3, *[1e-7] * 3, 1e-6, *[1.0] * 6, 1e-3]}
 
@@ -59,6 +62,20 @@ class Craft:
         self.v = drift_of(elements.a)
         self.e = complex(elements.k, elements.h)
         self.aim = first.aim
+        self.pull = self.mean_pull()
+
+    def mean_pull(self) -> tuple[float, float]:
+        """(b_s, b_r) of (3.46), of the perturbations averaged over the first sidereal day at the required longitude."""
+        t = np.linspace(0.0, SIDEREAL_DAY, 24, endpoint=False)
+        angle = self.aim + RATE * t
+        x, y, z = R0 * np.cos(angle), R0 * np.sin(angle), 0.0 * t
+        sx, sy, sz, mx, my, mz = ephemeris(self.p.sun_moon_time + t, self.o.tables, self.p.sun_moon)
+        light = self.p.light / self.p.mass
+        ax, ay, _ = field(t, x, y, z, (sx, sy, sz), (mx, my, mz), light, self.p, self.o)
+        px, py, _ = point_mass(x, y, z, MU)
+        ax, ay = ax - px, ay - py
+        outward, ahead = ax * np.cos(angle) + ay * np.sin(angle), ay * np.cos(angle) - ax * np.sin(angle)
+        return perturbation_coefficients(ahead.mean(), outward.mean())
 
     def burn_times(self, dv: np.ndarray) -> np.ndarray:
         """Lengths [s] of burns of velocity changes dv [m/s], one after the other."""

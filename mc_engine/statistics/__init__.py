@@ -4,7 +4,14 @@ from mc_engine.statistics.binomial import clopper_pearson, lower_bound, upper_bo
 from mc_engine.statistics.maps import SurfaceMap, map_metric
 from mc_engine.statistics.normality import Normality, normality
 from mc_engine.statistics.order_statistics import QUANTILES, Quantile, quantile, quantile_ranks
-from mc_engine.statistics.requirements import SAMPLING_DESIGNS, Verdict, judge, pass_probability
+from mc_engine.statistics.requirements import (
+    SAMPLING_DESIGNS,
+    Verdict,
+    judge,
+    judge_all,
+    pass_probability,
+    was_looked_at,
+)
 from mc_engine.statistics.summary import Summary, summarize
 from mc_engine.statistics.worst import worst_cases
 
@@ -18,6 +25,7 @@ __all__ = [
     "Verdict",
     "clopper_pearson",
     "judge",
+    "judge_all",
     "lower_bound",
     "map_metric",
     "normality",
@@ -26,5 +34,6 @@ __all__ = [
     "quantile_ranks",
     "summarize",
     "upper_bound",
+    "was_looked_at",
     "worst_cases",
 ]

@@ -1,10 +1,16 @@
 """A metric over two inputs: exact from a full grid, smoothed from scattered cases.
 
 Scattered cases: at each point of a picture grid, a quadratic surface through the nearest cases, weighted by
-distance (local regression, Cleveland & Devlin, J. Am. Stat. Assoc. 83 (1988), 596-610), with the standard
-error of the fitted value.  That error holds the scatter of the cases about the surface, among it all that the
-other inputs do; it does not hold the bias where the surface bends sharply within one neighbourhood.
-Points outside the hull of the cases, or where the error is large, are NaN: a map is no extrapolation.
+distance (local regression, Cleveland & Devlin, J. Am. Stat. Assoc. 83 (1988), 596-610).  How many cases are near is
+for the data to say: the number with the smallest squared error of cases left out one at a time, so that few are
+taken where the metric follows the two inputs closely, and many where the other inputs scatter it.
+
+The error given has two parts.  One is the standard error of the fitted value: it holds the scatter of the cases about
+the surface, among it all that the other inputs do.  The other is the bias of a surface that bends within one
+neighbourhood, for which the step to a cubic surface through the same cases stands (the correction of Calonico,
+Cattaneo & Farrell, J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).
+Points outside the hull of the cases, in a hole between them, or where the error is large, are NaN: a map is no
+extrapolation.
 """
 
 from dataclasses import dataclass
@@ -12,10 +18,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
-NEIGHBOURS = 60
-FEWEST = 12
+FEWEST = 24
+NEIGHBOURS = (24, 36, 54, 80, 120, 180, 270, 400, 600, 900)  # to choose from
+MANY_NEIGHBOURS = 300  # from here on the surface is smooth at the scale of a coarser picture grid
+COARSER = 2
+LEFT_OUT = 400  # cases, one at a time, on which the number of neighbours is chosen
+MOSTLY = 0.95  # of them must have a surface through their neighbours
+AS_GOOD = 1.01  # of the smallest squared error: the fewest neighbours that reach it bend the surface least
+WIDEST_HOLE = 0.6  # of the reach of the neighbourhood: where the nearest case is farther away, there is a hole
+MOST_CASES = 50_000  # smoothed; of more, so many are picked evenly
 MOST_ERROR = 0.05  # of the range of the metric; above it a point is left blank
-TERMS = 6  # of a quadratic in two variables
+TERMS = 6  # of a quadratic in two variables; a cubic has four more
+POINTS_AT_ONCE = 256
 
 
 @dataclass(frozen=True)
@@ -23,7 +37,8 @@ class SurfaceMap:
     """value[iy, ix] over x and y (both ascending); NaN outside the support.  error : standard error, or None.
 
     exact : the nodes are cases themselves.  cases_per_node : 1 for an exact grid; more when other inputs vary
-    between cases of one node, and value is then their mean; 0 for scattered cases.
+    between cases of one node, and value is then their mean; 0 for scattered cases.  n_smoothed : of the n_used
+    cases with numbers, those that a smoothed surface is made of.
     """
 
     x: np.ndarray
@@ -35,6 +50,7 @@ class SurfaceMap:
     neighbours: int
     n_used: int
     n_tried: int
+    n_smoothed: int = 0
 
 
 def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -> SurfaceMap | None:
@@ -98,26 +114,31 @@ def _node_means(node: np.ndarray, z: np.ndarray, nodes: int) -> tuple[np.ndarray
 
 
 def _smoothed(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int, tried: int) -> SurfaceMap | None:
-    centre, scale = np.array([x.mean(), y.mean()]), np.array([np.ptp(x), np.ptp(y)])
+    n_used, middle, spread = x.size, float(z.mean()), float(np.ptp(z)) or 1.0
+    low, high = (x.min(), y.min()), (x.max(), y.max())
+    rows = np.unique(np.linspace(0, n_used - 1, min(n_used, MOST_CASES)).astype(np.int64))
+    x, y, z = x[rows], y[rows], (z[rows] - middle) / spread
+    centre, scale = np.array([x.mean(), y.mean()]), np.array([x.std(), y.std()])
     cloud = (np.column_stack([x, y]) - centre) / scale
     hull = _hull(cloud)
     if hull is None:
         return None
-    x_axis, y_axis = np.linspace(x.min(), x.max(), points), np.linspace(y.min(), y.max(), points)
+    tree = cKDTree(cloud)
+    neighbours = _chosen_neighbours(tree, cloud, z)
+    points = points if neighbours < MANY_NEIGHBOURS else points // COARSER + 1
+    x_axis, y_axis = (np.linspace(*ends, points) for ends in zip(low, high, strict=True))
     at = (np.stack(np.meshgrid(x_axis, y_axis), axis=-1).reshape(-1, 2) - centre) / scale
     inside = (at @ hull[:, :2].T + hull[:, 2] <= 1e-9).all(axis=1)
-    neighbours = min(NEIGHBOURS, x.size)
-    value, error = (np.full(at.shape[0], np.nan) for _ in range(2))
-    middle, spread = float(z.mean()), float(np.ptp(z)) or 1.0
-    fit, deviation = _local_quadratic(cloud, (z - middle) / spread, at[inside], neighbours)
+    fit, deviation = _surface(tree, cloud, z, at[inside], neighbours)
     blank = ~(deviation <= MOST_ERROR)
     fit[blank] = deviation[blank] = np.nan
-    value[inside], error[inside] = middle + spread * fit, spread * deviation
-    if not np.isfinite(value).any():
+    if blank.all():
         return None
+    value, error = np.full(at.shape[0], np.nan), np.full(at.shape[0], np.nan)
+    value[inside], error[inside] = middle + spread * fit, spread * deviation
     shape = (points, points)
     return SurfaceMap(
-        x_axis, y_axis, value.reshape(shape), error.reshape(shape), False, 0, neighbours, int(x.size), tried
+        x_axis, y_axis, value.reshape(shape), error.reshape(shape), False, 0, neighbours, n_used, tried, rows.size
     )
 
 
@@ -128,25 +149,97 @@ def _hull(cloud: np.ndarray) -> np.ndarray | None:
     return ConvexHull(cloud).equations if widths[0] > 1e-6 * widths[1] else None
 
 
-def _local_quadratic(
-    cloud: np.ndarray, z: np.ndarray, at: np.ndarray, neighbours: int
+def _chosen_neighbours(tree: cKDTree, cloud: np.ndarray, z: np.ndarray) -> int:
+    """The number of neighbours that foretells cases best from the others, or a smaller one that is as good."""
+    rows = np.unique(np.linspace(0, len(cloud) - 1, min(len(cloud), LEFT_OUT)).astype(np.int64))
+    choices = [number for number in NEIGHBOURS if number < len(cloud)]
+    if len(choices) < 2:
+        return min(NEIGHBOURS[0], len(cloud))
+    distance, near = tree.query(cloud[rows], k=choices[-1] + 1)
+    distance, near = distance[:, 1:], near[:, 1:]  # without the case itself
+    scores = []
+    for number in choices:
+        fit = _Fit.of(cloud, cloud[rows], distance[:, :number], near[:, :number], cubic=False)
+        misses = (fit.value(z) - z[rows]) ** 2
+        # Cases on a few levels of an input: near ones fix no surface before a second and third level are among them.
+        scores.append(float(np.mean(misses[fit.fixed])) if fit.fixed.mean() >= MOSTLY else np.inf)
+    return next(number for number, score in zip(choices, scores, strict=True) if score <= AS_GOOD * min(scores))
+
+
+def _surface(
+    tree: cKDTree, cloud: np.ndarray, z: np.ndarray, at: np.ndarray, neighbours: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fitted value and its standard error at each point of `at`; NaN where the neighbours fix no quadratic."""
-    distance, near = cKDTree(cloud).query(at, k=neighbours)
-    reach = 1.0001 * distance[:, -1:] + 1e-12
-    weight = (1.0 - (distance / reach) ** 3) ** 3
-    u, v = np.moveaxis((cloud[near] - at[:, None, :]) / reach[:, :, None], -1, 0)
-    design = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v], axis=-1)
-    weighted = design * weight[:, :, None]
-    normal = np.einsum("mki,mkj->mij", weighted, design)
-    fixed = np.linalg.cond(normal) < 1e10
-    inverse = np.linalg.inv(np.where(fixed[:, None, None], normal, np.eye(TERMS)))
-    # The first row of `smoother` turns the neighbours' values into the fitted value at the point itself.
-    smoother = np.einsum("mij,mkj->mik", inverse, weighted)
-    coefficients = np.einsum("mik,mk->mi", smoother, z[near])
-    residual = z[near] - np.einsum("mki,mi->mk", design, coefficients)
-    freedom = weight.sum(axis=1) - np.einsum("mik,mki->m", smoother, weighted)
-    fixed &= freedom > 0.5
-    variance = (weight * residual**2).sum(axis=1) / np.where(fixed, freedom, 1.0)
-    error = np.sqrt(variance * (smoother[:, 0, :] ** 2).sum(axis=1))
-    return np.where(fixed, coefficients[:, 0], np.nan), np.where(fixed, error, np.nan)
+    """Fitted value and its error at each point of `at`; NaN where the neighbours do not support a surface."""
+    value, error = np.full(len(at), np.nan), np.full(len(at), np.nan)
+    for first in range(0, len(at), POINTS_AT_ONCE):
+        some = slice(first, first + POINTS_AT_ONCE)
+        distance, near = tree.query(at[some], k=neighbours)
+        fit = _Fit.of(cloud, at[some], distance, near, cubic=True)
+        usable = fit.fixed & (distance[:, 0] <= WIDEST_HOLE * distance[:, -1])
+        value[some] = np.where(usable, fit.value(z), np.nan)
+        error[some] = np.where(usable, np.hypot(fit.standard_error(z), fit.cubic_step(z)), np.nan)
+    return value, error
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Weighted quadratics, and cubics, about m points, each through k neighbours.  Last axis of `design`: the terms.
+
+    rows : float64[m, t], the row of the inverse normal matrix that gives the value at the point itself.
+    """
+
+    near: np.ndarray
+    weight: np.ndarray
+    design: np.ndarray
+    normal: np.ndarray
+    row: np.ndarray
+    cubic_row: np.ndarray | None
+    fixed: np.ndarray
+
+    @classmethod
+    def of(cls, cloud: np.ndarray, at: np.ndarray, distance: np.ndarray, near: np.ndarray, cubic: bool) -> "_Fit":
+        reach = 1.0001 * distance[:, -1:] + 1e-12
+        weight = (1.0 - (distance / reach) ** 3) ** 3
+        u, v = np.moveaxis((cloud[near] - at[:, None, :]) / reach[:, :, None], -1, 0)
+        terms = [np.ones_like(u), u, v, u * u, u * v, v * v]
+        terms += [u * u * u, u * u * v, u * v * v, v * v * v] if cubic else []
+        design = np.stack(terms, axis=-1)
+        normal = np.swapaxes(design * weight[:, :, None], 1, 2) @ design
+        quadratic = normal[:, :TERMS, :TERMS]
+        widths = np.linalg.eigvalsh(quadratic)
+        fixed = widths[:, 0] > 1e-10 * widths[:, -1]
+        safe = np.where(fixed[:, None, None], quadratic, np.eye(TERMS))
+        return cls(near, weight, design, safe, _value_row(safe), _value_row(normal) if cubic else None, fixed)
+
+    def value(self, z: np.ndarray) -> np.ndarray:
+        """The quadratic at the points."""
+        return np.einsum("mk,mk->m", self._smoother(self.row), z[self.near])
+
+    def cubic_step(self, z: np.ndarray) -> np.ndarray:
+        """From the quadratic to the cubic, at the points."""
+        assert self.cubic_row is not None
+        return np.einsum("mk,mk->m", self._smoother(self.cubic_row), z[self.near]) - self.value(z)
+
+    def _smoother(self, row: np.ndarray) -> np.ndarray:
+        """float64[m, k]: what turns the neighbours' values into the fitted one."""
+        return self.weight * (self.design[:, :, : row.shape[1]] @ row[:, :, None])[:, :, 0]
+
+    def standard_error(self, z: np.ndarray) -> np.ndarray:
+        """Of the quadratic's value, from the scatter about it; NaN where the cases leave no freedom for a scatter."""
+        design = self.design[:, :, :TERMS]
+        weighted = design * self.weight[:, :, None]
+        right = np.swapaxes(weighted, 1, 2) @ z[self.near][:, :, None]
+        residual = z[self.near] - (design @ np.linalg.solve(self.normal, right))[:, :, 0]
+        taken = np.linalg.solve(self.normal, np.swapaxes(weighted, 1, 2) @ weighted)
+        freedom = self.weight.sum(axis=1) - np.trace(taken, axis1=1, axis2=2)
+        enough = freedom > 0.5
+        variance = (self.weight * residual**2).sum(axis=1) / np.where(enough, freedom, 1.0)
+        error = np.sqrt(variance * (self._smoother(self.row) ** 2).sum(axis=1))
+        return np.where(enough, error, np.nan)
+
+
+def _value_row(normal: np.ndarray) -> np.ndarray:
+    """First row of the inverses of normal matrices; terms that the cases do not tell apart are left out."""
+    widths, vectors = np.linalg.eigh(normal)
+    told = widths > 1e-10 * widths[:, -1:]
+    return np.einsum("mij,mj->mi", vectors, np.where(told, vectors[:, 0, :] / np.where(told, widths, 1.0), 0.0))

@@ -40,9 +40,14 @@ def normality(values: np.ndarray) -> Normality | None:
     if not np.isfinite(spread) or spread <= 1e-13 * float(np.abs(values).max()):
         return None
     centred = centred / spread
-    m2 = float(np.mean(centred**2))
-    skewness = float(np.mean(centred**3)) / m2**1.5
-    kurtosis = float(np.mean(centred**4)) / m2**2
+    return normality_of(n, *(float(np.mean(centred**power)) for power in (2, 3, 4)))
+
+
+def normality_of(n: int, m2: float, m3: float, m4: float) -> Normality | None:
+    """The same from the second to fourth central moment of n values, in any unit; m2 > 0.  None for n < 20."""
+    if n < FEWEST:
+        return None
+    skewness, kurtosis = m3 / m2**1.5, m4 / m2**2
     k2 = _skewness_z(skewness, n) ** 2 + _kurtosis_z(kurtosis, n) ** 2
     return Normality(skewness, kurtosis - 3.0, exp(-0.5 * k2))
 

@@ -5,6 +5,7 @@ distribution (Wilks, Ann. Math. Statist. 12 (1941), 91-96; David & Nagaraja, Ord
 A limit that would need more cases than there are is None, never a guess.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, floor
 
@@ -47,21 +48,31 @@ def _first_rank(n: int, probability: float, level: float, strictly: bool) -> int
     return high
 
 
-def quantile(ordered: np.ndarray, probability: float, confidence: float = 0.90) -> Quantile:
-    """The quantile of sorted values (float64[n], n > 0), with its limits.
+def estimate_place(n: int, probability: float) -> float:
+    """Where between the ranks 1 ... n the estimate of the quantile lies, of n > 0 values.
 
-    The estimate is the approximately median-unbiased one: Hyndman & Fan, Amer. Statist. 50 (1996), type 8.
+    The approximately median-unbiased one: Hyndman & Fan, Amer. Statist. 50 (1996), 361-365, type 8.
     """
-    n = ordered.size
-    place = min(max((n + 1.0 / 3.0) * probability + 1.0 / 3.0, 1.0), float(n))
-    below, above = ordered[floor(place) - 1], ordered[ceil(place) - 1]
+    return min(max((n + 1.0 / 3.0) * probability + 1.0 / 3.0, 1.0), float(n))
+
+
+def ranks_read(n: int, probability: float, confidence: float = 0.90) -> set[int]:
+    """The ranks (1 ... n) of the order statistics that `quantile` looks at."""
+    place = estimate_place(n, probability)
+    return {floor(place), ceil(place), *(rank for rank in quantile_ranks(n, probability, confidence) if rank)}
+
+
+def quantile(ordered: np.ndarray, probability: float, confidence: float = 0.90) -> Quantile:
+    """The quantile of sorted values (float64[n], n > 0), with its limits."""
+    return ranked_quantile(ordered.size, lambda rank: float(ordered[rank - 1]), probability, confidence)
+
+
+def ranked_quantile(n: int, at: Callable[[int], float], probability: float, confidence: float = 0.90) -> Quantile:
+    """The same from the order statistics alone: `at` gives the value of a rank of `ranks_read`."""
+    place = estimate_place(n, probability)
+    below, above = at(floor(place)), at(ceil(place))
     part = place - floor(place)
     # Equal neighbours are returned as they are: a constant column must keep its bits.
     value = below if below == above else (1.0 - part) * below + part * above
     lower, upper = quantile_ranks(n, probability, confidence)
-    return Quantile(
-        probability,
-        float(value),
-        None if lower is None else float(ordered[lower - 1]),
-        None if upper is None else float(ordered[upper - 1]),
-    )
+    return Quantile(probability, value, None if lower is None else at(lower), None if upper is None else at(upper))

@@ -5,33 +5,57 @@ fail              even the upper confidence bound stays below it
 not demonstrable  the number of cases decides neither way, or the design gives no probabilities
 
 A case that failed, or whose metric is not a number, counts as not inside the limit.
+
+Where the number of cases was decided while looking at them (`looked`), the bounds are those of `time_uniform`, which
+hold at every number of cases at once; else those of `binomial`, which hold for the number fixed in advance.
+
+Several requirements.  Each verdict has the confidence that its requirement asks for.  The joint one counts the cases
+that are inside every limit at once, and wants of them 1 less what each requirement may miss: if each is met, so is
+that (Boole).  It passes if that share is shown and every requirement passes, which then holds with the smallest of
+their confidences (Berger, Technometrics 24 (1982), 295-300).  It fails if one of these tests fails with the error
+allowed, 1 - confidence, divided by their number (Bonferroni); `shared_outcome` is each verdict at that confidence, and
+those hold all at once.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from mc_engine.plan import smallest_sample
-from mc_engine.statistics.binomial import lower_bound, upper_bound
-from mc_engine.statistics.order_statistics import quantile_ranks
+from mc_engine.plan import half_rate_share
+from mc_engine.statistics import binomial, time_uniform, tolerance
 
 PASS = "pass"
 FAIL = "fail"
 NOT_DEMONSTRABLE = "not demonstrable"
+JOINT = "all at once"
 
 # Designs whose cases are a sample of the dispersions, so that a share of cases estimates a probability.
 SAMPLING_DESIGNS = ("mc", "lhs", "sobol", "halton")
+
+
+class ShareLimits(Protocol):
+    """What `binomial` and `time_uniform` both offer."""
+
+    def lower_bound(self, passed: int, tried: int, confidence: float = ...) -> float: ...
+    def upper_bound(self, passed: int, tried: int, confidence: float = ...) -> float: ...
+    def acceptance_number(self, tried: int, share: float, confidence: float) -> int | None: ...
+    def smallest_sample(self, share: float, confidence: float, failures: int = ...) -> int: ...
 
 
 @dataclass(frozen=True)
 class Verdict:
     """One requirement judged.  `estimate`, `lower`, `upper` are shares; None without a case.
 
+    The joint verdict is one, too: without metric and limits.
     demonstrated : the limit that the cases at hand do show with share and confidence, None if they show none
-        (or if the requirement has two limits).  margin : how far that is inside the required limit.
+        (or if the requirement has two limits).  enclosed : the same for two limits.
     needed : cases that would show the share if no further one failed; None if it is shown or refuted.
+    accepted : the most failures with which so many cases pass, None if they cannot.
+    consumer_risk : probability of passing a system that just misses the share.  producer_risk : of not passing one
+        that fails half as often as it may.  Both None where the number of cases was decided on the way; the
+        consumer's is then at most 1 - confidence.
     """
 
     name: str
@@ -48,17 +72,25 @@ class Verdict:
     lower: float | None
     upper: float | None
     demonstrated: float | None
+    enclosed: tuple[float, float] | None
     needed: int | None
+    accepted: int | None
+    consumer_risk: float | None
+    producer_risk: float | None
+    shared_outcome: str
     random: bool
+    looked: bool
 
     @property
     def margin(self) -> float | None:
-        """Distance from the demonstrated limit to the required one, positive inside; None if there is none."""
-        if self.demonstrated is None:
-            return None
-        if self.at_most is not None:
-            return self.at_most - self.demonstrated
-        return self.demonstrated - self.at_least if self.at_least is not None else None
+        """Distance from the demonstrated limit to the required one, positive inside; None if there is none.
+
+        With two limits, the smaller of the two distances.
+        """
+        low, high = self.enclosed if self.enclosed is not None else (self.demonstrated, self.demonstrated)
+        above = None if self.at_most is None or high is None else self.at_most - high
+        below = None if self.at_least is None or low is None else low - self.at_least
+        return min((one for one in (above, below) if one is not None), default=None)
 
 
 def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple[float, float]:
@@ -71,30 +103,100 @@ def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple
     """
     if tried <= 0:
         raise ValueError("no case was tried")
-    return passed / tried, lower_bound(passed, tried, confidence)
+    return passed / tried, binomial.lower_bound(passed, tried, confidence)
 
 
-def judge(requirement: Mapping[str, Any], values: np.ndarray, ok: np.ndarray, design: str = "mc") -> Verdict:
+def judge_all(
+    requirements: Sequence[Mapping[str, Any]],
+    column: Callable[[str], np.ndarray],
+    ok: np.ndarray,
+    design: str = "mc",
+    looked: bool = False,
+) -> tuple[list[Verdict], Verdict | None]:
+    """The verdict on each requirement record, and the joint one; None for a single one or none.
+
+    column : metric to float64[n_tried].  There is no joint verdict either where the requirements together leave
+    nothing to be asked for.  Its confidence is the smallest of theirs.
+    """
+    ok = np.asarray(ok, dtype=bool)
+    share = joint_share([float(one["share"]) for one in requirements]) if len(requirements) > 1 else None
+    among = len(requirements) + (share is not None)
+    verdicts = [judge(one, column(one["metric"]), ok, design, looked, among) for one in requirements]
+    if share is None:
+        return verdicts, None
+    inside, usable = ok.copy(), ok.copy()
+    for verdict in verdicts:
+        values = np.asarray(column(verdict.metric), dtype=np.float64)
+        inside &= inside_limits(values, verdict.at_most, verdict.at_least)
+        usable &= np.isfinite(values)
+    confidence = min(verdict.confidence for verdict in verdicts)
+    asked = {"name": JOINT, "metric": "", "share": share, "confidence": confidence}
+    alone = _verdict(asked, None, inside, usable, design, looked, among)
+    return verdicts, _joined(alone, [*verdicts, alone])
+
+
+def _joined(joint: Verdict, tests: Sequence[Verdict]) -> Verdict:
+    """The verdict on the joint share with the outcome of all tests together."""
+    if any(test.shared_outcome == FAIL for test in tests):
+        return replace(joint, outcome=FAIL, needed=None)
+    if all(test.outcome == PASS for test in tests):
+        return replace(joint, outcome=PASS, needed=None)
+    refuted = any(test.outcome == FAIL for test in tests)
+    needed = None if refuted else max((test.needed for test in tests if test.needed is not None), default=None)
+    return replace(joint, outcome=NOT_DEMONSTRABLE, needed=needed)
+
+
+def joint_share(shares: Sequence[float]) -> float | None:
+    """The share of cases that is inside all limits at once if each requirement misses no more than it may.
+
+    Boole's inequality; None if nothing is left.
+    """
+    left = 1.0 - sum(1.0 - share for share in shares)
+    return left if 0.0 < left < 1.0 else None
+
+
+def judge(
+    requirement: Mapping[str, Any],
+    values: np.ndarray,
+    ok: np.ndarray,
+    design: str = "mc",
+    looked: bool = False,
+    among: int = 1,
+) -> Verdict:
     """Verdict on one requirement record ("name", "metric", "at_most", "at_least", "share", "confidence").
 
     values : float64[n_tried], the metric; ok : bool[n_tried], whether the case was flown to its end.
+    looked : whether the number of cases was decided by looking at them.  among : how many requirements there are.
     """
     values = np.asarray(values, dtype=np.float64)
-    at_most, at_least = _limit(requirement, "at_most"), _limit(requirement, "at_least")
-    share, confidence = float(requirement["share"]), float(requirement["confidence"])
     usable = np.asarray(ok, dtype=bool) & np.isfinite(values)
-    inside = usable & inside_limits(values, at_most, at_least)
-    passed, tried = int(inside.sum()), int(values.size)
+    inside = usable & inside_limits(values, _limit(requirement, "at_most"), _limit(requirement, "at_least"))
+    return _verdict(requirement, values, inside, usable, design, looked, among)
+
+
+def _verdict(
+    requirement: Mapping[str, Any],
+    values: np.ndarray | None,
+    inside: np.ndarray,
+    usable: np.ndarray,
+    design: str,
+    looked: bool,
+    among: int,
+) -> Verdict:
+    limits: ShareLimits = time_uniform if looked else binomial
+    share, confidence = float(requirement["share"]), float(requirement["confidence"])
+    passed, tried = int(inside.sum()), int(inside.size)
     random = design in SAMPLING_DESIGNS
     known = random and tried > 0
-    lower = lower_bound(passed, tried, confidence) if known else None
-    upper = upper_bound(passed, tried, confidence) if known else None
-    outcome = _outcome(lower, upper, share)
-    return Verdict(
+    outcome, lower, upper = _outcome(limits, passed, tried, share, confidence) if known else _UNKNOWN
+    shared = _outcome(limits, passed, tried, share, 1.0 - (1.0 - confidence) / among)[0] if known else outcome
+    accepted = limits.acceptance_number(tried, share, confidence) if known else None
+    exact = known and not looked
+    verdict = Verdict(
         name=str(requirement["name"]),
         metric=str(requirement["metric"]),
-        at_most=at_most,
-        at_least=at_least,
+        at_most=_limit(requirement, "at_most"),
+        at_least=_limit(requirement, "at_least"),
         share=share,
         confidence=confidence,
         outcome=outcome,
@@ -104,10 +206,59 @@ def judge(requirement: Mapping[str, Any], values: np.ndarray, ok: np.ndarray, de
         estimate=passed / tried if tried else None,
         lower=lower,
         upper=upper,
-        demonstrated=_demonstrated(values[usable], tried, at_most, at_least, share, confidence) if known else None,
-        needed=smallest_sample(share, confidence, tried - passed) if random and outcome == NOT_DEMONSTRABLE else None,
+        demonstrated=None,
+        enclosed=None,
+        needed=limits.smallest_sample(share, confidence, tried - passed)
+        if random and outcome == NOT_DEMONSTRABLE
+        else None,
+        accepted=accepted,
+        consumer_risk=binomial.pass_chance(tried, accepted, share) if exact else None,
+        producer_risk=1.0 - binomial.pass_chance(tried, accepted, half_rate_share(share)) if exact else None,
+        shared_outcome=shared,
         random=random,
+        looked=looked,
     )
+    return verdict if values is None or not known else _with_limits_shown(verdict, values[usable], limits)
+
+
+_UNKNOWN: tuple[str, float | None, float | None] = (NOT_DEMONSTRABLE, None, None)
+
+
+def _outcome(
+    limits: ShareLimits, passed: int, tried: int, share: float, confidence: float
+) -> tuple[str, float | None, float | None]:
+    """Outcome, lower and upper bound of the passing share."""
+    lower = limits.lower_bound(passed, tried, confidence)
+    upper = limits.upper_bound(passed, tried, confidence)
+    if lower >= share:
+        return PASS, lower, upper
+    return (FAIL if upper < share else NOT_DEMONSTRABLE), lower, upper
+
+
+def _with_limits_shown(verdict: Verdict, usable: np.ndarray, limits: ShareLimits) -> Verdict:
+    """The verdict with the tolerance limits that the usable values show."""
+    lost = verdict.no_number
+    if verdict.at_least is None:
+        return replace(verdict, demonstrated=tolerance.upper_limit(usable, verdict.accepted, lost))
+    if verdict.at_most is None:
+        return replace(verdict, demonstrated=tolerance.lower_limit(usable, verdict.accepted, lost))
+    if not verdict.looked:
+        return replace(verdict, enclosed=tolerance.interval(usable, verdict.accepted, lost))
+    # Blocks of values are exchangeable at one number of cases only; at all of them each end stands for itself,
+    # with half of what may lie outside and half of the error.
+    half = limits.acceptance_number(
+        verdict.tried, half_rate_share(verdict.share), 1.0 - 0.5 * (1.0 - verdict.confidence)
+    )
+    low, high = tolerance.lower_limit(usable, half, lost), tolerance.upper_limit(usable, half, lost)
+    return replace(verdict, enclosed=None if low is None or high is None else (low, high))
+
+
+def was_looked_at(manifest: Mapping[str, Any], n_cases: int) -> bool:
+    """True if the number of cases was not fixed before the first flew: `run --until verdict`, or extended since.
+
+    n_cases : how many are wanted now.
+    """
+    return bool(manifest.get("looks")) or n_cases > manifest.get("campaign", {}).get("cases", n_cases)
 
 
 def _limit(requirement: Mapping[str, Any], key: str) -> float | None:
@@ -124,33 +275,3 @@ def inside_limits(values: np.ndarray, at_most: float | None, at_least: float | N
         if at_least is not None:
             inside &= values >= at_least
     return inside
-
-
-def _outcome(lower: float | None, upper: float | None, share: float) -> str:
-    if lower is None or upper is None:
-        return NOT_DEMONSTRABLE
-    if lower >= share:
-        return PASS
-    return FAIL if upper < share else NOT_DEMONSTRABLE
-
-
-def _demonstrated(
-    usable: np.ndarray,
-    tried: int,
-    at_most: float | None,
-    at_least: float | None,
-    share: float,
-    confidence: float,
-) -> float | None:
-    """The one-sided tolerance limit (Wilks): `share` of cases lie inside it, with `confidence`.
-
-    Cases without a number are worse than every number, so they take the worst ranks.
-    """
-    if (at_most is None) == (at_least is None):
-        return None
-    # quantile_ranks puts (1 - c)/2 in each tail; a one-sided limit wants 1 - confidence in one.
-    rank = quantile_ranks(tried, share, 2.0 * confidence - 1.0)[1]
-    if rank is None or rank > usable.size:
-        return None
-    from_best = np.sort(usable if at_most is not None else -usable)
-    return float(from_best[rank - 1]) if at_most is not None else -float(from_best[rank - 1])

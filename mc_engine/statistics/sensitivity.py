@@ -6,6 +6,8 @@ src          standardised regression coefficient: the standard deviations that t
 prcc         partial rank correlation: the monotonic trend with the (linear) effect of the other ranks taken out
 first_order  Var(E[metric | input]) / Var(metric): the share of the variance that goes when the input becomes known,
              of any shape; what is missing to 1 in the sum over independent inputs is due to interactions
+total        E[Var(metric | all other inputs)] / Var(metric): what the input does alone and together with others, from
+             a surrogate (`total_order`); NaN where inputs are correlated, for which it has no such meaning
 
 For inputs that are correlated with each other src and prcc tell them apart as far as the cases do, while spearman and
 first_order also hold what an input owes to its partners.  Errors are standard errors for independent cases (`mc`);
@@ -20,14 +22,14 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.stats import rankdata
 
-from mc_engine.statistics.input_columns import InputColumn, equal_bins, finite_rows, input_columns
+from mc_engine.statistics.first_order import first_order, standardised
+from mc_engine.statistics.input_columns import InputColumn, finite_rows, input_columns
+from mc_engine.statistics.total_order import total_order
 
 FEWEST_CASES = 20
-MOST_BINS = 100
-_INDICES = ("spearman", "src", "prcc", "first_order")
+_INDICES = ("spearman", "src", "prcc", "first_order", "total")
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,7 @@ class Sensitivity:
     """Indices and their standard errors, float64[n_inputs, n_metrics]; n_used int64[n_metrics] of n_tried cases.
 
     r_squared : float64[n_metrics], the share of variance that the linear regression behind `src` explains.
+    unexplained : float64[n_metrics], the share that the surrogate behind `total` leaves; total may be larger by it.
     correlated : the two inputs with the strongest rank correlation and that number; None below two inputs of order.
     """
 
@@ -50,7 +53,10 @@ class Sensitivity:
     prcc_error: np.ndarray
     first_order: np.ndarray
     first_order_error: np.ndarray
+    total: np.ndarray
+    total_error: np.ndarray
     r_squared: np.ndarray
+    unexplained: np.ndarray
     correlated: tuple[str, str, float] | None
 
 
@@ -78,8 +84,13 @@ def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) ->
     table = np.column_stack([np.asarray(metrics[name], dtype=np.float64) for name in names]) if names else None
     tried = len(next(iter([*metrics.values(), *inputs.values()]), ()))
     shape = (len(columns), len(names))
-    found = {f"{index}{end}": np.full(shape, np.nan) for index in _INDICES for end in ("", "_error")}
-    r_squared, n_used = np.full(len(names), np.nan), np.zeros(len(names), dtype=np.int64)
+    found: dict[str, np.ndarray] = {
+        f"{index}{end}": np.full(shape, np.nan) for index in _INDICES for end in ("", "_error")
+    }
+    found |= {share: np.full(len(names), np.nan) for share in ("r_squared", "unexplained")}
+    n_used = np.zeros(len(names), dtype=np.int64)
+    strongest = _strongest_correlation(columns, tried)
+    independent = strongest is None or not beyond_chance(strongest[2], tried)
     if table is not None and columns:
         used = np.isfinite(table) & finite_rows(columns, tried)[:, None]
         n_used[:] = used.sum(axis=0)
@@ -88,19 +99,22 @@ def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) ->
         for one in np.unique(pattern):
             where = np.flatnonzero(pattern == one)
             rows = np.flatnonzero(used[:, where[0]])
-            _fill(found, r_squared, [column.at(rows) for column in columns], table[np.ix_(rows, where)], where)
-    strongest = _strongest_correlation(columns, tried)
-    return Sensitivity(
-        tuple(inputs), names, n_used, int(tried), r_squared=r_squared, correlated=strongest, **found
-    )  # fmt: skip
+            part = table[np.ix_(rows, where)]
+            _fill(found, [column.at(rows) for column in columns], part, where, independent)
+    return Sensitivity(tuple(inputs), names, n_used, int(tried), correlated=strongest, **found)
+
+
+def beyond_chance(rank_correlation: float, n_cases: int) -> bool:
+    """Whether two inputs are correlated, and not so by chance: five standard errors of a correlation of nothing."""
+    return abs(rank_correlation) > max(5.0 / np.sqrt(n_cases), 0.05)
 
 
 def _fill(
     found: dict[str, np.ndarray],
-    r_squared: np.ndarray,
     columns: Sequence[InputColumn],
     table: np.ndarray,
     where: np.ndarray,
+    independent: bool,
 ) -> None:
     """The indices of the metrics at `where`, whose numbers `table` (float64[n_used, len(where)]) holds, all finite."""
     n = len(table)
@@ -111,6 +125,11 @@ def _fill(
     varying, where = table[:, moving], where[moving]
     for k in live:
         found["first_order"][k, where], found["first_order_error"][k, where] = first_order(columns[k], varying)
+    if independent:
+        alive = np.ix_(np.array(live), where)
+        found["total"][alive], found["total_error"][alive], found["unexplained"][where] = total_order(
+            [columns[k] for k in live], varying
+        )
     ordered = [k for k in live if columns[k].ordered]
     if not ordered:
         return
@@ -118,7 +137,7 @@ def _fill(
     place = np.ix_(np.array(ordered), where)
     plain = np.column_stack([columns[k].values for k in ordered])
     ranks, metric_ranks = rankdata(plain, axis=0), rankdata(varying, axis=0)
-    rho = _standard(ranks).T @ _standard(metric_ranks) / n
+    rho = standardised(ranks).T @ standardised(metric_ranks) / n
     found["spearman"][place] = rho
     # Bonett & Wright, Psychometrika 65 (2000), 23-28, carried from Fisher's z to the correlation.
     found["spearman_error"][place] = (1.0 - rho**2) * np.sqrt((1.0 + 0.5 * rho**2) / (n - 3))
@@ -126,40 +145,11 @@ def _fill(
     if fit is not None:
         found["src"][place] = fit.coefficient[: len(ordered)]
         found["src_error"][place] = _coefficient_error(fit, len(ordered))
-        r_squared[where] = fit.r_squared
+        found["r_squared"][where] = fit.r_squared
     fit = _regression(np.column_stack([ranks, *groups]), metric_ranks)
     if fit is not None:
         found["prcc"][place] = fit.partial[: len(ordered)]
         found["prcc_error"][place] = _partial_error(fit, len(ordered))
-
-
-def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """First-order index and its standard error per metric (columns of `table`, float64[n, n_metrics], finite).
-
-    The variance between bins of the input, or between the levels of a group, with the part that chance alone puts
-    between them taken off (Kelley's ε², Proc. Natl. Acad. Sci. 21 (1935), 554-559; hence it may come out below 0);
-    bins after Plischke, Borgonovo & Smith, Eur. J. Oper. Res. 226 (2013), 536-550, with 0.7 sqrt(n) of them.
-    The error is that of the influence function of the ratio of the two variances; at an index of 0 it is
-    sqrt(2) too large.
-    """
-    n = len(table)
-    index, bins = equal_bins(column, min(max(int(0.7 * np.sqrt(n)), 2), MOST_BINS))
-    if n <= 2 * bins or bins < 2:
-        return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)
-    centred = _standard(table)
-    members = csr_array((np.ones(n), (index, np.arange(n))), shape=(bins, n))
-    mean = ((members @ centred) / members.sum(axis=1)[:, None])[index]
-    inside = centred - mean
-    share = 1.0 - (inside**2).sum(axis=0) / (n - bins) * (n - 1) / n
-    influence = mean**2 + 2.0 * mean * inside - share * centred**2
-    return share, influence.std(axis=0) / np.sqrt(n)
-
-
-def _standard(table: np.ndarray) -> np.ndarray:
-    """Columns with mean 0 and standard deviation 1 (n in its denominator), safe from overflow."""
-    scaled = table / np.abs(table).max(axis=0)
-    centred = scaled - scaled.mean(axis=0)
-    return centred / centred.std(axis=0)
 
 
 def _indicators(groups: Sequence[InputColumn]) -> list[np.ndarray]:
@@ -173,7 +163,7 @@ def _regression(columns: np.ndarray, table: np.ndarray) -> _Fit | None:
     A column that the others give exactly has no coefficient of its own: NaN.
     """
     n = len(columns)
-    x, y = _standard(columns), _standard(table)
+    x, y = standardised(columns), standardised(table)
     value, vector = np.linalg.eigh(x.T @ x / n)
     null = value < 1e-10 * value[-1]
     freedom = n - 1 - int(np.count_nonzero(~null))
@@ -219,7 +209,7 @@ def _strongest_correlation(columns: Sequence[InputColumn], n: int) -> tuple[str,
     usable = [one for one in (column.at(rows) for column in columns) if one.ordered and one.varies]
     if len(usable) < 2 or rows.size < FEWEST_CASES:
         return None
-    ranks = _standard(rankdata(np.column_stack([column.values for column in usable]), axis=0))
+    ranks = standardised(rankdata(np.column_stack([column.values for column in usable]), axis=0))
     rho = ranks.T @ ranks / rows.size
     np.fill_diagonal(rho, 0.0)
     first, second = np.unravel_index(np.abs(rho).argmax(), rho.shape)

@@ -10,5 +10,8 @@ def worst_cases(values: np.ndarray, ok: np.ndarray, count: int, largest: bool = 
     """
     values = np.asarray(values, dtype=np.float64)
     rows = np.flatnonzero(np.asarray(ok, dtype=bool) & np.isfinite(values))
-    order = np.argsort(-values[rows] if largest else values[rows], kind="stable")
-    return rows[order[:count]]
+    goodness = -values[rows] if largest else values[rows]
+    if 0 < count < rows.size:  # sort none but those that can be among them: a table may have a million rows
+        among = np.flatnonzero(goodness <= np.partition(goodness, count - 1)[count - 1])
+        rows, goodness = rows[among], goodness[among]
+    return rows[np.argsort(goodness, kind="stable")[:count]]

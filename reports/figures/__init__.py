@@ -10,6 +10,7 @@ from reports.figures.indices import IndexMap
 from reports.figures.levels import LevelPanel, LevelsDrawing
 from reports.figures.maps import MapDrawing
 from reports.figures.profiles import ProfileBand, ProfileDrawing
+from reports.figures.running_estimates import RunningDrawing, RunningPanel
 from reports.figures.scatter import ScatterDrawing
 from reports.figures.success import SuccessDrawing, SuccessPanel
 
@@ -31,6 +32,8 @@ __all__ = [
     "MapDrawing",
     "ProfileBand",
     "ProfileDrawing",
+    "RunningDrawing",
+    "RunningPanel",
     "ScatterDrawing",
     "SuccessDrawing",
     "SuccessPanel",

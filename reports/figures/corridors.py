@@ -14,7 +14,6 @@ from reports.numbers import count, number
 INSIDE = 0  # the class of the cases inside all limits
 COLOURS = (BLUE, VERMILION, ORANGE, PURPLE, GREEN, SKY, MUTED)
 SIGNS = ("circle", "x", "diamond", "square", "triangle-up", "cross", "star")
-_PRINT_SIGNS = ("o", "x", "D", "s", "^", "P", "*")
 _DASHES = ("dash", "dot", "solid")
 _PRINT_DASHES = ("--", ":", "-")
 
@@ -49,7 +48,7 @@ class CorridorDrawing(Drawing):
     @property
     def key(self) -> tuple[Key, ...]:
         entries = [
-            Key("point", COLOURS[k % len(COLOURS)], f"{words}: {count(cases)}")
+            Key("point", COLOURS[k % len(COLOURS)], f"{words}: {count(cases)}", SIGNS[k % len(SIGNS)])
             for k, (words, cases) in enumerate(self.classes)
             if cases
         ]
@@ -78,6 +77,7 @@ class CorridorDrawing(Drawing):
                     "mode": "markers",
                     "x": screen.rounded(self.x[rows], 8),
                     "y": screen.rounded(self.y[rows], 8),
+                    "meta": screen.CASES,
                     "customdata": [int(case) for case in self.case_ids[rows]],
                     "name": screen.plain(words),
                     "marker": {
@@ -104,14 +104,14 @@ class CorridorDrawing(Drawing):
         if self.nominal:
             data.append(screen.ring(self.nominal, INK, "nominal"))
         x, y = screen.axis(self.x_label, zeroline=False), screen.axis(self.y_label, zeroline=False)
-        return [{"data": data, "layout": screen.layout(x, y, 460, hovermode="closest")}]
+        return [{"data": data, "layout": screen.layout(x, y, 460, hovermode="closest", dragmode="select")}]
 
     def printed(self) -> Figure:
         figure, (axis,) = paper.new_figure(3.9)
         for k in range(len(self.classes)):
             rows = self.member == k
             size, opacity, width = (3.0, 0.5, 0.0) if k == INSIDE else (9.0, 1.0, 0.8)
-            colour, sign = on_paper(COLOURS[k % len(COLOURS)]), _PRINT_SIGNS[k % len(SIGNS)]
+            colour, sign = on_paper(COLOURS[k % len(COLOURS)]), paper.SIGNS[SIGNS[k % len(SIGNS)]]
             axis.scatter(self.x[rows], self.y[rows], s=size, color=colour, marker=sign, alpha=opacity, linewidths=width)
         for k, limit in enumerate(self.limits):
             for curve in limit.curves:

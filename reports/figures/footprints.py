@@ -12,8 +12,8 @@ from reports.figures.palette import BLUE, GREEN, INK, VERMILION, on_paper
 from reports.numbers import count, number
 
 DASHES = ("solid", "dash", "dot")
-_MARKS = {"solid": "line", "dash": "dash", "dot": "dot"}
-_PRINT_DASH = {"solid": "-", "dash": "--", "dot": ":"}
+MARKS = {"solid": "line", "dash": "dash", "dot": "dot"}
+PRINT_DASH = {"solid": "-", "dash": "--", "dot": ":"}
 EAST, NORTH = "east of the mean place [km]", "north of the mean place [km]"
 ALONG, ACROSS = "along the long axis [km]", "across it, to the left [km]"
 
@@ -58,7 +58,7 @@ class FootprintDrawing(Drawing):
     def key(self) -> tuple[Key, ...]:
         shown = "all shown" if len(self.points) == self.n_used else f"{count(len(self.points))} shown"
         cases = Key("point", BLUE, f"{count(self.n_used)} of {count(self.n_tried)} cases, {shown}")
-        curves = [Key(_MARKS[dash], colour, curve.text) for curve, colour, dash in self.styled]
+        curves = [Key(MARKS[dash], colour, curve.text) for curve, colour, dash in self.styled]
         aim = [Key("ring", INK, self.aim[0])] if self.aim else []
         return (cases, *curves, *aim)
 
@@ -91,7 +91,7 @@ class FootprintDrawing(Drawing):
         }
         data: list[dict[str, Any]] = [cloud]
         for curve, colour, dash in self.styled:
-            line = view.turned(_joined(curve.outlines))
+            line = view.turned(joined(curve.outlines))
             trace = {
                 "type": "scatter",
                 "mode": "lines",
@@ -132,8 +132,8 @@ class FootprintDrawing(Drawing):
             points = view.turned(self.points)
             axis.scatter(points[:, 0], points[:, 1], s=3.0, color=BLUE, alpha=0.5, linewidths=0)
             for curve, colour, dash in self.styled:
-                line = view.turned(_joined(curve.outlines))
-                axis.plot(line[:, 0], line[:, 1], color=colour, linestyle=_PRINT_DASH[dash], linewidth=1.1)
+                line = view.turned(joined(curve.outlines))
+                axis.plot(line[:, 0], line[:, 1], color=colour, linestyle=PRINT_DASH[dash], linewidth=1.1)
             if self.aim:
                 x, y = view.turned(np.array([self.aim[1]]))[0]
                 axis.plot(x, y, "o", ms=6, mfc="none", color=on_paper(INK), markeredgewidth=1.6)
@@ -161,7 +161,7 @@ class View:
         return np.column_stack([c * points[:, 0] + s * points[:, 1], c * points[:, 1] - s * points[:, 0]])
 
 
-def _joined(outlines: tuple[np.ndarray, ...]) -> np.ndarray:
+def joined(outlines: tuple[np.ndarray, ...]) -> np.ndarray:
     """The curves behind each other, a not-a-number between two, at which the pen is lifted."""
     parts = [part for outline in outlines for part in (outline, np.full((1, 2), np.nan))]
     return np.concatenate(parts[:-1])

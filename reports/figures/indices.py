@@ -19,21 +19,28 @@ DARK = 0.55  # a field below this share is dark, and takes white numbers
 
 @dataclass(frozen=True)
 class IndexMap(Drawing):
-    """share : float64[n_inputs, n_metrics], NaN where there is none; n_used of n_tried cases, the fewest and most."""
+    """share : float64[n_inputs, n_metrics], NaN where there is none; n_used of n_tried cases, the fewest and most.
+
+    index : its name; none, all : what 0 and 1 mean; counted : what n_used counts.
+    """
 
     inputs: tuple[str, ...]
     metrics: tuple[str, ...]
     share: np.ndarray
     n_used: tuple[int, int]
     n_tried: int
+    index: str = "first-order index"
+    none: str = "knowing the input says nothing of the metric"
+    all: str = "it says all"
+    counted: str = "cases"
 
     @property
     def key(self) -> tuple[Key, ...]:
         few, most = self.n_used
         used = count(most) if few == most else f"{count(few)} to {count(most)}"
-        meaning = "from 0, dark: knowing the input says nothing of the metric, to 1, bright: it says all"
+        meaning = f"from 0, dark: {self.none}, to 1, bright: {self.all}"
         colour = _hex(colormaps[FIELD](0.5))
-        return (Key("field", colour, f"first-order index {meaning}; {used} of {count(self.n_tried)} cases"),)
+        return (Key("field", colour, f"{self.index} {meaning}; {used} of {count(self.n_tried)} {self.counted}"),)
 
     @property
     def alternative(self) -> str:
@@ -42,7 +49,7 @@ class IndexMap(Drawing):
             column = self.share[:, k]
             order = [int(row) for row in np.argsort(-np.nan_to_num(column, nan=-1.0)) if np.isfinite(column[row])][:3]
             parts.append(f"{metric}: " + ", ".join(f"{self.inputs[row]} {_digits(column[row])}" for row in order))
-        return f"Share of the variance of each metric that each input explains. {'; '.join(parts)}."
+        return f"Share of the variance of each metric by input, {self.index}. {'; '.join(parts)}."
 
     def interactive(self) -> list[dict[str, Any]]:
         trace = {

@@ -43,9 +43,11 @@ class MapDrawing(Drawing):
             return f"mean of {count(surface.cases_per_node)} cases at each grid node ({used})"
         assert surface.error is not None  # a smoothed surface always has one
         errors = [number(float(pick(surface.error)), 2) for pick in (np.nanmedian, np.nanmax)]
+        if surface.n_smoothed < surface.n_used:
+            used = f"{count(surface.n_smoothed)} cases picked evenly out of {used}"
         return (
-            f"local quadratic regression on the {surface.neighbours} nearest of {used}, "
-            f"standard error {errors[0]} (median) to {with_unit(errors[1], self.unit)} (largest)"
+            f"local quadratic regression on the {surface.neighbours} nearest of {used}, as many as foretell left-out "
+            f"cases best; error, bias included, {errors[0]} (median) to {with_unit(errors[1], self.unit)} (largest)"
         )
 
     @property
@@ -95,6 +97,7 @@ class MapDrawing(Drawing):
             "mode": "markers",
             "x": screen.rounded(self.points[:, 0]),
             "y": screen.rounded(self.points[:, 1]),
+            "meta": screen.CASES,
             "customdata": [
                 [int(case), number(value)] for case, value in zip(self.case_ids, self.point_values, strict=True)
             ],
@@ -118,7 +121,7 @@ class MapDrawing(Drawing):
                 }
             )
         x, y = (screen.axis(label, showgrid=False, zeroline=False) for label in (self.x_label, self.y_label))
-        return [{"data": data, "layout": screen.layout(x, y, 520, hovermode="closest")}]
+        return [{"data": data, "layout": screen.layout(x, y, 520, hovermode="closest", dragmode="select")}]
 
     def printed(self) -> Figure:
         figure, (axis,) = paper.new_figure(4.3)
@@ -132,7 +135,9 @@ class MapDrawing(Drawing):
             axis.plot(*self.nominal, "o", markersize=6, markerfacecolor="white", color=VERMILION, markeredgewidth=1.6)
         axis.set(xlabel=paper.literal(self.x_label), ylabel=paper.literal(self.y_label))
         axis.grid(visible=False)
-        bar = figure.colorbar(field, ax=axis, label=paper.literal(self.metric_label), pad=0.02, aspect=32)
+        bar = figure.colorbar(
+            field, ax=axis, label=paper.literal(self.metric_label), pad=0.02, aspect=32, format=paper.PlainNumbers()
+        )
         bar.outline.set_visible(False)
         paper.add_key(figure, self.key, columns=1)
         return figure

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from reports.document import Key
 from reports.figures.palette import on_paper
@@ -31,7 +31,6 @@ STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-3, 5),
-    "axes.formatter.use_mathtext": True,
     "grid.color": "#dddddd",
     "grid.linewidth": 0.5,
     "xtick.labelsize": 7.0,
@@ -43,9 +42,31 @@ STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "mc-engine",
 }
+SIGNS: dict[str, Any] = {  # a point's shape: by plotly's name, matplotlib's
+    "circle": "o",
+    "x": "x",
+    "diamond": "D",
+    "square": "s",
+    "triangle-up": "^",
+    "cross": "P",
+    "star": "*",
+}
 FILLED = {"bar": 0.6, "field": 0.6, "band": 0.3}  # opacity
+BELOW_POWER = 7.0  # points, a line of small print
 LONGEST_LINE = 104  # characters of a key that fit the width of the page
+_SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 _DASH: dict[str, Any] = {"line": "-", "dash": "--", "dot": ":"}
+
+
+class PlainNumbers(ScalarFormatter):
+    """Numbers at the ticks as plain text, a power of ten beside them as ×10⁶.
+
+    Matplotlib's own way to such a power lays out every tick as mathematics, in half of the time of a whole report.
+    """
+
+    def get_offset(self) -> str:
+        power = super().get_offset().removeprefix("1e").replace("−", "-")
+        return f"×10{power.translate(_SUPERSCRIPT)}" if power else ""
 
 
 def new_figure(
@@ -54,7 +75,11 @@ def new_figure(
     """A figure as wide as the text, `height` inches high, and its axes row by row.  heights : of the rows, relative."""
     figure = Figure(figsize=(WIDTH, height), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False, height_ratios=heights)
-    return figure, [axis for row in axes for axis in row]
+    found = [axis for row in axes for axis in row]
+    for axis in found:
+        axis.xaxis.set_major_formatter(PlainNumbers())
+        axis.yaxis.set_major_formatter(PlainNumbers())
+    return figure, found
 
 
 def literal(text: str) -> str:
@@ -70,6 +95,14 @@ def few_ticks(axis: Axes, x: int = 5, y: int = 4, whole: bool = False) -> None:
     axis.yaxis.set_major_locator(MaxNLocator(y))
 
 
+def label_below_power(axis: Axes) -> None:
+    """Moves the label of x down where a power of ten stands at the end of the axis, which a long label would cover."""
+    formatter = axis.xaxis.get_major_formatter()
+    formatter.set_locs(list(axis.xaxis.get_major_locator()()))
+    if formatter.get_offset():
+        axis.xaxis.labelpad += BELOW_POWER
+
+
 def add_key(figure: Figure, key: Sequence[Key], columns: int = 3) -> None:
     """The figure's key in rows above the axes."""
     if key:
@@ -83,7 +116,8 @@ def _handle(entry: Key) -> Line2D | Patch:
     if entry.mark in FILLED:
         return Patch(color=colour, alpha=FILLED[entry.mark], linewidth=0, label=label)
     if entry.mark == "point":
-        return Line2D([], [], linestyle="", marker="o", markersize=3, color=colour, label=label)
+        size = 3 if entry.sign == "circle" else 4.5
+        return Line2D([], [], linestyle="", marker=SIGNS[entry.sign], markersize=size, color=colour, label=label)
     if entry.mark == "ring":
         return Line2D(
             [], [], linestyle="", marker="o", markersize=6, markerfacecolor="white", color=colour, label=label

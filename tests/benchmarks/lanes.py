@@ -15,12 +15,16 @@ from typing import Any
 
 import numpy as np
 
+import mc_engine
 from mc_engine import flight
+from mc_engine.campaign import load_campaign
+from mc_engine.cases import case_table, full_inputs
 from mc_engine.kernel import build_kernel
 from mc_engine.kernel_parts import settings_class
 from mc_engine.model import Model, load_model
 
 HERE = Path(__file__).resolve().parent
+ROCKET = Path(mc_engine.__file__).parent / "documentation" / "tutorial" / "sounding_rocket"
 WIDTHS = (1, 8, 16)
 LONG = 12  # repeats of the long flights
 
@@ -80,6 +84,13 @@ def flexible_pulses(n_cases: int = 16) -> Flight:
     return replace(flexible(n_cases, actuator="pwpf", step_s=0.005), title="flexible satellite, pulses")
 
 
+def sounding_rocket(n_cases: int = 64) -> Flight:
+    """The tutorial's campaign, from the rail to the ground: noisy control in every step, three switches, a stop."""
+    campaign = load_campaign(ROCKET)
+    inputs = full_inputs(campaign, case_table(campaign, np.arange(n_cases)))
+    return Flight("sounding rocket of the tutorial", campaign.model, ROCKET, inputs, n_cases)
+
+
 def caller(cases: Flight, width: int) -> Callable[[], float]:
     """Function that flies all cases once and returns the time of a case-step [ns], that of the kernel call alone."""
     ready = flight.prepare(cases.model, cases.inputs, cases.n_cases)
@@ -127,7 +138,13 @@ def processor() -> str:
 
 def main() -> None:
     print(f"{processor()}, one thread")
-    for flown, repeats in ((orbit, 60), (deorbit, 60), (flexible, LONG), (flexible_pulses, LONG)):
+    for flown, repeats in (
+        (orbit, 60),
+        (deorbit, 60),
+        (flexible, LONG),
+        (flexible_pulses, LONG),
+        (sounding_rocket, LONG),
+    ):
         cases = flown()
         timing = measure(cases, repeats=repeats)
         for width, ns in timing.ns.items():

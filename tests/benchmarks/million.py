@@ -44,17 +44,16 @@ class Stopwatch:
 
 def fly(cases: int, workers: int) -> dict[str, float]:
     """One run in this process: wall [s], peak memory [MiB], thread-seconds by part, parts and cases in the largest."""
-    from mc_engine import flight, load_campaign, runner
-    from mc_engine.store import Store
+    from mc_engine import chunks, flight, load_campaign, runner
 
     with tempfile.TemporaryDirectory() as folder:
         runner.run(load_campaign(CAMPAIGN, cases=64), Path(folder) / "warm", workers=1)
         watch = Stopwatch()
         for place, name, part in (
-            (runner, "case_table", "sampling"),
+            (chunks, "case_table", "sampling"),
             (flight, "_call", "kernel"),
-            (runner, "fly", "flying"),
-            (Store, "append", "writing"),
+            (chunks, "fly", "flying"),
+            (chunks, "write_aside", "writing"),
         ):
             watch.watch(place, name, part)
         begin = time.perf_counter()

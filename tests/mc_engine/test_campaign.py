@@ -51,6 +51,16 @@ def test_cases_and_seed_can_be_given_from_outside():
     assert (campaign.cases, campaign.seed) == (7, 0)
 
 
+def test_the_file_caps_the_steps_of_a_model_that_chooses_them(tmp_path):
+    text = '[campaign]\nmodel = "campaigns.reentry"\ncases = 3\nseed = 1\ndesign = "mc"\nmax_steps = 7\n'
+    capped = load_campaign("capped", text=text, directory=tmp_path)
+    free = load_campaign("free", text=text.replace("max_steps = 7", ""), directory=tmp_path)
+    assert (capped.model.clock.attempts, capped.model.reference) == (7, "campaigns.reentry")
+    assert free.model.clock.attempts > 7
+    assert capped.digest != free.digest
+    assert "fixed grid" in problems("max_steps = 7\n")["campaign.max_steps"]
+
+
 @pytest.mark.parametrize(
     ("option", "place"), [({"cases": 0}, "cases"), ({"seed": -1}, "seed"), ({"cases": True}, "cases")]
 )
@@ -153,7 +163,7 @@ def test_a_latin_hypercube_that_does_not_fit_into_memory_is_refused():
 
 def test_a_file_over_five_megabytes_is_refused(folder):
     (folder / "campaign.toml").write_text(TEXT + "#" * 5_000_000)
-    with pytest.raises(CampaignError, match="larger than 5 MB"):
+    with pytest.raises(CampaignError, match="larger than 250 kB"):
         load_campaign(folder)
 
 
@@ -266,3 +276,14 @@ sigma = nan
     assert "dispersion.pitch_error_deg.lower: 5 is not below upper = -5" in told
     assert "dispersion.burn_dv.sigma: nan is not a finite number" in told
     assert 'dispersion.burn_dv: is not a parameter of minimal; did you mean "burn_dv_m_s"?' in told
+
+
+@pytest.mark.parametrize(("design", "cases", "nearest"), [("saltelli", 10, "8 or 12"), ("morris", 10, "9 or 12")])
+def test_a_design_in_blocks_takes_whole_blocks_and_independent_inputs(design, cases, nearest):
+    axes = "[dispersion.{}]\ndist = 'uniform'\nlower = 1.0\nupper = 2.0\n"
+    body = axes.format("mass_kg") + axes.format("delay_s")
+    message = problems(f"cases = {cases}\n{body}", design)["campaign.cases"]
+    assert message.endswith(f"{nearest} would fit")
+    assert problems(f"cases = 12\n{body}", design) == {}
+    pair = '[[correlation]]\nbetween = ["mass_kg", "delay_s"]\nrank = 0.3\n'
+    assert "is for independent inputs" in problems(f"cases = 12\n{body}{pair}", design)["correlation"]

@@ -9,8 +9,8 @@ from apogee_tuning import apogee_and_speed, apogee_campaign
 
 from mc_engine.candidates import cases_per_candidate, commonest_failure, fly_candidates, quantile_rank
 from mc_engine.cases import case_table
+from mc_engine.chunks import fly_chunk
 from mc_engine.kernel import build_kernel
-from mc_engine.runner import fly_chunk
 
 CHOICES = np.array([[300.0, 100.0], [250.0, 60.0], [600.0, 200.0], [400.0, 150.0], [200.0, 50.0]])
 ROBUST = '\n[tuning.constraint.most]\nmetric = "apogee_altitude_km"\nquantile = {}\n{} = 700.0\n'

@@ -1,6 +1,7 @@
 """Compiled kernels and their cache: one per model, width and state of the sources, and quick the second time."""
 
 import json
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -12,6 +13,7 @@ from small_run import ENVIRONMENT
 
 import mc_engine
 from mc_engine import kernel
+from mc_engine.campaign import SHIPPED
 from mc_engine.flight import fly
 from mc_engine.model import load_model
 
@@ -180,3 +182,25 @@ def test_the_cache_lies_where_the_user_says_or_where_the_system_keeps_such_thing
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     assert kernel.cache_folder() == Path(tempfile.gettempdir()) / "mc-engine"
+
+
+def test_the_same_campaign_under_the_same_relative_path_elsewhere_flies_from_the_cache(tmp_path):
+    """The compiled kernel remembers the file that it was made of; from another folder that is another file."""
+    script = """
+from pathlib import Path
+
+import numpy as np
+
+from mc_engine.flight import fly
+from mc_engine.model import load_model
+
+model = load_model("model.py", Path("case"))
+inputs = {one.name: one.default for one in model.parameters}
+assert fly(model, inputs, np.zeros(1, dtype=int), 1, folder=Path("case"), width=1)["status"][0] == "ok"
+"""
+    for place in ("here", "there"):
+        shutil.copytree(SHIPPED / "minimal", tmp_path / place / "case")
+        command = [sys.executable, "-c", script]
+        environment = {**ENVIRONMENT, "MC_ENGINE_CACHE": str(tmp_path / "cache")}
+        done = subprocess.run(command, cwd=tmp_path / place, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr

@@ -29,7 +29,14 @@ def loaded_by(*arguments):
 
 @pytest.mark.parametrize(
     "arguments",
-    [["--help"], ["run", "--help"], ["list"], ["schema"], ["plan", "--share", "0.99", "--confidence", "0.9"]],
+    [
+        ["--help"],
+        ["run", "--help"],
+        ["list"],
+        ["schema"],
+        ["published"],
+        ["plan", "--share", "0.99", "--confidence", "0.9"],
+    ],
 )
 def test_help_list_schema_and_plan_load_neither_numba_nor_matplotlib(arguments):
     modules = loaded_by(*arguments)
@@ -42,5 +49,5 @@ def test_help_loads_no_numpy_either():
 
 def test_check_and_status_load_neither_numba_nor_matplotlib(here):
     small_store(here / "flown")
-    for arguments in (["check", here / "cart"], ["status", here / "flown"]):
+    for arguments in (["check", "--no-model", here / "cart"], ["check", "minimal"], ["status", here / "flown"]):
         assert not {"numba", "matplotlib", "reports"} & loaded_by(*arguments)

@@ -53,10 +53,10 @@ def test_a_model_imports_the_files_beside_it_and_sees_their_edits(tmp_path):
 @pytest.mark.parametrize(
     ("helper", "sentence"),
     [
-        ("TITLE = = 2\n", '"helper.py", line 1: SyntaxError: invalid syntax'),
-        ("import sys\nsys.exit(3)\n", '"helper.py", line 2: ends the program; a model only defines MODEL'),
-        ("def f():\n    return 1 / 0\nTITLE = f()\n", '"helper.py", line 2: ZeroDivisionError: division by zero'),
-        ("import no_such_package\n", """"helper.py", line 1: ModuleNotFoundError: No module named 'no_such_package'"""),
+        ("TITLE = = 2\n", "helper.py, line 1: SyntaxError: invalid syntax"),
+        ("import sys\nsys.exit(3)\n", "helper.py, line 2: ends the program; a model only defines MODEL"),
+        ("def f():\n    return 1 / 0\nTITLE = f()\n", "helper.py, line 2: ZeroDivisionError: division by zero"),
+        ("import no_such_package\n", "helper.py, line 1: ModuleNotFoundError: No module named 'no_such_package'"),
     ],
 )
 def test_an_error_of_the_model_s_own_code_is_a_sentence_with_its_place(tmp_path, monkeypatch, helper, sentence):

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from mc_engine.plan import demonstrated_share, plan_table, smallest_sample
+from mc_engine.plan import acceptance_number, demonstrated_share, interval_lines, plan_table, smallest_sample
 
 # share, confidence: smallest samples for 0, 1, 2, ... failures.
 # 59, 93, 124 and 299, 473: Wilks, Ann. Math. Stat. 12 (1941), one-sided tolerance limits; the others by scipy.
@@ -50,3 +50,23 @@ def test_a_share_or_confidence_outside_zero_to_one_is_refused(share, confidence)
 def test_a_negative_number_of_failures_is_refused():
     with pytest.raises(ValueError, match="negative"):
         smallest_sample(0.9, 0.9, -1)
+
+
+@given(share=st.floats(0.5, 0.999), confidence=st.floats(0.5, 0.99), cases=st.integers(1, 5000))
+def test_the_acceptance_number_is_the_last_that_demonstrates(share, confidence, cases):
+    accepted = acceptance_number(cases, share, confidence)
+    if accepted is None:
+        assert smallest_sample(share, confidence) > cases
+    else:
+        assert smallest_sample(share, confidence, accepted) <= cases < smallest_sample(share, confidence, accepted + 1)
+
+
+@pytest.mark.parametrize("row", plan_table(0.9973, 0.90, 4))
+def test_a_row_says_how_likely_a_system_passes_that_fails_half_as_often(row):
+    assert row.half_rate == pytest.approx(binom.cdf(row.failures, row.cases, 0.00135), rel=1e-9)
+
+
+# Wilks, two-sided 95/95 and 99/95.
+@pytest.mark.parametrize(("share", "cases"), [(0.95, "93"), (0.99, "473")])
+def test_the_first_interval_lies_between_the_smallest_and_the_largest_value(share, cases):
+    assert list(interval_lines(share, 0.95))[1].split() == ["smallest", "and", "the", "largest", cases]

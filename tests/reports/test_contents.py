@@ -30,8 +30,8 @@ def said(document):
 
 def test_the_sections_come_in_the_order_of_a_review(document):
     assert [section.anchor for section in document.sections] == [
-        "requirements", "drivers", "maps", "distributions", "metrics", "histories", "scatter", "worst", "status",
-        "published", "inputs", "provenance", "reading",
+        "requirements", "drivers", "maps", "distributions", "metrics", "convergence", "histories", "scatter", "cases",
+        "worst", "status", "published", "inputs", "provenance", "reading",
     ]  # fmt: skip
 
 
@@ -43,7 +43,7 @@ def test_figures_and_tables_are_numbered_in_reading_order(document):
 
 def test_failed_requirements_come_first_in_the_headline(document):
     assert [(card.label, card.answer) for card in document.verdicts] == [
-        ("force", "fail"), ("settling", "fail"), ("fuel", "pass"),
+        ("force", "fail"), ("settling", "fail"), ("fuel", "pass"), ("all at once", "fail"),
     ]  # fmt: skip
     assert document.subtitle == "Of 3 requirements: 1 met, 2 failed."
 
@@ -80,8 +80,8 @@ def test_the_worst_case_comes_with_the_command_that_repeats_it(document):
 def test_the_map_says_that_it_is_smoothed_and_from_how_many_cases(document):
     drawing = next(block.drawing for block in blocks_of(document, FigureBlock) if isinstance(block.drawing, MapDrawing))
     key = " ".join(entry.text for entry in drawing.key)
-    assert "local quadratic regression on the 60 nearest of 9\u202f988 of 10\u202f000 cases" in key
-    assert "standard error" in key
+    assert "local quadratic regression on the 24 nearest of 9\u202f988 of 10\u202f000 cases" in key
+    assert "error, bias included" in key
     assert "of 9\u202f988 shown" in key
 
 

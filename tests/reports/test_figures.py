@@ -8,7 +8,7 @@ from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document import FigureBlock, blocks_of
-from reports.figures import paper
+from reports.figures import paper, screen
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
 
@@ -62,6 +62,17 @@ def test_the_printed_figures_are_the_same_bytes_twice_and_hold_no_date(drawings)
         assert first == paper.svg(drawing.printed)
         assert "<metadata>" not in first
         assert "<path" in first
+
+
+def test_numbers_that_differ_by_little_stay_different_on_the_screen():
+    values = -2.0 + 1e-5 * np.array([[0.0, 0.5, np.nan], [1.0, 0.25, 0.75]])
+    shown = np.array(screen.rounded(values, 5), dtype=float)
+    assert np.nanmax(np.abs(shown - values)) < 1e-9
+    assert np.isnan(shown[0, 2])
+    assert screen.rounded([1.0, 1.0 + 2**-52], 5)[1] == 1.0 + 2**-52
+    assert screen.rounded([-0.123456789, 2.0], 5) == [-0.12346, 2.0]
+    assert screen.rounded([1 / 3, 1 / 3], 5) == [0.33333, 0.33333]
+    assert screen.rounded([], 5) == []
 
 
 def test_dollar_signs_in_names_are_no_mathematics():

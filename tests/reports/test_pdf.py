@@ -1,10 +1,14 @@
 """The typeset report."""
 
+import io
 import re
 import shutil
 import subprocess
 
+import pypdf
+import pypdfium2
 import pytest
+from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_pdf
@@ -36,6 +40,51 @@ def text_of(pdf, tmp_path):
 def test_the_same_run_gives_the_same_bytes(pdf):
     assert pdf.startswith(b"%PDF")
     assert render_pdf(build(synthetic_run(3000), "run")) == pdf
+
+
+def test_two_readers_open_it_and_see_the_same_pages_with_ink_on_each(pdf):
+    pages = pypdf.PdfReader(io.BytesIO(pdf)).pages
+    drawn = pypdfium2.PdfDocument(pdf)
+    assert len(pages) == len(drawn) > 8
+    for page, other in zip(pages, drawn, strict=True):
+        grey = other.render(scale=0.3, grayscale=True).to_numpy()
+        assert (grey < 128).any()
+        squeezed = [re.sub(r"\s", "", text) for text in (page.extract_text(), other.get_textpage().get_text_bounded())]
+        assert abs(len(squeezed[0]) - len(squeezed[1])) <= 0.02 * len(squeezed[0]) + 5
+
+
+def test_it_has_a_title_a_language_an_outline_and_alternative_texts(pdf):
+    reader = pypdf.PdfReader(io.BytesIO(pdf))
+    assert reader.metadata.title == "De-orbit correction after an erroneous burn"
+    assert reader.trailer["/Root"]["/Lang"] == "en"
+    assert len(reader.outline) >= 12
+    assert sum("/Alt" in item for item in _dictionaries(reader)) >= 9
+
+
+def test_every_font_is_embedded_and_every_figure_is_drawn_with_lines(pdf):
+    reader = pypdf.PdfReader(io.BytesIO(pdf))
+    fonts = [item for item in _dictionaries(reader) if item.get("/Type") == "/FontDescriptor"]
+    assert fonts
+    assert all({"/FontFile", "/FontFile2", "/FontFile3"} & set(font) for font in fonts)
+    assert not [item for item in _dictionaries(reader) if item.get("/Subtype") == "/Image" and item["/Width"] > 64]
+
+
+def test_payloads_are_typeset_as_they_were_written():
+    text = " ".join(PAYLOADS)
+    reader = pypdf.PdfReader(io.BytesIO(render_pdf(build(hostile(text), "run"))))
+    squeezed = re.sub(r"\s", "", "".join(page.extract_text() for page in reader.pages))
+    for payload in PAYLOADS:
+        assert re.sub(r"\s", "", payload) in squeezed
+    assert not [item for item in _dictionaries(reader) if item.get("/S") == "/URI" or "/URI" in item]
+
+
+def _dictionaries(reader):
+    """Every dictionary that stands as an object of its own."""
+    found = (
+        reader.get_object(number)
+        for number in range(1, len(reader.xref_objStm) + sum(map(len, reader.xref.values())) + 1)
+    )
+    return [item for item in found if isinstance(item, pypdf.generic.DictionaryObject)]
 
 
 def test_the_creation_date_is_that_of_the_run(pdf):

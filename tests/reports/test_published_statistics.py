@@ -1,10 +1,13 @@
 """What a source says of many cases, beside the same of a run with these dispersions."""
 
+import numpy as np
 import pytest
 from synthetic_run import synthetic_run
 
+from reports.drawings import distribution_blocks
+from reports.figures.distributions import bin_edges, law_curve
 from reports.flown import Flown
-from reports.published import own_statistic, published_table
+from reports.published import own_statistic, published_law, published_table
 from reports.published_statistics import statistics_tables
 
 BOTH = ["ve_pct", "oe_pct"]
@@ -72,3 +75,30 @@ def test_a_run_of_chosen_cases_is_not_compared():
 
 def test_inputs_that_are_shared_and_agree_are_compared():
     assert len(list(statistics_tables(flown(record("mean", 1.0, at={"control": "continuous", "isp_s": 246.0}))))) == 1
+
+
+def test_a_printed_mean_and_deviation_are_drawn_as_a_normal_law_over_the_cases(fuel):
+    """The curve holds as many cases as the bars, and its middle and width are the printed ones."""
+    run = flown(record("mean", 3.0), record("standard deviation", 0.5))
+    panel = next(p for block in distribution_blocks(run) for p in block.drawing.panels if p.law)
+    edges = bin_edges(panel.values)
+    x, y = law_curve(panel, edges)
+    shares = y / (panel.values.size * (edges[1] - edges[0]))
+    assert np.trapezoid(shares, x) == pytest.approx(1.0, abs=1e-3)
+    assert np.trapezoid(shares * x, x) == pytest.approx(3.0, abs=1e-3)
+    assert np.trapezoid(shares * (x - 3.0) ** 2, x) == pytest.approx(0.25, rel=1e-2)
+    assert panel.values.size == np.isfinite(fuel["propellant_kg"]).sum()
+
+
+@pytest.mark.parametrize("records", [[record("mean", 3.0)], [record("standard deviation", 0.5)], []])
+def test_half_a_law_is_not_drawn(records):
+    run = flown(*records)
+    assert published_law(run, "propellant_kg") is None
+
+
+def test_a_law_of_other_dispersions_is_not_drawn():
+    other = {"over": ["ve_pct"]}
+    assert (
+        published_law(flown(record("mean", 3.0, **other), record("standard deviation", 0.5, **other)), "propellant_kg")
+        is None
+    )

@@ -11,7 +11,10 @@ import reports
 from mc_engine.store import Column, create_store
 
 PUBLIC = {"build", "render_html", "render_pdf", "report", "write_reports"}
-SHARED = {"store", "statistics", "status", "units", "figures", "tuning_folder"}
+SHARED = {
+    "store", "statistics", "status", "units", "figures", "tuning_folder", "rare_event_folder", "comparison",
+    "run_changes", "durable_file", "errors",
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -49,7 +52,7 @@ def test_no_path_of_this_machine_gets_into_the_page(run_path):
 
 
 def test_an_unknown_format_is_refused_before_anything_is_written(run_path):
-    with pytest.raises(ValueError, match='"docx" is no format of a report; use html or pdf'):
+    with pytest.raises(ValueError, match='"docx" is no format of a report; use html, pdf, md'):
         reports.write_reports(run_path, ["html", "docx"])
     assert not (run_path / "report.html").exists()
 

@@ -11,8 +11,9 @@ import campaigns.deorbit
 
 FILE = Path(campaigns.deorbit.__file__).with_name("published.toml")
 RECORDS = tomllib.loads(FILE.read_text(encoding="utf-8"))["published"]
-STATUSES = {"legible", "restored", "read so", "not reproduced", "curve lost"}
+STATUSES = {"legible", "restored", "read so", "not reproduced", "curve lost", "lost"}
 KEYS = {"quantity", "published", "unit", "source", "column", "at", "ours", "tolerance", "status", "note"}
+KEYS |= {"headline", "at_most"}
 IDS = [record["quantity"] for record in RECORDS]
 DIGITS = 5e-7  # ours is written to seven digits and more
 
@@ -29,11 +30,24 @@ def normal_force():
     return "zero" if largest < 1e-9 else largest
 
 
+def entry_state():
+    speed, angle, radius, place = (NOMINAL[f"target_{one}"] for one in _ENTRY)
+    return f"{speed / 1e3:g} km/s, {angle:g}°, {radius:g} km, {place:g}°"
+
+
+def modulator():
+    return "{:g}, {:g}, {:g} s, {:g} N, {:g} N".format(*(NOMINAL[f"modulator_{one}"] for one in _MODULATOR))
+
+
+_ENTRY = ("speed_m_s", "flight_path_angle_deg", "radius_km", "latitude_argument_deg")
+_MODULATOR = ("input_gain", "feedback_gain", "time_constant_s", "on_n", "off_n")
 # numbers that are no column: how to compute them, and how far a history in steps lets us
 ORDER = ("first", "second", "third", "fourth", "fifth")
 COMPUTED = {
     "the same, as the text concludes from Fig. 9": (settled_to_half_a_percent, 1e-3),
     "force along the orbit normal": (normal_force, 0.0),
+    "speed, angle below the horizon, radius and place at entry": (entry_state, 0.0),
+    "gains, time constant and levels of the modulator": (modulator, 0.0),
 }
 COMPUTED |= {
     f"width of the {word} pulse": (lambda number=number: pulses(0.002, **PULSED)[1][number], 0.004)

@@ -6,11 +6,7 @@ from geo_flights import MODEL, NOMINAL, fly_cases, fly_one
 
 from campaigns.geo_injection.linear_prediction import predicted_sigmas
 
-# the orbits of table 7
-THREE_STAGED = {
-    "method": "staged", "burns": 3, "transfer_1_semi_major_axis_km": 8733.1, "transfer_1_eccentricity": 0.2456,
-    "transfer_1_plane_change_deg": 1.5,
-}  # fmt: skip
+THREE_STAGED = {"method": "staged", "burns": 3}
 SEQUENCES = [
     {},
     {"initial_inclination_deg": 55.0},
@@ -19,6 +15,9 @@ SEQUENCES = [
     {"burns": 3, "planar": True},
     {"method": "staged"},
     THREE_STAGED,
+    {"method": "staged", "planar": True},
+    THREE_STAGED | {"planar": True},
+    {"method": "staged", "initial_inclination_deg": 1.0},
     {"final_inclination_deg": 28.5, "initial_inclination_deg": 5.0},
 ]
 
@@ -35,6 +34,30 @@ def test_the_nominal_replay_reaches_the_final_circle(inputs, guidance, shutdown)
     assert row["inclination_deg"] == pytest.approx(inputs.get("final_inclination_deg", 0.0), abs=1e-4)
     assert row["correction_dv_m_s"] < 0.02
     assert abs(row["radius_error_km"]) < 0.1
+
+
+# first burn [s] of the orbits that the source goes over, where no orbit is given
+STAGED = [
+    ({}, 2051.2),
+    ({"planar": True}, 2027.9),
+    ({"initial_inclination_deg": 55.0}, 2061.3),
+    ({"burns": 3}, 928.1),
+    ({"burns": 3, "planar": True}, 904.3),
+]
+
+
+@pytest.mark.parametrize(("inputs", "first_burn_s"), STAGED)
+def test_the_staged_procedure_goes_over_the_orbits_of_the_source_unless_others_are_given(inputs, first_burn_s):
+    assert fly_one(method="staged", **inputs)["burn_out_1_s"] == pytest.approx(first_burn_s, abs=0.5)
+
+
+def test_another_orbit_between_two_staged_burns_is_gone_over():
+    given = {"transfer_1_semi_major_axis_km": 24_600.0, "transfer_1_eccentricity": 0.71}
+    lower, higher = (fly_one(method="staged", **given, transfer_1_plane_change_deg=angle) for angle in (0.0, 4.0))
+    assert lower["correction_dv_m_s"] < 0.02
+    assert higher["burn_out_1_s"] > lower["burn_out_1_s"] + 20.0
+    sunk = fly_one(method="staged", transfer_1_semi_major_axis_km=100.0)
+    assert "transfer_1_semi_major_axis_km is below the Earth's radius" in sunk["reason"]
 
 
 def test_one_thousandth_more_thrust():

@@ -11,6 +11,7 @@ from campaigns.geo_injection.kept_programs import SEQUENCES
 from campaigns.geo_injection.model import sequence_of
 from campaigns.geo_injection.program import from_text, to_text
 from mc_engine.campaign import list_campaigns, load_campaign
+from mc_engine.cases import case_table
 from mc_engine.flight import fly
 
 FILES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "geo_injection")
@@ -95,3 +96,15 @@ def test_an_inclination_that_rises_is_the_mirror_image_of_one_that_falls():
     falling = design.new_design(sequence_of(chosen(initial_inclination_deg=20.0, final_inclination_deg=5.0)))
     rising = design.new_design(sequence_of(chosen(initial_inclination_deg=5.0, final_inclination_deg=20.0)))
     assert rising.propellant == pytest.approx(falling.propellant, abs=1e-6)
+
+
+def test_the_file_of_a_covariance_draws_that_covariance():
+    campaign = load_campaign("geo_injection/parking_orbit_errors")
+    drawn = case_table(campaign, np.arange(20_000))
+    names = [one.name for one in campaign.dispersions]
+    found = np.cov([drawn[name] for name in names])
+    wanted = np.diag([300.0, 1500.0, 500.0, 1.8, 0.4, 0.6]) ** 2
+    wanted[1, 3] = wanted[3, 1] = -2430.0
+    wanted[0, 4] = wanted[4, 0] = -108.0
+    sigmas = np.sqrt(np.diag(wanted))
+    assert found / np.outer(sigmas, sigmas) == pytest.approx(wanted / np.outer(sigmas, sigmas), abs=0.03)

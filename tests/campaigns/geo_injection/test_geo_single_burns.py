@@ -7,8 +7,8 @@ import pytest
 from geo_sequences import FLOW, GEO, MASS, MU, PARKING, THRUST, sequence
 
 from campaigns.geo_injection.avoidance import AVOIDANCE, analytic_guess, converged
-from campaigns.geo_injection.single_burn import Stage, circle, fly_shortest
-from campaigns.geo_injection.staged import Orbit, staged
+from campaigns.geo_injection.single_burn import Stage, circle, fly_shortest, rise_guess
+from campaigns.geo_injection.staged import Orbit, rising, staged
 
 SOURCE = {
     "planar, 2 burns": (2, 0.0, [(24_588, 0.7142, 0.0)]),
@@ -19,11 +19,16 @@ SOURCE = {
 }
 
 
-def first_burn_s(name):
+def burn_s(name, number):
+    """Least time [s] of a burn of the staged sequence, counted from 0."""
     burns, inclination, between = SOURCE[name]
     orbits = tuple(Orbit(1e3 * a / PARKING, e, np.radians(i)) for a, e, i in between)
     one = sequence(burns, inclination)
-    return one.time_unit * staged(one.problem(), orbits)[0].burn.duration
+    return one.time_unit * staged(one.problem(), orbits)[number].burn.duration
+
+
+def first_burn_s(name):
+    return burn_s(name, 0)
 
 
 def apogee_burn_s(a_km, e, inclination_deg, propellant_so_far_kg, placing):
@@ -36,6 +41,26 @@ def apogee_burn_s(a_km, e, inclination_deg, propellant_so_far_kg, placing):
     stage = Stage(reference, mass, problem.thrust, problem.flow, circle(problem.ratio), placing)
     change = np.array([0.0, -np.sqrt(1.0 / problem.ratio), 0.0]) - reference[3:]
     return unit * fly_shortest(stage, change, np.zeros(3), 600.0 / unit, -300.0 / unit).duration
+
+
+@pytest.mark.parametrize(
+    ("a_km", "e", "degrees", "used_kg"),
+    [(24_588, 0.7142, 0.0, 12_480.0), (24_438, 0.7247, 0.0, 11_984.1), (24_588, 0.7142, 26.0, 12_683.0)],
+)
+def test_the_source_s_guess_for_burns_between_ellipses_leads_to_the_same_apogee_burns(a_km, e, degrees, used_kg):
+    """Eq. (23), though it gives less than a third of their time."""
+    problem, unit = sequence(2, 28.5).problem(), sequence(2, 28.5).time_unit
+    a, i = 1e3 * a_km / PARKING, np.radians(degrees)
+    speed = np.sqrt((1 - e) / ((1 + e) * a))
+    up, along = np.array([-1.0, 0.0, 0.0]), np.array([0.0, -np.cos(i), -np.sin(i)])
+    mass = 1.0 - used_kg / MASS
+    stage = Stage(np.concatenate([a * (1 + e) * up, speed * along]), mass, problem.thrust, problem.flow,
+                  circle(problem.ratio))  # fmt: skip
+    guess = rise_guess((problem.ratio - a * (1 + e)) * mass / problem.thrust)
+    found = rising(stage, problem.ratio, up, along).duration
+    assert unit * found == pytest.approx(apogee_burn_s(a_km, e, degrees, used_kg, "centred"), abs=1e-6)
+    assert guess[0] < found / 3.0
+    assert guess[2] == pytest.approx(guess[1] ** 2, rel=1e-12)
 
 
 @pytest.mark.parametrize("placing", ["centred", "free"])

@@ -11,8 +11,8 @@ NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settin
 PUBLISHED = {"schedule": "published", "feedback": False, "navigation": "perfect", "sunlight": False}
 KEPLER = {"gravity_degree": 0.0, "gravity_order": 0.0, "sun_and_moon": False, "sunlight": False}
 INSPECTION = {
-    "phase": "inspection", "epoch_utc": 58828.0, "duration_days": 30.0, "sunlight": False, "navigation": "perfect",
-    "assumed_pointing_deg": 1.0 / 6.0,
+    "phase": "inspection", "epoch_utc": "2019-12-11T00:00:00", "duration_days": 30.0, "sunlight": False,
+    "navigation": "perfect", "assumed_pointing_deg": 1.0 / 6.0,
 }  # fmt: skip
 
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from mc_engine.campaign import list_campaigns, load_campaign
+from mc_engine.errors import CampaignError
 from mc_engine.flight import fly
+from mc_engine.model import load_model
 
 NAMES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "geo_servicing")
 FILES = {"", "published_per_burn", "published_per_run", "published_raw", "inspection", "inspection_single"}
@@ -59,3 +61,29 @@ def test_craft_that_drift_freely_fall_towards_the_two_stable_longitudes():
     assert gained[0] > gained[1]
     assert gained[2] > gained[3]
     assert (gained[[0, 2]] - gained[[1, 3]] > 0.5).all()
+
+
+@pytest.mark.parametrize(
+    "written", ['"2019-12-11T00:00:00"', "2019-12-11T00:00:00", '"2019-12-11T03:00+03:00"', "58828.0"]
+)
+def test_the_epoch_is_a_date_in_utc(written, tmp_path):
+    head = '[campaign]\nmodel = "campaigns.geo_servicing"\ndesign = "one_at_a_time"\n'
+    body = f"[parameters]\nepoch_utc = {written}\n[dispersion.epoch_error_days]\nvalues = [0.0, 0.5]\n"
+    (tmp_path / "dated.toml").write_text(head + body)
+    campaign = load_campaign(tmp_path / "dated.toml")
+    assert campaign.nominal["epoch_utc"] == "2019-12-11T00:00:00"
+    epoch = next(one for one in campaign.model.settings if one.name == "epoch_utc")
+    assert epoch.code(campaign.nominal["epoch_utc"]) == 58828.0
+
+
+@pytest.mark.parametrize("model", ["geo_servicing", "geo_injection"])
+def test_a_setting_that_is_dispersed_like_a_parameter_is_refused_with_the_parameter_to_take(model, tmp_path):
+    settings = [one for one in load_model(f"campaigns.{model}").settings if one.dispersed_by]
+    parameters = {one.name for one in load_model(f"campaigns.{model}").parameters}
+    assert settings
+    head = f'[campaign]\nmodel = "campaigns.{model}"\ndesign = "mc"\ncases = 2\nseed = 1\n'
+    for one in settings:
+        assert one.dispersed_by in parameters
+        (tmp_path / "one.toml").write_text(head + f'[dispersion.{one.name}]\ndist = "normal"\nsigma = 1.0\n')
+        with pytest.raises(CampaignError, match=f'use "discrete", or disperse {one.dispersed_by}'):
+            load_campaign(tmp_path / "one.toml")

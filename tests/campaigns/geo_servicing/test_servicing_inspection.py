@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from procedure_twin import settled_ranges
 from servicing_flights import INSPECTION, MODEL, NOMINAL, fly_cases, fly_one, history
 from servicing_twin import R0, RATE, SIDEREAL_DAY, Twin, elements
 
@@ -133,16 +134,34 @@ def held(row):
     return (row["settled_min_range_m"] >= LOW) & (row["settled_max_range_m"] <= HIGH)
 
 
+def twin_share(chi1, **errors):
+    least, largest = settled_ranges(1000, chi1, 0.1, 1e-5, **errors)
+    return ((least >= LOW) & (largest <= HIGH)).mean()
+
+
+@pytest.mark.parametrize("chi1", [0.85, 0.9])
+def test_as_many_runs_hold_the_sources_band_as_of_a_twin_on_point_mass_orbits(chi1):
+    """0.1 m and 1e-5 m/s relative, every look a fix of its own; fresh errors of thrust and pointing in every burn."""
+    share = held(fly_cases(**INSPECTION | GOOD_FIXES | EXECUTION, chi1=np.full(1000, chi1))).mean()
+    assert share == pytest.approx(twin_share(chi1, thrust=0.005, pointing=np.radians(1.0 / 6.0)), abs=0.04)
+
+
 def test_navigation_of_a_decimetre_holds_the_sources_band_if_the_gain_is_right():
-    """0.1 m and 1e-5 m/s relative, used as they come: 97 % with chi1 = 0.9."""
-    assert held(fly_cases(**INSPECTION | GOOD_FIXES, chi1=np.full(400, 0.9))).mean() >= 0.9
+    """0.1 m and 1e-5 m/s relative, used as they come: 99 % with chi1 = 0.9."""
+    assert held(fly_cases(**INSPECTION | GOOD_FIXES, chi1=np.full(400, 0.9))).mean() >= 0.95
 
 
-def test_with_the_gain_of_the_ideal_case_a_quarter_of_the_trials_leave_the_sources_band():
-    """The source has all of them inside.  The reference procedure with chi1 = 0.85 leaves a relative ellipse of half
-    the band already without errors, and goes 4.7 m near the limit; its errors do the rest."""
-    share = held(fly_cases(**INSPECTION | GOOD_FIXES | EXECUTION, chi1=np.full(400, 0.85))).mean()
-    assert 0.6 < share < 0.85
+def test_with_the_gain_of_the_ideal_case_one_trial_in_eight_leaves_the_sources_band():
+    """The source has all of them inside; nine in ten were hoped for.  The procedure with chi1 = 0.85 leaves a relative
+    ellipse of half the band already without errors, and goes 4.7 m near the limit; drift errors of 3 m in a revolution
+    do the rest.  Without errors of thrust it is one in six, because that ellipse is then always as wide.
+    """
+    chi1 = np.full(1000, 0.85)
+    share = held(fly_cases(**INSPECTION | GOOD_FIXES | EXECUTION, chi1=chi1)).mean()
+    assert share == pytest.approx(0.88, abs=0.03)
+    (record,) = [one for one in MODEL.published if "keep the steady range" in one["quantity"]]
+    assert 100.0 * share == pytest.approx(record["ours"], abs=0.05)
+    assert held(fly_cases(**INSPECTION | GOOD_FIXES, chi1=chi1)).mean() == pytest.approx(0.845, abs=0.035)
 
 
 def test_corrections_in_pairs_hold_the_sources_band_in_every_trial():
@@ -155,6 +174,14 @@ def test_corrections_in_pairs_hold_the_sources_band_in_every_trial():
 def test_single_fixes_with_the_printed_errors_hold_nothing():
     raw = INSPECTION | EXECUTION | PRINTED_FIXES | {"navigation": "raw"}
     assert held(fly_cases(**raw, chi1=np.full(200, 0.85))).mean() == 0.0
+
+
+def test_fixes_of_both_craft_err_as_one_relative_fix_of_their_root_sum_square():
+    both = {"nav_position_m": 0.06, "target_nav_position_m": 0.08, "nav_velocity_m_s": 6e-6} | FIVE_DAYS
+    row = fly_one(**INSPECTION | {"navigation": "raw"} | both | {"target_nav_velocity_m_s": 8e-6})
+    one = fly_one(**INSPECTION | GOOD_FIXES | FIVE_DAYS)
+    assert row["delta_v_m_s"] == pytest.approx(one["delta_v_m_s"], rel=1e-9)
+    assert row["delta_v_m_s"] != fly_one(**INSPECTION | {"navigation": "raw"} | both)["delta_v_m_s"]
 
 
 def test_the_printed_errors_are_enough_for_a_filter():

@@ -35,6 +35,20 @@ def scatter(columns):
     return columns["downrange_km"].std()
 
 
+def test_spreads_and_loads_of_the_laws_are_those_of_the_published_table(flown):
+    open_loop = scatter(flown["none"])
+    spread = {"open loop": open_loop, "law 1": scatter(flown["law1"])}
+    spread |= {f"law {k} with range": scatter(flown[f"law{k}r"]) for k in (2, 3)}
+    ours = {f"spread of the range, {name}": value for name, value in spread.items()}
+    for k in (2, 3):
+        taken = 100.0 * (1.0 - scatter(flown[f"law{k}"]) / open_loop)
+        ours[f"spread of the range taken away by law {k} without range"] = taken
+    for name, law in (("open loop", "none"), ("law 1", "law1")):
+        ours[f"largest load of all cases, {name}"] = flown[law]["peak_load_g"].max()
+    records = {one["quantity"]: one["ours"] for one in MODEL.published if one["quantity"] in ours}
+    assert records == pytest.approx(ours, rel=1e-7)
+
+
 def test_every_case_comes_down(flown):
     assert all(set(columns["status"]) == {"ok"} for columns in flown.values())
 

@@ -1,20 +1,40 @@
 """Published check cases, and the table of published values: ours computed again, every verdict held."""
 
 import tomllib
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from reentry_flights import EXACT, MODEL, NOMINAL, PLANAR, fly_one, history
+from reentry_flights import (
+    EXACT,
+    MODEL,
+    NOMINAL,
+    PLANAR,
+    RADIUS,
+    TEXTBOOK,
+    ballistic,
+    circular_speed,
+    fly_cases,
+    fly_one,
+    history,
+)
 
 import campaigns.reentry
-from campaigns.reentry.closed_forms import shallow_peak
+from campaigns.reentry.closed_forms import critical_roll_angle, glide_range, shallow_peak
+from campaigns.reentry.critical_trajectories import critical_periapses
+from campaigns.reentry.lead_compensator import design_lead, margins_of
+from mc_engine.campaign import load_campaign
 from mc_engine.physics.atmosphere import us76
+from mc_engine.plan import demonstrated_share, smallest_sample
 
 FILE = Path(campaigns.reentry.__file__).with_name("published.toml")
 RECORDS = tomllib.loads(FILE.read_text(encoding="utf-8"))["published"]
-STATUSES = {"legible", "not reproduced", "fitted"}
+STATUSES = {"legible", "not reproduced", "fitted", "reference", "lost"}
 IDS = [record["quantity"] for record in RECORDS]
+# test_reentry_guidance flies these
+OF_MANY_CASES = {one for one in IDS if one.startswith("spread of the range") or one.startswith("largest load of all")}
+WITH_OURS = [record for record in RECORDS if "ours" in record and record["quantity"] not in OF_MANY_CASES]
 DIGITS = 5e-7  # ours is written to seven digits and more
 FOOT = 0.3048
 TENTH_OF_A_FOOT = 0.1
@@ -92,7 +112,57 @@ COMPUTED = {
     "density at 120 km": lambda: us76(120e3),
     "largest load of a grazing ballistic entry": lambda: 30.0 * shallow_peak(0.0),
     "Stardust: drogue, at Mach 1.23": lambda: mach_time(1.23, **STARDUST),
+    "density at 50 km": lambda: us76(50e3),
+    "density at 80 km": lambda: us76(80e3),
+    "Stardust: load overpredicted by a planar entry at rest": lambda: overpredicted(tolerance=EXACT),
+    "entry from orbit at −2°, 50 to 1000 kg/m²: smallest of the largest loads": lambda: shallow_loads().min(),
+    "entry from orbit at −2°, 50 to 1000 kg/m²: largest of the largest loads": lambda: shallow_loads().max(),
+    "critical roll angle at −10°": lambda: np.degrees(critical_roll_angle(np.radians(-10.0))),
+    "equilibrium glide: range, L/D 1 from 0.95 of circular speed at 80 km": lambda: (
+        glide_range(1.0, 0.95, 0.0, RADIUS) / 1e3
+    ),
+    "aerobraking: periapsis of capture": lambda: periapses().capture,
+    "aerobraking: periapsis of entry": lambda: periapses().entry,
+    "lead design: phase margin without it": lambda: np.degrees(margins_of(lambda w: 10.0 * ogata(w)).phase),
+    "lead design: zero": lambda: lead().zero,
+    "lead design: pole": lambda: lead().pole,
+    "lead design: gain": lambda: lead().gain,
+    "lead design: phase margin": lambda: np.degrees(lead().margins.phase),
+    "lead design: crossover": lambda: lead().margins.crossover,
+    "cases without a failure that show 0.99865 with 90 %": lambda: smallest_sample(0.99865, 0.90),
+    "failure probability not exceeded with 90 %, none in 1000 cases": lambda: 1.0 - demonstrated_share(1000, 0, 0.90),
 }
+
+
+def overpredicted(**more):
+    """How much larger [%] the load of Stardust is in the plane over a sphere at rest."""
+    at_rest = {"rotating": False, "shape": "sphere", "gravity": "point"}
+    return 100.0 * (
+        fly_one(**STARDUST, **at_rest, **more)["peak_load_g"] / fly_one(**STARDUST, **more)["peak_load_g"] - 1.0
+    )
+
+
+@lru_cache
+def shallow_loads():
+    """Largest loads [g] of entries at circular speed, from where rho / B is that of 100 kg/m^2 at 120 km."""
+    b = np.array([50.0, 100.0, 200.0, 400.0, 1000.0])
+    altitude = 120.0 - 7.2 * np.log(b / 100.0)
+    start = {"entry_altitude_km": altitude, "entry_speed_m_s": circular_speed(altitude), "stop_altitude_km": 5.0}
+    return fly_cases(**TEXTBOOK, **ballistic(b), **start, tolerance=EXACT)["peak_load_g"]
+
+
+@lru_cache
+def periapses():
+    return critical_periapses(load_campaign("reentry/aerobraking").nominal)
+
+
+def ogata(w):
+    return 4.0 / (1j * w * (1j * w + 2.0))
+
+
+@lru_cache
+def lead():
+    return design_lead(ogata, 10.0, np.radians(50.0))
 
 
 def computed(record):
@@ -102,14 +172,16 @@ def computed(record):
     return COMPUTED[record["quantity"]]()
 
 
-@pytest.mark.parametrize("record", RECORDS, ids=IDS)
+@pytest.mark.parametrize("record", WITH_OURS, ids=lambda record: record["quantity"])
 def test_our_number_is_what_the_campaign_computes(record):
     # a history's rows tell the time of a Mach number to a millisecond
     error = 1e-3 if record["quantity"].startswith("Stardust: drogue") else DIGITS * abs(record["ours"])
     assert computed(record) == pytest.approx(record["ours"], rel=0.0, abs=error)
 
 
-@pytest.mark.parametrize("record", RECORDS, ids=IDS)
+@pytest.mark.parametrize(
+    "record", [one for one in WITH_OURS if "tolerance" in one], ids=lambda record: record["quantity"]
+)
 def test_our_number_lies_in_the_printed_digits_unless_it_is_said_not_to(record):
     inside = abs(computed(record) - record["published"]) <= record["tolerance"]
     assert inside == (record["status"] != "not reproduced")
@@ -117,13 +189,15 @@ def test_our_number_lies_in_the_printed_digits_unless_it_is_said_not_to(record):
 
 @pytest.mark.parametrize("record", RECORDS, ids=IDS)
 def test_each_record_is_complete_and_in_the_unit_of_its_column(record):
-    assert {"quantity", "published", "unit", "source", "ours", "tolerance", "status"} <= set(record)
+    assert {"quantity", "published", "unit", "source", "status"} <= set(record)
+    assert (record["status"] == "lost") == ("ours" not in record)
+    assert "ours" not in record or "tolerance" in record or "at_most" in record
     assert record["status"] in STATUSES
     assert set(record.get("at", {})) <= set(NOMINAL)
     if "column" in record:
         assert {field.name: field.unit for field in MODEL.metrics}[record["column"]] == record["unit"]
-    else:
-        assert record["quantity"] in COMPUTED
+    elif "ours" in record:
+        assert record["quantity"] in COMPUTED or record["quantity"] in OF_MANY_CASES
 
 
 def test_the_model_carries_the_records_into_its_reports():

@@ -41,6 +41,7 @@ def test_a_place_outside_or_none_at_all_is_the_nearest_one_inside(width):
 def test_interpreted_physics_reads_the_same_numbers():
     tables = settings_of(SHELF, np.array([2.0, 0.5])).tables
     assert look_up(tables, 7.0) == 98.0
+    assert [look_up(tables, place) for place in (-1.0, np.nan, np.inf)] == [0.0, 0.0, 4802.0]
     assert look_up(tables, np.array([0.0, 3.0])).tolist() == [0.0, 18.0]
     assert look_up(tables, np.array([-1.0, np.nan, np.inf])).tolist() == [0.0, 0.0, 4802.0]
 

@@ -38,10 +38,12 @@ def test_upper_bound_mirrors_the_lower_bound_of_the_failures():
     assert upper_bound(7, 20, 0.9) == pytest.approx(1.0 - lower_bound(13, 20, 0.9), abs=1e-12)
 
 
-@pytest.mark.parametrize(("passed", "tried", "confidence"), [(-1, 3, 0.9), (4, 3, 0.9), (1, 3, 1.0)])
+@pytest.mark.parametrize(("passed", "tried", "confidence"), [(-1, 3, 0.9), (4, 3, 0.9), (1, 3, 1.0), (1, 3, 0.0)])
 def test_impossible_counts_and_confidences_are_refused(passed, tried, confidence):
     with pytest.raises(ValueError, match=r"passed|confidence"):
         lower_bound(passed, tried, confidence)
+    with pytest.raises(ValueError, match=rf"{passed} of|confidence {confidence}"):
+        clopper_pearson(passed, tried, confidence)
 
 
 def test_the_lower_bound_lies_below_the_true_share_as_often_as_it_promises():

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
-from mc_engine.statistics import judge, pass_probability
+from mc_engine.statistics import judge, judge_all, pass_probability, was_looked_at
 
 FUEL = {"name": "fuel", "metric": "propellant_kg", "at_most": 1.0, "at_least": None, "share": 0.9973, "confidence": 0.9}
 
@@ -56,6 +57,20 @@ def test_both_limits_together_make_a_band():
     found = judge({**FUEL, "at_least": 0.5}, np.array([0.4, 0.5, 0.7, 1.0, 1.1]), np.ones(5, dtype=bool))
     assert found.passed == 3
     assert found.demonstrated is None
+    assert found.enclosed is None
+    assert found.margin is None
+
+
+def test_two_limits_are_held_against_the_interval_that_the_cases_show():
+    values, ok = np.linspace(0.1, 0.9, 1440), np.ones(1440, dtype=bool)
+    band = {**FUEL, "at_least": 0.0}
+    found = judge(band, values, ok)
+    assert found.enclosed == (values[0], values[-1])  # 1440: one failure, and so two values may be left out
+    assert found.margin == pytest.approx(0.1)
+    assert judge(band, values[1:], ok[1:]).enclosed is None
+    looked = judge(band, values, ok, looked=True)
+    assert looked.enclosed is None  # takes half the error and half of what may lie outside at each end
+    assert judge(band, np.linspace(0.1, 0.9, 5000), np.ones(5000, dtype=bool), looked=True).enclosed is not None
 
 
 def test_the_limit_shown_is_the_largest_value_at_the_smallest_sample_and_the_margin_follows():
@@ -98,6 +113,134 @@ def test_a_grid_gives_counts_but_no_verdict():
 @pytest.mark.parametrize("n", [0, 1, 2])
 def test_hardly_any_cases_demonstrate_nothing_and_warn_of_nothing(n):
     assert judge(FUEL, np.zeros(n), np.ones(n, dtype=bool)).outcome == "not demonstrable"
+
+
+# Probability that 852 cases with no failure, or 1440 with one, pass a system that just misses 0.9973.
+@pytest.mark.parametrize(("tried", "accepted"), [(852, 0), (1440, 1), (2473, 3)])
+def test_consumers_and_producers_risk_are_binomial(tried, accepted):
+    found = judge(FUEL, *cases(tried, 0))
+    assert found.accepted == accepted
+    assert found.consumer_risk == pytest.approx(binom.cdf(accepted, tried, 0.0027), rel=1e-9)
+    assert 0.095 < found.consumer_risk <= 0.1
+    assert found.producer_risk == pytest.approx(binom.sf(accepted, tried, 0.00135), rel=1e-9)
+
+
+def test_so_few_cases_that_none_pass_have_no_consumers_risk_and_all_of_the_producers():
+    found = judge(FUEL, *cases(851, 0))
+    assert (found.accepted, found.consumer_risk, found.producer_risk) == (None, 0.0, 1.0)
+
+
+def test_the_number_accepted_is_where_the_verdict_turns():
+    for tried in (852, 3000):
+        for looked in (False, True):
+            accepted = judge(FUEL, *cases(tried, 0), looked=looked).accepted
+            if accepted is not None:
+                assert judge(FUEL, *cases(tried - accepted, accepted), looked=looked).outcome == "pass"
+                assert judge(FUEL, *cases(tried - accepted - 1, accepted + 1), looked=looked).outcome != "pass"
+
+
+def test_a_run_that_was_looked_at_takes_more_cases_and_says_what_it_cannot():
+    assert judge(FUEL, *cases(1000, 0)).outcome == "pass"
+    found = judge(FUEL, *cases(1000, 0), looked=True)
+    assert (found.outcome, found.needed) == ("not demonstrable", 1104)
+    assert (found.consumer_risk, found.producer_risk) == (None, None)
+    passed = judge(FUEL, *cases(1104, 0), looked=True)
+    assert passed.outcome == "pass"
+    assert passed.demonstrated == cases(1104, 0)[0].max()
+
+
+@pytest.mark.parametrize(
+    ("manifest", "n_cases", "looked"),
+    [
+        ({"campaign": {"cases": 100}}, 100, False),
+        ({"campaign": {"cases": 100}}, 200, True),
+        ({"campaign": {"cases": 100}, "looks": [100, 150]}, 100, True),
+        ({"campaign": {"cases": 100}, "looks": []}, 100, False),
+        ({}, 100, False),
+    ],
+)
+def test_a_run_was_looked_at_when_it_flew_by_looks_or_was_extended(manifest, n_cases, looked):
+    assert was_looked_at(manifest, n_cases) is looked
+
+
+SPEED = {**FUEL, "name": "speed", "metric": "speed_m_s", "at_most": None, "at_least": 5.0, "confidence": 0.95}
+
+
+def both(fuel, speed, ok=None, **changes):
+    table = {"propellant_kg": np.asarray(fuel, dtype=float), "speed_m_s": np.asarray(speed, dtype=float)}
+    ok = np.ones(len(fuel), dtype=bool) if ok is None else ok
+    return judge_all([FUEL, SPEED], table.__getitem__, ok, **changes)
+
+
+def test_the_joint_verdict_counts_cases_inside_every_limit_at_once():
+    verdicts, joint = both([0.5, 1.5, 0.5, 1.5, np.nan], [6.0, 6.0, 4.0, 4.0, 6.0])
+    assert [verdict.passed for verdict in verdicts] == [2, 3]
+    assert (joint.passed, joint.tried, joint.no_number) == (1, 5, 1)
+
+
+def test_the_joint_share_is_one_less_what_each_may_miss_and_its_confidence_the_smallest():
+    joint = both([0.5] * 1200, [6.0] * 1200)[1]
+    assert joint.share == pytest.approx(1.0 - 0.0027 - 0.0027)
+    assert joint.confidence == 0.9
+    assert joint.outcome == "pass"
+    assert joint.lower == pytest.approx(0.1 ** (1.0 / 1200.0))
+
+
+def test_requirements_that_pass_alone_can_fail_together():
+    fuel, speed = np.full(10_000, 0.5), np.full(10_000, 6.0)
+    fuel[:19], speed[19:38] = 1.5, 4.0
+    verdicts, joint = both(fuel, speed)
+    assert [verdict.outcome for verdict in verdicts] == ["pass", "not demonstrable"]
+    assert (joint.passed, joint.outcome) == (10_000 - 38, "not demonstrable")
+    assert joint.lower > joint.share  # shown, but speed is not
+    assert joint.needed == verdicts[1].needed
+    fuel, speed = np.full(10_000, 0.5), np.full(10_000, 6.0)
+    fuel[:36], speed[36:72] = 1.5, 4.0
+    verdicts, joint = both(fuel, speed)
+    assert [verdict.shared_outcome for verdict in verdicts] == ["not demonstrable", "not demonstrable"]
+    assert joint.outcome == "fail"  # 72 in all are too many, 36 of each are not surely
+
+
+def test_one_requirement_that_surely_fails_fails_them_all():
+    fuel = np.full(10_000, 0.5)
+    fuel[:45] = 1.5
+    verdicts, joint = both(fuel, np.full(10_000, 6.0))
+    assert verdicts[0].shared_outcome == "fail"
+    assert joint.estimate > joint.share
+    assert (joint.outcome, joint.needed) == ("fail", None)
+    fuel[36:45] = 0.5  # fails by itself, but not when two more had the chance to
+    verdicts, joint = both(fuel, np.full(10_000, 6.0))
+    assert (verdicts[0].outcome, verdicts[0].shared_outcome) == ("fail", "not demonstrable")
+    assert (joint.outcome, joint.needed) == ("not demonstrable", None)
+
+
+def test_a_shared_confidence_asks_more_of_each():
+    alone = both([0.5] * 1000, [6.0] * 1000)[0][0]
+    assert (alone.outcome, alone.shared_outcome) == ("pass", "not demonstrable")  # 852 at 90 %, 1259 at 96.67 %
+    enough = both([0.5] * 1259, [6.0] * 1259)[0][0]
+    assert enough.shared_outcome == "pass"
+    assert judge(FUEL, *cases(852, 0)).shared_outcome == "pass"  # a single one shares with none
+
+
+def test_a_single_requirement_has_no_joint_verdict_and_neither_have_shares_that_leave_nothing():
+    one = np.ones(3, dtype=bool)
+    assert judge_all([FUEL], lambda name: np.ones(3), one)[1] is None
+    assert judge_all([], lambda name: np.ones(3), one) == ([], None)
+    half = {**FUEL, "share": 0.5}
+    assert judge_all([half, half], lambda name: np.ones(3), one)[1] is None
+
+
+@pytest.mark.parametrize("looked", [False, True])
+@pytest.mark.parametrize("n", [0, 1, 2, 50])
+@pytest.mark.parametrize("kind", ["constant", "not a number", "failed", "infinite"])
+def test_runs_of_hardly_anything_are_judged_together_without_a_warning(n, kind, looked):
+    value = {"constant": 0.5, "not a number": np.nan, "failed": 0.5, "infinite": np.inf}[kind]
+    verdicts, joint = both(np.full(n, value), np.full(n, 6.0), np.full(n, kind != "failed"), looked=looked)
+    usable = kind == "constant"
+    assert joint.passed == (n if usable else 0)
+    assert verdicts[0].no_number == (0 if usable else n)
+    assert verdicts[0].outcome == ("fail" if n and not usable else "not demonstrable")
+    assert verdicts[0].demonstrated is None
 
 
 def test_all_failed_is_a_fail():

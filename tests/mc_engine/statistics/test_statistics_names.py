@@ -4,8 +4,8 @@ from mc_engine import statistics
 
 PUBLIC = {
     "QUANTILES", "SAMPLING_DESIGNS", "Normality", "Quantile", "Summary", "SurfaceMap", "Verdict", "clopper_pearson",
-    "judge", "lower_bound", "map_metric", "normality", "pass_probability", "quantile", "quantile_ranks", "summarize",
-    "upper_bound", "worst_cases",
+    "judge", "judge_all", "lower_bound", "map_metric", "normality", "pass_probability", "quantile", "quantile_ranks",
+    "summarize", "upper_bound", "was_looked_at", "worst_cases",
 }  # fmt: skip
 
 

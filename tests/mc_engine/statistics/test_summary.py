@@ -1,9 +1,15 @@
 """Summaries of a metric."""
 
+import subprocess
+import sys
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
 from mc_engine.statistics import summarize
+from mc_engine.statistics.moments import Spread, Tally, finite_values
+from mc_engine.statistics.summary import summarize_parts
 
 DRAW = np.random.Generator(np.random.Philox(key=2))
 
@@ -58,3 +64,106 @@ def test_ten_thousand_cases_reach_the_three_sigma_limits_with_their_intervals():
     assert [item.probability for item in found.quantiles] == [0.00135, 0.02275, 0.5, 0.97725, 0.99865]
     assert all(item.lower < item.value < item.upper for item in found.quantiles)
     assert found.at(0.99865).value == pytest.approx(3.0, abs=0.3)
+
+
+# ---- the same, part by part
+
+
+def in_parts(values, ends, order):
+    """The parts of a table with one column, cut at `ends`, in this order."""
+    parts = np.split(values, ends)
+    return lambda: ({"metric": parts[place]} for place in order)
+
+
+def awkward(kind, n):
+    draw = np.random.Generator(np.random.Philox(key=n))
+    values = {
+        "normal": draw.normal(7e6, 3.0, n),
+        "heavy": draw.standard_cauchy(n),
+        "wide": draw.normal(size=n) * 10.0 ** draw.integers(-200, 200, n),
+        "counts": np.round(draw.normal(0.0, 4.0, n)),
+        "constant": np.full(n, 0.1),
+    }[kind]
+    values[::97] = np.nan
+    values[5::1009] = np.inf
+    return values
+
+
+@pytest.mark.parametrize("kind", ["normal", "heavy", "wide", "counts", "constant"])
+@pytest.mark.parametrize("n", [0, 1, 2, 3, 19, 100_000])
+def test_part_by_part_gives_the_bits_of_the_whole_in_any_order_of_the_parts(kind, n):
+    values = awkward(kind, n)
+    whole = summarize(values)
+    for ends, order in (([], [0]), (sorted([n // 3, n // 3 + 1, n // 2]), [2, 0, 3, 1]), ([0, n], [1, 2, 0])):
+        assert summarize_parts(in_parts(values, ends, order), ["metric"]) == {"metric": whole}
+
+
+def test_moments_merge_to_the_same_bits_in_any_tree():
+    values = awkward("heavy", 5000)
+    parts = np.split(values, [1, 17, 3000])
+
+    def tallied(tree):
+        """The tally of a tree of part numbers."""
+        found = Tally()
+        if isinstance(tree, int):
+            found.add(parts[tree])
+        else:
+            for branch in tree:
+                found.merge(tallied(branch))
+        return found
+
+    def spread(tree, tally):
+        found = Spread(tally)
+        if isinstance(tree, int):
+            found.add(finite_values(parts[tree]))
+        else:
+            for branch in tree:
+                found.merge(spread(branch, tally))
+        return found
+
+    whole = summarize(values)
+    for tree in ((0, 1, 2, 3), (3, (2, (1, 0))), ((1, 3), (0, 2))):
+        tally = tallied(tree)
+        found = spread(tree, tally)
+        assert (tally.n_used, tally.n_tried, tally.mean) == (whole.n_used, whole.n_tried, whole.mean)
+        assert (found.sd, found.shape) == (whole.sd, whole.shape)
+
+
+def test_the_moments_are_right_to_the_last_digits():
+    values = awkward("normal", 20_000)
+    fractions = [Fraction(one) for one in values[np.isfinite(values)].tolist()]
+    mean = sum(fractions) / len(fractions)
+    variance = sum((one - mean) ** 2 for one in fractions) / (len(fractions) - 1)
+    found = summarize(values)
+    assert found.mean == float(mean)
+    assert found.sd == pytest.approx(float(variance) ** 0.5, rel=1e-15)
+
+
+@pytest.mark.slow
+def test_ten_million_rows_are_summarised_in_bounded_memory():
+    done = subprocess.run([sys.executable, "-c", TEN_MILLION], capture_output=True, text=True, timeout=600, check=True)
+    before, peak, used, mean, tail = map(float, done.stdout.split())
+    assert used == 10_000_000
+    assert mean == pytest.approx(0.0, abs=5.0 / 10_000_000**0.5)
+    assert tail == pytest.approx(2.99998, abs=5.0 * (0.00135 * 0.99865 / 1e7) ** 0.5 / 0.00443)
+    # The table has 80 MB; a part of it 0.5 MB, the counts of twenty ranks 10 MB.
+    assert peak - before < 40.0
+
+
+TEN_MILLION = """
+import resource
+import numpy as np
+from mc_engine.statistics.summary import summarize_parts
+
+def parts():
+    for part in range(160):
+        yield {"metric": np.random.Generator(np.random.Philox(key=part)).normal(size=62_500)}
+
+def peak():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+
+summarize_parts(lambda: ({"metric": np.zeros(62_500)} for _ in range(2)), ["metric"])
+before = peak()
+found = summarize_parts(parts, ["metric"])["metric"]
+print(before, peak(), found.n_used, found.mean, found.at(0.99865).value)
+"""

@@ -17,3 +17,13 @@ def test_worst_first_ties_in_order_and_no_failed_case_among_them(largest, rows):
 def test_fewer_cases_than_asked_for_are_all_given():
     assert worst_cases(VALUES, OK, 100).size == 4
     assert worst_cases(VALUES[:0], OK[:0], 5).size == 0
+
+
+@pytest.mark.parametrize("largest", [True, False])
+def test_of_many_cases_with_ties_the_worst_are_those_of_a_full_sort(largest):
+    draw = np.random.Generator(np.random.Philox(key=1))
+    values = np.round(draw.normal(size=5000), 1)
+    ok = draw.random(5000) > 0.1
+    rows = np.flatnonzero(ok)
+    expected = rows[np.argsort(-values[rows] if largest else values[rows], kind="stable")[:200]]
+    assert worst_cases(values, ok, 200, largest).tolist() == expected.tolist()

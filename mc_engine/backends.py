@@ -1,0 +1,50 @@
+"""What a user asks for when he says who is to fly the cases; `mc_engine.crews` has those who do."""
+
+import importlib.util
+import sys
+from dataclasses import dataclass
+
+from mc_engine.errors import EngineError
+
+BACKENDS = ("threading", "loky", "dask")
+
+
+@dataclass(frozen=True)
+class Backend:
+    """What flies the cases.
+
+    name : "threading", "loky" or "dask".  scheduler : address of a `distributed` scheduler; without one, "dask"
+    starts a cluster of this machine for the run.
+    case_seconds : a case that takes longer is given up with status time-limit.  memory_mib : what a worker may have.
+    """
+
+    name: str = "threading"
+    scheduler: str | None = None
+    case_seconds: float | None = None
+    memory_mib: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.name not in BACKENDS:
+            raise EngineError(f'backend "{self.name}" is not known; there are {", ".join(BACKENDS)}')
+        if self.scheduler is not None and self.name != "dask":
+            raise EngineError(f'a scheduler is for the backend "dask", not for "{self.name}"')
+        if self.name == "threading" and (self.case_seconds is not None or self.memory_mib is not None):
+            raise EngineError('a thread cannot be limited in time or memory; fly with the backend "loky"')
+        if self.scheduler is not None and self.memory_mib is not None:
+            raise EngineError("the workers of a scheduler have limits of their own: `dask worker --memory-limit`")
+        if self.memory_mib is not None and not memory_can_be_limited():
+            raise EngineError("this system keeps no limit on memory; install psutil, with which the workers look")
+        if self.name == "dask" and importlib.util.find_spec("distributed") is None:
+            raise EngineError('the backend "dask" needs the package distributed: pip install "mc-engine[cluster]"')
+
+    def options(self) -> str:
+        """The options of the command line that ask for this backend, each with a space before it."""
+        name = None if self.name == "threading" else self.name
+        seconds = None if self.case_seconds is None else f"{self.case_seconds:g}"
+        words = {"backend": name, "scheduler": self.scheduler, "case-seconds": seconds, "memory": self.memory_mib}
+        return "".join(f" --{key} {value}" for key, value in words.items() if value is not None)
+
+
+def memory_can_be_limited() -> bool:
+    """True where the system limits the memory of a process, or psutil is there to look at it."""
+    return sys.platform.startswith("linux") or importlib.util.find_spec("psutil") is not None

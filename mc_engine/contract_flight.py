@@ -1,0 +1,169 @@
+"""What only a flight shows of a model's contract: a few cases of the campaign, flown several times over.
+
+Results must be there, must be the same again and in other company, and every declared input, metric and event must
+matter.  `python -m mc_engine.contract_flight FILE` prints the sentences as JSON; `check` calls it as a process of its
+own, which a model may kill or hang.
+"""
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from mc_engine.campaign import Campaign, load_campaign
+from mc_engine.cases import case_table, full_inputs
+from mc_engine.dispersions import Dispersion
+from mc_engine.distributions import column, quantiles
+from mc_engine.errors import EngineError
+from mc_engine.event_watch import watching_events
+from mc_engine.flight import fly
+from mc_engine.model_faults import naming_faults
+from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
+
+_CASES = 32
+_CUT = 5  # cases of the smaller part when they are flown in two
+_EDGES = np.array([0.05, 0.95])  # where along its distribution an input is tried
+_PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
+_ZERO = 1e-6  # of an event function's reach: a flight that stops there has reached the zero
+
+Columns = Mapping[str, np.ndarray]
+
+
+def faults(campaign: Campaign) -> list[str]:
+    """Sentences on what a flight of a few cases shows to be wrong; empty if nothing."""
+    if campaign.first is not None:
+        return []  # its inputs come from a run that is not there yet
+    ids = np.arange(min(campaign.cases, _CASES))
+    inputs = full_inputs(campaign, case_table(campaign, ids))
+    try:
+        with naming_faults(campaign.model_reference, "the model"):
+            flown = _fly(campaign, inputs, ids)
+            found = [*_failed(campaign, flown), *_other_bits(campaign, inputs, ids, flown)]
+            return found or [
+                *_never_set(campaign, flown),
+                *_moving_nothing(campaign, inputs, ids),
+                *_never_crossing(campaign, inputs, ids),
+            ]
+    except EngineError as error:
+        return [str(error)]
+
+
+def _fly(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
+    return fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
+
+
+def _failed(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    """One sentence if no case at all reached its end."""
+    status = flown["status"]
+    if (status == STATUS_NAME[OK]).any():
+        return
+    words, counts = np.unique(status.astype(str), return_counts=True)
+    word = str(words[counts.argmax()])
+    text = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}[word]
+    reasons = [str(reason) for reason in flown["reason"] if reason]
+    sentence = f"none of the first {status.size} cases flies to its end: {counts.max()} are {word}"
+    stops = [f'"{event.name}"' for event in campaign.model.event_list if event.action == "stop"]
+    if word == "no-stop":
+        text = f"no stopping event crosses zero before the time limit, of {', '.join(stops)}; look at its function, "
+        text += "its direction and the clock's `until`"
+    yield f"{sentence} ({reasons[0] if word == 'refused' and reasons else text})"
+
+
+def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
+    """One sentence if the same cases come out differently a second time, or in other company."""
+    why = "a case must depend on its inputs and case_id alone: no global state, clock or numpy.random"
+    again = _difference(flown, _fly(campaign, inputs, ids))
+    if again is not None:
+        yield f'case {ids[again[0]]} has another "{again[1]}" when the same cases fly a second time; {why}'
+        return
+    parts = [np.arange(ids.size)[_CUT:][::-1], np.arange(ids.size)[:_CUT]]
+    for part in parts:
+        if part.size:
+            own = {name: value[part] if np.ndim(value) else value for name, value in inputs.items()}
+            alone = _difference({name: values[part] for name, values in flown.items()}, _fly(campaign, own, ids[part]))
+            if alone is not None:
+                yield (
+                    f'case {ids[part[alone[0]]]} has another "{alone[1]}" when it flies among other cases; {why}, '
+                    "and `prepare` must treat each case by itself"
+                )
+                return
+
+
+def _difference(a: Columns, b: Columns) -> tuple[int, str] | None:
+    """Place and column of the first number with other bits, None if there is none."""
+    for name, values in a.items():
+        same = values == b[name]
+        if values.dtype != object:
+            same |= np.isnan(values) & np.isnan(b[name])
+        if not same.all():
+            return int(np.flatnonzero(~same)[0]), name
+    return None
+
+
+def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    ok = flown["status"] == STATUS_NAME[OK]
+    for metric in campaign.model.metrics:
+        if not metric.sometimes and np.isnan(flown[metric.name][ok]).all():
+            yield (
+                f'the metric "{metric.name}" is not a number in any of the {ok.sum()} cases that flew; let `evaluate` '
+                "set it, or declare it with sometimes=True if it exists only with some settings"
+            )
+
+
+def _moving_nothing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
+    """Dispersions whose edges change no metric: neither of the nominal case, nor of some dispersed ones."""
+    idle = [one for one in campaign.dispersions if not _moves(campaign, one, campaign.nominal)]
+    for one in idle:
+        rows = [{k: v[i] if np.ndim(v) else v for k, v in inputs.items()} for i in range(min(_PARTNERS, ids.size))]
+        if not any(_moves(campaign, one, row) for row in rows):
+            yield f'dispersion "{one.name}" moves no metric; use it in the physics, or leave it out of the campaign'
+
+
+def _moves(campaign: Campaign, one: Dispersion, others: Mapping[str, Any]) -> bool:
+    """Whether the two edges of a dispersion give different results; one that has but one value does."""
+    edges = _edges(campaign, one)
+    if edges[0] == edges[-1]:
+        return True
+    flown = _fly(campaign, {**others, one.name: edges}, np.zeros(len(edges), dtype=np.int64))
+    names = ["status", *(metric.name for metric in campaign.model.metrics)]
+    low, high = ({name: flown[name][[i]] for name in names} for i in (0, -1))
+    return _difference(low, high) is not None
+
+
+def _edges(campaign: Campaign, one: Dispersion) -> np.ndarray:
+    if campaign.upstream is None and campaign.design != "table":
+        if one.levels:
+            return column(one.levels)[[0, -1]]
+        assert one.distribution is not None  # a loaded campaign has one for every random design
+        return quantiles(one.distribution, _EDGES)
+    values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[one.name]
+    return np.sort(values)[[0, -1]]
+
+
+def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
+    """Events that fire in none of the cases: their functions keep one sign."""
+    model = campaign.model
+    if all(event.rare for event in model.event_list):
+        return
+    reached = fly(watching_events(model), inputs, ids, campaign.seed, folder=campaign.directory)
+    ok = reached["status"] == STATUS_NAME[OK]
+    for event in model.event_list:
+        least, most = reached[f"least_{event.name}"][ok], reached[f"most_{event.name}"][ok]
+        zero = _ZERO * np.fmax(np.abs(least), np.abs(most))
+        if not event.rare and not ((least <= zero) & (most >= -zero)).any():
+            sign = "above" if (least > 0.0).all() else "below"
+            yield (
+                f'the event "{event.name}" crosses zero in none of {ok.sum()} cases, its function stays {sign} it; '
+                "mend the function, or declare it with rare=True if it is for unusual cases"
+            )
+
+
+def main() -> None:
+    """Print the sentences on the campaign named on the command line as a JSON list."""
+    print(json.dumps(faults(load_campaign(sys.argv[1]))))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,23 @@
+"""Dates of campaign files: text in UTC outside, modified Julian dates inside."""
+
+from datetime import UTC, datetime, timedelta
+
+EXAMPLE = '"2019-01-01T12:00:00"'
+_ORIGIN = datetime(1858, 11, 17, tzinfo=UTC)
+_DAY_S = 86_400.0
+
+
+def modified_julian_date(text: str) -> float:
+    """Days since 1858-11-17 00:00 UTC of a date as ISO 8601 writes it; without an offset it is UTC.
+
+    A day counts 86 400 s, so a leap second, :60, is none of its own.  ValueError where the text is no date.
+    """
+    moment = datetime.fromisoformat(text)
+    moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+    since = moment - _ORIGIN
+    return since.days + (since.seconds + 1e-6 * since.microseconds) / _DAY_S
+
+
+def date_text(mjd: float) -> str:
+    """The date in UTC, to a microsecond, of a modified Julian date.  OverflowError outside the years 1 to 9999."""
+    return (_ORIGIN + timedelta(days=mjd)).replace(tzinfo=None).isoformat()

@@ -1,0 +1,143 @@
+"""The reference of the shipped campaigns: their files, and every number that goes in and comes out."""
+
+import tomllib
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+
+from mc_engine.campaign import SHIPPED, ShippedCampaign, list_campaigns
+from mc_engine.documentation.markdown_text import code, escaped, table
+from mc_engine.model import AdaptiveStep, Field, Model, Parameter, Setting, load_model
+from mc_engine.published_table import campaign_table
+from mc_engine.status import STATUS_NAME, STATUS_TEXT
+
+_COLUMNS = """# Columns of a run
+
+One row a case in `cases/*.parquet` of a run directory. Units are in the columns' names, in the Parquet metadata of each
+field, and in `Store.units()`. The nominal case is kept apart, in `nominal.parquet`, and enters no statistic.
+
+| Column | Meaning |
+|---|---|
+| `case_id` | number of the case, from 0 on; it never changes |
+| `status` | how the case ended, see below |
+| `reason` | one sentence where the inputs were refused |
+| dispersions | a column per dispersed parameter, under its name |
+| metrics | a column per metric of the model; not a number where the case failed |
+| `end_…` | the last state of the case, a column per state |
+
+## How a case ended
+
+"""
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """A page for what all runs have in common, and one a model."""
+    statuses = [(code(name), escaped(STATUS_TEXT[key])) for key, name in STATUS_NAME.items()]
+    groups = {name: list(files) for name, files in groupby(list_campaigns(), lambda one: one.path.parent.name)}
+    names = "\n".join(f"- [{name}](campaigns/{name}.md)" for name in groups)
+    toctree = "\n".join(f"campaigns/{name}" for name in groups)
+    hidden = f"```{{toctree}}\n:hidden:\n\n{toctree}\n```"
+    common = [_COLUMNS + table(("Status", "Meaning"), statuses), "## The columns of each campaign", names, hidden]
+    yield "columns.md", "\n\n".join(common) + "\n"
+    for name, files in groups.items():
+        yield f"campaigns/{name}.md", campaign_page(name, files)
+
+
+def campaign_page(name: str, files: Sequence[ShippedCampaign]) -> str:
+    """All campaign files of the folder campaigns/`name`, and the columns of each model that they fly."""
+    folder = SHIPPED / name
+    references = [model_reference(one.path) for one in files]
+    models = {reference: load_model(reference, folder) for reference in dict.fromkeys(references)}
+    parts = [f"# {name}"]
+    for reference, model in models.items():
+        shown = [one for one, flies in zip(files, references, strict=True) if flies == reference]
+        parts += _model(model, reference, shown, len(models) == 1)
+    if (folder / "published.toml").is_file():
+        parts += ["## Published and ours", campaign_table(folder / "published.toml")]
+    return "\n\n".join(parts) + "\n"
+
+
+def model_reference(path: Path) -> str:
+    """The model that a campaign file names."""
+    return str(tomllib.loads(path.read_text(encoding="utf-8"))["campaign"]["model"])
+
+
+def _model(model: Model, reference: str, files: Sequence[ShippedCampaign], alone: bool) -> Iterator[str]:
+    """One model's files and columns, under a heading of its own where the folder has several."""
+    if not alone:
+        yield f"## {escaped(model.title)}"
+    yield f"{escaped(model.title)}: the model {code(reference)}."
+    if model.source:
+        yield f"Source: {escaped(model.source)}."
+    level = "##" if alone else "###"
+    yield f"{level} Campaign files"
+    yield table(("Name", "Title"), [(code(one.name), escaped(one.title)) for one in files])
+    yield from _columns(model, level)
+
+
+def _columns(model: Model, level: str) -> Iterator[str]:
+    rows = [(*_meaning(one), f"{one.default:.10g}", _range(one)) for one in model.parameters]
+    yield f"{level} Parameters"
+    yield table(("Parameter", "Unit", "Meaning", "Nominal", "Allowed"), rows)
+    if model.settings:
+        yield f"{level} Settings"
+        yield "The same for all cases of a run; `[parameters]` of a campaign file sets them."
+        settings = [(*_meaning(one), code(_word(one.default)), _choices(one)) for one in model.settings]
+        yield table(("Setting", "Unit", "Meaning", "Unless said", "Allowed"), settings)
+    for title, fields in (("Metrics", model.metrics), ("States", model.states), ("Histories", model.quantities)):
+        yield f"{level} {title}"
+        yield _INTRODUCTION[title]
+        yield table(("Column", "Unit", "Meaning"), [_meaning(one, title == "States") for one in fields])
+    yield f"{level} Flight"
+    yield _flight(model)
+
+
+_INTRODUCTION = {
+    "Metrics": "One number a case.",
+    "States": "What the integrator carries; its last value stands in the table of cases.",
+    "Histories": "Along the flight of the retained cases, besides `case_id`, `t_s` and the states.",
+}
+
+
+def _meaning(one: Field, at_the_end: bool = False) -> tuple[str, str, str]:
+    return code(f"end_{one.name}" if at_the_end else one.name), escaped(one.unit) or "–", escaped(one.description)
+
+
+def _range(one: Parameter | Setting) -> str:
+    if np.isinf(one.low) and np.isinf(one.high):
+        return ""
+    if np.isinf(one.high):
+        return f"≥ {one.low:.10g}"
+    return f"≤ {one.high:.10g}" if np.isinf(one.low) else f"{one.low:.10g} … {one.high:.10g}"
+
+
+def _choices(one: Setting) -> str:
+    if one.date:
+        return "a date in UTC"
+    return ", ".join(code(word) for word in one.choices) or _range(one)
+
+
+def _word(value: str | bool | float) -> str:
+    return str(value).lower() if isinstance(value, bool) else value if isinstance(value, str) else f"{value:.10g}"
+
+
+def _flight(model: Model) -> str:
+    clock = model.clock
+    stepping = (
+        f"Steps chosen by each case ({clock.method}), relative error {_shown(clock.rtol)} a step"
+        if isinstance(clock, AdaptiveStep)
+        else f"Steps of {_shown(clock.step)} on a common grid ({clock.method})"
+    )
+    events = [
+        (code(one.name), one.direction, "ends the case" if one.action == "stop" else "switches the model")
+        for one in model.event_list
+    ]
+    listed = "\n\n" + table(("Event", "Crossing", "Then"), events) if events else ""
+    return f"{stepping}, up to {_shown(clock.until)}.{listed}"
+
+
+def _shown(value: object) -> str:
+    """A number of the clock, or the setting that holds it."""
+    return f"the setting {code(value)}" if isinstance(value, str) else f"{value:g}"

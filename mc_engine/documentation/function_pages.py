@@ -1,0 +1,101 @@
+"""The reference of functions and classes, from their definitions and docstrings, which are read and not run."""
+
+import ast
+import importlib.util
+from collections.abc import Iterator
+from pathlib import Path
+
+from mc_engine.documentation.markdown_text import prose
+
+# Module, and what a reader looks for there.  Of a package that only passes names on, its modules follow.
+SECTIONS = {
+    "engine": (
+        "Campaigns, runs and their results",
+        "runner campaign campaign_search store opened_run cases model tuning tuning_folder comparison rare_event "
+        "figures errors status",
+    ),
+    "random": ("Designs, distributions and random numbers", "designs distributions correlation streams units dates"),
+    "lanes": ("Mathematics inside models", "lanes.physics_function lanes.functions lanes.elementary"),
+    "physics": ("Shared physics", "physics"),
+    "statistics": ("Statistics", "statistics"),
+}
+_HEAD = """# Functions and classes
+
+`import mc_engine` gives the names that most programs need: NAMES. The rest is imported from the modules below.
+Docstrings give meaning, units, shapes and errors, and the source with its equation; arrays are written
+`float64[n_cases, n_state]`.
+"""
+Definition = ast.FunctionDef | ast.ClassDef
+
+
+def pages() -> Iterator[tuple[str, str]]:
+    """An overview, and a page for each section."""
+    import mc_engine
+
+    names = ", ".join(f"`{name}`" for name in mc_engine.__all__)
+    listed = "\n".join(f"- [{title}](functions/{key}.md)" for key, (title, _) in SECTIONS.items())
+    toctree = "\n".join(f"functions/{key}" for key in SECTIONS)
+    hidden = f"```{{toctree}}\n:hidden:\n\n{toctree}\n```"
+    yield "functions.md", "\n\n".join([_HEAD.replace("NAMES", names), listed, hidden]) + "\n"
+    for key, (title, modules) in SECTIONS.items():
+        bodies = [text for name in modules.split() for path in files(name) for text in _module(path)]
+        yield f"functions/{key}.md", "\n\n".join([f"# {title}", *bodies]) + "\n"
+
+
+def files(name: str) -> list[Path]:
+    """The file of a module, or those of all modules of a package."""
+    spec = importlib.util.find_spec(f"mc_engine.{name}")
+    assert spec is not None  # the names above are tested
+    assert spec.origin is not None
+    path = Path(spec.origin)
+    return [path] if path.name != "__init__.py" else [one for one in sorted(path.parent.glob("*.py")) if one != path]
+
+
+def definitions(path: Path) -> list[Definition]:
+    """The functions and classes of a file whose names do not begin with an underscore."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    found = [one for one in tree.body if isinstance(one, ast.FunctionDef | ast.ClassDef)]
+    return [one for one in found if not one.name.startswith("_")]
+
+
+def _module(path: Path) -> Iterator[str]:
+    root = Path(__file__).resolve().parents[2]
+    name = ".".join(path.relative_to(root).with_suffix("").parts)
+    yield f"## {name}"
+    yield f"```{{py:module}} {name}\n```"
+    yield prose(ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "")
+    for one in definitions(path):
+        yield _entry(one, "class" if isinstance(one, ast.ClassDef) else "function")
+
+
+def _entry(one: Definition, kind: str) -> str:
+    inner = [prose(ast.get_docstring(one) or "")]
+    if isinstance(one, ast.ClassDef):
+        methods = [method for method in one.body if isinstance(method, ast.FunctionDef)]
+        inner += [_entry(method, "method") for method in methods if _is_shown(method)]
+    fence = "`" * (12 if kind == "class" else 9)  # longer than what it holds
+    text = "\n\n".join(part for part in inner if part)
+    return f"{fence}{{py:{kind}}} {_signature(one, kind)}\n{text}\n{fence}"
+
+
+def _is_shown(one: ast.FunctionDef) -> bool:
+    return not one.name.startswith("_") and ast.get_docstring(one) is not None
+
+
+def _signature(one: Definition, kind: str) -> str:
+    if isinstance(one, ast.ClassDef):
+        fields = [ast.unparse(field) for field in one.body if isinstance(field, ast.AnnAssign)]
+        return f"{one.name}({', '.join(_shortened(field) for field in fields)})" if fields else one.name
+    arguments = one.args
+    if kind == "method" and arguments.args and arguments.args[0].arg in ("self", "cls"):
+        arguments.args = arguments.args[1:]
+    if any(isinstance(mark, ast.Name) and mark.id in ("property", "cached_property") for mark in one.decorator_list):
+        return one.name
+    returns = f" -> {ast.unparse(one.returns)}" if one.returns else ""
+    return f"{one.name}({ast.unparse(arguments)}){returns}"
+
+
+def _shortened(field: str) -> str:
+    """A field with its type; a default that calls a function is left out, as signatures have no place for it."""
+    name, _, default = field.partition(" = ")
+    return name if "(" in default else field

@@ -1,0 +1,57 @@
+"""Markdown from plain prose: docstrings and help texts, with nothing in them read as markup but `code`."""
+
+import re
+from collections.abc import Iterable, Sequence
+
+_MARKUP = re.compile(r"([\\*_\[\]<>#|$~^{}!])")
+_FENCE = "``````"
+
+
+def escaped(text: str) -> str:
+    """One line of prose; what stands between backticks is code."""
+    pieces = re.split(r"(`[^`\n]+`)", text)
+    line = "".join(one if one.startswith("`") and len(one) > 1 else _MARKUP.sub(r"\\\1", one) for one in pieces)
+    return re.sub(r"^(\s*)([-+]|\d+[.)])(?=\s)", r"\1\\\2", line)
+
+
+def prose(docstring: str) -> str:
+    """Paragraphs of a docstring; those set out in columns or steps keep their layout."""
+    paragraphs = re.split(r"\n\s*\n", docstring.strip("\n"))
+    return "\n\n".join(_verbatim(one) if _is_set_out(one) else _flowing(one) for one in paragraphs if one.strip())
+
+
+def _is_set_out(paragraph: str) -> bool:
+    lines = paragraph.split("\n")
+    if any(re.match(r"\S.* : ", line) for line in lines):
+        return False
+    columns = sum(bool(re.search(r"\S {3,}\S", line)) for line in lines)
+    return all(line.startswith("    ") for line in lines) or columns > 0 or any(line[:1] == " " for line in lines)
+
+
+def _verbatim(paragraph: str) -> str:
+    return f"{_FENCE}text\n{paragraph}\n{_FENCE}"
+
+
+def _flowing(paragraph: str) -> str:
+    """Running text, or a list where each line that names something begins an item."""
+    if not re.search(r"^\S.* : ", paragraph, re.MULTILINE):
+        return "\n".join(escaped(line.strip()) for line in paragraph.split("\n"))
+    items: list[str] = []
+    for line in paragraph.split("\n"):
+        starts = re.match(r"\S[^ ].* : |\S : ", line) is not None
+        if starts or not items:
+            items.append(escaped(line.strip()))
+        else:
+            items[-1] += " " + escaped(line.strip())
+    return "\n".join(f"- {one}" for one in items)
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A pipe table; cells are Markdown already."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(" ".join(cell.split()) for cell in line) + " |" for line in lines)
+
+
+def code(text: str) -> str:
+    """Text as code within a table's cell."""
+    return f"`{text}`".replace("|", "\\|") if text else ""

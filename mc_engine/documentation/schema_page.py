@@ -1,0 +1,87 @@
+"""The reference of campaign-file keys, from the JSON schema of the file."""
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from mc_engine.campaign import schema
+from mc_engine.documentation.markdown_text import code, escaped, table
+
+_HEAD = """# Keys of a campaign file
+
+Made from the JSON schema, which `mc-engine schema` prints for an editor. Nothing else is allowed in a file, and every
+mistake is reported at once, with its place and what was allowed (`mc-engine check FILE`). Numbers are in the units of
+the model's parameters and metrics, see the pages of the campaigns.
+"""
+
+
+def page() -> str:
+    """One section per table of the file, one row per key."""
+    document = schema()
+    definitions = document["$defs"]
+    parts = [_HEAD]
+    parts += _section("A file", document, definitions)
+    for name, definition in sorted(definitions.items(), key=lambda one: one[0].endswith("Dispersion")):
+        parts += _section(_title(name), definition, definitions)
+    return "\n".join(parts)
+
+
+def _title(name: str) -> str:
+    for ending, kind in (("Dispersion", "distribution "), ("Section", "section ")):
+        if name.endswith(ending):
+            return kind + name.removesuffix(ending).lower()
+    return name
+
+
+def _section(title: str, definition: Mapping[str, Any], definitions: Mapping[str, Any]) -> Iterator[str]:
+    yield f"## {title[:1].upper()}{title[1:]}\n"
+    if text := definition.get("description"):
+        yield f"{escaped(text)}\n"
+    required = definition.get("required", ())
+    rows = [
+        (
+            code(key),
+            _kind(one, definitions),
+            "required" if key in required else _default(one),
+            escaped(one.get("description", "")),
+        )
+        for key, one in definition.get("properties", {}).items()
+    ]
+    yield table(("Key", "Value", "Unless said", "Meaning"), rows) + "\n"
+
+
+def _default(one: Mapping[str, Any]) -> str:
+    value = one.get("default")
+    return "" if value in (None, "") or isinstance(value, dict) else code(json.dumps(value))
+
+
+def _kind(one: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
+    """What a value may be, in words."""
+    for several in ("anyOf", "oneOf"):
+        if several in one:
+            words = [_kind(choice, definitions) for choice in one[several] if choice.get("type") != "null"]
+            return " or ".join(dict.fromkeys(words))
+    if "$ref" in one:
+        name = one["$ref"].rsplit("/", 1)[-1]
+        title = _title(name)
+        return f"[{title}](#{title.replace(' ', '-')})"
+    if "const" in one:
+        return code(json.dumps(one["const"]))
+    if "enum" in one:
+        return ", ".join(code(json.dumps(word)) for word in one["enum"])
+    if one.get("type") == "array":
+        return f"list of: {_kind(one.get('items', {}), definitions)}"
+    if one.get("type") == "object":
+        inner = one.get("additionalProperties")
+        return f"tables by name, each: {_kind(inner, definitions)}" if isinstance(inner, dict) else "table"
+    return _WORDS.get(one.get("type", ""), "any") + _range(one)
+
+
+_WORDS = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false"}
+_LARGEST = 1e40  # limits beyond it keep arithmetic finite and are of no interest to a reader
+
+
+def _range(one: Mapping[str, Any]) -> str:
+    words = {"minimum": "≥", "exclusiveMinimum": "\\>", "maximum": "≤", "exclusiveMaximum": "\\<"}
+    limits = [f"{sign} {one[key]:g}" for key, sign in words.items() if abs(one.get(key, 1e50)) < _LARGEST]
+    return f" {', '.join(limits)}" if limits else ""

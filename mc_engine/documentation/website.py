@@ -1,0 +1,62 @@
+"""The pages of the site: gathered in a folder of their own, then built by Sphinx with every warning an error."""
+
+import importlib
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from mc_engine.campaign_search import SHIPPED
+from mc_engine.documentation import campaign_pages, function_pages, schema_page, verbs_page, words_page
+from mc_engine.errors import EngineError
+
+HOME = Path(__file__).resolve().parent
+_PICTURE = SHIPPED / "deorbit" / "fuel_map.png"
+
+
+def build(folder: Path) -> bool:
+    """Write the site to `folder`; whether all pages are in order.  Sphinx says on stderr what is not.
+
+    Raises EngineError without the extra "docs".
+    """
+    try:
+        sphinx = importlib.import_module("sphinx.cmd.build")
+        importlib.import_module("myst_parser")
+        importlib.import_module("furo")
+    except ModuleNotFoundError as error:
+        raise EngineError(f'the site needs {error.name}; pip install "mc-engine[docs]"') from None
+    with TemporaryDirectory() as scratch:
+        pages = Path(scratch) / "pages"
+        write_pages(pages)
+        # Without a doctree folder of its own, Sphinx leaves one among the pages.
+        options = ["-q", "-W", "--keep-going", "-n", "-b", "html", "-d", str(Path(scratch) / "doctrees")]
+        return bool(sphinx.build_main([*options, str(pages), str(folder)]) == 0)
+
+
+def write_pages(folder: Path) -> None:
+    """All sources of the site: what stands beside this file, and the reference from the program as it is."""
+    for path in handwritten():
+        target = folder / path.relative_to(HOME)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, target)
+    shutil.copyfile(_PICTURE, folder / _PICTURE.name)
+    for name, text in reference_pages():
+        target = folder / "reference" / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(text, encoding="utf-8")
+
+
+def handwritten() -> list[Path]:
+    """conf.py and the Markdown pages with the files that they show."""
+    shown = (".md", ".toml", ".yml", ".yaml", ".sh", ".sbatch", ".slurm", ".png", ".svg", ".py")
+    files = [path for path in sorted(HOME.rglob("*")) if path.suffix in shown and path.parent != HOME]
+    return [HOME / "conf.py", *sorted(HOME.glob("*.md")), *(path for path in files if "__pycache__" not in path.parts)]
+
+
+def reference_pages() -> Iterator[tuple[str, str]]:
+    """(name, Markdown) of each page that comes from schema, program, models and docstrings."""
+    yield "campaign_file.md", schema_page.page()
+    yield "command_line.md", verbs_page.page()
+    yield "words.md", words_page.page()
+    yield from campaign_pages.pages()
+    yield from function_pages.pages()

@@ -1,0 +1,208 @@
+"""Run directories on object stores: published after commit, fetched to be read.  s3://, gs://, memory://, file://, ...
+
+A run is flown in a local directory, where files can be synced and renamed; an object store can do neither.  What the
+journal counts is copied: parts first, then campaign and manifest, then the journal that names them, reports last.  So
+the copy can be loaded at every moment, also while the run still flies, and one that was cut short is completed by
+publishing again: only what is missing or differs travels.  Every byte that was sent is read back.  Credentials come
+from the environment, as fsspec and the packages below it read them.
+"""
+
+import atexit
+import json
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from mc_engine.durable_file import is_temporary, make_folder, read_file, write_durably
+from mc_engine.errors import EngineError, StoreError
+from mc_engine.journal import Entry, Scan, scan
+from mc_engine.receipts import counted_nominal, counted_parts, history_receipts
+from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, is_part_file, is_run_directory
+from mc_engine.writer_lock import LOCK_NAME
+
+
+@dataclass(frozen=True)
+class Publication:
+    """What was sent to `url`: names and bytes; and how many files lay there already."""
+
+    url: str
+    sent: tuple[str, ...]
+    sent_bytes: int
+    kept: int
+
+
+def is_url(place: str | Path) -> bool:
+    """True for what names an object store, and no local path."""
+    return "://" in str(place)
+
+
+def publish(run: Path, url: str) -> Publication:
+    """Copy the run in directory `run` to `url`; on return all of it is there, byte by byte.
+
+    Parts up there that the journal counts no more are removed.  StoreError if the store cannot be reached, or holds
+    anything else than an earlier state of this run.
+    """
+    if not is_run_directory(run):
+        raise StoreError(f"{run}: is no run directory")
+    journal = _sound(scan(read_file(run / JOURNAL)), run / JOURNAL)
+    counted = _counted(journal.entries)
+    contents = {**counted, JOURNAL: None, **dict.fromkeys(_others(run, counted))}
+    with _reaching(url):
+        remote = _Remote(url)
+        before = remote.journal()
+        _refuse_another_run(remote, before, journal, set(contents))
+        trusted = {} if before is None else _counted(before.entries)
+        sent, sent_bytes = [], 0
+        for name in contents:
+            content = read_file(run / name)
+            if name == JOURNAL:
+                content = content[: journal.length]  # the run may have flown on since
+            digest = sha256(content).hexdigest()
+            if counted.get(name, digest) != digest:
+                raise StoreError(f"{run / name}: damaged; `mc-engine verify {run}` names all damage")
+            if not remote.holds(name, content, trusted.get(name) == digest):
+                remote.write(name, content)
+                sent.append(name)
+                sent_bytes += len(content)
+        for name in remote.sizes:
+            if is_part_file(name) and name not in contents:
+                remote.remove(name)
+    return Publication(url, tuple(sent), sent_bytes, len(contents) - len(sent))
+
+
+def fetch(url: str, folder: Path) -> Path:
+    """Copy the run at `url` to the new directory `folder`, with its reports; every part is held against the journal."""
+    if folder.exists() and any(folder.iterdir()):
+        raise StoreError(f"{folder}: is not empty; choose another folder")
+    with _reaching(url):
+        remote = _Remote(url)
+        journal = remote.journal()
+        if journal is None:
+            raise StoreError(f"{url}: holds no run")
+        counted = _counted(journal.entries)
+        others = [name for name in remote.sizes if name not in counted and name != JOURNAL and not is_part_file(name)]
+        for name in [*counted, *others]:
+            content = remote.read(name)
+            if counted.get(name, "") not in ("", sha256(content).hexdigest()):
+                raise StoreError(f"{url}/{name}: damaged, its SHA-256 is not the one in the journal")
+            _place(folder, name, content, url)
+        _place(folder, JOURNAL, remote.read(JOURNAL)[: journal.length], url)
+    for part_folder in ("cases", "history"):
+        make_folder(folder / part_folder)
+    return folder
+
+
+def fetched(url: str) -> Path:
+    """A copy of the run at `url` in a directory that lasts as long as this process."""
+    scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))
+    atexit.register(shutil.rmtree, scratch, ignore_errors=True)
+    return fetch(url, scratch / (url.rstrip("/").rpartition("/")[2] or "run"))
+
+
+def local_copy(place: str | Path) -> Path:
+    """The directory that is named; of a URL, a copy that lasts as long as this process."""
+    return fetched(str(place)) if is_url(place) else Path(place)
+
+
+def refuse_unreachable(url: str) -> None:
+    """StoreError if nothing can be listed at `url`; to be asked before a long flight."""
+    with _reaching(url):
+        _Remote(url)
+
+
+def _counted(entries: tuple[Entry, ...]) -> dict[str, str]:
+    """SHA-256 by name of all that a run consists of by its journal, in the order in which it is to be sent."""
+    nominal, created = counted_nominal(entries), entries[0].facts
+    parts = [*counted_parts(entries), *([nominal] if nominal else []), *history_receipts(entries)[-1:]]
+    heads = {**created.get("companions", {}), CAMPAIGN: created["campaign"], MANIFEST: created["manifest"]}
+    return {**{part.file: part.sha256 for part in parts}, **heads}
+
+
+def _others(run: Path, counted: Mapping[str, str]) -> list[str]:
+    """Reports and all else that lies in the run directory and is no part, no lock, no file half written."""
+    files = [path.relative_to(run).as_posix() for path in sorted(run.rglob("*")) if path.is_file()]
+    ours = {*counted, JOURNAL, LOCK_NAME}
+    return [name for name in files if name not in ours and not is_part_file(name) and not is_temporary(Path(name).name)]
+
+
+def _sound(found: Scan, place: Path | str) -> Scan:
+    if found.damaged or not found.entries or found.entries[0].event != "created":
+        raise StoreError(f"{place}, line {found.damaged[0] if found.damaged else 1}: damaged")
+    return found
+
+
+def _refuse_another_run(remote: "_Remote", before: Scan | None, journal: Scan, ours: set[str]) -> None:
+    if before is not None:
+        theirs = before.entries[0]
+        if (theirs.at, theirs.facts) != (journal.entries[0].at, journal.entries[0].facts):
+            raise StoreError(f"{remote.url}: holds another run; choose another place")
+        if before.length > journal.length:
+            raise StoreError(f"{remote.url}: holds a later state of this run; fetch that one")
+    elif foreign := sorted(set(remote.sizes) - ours):
+        raise StoreError(f"{remote.url}: holds {foreign[0]} and no run; choose another place")
+
+
+def _place(folder: Path, name: str, content: bytes, url: str) -> None:
+    path = folder / name
+    if not path.resolve().is_relative_to(folder.resolve()):  # what lies in a store may come from anyone
+        raise StoreError(f"{url}: {json.dumps(name)} lies outside the run")
+    make_folder(path.parent)
+    write_durably(path, content)
+
+
+class _Remote:
+    """The objects below a URL; `sizes` has their lengths by name, as listed when it was made."""
+
+    def __init__(self, url: str):
+        from fsspec.core import url_to_fs
+
+        self.url = url.rstrip("/")
+        self._files, root = url_to_fs(self.url, use_listings_cache=False)
+        self._root = str(root).rstrip("/")
+        self._files.invalidate_cache()
+        listed: dict[str, dict[str, Any]] = self._files.find(self._root, detail=True)
+        self.sizes = {path[len(self._root) :].lstrip("/"): int(facts["size"]) for path, facts in listed.items()}
+
+    def journal(self) -> Scan | None:
+        """The journal that lies there, or None."""
+        if JOURNAL not in self.sizes:
+            return None
+        found = scan(self.read(JOURNAL))
+        if not found.entries and not found.damaged:  # the sending of it was cut short in its first line
+            return None
+        return _sound(found, f"{self.url}/{JOURNAL}")
+
+    def read(self, name: str) -> bytes:
+        return bytes(self._files.cat_file(f"{self._root}/{name}"))
+
+    def holds(self, name: str, content: bytes, trusted: bool) -> bool:
+        """True if these bytes lie there; where the journal up there vouches for them, by their number alone."""
+        return self.sizes.get(name) == len(content) and (trusted or self.read(name) == content)
+
+    def write(self, name: str, content: bytes) -> None:
+        path = f"{self._root}/{name}"
+        self._files.makedirs(path.rpartition("/")[0], exist_ok=True)  # nothing, where folders are only names
+        self._files.pipe_file(path, content)
+        if self.read(name) != content:
+            raise StoreError(f"{self.url}/{name}: what was sent is not what lies there; publish again")
+
+    def remove(self, name: str) -> None:
+        self._files.rm_file(f"{self._root}/{name}")
+
+
+@contextmanager
+def _reaching(url: str) -> Iterator[None]:
+    """Turn what a store's package raises into a StoreError that begins with the URL."""
+    try:
+        yield
+    except EngineError:
+        raise
+    except ImportError as error:
+        raise StoreError(f"{url}: needs a package: {error}; `pip install mc-engine[cloud]`") from error
+    except Exception as error:  # every store's package has errors of its own
+        raise StoreError(f"{url}: {type(error).__name__}: {error}") from error

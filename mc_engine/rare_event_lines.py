@@ -1,0 +1,78 @@
+"""What the command line says of a rare event: probability, interval, cost, levels, and what the failures look like."""
+
+from collections.abc import Iterator
+from typing import Any
+
+METHOD_WORDS = {
+    "subset": "subset simulation",
+    "cross-entropy": "importance sampling by cross entropy",
+    "plain": "plain cases counted",
+}
+
+
+def outcome_lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result, line by line; `result` is `RareEventRecord.result`."""
+    yield f"requirement  {requirement_words(result)}"
+    yield f"probability  {probability_words(result)}"
+    yield f"cases        {cost_words(result)}"
+    yield from _level_lines(result)
+    yield from _input_lines(result)
+    for remark in result["remarks"]:
+        yield f"note         {remark}"
+
+
+def requirement_words(result: dict[str, Any]) -> str:
+    one, unit = result["requirement"], result["metric"]["unit"]
+    limits = [("at least", one["at_least"]), ("at most", one["at_most"])]
+    texts = [f"{word} {limit:g}{' ' * bool(unit)}{unit}" for word, limit in limits if limit is not None]
+    return f"{one['name']}: {one['metric']} {' and '.join(texts)}"
+
+
+def probability_words(result: dict[str, Any]) -> str:
+    """The estimate, its interval, and what the requirement allows."""
+    allowed = 1.0 - result["requirement"]["share"]
+    if not result["probability"]:
+        return f"below {result['upper']:.2g}; no case failed (the requirement allows {allowed:.3g})"
+    interval = f"{result['confidence']:.0%} interval {result['lower']:.3g} to {result['upper']:.3g}"
+    return (
+        f"{result['probability']:.3g} of not meeting it, {interval}, by {METHOD_WORDS[result['method']]}; the "
+        f"requirement allows {allowed:.3g}, so it is {standing(result)}"
+    )
+
+
+def standing(result: dict[str, Any]) -> str:
+    """Met, not met, or open: where the interval lies against the share of failures that the requirement allows."""
+    allowed = 1.0 - result["requirement"]["share"]
+    return "met" if result["upper"] <= allowed else "not met" if result["lower"] > allowed else "open"
+
+
+def cost_words(result: dict[str, Any]) -> str:
+    text = f"{result['cases']:,} flown, {result['failed']:,} of them failed"
+    if result["no_number"]:
+        text += f" ({result['no_number']:,} without a number)"
+    if result["plain_cases"] is None or result["method"] == "plain":
+        return text
+    return f"{text}; {result['plain_cases']:,.0f} plain ones would tell it with the same error"
+
+
+def _level_lines(result: dict[str, Any]) -> Iterator[str]:
+    unit = result["metric"]["unit"]
+    yield f"{'level':<13}{'margin' + (f' [{unit}]' if unit else ''):>16}{'probability':>13}{'cases':>9}{'accepted':>10}"
+    for number, level in enumerate(result["levels"]):
+        margin = "all" if level["margin"] is None else f"{level['margin']:.4g}"
+        yield (f"{number:<13}{margin:>16}{level['probability']:>13.3g}{level['cases']:>9,}{level['accepted']:>10.0%}")
+
+
+def _input_lines(result: dict[str, Any]) -> Iterator[str]:
+    if not result["inputs"]:
+        return
+    width = max(len(one["name"]) for one in result["inputs"])
+    across = "across" in result["inputs"][0]
+    yield f"failed cases, by input: mean and spread in sigmas; the likeliest{', and the one across' * across}"
+    for one in sorted(result["inputs"], key=lambda one: -abs(one["likeliest_sigma"])):
+        texts = [
+            f"{one[what]:.5g}{' ' * bool(one['unit'])}{one['unit']} ({one[f'{what}_sigma']:+.2f} σ)"
+            for what in ("likeliest", "across")
+            if what in one
+        ]
+        yield f"  {one['name']:<{width}}  {one['mean_sigma']:+.2f} ± {one['spread_sigma']:.2f} σ;  {'; '.join(texts)}"

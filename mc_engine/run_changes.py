@@ -1,0 +1,101 @@
+"""What changed in code and campaign between two runs, as their manifests and campaign files tell it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from difflib import unified_diff
+from typing import Any
+
+SHOWN_OF_A_DIGEST = 12
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One thing that is not the same in both runs: before and after, in words; "none" where a run has no such thing."""
+
+    what: str
+    before: str
+    after: str
+
+
+def code_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Difference, ...]:
+    """Engine, model, sampling, packages and processor, of two manifests; empty if all of them agree."""
+    return _differences(_code(a), _code(b))
+
+
+def campaign_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Difference, ...]:
+    """Design, seed, number of cases, dispersions, parameters, settings and requirements, of two manifests."""
+    return _differences(_campaign(a), _campaign(b))
+
+
+def campaign_diff(a: str, b: str) -> tuple[str, ...]:
+    """The lines of the two campaign files that differ, each with one line about it, as `diff -u` marks them."""
+    lines = unified_diff(a.splitlines(), b.splitlines(), "A", "B", lineterm="", n=1)
+    return tuple(lines)[2:]  # after the names
+
+
+def _differences(a: Mapping[str, str], b: Mapping[str, str]) -> tuple[Difference, ...]:
+    names = dict.fromkeys([*a, *b])
+    return tuple(
+        Difference(name, a.get(name, "none"), b.get(name, "none"))
+        for name in names
+        if a.get(name, "none") != b.get(name, "none")
+    )
+
+
+def _code(manifest: Mapping[str, Any]) -> dict[str, str]:
+    model, made = manifest.get("model", {}), manifest.get("provenance", {})
+    facts = {
+        "engine": str(manifest.get("engine", "")),
+        "model sources": _short(model.get("digest")),
+        "sampling sources": _short(model.get("sampling_digest")),
+        "seed contract": str(manifest.get("seed_contract", "")),
+        "git": _git(made.get("git")),
+    }
+    for key in ("python", "platform", "cpu", "numba", "llvm"):
+        facts[key] = str(made.get(key, ""))
+    packages = made.get("packages", {})
+    return {**facts, **{f"package {name}": str(version) for name, version in packages.items()}}
+
+
+def _campaign(manifest: Mapping[str, Any]) -> dict[str, str]:
+    campaign = manifest.get("campaign", {})
+    facts = {key: str(campaign.get(key, "")) for key in ("model", "design", "seed", "cases")}
+    for record in manifest.get("inputs", []):
+        facts[f"dispersion {record['name']}"] = _joined(record, "distribution", "bounds")
+        facts[f"nominal {record['name']}"] = str(record.get("nominal", ""))
+    for kind in ("parameter", "setting"):
+        for record in manifest.get(f"{kind}s", []):
+            facts[f"{kind} {record['name']}"] = f"{record.get('value', '')} {record.get('unit', '')}".strip()
+    for record in manifest.get("requirements", []):
+        facts[f"requirement {record['name']}"] = _requirement(record)
+    return facts
+
+
+def _requirement(record: Mapping[str, Any]) -> str:
+    limits = [
+        f"{words} {record[key]:g}"
+        for key, words in (("at_least", "at least"), ("at_most", "at most"))
+        if record.get(key) is not None
+    ]
+    wanted = f"in {record.get('share')} of the cases with confidence {record.get('confidence')}"
+    return f"{record.get('metric')} {' and '.join(limits)} {wanted}"
+
+
+def _joined(record: Mapping[str, Any], *keys: str) -> str:
+    return ", ".join(str(record[key]) for key in keys if record.get(key))
+
+
+def _short(digest: Any) -> str:
+    return str(digest or "")[:SHOWN_OF_A_DIGEST]
+
+
+def _git(state: Mapping[str, Any] | None) -> str:
+    if not state:
+        return "none"
+    return f"{_short(state.get('commit'))}{' with uncommitted changes' if state.get('dirty') else ''}"
+
+
+def changed_lines(differences: tuple[Difference, ...]) -> Iterator[str]:
+    """A line each, for the terminal."""
+    for one in differences:
+        yield f"{one.what}: {one.before} -> {one.after}"

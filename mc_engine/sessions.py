@@ -1,0 +1,166 @@
+"""A session of work on a run directory: from what is missing to a complete run, or to a clean stop.
+
+One process writes at a time; it counts the parts that the workers of its crew wrote.
+"""
+
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from mc_engine.backends import Backend
+from mc_engine.campaign import Campaign
+from mc_engine.chunks import Order, chunk_size, chunks_of, fly_nominal, rerun_orders
+from mc_engine.crews import crew_of
+from mc_engine.dispatch import Dispatch
+from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
+from mc_engine.interruption import stop_signal
+from mc_engine.parts import Written
+from mc_engine.progress import ProgressCall
+from mc_engine.repair import withdraw_damaged
+from mc_engine.retained_histories import write_histories
+from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store import Store
+
+Settle = Callable[[Order, Written], None]
+
+
+@dataclass(frozen=True)
+class Session:
+    """How to fly.  workers : threads or processes, all cores by default.  chunk : cases of an order, and of a part."""
+
+    progress: ProgressCall | None = None
+    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
+    chunk: int | None = None
+    backend: Backend = field(default_factory=Backend)
+
+
+def session_of(
+    progress: ProgressCall | None, workers: int | None, chunk: int | None, backend: Backend | str
+) -> Session:
+    """A session from the arguments of the runner's functions."""
+    backend = Backend(backend) if isinstance(backend, str) else backend
+    return Session(progress, workers or os.cpu_count() or 1, chunk, backend)
+
+
+def complete(store: Store, campaign: Campaign, session: Session, repair: bool = False) -> Store:
+    """Fly what is missing, then the histories.  repair : parts that are damaged are missing, too."""
+    again = f"mc-engine resume {store.path}{session.backend.options()}"
+    with _resumable(again), store.lock(), stop_signal() as stop:
+        if repair:
+            withdraw_damaged(store)
+        missing = store.missing()
+        wanted = sum(last - first for first, last in missing)
+        size = session.chunk or _chunk_of_the_run(store) or chunk_size(wanted, session.workers)
+        store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=wanted)
+        begin = time.perf_counter()
+        store.write_nominal(fly_nominal(campaign))  # also compiles the kernel
+        compiled = time.perf_counter()
+        orders = [Order(*chunk) for chunk in chunks_of(missing, size)]
+        _fly(store, campaign, session, orders, lambda order, written: store.publish(written), stop.is_set, again)
+        if store.missing():
+            raise _interrupted(store, again)
+        flown = time.perf_counter()
+        _keep_histories(store, campaign, session, stop.is_set, again)
+        store.note("finished", prepare_s=round(compiled - begin, 3), fly_s=round(flown - compiled, 3))
+    return store
+
+
+@contextmanager
+def _resumable(again: str) -> Iterator[None]:
+    """Where the disk refuses, say how to go on once it does no more."""
+    try:
+        yield
+    except DiskError as error:
+        raise RunInterrupted(f"{error}; what was committed is safe, `{again}` flies the rest") from error
+
+
+def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
+    """Fly the cases again that did not come to their end; a part in which nothing changes stays as it is."""
+    if store.missing():
+        raise StoreError(f"{store.path}: is not complete; `mc-engine resume {store.path}` flies the rest first")
+    again = f"mc-engine rerun --failed {store.path}{session.backend.options()}"
+    with _resumable(again), store.lock(), stop_signal() as stop:
+        orders = rerun_orders(store.path, store.parts)
+        cases = sum(len(order.failed) for order in orders)
+        store.note("rerun", backend=session.backend.name, workers=session.workers, cases=cases)
+        fly_nominal(campaign)  # compiles the kernel
+        left = {order.base.file for order in orders if order.base}
+
+        def settle(order: Order, written: Written) -> None:
+            assert order.base is not None  # each of these orders has one
+            left.discard(order.base.file)
+            if written.part.sha256 == order.base.sha256:
+                (store.path / written.temporary).unlink(missing_ok=True)
+            else:
+                store.replace(order.base, written)
+
+        _fly(store, campaign, session, orders, settle, stop.is_set, again)
+        if left:
+            raise _interrupted(store, again)
+        _keep_histories(store, campaign, session, stop.is_set, again)
+        store.note("finished")
+    return store
+
+
+def _fly(
+    store: Store,
+    campaign: Campaign,
+    session: Session,
+    orders: Iterable[Order],
+    settle: Settle,
+    stopped: Callable[[], bool],
+    again: str,
+) -> None:
+    """Have the orders carried out, settle each as it lands, and tell of the progress."""
+    counts = store.status_counts()
+    done, failed = sum(counts.values()), _failed(counts)
+    total = len(store.wanted)
+    tell = session.progress or (lambda *_: None)
+    tell(done, total, failed)
+    orders = list(orders)
+    if not orders or stopped():
+        return
+    crew, at_once = None, True
+    try:
+        crew = crew_of(session.backend, store, campaign, session.workers)
+        dispatch = Dispatch(crew, store.path, session.backend.case_seconds)
+        for order, written in dispatch.receipts(orders, stopped):
+            settle(order, written)
+            done += written.part.rows - (order.base.rows if order.base else 0)
+            failed += _failed(written.part.status) - (_failed(order.base.status) if order.base else 0)
+            tell(done, total, failed)
+        at_once = False
+    except WorkersLost as error:
+        store.note("interrupted", cases=done)
+        raise RunInterrupted(f"{error}; {done:,} of {total:,} cases are safe, `{again}` flies the rest") from error
+    finally:
+        if crew is not None:
+            crew.close(at_once)
+        store.sweep()
+
+
+def _failed(status: dict[str, int]) -> int:
+    return sum(count for word, count in status.items() if word != STATUS_NAME[OK])
+
+
+def _interrupted(store: Store, again: str) -> RunInterrupted:
+    done, total = sum(store.status_counts().values()), len(store.wanted)
+    store.note("interrupted", cases=done)
+    return RunInterrupted(f"interrupted with {done:,} of {total:,} cases; `{again}` flies the rest")
+
+
+def _keep_histories(
+    store: Store, campaign: Campaign, session: Session, stopped: Callable[[], bool], again: str
+) -> None:
+    """A shard has none: which cases are the worst is known when all have been flown."""
+    whole = len(store.wanted) == store.n_cases
+    if whole and not write_histories(store, campaign, session.workers, stopped):
+        raise _interrupted(store, again)
+
+
+def _chunk_of_the_run(store: Store) -> int | None:
+    """The chunk that the run began with, so that a run that was cut has the parts of one that was not."""
+    started, extended = store.notes("started"), store.notes("extended")
+    return int(started[0].facts["chunk"]) if started and not extended else None

@@ -1,0 +1,139 @@
+"""How an estimate came to its value with the number of cases, and whether it has settled.
+
+Settled means two things at once, of the estimate from all cases:
+- its interval reaches no farther from it than a stated part of the metric's standard deviation
+  (`CLOSE_MEAN`, `CLOSE_QUANTILE`), so that more cases cannot move it by much;
+- the first and the second half of the cases tell no difference beyond chance (`DRIFT`), so that it does not wander
+  with the case number, which independent cases never do.
+The order is that of the case numbers.  The first n cases of `lhs` are no Latin hypercube of n: their intervals,
+those of independent draws, are on the safe side.
+"""
+
+from dataclasses import dataclass
+from math import erfc, sqrt
+
+import numpy as np
+from scipy.special import stdtrit
+from scipy.stats import hypergeom
+
+from mc_engine.statistics.order_statistics import quantile
+
+FEWEST = 20  # cases with a number
+CLOSE_MEAN, CLOSE_QUANTILE = 0.05, 0.20  # of the standard deviation of the metric
+DRIFT = 0.01  # p-value of the difference of the halves
+PLACES = 40
+SMALLEST_SHARE = 0.005  # of the cases, at the first place
+
+
+@dataclass(frozen=True)
+class RunningEstimate:
+    """An estimate from the first n cases with its two-sided interval, float64[k] each; NaN for a limit beyond reach.
+
+    probability : of a quantile; None for the mean.  cases : int64[k], tried so far.  n_used of n_tried have a number.
+    reach : of the last interval from the estimate, in standard deviations; None where it has an open end.
+    halves_p : probability of a difference like that of the two halves, or a larger one, by chance alone.
+    """
+
+    probability: float | None
+    cases: np.ndarray
+    estimate: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    n_used: int
+    n_tried: int
+    reach: float | None
+    halves_p: float
+
+    @property
+    def close(self) -> float:
+        """What `reach` must not exceed."""
+        return CLOSE_MEAN if self.probability is None else CLOSE_QUANTILE
+
+    @property
+    def settled(self) -> bool:
+        """As the module says."""
+        return self.reach is not None and self.reach <= self.close and self.halves_p >= DRIFT
+
+    @property
+    def cases_wanted(self) -> int | None:
+        """About how many cases would make the interval close enough: it shrinks with their square root.
+
+        None where it is close enough, or has an open end.
+        """
+        if self.reach is None or self.reach <= self.close:
+            return None
+        return int(np.ceil(self.n_tried * (self.reach / self.close) ** 2))
+
+
+def running_mean(values: np.ndarray, confidence: float = 0.90) -> RunningEstimate | None:
+    """The mean of the first n of float64[n_tried], in the order of the cases, with Student's interval.
+
+    None for fewer than 20 numbers, or a constant.
+    """
+    cases, used = _places(values)
+    finite = _numbers(values)
+    if finite is None:
+        return None
+    scale = float(np.abs(finite).max())
+    middle = float(np.mean(finite / scale))
+    off = finite / scale - middle
+    sums, squares = np.concatenate([[0.0], off.cumsum()])[used], np.concatenate([[0.0], (off * off).cumsum()])[used]
+    mean = sums / used
+    deviation = np.sqrt(np.maximum(squares - used * mean * mean, 0.0) / (used - 1.0))
+    half = stdtrit(used - 1.0, 0.5 * (1.0 + confidence)) * deviation / np.sqrt(used)
+    first, second = np.array_split(off, 2)
+    error = sqrt(first.var(ddof=1) / first.size + second.var(ddof=1) / second.size)
+    apart = abs(float(first.mean() - second.mean())) / error
+    return RunningEstimate(
+        None,
+        cases,
+        scale * (middle + mean),
+        scale * (middle + mean - half),
+        scale * (middle + mean + half),
+        finite.size,
+        values.size,
+        float(half[-1] / deviation[-1]),
+        erfc(apart / sqrt(2.0)),
+    )
+
+
+def running_quantile(values: np.ndarray, probability: float, confidence: float = 0.90) -> RunningEstimate | None:
+    """A quantile of the first n of float64[n_tried] with its distribution-free interval; None as for the mean.
+
+    The halves are compared by how many of each lie above the quantile of all (Fisher's exact test).
+    """
+    cases, used = _places(values)
+    finite = _numbers(values)
+    if finite is None:
+        return None
+    found = [quantile(np.sort(finite[:n]), probability, confidence) for n in used]
+    estimate, lower, upper = (
+        np.array([getattr(one, name) for one in found], dtype=np.float64) for name in ("value", "lower", "upper")
+    )
+    ends = np.array([estimate[-1] - lower[-1], upper[-1] - estimate[-1]])
+    scale = float(np.abs(finite).max())
+    reach = float(ends.max() / scale / (finite / scale).std(ddof=1)) if np.isfinite(ends).all() else None
+    above = finite > estimate[-1]
+    half = -(-finite.size // 2)
+    law = hypergeom(finite.size, int(above.sum()), half)
+    in_first = int(above[:half].sum())
+    p = min(1.0, 2.0 * min(float(law.cdf(in_first)), float(law.sf(in_first - 1))))
+    return RunningEstimate(probability, cases, estimate, lower, upper, finite.size, values.size, reach, p)
+
+
+def _numbers(values: np.ndarray) -> np.ndarray | None:
+    """The finite values in their order; None for fewer than 20, or equal ones."""
+    finite = values[np.isfinite(values)]
+    if finite.size < FEWEST or float(np.ptp(finite / np.abs(finite).max(initial=1e-300))) <= 1e-13:
+        return None
+    return finite
+
+
+def _places(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of cases at which the estimate is looked at, evenly in their logarithm, and how many have a number."""
+    numbers = np.isfinite(values).cumsum()
+    if not numbers.size or numbers[-1] < FEWEST:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    first = max(int(np.searchsorted(numbers, FEWEST)) + 1, int(SMALLEST_SHARE * values.size))
+    cases = np.unique(np.geomspace(first, values.size, PLACES).round().astype(np.int64))
+    return cases, numbers[cases - 1]

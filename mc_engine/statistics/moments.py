@@ -1,0 +1,99 @@
+"""Moments of a metric in two passes, the same to the last bit in any order of the cases and any grouping of parts.
+
+First pass (`Tally`): number, smallest, largest and exact sum.  Second pass (`Spread`): exact sums of the powers of
+the distances from the mean; each power is rounded on its own, which depends on the case alone.  Both merge.
+"""
+
+from math import frexp, ldexp, sqrt
+
+import numpy as np
+
+from mc_engine.statistics.exact_sums import ExactSum
+from mc_engine.statistics.normality import Normality, normality_of
+
+
+def finite_values(values: np.ndarray) -> np.ndarray:
+    """The finite ones of float64[n], with -0.0 as 0.0, which it equals."""
+    return values[np.isfinite(values)] + 0.0
+
+
+class Tally:
+    """First pass.  n_used : finite values of n_tried."""
+
+    def __init__(self) -> None:
+        self.n_used = self.n_tried = 0
+        self.minimum, self.maximum = np.inf, -np.inf
+        self.total = ExactSum()
+
+    def add(self, values: np.ndarray) -> np.ndarray:
+        """Count float64[n]; gives back its finite values."""
+        finite = finite_values(values)
+        self.n_tried += values.size
+        if finite.size:
+            self.n_used += finite.size
+            self.minimum, self.maximum = (
+                min(self.minimum, float(finite.min())),
+                max(self.maximum, float(finite.max())),
+            )
+            self.total.add(finite)
+        return finite
+
+    def merge(self, other: "Tally") -> None:
+        """Count all that another tally has counted."""
+        self.n_used, self.n_tried = self.n_used + other.n_used, self.n_tried + other.n_tried
+        self.minimum, self.maximum = min(self.minimum, other.minimum), max(self.maximum, other.maximum)
+        self.total.merge(other.total)
+
+    @property
+    def mean(self) -> float:
+        """The mean, rounded once; needs a value."""
+        return self.total.over(self.n_used)
+
+
+class Spread:
+    """Second pass, about the mean of a tally that has seen all values, of which it needs one at least."""
+
+    def __init__(self, tally: Tally):
+        self.tally = tally
+        # Distances in units of a power of two near the largest value: their fourth powers stay in range.
+        self.exponent = frexp(max(abs(tally.minimum), abs(tally.maximum)))[1]
+        self.middle = ldexp(tally.mean, -self.exponent)
+        ends = (ldexp(end, -self.exponent) - self.middle for end in (tally.minimum, tally.maximum))
+        self.unit = max(map(abs, ends)) or 1.0
+        self.powers = tuple(ExactSum() for _ in range(4))
+
+    def add(self, finite: np.ndarray) -> None:
+        """Put in finite values float64[n]."""
+        distance = (np.ldexp(finite, -self.exponent) - self.middle) / self.unit
+        square = distance * distance
+        for power, values in zip(self.powers, (distance, square, square * distance, square * square), strict=True):
+            power.add(values)
+
+    def merge(self, other: "Spread") -> None:
+        """Put in all that another spread about the same tally holds."""
+        for mine, theirs in zip(self.powers, other.powers, strict=True):
+            mine.merge(theirs)
+
+    @property
+    def sd(self) -> float | None:
+        """Standard deviation, n - 1 in its denominator; None for one value, 0 for equal ones.
+
+        The sum of distances takes off what the rounding of the mean left (Chan, Golub & LeVeque, Amer. Statist. 37
+        (1983), 242-247).
+        """
+        n = self.tally.n_used
+        if n < 2:
+            return None
+        if self.tally.minimum == self.tally.maximum:
+            return 0.0
+        left = self.powers[0].over(n)
+        variance = max(self.powers[1].over(n) - left * left, 0.0) * (n / (n - 1.0))
+        return ldexp(sqrt(variance) * self.unit, self.exponent - 1) * 2.0  # inf, not an error, beyond float64
+
+    @property
+    def shape(self) -> Normality | None:
+        """Shape against the normal; None for fewer than 20 values, or (nearly) constant ones."""
+        if self.unit <= 1e-13 or self.tally.minimum == self.tally.maximum:
+            return None
+        n = self.tally.n_used
+        return normality_of(n, *(power.over(n) for power in self.powers[1:]))

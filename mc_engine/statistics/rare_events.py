@@ -1,0 +1,158 @@
+"""Probabilities far below what plain cases can show: the record of an estimate, and its interval.
+
+The question is put in standard normal space: a vector u of independent standard normal numbers stands for the inputs
+of a case, and `margin` says how far the case is inside its limit.  A case has failed where the margin is zero, below
+zero, or not a number.  `subset_simulation` and `importance_sampling` estimate the share of failed cases.
+
+Noise of the flight: where the margin depends on more than u, it is called as margin(u, noise), and `noise` addresses
+the rest of the case.  What is estimated is then the share of failed cases over inputs and noise together, which is
+what plain cases estimate.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from mc_engine.statistics.binomial import clopper_pearson
+
+Margin = Callable[..., np.ndarray]
+# Intervals reach a fifth further than the scatter asks for: runs of subset simulation share their levels, and rare
+# large weights of importance sampling have yet to be seen, neither of which the scatter shows.
+ALLOWANCE = 1.2
+FRESH = -1  # in place of a noise address: noise that no case has had yet
+
+
+@dataclass(frozen=True)
+class Level:
+    """One step towards the failures.
+
+    margin : all cases of the level are at or below it (mean over the runs).  probability : of being there.
+    runs : of the independent runs, how many came here.  cases : flown for it.
+    accepted : share of the steps of its chains that were taken; for importance sampling the share of its cases that
+        the next level rests on.
+    """
+
+    margin: float
+    probability: float
+    runs: int
+    cases: int
+    accepted: float
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """Every case flown, in order.
+
+    u : float64[n, n_inputs];  margin : float64[n], -inf where it was not a number;  level, noise : int64[n]
+    weight : float64[n], what the case counts for.  The weights of the failed cases add up to the probability.
+        With chains all weights add up to 1, and weigh any case as plain sampling would; with importance sampling
+        cases far from failure are few, and their weights say little.
+    """
+
+    u: np.ndarray
+    margin: np.ndarray
+    level: np.ndarray
+    noise: np.ndarray
+    weight: np.ndarray
+
+    @property
+    def failed(self) -> np.ndarray:
+        return self.margin <= 0.0
+
+
+@dataclass(frozen=True)
+class RareEvent:
+    """The estimated probability of failure with its two-sided interval, and all that it rests on.
+
+    relative_error : standard error over estimate; infinite without a failed case.
+    method : "subset", "cross-entropy", or "plain" where the margins gave no direction and plain cases are counted.
+    remarks : what a reader must know before trusting the number, in sentences.
+    """
+
+    method: str
+    probability: float
+    lower: float
+    upper: float
+    confidence: float
+    relative_error: float
+    levels: tuple[Level, ...]
+    cases: Evaluated
+    remarks: tuple[str, ...]
+
+    @property
+    def n_cases(self) -> int:
+        return self.cases.margin.size
+
+    @property
+    def plain_cases(self) -> float:
+        """How many plain cases would have the same relative error: (1 - p) / (p error^2)."""
+        if not 0.0 < self.relative_error < math.inf:
+            return math.inf if self.relative_error else 1.0
+        return (1.0 - self.probability) / (self.probability * self.relative_error**2)
+
+
+class Flights:
+    """The margin with a memory: every case that was asked for, numbered in order."""
+
+    def __init__(self, margin: Margin, noise: bool):
+        self._margin, self._noisy = margin, noise
+        self._kept: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
+        self.n = 0
+
+    def fly(self, u: np.ndarray, noise: np.ndarray, level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(margins, case numbers, noise addresses) of some cases; FRESH noise has the address of the case itself."""
+        case = np.arange(self.n, self.n + len(u))
+        noise = np.where(noise == FRESH, case, noise)
+        margin = np.asarray(self._margin(u, noise) if self._noisy else self._margin(u), dtype=np.float64)
+        if margin.shape != (len(u),):
+            raise ValueError(f"the margin of {len(u)} cases has shape {margin.shape}, not ({len(u)},)")
+        margin = np.where(np.isnan(margin), -np.inf, margin)
+        self._kept.append((u, margin, np.full(len(u), level), noise))
+        self.n += len(u)
+        return margin, case, noise
+
+    def evaluated(self, weight: np.ndarray) -> Evaluated:
+        u, margin, level, noise = (np.concatenate(parts) for parts in zip(*self._kept, strict=True))
+        return Evaluated(u, margin, level, noise, weight)
+
+
+def interval_of_mean(estimates: np.ndarray, confidence: float) -> tuple[float, float]:
+    """Interval on what independent runs estimate in the mean.
+
+    Estimates by subset simulation are products and nearly log-normal: Cox's interval on the mean of a log-normal, with
+    Student's t for the few runs, and ALLOWANCE.  With a run at zero it is Student's interval on the mean itself,
+    cut at zero.
+    Olsson, Journal of Statistics Education 13 (2005), no. 1, eq. (modified Cox).
+    """
+    n = estimates.size
+    quantile = ALLOWANCE * float(stats.t.ppf(0.5 * (1.0 + confidence), n - 1))
+    mean = float(estimates.mean())
+    if estimates.min() <= 0.0:
+        reach = quantile * float(estimates.std(ddof=1)) / math.sqrt(n)
+        return max(0.0, mean - reach), mean + reach
+    logs = np.log(estimates)
+    variance = float(logs.var(ddof=1))
+    centre = float(logs.mean()) + 0.5 * variance
+    reach = quantile * math.sqrt(variance / n + 0.5 * variance**2 / (n - 1))
+    return min(mean, math.exp(centre - reach)), max(mean, math.exp(centre + reach))
+
+
+def plain_count(flights: Flights, levels: tuple[Level, ...], confidence: float) -> RareEvent:
+    """The failed among plain cases, with the exact interval: where failures are frequent, or nothing points to them."""
+    cases = flights.evaluated(np.full(flights.n, 1.0 / flights.n))
+    failed = int(cases.failed.sum())
+    lower, upper = clopper_pearson(failed, flights.n, confidence)
+    if failed >= 0.05 * flights.n:
+        remark = f"Failures are frequent: {failed} of {flights.n} plain cases are counted, with the exact interval."
+    else:
+        remark = (
+            "The margin is the same for nearly all cases, so nothing points towards the failures: "
+            f"{failed} of {flights.n} plain cases failed, and the interval is the exact one of that count. A metric "
+            "that varies from case to case would lead further."
+        )
+    share = failed / flights.n
+    error = math.sqrt((1.0 - share) / failed) if failed else math.inf
+    return RareEvent("plain", share, lower, upper, confidence, error, levels, cases, (remark,))

@@ -1,0 +1,223 @@
+"""Subset simulation: a small probability as a product of larger ones, each estimated by Markov chains.
+
+The first level holds plain cases.  The tenth of them that is nearest to failure starts chains which explore what lies
+at or below that margin, the nearest tenth of these starts the next level, and so on.  Several runs are flown side by
+side, one step of all their chains at a time.  They share the margins of the levels and the size of the steps, and
+nothing else: the estimate is their mean, and the interval comes from their scatter, whatever the correlation within
+chains.
+
+Au & Beck, Probabilistic Engineering Mechanics 16 (2001), 263-277.  Chains: conditional sampling, which works in any
+number of inputs, with adaptive step; Papaioannou, Betz, Zwirglmaier & Straub, Prob. Eng. Mech. 41 (2015), 89-103.
+Runs with shared levels have no bias once the levels are given: Cerou, Del Moral, Furon & Guyader, Statistics and
+Computing 22 (2012), 795-808.
+
+Valid where failure is reached through cases ever nearer to it.  A failure that comes without warning, from a part of
+the inputs where margins are large, may be missed by all runs; more cases per level help.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from mc_engine.statistics.rare_events import (
+    FRESH,
+    Flights,
+    Level,
+    Margin,
+    RareEvent,
+    interval_of_mean,
+    plain_count,
+)
+from mc_engine.streams import stream
+
+RUNS = 10
+SHARE = 0.1  # of a level's cases that start the chains of the next
+FEWEST_SEEDS = 5  # of the chains of a level, for each run
+MOST_LEVELS = 15
+_WANTED_ACCEPTANCE = 0.44  # Papaioannou et al. (2015), section 4.2
+_FIRST_SCALE = 0.6
+_KEEPS_NOISE = 0.5  # share of the steps that leave the noise of the flight as it is
+_POOR_ACCEPTANCE = 0.05
+_DISAGREE = 30.0  # largest over smallest estimate of the runs; chance alone brings some 5
+
+
+class Members(NamedTuple):
+    """Cases that stand for a level: u float64[n, n_inputs], margin float64[n]; case, noise and run int64[n]."""
+
+    u: np.ndarray
+    margin: np.ndarray
+    case: np.ndarray
+    noise: np.ndarray
+    run: np.ndarray
+
+    def take(self, index: np.ndarray) -> "Members":
+        return Members(*(values[index] for values in self))
+
+
+class Climb(NamedTuple):
+    """Where the levels led to.
+
+    reached : float64[runs], each run's probability of the last level, which `members` stand for.  weight : float64, of
+    every case flown.  flat : whether ties of the margin ended it.
+    """
+
+    members: Members
+    reached: np.ndarray
+    levels: tuple[Level, ...]
+    weight: np.ndarray
+    flat: bool
+
+
+def subset_simulation(
+    margin: Margin,
+    n_inputs: int,
+    *,
+    cases_per_level: int = 10_000,
+    runs: int = RUNS,
+    seed: int = 0,
+    confidence: float = 0.95,
+    noise: bool = False,
+) -> RareEvent:
+    """Probability that margin(u) <= 0 for u of `n_inputs` independent standard normal numbers.
+
+    margin : float64[n, n_inputs] -> float64[n];  not a number counts as failed.
+    cases_per_level : of all runs together, at least 50 for each of at least 3 runs.
+    noise : call margin(u, addresses), int64[n]; see `rare_events`.
+    """
+    per_run = cases_per_level // runs
+    if runs < 3 or per_run * SHARE < FEWEST_SEEDS:
+        raise ValueError(f"{cases_per_level} cases per level are too few for {runs} runs; 3 runs of 50 are the least")
+    flights, rng = Flights(margin, noise), stream(seed, "subset simulation", 0)
+    climb = _climb(flights, rng, n_inputs, runs, per_run)
+    if len(climb.levels) == 1:
+        return plain_count(flights, climb.levels, confidence)
+    estimates = climb.reached * _shares(climb.members.run[climb.members.margin <= 0.0], runs, per_run)
+    lower, upper = interval_of_mean(estimates, confidence)
+    if not estimates.any():  # failure is rarer than the last level
+        upper = interval_of_mean(climb.reached, confidence)[1]
+    mean = float(estimates.mean())
+    error = float(estimates.std(ddof=1)) / (mean * math.sqrt(runs)) if mean > 0.0 else math.inf
+    remarks = tuple(_remarks(climb, estimates, upper))
+    cases = flights.evaluated(climb.weight)
+    return RareEvent("subset", mean, lower, upper, confidence, error, climb.levels, cases, remarks)
+
+
+def _climb(flights: Flights, rng: np.random.Generator, n_inputs: int, runs: int, per_run: int) -> Climb:
+    """Level by level to the failures, or to where there is no further level."""
+    n = per_run * runs
+    fresh, run = np.full(n, FRESH), np.repeat(np.arange(runs), per_run)
+    members = _flown(flights, rng.standard_normal((n, n_inputs)), fresh, run, 0)
+    reached, scale = np.ones(runs), _FIRST_SCALE
+    levels, weights = [Level(math.inf, 1.0, runs, n, 1.0)], list[tuple[np.ndarray, np.ndarray]]()
+    while True:
+        threshold = _threshold(members.margin, FEWEST_SEEDS * runs)
+        weight = reached[members.run] / n
+        if threshold is None or threshold <= 0.0 or len(levels) == MOST_LEVELS:
+            total = np.zeros(flights.n)
+            for cases, share in [*weights, (members.case, weight)]:
+                np.add.at(total, cases, share)
+            return Climb(members, reached, tuple(levels), total, threshold is None)
+        near = members.margin <= threshold
+        weights.append((members.case[~near], weight[~near]))
+        reached = reached * _shares(members.run[near], runs, per_run)
+        before = flights.n
+        members, accepted, scale = _chains(flights, rng, members.take(near), per_run, threshold, scale, len(levels))
+        alive = int(np.count_nonzero(reached))
+        levels.append(Level(threshold, float(reached.mean()), alive, flights.n - before, accepted))
+
+
+def _shares(run: np.ndarray, runs: int, per_run: int) -> np.ndarray:
+    """float64[runs]: how much of each run's members these are."""
+    return np.bincount(run, minlength=runs) / per_run
+
+
+def _flown(flights: Flights, u: np.ndarray, noise: np.ndarray, run: np.ndarray, level: int) -> Members:
+    return Members(u, *flights.fly(u, noise, level), run)
+
+
+def _threshold(margin: np.ndarray, fewest: int) -> float | None:
+    """Margin of the next level: the nearest tenth is at or below it.  Zero at the last, None if ties forbid one."""
+    seeds = round(SHARE * margin.size)
+    value = float(np.partition(margin, seeds - 1)[seeds - 1])
+    if value <= 0.0:
+        return 0.0
+    if np.count_nonzero(margin <= value) <= margin.size // 2:
+        return value
+    below = margin[margin < value]  # most cases share one margin: the level goes below that plateau
+    if below.size >= fewest and below.max() > 0.0:
+        return float(below.max())
+    return None
+
+
+def _chains(
+    flights: Flights, rng: np.random.Generator, seeds: Members, per_run: int, threshold: float, scale: float, level: int
+) -> tuple[Members, float, float]:
+    """(members at or below the threshold, share of steps accepted, scale of the steps); `per_run` for each run.
+
+    The seeds are among the members.  Candidate: rho u + sigma times a normal vector, rho^2 + sigma^2 = 1, which leaves
+    the normal density alone; so it is accepted where it stays at or below the threshold.  Papaioannou et al. (2015),
+    eq. (15) and (24).  Half of the steps keep the noise of the flight, the others draw it anew with the inputs: both
+    leave its distribution alone.
+    """
+    state, length = _shared_out(seeds.take(rng.permutation(seeds.case.size)), per_run)
+    spread = np.minimum(seeds.u.std(axis=0), 1.0)
+    kept, shares = [state], list[float]()
+    for step in range(1, int(length.max())):
+        state, length = state.take(length > step), length[length > step]
+        sigma = np.minimum(scale * spread, 1.0)
+        u = np.sqrt(1.0 - sigma * sigma) * state.u + sigma * rng.standard_normal(state.u.shape)
+        noise = np.where(rng.random(length.size) < _KEEPS_NOISE, state.noise, FRESH)
+        flown = _flown(flights, u, noise, state.run, level)
+        taken = flown.margin <= threshold
+        state = _chosen(taken, flown, state)
+        kept.append(state)
+        shares.append(float(taken.mean()))
+        scale = min(max(scale * math.exp((shares[-1] - _WANTED_ACCEPTANCE) / math.sqrt(len(shares))), 1e-3), 10.0)
+    members = Members(*(np.concatenate(values) for values in zip(*kept, strict=True)))
+    return members, float(np.mean(shares)), scale
+
+
+def _shared_out(seeds: Members, per_run: int) -> tuple[Members, np.ndarray]:
+    """(seeds, length of the chain of each), so that the chains of a run hold `per_run` members together."""
+    order = np.argsort(seeds.run, kind="stable")
+    seeds = seeds.take(order)
+    _, first, count = np.unique(seeds.run, return_index=True, return_counts=True)
+    place = np.arange(seeds.run.size) - np.repeat(first, count)
+    each = np.repeat(count, count)
+    return seeds, per_run // each + (place < per_run % each)
+
+
+def _chosen(taken: np.ndarray, new: Members, old: Members) -> Members:
+    return Members(
+        np.where(taken[:, None], new.u, old.u), *(np.where(taken, a, b) for a, b in zip(new[1:], old[1:], strict=True))
+    )
+
+
+def _remarks(climb: Climb, estimates: np.ndarray, upper: float) -> list[str]:
+    remarks, levels = [], climb.levels
+    if not estimates.any():
+        remarks.append(
+            f"No case failed in {len(levels)} levels: the probability is smaller than {upper:.2g}, and that is all "
+            "that is shown."
+        )
+    elif not estimates.all():
+        remarks.append(
+            f"{np.count_nonzero(estimates == 0.0)} of {estimates.size} runs found no failed case: the interval is "
+            "rough, and more cases per level are needed."
+        )
+    elif estimates.max() > _DISAGREE * estimates.min():
+        remarks.append(
+            f"The runs disagree, from {estimates.min():.1e} to {estimates.max():.1e}: there may be failures that "
+            "some of them did not find. Fly more cases per level."
+        )
+    if climb.flat:
+        remarks.append("On the way the margin became the same for nearly all cases; from there plain shares are used.")
+    poor = [k for k, level in enumerate(levels) if level.accepted < _POOR_ACCEPTANCE]
+    if poor:
+        remarks.append(
+            f"In level {poor[0]} only {levels[poor[0]].accepted:.1%} of the steps were accepted: the chains hardly "
+            "move, because failure hangs on the noise of the flight or on very few inputs together. The interval may "
+            "be too narrow."
+        )
+    return remarks

@@ -1,0 +1,88 @@
+"""Limits on the share of passing cases that hold at every number of cases at once, whoever stops when and why.
+
+Clopper-Pearson limits hold for a number of cases that was fixed in advance.  Looked at again and again until they
+say what one hopes for, they are wrong more often than promised.  The limits here may be looked at after every case:
+with the stated confidence they hold at all of them.  They are wider; near 99.73 % with 90 % confidence and no
+failure, 1104 cases take the place of 852.
+
+A failure rate q0 is given up once the mixed likelihood ratio
+
+    e(q0) = integral of w(q) (q / q0)^k ((1 - q) / (1 - q0))^(n - k) dq       k failures in n cases
+
+reaches 1 / (1 - confidence).  Under q0 it is a martingale that starts at 1, so it ever gets there with a probability
+of at most 1 - confidence (Ville, Etude critique de la notion de collectif, 1939; Robbins, Ann. Math. Statist. 41
+(1970), 1397-1409; Howard, Ramdas, McAuliffe & Sekhon, Ann. Statist. 49 (2021), 1055-1080).  The weights w(q) go as
+q^(-1/2) on the side that would refute q0, below it for the lower limit on the passing share and above it for the
+upper one, and as nothing on the other.  Valid for independent cases (design `mc`).
+"""
+
+from collections.abc import Callable
+from math import log
+
+import numpy as np
+from scipy.special import betainc, betaincc, betaln
+
+from mc_engine.plan import fewest_cases, most_failures
+from mc_engine.statistics.binomial import check_counts
+
+_POWER = 0.5  # weights q^(_POWER - 1): much weight on rare failures, some on frequent ones
+_HALVINGS = 100  # of a bracket inside (0, 1): more than doubles can tell apart
+
+
+def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
+    """One-sided lower limit on the passing share; 0.0 when nothing passed or nothing was tried."""
+    check_counts(passed, tried, confidence)
+    if passed == 0:
+        return 0.0
+    failures, wanted = tried - passed, -log(1.0 - confidence)
+    return 1.0 - _crossing(lambda q: _evidence_below(failures, tried, q) >= wanted, failures / tried, 1.0)
+
+
+def upper_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
+    """One-sided upper limit on the passing share; 1.0 when all passed or nothing was tried."""
+    check_counts(passed, tried, confidence)
+    if passed == tried:
+        return 1.0
+    failures, wanted = tried - passed, -log(1.0 - confidence)
+    return 1.0 - _crossing(lambda q: _evidence_above(failures, tried, q) >= wanted, failures / tried, 0.0)
+
+
+def acceptance_number(tried: int, share: float, confidence: float) -> int | None:
+    """The most failures among `tried` cases that still show `share`; None if even none at all would not do."""
+    return most_failures(lambda failures: lower_bound(tried - failures, tried, confidence) >= share, tried)
+
+
+def smallest_sample(share: float, confidence: float, failures: int = 0) -> int:
+    """Smallest number of cases in which `failures` failures show `share`, at whatever time one looks."""
+    return fewest_cases(lambda cases: lower_bound(cases - failures, cases, confidence) >= share, failures)
+
+
+def _crossing(refuted: Callable[[float], bool], kept: float, end: float) -> float:
+    """The failure rate between `kept` (not refuted) and `end` beyond which all are refuted; bisection.
+
+    The last rate that was refuted is returned: the limit is never on the unsafe side.
+    """
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (kept + end)
+        if middle in (kept, end):
+            break
+        kept, end = (kept, middle) if refuted(middle) else (middle, end)
+    return end
+
+
+def _evidence_below(failures: int, tried: int, rate: float) -> float:
+    """log e(rate), the weights on failure rates below `rate`."""
+    a, b = failures + _POWER, tried - failures + 1.0
+    mass = log(_POWER) - _POWER * log(rate)
+    return float(mass + betaln(a, b) + np.log(betainc(a, b, rate)) - _log_likelihood(failures, tried, rate))
+
+
+def _evidence_above(failures: int, tried: int, rate: float) -> float:
+    """log e(rate), the weights on failure rates above `rate`."""
+    a, b = failures + _POWER, tried - failures + 1.0
+    mass = log(_POWER) - np.log1p(-(rate**_POWER))
+    return float(mass + betaln(a, b) + np.log(betaincc(a, b, rate)) - _log_likelihood(failures, tried, rate))
+
+
+def _log_likelihood(failures: int, tried: int, rate: float) -> float:
+    return float(failures * log(rate) + (tried - failures) * np.log1p(-rate))

@@ -1,0 +1,50 @@
+"""The verb that holds two runs against each other: compare."""
+
+import importlib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mc_engine.command_line import USAGE, app, existing_run, exit_status, leave
+
+CHANGED = 1
+
+
+@app.command()
+@exit_status()
+def compare(
+    before: Annotated[Path, typer.Argument(metavar="A", help="The directory of the run before.")],
+    after: Annotated[Path, typer.Argument(metavar="B", help="The directory of the run after.")],
+    alpha: Annotated[
+        float, typer.Option(help="Chance of even one false alarm in all tests together, above 0, below 1.")
+    ] = 0.003,
+    tolerance: Annotated[
+        float, typer.Option(min=0.0, help="Standard deviations; smaller differences of a pair are rounding.")
+    ] = 1e-6,
+    report: Annotated[
+        list[Path] | None, typer.Option(help="File to write the comparison to, .html or .pdf; may be given twice.")
+    ] = None,
+) -> None:
+    """What changed from run A to run B beyond chance.
+
+    Exit status 0: no significant change; 1: a metric or share changed, or a requirement stands worse on the same cases.
+    """
+    wrong = [path for path in report or [] if path.suffix not in (".html", ".pdf")]
+    if wrong:
+        leave(USAGE, f"--report {wrong[0]}: the name must end in .html or .pdf")
+    if not 0.0 < alpha < 1.0:
+        leave(USAGE, f"--alpha {alpha:g}: must lie between 0 and 1, such as 0.003")
+    a, b = existing_run(before), existing_run(after)
+    from mc_engine.comparison import compare_runs
+    from mc_engine.comparison_lines import comparison_lines
+
+    found = compare_runs(a, b, (str(before), str(after)), alpha=alpha, tolerance=tolerance)
+    for line in comparison_lines(found):
+        typer.echo(line)
+    for path in report or []:
+        # As for the reports of a run: looked for only where they are asked for.
+        importlib.import_module("reports.compare").write_comparison(found, path)
+        typer.echo(str(path))
+    if found.changed:
+        raise typer.Exit(CHANGED)

@@ -1,0 +1,165 @@
+"""Inside a worker process: the campaign of its run, the limits it keeps, and its end with the process that began it."""
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from mc_engine.campaign import Campaign
+from mc_engine.chunks import Order, carry_out, fly_nominal
+from mc_engine.durable_file import temporary_name
+from mc_engine.errors import StoreError
+from mc_engine.flown_campaign import campaign_of
+from mc_engine.interruption import SIGNALS
+from mc_engine.parts import Column, Written
+from mc_engine.store import open_store
+
+LOOK_EVERY_S = 0.5  # at the parent process, and at the memory where the system keeps no limit
+_MIB = 2**20
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where a worker finds its campaign.  All paths are absolute, and the same for all workers.
+
+    directory : folder of the campaign's files; the run directory has copies where that one is not to be seen.
+    n_cases : how many cases the campaign has.  case_seconds : time that one case may take, or no limit.
+    """
+
+    run: str
+    directory: str
+    n_cases: int
+    case_seconds: float | None = None
+
+
+def perform(site: Site, order: Order) -> Written | None:
+    """Carry out one order in this process."""
+    campaign, columns = _campaign(site)
+    guard = None
+    if site.case_seconds is not None or order.suspected:
+        guard = Watch(Path(site.run), site.case_seconds).over
+    try:
+        return carry_out(campaign, columns, Path(site.run), order, guard)
+    except Exception as error:
+        if is_out_of_memory(error):  # causes do not travel
+            raise MemoryError(str(error)) from None
+        raise
+
+
+def is_out_of_memory(error: BaseException | None) -> bool:
+    """True for a MemoryError, also as the cause of another."""
+    return error is not None and (isinstance(error, MemoryError) or is_out_of_memory(error.__cause__))
+
+
+@lru_cache(maxsize=4)
+def _campaign(site: Site) -> tuple[Campaign, tuple[Column, ...]]:
+    """The campaign, checked against the run's digests, with its kernel compiled or loaded."""
+    store = open_store(site.run)
+    if store.n_cases != site.n_cases:
+        raise StoreError(f"{site.run}: a worker sees {store.n_cases} cases here, where there are {site.n_cases}")
+    directory = Path(site.directory)
+    campaign = campaign_of(store, directory if directory.is_dir() else None)
+    fly_nominal(campaign)
+    return campaign, store.columns
+
+
+class Watch:
+    """Leaves a note in the run directory of which cases are in flight, and ends this process where they take too long.
+
+    A worker that dies leaves its last note behind.
+    """
+
+    def __init__(self, run: Path, seconds: float | None):
+        self._run, self._seconds = run, seconds
+
+    @contextmanager
+    def over(self, case_ids: np.ndarray) -> Iterator[None]:
+        """The cases of a batch fly side by side, so that the batch takes as long as its longest case."""
+        first, last = int(case_ids[0]), int(case_ids[-1])
+        note = _note(self._run, IN_FLIGHT, first, last)
+        note.touch()
+        timer = threading.Timer(self._seconds or 0.0, self._end, (note, _note(self._run, LATE, first, last)))
+        timer.daemon = True
+        if self._seconds is not None:
+            timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+        note.unlink(missing_ok=True)
+
+    def _end(self, in_flight: Path, late: Path) -> None:
+        try:
+            in_flight.replace(late)
+        finally:
+            os._exit(1)  # nothing else ends a thread that flies
+
+
+IN_FLIGHT, LATE = "in_flight", "late"
+
+
+def _note(run: Path, kind: str, first: int, last: int) -> Path:
+    return temporary_name(run / "cases" / f"{kind}-{first}-{last}")  # a name that the next writer sweeps away
+
+
+def take_note(run: Path, case_ids: np.ndarray) -> tuple[str, np.ndarray]:
+    """What a dead worker noted of some of these cases: "late", "in_flight" or nothing, and which.  Takes the note away.
+
+    case_ids : int64[n], what the worker was flying.
+    """
+    for kind in (LATE, IN_FLIGHT):
+        for path in (run / "cases").glob(temporary_name(Path(f"{kind}-*")).name):
+            _, first, last = path.stem.split("-")
+            noted = case_ids[(case_ids >= int(first)) & (case_ids <= int(last))]
+            if noted.size:
+                path.unlink(missing_ok=True)
+                return kind, noted
+    return "", case_ids[:0]
+
+
+def begin_process(memory_mib: int | None, parent: int) -> None:
+    """Set up this process as a worker of process `parent`."""
+    for number in SIGNALS:  # a Ctrl-C goes to all processes of a terminal; the one that asked us decides
+        signal.signal(number, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    if memory_mib is not None:
+        _limit_memory(memory_mib)
+
+
+def dask_setup(worker: object) -> None:
+    """Called in a Dask worker that has this module among its preloads: a terminal's Ctrl-C is not for it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _end_with(parent: int) -> None:
+    """Leave when the parent is gone.  Windows keeps the number of a dead parent; idle workers leave by themselves."""
+    while os.getppid() == parent:
+        time.sleep(LOOK_EVERY_S)
+    os._exit(1)
+
+
+def _limit_memory(mib: int) -> None:
+    """Let allocations beyond `mib` fail, or where the system cannot, end the process that has more."""
+    if sys.platform.startswith("linux"):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_DATA, (mib * _MIB, mib * _MIB))
+    else:
+        threading.Thread(target=_end_beyond, args=(mib * _MIB,), daemon=True).start()
+
+
+def _end_beyond(limit: int) -> None:
+    import psutil
+
+    process = psutil.Process()
+    while process.memory_info().rss <= limit:
+        time.sleep(LOOK_EVERY_S)
+    os._exit(1)

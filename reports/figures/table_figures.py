@@ -1,0 +1,123 @@
+"""Figures from a table of cases: a DataFrame in, a matplotlib `Figure` out.
+
+    from reports.figures.table_figures import fuel_map, histogram, scatter
+
+    cases = mc_engine.open_run("runs/deorbit").cases
+    histogram(cases, "propellant_kg").savefig("propellant.png")
+
+They draw what the reports draw, in the same style.  A table from `open_run` brings its units along; of any other table
+the names stand alone.  Where there is a column `status`, cases that are not ok have no metrics.
+"""
+
+from collections.abc import Callable
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+from mc_engine.errors import EngineError
+from mc_engine.statistics import map_metric, summarize
+from mc_engine.status import OK, STATUS_NAME
+from reports.figures.distributions import DistributionPanel, Distributions
+from reports.figures.maps import MapDrawing
+from reports.figures.paper import STYLE
+from reports.figures.scatter import ScatterDrawing
+from reports.numbers import axis_label, count, words
+
+OUTER = (0.00135, 0.99865)  # quantiles drawn beside the median
+POINTS_ON_MAP = 2000
+
+
+def histogram(table: pd.DataFrame, column: str) -> Figure:
+    """Cases over the values of a column, with its median and outer quantiles.
+
+    EngineError if there is no such column of numbers, or fewer than two cases have one.
+    """
+    values = _values(table, column)
+    finite = values[np.isfinite(values)]
+    _refuse_few(finite.size, 2, column)
+    used = f"{count(finite.size)} of {count(values.size)} cases"
+    panel = DistributionPanel(used, _label(table, column), finite, summarize(values), None, ())
+    return _styled(Distributions((panel,), OUTER, False).printed)
+
+
+def scatter(table: pd.DataFrame, x: str, y: str) -> Figure:
+    """One column against another, a point a case.  EngineError as for `histogram`."""
+    a, b = _values(table, x), _values(table, y)
+    used = np.flatnonzero(np.isfinite(a) & np.isfinite(b))
+    _refuse_few(used.size, 1, f"{x} and {y}")
+    drawing = ScatterDrawing(
+        x=a[used],
+        y=b[used],
+        case_ids=_case_ids(table)[used],
+        x_label=_label(table, x),
+        y_label=_label(table, y),
+        n_used=int(used.size),
+        n_tried=len(table),
+        nominal=None,
+        outcome=np.zeros(used.size, dtype=np.int8),
+        outcomes=(("cases with both numbers", int(used.size)),),
+    )
+    return _styled(drawing.printed)
+
+
+def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Figure:
+    """Filled contours of any metric over two columns: exact on a grid, smoothed from scattered cases.
+
+    Blank where the cases do not support a surface; see `mc_engine.statistics.map_metric`.  EngineError where the cases
+    are too few, or lie on a line.
+    """
+    a, b, c = (_values(table, name) for name in (x, y, metric))
+    surface = map_metric(a, b, c)
+    if surface is None or not np.isfinite(surface.value).any():
+        raise EngineError(f"{metric}: too few cases over {x} and {y} for a map; draw a scatter instead")
+    used = np.flatnonzero(np.isfinite(a) & np.isfinite(b) & np.isfinite(c))
+    shown = used[np.linspace(0, used.size - 1, min(used.size, POINTS_ON_MAP)).astype(np.int64)]
+    drawing = MapDrawing(
+        surface=surface,
+        x_label=_label(table, x),
+        y_label=_label(table, y),
+        metric_label=_label(table, metric),
+        unit=_unit(table, metric),
+        points=np.column_stack([a[shown], b[shown]]),
+        case_ids=_case_ids(table)[shown],
+        point_values=c[shown],
+        n_points=int(used.size),
+        nominal=None,
+    )
+    return _styled(drawing.printed)
+
+
+def _values(table: pd.DataFrame, column: str) -> np.ndarray:
+    """float64[n]: the column, NaN where a case has no number."""
+    if column not in table:
+        raise EngineError(f'the table has no column "{column}"; it has {", ".join(map(str, table.columns))}')
+    values = pd.to_numeric(table[column], errors="coerce").to_numpy(dtype=np.float64)
+    role = table.attrs.get("roles", {}).get(column, "metric")
+    if "status" not in table or role == "dispersion":
+        return values
+    return np.where(table["status"].to_numpy() == STATUS_NAME[OK], values, np.nan)
+
+
+def _refuse_few(n_used: int, needed: int, what: str) -> None:
+    if n_used < needed:
+        raise EngineError(f"{what}: {n_used} cases have a number; the figure needs {needed}")
+
+
+def _unit(table: pd.DataFrame, column: str) -> str:
+    return str(table.attrs.get("units", {}).get(column, ""))
+
+
+def _label(table: pd.DataFrame, column: str) -> str:
+    unit = _unit(table, column)
+    return axis_label(words(column, unit), unit)
+
+
+def _case_ids(table: pd.DataFrame) -> np.ndarray:
+    return (table["case_id"] if "case_id" in table else table.index).to_numpy()
+
+
+def _styled(draw: Callable[[], Figure]) -> Figure:
+    with mpl.rc_context({**mpl.rcParamsDefault, **STYLE, "backend": "agg"}):
+        return draw()

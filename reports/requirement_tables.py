@@ -1,0 +1,125 @@
+"""The tables of requirements: what was asked, what the cases show, and how much the verdicts can be wrong."""
+
+from mc_engine.statistics import Verdict
+from reports.document import Cell, Column, Table
+from reports.flown import Flown
+from reports.numbers import count, number, percent, with_unit
+from reports.tables import TONES, limit_text
+
+
+def requirement_table(flown: Flown) -> Table:
+    """Every requirement with its counts, bounds and verdict, and all of them at once."""
+    columns = (
+        Column("Requirement", "text", 2.3),
+        Column("Limit", "text", 1.9),
+        Column("Required", "number", 1.3),
+        Column("Inside / tried", "number", 1.5),
+        Column("Share shown", "number", 1.8),
+        Column("Limit shown", "text", 1.8),
+        Column("Verdict", "text", 2.0),
+    )
+    records = flown.manifest.get("requirements", [])
+    sources = [str(record.get("source") or "") for record in records]
+    rows = [_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True)]
+    note = (
+        f"Share shown: observed share, below it {_bounds_named(flown)}. "
+        "Limit shown: the limit that these cases demonstrate with the share and confidence required (Wilks), below it "
+        "its distance inside the required one. A failed case, or one whose metric is not a number, counts as outside."
+    )
+    if flown.joint is not None:
+        rows.append(_requirement_row(flown, flown.joint, ""))
+        note += (
+            " All at once: cases inside every limit; required is 100 % less what each requirement may miss. It passes "
+            "where that is shown and every requirement passes, and fails where one of them fails with confidence "
+            "shared (next table)."
+        )
+    return Table("Requirements and their verdicts", columns, tuple(rows), note)
+
+
+def _bounds_named(flown: Flown) -> str:
+    if not flown.looked:
+        return "the Clopper–Pearson bounds, each holding with the confidence required"
+    return (
+        "bounds that hold, each with the confidence required, at every number of cases at once (Robbins’ mixture): "
+        "how many to fly was decided while looking at them"
+    )
+
+
+def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell, ...]:
+    unit = flown.unit(verdict.metric)
+    lost = f"{count(verdict.no_number)} without a number" if verdict.no_number else ""
+    bounds = f"[{percent(verdict.lower)}, {percent(verdict.upper)}]" if verdict.lower is not None else ""
+    margin = "" if verdict.margin is None else f"margin {with_unit(number(verdict.margin, 3), unit)}"
+    needed = f"needs {count(verdict.needed)} cases" if verdict.needed else ""
+    return (
+        Cell(verdict.name, small=verdict.metric),
+        Cell(limit_text(verdict, unit), small=source) if verdict.metric else Cell("every limit"),
+        Cell(percent(verdict.share, 3), verdict.share, f"with {percent(verdict.confidence)} confidence"),
+        Cell(f"{count(verdict.passed)} / {count(verdict.tried)}", verdict.passed, lost),
+        Cell(percent(verdict.estimate), verdict.estimate, bounds),
+        Cell(_limit_shown(verdict, unit), verdict.margin, margin),
+        Cell(verdict.outcome, small=needed, tone=TONES[verdict.outcome]),
+    )
+
+
+def _limit_shown(verdict: Verdict, unit: str) -> str:
+    if verdict.enclosed is not None:
+        low, high = verdict.enclosed
+        fine = 0.01 * (high - low)  # the ends to four digits of the width
+        return f"{number(low, scale=fine)} to {with_unit(number(high, scale=fine), unit)}"
+    return "–" if verdict.demonstrated is None else with_unit(number(verdict.demonstrated), unit)
+
+
+def risk_table(flown: Flown) -> Table | None:
+    """How much the verdicts can be wrong, one by one and together; None without a random sample."""
+    judged = [*flown.verdicts, *([flown.joint] if flown.joint is not None else [])]
+    if not flown.random or not flown.n_tried or not judged:
+        return None
+    columns: tuple[Column, ...] = (
+        Column("Requirement", "text", 2.0),
+        Column("Outside", "number", 1.0),
+        Column("Allowed outside", "number", 1.3),
+        Column("Consumer’s risk", "number", 1.3),
+        Column("Producer’s risk", "number", 1.3),
+        Column("With confidence shared", "text", 1.7),
+    )
+    rows = tuple(_risk_row(verdict, len(judged)) for verdict in judged)
+    note = (
+        f"Allowed outside: the most of these {count(flown.n_tried)} cases with which the requirement still passes. "
+        "Consumer’s risk: the probability that so many cases pass a system that just misses the share required. "
+        "Producer’s risk: the probability that they do not pass one that fails half as often as it may. "
+    )
+    if flown.looked:
+        note += (
+            "The number of cases was decided on the way: the consumer’s risk is then below the figure given, whatever "
+            "the rule by which flying ended, and the producer’s has no figure. "
+        )
+    if len(flown.verdicts) > 1:
+        note += (
+            "With confidence shared: the verdict if all verdicts together are to hold with their confidence, each "
+            f"taking 1/{len(judged)} of the error allowed (Bonferroni). Where every requirement passes, that "
+            "all are met holds without such sharing, with the smallest of their confidences (Berger 1982)."
+        )
+    else:
+        columns, rows = columns[:-1], tuple(row[:-1] for row in rows)
+    return Table("Risks of the verdicts", columns, rows, note)
+
+
+def _risk_row(verdict: Verdict, among: int) -> tuple[Cell, ...]:
+    outside = verdict.tried - verdict.passed
+    allowed = (
+        Cell("none would do", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
+    )
+    if verdict.looked:
+        consumer = Cell(f"below {percent(1.0 - verdict.confidence)}", 1.0 - verdict.confidence)
+    else:
+        consumer = Cell(percent(verdict.consumer_risk), verdict.consumer_risk)
+    shared = f"with {percent(1.0 - (1.0 - verdict.confidence) / among)} each"
+    return (
+        Cell(verdict.name, small=verdict.metric),
+        Cell(count(outside), outside),
+        allowed,
+        consumer,
+        Cell(percent(verdict.producer_risk), verdict.producer_risk),
+        Cell(verdict.shared_outcome, small=shared),
+    )

@@ -1,0 +1,202 @@
+"""Single cases: the figure of all by their outcome, and what an interactive page needs to look any of them up.
+
+A page cannot hold a million cases.  It holds those that its figures draw, the worst ones and those that did not pass,
+up to a budget; what is left out is counted.
+"""
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from reports.document import Block, CaseColumn, CaseData, FigureBlock, Section
+from reports.drawings import nominal_point, thinned_rows
+from reports.figures import ScatterDrawing, screen
+from reports.figures.histories import thinned
+from reports.flown import ColumnFacts, Flown
+from reports.numbers import axis_label, words
+from reports.outcomes import INSIDE, case_outcomes, outcome_names, outcome_sentence
+
+ANCHOR = "cases"
+NOMINAL = -1
+BINS = 10
+MOST_CASES = 6000
+MOST_NUMBERS = 300_000  # of the cases
+MOST_METRICS = 24
+WORST_RANKS = 10
+SAMPLES = 160  # of a curve
+MOST_SAMPLES = 300_000  # of all histories; about 3 MB
+
+
+def case_blocks(flown: Flown) -> Iterator[Block | str]:
+    """The figure of the cases by outcome; a sentence where there is nothing to draw them over."""
+    if not flown.n_tried:
+        return
+    axes = case_axes(flown)
+    if axes is None:
+        yield "Cases are not drawn by their outcome: fewer than two inputs or metrics differ between them."
+        return
+    yield _outcome_figure(flown, *axes)
+
+
+def _outcome_figure(flown: Flown, x_name: str, y_name: str) -> FigureBlock:
+    x, y, outcome = flown.values(x_name), flown.values(y_name), case_outcomes(flown)
+    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    rows = thinned_rows(used, np.flatnonzero(outcome != INSIDE)[:MOST_CASES])
+    drawing = ScatterDrawing(
+        x=x[rows],
+        y=y[rows],
+        case_ids=flown.case_ids[rows],
+        x_label=flown.axis(x_name),
+        y_label=flown.axis(y_name),
+        n_used=int(used.size),
+        n_tried=flown.n_tried,
+        nominal=nominal_point(flown, x_name, y_name),
+        outcome=outcome[rows],
+        outcomes=tuple(zip(outcome_names(flown), np.bincount(outcome[used], minlength=3).tolist(), strict=True)),
+    )
+    return FigureBlock(f"Cases by how they came out: {outcome_sentence(flown)}.", drawing, "wide")
+
+
+def case_axes(flown: Flown) -> tuple[str, str] | None:
+    """The two columns along which the share of passed cases changes most, inputs before metrics; None without two."""
+    inputs = [fact.name for fact in flown.with_role("dispersion") if _differs(flown.values(fact.name))]
+    metrics = [name for name in flown.key_metrics if _differs(flown.values(name))]
+    lost = case_outcomes(flown) != INSIDE
+    if lost.any() and not lost.all():
+        inputs.sort(key=lambda name: -_told(flown.values(name), lost))
+    names = [*inputs, *metrics][:2]
+    return (names[0], names[1]) if len(names) == 2 else None
+
+
+def _differs(values: np.ndarray) -> bool:
+    finite = values[np.isfinite(values)]
+    return finite.size > 0 and bool(finite.min() < finite.max())
+
+
+def _told(values: np.ndarray, lost: np.ndarray) -> float:
+    """Variance of the share of lost cases over bins of equally many values: also where both ends are lost."""
+    finite = np.isfinite(values)
+    order = np.argsort(values[finite], kind="stable")
+    return float(np.var([part.mean() for part in np.array_split(lost[finite][order], BINS) if part.size]))
+
+
+# ---- what the page looks up
+
+
+def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
+    """Inputs, metrics and histories of the cases that the page holds; None without a case."""
+    if not flown.n_tried:
+        return None
+    facts = [*flown.with_role("dispersion"), *_metrics(flown)]
+    histories, left_out = case_histories(flown)
+    rows = _rows(flown, sections, histories, max(1, len(facts)))
+    outcome = case_outcomes(flown)
+    return CaseData(
+        n_tried=flown.n_tried,
+        ids=tuple(int(case) for case in flown.case_ids[rows]),
+        outcome=tuple(int(k) for k in outcome[rows]),
+        outcomes=outcome_names(flown),
+        columns=tuple(_column(flown, fact, rows) for fact in facts),
+        axes=case_axes(flown),
+        quantities={name: _quantity_label(flown, name) for name in _quantities(flown, histories)},
+        histories=histories,
+        histories_left_out=left_out,
+    )
+
+
+def _metrics(flown: Flown) -> list[ColumnFacts]:
+    names = dict.fromkeys([*flown.key_metrics, *(fact.name for fact in flown.with_role("metric"))])
+    return [flown.columns[name] for name in list(names)[:MOST_METRICS]]
+
+
+def _column(flown: Flown, fact: ColumnFacts, rows: np.ndarray) -> CaseColumn:
+    values = flown.cases[fact.name].iloc[rows]
+    label = axis_label(fact.name, fact.unit)
+    if pd.api.types.is_bool_dtype(values) or not pd.api.types.is_numeric_dtype(values):
+        return CaseColumn(fact.name, label, fact.role, tuple(values.astype(str)))
+    return CaseColumn(fact.name, label, fact.role, tuple(screen.rounded(flown.values(fact.name)[rows])))
+
+
+def _rows(flown: Flown, sections: Iterable[Section], histories: Iterable[int], columns: int) -> np.ndarray:
+    """Row numbers of the cases that the page holds, in the order of the table."""
+    most = min(MOST_CASES, max(MOST_NUMBERS // columns, 1))
+    place = pd.Index(flown.case_ids)
+    worst = [flown.worst(metric, WORST_RANKS) for metric in flown.key_metrics]
+    lost = thinned_rows(np.flatnonzero(case_outcomes(flown) != INSIDE), np.empty(0, np.int64), most // 2)
+    drawn = [place.get_indexer(np.asarray(ids)) for ids in _drawn_cases(sections)]
+    wanted = np.concatenate([place.get_indexer(np.array(list(histories), np.int64)), *worst, lost, *drawn])
+    first = pd.unique(wanted[wanted >= 0].astype(np.int64))[:most]
+    return np.sort(first)
+
+
+def _drawn_cases(sections: Iterable[Section]) -> Iterator[np.ndarray]:
+    """Numbers of the cases that the figures draw as points."""
+    for section in sections:
+        for block in section.blocks:
+            ids = getattr(block.drawing, "case_ids", None) if isinstance(block, FigureBlock) else None
+            if ids is not None:
+                yield ids
+
+
+# ---- histories
+
+
+def case_histories(flown: Flown) -> tuple[dict[int, dict[str, tuple[Any, Any]]], int]:
+    """Thinned curves of the retained and replayed cases: the nominal, the worst, the failed, then the others.
+
+    Returns them by case and quantity, and how many cases the budget leaves out.
+    """
+    table = _all_histories(flown)
+    if not len(table):
+        return {}, 0
+    names = [name for name in table.columns if name not in ("case_id", "t_s")]
+    frames = {int(case): frame for case, frame in table.groupby("case_id", sort=True)}
+    ordered = [case for case in dict.fromkeys([NOMINAL, *_first_of_all(flown), *frames]) if case in frames]
+    most = max(1, MOST_SAMPLES // (2 * SAMPLES * max(1, len(names))))
+    chosen = {case: _curves(frames[case], names) for case in ordered[:most]}
+    return chosen, len(ordered) - len(chosen)
+
+
+def _first_of_all(flown: Flown) -> Iterator[int]:
+    for metric in flown.key_metrics:
+        yield from (int(flown.case_ids[row]) for row in flown.worst(metric, WORST_RANKS))
+    yield from replayed_cases(flown)
+    yield from (int(case) for case in flown.case_ids[~flown.ok])
+
+
+def _curves(frame: pd.DataFrame, names: list[str]) -> dict[str, tuple[Any, Any]]:
+    rows = frame.sort_values("t_s", kind="stable")
+    t = rows["t_s"].to_numpy(dtype=np.float64)
+    return {name: thinned(t, rows[name].to_numpy(dtype=np.float64), SAMPLES) for name in names}
+
+
+def _all_histories(flown: Flown) -> pd.DataFrame:
+    """The run's histories and those of cases that were replayed since."""
+    kept = set(flown.histories["case_id"]) if len(flown.histories) else set()
+    replayed = [pd.read_parquet(path) for case, path in replayed_cases(flown).items() if case not in kept]
+    tables = [table for table in (flown.histories, *replayed) if len(table)]
+    return pd.concat(tables, ignore_index=True) if tables else flown.histories
+
+
+def replayed_cases(flown: Flown) -> dict[int, Path]:
+    """Files that `mc-engine replay` left in the run's folder, by case."""
+    folder = Path(getattr(flown.run, "path", "")) / "replay"
+    if not hasattr(flown.run, "path") or not folder.is_dir():
+        return {}
+    known = set(flown.case_ids.tolist())
+    found = {path.stem.removeprefix("case-"): path for path in folder.glob("case-*.parquet")}
+    return {int(case): found[case] for case in sorted(found) if case.isdigit() and int(case) in known}
+
+
+def _quantities(flown: Flown, histories: dict[int, dict[str, tuple[Any, Any]]]) -> list[str]:
+    """History quantities in the order of the model's figures, those that none of them draws last."""
+    held = list(dict.fromkeys(name for curves in histories.values() for name in curves))
+    drawn = [name for figure in flown.figures for name in getattr(figure, "quantities", ())]
+    return [name for name in dict.fromkeys([*drawn, *held]) if name in held]
+
+
+def _quantity_label(flown: Flown, name: str) -> str:
+    return axis_label(words(name, flown.unit(name)), flown.unit(name))

@@ -1,0 +1,142 @@
+"""Parking orbits of any size, shape and direction: designed for, or refused in one sentence."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from geo_flights import fly_one
+from geo_impulses import least_speed
+from geo_sequences import MASS, elements, sequence
+from geo_twin import fly_twin
+
+from campaigns.geo_injection.continuation import optimum
+from campaigns.geo_injection.design import program_for
+from campaigns.geo_injection.impulsive import propellant_share, two_impulses
+from campaigns.geo_injection.optimal import first_states
+from campaigns.geo_injection.optimality import arcs
+from mc_engine.errors import ModelError
+
+
+def parked(burns, inclination_deg, *, e=0.0, perigee_deg=0.0, altitude_km=200.0, thrust=20_000.0):
+    """A sequence of the source's engine from any parking orbit."""
+    return replace(
+        sequence(burns, inclination_deg, thrust=thrust),
+        parking_eccentricity=e,
+        parking_perigee=float(np.radians(perigee_deg)),
+        parking_radius=6_378_137.0 + 1e3 * altitude_km,
+    )
+
+
+def used_kg(one):
+    problem = one.problem()
+    return MASS * problem.flow * optimum(problem).durations.sum()
+
+
+def bound_kg(one):
+    problem = one.problem()
+    return MASS * propellant_share(least_speed(problem), problem.exhaust)
+
+
+def test_the_best_two_impulses_from_a_circle_are_those_at_the_node():
+    problem = parked(2, 28.5).problem()
+    two = two_impulses(problem.plane_change, problem.ratio)
+    assert least_speed(problem) == pytest.approx(two.first + two.second, abs=1e-6)
+
+
+ELLIPSES = [
+    (2, {"inclination_deg": 46.0, "e": 0.2, "perigee_deg": 20.0}),
+    (3, {"inclination_deg": 28.5, "e": 0.25, "perigee_deg": 170.0, "altitude_km": 500.0}),
+    (2, {"inclination_deg": 0.0, "e": 0.4, "perigee_deg": 77.0, "thrust": 8000.0}),
+]
+
+
+@pytest.mark.parametrize(("burns", "orbit"), ELLIPSES)
+def test_sequences_from_ellipses_are_optima_above_the_best_two_impulses(burns, orbit):
+    one = parked(burns, **orbit)
+    found = optimum(one.problem())
+    flown = arcs(found, 60)
+    for arc in flown:
+        assert np.abs(arc.hamiltonian).max() < 1e-9
+        assert ((arc.switching if arc.burning else -arc.switching) < 1e-9).all()
+    r, v = found.states[-1, :3], found.states[-1, 3:6]
+    assert np.linalg.norm(r) == pytest.approx(one.problem().ratio, abs=1e-9)
+    assert np.linalg.norm(v) ** 2 * np.linalg.norm(r) == pytest.approx(1.0, abs=1e-9)
+    assert abs(r[2]) + abs(v[2]) + abs(r @ v) < 1e-9
+    used, bound = MASS * found.problem.flow * found.durations.sum(), bound_kg(one)
+    assert bound < used < bound * (1.06 if orbit.get("thrust") else 1.03)
+
+
+def test_large_thrust_comes_near_the_best_two_impulses():
+    one = parked(2, 30.0, e=0.15, perigee_deg=30.0, thrust=800_000.0)
+    assert bound_kg(one) < used_kg(one) < 1.0002 * bound_kg(one)
+
+
+def test_a_planar_ellipse_costs_the_same_wherever_its_perigee_is():
+    assert used_kg(parked(2, 0.0, e=0.1, perigee_deg=0.0)) == pytest.approx(
+        used_kg(parked(2, 0.0, e=0.1, perigee_deg=200.0)), abs=1e-4
+    )
+
+
+def test_an_ellipse_that_is_nearly_a_circle_costs_what_the_circle_does():
+    circle = used_kg(parked(2, 28.5))
+    assert used_kg(parked(2, 28.5, e=1e-5, perigee_deg=50.0)) == pytest.approx(circle, abs=0.5)
+
+
+def test_a_perigee_on_the_descending_node_is_used_there():
+    """The mirror image of the perigee on the ascending node."""
+    ascending, descending = (parked(2, 28.5, e=0.1, perigee_deg=angle) for angle in (0.0, 180.0))
+    assert used_kg(descending) == pytest.approx(used_kg(ascending), abs=1e-4)
+    start = optimum(descending.problem()).states[0]
+    assert start[0] < 0.0 < start[2]
+
+
+def test_the_first_state_lies_on_the_ellipse():
+    problem = parked(2, 40.0, e=0.3, perigee_deg=65.0).problem()
+    for place in (0.0, 1.0, 4.0):
+        y = first_states(problem, np.array([[place, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]))[0]
+        a, e, i = elements(y)
+        assert a * (1.0 - e) == pytest.approx(6578.137, abs=1e-6)
+        assert (e, i) == pytest.approx((0.3, 40.0), abs=1e-9)
+    perigee = first_states(problem, np.array([[problem.perigee, *np.ones(9)]]))[0]
+    assert np.linalg.norm(perigee[:3]) == pytest.approx(1.0, abs=1e-12)
+
+
+ELLIPTIC = {
+    "initial_inclination_deg": 46.0, "parking_eccentricity": 0.2, "parking_argument_of_perigee_deg": 20.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("tilt", [{}, {"final_inclination_deg": 10.0}, {"parking_altitude_km": 800.0}])
+def test_a_program_from_an_ellipse_flies_to_its_circle(tilt):
+    row = fly_one(**ELLIPTIC, **tilt)
+    assert row["status"] == "ok"
+    assert row["semi_major_axis_km"] == pytest.approx(42_164.137, abs=0.1)
+    assert row["eccentricity"] < 1e-5
+    assert row["plane_error_deg"] < 1e-4
+
+
+def test_a_late_ignition_on_an_ellipse_flies_as_in_an_independent_program():
+    errors = {
+        "ignition_delay_1_s": 12.0,
+        "thrust_factor": 1.004,
+        "pitch_error_deg": -0.3,
+        "initial_position_t_m": 800.0,
+    }
+    row = fly_one(**ELLIPTIC, **errors, tolerance=1e-13)
+    ours = [row[f"end_{name}"] for name in ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")]
+    twin = fly_twin(program_for(parked(2, 46.0, e=0.2, perigee_deg=20.0)), **errors)
+    assert ours[:3] == pytest.approx(twin[:3], abs=1.0)
+    assert ours[3:] == pytest.approx(twin[3:6], abs=1e-4)
+
+
+def test_the_staged_procedure_begins_about_the_perigee_of_an_ellipse_on_the_node():
+    row = fly_one(method="staged", parking_eccentricity=0.1)
+    assert row["correction_dv_m_s"] < 0.02
+    refused = fly_one(method="staged", parking_eccentricity=0.1, parking_argument_of_perigee_deg=30.0)
+    assert "parking_argument_of_perigee_deg = 0" in refused["reason"]
+
+
+def test_a_parking_orbit_beyond_the_final_circle_is_refused():
+    with pytest.raises(ModelError, match=r"reaches 1\.4\d* of the final radius"):
+        optimum(parked(2, 28.5, e=0.8).problem())
+    assert "of the final radius" in fly_one(parking_altitude_km=15_000.0, final_radius_km=12_000.0)["reason"]

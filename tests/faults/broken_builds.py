@@ -1,0 +1,81 @@
+"""Builds of the engine that are broken on purpose, to see that the tests of faults would notice.
+
+A break is a function of `patch`, which sets an attribute: `setattr` in a process that is thrown away, or that of a
+MonkeyPatch.
+"""
+
+import os
+from contextlib import suppress
+from dataclasses import asdict
+
+from mc_engine import dispatch, durable_file, parts, store, verification
+from mc_engine.writer_lock import WriterLock
+
+
+def line_before_part(patch):
+    """The journal counts a part before the part has its name."""
+
+    def publish(self, written):
+        with self.lock():
+            self._journal.append("part", asdict(written.part))
+            self._name(written)
+
+    patch(store.Store, "publish", publish)
+
+
+def dead_worker_forgotten(patch):
+    """Nobody flies again what a dead worker was flying."""
+    patch(dispatch.Dispatch, "_mourn", lambda self, landing: None)
+
+
+def disk_unheard(patch):
+    """What the disk says when it cannot write is not heard."""
+
+    def write_synced(path, content, place=None):
+        with open(path, "wb", buffering=0) as file, suppress(OSError):
+            durable_file.write_all(file.fileno(), content)
+            os.fsync(file.fileno())
+
+    patch(durable_file, "write_synced", write_synced)
+    patch(parts, "write_synced", write_synced)
+
+
+def contents_unsynced(patch):
+    """Files get their names before their bytes are on the disk."""
+
+    def write_synced(path, content, place=None):
+        with open(path, "wb", buffering=0) as file:
+            file.write(content)
+
+    patch(durable_file, "write_synced", write_synced)
+    patch(parts, "write_synced", write_synced)
+
+
+def names_unsynced(patch):
+    """A journal line is written before the name of its part is on the disk."""
+    patch(durable_file, "sync_folder", lambda path: None)
+
+
+def digests_unread(patch):
+    """The bytes of a part are not held against the journal."""
+    patch(parts, "content_problem", lambda content, part: "")
+    patch(verification, "content_problem", lambda content, part: "")
+
+
+def unlocked(patch):
+    """Everybody may write."""
+    patch(WriterLock, "acquire", lambda self: None)
+
+
+BREAKS = {
+    one.__name__: one
+    for one in (
+        line_before_part,
+        dead_worker_forgotten,
+        disk_unheard,
+        contents_unsynced,
+        names_unsynced,
+        digests_unread,
+        unlocked,
+    )
+}

@@ -1,0 +1,216 @@
+"""The same campaign by threads, processes, a Dask cluster and shards: the same bytes in every file of results."""
+
+import shutil
+
+import numpy as np
+import pytest
+from trapped import campaign_folder, files_of, trapped
+
+from mc_engine import crews, load_campaign, runner
+from mc_engine.backends import Backend
+from mc_engine.chunks import Order
+from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
+from mc_engine.shards import Shard
+from mc_engine.verification import damage
+from mc_engine.worker_process import Site, perform
+
+CASES, CHUNK = 1500, 100
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    return trapped(tmp_path_factory.mktemp("stones"), CASES)
+
+
+@pytest.fixture(scope="module")
+def whole(campaign, tmp_path_factory):
+    """The campaign flown by two threads."""
+    return runner.run(campaign, tmp_path_factory.mktemp("whole") / "run", workers=2, chunk=CHUNK)
+
+
+def test_processes_write_the_bytes_of_threads(campaign, whole, tmp_path):
+    store = runner.run(campaign, tmp_path / "run", workers=2, chunk=CHUNK, backend="loky")
+    assert files_of(store.path) == files_of(whole.path)
+
+
+def test_a_model_in_a_file_flies_in_processes(tmp_path):
+    campaign = load_campaign("minimal", cases=300)
+    store = runner.run(campaign, tmp_path / "run", workers=2, backend="loky")
+    plain = runner.run(campaign, tmp_path / "plain", workers=2)
+    assert files_of(store.path) == files_of(plain.path)
+
+
+def test_a_cluster_that_loses_a_worker_and_gains_one_writes_the_bytes_of_threads(
+    campaign, whole, tmp_path, monkeypatch
+):
+    """Over TCP, with a worker killed after the first part and another one added after the third."""
+    from distributed import LocalCluster
+
+    monkeypatch.setenv("STONES_SLEEP_S", "0.1")
+    done_so_far = []
+    with LocalCluster(n_workers=2, threads_per_worker=1, protocol="tcp", dashboard_address=None) as cluster:
+
+        def disturb(done, total, failed):
+            done_so_far.append(done)
+            if len(done_so_far) == 2:
+                next(iter(cluster.workers.values())).process.process._process.kill()
+            if len(done_so_far) == 4:
+                cluster.scale(3)
+
+        backend = Backend("dask", cluster.scheduler_address)
+        assert cluster.scheduler_address.startswith("tcp://")
+        store = runner.run(campaign, tmp_path / "run", chunk=CHUNK, backend=backend, progress=disturb)
+    assert len(done_so_far) > 4
+    monkeypatch.delenv("STONES_SLEEP_S")
+    assert files_of(store.path) == files_of(whole.path)
+
+
+def test_shards_in_any_order_some_killed_and_some_twice_merge_to_the_whole(campaign, whole, tmp_path):
+    rng = np.random.default_rng(8)
+    shards, folders = [Shard(number, 20) for number in range(1, 21)], []
+    for shard in rng.permutation(np.array(shards, dtype=object)):
+        folders.append(tmp_path / f"shard-{shard.number}")
+        runner.run(campaign, folders[-1], workers=1, chunk=20, shard=shard)
+    for folder in rng.choice(folders, 3, replace=False):
+        lose_parts(folder)
+        runner.resume(folder, workers=1)
+    for number in (4, 17):
+        folders.append(tmp_path / f"again-{number}")
+        runner.run(campaign, folders[-1], workers=2, chunk=33, shard=Shard(number, 20))
+    merged = runner.merge(tmp_path / "merged", [folders[i] for i in rng.permutation(len(folders))], chunk=CHUNK)
+    assert files_of(merged.path) == files_of(whole.path)
+    assert merged.verify() == []
+
+
+def lose_parts(folder):
+    """Leave the shard as a kill after its second part leaves it."""
+    journal = folder / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    second = [i for i, line in enumerate(lines) if b'"event":"part"' in line][1]
+    journal.write_bytes(b"".join(lines[: second + 1]) + lines[second + 1][:20])
+
+
+def test_missing_shards_are_named_with_the_commands_that_fly_them(campaign, tmp_path):
+    for number in (1, 3):
+        runner.run(campaign, tmp_path / f"{number}", chunk=100, shard=Shard(number, 4))
+    lose_parts(tmp_path / "3")
+    with pytest.raises(StoreError) as caught:
+        runner.merge(tmp_path / "merged", [tmp_path / "1", tmp_path / "3"])
+    text = str(caught.value)
+    assert "cases 375 to 749, 950 to 1499 are missing" in text
+    assert f"`mc-engine resume {tmp_path / '3'}`" in text
+    assert f"`mc-engine run {campaign.name} --cases 1500 --seed 1 --shard 2/4 --out DIR`" in text
+    assert "--shard 4/4" in text
+    assert "--shard 1/4" not in text
+    assert not (tmp_path / "merged").exists()
+
+
+def test_shards_that_differ_or_are_of_another_campaign_are_not_merged(campaign, tmp_path):
+    for number in (1, 2):
+        runner.run(campaign, tmp_path / f"{number}", shard=Shard(number, 2))
+    (tmp_path / "other").mkdir()
+    other = trapped(tmp_path / "other", CASES, {5: 3})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TRAPS_OFF", "3")
+        runner.run(other, tmp_path / "1b", shard=Shard(1, 2))
+    with pytest.raises(StoreError, match="1b: is not of the campaign of"):
+        runner.merge(tmp_path / "merged", [tmp_path / "1", tmp_path / "2", tmp_path / "1b"])
+    shutil.copytree(tmp_path / "1", tmp_path / "1c")
+    change_a_number(tmp_path / "1c")
+    assert damage(tmp_path / "1c") == []
+    with pytest.raises(StoreError, match="differ on case 7"):
+        runner.merge(tmp_path / "merged", [tmp_path / "1", tmp_path / "2", tmp_path / "1c"])
+
+
+def change_a_number(folder):
+    """A part whose receipt holds, and in which case 7 has another metric."""
+    from mc_engine import parts
+    from mc_engine.store import open_store
+
+    store = open_store(folder)
+    part = store.parts[0]
+    table = parts.read_part(folder, part).to_pandas()
+    table.loc[7, "end_height_m"] += 1e-9
+    arrays = {name: table[name].to_numpy() for name in table}
+    store.withdraw(part)
+    store.append(part.first, part.rows, arrays)
+
+
+def test_a_shard_is_no_run_to_extend_or_to_take_inputs_from(campaign, tmp_path):
+    store = runner.run(load_campaign("minimal", cases=200), tmp_path / "shard", shard=Shard(2, 2))
+    assert store.committed() == [(100, 200)]
+    assert store.missing() == []
+    assert store.histories().empty
+    with pytest.raises(StoreError, match="is a shard; merge the shards"):
+        runner.extend(store.path, 300)
+    text = '[campaign]\nmodel = "campaigns.deorbit"\ndesign = "mc"\nseed = 1\n[inputs]\nfrom = "shard"\n'
+    with pytest.raises((CampaignError, StoreError), match="is a shard"):
+        load_campaign("chain", text=text, directory=tmp_path)
+
+
+@pytest.mark.parametrize("text", ["0/3", "4/3", "3", "-1/3", "1/2/3", "x/y", ""])
+def test_what_is_no_shard_is_told(text):
+    with pytest.raises(ValueError, match="the third of twenty is 3/20"):
+        Shard.parse(text)
+
+
+def test_shards_share_all_cases_evenly():
+    for cases, of in ((1500, 20), (7, 3), (2, 5)):
+        shares = [Shard(number, of).cases(cases) for number in range(1, of + 1)]
+        assert [case for share in shares for case in share] == list(range(cases))
+        assert max(map(len, shares)) - min(map(len, shares)) <= 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("fork",), '"fork" is not known; there are threading, loky, dask'),
+        (("loky", "tcp://node:1"), 'a scheduler is for the backend "dask"'),
+        (("threading", None, 3.0), "a thread cannot be limited in time or memory"),
+        (("dask", "tcp://node:1", None, 1000), "dask worker --memory-limit"),
+    ],
+)
+def test_backends_that_cannot_be_are_told(arguments, words):
+    with pytest.raises(EngineError, match=words):
+        Backend(*arguments)
+
+
+def test_a_damaged_part_is_flown_again_and_only_that(campaign, whole, tmp_path):
+    shutil.copytree(whole.path, tmp_path / "run")
+    victim, lost = (tmp_path / "run" / part.file for part in whole.parts[3:5])
+    victim.write_bytes(victim.read_bytes()[:-1] + b"?")
+    lost.unlink()
+    times = {path: path.stat().st_mtime_ns for path in (tmp_path / "run" / "cases").iterdir()}
+    store = runner.resume(tmp_path / "run", repair=True)
+    assert store.verify() == []
+    assert files_of(store.path).keys() - {"history/part-00001.parquet"} == {
+        name for name in files_of(whole.path) if not name.startswith("history")
+    }
+    assert store.cases().equals(whole.cases())
+    changed = {path.name for path, time in times.items() if path.stat().st_mtime_ns != time}
+    assert changed == {victim.name}
+
+
+def test_a_grid_without_a_seed_can_be_resumed_and_replayed(tmp_path):
+    folder = campaign_folder(tmp_path / "stones", 50)
+    text = (folder / "campaign.toml").read_text().replace("seed = 1\n", "")
+    store = runner.run(load_campaign("stones", text=text, directory=folder), tmp_path / "run")
+    assert runner.replay(store.path, 7).equal
+
+
+@pytest.mark.parametrize("address", ["no such:x", "tcp://127.0.0.1:1"])
+def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign, tmp_path, monkeypatch, address):
+    monkeypatch.setattr(crews, "START_S", 0.5)
+    with pytest.raises(RunInterrupted, match=r"there is no scheduler: .*`mc-engine resume .*--backend dask"):
+        runner.run(campaign, tmp_path / "run", chunk=CHUNK, backend=Backend("dask", address))
+    assert runner.resume(tmp_path / "run").status_counts() == {"ok": CASES}
+
+
+def test_a_worker_of_other_sources_is_refused(campaign, whole):
+    """A machine with another engine would write other numbers: it says so, and writes none."""
+    site = Site(str(whole.path), str(campaign.directory), CASES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("mc_engine.flown_campaign.sampling_digest", lambda: "another")
+        with pytest.raises(StoreError, match="was flown by other sources"):
+            perform(site, Order(0, 10))
+    assert perform(site, Order(0, 10, probe=(3,))) is None

@@ -1,0 +1,163 @@
+"""Cuts and flipped bits in every file of a run directory: all are found and named, repair flies only what it must."""
+
+import shutil
+
+import numpy as np
+import pytest
+from stones import results, stones
+
+from mc_engine import open_store, runner
+from mc_engine.errors import StoreError
+from mc_engine.verification import damage
+
+CASES, CHUNK = 200, 40
+RECOMPUTED = ("cases/", "history/", "nominal.parquet")  # what repair can fly again; the rest is told and refused
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("stones")
+    campaign = stones(folder / "campaign", CASES)
+    return runner.run(campaign, folder / "whole", workers=2, chunk=CHUNK)
+
+
+@pytest.fixture
+def run(flown, tmp_path):
+    """A copy of the run, to be damaged."""
+    shutil.copytree(flown.path, tmp_path / "run")
+    return tmp_path / "run"
+
+
+def files_of(run):
+    """All files but the lock, which is empty when nobody writes."""
+    paths = sorted(path for path in run.rglob("*") if path.is_file() and path.name != ".lock")
+    return {path.relative_to(run).as_posix(): path for path in paths}
+
+
+def damaged_contents(whole, rng, cuts, flips):
+    """The content cut at random places, then with single bits flipped."""
+    at = rng.choice(len(whole), min(cuts, len(whole)), replace=False)
+    yield from (whole[: int(place)] for place in at)
+    for place in rng.choice(8 * len(whole), flips, replace=False):
+        flipped = bytearray(whole)
+        flipped[place // 8] ^= 1 << int(place % 8)
+        yield bytes(flipped)
+
+
+def check_all_damage_is_named(run, cuts, flips, seed):
+    """Damage one file at a time; how often, and how often `verify` did not name it."""
+    rng, tried, unseen = np.random.default_rng(seed), 0, []
+    for name, path in files_of(run).items():
+        whole = path.read_bytes()
+        for content in damaged_contents(whole, rng, cuts, flips):
+            path.write_bytes(content)
+            tried += 1
+            if not any(problem.startswith(name) for problem in damage(run)):
+                unseen.append((name, len(content)))
+        path.write_bytes(whole)
+    assert damage(run) == []
+    assert unseen == []
+    return tried
+
+
+def test_verify_names_every_file_that_was_cut_or_has_a_flipped_bit(run, record_property):
+    record_property("damages", check_all_damage_is_named(run, cuts=3, flips=8, seed=1))
+
+
+@pytest.mark.slow
+def test_verify_names_all_of_fifty_cuts_and_two_hundred_flips_in_each_file(run, record_property):
+    tried = check_all_damage_is_named(run, cuts=50, flips=200, seed=2)
+    record_property("damages", tried)
+    print(f"{tried} of {tried} cuts and flipped bits were named by verify, in {len(files_of(run))} files")
+
+
+def test_damage_in_all_files_at_once_is_named_file_by_file(run):
+    rng = np.random.default_rng(3)
+    names = [name for name in files_of(run) if name != "journal.jsonl"]
+    for name in names:
+        path = run / name
+        path.write_bytes(next(damaged_contents(path.read_bytes(), rng, 1, 0)))
+    problems = damage(run)
+    assert [name for name in names if not any(problem.startswith(name) for problem in problems)] == []
+
+
+def test_a_torn_last_line_loads_and_a_torn_middle_line_is_refused_with_its_number(run):
+    journal = run / "journal.jsonl"
+    whole = journal.read_bytes()
+    lines = whole.splitlines(keepends=True)
+    rng = np.random.default_rng(4)
+    for cut in rng.integers(1, len(lines[-1]), 10):
+        journal.write_bytes(whole[: -int(cut)])
+        assert len(open_store(run).notes()) == len(lines) - 1
+        assert [problem for problem in damage(run) if f"line {len(lines)}: torn" in problem]
+    for number in range(1, len(lines)):
+        torn = lines[number - 1][: int(rng.integers(0, len(lines[number - 1]) - 1))]
+        journal.write_bytes(b"".join([*lines[: number - 1], torn, b"\n", *lines[number:]]))
+        with pytest.raises(StoreError, match=rf"journal\.jsonl, line {number}: damaged"):
+            open_store(run)
+
+
+def repaired(run, flown):
+    """Repair the run; the parts that were written anew.  All results are then those of the unbroken run."""
+    before = {path: path.stat().st_mtime_ns for path in (run / "cases").iterdir()}
+    store = runner.resume(run, workers=2, repair=True)
+    assert store.verify() == []
+    assert results(run) == {**results(flown.path)}
+    return {path.name for path in (run / "cases").iterdir() if before.get(path) != path.stat().st_mtime_ns}
+
+
+def test_repair_flies_only_what_is_damaged(run, flown):
+    rng = np.random.default_rng(5)
+    for name, path in files_of(run).items():
+        if name.startswith(RECOMPUTED) and path.exists():
+            whole = path.read_bytes()
+            for content in damaged_contents(whole, rng, 1, 1):
+                path.write_bytes(content)
+                anew = repaired(run, flown)
+                assert anew == ({path.name} if name.startswith("cases/") else set())
+                if not path.exists():
+                    break  # histories that are flown anew have a new name
+
+
+def test_parts_whose_journal_lines_are_damaged_are_flown_again(run, flown):
+    journal = run / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    hit = [number for number, line in enumerate(lines) if b'"event":"part"' in line][1:3]
+    for number in hit:
+        lines[number] = lines[number][:40] + b"?" + lines[number][41:]
+    journal.write_bytes(b"".join(lines))
+    with pytest.raises(StoreError, match=rf"line {hit[0] + 1}: damaged.*resume --repair"):
+        runner.resume(run)
+    anew = repaired(run, flown)
+    assert len(anew) == 2
+    assert open_store(run).notes("mended")[0].facts["lost"] == [number + 1 for number in hit]
+
+
+@pytest.mark.parametrize("event", ["part-withdrawn", "nominal-withdrawn", "history", "started", "finished"])
+def test_no_lost_line_makes_a_case_count_twice(run, flown, event):
+    store = open_store(run)
+    part = store.parts[2]
+    (run / part.file).write_bytes(b"")
+    runner.resume(run, repair=True)
+    journal = run / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    number = next(i for i, line in enumerate(lines) if f'"event":"{event}"'.encode() in line)
+    lines[number] = b"?\n"
+    journal.write_bytes(b"".join(lines))
+    repaired(run, flown)
+    assert len(open_store(run).cases()) == CASES
+
+
+def test_what_cannot_be_flown_again_is_refused_by_name(run):
+    for name in ("campaign.toml", "manifest.json"):
+        whole = (run / name).read_bytes()
+        (run / name).write_bytes(whole[:-2])
+        with pytest.raises(StoreError, match=f"{name}: damaged or edited"):
+            runner.resume(run, repair=True)
+        (run / name).write_bytes(whole)
+    journal = run / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join([b"?\n", *lines[1:]]))
+    with pytest.raises(StoreError, match=r"journal\.jsonl, line 1: damaged"):
+        runner.resume(run, repair=True)
+    assert journal.read_bytes().startswith(b"?\n")

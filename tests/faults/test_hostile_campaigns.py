@@ -1,0 +1,97 @@
+"""Campaign files that are broken or meant to break: one sentence and exit status 2, within two seconds."""
+
+import subprocess
+import sys
+import time
+from collections import Counter
+
+import numpy as np
+import pytest
+from mutated_campaigns import lay_out, mutate, slip
+from typer.testing import CliRunner
+
+from mc_engine.cli import app
+
+SEED = 20161109
+FEW, ALL = 240, 20_000  # mutations; half as many slips of one letter come on top of few, a quarter is among all
+HANG_S = 2.0
+VALID, REFUSED = 0, 2
+
+
+@pytest.fixture(scope="module")
+def bases(tmp_path_factory):
+    """Base -> (path, text); every base is valid, and its model loaded, before it is mutated."""
+    laid_out = lay_out(tmp_path_factory.mktemp("campaigns"))
+    for path, text in laid_out.values():
+        path.write_text(text, encoding="utf-8")
+        assert checked(path)[0] == VALID, text[:200]
+    return laid_out
+
+
+def checked(path):
+    """(exit status, all that was said, processor time [s]) of `mc-engine check --no-model` in this process."""
+    begin = time.process_time()
+    answer = CliRunner().invoke(app, ["check", "--no-model", str(path)])
+    duration = time.process_time() - begin
+    assert answer.exception is None or isinstance(answer.exception, SystemExit), repr(answer.exception)
+    return answer.exit_code, answer.output, duration
+
+
+def cases_of(bases, count, offset):
+    """(number, generator, path, text): the bases in turn, each number with random numbers of its own."""
+    laid_out = list(bases.values())
+    for number in range(offset, offset + count):
+        path, text = laid_out[number % len(laid_out)]
+        yield number, np.random.default_rng([SEED, number]), path, text
+
+
+@pytest.mark.parametrize("count", [FEW, pytest.param(ALL * 3 // 4, marks=pytest.mark.slow)])
+def test_a_mutated_campaign_is_refused_in_sentences_or_is_still_a_campaign(bases, count):
+    refused = 0
+    for number, rng, path, text in cases_of(bases, count, 0):
+        kind, content = mutate(text, rng)
+        path.write_bytes(content)
+        status, said, duration = checked(path)
+        where = f"mutation {number}, {kind}, of {path.parent.name}: {said[:500]}"
+        assert status in (VALID, REFUSED), where
+        assert duration < HANG_S, where
+        assert "Traceback" not in said, where
+        assert all(letter.isprintable() or letter == "\n" for letter in said), where
+        refused += status == REFUSED
+    assert refused > 0.7 * count  # the others exchange lines or values that may be exchanged
+
+
+@pytest.mark.parametrize("count", [FEW // 2, pytest.param(ALL // 4, marks=pytest.mark.slow)])
+def test_a_slip_of_one_letter_is_answered_with_the_word_that_was_meant(bases, count):
+    answers, missed = Counter(), []
+    for number, rng, path, text in cases_of(bases, count, ALL):
+        wrong = slip(text, rng)
+        path.write_text(wrong.text, encoding="utf-8")
+        status, said, duration = checked(path)
+        assert status in (VALID, REFUSED), f"slip {number}: {said}"
+        assert duration < HANG_S
+        if status == REFUSED:  # a slip may make another word that is right: kd of kp, km of m
+            right = f'did you mean "{wrong.meant}"' in said
+            answers[right] += 1
+            missed += [] if right else [f"{wrong.meant} -> {wrong.written}: {said}"]
+    print(f"{answers[True]} of {answers.total()} slips of one letter answered with the word that was meant")
+    assert answers.total() > 0.95 * count
+    assert answers[True] >= 0.95 * answers.total(), "\n".join(missed[:20])
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"x = " + b"[" * 100_000,
+        b'[campaign]\nmodel = "\\u0000.py"\n',
+    ],
+)
+def test_a_process_of_the_command_line_says_the_same_and_exits_with_2(tmp_path, content):
+    path = tmp_path / "campaign.toml"
+    path.write_bytes(content)
+    done = subprocess.run(
+        [sys.executable, "-m", "mc_engine", "check", path], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (REFUSED, "")
+    assert done.stderr.startswith("campaign.toml: ")
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,197 @@
+"""Runs on object stores: an S3-speaking server on this machine, and fsspec's own store in memory."""
+
+import hashlib
+import logging
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mc_engine"))
+from small_run import block, created, filled
+
+from mc_engine.cli import app
+from mc_engine.errors import StoreError
+from mc_engine.object_store import _Remote, fetch, publish
+from mc_engine.store import open_store
+from mc_engine.verification import damage
+
+fsspec = pytest.importorskip("fsspec")
+
+
+@pytest.fixture(scope="module")
+def s3():
+    """A bucket "runs" of a server that speaks S3; its address and keys stand in the environment, as for any other."""
+    server_class = pytest.importorskip("moto.server").ThreadedMotoServer
+    logging.getLogger("werkzeug").setLevel(logging.ERROR)
+    server = server_class(ip_address="127.0.0.1", port=0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
+        patch.setenv("AWS_ACCESS_KEY_ID", "key")
+        patch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
+        patch.setenv("AWS_DEFAULT_REGION", "us-east-1")
+        fsspec.filesystem("s3").mkdir("runs")
+        yield "s3://runs"
+        fsspec.filesystem("s3").clear_instance_cache()
+    server.stop()
+
+
+@pytest.fixture
+def memory():
+    files = fsspec.filesystem("memory")
+    files.store.clear()
+    files.pseudo_dirs[:] = [""]
+    return "memory://runs"
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A run of forty cases in four parts, with a report."""
+    filled(created(tmp_path / "run"))
+    (tmp_path / "run" / "report.html").write_text("<p>forty cases</p>")
+    return tmp_path / "run"
+
+
+def digests(folder):
+    paths = [path for path in folder.rglob("*") if path.is_file() and path.name != ".lock"]
+    return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
+
+
+def test_a_run_comes_back_from_s3_byte_by_byte(s3, run, tmp_path):
+    sent = publish(run, f"{s3}/study/one").sent
+    assert sent.index("journal.jsonl") > max(i for i, name in enumerate(sent) if name.startswith("cases/"))
+    assert sent[-1] == "report.html"
+    back = fetch(f"{s3}/study/one", tmp_path / "back")
+    assert digests(back) == digests(run)
+    assert damage(back) == []
+
+
+def test_what_lies_on_s3_already_does_not_travel_again(s3, run):
+    assert len(publish(run, f"{s3}/again").sent) == 8
+    assert publish(run, f"{s3}/again").sent == ()
+    (run / "report.html").write_text("<p>anew</p>")
+    open_store(run).note("finished")
+    assert publish(run, f"{s3}/again").sent == ("journal.jsonl", "report.html")
+
+
+def test_the_verbs_take_a_run_to_s3_and_report_on_it_there(s3, run, tmp_path):
+    for verb in (["publish", run, f"{s3}/verbs"], ["fetch", f"{s3}/verbs", tmp_path / "back"]):
+        answer = CliRunner().invoke(app, [str(word) for word in verb])
+        assert answer.exit_code == 0, answer.output
+    assert digests(tmp_path / "back") == digests(run)
+    assert len(open_store(f"{s3}/verbs").cases()) == 40
+
+
+def test_a_bucket_that_is_not_there_is_a_sentence_and_damage(s3, run):
+    answer = CliRunner().invoke(app, ["publish", str(run), "s3://no-such-bucket/x"])
+    assert answer.exit_code == 5
+    assert answer.output.startswith("s3://no-such-bucket/x: ")
+    assert answer.output.count("\n") == 1
+
+
+def test_a_server_that_cannot_be_reached_is_a_sentence(run, monkeypatch):
+    pytest.importorskip("s3fs").S3FileSystem.clear_instance_cache()
+    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
+    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "key")
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
+    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
+    with pytest.raises(StoreError, match=r"^s3://runs/x: "):
+        publish(run, "s3://runs/x")
+
+
+def test_an_upload_that_breaks_off_anywhere_is_completed_and_never_loads_wrong(memory, run, tmp_path, monkeypatch):
+    whole = digests(run)
+    whole_parts = sum(name != "journal.jsonl" and name != "report.html" for name in whole) - 1
+    write = _Remote.write
+    for stop in range(len(whole)):
+        url = f"{memory}/{stop}"
+        written = []
+
+        def breaks_off(remote, name, content, written=written, stop=stop):
+            if len(written) == stop:
+                remote._files.pipe_file(f"{remote._root}/{name}", content[: len(content) // 2])
+                raise ConnectionError("the line is cut")
+            written.append(name)
+            write(remote, name, content)
+
+        monkeypatch.setattr(_Remote, "write", breaks_off)
+        with pytest.raises(StoreError, match="the line is cut"):
+            publish(run, url)
+        monkeypatch.setattr(_Remote, "write", write)
+        if len(written) > whole_parts:
+            ids = open_store(url).cases()["case_id"].tolist()
+            assert ids == list(range(40 if "journal.jsonl" in written else len(ids)))
+        else:
+            with pytest.raises(StoreError, match="holds no run"):
+                fetch(url, tmp_path / "none")
+        assert len(publish(run, url).sent) == len(whole) - stop
+        assert digests(fetch(url, tmp_path / f"back-{stop}")) == whole
+
+
+def test_a_copy_of_a_run_that_still_flies_holds_what_was_committed(memory, tmp_path):
+    store = created(tmp_path / "run")
+    for first in range(0, 40, 10):
+        store.append(first, 10, block(first, 10))
+        with open(store.path / "journal.jsonl", "ab") as journal:
+            journal.write(b'{"n": 99, torn')
+        publish(store.path, memory)
+        assert len(open_store(memory).cases()) == first + 10
+
+
+def test_a_part_that_no_longer_counts_is_removed_up_there(memory, run):
+    publish(run, memory)
+    store = open_store(run)
+    store.withdraw(store.parts[0])
+    publish(run, memory)
+    assert len(fsspec.filesystem("memory").find("runs/cases")) == 3
+    assert len(open_store(memory).cases()) == 30
+
+
+def test_another_run_or_other_files_or_a_later_state_are_not_overwritten(memory, run, tmp_path):
+    before = tmp_path / "before"
+    shutil.copytree(run, before)
+    open_store(run).note("finished")
+    publish(run, memory)
+    with pytest.raises(StoreError, match="later state"):
+        publish(before, memory)
+    filled(created(tmp_path / "other"))
+    with pytest.raises(StoreError, match="holds another run"):
+        publish(tmp_path / "other", memory)
+    fsspec.filesystem("memory").pipe_file("elsewhere/thesis.txt", b"x")
+    with pytest.raises(StoreError, match=r"holds thesis\.txt and no run"):
+        publish(run, "memory://elsewhere")
+
+
+def test_damage_is_neither_sent_nor_fetched(memory, run, tmp_path):
+    publish(run, memory)
+    files = fsspec.filesystem("memory")
+    part = open_store(run).parts[1].file
+    content = bytearray(files.cat_file(f"runs/{part}"))
+    content[100] ^= 1
+    files.pipe_file(f"runs/{part}", bytes(content))
+    with pytest.raises(StoreError, match=f"{part}: damaged"):
+        fetch(memory, tmp_path / "back")
+    (run / part).write_bytes(bytes(content))
+    with pytest.raises(StoreError, match="verify"):
+        publish(run, "memory://fresh")
+
+
+def test_names_from_a_store_stay_inside_the_folder(memory, run, tmp_path):
+    publish(run, memory)
+    files = fsspec.filesystem("memory")
+    files.store["/runs/../../evil.txt"] = files.store["/runs/report.html"]
+    with pytest.raises(StoreError, match="lies outside the run"):
+        fetch(memory, tmp_path / "back")
+    assert not list(tmp_path.rglob("evil.txt"))
+
+
+@pytest.mark.parametrize("url", ["here", "/tmp/x", "nosuch://x/y"])
+def test_what_is_no_url_or_of_no_known_store_is_refused(run, url):
+    answer = CliRunner().invoke(app, ["publish", str(run), url])
+    assert answer.exit_code in (2, 5)
+    assert url in answer.output
+    assert "Traceback" not in answer.output

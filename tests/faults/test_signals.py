@@ -1,0 +1,112 @@
+"""Ctrl-C, SIGTERM and kill -9 of a run with worker processes: what lands, what is said, and who stays behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+from trapped import ENVIRONMENT, campaign_folder
+
+from mc_engine import open_store, runner
+
+CASES = 3200  # sixteen chunks for two workers
+GONE_WITHIN_S = 20.0
+
+
+def begin(folder, backend, sleep_s):
+    """A run on the command line, in a process group of its own, whose first part has landed."""
+    campaign = campaign_folder(folder / "campaign", CASES)
+    command = [sys.executable, "-m", "mc_engine", "run", str(campaign), "--out", str(folder / "run"), "--no-report"]
+    process = subprocess.Popen(
+        [*command, "--workers", "2", "--backend", backend],
+        env={**ENVIRONMENT, "STONES_SLEEP_S": f"{sleep_s}"},
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    deadline = time.monotonic() + 120.0
+    while not list((folder / "run" / "cases").glob("part-*")):
+        if process.poll() is not None or time.monotonic() > deadline:
+            process.kill()
+            raise AssertionError(process.communicate()[1])
+        time.sleep(0.05)
+    return process
+
+
+def family(process):
+    """The process and all that it began."""
+    return [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]
+
+
+def end(process):
+    """What the process says on stderr; it must come to its end by itself."""
+    try:
+        return process.communicate(timeout=90.0)[1]
+    finally:
+        process.kill()
+
+
+def assert_gone(processes):
+    _, alive = psutil.wait_procs(processes[1:], timeout=GONE_WITHIN_S)
+    assert [process for process in alive if process.status() != psutil.STATUS_ZOMBIE] == []
+
+
+# A terminal's Ctrl-C goes to the whole group, a batch system's SIGTERM often to the first process alone.
+@pytest.mark.parametrize(
+    ("backend", "send"),
+    [
+        ("loky", lambda process: os.killpg(process.pid, signal.SIGINT)),
+        ("threading", lambda process: os.killpg(process.pid, signal.SIGTERM)),
+        pytest.param("loky", lambda process: os.killpg(process.pid, signal.SIGTERM), marks=pytest.mark.slow),
+        pytest.param("dask", lambda process: os.killpg(process.pid, signal.SIGINT), marks=pytest.mark.slow),
+        ("dask", lambda process: os.kill(process.pid, signal.SIGTERM)),
+    ],
+)
+def test_one_signal_lets_what_is_in_flight_land_and_says_how_to_go_on(tmp_path, backend, send):
+    process = begin(tmp_path, backend, 1.0)
+    processes = family(process)
+    before = set((tmp_path / "run" / "cases").glob("part-*"))
+    send(process)
+    errors = end(process)
+    assert process.returncode == 4, errors
+    option = "" if backend == "threading" else f" --backend {backend}"
+    assert f"`mc-engine resume {tmp_path / 'run'}{option}` flies the rest" in errors
+    assert "Traceback" not in errors
+    assert_gone(processes)
+    store = open_store(tmp_path / "run")
+    assert store.missing()
+    assert len(store.parts) > len(before)
+    assert store.verify() == []
+    whole = runner.resume(tmp_path / "run")
+    assert whole.status_counts() == {"ok": CASES}
+
+
+@pytest.mark.parametrize("backend", ["loky", pytest.param("threading", marks=pytest.mark.slow), "dask"])
+def test_the_second_signal_ends_at_once(tmp_path, backend):
+    process = begin(tmp_path, backend, 12.0)
+    processes = family(process)
+    process.send_signal(signal.SIGINT)
+    time.sleep(1.0)
+    assert process.poll() is None
+    begun = time.monotonic()
+    process.send_signal(signal.SIGINT)
+    errors = end(process)
+    assert process.returncode == 4, errors
+    assert "Traceback" not in errors
+    assert time.monotonic() - begun < 9.0  # the flights under way would take longer
+    assert_gone(processes)
+    assert open_store(tmp_path / "run").missing()
+
+
+@pytest.mark.parametrize("backend", ["loky", pytest.param("dask", marks=pytest.mark.slow)])
+def test_no_worker_outlives_a_killed_run(tmp_path, backend):
+    process = begin(tmp_path, backend, 1.0)
+    processes = family(process)
+    assert len(processes) > 2
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stderr.close()
+    assert_gone(processes)

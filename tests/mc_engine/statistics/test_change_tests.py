@@ -1,0 +1,137 @@
+"""Changes between two runs: planted ones are found, chance is held at its rate, sizes and intervals are right."""
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, fisher_exact, norm
+
+from mc_engine.comparison import ALPHA
+from mc_engine.statistics.change_tests import FEWEST, holm, metric_change, share_change
+from mc_engine.streams import uniforms
+
+N = 1000
+METRICS = 8
+
+
+def normal(name, seed, n=N):
+    return norm.ppf(uniforms(seed, name, np.arange(n)))
+
+
+def smallest_adjusted(seed, paired, shift=0.0, together=0.0):
+    """Adjusted p-values of the shift of metric 2, and the smallest of all shifts and spreads of eight metrics."""
+    found = []
+    for k in range(METRICS):
+        a, own = normal(f"a{k}", seed), normal(f"b{k}", seed)
+        b = together * a + np.sqrt(1.0 - together**2) * own + (shift if k == 2 else 0.0)
+        one = metric_change("y", a, b, paired=paired)
+        found += [one.shift_p, one.spread_p]
+    adjusted = holm(found)
+    return adjusted[4], adjusted.min()
+
+
+@pytest.mark.parametrize(("paired", "together"), [(False, 0.0), (True, 0.0), (True, 0.7)])
+def test_a_shift_of_three_tenths_of_sigma_is_found_ninety_nine_times_of_a_hundred(paired, together):
+    found = sum(smallest_adjusted(seed, paired, 0.3, together)[0] <= ALPHA for seed in range(100))
+    assert found >= 99
+
+
+@pytest.mark.parametrize(("paired", "together"), [(False, 0.0), (True, 0.7)])
+def test_nothing_changed_gives_at_most_one_false_alarm_in_a_hundred_comparisons(paired, together):
+    alarms = sum(smallest_adjusted(seed, paired, 0.0, together)[1] <= ALPHA for seed in range(100))
+    assert alarms <= 1
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_a_spread_that_grows_by_three_tenths_is_found_and_is_no_shift(paired):
+    a = normal("a", 1)
+    b = 1.3 * (0.8 * a + 0.6 * normal("b", 1) if paired else normal("b", 1))
+    found = metric_change("y", a, b, paired=paired)
+    assert found.spread_p < 1e-4
+    assert found.shift_p > 0.01
+    assert found.ratio.value == pytest.approx(1.3, rel=0.08)
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_the_interval_of_a_ratio_holds_the_true_one_as_often_as_it_says(paired):
+    held = []
+    for seed in range(300):
+        a, own = normal("a", seed, 200), normal("b", seed, 200)
+        found = metric_change("y", a, 1.3 * (0.8 * a + 0.6 * own if paired else own), paired=paired).ratio
+        held.append(found.lower <= 1.3 <= found.upper)
+    assert 0.92 <= np.mean(held) <= 0.98
+
+
+def test_the_same_numbers_are_no_change_and_rounding_is_none():
+    a = normal("a", 1)
+    for b in (a, a + 1e-12, a * (1.0 + 1e-9)):
+        found = metric_change("y", a, b, paired=True)
+        assert (found.differing, found.shift_p, found.spread_p, found.same) == (0, 1.0, 1.0, True)
+    assert metric_change("y", a, a + 1e-3, paired=True).shift_p < 1e-6
+
+
+def test_intervals_hold_the_true_shift_and_ratio_as_often_as_they_say():
+    for paired in (False, True):
+        held = []
+        for seed in range(200):
+            a = np.exp(normal("a", seed, 300))
+            b = 2.0 * (a if paired else np.exp(normal("b", seed, 300))) + normal("c", seed, 300) + 1.0
+            found = metric_change("y", a, b, paired=paired)
+            mean = 1.0 + np.exp(0.5)
+            held.append(found.shift.lower <= mean <= found.shift.upper)
+        # of lognormal clouds the normal limit holds a little less often than it says
+        assert np.mean(held) >= 0.95 - 0.04
+
+
+def test_pairs_without_a_number_in_one_run_are_left_out_and_counted():
+    a, b = normal("a", 1, 50), normal("b", 1, 50)
+    holes = np.where(np.arange(50) < 4, np.nan, b)
+    found = metric_change("y", a, holes, paired=True)
+    assert (found.n_used, found.n_tried) == ((46, 46), (50, 50))
+    assert found.shift.value == pytest.approx((b - a)[4:].mean())
+    assert metric_change("y", a, holes, paired=False).n_used == (50, 46)
+
+
+@pytest.mark.parametrize("paired", [False, True])
+@pytest.mark.parametrize("n", [0, 1, 2, FEWEST - 1])
+def test_too_few_numbers_are_not_tested(n, paired):
+    found = metric_change("y", normal("a", 1, n), normal("b", 1, n), paired=paired)
+    assert np.isnan([found.shift_p, found.spread_p]).all()
+    assert not found.same or n == 0
+    nothing = metric_change("y", np.full(n, np.nan), normal("b", 1, n), paired=paired)
+    assert np.isnan(nothing.shift_p)
+    assert not nothing.same
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_constants_are_the_same_or_surely_another(paired):
+    a = np.full(40, 0.1)
+    assert metric_change("y", a, a + 1e-17, paired=paired).same
+    moved = metric_change("y", a, a + 1.0, paired=paired)
+    assert moved.shift_p < 1e-6
+    assert not moved.same
+    assert np.isnan(moved.shift_in_sigma.value)  # there is no sigma
+
+
+def test_a_paired_share_is_mcnemars_and_an_unpaired_one_fishers():
+    a = np.arange(200) < 190
+    b = (np.arange(200) < 175) | (np.arange(200) >= 199)
+    paired = share_change("inside", a, b, paired=True)
+    assert (paired.lost, paired.gained) == (15, 1)
+    assert paired.p_value == pytest.approx(binomtest(1, 16).pvalue)
+    assert paired.difference.value == pytest.approx(-14 / 200)
+    assert paired.difference.lower < -14 / 200 < paired.difference.upper < 0.0
+    free = share_change("inside", a, b, paired=False)
+    assert free.p_value == pytest.approx(fisher_exact([[190, 10], [176, 24]]).pvalue)
+    assert free.difference.lower < -14 / 200 < free.difference.upper
+    assert np.isnan(share_change("inside", a[:0], b, paired=False).p_value)
+
+
+def test_newcombes_interval_is_the_printed_one():
+    # Newcombe, Stat. Med. 17 (1998), 873-890, Table II, method 10: 56/70 - 48/80 = 0.2, [0.0524, 0.3339].
+    a, b = np.arange(80) < 48, np.arange(70) < 56
+    found = share_change("inside", a, b, paired=False).difference
+    assert (found.lower, found.upper) == pytest.approx((0.0524, 0.3339), abs=5e-5)
+
+
+def test_holm_multiplies_the_smallest_by_all_and_never_falls():
+    # Holm (1979): by hand, 0.01 * 4, 0.02 * 3, 0.02 * 3 (not below the one before), 0.5; a NaN is no test.
+    assert holm([0.02, 0.01, np.nan, 0.5, 0.03]) == pytest.approx([0.06, 0.04, np.nan, 0.5, 0.06], nan_ok=True)

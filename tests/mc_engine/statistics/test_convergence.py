@@ -1,0 +1,69 @@
+"""Running estimates and whether they have settled."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from mc_engine.statistics.convergence import running_mean, running_quantile
+from mc_engine.statistics.order_statistics import quantile
+
+
+def draws(n, key=1):
+    return np.random.Generator(np.random.Philox(key=key)).normal(1e6, 2.0, n)
+
+
+def test_the_running_mean_is_that_of_the_first_cases_with_students_interval():
+    values = draws(3000)
+    values[[3, 700]] = np.nan
+    found = running_mean(values, 0.90)
+    assert (found.n_used, found.n_tried) == (2998, 3000)
+    assert found.cases[0] == 21  # with the twentieth number
+    assert found.cases[-1] == 3000
+    for place in (0, 10, -1):
+        part = values[: found.cases[place]]
+        part = part[np.isfinite(part)]
+        low, high = stats.t.interval(0.90, part.size - 1, part.mean(), stats.sem(part))
+        assert found.estimate[place] == pytest.approx(part.mean(), abs=1e-8)
+        assert (found.lower[place], found.upper[place]) == pytest.approx((low, high), abs=1e-8)
+
+
+def test_the_running_quantile_is_that_of_the_first_cases():
+    values = draws(5000)
+    found = running_quantile(values, 0.99865)
+    for place in (0, 20, -1):
+        expected = quantile(np.sort(values[: found.cases[place]]), 0.99865)
+        assert found.estimate[place] == expected.value
+    assert np.isnan(found.upper[0])
+    assert found.upper[-1] == expected.upper
+
+
+def test_an_interval_close_enough_and_equal_halves_have_settled():
+    assert not running_mean(draws(800)).settled
+    assert running_mean(draws(800)).cases_wanted == pytest.approx(1.645**2 / 0.05**2, rel=0.03)
+    assert running_mean(draws(1200)).settled
+    assert running_mean(draws(1200)).cases_wanted is None
+    assert not running_quantile(draws(1200), 0.99865).settled
+    assert running_quantile(draws(20_000), 0.99865).settled
+    assert running_quantile(draws(200), 0.99865).reach is None
+
+
+@pytest.mark.parametrize("estimate", [running_mean, lambda values: running_quantile(values, 0.97725)])
+def test_cases_that_drift_have_not_settled(estimate):
+    values = draws(20_000)
+    assert estimate(values).settled
+    found = estimate(values + np.linspace(0.0, 2.0, values.size))
+    assert found.halves_p < 1e-6
+    assert not found.settled
+
+
+@pytest.mark.parametrize("estimate", [running_mean, lambda values: running_quantile(values, 0.97725)])
+def test_independent_cases_are_said_to_drift_no_more_often_than_stated(estimate):
+    # stated 1 %; three sigma of 400 trials are 1.5 %
+    alarms = [estimate(draws(400, key)).halves_p < 0.01 for key in range(400)]
+    assert np.mean(alarms) < 0.01 + 0.015
+
+
+@pytest.mark.parametrize("values", [np.zeros(0), np.arange(19.0), np.full(50, 0.1), np.full(50, np.nan), np.zeros(30)])
+def test_of_too_few_or_equal_values_nothing_is_said(values):
+    assert running_mean(values) is None
+    assert running_quantile(values, 0.5) is None

@@ -1,0 +1,190 @@
+"""Small probabilities in closed form, by both methods: bias and coverage over 50 seeds; hard and hopeless margins.
+
+Normal tails: Abramowitz & Stegun, Table 26.2 gives 1 - Phi(3.5) = 2.326e-4.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.special import log_ndtr, ndtri
+
+from mc_engine.statistics.importance_sampling import cross_entropy
+from mc_engine.statistics.rare_events import interval_of_mean
+from mc_engine.statistics.subset_simulation import subset_simulation
+from mc_engine.streams import uniforms
+
+SEEDS = 50
+# Cases per level: fewer serve importance sampling.
+METHODS = {"subset": (subset_simulation, 10_000), "cross-entropy": (cross_entropy, 1_000)}
+MILLIONTH = float(stats.norm.isf(1e-6))
+SQUARES = float(stats.chi2.isf(1e-6, 5))
+SUM = float(stats.gamma.isf(1e-6, 5))
+
+
+def plane(u):
+    return 3.5 - (u[:, 0] + u[:, 1]) / math.sqrt(2.0)
+
+
+def twenty_inputs(u):
+    return MILLIONTH - u.sum(axis=1) / math.sqrt(20.0)
+
+
+def four_branches(u):
+    return 4.5 - np.abs(u).max(axis=1)
+
+
+def sphere(u):
+    return SQUARES - (u * u).sum(axis=1)
+
+
+def sum_of_exponentials(u):
+    return SUM + log_ndtr(-u).sum(axis=1)
+
+
+LIMIT_STATES = {
+    "a plane": (plane, 2, 2.326e-4),
+    "a plane of 20 inputs": (twenty_inputs, 20, 1e-6),
+    "four branches": (four_branches, 2, 1.0 - (1.0 - 2.0 * stats.norm.sf(4.5)) ** 2),
+    "outside a sphere": (sphere, 5, 1e-6),
+    "a sum of exponentials": (sum_of_exponentials, 5, 1e-6),
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("name", LIMIT_STATES)
+def test_known_probabilities_are_met_without_bias_and_inside_the_interval(method, name):
+    margin, n_inputs, p = LIMIT_STATES[name]
+    estimate, cases = METHODS[method]
+    found = [estimate(margin, n_inputs, cases_per_level=cases, seed=seed) for seed in range(SEEDS)]
+    assert abs(np.mean([math.log10(one.probability / p) for one in found])) <= 0.05
+    assert abs(math.log10(np.mean([one.probability for one in found]) / p)) <= 0.05
+    assert sum(one.lower <= p <= one.upper for one in found) >= 0.9 * SEEDS
+    # An interval that holds the truth by being wide would be no achievement.
+    assert np.median([math.log10(one.upper / one.lower) for one in found]) < 0.45
+    assert np.median([one.plain_cases / one.n_cases for one in found]) > 5.0
+
+
+def noisy(share):
+    """A plane, a share of whose variance is noise of the flight."""
+
+    def margin(u, addresses):
+        z = ndtri(np.clip(uniforms(7, "noise", addresses), 1e-16, 1.0 - 1e-16))
+        return 4.0 - math.sqrt(1.0 - share) * u[:, 0] - math.sqrt(share) * z
+
+    return margin
+
+
+@pytest.mark.parametrize(("method", "share"), [("subset", 0.5), ("cross-entropy", 0.1)])
+def test_noise_of_the_flight_belongs_to_the_probability(method, share):
+    estimate, cases = METHODS[method]
+    found = [estimate(noisy(share), 1, cases_per_level=cases, seed=seed, noise=True) for seed in range(20)]
+    p = stats.norm.sf(4.0)
+    assert abs(np.mean([math.log10(one.probability / p) for one in found])) <= 0.05
+    assert sum(one.lower <= p <= one.upper for one in found) >= 18
+
+
+def test_importance_sampling_says_that_it_cannot_lead_the_noise_of_the_flight():
+    found = cross_entropy(noisy(0.7), 1, cases_per_level=1_000, seed=1, noise=True)
+    assert any("subset simulation" in remark for remark in found.remarks) or found.probability == 0.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_weights_of_the_failed_cases_add_up_to_the_probability(method):
+    found = METHODS[method][0](plane, 2, cases_per_level=2_000, seed=3)
+    cases = found.cases
+    assert cases.weight[cases.failed].sum() == pytest.approx(found.probability, rel=1e-12)
+    np.testing.assert_array_equal(cases.margin, plane(cases.u))
+    if method == "subset":  # chains keep the distribution, so any weighted mean is that of plain cases
+        assert cases.weight.sum() == pytest.approx(1.0, rel=1e-12)
+        assert cases.weight @ (cases.margin < 1.5) == pytest.approx(stats.norm.sf(2.0), rel=0.15)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_same_seed_gives_the_same_cases(method):
+    first, again, other = (METHODS[method][0](plane, 2, cases_per_level=1_000, seed=seed) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first.cases.u, again.cases.u)
+    assert (first.probability, first.upper) == (again.probability, again.upper)
+    assert first.probability != other.probability
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_margin_that_is_not_a_number_has_failed(method):
+    def lost(u):
+        return np.where(plane(u) < 0.0, np.nan, plane(u))
+
+    found, whole = (METHODS[method][0](one, 2, cases_per_level=2_000, seed=5) for one in (lost, plane))
+    assert np.isneginf(found.cases.margin[found.cases.failed]).all()
+    assert found.lower <= 2.326e-4 <= found.upper
+    assert whole.probability > 0.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_steps_in_the_margin_are_climbed(method):
+    def stairs(u):
+        return np.ceil(4.0 * plane(u)) / 4.0
+
+    found = METHODS[method][0](stairs, 2, cases_per_level=5_000, seed=2)
+    assert found.lower <= 2.326e-4 <= found.upper
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_failures_on_the_other_side_of_a_misleading_slope_are_found_or_doubted(method):
+    """A slope that leads to the far rarer of two failures.  Breitung, Rel. Eng. & Sys. Safety 192 (2019) 106337."""
+
+    def misleading(u):
+        x, y = u[:, 0], u[:, 1]
+        return np.minimum(np.where(x > 3.5, 4.0 - x, 0.85 - 0.1 * x), np.where(y > 2.0, 0.5 - 0.1 * y, 2.3 - y))
+
+    p = stats.norm.sf(4.0)
+    for seed in range(4):
+        found = METHODS[method][0](misleading, 2, cases_per_level=5_000, seed=seed)
+        assert found.lower <= p <= found.upper or "failures that some of them did not find" in " ".join(found.remarks)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_single_input_will_do(method):
+    found = METHODS[method][0](lambda u: 4.0 - u[:, 0], 1, cases_per_level=3_000, seed=1)
+    assert found.cases.u.shape == (found.n_cases, 1)
+    assert found.lower <= stats.norm.sf(4.0) <= found.upper
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_margin_without_slope_is_counted_with_its_exact_interval(method):
+    found = METHODS[method][0](lambda u: np.ones(len(u)), 3, cases_per_level=1_000, seed=1)
+    assert (found.method, found.probability, found.lower) == ("plain", 0.0, 0.0)
+    # Clopper-Pearson, none of 1000: 1 - 0.025^(1/1000)
+    assert found.upper == pytest.approx(1.0 - 0.025**0.001, rel=1e-9)
+    assert "points towards the failures" in found.remarks[0]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_frequent_failures_are_counted(method):
+    found = METHODS[method][0](lambda u: u[:, 0], 1, cases_per_level=1_000, seed=1)
+    assert found.method == "plain"
+    assert found.lower <= 0.5 <= found.upper
+    assert found.n_cases == 1_000
+
+
+def test_what_cannot_fail_is_below_the_last_level():
+    found = subset_simulation(lambda u: 1e-3 + np.exp(-u[:, 0]), 1, cases_per_level=500, seed=1)
+    assert found.probability == found.lower == 0.0
+    assert 0.0 < found.upper < 1e-10
+    assert math.isinf(found.plain_cases)
+    assert "No case failed" in found.remarks[0]
+
+
+def test_the_interval_on_the_mean_of_log_normal_estimates_holds_it():
+    rng = np.random.default_rng(1)
+    held = 0
+    for _ in range(2_000):
+        lower, upper = interval_of_mean(np.exp(0.6 * rng.standard_normal(10)), 0.95)
+        held += lower <= math.exp(0.5 * 0.6**2) <= upper
+    assert held / 2_000 > 0.95
+
+
+def test_too_few_cases_are_refused():
+    for method, least in (("subset", "3 runs of 50"), ("cross-entropy", "500")):
+        with pytest.raises(ValueError, match=least):
+            METHODS[method][0](plane, 2, cases_per_level=100)

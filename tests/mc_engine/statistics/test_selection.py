@@ -1,0 +1,58 @@
+"""Order statistics in passes."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from mc_engine.statistics.selection import PASSES, Selection, from_sortable, sortable
+
+FINITE = st.floats(allow_nan=False, allow_infinity=False).map(lambda value: value + 0.0)
+
+
+def selected(parts, ranks):
+    """Four passes, the parts counted apart and merged backwards."""
+    passed = Selection()
+    for step in range(PASSES):
+        counts = [Selection(dict(passed.wanted), passed.digit) for _ in parts]
+        for count, part in zip(counts, parts, strict=True):
+            count.add(part)
+        for count in reversed(counts):
+            passed.merge(count)
+        passed = passed.next(ranks if step == 0 else None)
+    return passed.values
+
+
+@settings(max_examples=25, deadline=None)
+@given(arrays(np.float64, st.integers(1, 30), elements=FINITE))
+def test_every_rank_of_any_values_is_the_sorted_one(values):
+    ordered = np.sort(values)
+    assert selected([values], range(1, values.size + 1)) == {rank + 1: one for rank, one in enumerate(ordered.tolist())}
+
+
+@pytest.mark.parametrize("kind", ["normal", "tied", "constant", "wide"])
+def test_large_and_tied_columns_in_uneven_parts(kind):
+    draw = np.random.Generator(np.random.Philox(key=5))
+    values = draw.normal(1000.0, 1e-6, 20_000)
+    if kind == "tied":
+        values = np.round(draw.normal(0.0, 3.0, 20_000)) + 0.0
+    if kind == "constant":
+        values = np.full(20_000, -0.1)
+    if kind == "wide":
+        values = draw.normal(size=20_000) * 10.0 ** draw.integers(-300, 300, 20_000)
+    ranks = [1, 2, 27, 10_000, 10_001, 19_999, 20_000]
+    found = selected(np.split(values, [3, 9000, 9001]), ranks)
+    assert found == {rank: float(np.sort(values)[rank - 1]) for rank in ranks}
+
+
+@given(FINITE, FINITE)
+def test_keys_sort_as_the_values_do(a, b):
+    first, second = (int(key) for key in sortable(np.array([a, b])))
+    assert (first < second) == (a < b)
+    assert from_sortable(first) == a
+
+
+def test_values_are_told_only_after_the_last_pass():
+    with pytest.raises(ValueError, match="0 of 4 passes"):
+        _ = Selection().values

@@ -1,0 +1,51 @@
+"""Tolerance limits from order statistics."""
+
+import numpy as np
+import pytest
+
+from mc_engine.plan import smallest_interval_sample, smallest_sample
+from mc_engine.statistics.binomial import acceptance_number
+from mc_engine.statistics.tolerance import interval, lower_limit, upper_limit
+
+VALUES = np.array([3.0, 1.0, 5.0, 2.0, 4.0])
+
+
+# Wilks, two-sided: smallest n whose smallest and largest value enclose 0.95 or 0.99 with 95 %.
+@pytest.mark.parametrize(("share", "cases"), [(0.95, 93), (0.99, 473)])
+def test_smallest_and_largest_value_enclose_the_share_from_wilks_sample_size_on(share, cases):
+    assert smallest_interval_sample(share, 0.95) == cases
+    values = np.arange(float(cases))
+    assert interval(values, acceptance_number(cases, share, 0.95), 0) == (0.0, cases - 1.0)
+    assert interval(values[1:], acceptance_number(cases - 1, share, 0.95), 0) is None
+
+
+def test_a_second_value_is_left_out_at_each_end_when_there_are_enough():
+    cases = smallest_interval_sample(0.95, 0.95, 2)
+    assert cases == smallest_sample(0.95, 0.95, 3) == 153
+    assert interval(np.arange(153.0), acceptance_number(153, 0.95, 0.95), 0) == (1.0, 151.0)
+    assert interval(np.arange(152.0), acceptance_number(152, 0.95, 0.95), 0) == (0.0, 150.0)
+
+
+def test_a_rank_below_one_is_refused():
+    with pytest.raises(ValueError, match="first rank is 1"):
+        smallest_interval_sample(0.95, 0.95, 0)
+
+
+@pytest.mark.parametrize(("accepted", "limit"), [(0, 5.0), (1, 4.0), (4, 1.0), (5, None), (None, None)])
+def test_an_upper_limit_leaves_out_as_many_values_as_failures_are_allowed(accepted, limit):
+    assert upper_limit(VALUES, accepted, 0) == limit
+    assert lower_limit(-VALUES, accepted, 0) == (None if limit is None else -limit)
+
+
+def test_cases_without_a_number_are_left_out_first():
+    assert upper_limit(VALUES, 2, 1) == 4.0
+    assert lower_limit(VALUES, 2, 2) == 1.0
+    assert upper_limit(VALUES, 2, 3) is None
+    assert interval(VALUES, 3, 2) == (1.0, 5.0)
+    assert interval(VALUES, 3, 3) is None
+
+
+def test_no_value_has_no_limit():
+    none = np.array([])
+    assert upper_limit(none, 0, 0) is None
+    assert interval(none, 1, 0) is None

@@ -1,0 +1,64 @@
+"""What a campaign's requirements take."""
+
+import pytest
+from toy import load
+
+from mc_engine.campaign_plan import plan_lines
+
+RANGE = '[requirement.range]\nmetric = "range_m"\nat_least = 1.0\nshare = 0.9973\nconfidence = 0.9\n'
+FUEL = '[requirement.fuel]\nmetric = "propellant_kg"\nat_most = 1.0\nshare = 0.95\nconfidence = 0.95\n'
+SPREAD = '[dispersion.mass_kg]\ndist = "normal"\nsigma = 1.0\n'
+
+
+def plan(body, design="mc", cases=10_000, **options):
+    campaign = load(body + SPREAD, design, cases=cases if design == "mc" else None)
+    return list(plan_lines(campaign, **options))
+
+
+def numbers(lines, heading):
+    """The second word of the rows under the line that begins so, a heading between."""
+    first = next(place for place, line in enumerate(lines) if line.startswith(heading)) + 2
+    rows = [line.split() for line in lines[first:]]
+    return [row[1] for row in rows[: next((k for k, row in enumerate(rows) if not row or row[0] != str(k)), None)]]
+
+
+def test_each_requirement_has_the_smallest_samples_for_its_own_share():
+    lines = plan(RANGE + FUEL)
+    assert numbers(lines, "range:") == ["852", "1440", "1970", "2473", "2959", "3433"]
+    assert numbers(lines, "fuel:") == ["59", "93", "124", "153", "181", "208"]
+
+
+def test_all_together_take_the_most_of_each_and_the_joint_share_less():
+    lines = plan(RANGE + FUEL)
+    assert numbers(lines, "every requirement") == ["852", "1440", "1970", "2473", "2959", "3433"]
+    assert "all at once: share 0.9473 with confidence 0.9" in lines
+    assert numbers(lines, "all at once")[0] == "43"
+    assert numbers(plan(RANGE), "range:")[0] == "852"
+    assert not any(line.startswith(("every", "all at once")) for line in plan(RANGE))
+
+
+def test_requirements_that_want_the_same_stand_together():
+    lines = plan(RANGE + FUEL.replace("0.95", "0.9973").replace("confidence = 0.9973", "confidence = 0.9"))
+    assert "range, fuel: share 0.9973 with confidence 0.9" in lines
+
+
+@pytest.mark.parametrize(
+    ("cases", "words"),
+    [
+        (851, "851 in the file are too few, even if none fails: 852 are needed"),
+        (10_000, "10,000 cases allow 19 failures"),
+    ],
+)
+def test_the_files_own_number_of_cases_is_held_against_the_plan(cases, words):
+    assert any(line.strip().startswith(words) for line in plan(RANGE, cases=cases))
+
+
+def test_two_sided_limits_are_planned_where_asked():
+    assert any(line.split()[-1:] == ["1440"] and "smallest and the largest" in line
+               for line in plan(RANGE, two_sided=True))  # fmt: skip
+    assert not any("smallest and" in line for line in plan(RANGE))
+
+
+def test_a_grid_is_told_that_its_shares_are_no_probabilities():
+    lines = list(plan_lines(load("[dispersion.speed_pct]\nvalues = [-1.0, 0.0, 1.0]\n" + RANGE, "grid")))
+    assert 'shares of cases of design "grid" are no probabilities' in lines[1]

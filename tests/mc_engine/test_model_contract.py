@@ -1,0 +1,227 @@
+"""Deliberate mistakes in the smallest model: each gets one sentence with its place, none a compiler's page."""
+
+import json
+import re
+import subprocess
+import sys
+
+import pytest
+from small_run import ENVIRONMENT
+
+from mc_engine.campaign import SHIPPED, load_campaign
+from mc_engine.contract_flight import faults
+from mc_engine.errors import CampaignError
+from mc_engine.model_contract import breaches
+
+MODEL = (SHIPPED / "minimal" / "model.py").read_text()
+CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()
+ACCELERATION = "g = -MU_EARTH / (r2 * sqrt(r2))"
+
+
+def campaign_with(folder, *edits):
+    """The smallest campaign with each (text, other text) of its model exchanged."""
+    text = MODEL
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    folder.mkdir(exist_ok=True)
+    (folder / "model.py").write_text(text)
+    (folder / "campaign.toml").write_text(CAMPAIGN)
+    return load_campaign(folder)
+
+
+def line_of(folder, text):
+    return 1 + (folder / "model.py").read_text()[: (folder / "model.py").read_text().index(text)].count("\n")
+
+
+def only(sentences):
+    assert len(sentences) == 1, sentences
+    assert "\n" not in sentences[0]
+    return sentences[0]
+
+
+INTERPRETED = {
+    "wrong arity": (
+        [("def rhs(t, s, m, p, o):", "def rhs(t, s, p, o):")],
+        "@physics\ndef rhs",
+        "`rhs` takes (t, s, p, o); the engine gives it (t, s, m, p, o)",
+    ),
+    "no decorator": ([("@physics\ndef rhs", "def rhs")], "def rhs", "`rhs` is not marked; write @physics"),
+    "missing parameter": (
+        [('"altitude burn_dv magnitude_error pitch_error"', '"altitude burn_dv magnitude_error"')],
+        "    return State(r, 0.0, dv",
+        '`initial`: there is no "pitch_error" in Parameters(altitude, burn_dv, magnitude_error)',
+    ),
+    "parameter of nobody": (
+        [("magnitude_error pitch_error", "magnitude_error pitch_errors")],
+        None,
+        'kernel_parameters has the field "pitch_errors", but no parameter has this name without its unit',
+    ),
+    "missing state": (
+        [(', Field("vy_m_s", "m/s", "vy")', "")],
+        "@physics\ndef initial",
+        "`initial` gives 4 numbers, the model declares 3 in `states`; \"vy\" is too many",
+    ),
+    "order of the metrics": (
+        [("apogee_altitude apogee_time top_speed", "apogee_time apogee_altitude top_speed")],
+        "@physics\ndef evaluate",
+        "`metrics` declares them in the order",
+    ),
+    "NaN derivative": (
+        [(ACCELERATION, "g = -MU_EARTH / (r2 * sqrt(-r2))")],
+        "@physics\ndef rhs",
+        '`rhs` gives nan for the derivative of "vx" at the start of the nominal case',
+    ),
+    "if": (
+        [(ACCELERATION, f"if r2 > 1.0:\n        {ACCELERATION}\n    else:\n        g = 0.0")],
+        "    if r2 > 1.0",
+        "use where(condition, a, b)",
+    ),
+    "math": (
+        [("from collections", "import math\nfrom collections"), ("r2 * sqrt(r2))\n", "r2 * math.sqrt(r2))\n")],
+        "    g = -MU_EARTH",
+        "take it from mc_engine.lanes",
+    ),
+    "allocation": (
+        [
+            ("from mc_engine.lanes", "import numpy as np\n\nfrom mc_engine.lanes"),
+            (ACCELERATION, f"a = np.zeros(2)\n    {ACCELERATION}"),
+        ],
+        "    a = np.zeros(2)",
+        "`np.zeros` makes an array or list in every step of `rhs`",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", INTERPRETED)
+def test_a_mistake_that_shows_without_compiling_is_named_with_its_line(mistake, tmp_path):
+    edits, place, sentence = INTERPRETED[mistake]
+    found = only(breaches(campaign_with(tmp_path, *edits)))
+    assert sentence in found
+    if place is not None:
+        assert found.startswith(f"model.py, line {line_of(tmp_path, place)}: ")
+
+
+def test_an_unknown_unit_is_named_with_the_nearest(tmp_path):
+    with pytest.raises(
+        CampaignError, match=re.escape('model.py, line 63: "altitude_km" has the unit "kilometres"; did you mean "km"?')
+    ):
+        campaign_with(tmp_path, ('Field("altitude_km", "km"', 'Field("altitude_km", "kilometres"'))
+
+
+NOISE = (
+    "def prepare(inputs, settings, refusals):\n    return {**vars(inputs), 'burn_dv': BURN}\n\n\n@physics\ndef initial"
+)
+FLOWN = {
+    "metric never set": (
+        [("t, best.speed)", "t, best.speed / 0.0 * 0.0)")],
+        'the metric "top_speed_m_s" is not a number in any of the 32 cases',
+    ),
+    "dispersion that moves nothing": (
+        [("cos(p.pitch_error)", "1.0"), ("sin(p.pitch_error)", "0.0")],
+        'dispersion "pitch_error_deg" moves no metric',
+    ),
+    "event never crossing": (
+        [("Events(s.x * s.vx + s.y * s.vy)", "Events(1e12 + s.x * s.vx + s.y * s.vy)")],
+        'no stopping event crosses zero before the time limit, of "apogee"',
+    ),
+    "non-deterministic": (
+        [
+            ("from mc_engine.lanes", "import numpy as np\n\nfrom mc_engine.lanes"),
+            ("@physics\ndef initial", NOISE.replace("BURN", "inputs.burn_dv + np.random.rand(inputs.burn_dv.size)")),
+            ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+        ],
+        "when the same cases fly a second time; a case must depend on its inputs and case_id alone",
+    ),
+    "depends on the company": (
+        [
+            ("@physics\ndef initial", NOISE.replace("BURN", "inputs.burn_dv - inputs.magnitude_error.mean()")),
+            ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+        ],
+        "when it flies among other cases",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", FLOWN)
+def test_a_mistake_that_shows_in_flight_is_one_sentence(mistake, tmp_path):
+    edits, sentence = FLOWN[mistake]
+    campaign = campaign_with(tmp_path, *edits)
+    assert breaches(campaign) == []
+    assert sentence in only(faults(campaign))
+
+
+def test_a_switching_event_that_never_fires_is_missed_unless_it_is_declared_rare(tmp_path):
+    edits = [
+        ('"apogee")', '"apogee moon")'),
+        ("    return Events(s.x * s.vx + s.y * s.vy)", "    return Events(s.x * s.vx + s.y * s.vy, s.x - 3.8e8)"),
+        ("    initial=initial", "    switch=switch,\n    initial=initial"),
+        (
+            "@physics\ndef observe",
+            "@physics\ndef switch(t, s, m, p, o, hit):\n    return s, m\n\n\n@physics\ndef observe",
+        ),
+    ]
+    stop = 'Event("apogee", "falling", "stop")'
+    rare = [*edits, (stop, f'{stop}, Event("moon", "rising", "switch", rare=True)')]
+    assert faults(campaign_with(tmp_path / "rare", *rare)) == []
+    missed = only(
+        faults(campaign_with(tmp_path / "missed", *edits, (stop, f'{stop}, Event("moon", "rising", "switch")')))
+    )
+    assert 'the event "moon" crosses zero in none of 32 cases, its function stays below it' in missed
+
+
+PREPARE = "def prepare(inputs, settings, refusals):\n    {}\n    return vars(inputs)\n\n\n@physics\ndef initial"
+
+
+def with_prepare(body):
+    return ("@physics\ndef initial", PREPARE.format(body)), (
+        "    initial=initial",
+        "    prepare=prepare,\n    initial=initial",
+    )
+
+
+def test_a_design_that_breaks_is_a_problem_of_the_campaign_with_its_line(tmp_path):
+    with pytest.raises(
+        CampaignError, match=r"campaign\.model: .* model\.py, line 30: ZeroDivisionError: division by zero"
+    ):
+        campaign_with(tmp_path, *with_prepare("1 / 0"))
+
+
+def check(folder, *options, **environment):
+    return subprocess.run(
+        [sys.executable, "-m", "mc_engine", "check", str(folder), *options],
+        capture_output=True, text=True, env={**ENVIRONMENT, **environment}, check=False,
+    )  # fmt: skip
+
+
+def test_check_leaves_with_two_and_the_sentence(tmp_path):
+    edits, _, sentence = INTERPRETED["if"]
+    campaign_with(tmp_path, *edits)
+    done = check(tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.splitlines()[0] == "model.py: 1 problem"
+    assert sentence in done.stderr
+
+
+def test_a_model_that_kills_its_process_is_a_sentence_unless_only_the_file_is_read(tmp_path):
+    kill = "import os\n    if os.environ.get('KILL') and inputs.burn_dv.size > 3:\n        os._exit(9)"
+    campaign_with(tmp_path, *with_prepare(kill))
+    done = check(tmp_path, KILL="1")
+    assert done.returncode == 2
+    assert "killed its process: exit status 9" in done.stderr
+    assert check(tmp_path, "--no-model", KILL="1").returncode == 0
+
+
+@pytest.mark.parametrize("name", ["minimal", "deorbit"])
+def test_shipped_models_keep_the_contract(name):
+    campaign = load_campaign(name)
+    assert breaches(campaign) == []
+    assert faults(campaign) == []
+
+
+def test_the_process_of_its_own_prints_the_sentences_last():
+    done = subprocess.run(
+        [sys.executable, "-m", "mc_engine.contract_flight", "minimal"],
+        capture_output=True, text=True, env=ENVIRONMENT, check=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout.splitlines()[-1]) == []

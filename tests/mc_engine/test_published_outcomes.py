@@ -1,0 +1,155 @@
+"""What became of a published value: the rule, number by number, and the verb that shows it."""
+
+import pytest
+from typer.testing import CliRunner
+
+from mc_engine.cli import app
+from mc_engine.errors import EngineError, ModelError
+from mc_engine.published import NOT_REACHED, REACHED, UNKNOWN, half_a_unit, outcome, read_published, read_source
+from mc_engine.published_table import campaign_table, headline_table, written_into
+
+RECORD = {"quantity": "fuel", "published": 3.8, "unit": "kg", "ours": 3.84, "status": "legible"}
+TEXT = """
+[source]
+campaign = "small"
+work = "Somebody 2001"
+
+[[published]]
+quantity = "|dv|"
+published = 1.5e-7
+unit = "m/s"
+ours = -2.5e-7
+status = "restored"
+note = "half of it | is ours"
+headline = true
+
+[[published]]
+quantity = "time"
+published = "below 80"
+unit = "s"
+source = "Table 2"
+ours = 79.5
+at_most = 80.0
+status = "legible"
+
+[[published]]
+quantity = "gain"
+published = "lost"
+status = "lost"
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "small" / "published.toml"
+    path.parent.mkdir()
+    path.write_text(TEXT)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("number", "half"), [(6431.5, 0.05), (706.0, 0.5), (5, 0.5), (2.5e-6, 0.5e-7), (0.0361, 5e-5), (1e22, 0.5)]
+)
+def test_half_a_unit_is_of_the_last_digit_that_is_written(number, half):
+    assert half_a_unit(number) == pytest.approx(half, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "expected"),
+    [
+        ({}, REACHED),
+        ({"ours": 3.86}, NOT_REACHED),
+        ({"ours": 3.86, "tolerance": 0.1}, REACHED),
+        ({"ours": 3.84, "tolerance": 0.01}, NOT_REACHED),
+        ({"published": "zero", "ours": "zero"}, REACHED),
+        ({"published": "zero", "ours": 1e-3}, NOT_REACHED),
+        ({"published": "below 4", "at_most": 4.0}, REACHED),
+        ({"published": "below 3", "at_most": 3.0}, NOT_REACHED),
+        ({"published": "2 to 3.8", "at_least": 2.0, "at_most": 3.8}, NOT_REACHED),
+        ({"published": "at least 4", "at_least": 4.0}, NOT_REACHED),
+        ({"published": "lost", "status": "lost"}, UNKNOWN),
+        ({"published": "curve lost", "status": "curve lost"}, UNKNOWN),
+        ({"status": "not printed"}, UNKNOWN),
+    ],
+)
+def test_the_outcome_follows_from_both_numbers_and_the_print(changes, expected):
+    assert outcome(RECORD | changes) == expected
+
+
+def test_a_record_that_can_be_compared_needs_a_number_of_ours():
+    with pytest.raises(ModelError, match="'fuel' has no `ours`"):
+        outcome({name: value for name, value in RECORD.items() if name != "ours"})
+
+
+@pytest.mark.parametrize(
+    ("ours", "expected"), [(-2.0, REACHED), (2.0, REACHED), (4.8, NOT_REACHED), (0.1, NOT_REACHED)]
+)
+def test_the_farthest_of_many_cases_is_compared_by_its_distance_from_the_mean(ours, expected):
+    """Printed 2 from the mean of 0, deviation 1: ours may lie 0.3 to 3.7 from our mean, on either side."""
+    of = {"of": "x", "over": ["a"], "unit": "", "quantity": "x"}
+    mean = of | {"statistic": "mean", "published": 0.0, "ours": 0.0}
+    deviation = of | {"statistic": "standard deviation", "published": 1.0, "ours": 9.0}
+    other = deviation | {"over": ["b"], "published": 100.0}
+    farthest = of | {"statistic": "farthest", "published": 2.0, "ours": ours}
+    assert outcome(farthest, [mean, deviation, other, farthest]) == expected
+
+
+def test_the_source_is_that_of_the_file_or_the_name_of_its_folder(file):
+    assert (read_source(file).campaign, read_source(file).work) == ("small", "Somebody 2001")
+    file.write_text(TEXT.replace("[source]", "[other]"))
+    assert (read_source(file).campaign, read_source(file).work) == ("small", "")
+
+
+def test_the_table_of_a_campaign_has_every_record_with_its_outcome(file):
+    table = campaign_table(file).splitlines()
+    assert table[0] == "small: Somebody 2001. 3 values: 1 reached, 1 not reached, 1 unknown."
+    assert table[4:] == [
+        "| \\|dv\\| |  | 1.5e-7 m/s | −2.5e-7 m/s | **not reached**: half of it \\| is ours |",
+        "| time | Table 2 | below 80 s | 79.5 s | reached |",
+        "| gain |  | lost | – | unknown: lost |",
+    ]
+
+
+def test_the_short_table_counts_outcomes_and_shows_headlines(file):
+    table = headline_table([file]).splitlines()
+    assert table[2] == "| [small](campaigns/small/README.md) | Somebody 2001 | 3 | 1 | 1 | 1 |"
+    assert [line for line in table[4:] if "small" in line] == [
+        "| small | \\|dv\\| | 1.5e-7 m/s | −2.5e-7 m/s | **not reached**: half of it \\| is ours |"
+    ]
+    assert "gain" not in "\n".join(table)
+
+
+def test_the_table_goes_between_its_marks_and_nowhere_else(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text("a\n<!-- published -->\nold\n<!-- end -->\nb\n<!-- end -->\n")
+    assert written_into(page, "new \\1") == "a\n<!-- published -->\nnew \\1\n<!-- end -->\nb\n<!-- end -->\n"
+    page.write_text("no marks\n")
+    with pytest.raises(EngineError, match=r"page\.md: the table goes between a line <!-- published -->"):
+        written_into(page, "new")
+
+
+def test_an_unknown_key_is_named_with_its_record(file):
+    file.write_text(TEXT.replace("at_most", "atmost"))
+    with pytest.raises(ModelError, match="record 2: atmost"):
+        read_published(file)
+
+
+def test_the_verb_shows_a_campaign_of_ones_own_and_writes_it_into_a_page(file, tmp_path):
+    runner, page = CliRunner(), tmp_path / "page.md"
+    assert "| gain |" in runner.invoke(app, ["published", str(file.parent)]).output
+    page.write_text("<!-- published -->\n<!-- end -->\n")
+    assert runner.invoke(app, ["published", str(file.parent), "--write", str(page)]).exit_code == 0
+    assert page.read_text() == f"<!-- published -->\n{campaign_table(file)}\n<!-- end -->\n"
+
+
+def test_a_name_without_published_values_is_answered_with_those_that_have_some():
+    done = CliRunner().invoke(app, ["published", "deorbitt"])
+    assert done.exit_code == 2
+    assert "deorbitt: no published.toml there; campaigns that have one: deorbit, flexible_satellite" in done.output
+
+
+def test_a_page_that_is_not_there_is_one_sentence(tmp_path):
+    done = CliRunner().invoke(app, ["published", "--write", str(tmp_path / "none.md")])
+    assert done.exit_code == 2
+    assert done.output.count("\n") == 1
+    assert "none.md" in done.output

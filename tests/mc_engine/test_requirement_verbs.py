@@ -1,0 +1,43 @@
+"""The verbs that plan for requirements, and fly until they are decided."""
+
+import pytest
+from cart import CAMPAIGN, MODEL, call, fails_with
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A working folder with a campaign of a cart in `cart/`."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cart").mkdir()
+    (tmp_path / "cart" / "model.py").write_text(MODEL)
+    (tmp_path / "cart" / "campaign.toml").write_text(CAMPAIGN)
+    return tmp_path
+
+
+def test_plan_reads_the_requirements_of_a_campaign(here):
+    result = call("plan", "cart", "--failures", "1")
+    assert result.exit_code == 0
+    lines = result.stdout.splitlines()
+    assert lines[0] == "cart: 20 cases, design mc"
+    assert lines[2] == "reach: share 0.9973 with confidence 0.9"
+    assert lines[4].split()[:2] == ["1", "1440"]
+    assert "20 in the file are too few, even if none fails: 852 are needed" in result.stdout
+
+
+def test_plan_gives_two_sided_limits(here):
+    lines = call("plan", "--share", "0.95", "--confidence", "0.95", "--two-sided").stdout.splitlines()
+    assert ["smallest", "and", "the", "largest", "93"] in [line.split() for line in lines]
+
+
+def test_plan_refuses_what_it_cannot_answer(here):
+    fails_with(2, call("plan", "--share", "0.9"), "--confidence is missing")
+    fails_with(2, call("plan", "cart", "--share", "0.9"), "says share and confidence itself")
+    (here / "cart" / "campaign.toml").write_text(CAMPAIGN.split("[requirement")[0])
+    fails_with(2, call("plan", "cart"), "sets no requirement")
+
+
+def test_until_takes_one_word_and_a_campaign_that_can_be_judged_on_the_way(here):
+    fails_with(2, call("run", "cart", "--until", "tomorrow"), '"tomorrow" is not known')
+    (here / "cart" / "campaign.toml").write_text(CAMPAIGN.replace('"mc"', '"lhs"'))
+    fails_with(2, call("run", "cart", "--until", "verdict", "--out", "a"), 'cases of "lhs" are not independent')
+    assert not (here / "a").exists()

@@ -1,0 +1,161 @@
+"""The page in a real browser: all drawn, cases chosen and looked up, nothing logged, nothing asked of a network."""
+
+import pytest
+from browser import INSTALLED, chromium
+from payloads import PAYLOADS, hostile
+from synthetic_run import synthetic_run
+
+from reports import build, render_html
+
+pytestmark = pytest.mark.skipif(not INSTALLED, reason="needs the Debian package chromium")
+COUNT = "document.getElementById('selection-count').textContent"
+ROWS = (
+    "[...document.querySelectorAll('#selection-table tbody tr')].map((row) => [...row.cells].map((c) => c.textContent))"
+)
+PLACE = """(() => {
+  const panel = document.querySelector(`#${document.getElementById('explorer').dataset.figure} .nsewdrag`);
+  panel.scrollIntoView({block: 'start', behavior: 'instant'});
+  const box = panel.getBoundingClientRect();
+  return [box.x, box.y, box.width, box.height];
+})()"""
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    with chromium(tmp_path_factory.mktemp("profile")) as page:
+        yield page
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    path.write_bytes(render_html(build(synthetic_run(600), "run")))
+    return path
+
+
+@pytest.fixture(scope="module")
+def opened(browser, file):
+    browser.open(file)
+    return browser
+
+
+@pytest.fixture
+def page(opened):
+    """The page with nothing chosen and nothing open."""
+    opened.run("document.getElementById('selection-close').click(); document.getElementById('history').close()")
+    yield opened
+    assert opened.logged == []
+    assert opened.requests == []
+
+
+def test_every_panel_of_every_figure_is_drawn(page):
+    drawn = page.run(
+        "[...document.querySelectorAll('.panels > .panel')].map((p) => p.querySelectorAll('.main-svg').length)"
+    )
+    assert len(drawn) == page.run("JSON.parse(document.getElementById('figures').textContent).length")
+    assert len(drawn) > 10
+    assert all(drawn)
+
+
+def test_nothing_can_be_sent_from_a_figure(page):
+    offered = page.run("[...document.querySelectorAll('.modebar-btn')].map((button) => button.dataset.title)")
+    assert "Download plot" in offered
+    assert not [title for title in offered if "hare" in title or "loud" in title]
+
+
+def test_failed_cases_are_chosen_without_a_mouse_and_listed_with_their_inputs(page):
+    page.run("document.querySelector('[data-outcome=\"2\"]').focus()")
+    page.key("Enter", "\r")
+    assert page.run(COUNT).startswith("12 cases chosen, of 600 in this page")
+    table = synthetic_run(600).table
+    rows = page.run(ROWS)
+    assert [int(row[0]) for row in rows] == list(range(588, 600))
+    assert {row[1] for row in rows} == {"failed"}
+    for row, ve in zip(rows, table["ve_pct"][588:], strict=True):
+        assert float(row[2].replace("−", "-")) == pytest.approx(ve, rel=1e-4)
+
+
+def test_a_box_drawn_over_a_cloud_lists_its_cases_and_lifts_them_out_in_every_figure(page):
+    x, y, width, height = page.settled(PLACE)
+    page.drag([(x + 3, y + 3), (x + width / 3, y + height / 4), (x + width - 3, y + height / 3)])
+    page.until("!document.getElementById('selection').hidden")
+    chosen = {int(row[0]) for row in page.run(ROWS)}
+    assert 5 < len(chosen) < 590
+    lifted = page.run(
+        "[...document.querySelectorAll('.panel')].flatMap((p) => (p.data || []).filter((t) => t.meta === 'cases').map("
+        "(t) => t.selectedpoints.map((k) => t.customdata[k]).map((c) => Array.isArray(c) ? c[0] : c)))"
+    )
+    assert len(lifted) >= 4
+    assert set().union(*lifted) <= chosen
+    assert chosen == set().union(*lifted)
+    page.click("#selection-close")
+    assert page.run("document.getElementById('selection').hidden")
+
+
+def test_the_figure_of_cases_takes_other_axes_and_a_range_of_any_column(page):
+    page.run(
+        "(() => { const s = document.getElementById('explorer-x');"
+        " s.value = 3; s.dispatchEvent(new Event('change')); })()"
+    )
+    axis = "document.getElementById(document.getElementById('explorer').dataset.figure).layout.xaxis.title.text"
+    assert page.run(axis) == "peak_force_n [N]"
+    page.run(
+        "document.getElementById('explorer-column').value = 3; document.getElementById('explorer-low').value = '100'"
+    )
+    page.click("#explorer [type=submit]")
+    lost = synthetic_run(600).table["peak_force_n"] >= 100.0
+    assert page.run(COUNT).startswith(f"{int(lost.sum())} cases chosen")
+
+
+def test_tables_sort_by_a_click_and_by_the_keyboard(page):
+    table = "#worst table"
+    cells = f"[...document.querySelector('{table}').tBodies[0].rows].map((row) => Number(row.cells[2].dataset.value))"
+    page.click(f"{table} th:nth-child(3) button")
+    rising = page.run(cells)
+    assert rising == sorted(rising)
+    page.run(f"document.querySelector('{table} th:nth-child(3) button').focus()")
+    page.key("Enter", "\r")
+    assert page.run(cells) == rising[::-1]
+    assert page.run(f"document.querySelector('{table} th:nth-child(3)').getAttribute('aria-sort')") == "descending"
+
+
+def test_the_history_of_a_worst_case_opens_over_the_nominal_one_and_closes_with_a_key(page):
+    page.click("#worst table tbody a[href^='#case-']")
+    page.until("document.getElementById('history').open")
+    case = page.run("document.querySelector('#worst table tbody a').textContent")
+    assert page.run("document.getElementById('history-title').textContent") == f"Case {case}"
+    names = page.run("[...document.querySelectorAll('#history .panel')].map((p) => p.data.map((t) => t.name))")
+    assert names == [["nominal", f"case {case}"]] * 4
+    page.click("#history-after")
+    page.until(f"document.getElementById('history-title').textContent !== 'Case {case}'")
+    page.key("Escape")
+    page.until("!document.getElementById('history').open")
+
+
+def test_figures_follow_the_dark_mode(page):
+    ink = "document.querySelector('.panel').layout.font.color"
+    light = page.run(ink)
+    page.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
+    page.until(f"{ink} !== '{light}'")
+    assert page.run(ink) == "#e8eaec"
+    page.ask("Emulation.setEmulatedMedia", features=[])
+
+
+def test_what_users_write_stays_text_in_the_browser(browser, tmp_path):
+    file = tmp_path / "report.html"
+    text = " ".join(PAYLOADS)
+    file.write_bytes(render_html(build(hostile(text, PAYLOADS), "run")))
+    browser.logged.clear()
+    browser.open(file)
+    assert browser.run("document.querySelector('h1').textContent") == text
+    assert (
+        browser.run(
+            "document.querySelectorAll('main img, main iframe, main object, main a[href^=\"javascript\"]').length"
+        )
+        == 0
+    )
+    browser.run("document.querySelector('[data-outcome=\"2\"]').click(); location.hash = '#case-0'")
+    browser.until("document.getElementById('history').open")
+    assert browser.run("window.struck === undefined")
+    assert browser.logged == []
+    assert browser.requests == []

@@ -1,0 +1,90 @@
+"""The comparison of two runs as a page and as a PDF."""
+
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from synthetic_run import synthetic_run
+
+from mc_engine.comparison import compare_runs
+from mc_engine.errors import StoreError
+from reports.compare import build_comparison, write_comparison
+from reports.document import FigureBlock, Table, blocks_of
+from reports.figures.changes import ratio_ticks
+from reports.html import render_html
+
+INJECTION = "<script>alert(1)</script>"
+
+
+def compared(shift=0.0, seed=1, n=400, failed=3, text="", names=("before", "after")):
+    runs = []
+    for own, moved, words in ((1, 0.0, "[campaign]"), (seed, shift, text or "[campaign]")):
+        made = synthetic_run(n, failed=min(failed, n), seed=own)
+        made.table["peak_force_n"] += moved
+        runs.append(SimpleNamespace(manifest=made.manifest, campaign_text=words, cases=made.cases))
+    return compare_runs(*runs, names)
+
+
+def tables(document):
+    return {table.caption: table for table in blocks_of(document, Table)}
+
+
+def test_the_headline_says_what_changed_and_the_table_by_how_much():
+    found = compared(shift=8.0, seed=2)
+    document = build_comparison(found)
+    assert document.subtitle.startswith("Something changed from run A to run B")
+    assert [(card.label, card.tone) for card in document.verdicts][:2] == [("Shift", "bad"), ("Spread", "good")]
+    (row,) = [row for row in tables(document)["Metrics of both runs"].rows if row[0].text.startswith("peak force")]
+    assert row[4].tone == "bad"
+    change = next(one for one in found.metrics if one.metric == "peak_force_n")
+    assert row[3].value == pytest.approx(change.shift.value / change.deviation[0])
+    (figure,) = blocks_of(document, FigureBlock)
+    assert "peak force" in figure.drawing.alternative
+
+
+def test_the_same_run_twice_has_no_figure_and_says_so():
+    document = build_comparison(compared())
+    assert document.subtitle.startswith("No significant change")
+    assert not list(blocks_of(document, FigureBlock))
+    page = render_html(document).decode()
+    assert "The same in both runs: correction_impulse_m_s" in page
+    assert "Code: the same in both runs." in page
+
+
+@pytest.mark.parametrize(("n", "failed"), [(0, 0), (1, 0), (2, 0), (40, 40)])
+def test_few_cases_and_failed_ones_make_a_page_without_a_warning(n, failed, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = compared(shift=1.0, seed=2, n=n, failed=failed)
+        write_comparison(found, tmp_path / "compare.html")
+        write_comparison(found, tmp_path / "compare.pdf")
+    assert (tmp_path / "compare.html").stat().st_size > 10_000
+
+
+def test_names_and_campaign_lines_stay_text():
+    page = render_html(build_comparison(compared(text=INJECTION, names=(INJECTION, "b")))).decode()
+    assert INJECTION not in page
+    assert page.count("&lt;script&gt;alert(1)&lt;/script&gt;") >= 2
+
+
+def test_page_and_pdf_are_the_same_bytes_twice(tmp_path):
+    found = compared(shift=8.0, seed=2)
+    for name in ("compare.html", "compare.pdf"):
+        first = write_comparison(found, tmp_path / name).read_bytes()
+        assert write_comparison(found, tmp_path / name).read_bytes() == first
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["compare.html", "compare.pdf"]
+
+
+def test_a_folder_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(StoreError, match="No such file"):
+        write_comparison(compared(), tmp_path / "none" / "compare.html")
+
+
+@pytest.mark.parametrize("span", [(0.97, 1.02), (0.8, 1.1), (0.5, 3.0), (0.1, 8.0), (1e-4, 1e3)])
+def test_the_ticks_of_a_ratio_lie_inside_and_hold_one(span):
+    ticks = ratio_ticks(span)
+    assert 1.0 in ticks
+    assert 2 <= len(ticks) <= 9
+    assert np.all(np.diff(ticks) > 0.0)
+    assert span[0] <= ticks[0] <= ticks[-1] <= span[1]

@@ -1,0 +1,45 @@
+"""Runs with next to nothing in them: each format says so, in words, and warns of nothing else (warnings are errors)."""
+
+import numpy as np
+import pytest
+from synthetic_run import synthetic_run
+
+from reports import build, render_html, render_pdf
+from reports.markdown import figure_files, render_markdown
+from reports.pictures import Pictures
+
+
+def constant(run):
+    for name in run.table.columns[3:]:
+        run.table[name] = 1.5
+    return run
+
+
+def without_numbers(run):
+    run.table["propellant_kg"] = np.nan
+    return run
+
+
+SMALL = {
+    "no case": (synthetic_run(0, failed=0), "No case was flown."),
+    "one case": (synthetic_run(1, failed=0), "too few cases"),
+    "two cases": (synthetic_run(2, failed=0), "too few cases"),
+    "one failed case": (synthetic_run(1, failed=1), "All 1 cases failed"),
+    "all failed": (synthetic_run(30, failed=30), "All 30 cases failed: no metric has a number."),
+    "constant": (constant(synthetic_run(30, failed=0)), "the same in all cases"),
+    "a metric without numbers": (without_numbers(synthetic_run(30, failed=0)), "no case has a number: propellant_kg."),
+}
+
+
+@pytest.mark.parametrize("case", SMALL)
+def test_the_report_says_so_in_every_format(case):
+    run, said = SMALL[case]
+    document = build(run, "run")
+    pictures = Pictures()
+    page = render_html(document).decode()
+    text = render_markdown(document).decode()
+    assert said in page
+    assert said in text
+    assert "nan" not in text.split()
+    assert render_pdf(document, pictures).startswith(b"%PDF")
+    assert len(list(figure_files(document, pictures))) == page.count('<figure class="drawing"')

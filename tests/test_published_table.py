@@ -1,0 +1,60 @@
+"""Every published value of the shipped campaigns has an outcome, and README shows them as they stand."""
+
+from pathlib import Path
+
+import pytest
+
+from mc_engine.published import NOT_REACHED, OUTCOMES, REACHED, UNKNOWN, outcome, read_published, read_source
+from mc_engine.published_table import headline_table, published_files, written_into
+
+README = Path(__file__).resolve().parents[1] / "README.md"
+FILES = {path.parent.name: path for path in published_files()}
+TABLES = {name: read_published(path) for name, path in FILES.items()}
+RECORDS = [(name, one) for name, records in TABLES.items() for one in records]
+IDS = [f"{name}: {one['quantity']}" for name, one in RECORDS]
+# the tables, figures, equations and works with results; all other tables of the sources are inputs
+PLACES = {
+    "deorbit": ["Table 2", "Table 3", "eq. 18", "eq. 23", "Fig. 7", "Fig. 8", "Fig. 9", "Fig. 10", "abstract"],
+    "flexible_satellite": [
+        "Table 4", "Table 5", "Table 8", "Table 9", "Table 12", "worst of 100", "eq. 19", "conclusions",
+    ],
+    "geo_injection": [f"Table {k}" for k in range(1, 9)],
+    "geo_servicing": ["section 3.3", "section 9.1", "section 9.2", "section 9.3"],
+    "reentry": [
+        "case 1", "case 4", "case 6", "TR R-11", "Rep. 1381", "Rep. 1382", "2008-1198", "Standard Atmosphere", "Ogata",
+        "eqs 7 to 13", "eqs 14 to 16", "eqs 17, 18", "chapter 2", "chapter 3",
+    ],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "place"), [(name, place) for name, places in PLACES.items() for place in places])
+def test_every_table_and_figure_with_results_is_there(name, place):
+    assert any(place in one["source"] for one in TABLES[name])
+
+
+def test_the_five_systems_have_published_values():
+    assert set(FILES) == set(PLACES)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_source_is_named_and_has_headlines_that_are_told_apart(name):
+    records = TABLES[name]
+    assert read_source(FILES[name]).work
+    assert 4 <= sum(one.get("headline", False) for one in records) <= 12
+    assert len({one["quantity"] for one in records}) == len(records)
+
+
+@pytest.mark.parametrize(("name", "record"), RECORDS, ids=IDS)
+def test_every_record_has_an_outcome_and_says_why_where_it_is_not_reached(name, record):
+    found = outcome(record, TABLES[name])
+    assert found in OUTCOMES
+    assert found != NOT_REACHED or record["note"]
+    # what a status says of our number and what the numbers say is the same
+    assert record["status"] not in {"not reproduced", "near"} or found == NOT_REACHED
+    assert (found == UNKNOWN) == (record["status"] in {"lost", "curve lost", "not printed"})
+    assert found != REACHED or "ours" in record
+
+
+def test_readme_is_in_step_with_the_command():
+    table = headline_table(published_files())
+    assert README.read_text(encoding="utf-8") == written_into(README, table), "mc-engine published --write README.md"
