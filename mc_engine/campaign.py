@@ -303,7 +303,8 @@ def _dispersions(
     for name, section in sections.dispersions.items():
         spot = found.under("dispersion", name)
         if name not in nominal:
-            spot.add("", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}")
+            near = "" if found.full else hint(name, inputs_of(model))
+            spot.add("", f"is not a parameter of {model.name}{near}")
         elif design is not None:  # without a design it is unknown which keys make sense
             built.append(build_dispersion(name, section, model.input(name), nominal[name], design, directory, spot))
     return tuple(built)

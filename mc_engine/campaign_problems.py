@@ -31,7 +31,7 @@ from mc_engine.campaign_file import (
     Value,
 )
 from mc_engine.distributions import Scalar
-from mc_engine.errors import CampaignError, Problem
+from mc_engine.errors import MOST_SHOWN, CampaignError, Problem
 from mc_engine.suggestions import hint, listed, nearest
 
 _VALUE: TypeAdapter[Scalar] = TypeAdapter(Value)
@@ -72,6 +72,11 @@ class Findings:
         """The same list, one or more steps further in."""
         readable = [name if name.isprintable() else json.dumps(name) for name in names]
         return Findings(".".join(part for part in (self.place, *readable) if part), self.problems)
+
+    @property
+    def full(self) -> bool:
+        """So much is wrong that no further sentence is shown; it need not say what was meant."""
+        return len(self.problems) >= MOST_SHOWN
 
     def add(self, key: str, message: str) -> None:
         """Note a problem with `key` of the place we are at; the place itself where `key` is empty."""
@@ -146,8 +151,11 @@ def read(section: type[_AnySection], raw: Any, found: Findings) -> _AnySection |
     try:
         return section.model_validate(raw)
     except ValidationError as error:
-        for details in error.errors(include_url=False):
+        mistakes = error.errors(include_url=False)
+        for details in mistakes[:MOST_SHOWN]:
             found.add(_place(raw, details["loc"]), _sentence(section, details))
+        # nobody is shown the rest: it is only counted
+        found.problems.extend(Problem(found.place, details["msg"]) for details in mistakes[MOST_SHOWN:])
         return None
 
 

@@ -91,17 +91,7 @@ class FootprintDrawing(Drawing):
         }
         data: list[dict[str, Any]] = [cloud]
         for curve, colour, dash in self.styled:
-            line = view.turned(joined(curve.outlines))
-            trace = {
-                "type": "scatter",
-                "mode": "lines",
-                "x": screen.rounded(line[:, 0]),
-                "y": screen.rounded(line[:, 1]),
-                "line": {"color": colour, "dash": dash, "width": 1.8},
-                "text": screen.plain(curve.text),
-                "hovertemplate": "%{text}<extra></extra>",
-            }
-            data.append(trace)
+            data.append(screen.outline(view.turned(joined(curve.outlines)), colour, dash, curve.text))
         if self.aim:
             x, y = view.turned(np.array([self.aim[1]]))[0].tolist()
             data.append(screen.ring((x, y), INK, self.aim[0]))

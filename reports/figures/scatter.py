@@ -86,17 +86,7 @@ class ScatterDrawing(Drawing):
     def interactive(self) -> list[dict[str, Any]]:
         data = [self._screen_cloud(k) for k, (_, cases) in enumerate(self.outcomes) if cases]
         for region, colour, dash in self.styled:
-            line = joined(region.outlines)
-            trace = {
-                "type": "scatter",
-                "mode": "lines",
-                "x": screen.rounded(line[:, 0]),
-                "y": screen.rounded(line[:, 1]),
-                "line": {"color": colour, "dash": dash, "width": 1.8},
-                "text": screen.plain(region.text),
-                "hovertemplate": "%{text}<extra></extra>",
-            }
-            data.append(trace)
+            data.append(screen.outline(joined(region.outlines), colour, dash, region.text))
         if self.nominal:
             nominal = {
                 "type": "scatter",

@@ -54,6 +54,19 @@ def axis(title: str, **more: Any) -> dict[str, Any]:
     }
 
 
+def outline(line: np.ndarray, colour: str, dash: str, text: str) -> dict[str, Any]:
+    """The edge of a region, float64[n, 2] with NaN between its pieces; `text` shows under the pointer."""
+    return {
+        "type": "scatter",
+        "mode": "lines",
+        "x": rounded(line[:, 0]),
+        "y": rounded(line[:, 1]),
+        "line": {"color": colour, "dash": dash, "width": 1.8},
+        "text": plain(text),
+        "hovertemplate": "%{text}<extra></extra>",
+    }
+
+
 def ring(place: tuple[float, float], colour: str, words: str) -> dict[str, Any]:
     """A ring about one place that leaves what lies under it to be seen."""
     return {
