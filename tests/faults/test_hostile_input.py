@@ -1,6 +1,7 @@
 """Names, numbers and sizes that no honest campaign has, and cells that a spreadsheet would run."""
 
 import ast
+import gc
 import re
 import subprocess
 import sys
@@ -26,10 +27,13 @@ SENTENCE_S = 1.0
 def refused(text, directory=None):
     """The sentences about a campaign text, which must come within a second of processor time."""
     load_campaign("deorbit")  # the model is imported once, and not on the clock
-    begin = time.process_time()
+    gc.freeze()  # what other tests have left in this process is not searched for waste on the clock
+    begin = time.thread_time()
     with pytest.raises(CampaignError) as caught:
         load_campaign("x.toml", text=text, directory=directory)
-    assert time.process_time() - begin < SENTENCE_S
+    taken = time.thread_time() - begin
+    gc.unfreeze()
+    assert taken < SENTENCE_S
     assert len(str(caught.value)) < 300_000
     assert all(letter.isprintable() or letter == "\n" for letter in str(caught.value))
     return str(caught.value)
