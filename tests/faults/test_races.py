@@ -12,6 +12,7 @@ from stones import assert_as_unbroken, results, stones
 from mc_engine import open_store, runner
 
 CASES, CHUNK = 400, 40
+LONG = 4000  # cases: no racer is done before the other has begun
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the racers are forked, which Windows cannot")
 
@@ -111,7 +112,7 @@ def test_a_hundred_races_corrupt_nothing(tmp_path, record_property):
 
 
 def test_two_that_resume_one_run_do_not_both_write(tmp_path):
-    campaign = stones(tmp_path / "campaign", CASES)
+    campaign = stones(tmp_path / "campaign", LONG)
     whole = runner.run(campaign, tmp_path / "whole", workers=2, chunk=CHUNK)
     expected, races = results(whole.path), Races(tmp_path / "campaign")
     try:
@@ -120,8 +121,7 @@ def test_two_that_resume_one_run_do_not_both_write(tmp_path):
         outcomes = races("resume", whole.path, [0.0, 0.0])
     finally:
         races.close()
-    # one may be done before the other looks, which then finds nothing to do
-    assert all("is writing here" in said for said, _ in outcomes if said), outcomes
-    assert min(len(said) for said, _ in outcomes) == 0, outcomes
+    refused = [said for said, _ in outcomes if said]
+    assert len(refused) == 1, outcomes
+    assert "is writing here" in refused[0]
     assert_as_unbroken(whole.path, expected)
-    assert len(open_store(whole.path).notes("finished")) <= 3  # the first run's, and one of each that resumed
