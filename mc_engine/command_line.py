@@ -56,6 +56,10 @@ CaseSeconds = Annotated[
     float | None, typer.Option(min=0.1, help="With loky or dask: give a case up that takes longer.")
 ]
 Memory = Annotated[int | None, typer.Option(min=512, metavar="MIB", help="With loky or dask: memory of a worker.")]
+Publish = Annotated[
+    str | None,
+    typer.Option(metavar="URL", help="Keep a copy, such as s3://bucket/prefix, up to date while the run flies."),
+]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the reports out.")]
 
 

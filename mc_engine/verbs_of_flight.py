@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -18,6 +19,7 @@ from mc_engine.command_line import (
     CaseSeconds,
     Memory,
     NoReport,
+    Publish,
     RunFolder,
     Scheduler,
     Workers,
@@ -58,9 +60,7 @@ def run(
     ] = None,
     judge: Annotated[bool, typer.Option("--judge", help="Exit with 1 unless every requirement passes.")] = False,
     max_failed: Annotated[int | None, typer.Option(min=0, help="Exit with 3 if more cases fail.")] = None,
-    publish: Annotated[
-        str | None, typer.Option(metavar="URL", help="Copy the run there when it is complete: s3://bucket/prefix.")
-    ] = None,
+    publish: Publish = None,
     until: Annotated[
         str | None,
         typer.Option(help='"verdict": stop when every requirement passes or fails, at the number of cases at latest.'),
@@ -72,11 +72,7 @@ def run(
 
     if upstream is not None:
         existing_run(upstream)
-    if publish is not None:
-        from mc_engine.object_store import refuse_unreachable
-
-        refuse_path(publish)
-        refuse_unreachable(publish)
+    _refuse_publication(publish)
     if until not in (None, "verdict"):
         leave(USAGE, f'--until "{until}" is not known; the word is verdict')
     _refuse_with_shard(shard, {"--until": until, "--judge": judge or None, "--out": "missing" if out is None else None})
@@ -84,14 +80,15 @@ def run(
     path = out if out is not None else default_folder(campaign.name)
     _refuse_folder(path)
     crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    kept = _kept(path, publish)
     if until is None:
         piece = _shard(shard)
-        store = _fly(lambda runner, progress: runner.run(campaign, path, progress=progress, shard=piece, **crew))
+        store = _fly(lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **crew), kept)
     else:
         from mc_engine.stopping import fly_until_decided, refuse_undecidable
 
         refuse_undecidable(campaign)
-        store = _fly(lambda _, progress: fly_until_decided(campaign, path, progress=progress, **crew))
+        store = _fly(lambda _, note: fly_until_decided(campaign, path, progress=note, **crew), kept)
     _finish(store, no_report, judge, max_failed, publish)
 
 
@@ -135,11 +132,29 @@ def _refuse_folder(path: Path) -> None:
         leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")
 
 
-def _fly(fly: Callable[[Any, Any], "Store"]) -> "Store":
+def _refuse_publication(url: str | None) -> None:
+    """A URL that is none, or where nothing can be listed, is told before a long flight."""
+    if url is not None:
+        from mc_engine.object_store import refuse_unreachable
+
+        refuse_path(url)
+        refuse_unreachable(url)
+
+
+def _kept(path: Path, url: str | None) -> AbstractContextManager[Any]:
+    """Keeps a copy of the run in `path` up to date at `url`, where there is one to be."""
+    if url is None:
+        return nullcontext()
+    from mc_engine.publisher import Publisher
+
+    return Publisher(path, url)
+
+
+def _fly(fly: Callable[[Any, Any], "Store"], kept: AbstractContextManager[Any] | None = None) -> "Store":
     from mc_engine import runner
     from mc_engine.progress import Progress
 
-    with Progress() as progress:
+    with Progress() as progress, kept or nullcontext():
         if not progress.stream.isatty():
             typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
         return fly(runner, progress)
@@ -200,8 +215,10 @@ def resume(
     case_seconds: CaseSeconds = None,
     memory: Memory = None,
     repair: Annotated[bool, typer.Option("--repair", help="Fly again what is damaged.")] = False,
+    publish: Publish = None,
 ) -> None:
     """Complete a run that was interrupted."""
+    _refuse_publication(publish)
     crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
     crew["repair"] = repair
     if repair:
@@ -211,10 +228,10 @@ def resume(
     if existing_run(folder).manifest.get("looks"):
         from mc_engine.stopping import carry_on
 
-        store = _fly(lambda _, progress: carry_on(folder, progress=progress, **crew))
+        store = _fly(lambda _, note: carry_on(folder, progress=note, **crew), _kept(folder, publish))
     else:
-        store = _fly(lambda runner, progress: runner.resume(folder, progress=progress, **crew))
-    _finish(store, no_report)
+        store = _fly(lambda runner, note: runner.resume(folder, progress=note, **crew), _kept(folder, publish))
+    _finish(store, no_report, url=publish)
 
 
 @app.command()
@@ -228,10 +245,12 @@ def extend(
     scheduler: Scheduler = None,
     case_seconds: CaseSeconds = None,
     memory: Memory = None,
+    publish: Publish = None,
 ) -> None:
     """Add cases to a run; 1000 extended to 2000 are the same as 2000 from the start."""
     from mc_engine.designs import EXTENSIBLE
 
+    _refuse_publication(publish)
     store = existing_run(folder)
     wanted, design = store.n_cases, store.manifest["campaign"]["design"]
     if store.manifest.get("upstream") is not None:
@@ -243,8 +262,8 @@ def extend(
     if cases <= wanted:
         leave(USAGE, f"--cases {cases}: {folder} has {wanted} cases; give the number it is to have in all")
     crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
-    store = _fly(lambda runner, progress: runner.extend(folder, cases, progress=progress, **crew))
-    _finish(store, no_report)
+    store = _fly(lambda runner, note: runner.extend(folder, cases, progress=note, **crew), _kept(folder, publish))
+    _finish(store, no_report, url=publish)
 
 
 @app.command()

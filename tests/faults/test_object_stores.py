@@ -4,6 +4,7 @@ import hashlib
 import logging
 import shutil
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -11,10 +12,12 @@ from typer.testing import CliRunner
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mc_engine"))
 from small_run import block, created, filled
+from stones import stones
 
 from mc_engine.cli import app
 from mc_engine.errors import StoreError
 from mc_engine.object_store import _Remote, fetch, publish
+from mc_engine.publisher import Publisher
 from mc_engine.store import open_store
 from mc_engine.verification import damage
 
@@ -84,6 +87,60 @@ def test_the_verbs_take_a_run_to_s3_and_report_on_it_there(s3, run, tmp_path):
         assert answer.exit_code == 0, answer.output
     assert digests(tmp_path / "back") == digests(run)
     assert len(open_store(f"{s3}/verbs").cases()) == 40
+
+
+def test_a_run_that_flies_keeps_its_copy_on_s3_and_a_report_on_it_is_written_there(s3, tmp_path):
+    stones(tmp_path, 60)
+    answer = run_verb("run", tmp_path / "campaign.toml", "--out", tmp_path / "run", "--publish", f"{s3}/flown")
+    assert "published" in answer
+    assert open_store(f"{s3}/flown").cases().equals(open_store(tmp_path / "run").cases())
+    fsspec.filesystem("s3").rm(f"{s3}/flown/report.html")
+    answer = run_verb("report", f"{s3}/flown", "--format", "html")
+    assert answer.splitlines()[0] == f"{s3}/flown/report.html"
+    assert fsspec.filesystem("s3").cat_file(f"{s3}/flown/report.html").startswith(b"<!doctype html>")
+    run_verb("extend", tmp_path / "run", "--cases", 80, "--publish", f"{s3}/flown", "--no-report")
+    assert len(open_store(f"{s3}/flown").cases()) == 80
+
+
+def run_verb(*words):
+    answer = CliRunner().invoke(app, [str(word) for word in words])
+    assert answer.exit_code == 0, answer.output
+    return answer.output
+
+
+def test_what_is_committed_is_sent_while_the_run_flies_and_when_it_breaks_off(memory, tmp_path):
+    store, seen = created(tmp_path / "run"), []
+
+    def fly():
+        for first in range(0, 30, 10):
+            store.append(first, 10, block(first, 10))
+            begin = time.monotonic()
+            while first < 20 and first not in seen and time.monotonic() < begin + 20.0:
+                seen.extend([first] if copied(memory) == first + 10 else [])
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt), Publisher(store.path, memory, every_s=0.01):
+        fly()
+    assert seen == [0, 10]
+    assert copied(memory) == 30
+
+
+def copied(url):
+    """How many cases the copy at `url` has; none before its journal is there."""
+    try:
+        return len(open_store(url).cases())
+    except StoreError:
+        return 0
+
+
+def test_a_copy_that_fails_is_told_and_the_flight_goes_on(memory, run, capsys, monkeypatch):
+    def cut(*_):
+        raise ConnectionError("the line is cut")
+
+    monkeypatch.setattr(_Remote, "write", cut)
+    with Publisher(run, memory, every_s=0.01):
+        time.sleep(0.1)
+    assert capsys.readouterr().err == f"not published: {memory}: ConnectionError: the line is cut\n"
 
 
 def test_a_bucket_that_is_not_there_is_a_sentence_and_damage(s3, run):
