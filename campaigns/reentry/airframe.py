@@ -86,5 +86,7 @@ def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Airfr
         "sin_trim": np.sin(trim),
         "cos_tilted": np.cos(tilted),
         "sin_tilted": np.sin(tilted),
+        "cos_misaligned": np.cos(i.accelerometer_misalignment),
+        "sin_misaligned": np.sin(i.accelerometer_misalignment),
         "heating": heating * i.heating_factor,
     }

@@ -43,7 +43,7 @@ Parameters = namedtuple(
     "radius heading speed path aim_down aim_cross aimed tx ty tz "  # of the ground; entry over ground; target
     "first_bank bank_error bank_lag bank_rate_limit reversal_floor reversal_width load_limit "
     "reference planned_range planned_share planned_lift_to_drag "  # place in the tables; what the laws know
-    "sensed accelerometer_bias accelerometer_scale accelerometer_noise "
+    "sensed cos_misaligned sin_misaligned accelerometer_bias accelerometer_scale accelerometer_noise "
     "weather corridor_load corridor_heat_rate corridor_heat_load corridor_pressure "
     "nav_range nav_altitude nav_speed nav_path nav_climb",
 )

@@ -24,6 +24,7 @@ from campaigns.reentry.reference_table import (
 )
 from mc_engine.lanes import acos, any_lane, asin, atan2, log, maximum, minimum, physics, sqrt, where
 from mc_engine.lanes.noise import normal_pair
+from mc_engine.physics.aerodynamics import axial_coefficient
 
 LAW1, LAW2, LAW2R, LAW3, LAW3R, APOLLO = (float(GUIDANCE.index(law)) for law in GUIDANCE[1:])
 LEAST_SHARE = -0.9659258262890683  # cos 165 deg: never quite lift down
@@ -61,7 +62,7 @@ def sensed(s, p, o, draws):
         asin(bounded(sine, 1.0)) + p.nav_path,
         p.radius * atan2(ahead, up) + p.nav_range,
         place.climb + p.nav_climb,
-        stretch * (pressure * force.drag) + wrong,
+        stretch * (pressure * axial_coefficient(force.drag, force.lift, p.cos_misaligned, p.sin_misaligned)) + wrong,
         stretch * (pressure * force.sensed) + wrong,
         force.total / force.axial,
         force.total / force.drag,

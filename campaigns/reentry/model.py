@@ -198,7 +198,7 @@ MODEL = Model(
         Event("roll", "rising", "switch", rare=True),
         Event("leave", "rising", "switch", rare=True),
         Event("stop", "falling", "stop"),
-        Event("left", "rising", "stop"),
+        Event("left", "rising", "stop", rare=True),
         Event("over", "falling", "stop", rare=True),
     ),
     observe=outcome.observe,

@@ -8,7 +8,7 @@ import sys
 import pytest
 from small_run import ENVIRONMENT
 
-from mc_engine.campaign import SHIPPED, load_campaign
+from mc_engine.campaign import SHIPPED, list_campaigns, load_campaign
 from mc_engine.contract_flight import faults
 from mc_engine.errors import CampaignError
 from mc_engine.model_contract import breaches
@@ -212,8 +212,8 @@ def test_a_model_that_kills_its_process_is_a_sentence_unless_only_the_file_is_re
     assert check(tmp_path, "--no-model", KILL="1").returncode == 0
 
 
-@pytest.mark.parametrize("name", ["minimal", "deorbit"])
-def test_shipped_models_keep_the_contract(name):
+@pytest.mark.parametrize("name", [one.name for one in list_campaigns()])
+def test_shipped_campaigns_keep_the_contract(name):
     campaign = load_campaign(name)
     assert breaches(campaign) == []
     assert faults(campaign) == []
