@@ -7,6 +7,7 @@ the speed lost, and a backward Riccati equation gives the gains of the vertical 
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import count
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ from mc_engine.physics.frames import over_ellipsoid
 
 US76, J2, NO_GRAVITY = 0.0, 0.0, 2.0  # codes of settings
 MOST_PLANS = 16  # different plans among the cases prepared at once: a grid, but no random draws
+MOST_EVALUATIONS = 15_000  # of the rates of one reference path; the planned entries of the campaigns take some 3000
 _KILOMETRE, _DEGREE = 1e3, np.pi / 180.0
 _SCALES = np.array([_KILOMETRE, _DEGREE, _KILOMETRE])
 
@@ -122,7 +124,14 @@ class Planner:
 def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
     """The reference from the planned entry down to plan_stop_altitude, at equal steps of time."""
 
+    begin = planner.start()
+    if planner.height(begin[0], begin[2])[0] <= planner.plan.end:
+        raise ModelError("the planned entry lies below plan_stop_altitude_km, where its reference path is to end")
+    evaluated = count(1)
+
     def derivative(t, y):
+        if next(evaluated) > MOST_EVALUATIONS:
+            raise ModelError("the reference path of the planned entry cannot be integrated; check the plan_ parameters")
         r, _, latitude, v, path, heading, _, _ = y
         six, along, _ = planner.motion(r, latitude, v, path, heading, planner.plan.share)
         axial = planner.axial(r, latitude, v)
@@ -132,9 +141,7 @@ def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
         return planner.height(y[0], y[2])[0] - planner.plan.end
 
     low.terminal, low.direction = True, -1.0  # type: ignore[attr-defined]
-    path = solve_ivp(
-        derivative, (0.0, 5000.0), planner.start(), "DOP853", rtol=1e-10, atol=1e-9, events=low, dense_output=True
-    )
+    path = solve_ivp(derivative, (0.0, 5000.0), begin, "DOP853", rtol=1e-10, atol=1e-9, events=low, dense_output=True)
     if path.t_events[0].size == 0:
         raise ModelError(
             "the planned entry does not come down to plan_stop_altitude_km, so that there is no reference path"

@@ -5,6 +5,7 @@ import pytest
 from reentry_flights import PLANAR, fly_one, history, plan_of
 from scipy.integrate import solve_ivp
 
+from campaigns.reentry import reference
 from campaigns.reentry.apollo_final_phase import FLOWN
 from campaigns.reentry.reference import (
     PROFILE_SET,
@@ -207,6 +208,14 @@ def test_a_plan_that_does_not_come_down_is_said_so():
     assert "does not come down" in reference_table_of(high)
     with pytest.raises(ModelError, match="no law could steer"):
         steered_part(fly_reference(Planner(plan_of(**PLANNED, guidance="law1", plan_stop_altitude_km=100.0))))
+
+
+def test_a_plan_that_cannot_be_flown_is_said_so_at_once(monkeypatch):
+    inside = plan_of(**PLANNED | {"plan_radius_km": 649.0}, guidance="law1")
+    assert "lies below plan_stop_altitude_km" in reference_table_of(inside)
+    monkeypatch.setattr(reference, "MOST_EVALUATIONS", 100)
+    with pytest.raises(ModelError, match="cannot be integrated"):
+        fly_reference(Planner(plan_of(**PLANNED, guidance="law1")))
 
 
 def test_a_reference_is_found_wherever_it_lies_in_the_tables(table):
