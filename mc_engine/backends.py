@@ -5,6 +5,7 @@ import sys
 from dataclasses import dataclass
 
 from mc_engine.errors import EngineError
+from mc_engine.extras import how_to_install
 
 BACKENDS = ("threading", "loky", "dask")
 
@@ -16,12 +17,14 @@ class Backend:
     name : "threading", "loky" or "dask".  scheduler : address of a `distributed` scheduler; without one, "dask"
     starts a cluster of this machine for the run.
     case_seconds : a case that takes longer is given up with status time-limit.  memory_mib : what a worker may have.
+    patience_s : how long a scheduler may be without workers, as while its jobs wait in a queue; 300 by default.
     """
 
     name: str = "threading"
     scheduler: str | None = None
     case_seconds: float | None = None
     memory_mib: int | None = None
+    patience_s: float | None = None
 
     def __post_init__(self) -> None:
         if self.name not in BACKENDS:
@@ -32,16 +35,25 @@ class Backend:
             raise EngineError('a thread cannot be limited in time or memory; fly with the backend "loky"')
         if self.scheduler is not None and self.memory_mib is not None:
             raise EngineError("the workers of a scheduler have limits of their own: `dask worker --memory-limit`")
+        if self.patience_s is not None and self.name != "dask":
+            raise EngineError(f'patience is for the backend "dask", whose workers come and go, not for "{self.name}"')
         if self.memory_mib is not None and not memory_can_be_limited():
             raise EngineError("this system keeps no limit on memory; install psutil, with which the workers look")
         if self.name == "dask" and importlib.util.find_spec("distributed") is None:
-            raise EngineError('the backend "dask" needs the package distributed: pip install "mc-engine[cluster]"')
+            raise EngineError(f'the backend "dask" needs the package distributed; {how_to_install("cluster")}')
 
     def options(self) -> str:
         """The options of the command line that ask for this backend, each with a space before it."""
         name = None if self.name == "threading" else self.name
         seconds = None if self.case_seconds is None else f"{self.case_seconds:g}"
-        words = {"backend": name, "scheduler": self.scheduler, "case-seconds": seconds, "memory": self.memory_mib}
+        patience = None if self.patience_s is None else f"{self.patience_s:g}"
+        words = {
+            "backend": name,
+            "scheduler": self.scheduler,
+            "case-seconds": seconds,
+            "memory": self.memory_mib,
+            "patience": patience,
+        }
         return "".join(f" --{key} {value}" for key, value in words.items() if value is not None)
 
 

@@ -15,6 +15,7 @@ from mc_engine.distributions import Scalar
 MOST_CASES = 1_000_000_000
 MOST_LEVELS = 1_000_000
 MOST_STEPS = 10**12
+LONGEST_LINE, LONGEST_NOTE = 300, 5000  # letters
 LARGEST = 1e50  # beyond it, squares and quotients of numbers leave the range of float64
 
 DesignName = Literal["mc", "lhs", "sobol", "halton", "saltelli", "morris", "grid", "one_at_a_time", "table"]
@@ -40,6 +41,21 @@ def _not_tiny(value: float) -> float:
     return value
 
 
+def _printable(value: str) -> str:
+    """Text that is shown as it is written: nothing in it steers a terminal or hides from the eye."""
+    if not value.replace("\n", "").replace("\t", "").isprintable():
+        raise PydanticCustomError("not_printable", "letters that cannot be seen")
+    return value
+
+
+def _one_line(value: str) -> str:
+    if "\n" in value:
+        raise PydanticCustomError("not_one_line", "more than one line")
+    return value
+
+
+Line = Annotated[str, Field(max_length=LONGEST_LINE), AfterValidator(_printable), AfterValidator(_one_line)]
+Note = Annotated[str, Field(max_length=LONGEST_NOTE), AfterValidator(_printable)]
 Value = Annotated[
     Any, PlainValidator(_scalar), WithJsonSchema({"anyOf": [{"type": t} for t in ("number", "boolean", "string")]})
 ]
@@ -69,22 +85,22 @@ class CampaignSection(Section):
     max_steps: int | None = Field(
         default=None, ge=1, le=MOST_STEPS, description="integration steps of a case, then it ends as step-limit"
     )
-    title: str = Field(default="", description="one line for the report")
-    note: str = ""
+    title: Line = Field(default="", description="one line for the report")
+    note: Note = ""
 
 
 class DispersionSection(Section):
     """Keys that every [dispersion.NAME] may have."""
 
-    unit: str | None = Field(default=None, description="unit of the numbers here; the parameter's own unless said")
+    unit: Line | None = Field(default=None, description="unit of the numbers here; the parameter's own unless said")
     levels: int | None = Field(
         default=None, ge=2, le=MOST_LEVELS, description="grid, one_at_a_time: so many equal steps"
     )
     values: list[Value] | None = Field(
         default=None, min_length=1, description="the levels themselves, or what discrete draws"
     )
-    source: str = Field(default="", description="where the spread comes from, for the report")
-    note: str = ""
+    source: Line = Field(default="", description="where the spread comes from, for the report")
+    note: Note = ""
 
 
 class LevelsDispersion(DispersionSection):
@@ -197,8 +213,8 @@ class CorrelationSection(Section):
 
     between: list[str] = Field(min_length=2, max_length=2, description="the names of two dispersions")
     rank: float = Field(gt=-1.0, lt=1.0, description="Spearman rank correlation, between -1 and 1")
-    source: str = ""
-    note: str = ""
+    source: Line = ""
+    note: Note = ""
 
 
 class CovarianceSection(Section):
@@ -212,8 +228,8 @@ class CovarianceSection(Section):
         min_length=1, description="axes of the parameters: RTN, TNW, or the frame of the message's state"
     )
     epoch: str | None = Field(default=None, description="which covariance, where an OEM has more than one")
-    source: str = ""
-    note: str = ""
+    source: Line = ""
+    note: Note = ""
 
 
 class RequirementSection(Section):
@@ -224,8 +240,8 @@ class RequirementSection(Section):
     at_least: Number | None = None
     share: Share = 0.9973
     confidence: Share = 0.90
-    source: str = ""
-    note: str = ""
+    source: Line = ""
+    note: Note = ""
 
 
 class WorstSection(Section):
@@ -264,8 +280,8 @@ class TunedSection(Section):
 
     lower: Number = Field(description="the smallest value that may be chosen")
     upper: Number = Field(description="the largest value that may be chosen")
-    source: str = ""
-    note: str = ""
+    source: Line = ""
+    note: Note = ""
 
 
 class ObjectiveSection(Section):
@@ -276,7 +292,7 @@ class ObjectiveSection(Section):
     quantile: Share | None = Field(
         default=None, description="this quantile over the dispersed cases; the nominal case unless said"
     )
-    note: str = ""
+    note: Note = ""
 
 
 class ConstraintSection(Section):
@@ -288,16 +304,16 @@ class ConstraintSection(Section):
     quantile: Share | None = Field(
         default=None, description="this quantile over the dispersed cases; the nominal case unless said"
     )
-    source: str = ""
-    note: str = ""
+    source: Line = ""
+    note: Note = ""
 
 
 class PublishedPointSection(Section):
     """[[tuning.published]]: a point to be drawn beside the front."""
 
-    name: str = Field(min_length=1, description="what the report calls the point")
+    name: Line = Field(min_length=1, description="what the report calls the point")
     values: dict[str, Number] = Field(description="a number for every objective, by its name")
-    source: str = ""
+    source: Line = ""
 
 
 class TuningSection(Section):
@@ -345,7 +361,7 @@ class InputsSection(Section):
         default_factory=dict,
         description="parameter = column of that run; results that have a parameter's name need no line here",
     )
-    note: str = ""
+    note: Note = ""
 
 
 class CampaignFile(Section):

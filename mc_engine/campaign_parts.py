@@ -99,7 +99,7 @@ def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
     settings = {s.symbol: np.array([s.code(values[s.name])]) for s in model.settings}
     refusals = Refusals.none(1)
     # a refused case may divide by zero on its way
-    with np.errstate(all="ignore"), naming_faults(model.reference, "the nominal case"):
+    with np.errstate(all="ignore"), naming_faults(model.reference, "the nominal case", ""):
         model.prepare(SimpleNamespace(**inputs), SimpleNamespace(**settings), refusals)
     return str(refusals.reason[0])
 

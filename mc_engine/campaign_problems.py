@@ -38,6 +38,8 @@ _VALUE: TypeAdapter[Scalar] = TypeAdapter(Value)
 _TAGS = ("one", "many")  # pydantic puts the tag of a union into the place
 _AnySection = TypeVar("_AnySection", bound=Section)
 
+_FREE_NAME = re.compile(r"\w[\w-]{0,59}")  # of what the file itself names; it stands in reports and on terminals
+
 # tomllib takes a time that grows with the square of the parts of a dotted key; a campaign file has keys of three.
 _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
 
@@ -58,6 +60,9 @@ _MESSAGES = {
     "too_short": "{actual_length} given; at least {min_length} needed",
     "too_long": "{actual_length} given; at most {max_length} allowed",
     "string_too_short": "{shown} is empty",
+    "string_too_long": "{shown} is too long; at most {max_length} letters are allowed",
+    "not_printable": "{shown} has letters that cannot be seen; leave them out",
+    "not_one_line": "{shown} is of more than one line; write it in one",
 }
 
 
@@ -139,7 +144,7 @@ def read_sections(document: dict[str, Any], found: Findings) -> Sections:
         parameters=_parameters(document, inside["parameters"]),
         dispersions=_read_each(_dispersion, _named(document, "dispersion", found)),
         correlations=_read_each(_correlation, _listed(document, "correlation", found)),
-        requirements=_read_each(_requirement, _named(document, "requirement", found)),
+        requirements=_read_each(_requirement, _freely_named(document, "requirement", found)),
         retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
         tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
         inputs=read(InputsSection, document["inputs"], inside["inputs"]) if "inputs" in document else None,
@@ -193,6 +198,15 @@ def _named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[s
     return []
 
 
+def _freely_named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+    """The tables whose names the file chooses; one that is no word is noted and left out."""
+    entries = _named(document, name, found)
+    wrong = [entry for entry in entries if not _FREE_NAME.fullmatch(entry[0])]
+    for key, _, _ in wrong:
+        found.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
+    return [entry for entry in entries if entry not in wrong]
+
+
 def _listed(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
     raw = document.get(name, [])
     if isinstance(raw, list):
@@ -221,8 +235,8 @@ def _tuning(raw: Any, found: Findings) -> TuningSections | None:
     return TuningSections(
         head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, found),
         parameters=_read_each(partial(read, TunedSection), _named(raw, "parameter", found)),
-        objectives=_read_each(partial(read, ObjectiveSection), _named(raw, "objective", found)),
-        constraints=_read_each(partial(read, ConstraintSection), _named(raw, "constraint", found)),
+        objectives=_read_each(partial(read, ObjectiveSection), _freely_named(raw, "objective", found)),
+        constraints=_read_each(partial(read, ConstraintSection), _freely_named(raw, "constraint", found)),
         published=_read_each(partial(read, PublishedPointSection), _listed(raw, "published", found)),
         objective_names=tuple(objectives) if isinstance(objectives, dict) else (),
     )

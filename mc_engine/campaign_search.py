@@ -82,6 +82,16 @@ def find_campaign(reference: str | Path) -> Path:
     raise CampaignError(text, [Problem("", _not_found(text, path, list(shipped)))])
 
 
+def requirement_names(reference: str) -> list[str]:
+    """The requirements of a campaign by their names in its file, for completion; none where there is no such file."""
+    try:
+        document = tomllib.loads(find_campaign(reference).read_text(encoding="utf-8"))
+    except (CampaignError, OSError, ValueError):
+        return []
+    written = document.get("requirement", {})
+    return list(written) if isinstance(written, dict) else []
+
+
 def campaign_name(path: Path) -> str:
     """The shipped name of a file, or the name that its path suggests."""
     path = path.resolve()
@@ -109,9 +119,24 @@ def _title(path: Path) -> str:
     return str(campaign.get("title", "")) if isinstance(campaign, dict) else ""
 
 
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
 def _not_found(text: str, path: Path, names: list[str]) -> str:
+    if text and _is_folder(path):
+        others = [name for name in campaign_paths(f"{text.rstrip('/')}/") if name.endswith(".toml")]
+        found = f", but {others[0]}" if others else "; `mc-engine init DIR` makes a campaign in a new folder"
+        return f"holds no campaign.toml{found}"
     if path.suffix == ".toml":
-        return "there is no such file"
+        return (
+            "there is no such file; `mc-engine list` names the shipped campaigns, `mc-engine init DIR` makes a new one"
+        )
+    if "://" in text:
+        return "is a URL; a campaign is read from a file here"
     if "/" not in text and not text.startswith("."):
         near = hint(text, names)
         known = near if "did you mean" in near else "; `mc-engine list` names the campaigns"

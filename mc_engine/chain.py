@@ -11,7 +11,7 @@ import numpy as np
 from mc_engine.campaign_file import CampaignSection
 from mc_engine.campaign_problems import Findings, Sections
 from mc_engine.designs import BY_LEVELS, IN_BLOCKS, RANDOM
-from mc_engine.errors import CampaignError, StoreError
+from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.model import Model
 
 if TYPE_CHECKING:
@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 _LONGEST_CHAIN = 5  # campaigns, each flown for the next
 _waiting: ContextVar[int] = ContextVar("_waiting", default=0)  # campaigns of the chain that is being read
+
+
+class _Endless(CampaignError):
+    """A chain that comes back to itself, or is longer than any that is meant; told once, where it begins."""
 
 
 def take_inputs(
@@ -52,8 +56,8 @@ def take_inputs(
             cases = sections.campaign.cases if sections.campaign is not None else None
             beside = directory / source
             if _waiting.get() == _LONGEST_CHAIN:
-                spot.add("from", "the campaigns take their inputs from one another, round and round")
-                return None, None
+                message = f"the campaigns take their inputs from one another, round and round ({source}, ...)"
+                raise _Endless(source, [Problem("from", message)])
             below = copy_context()
             below.run(_waiting.set, _waiting.get() + 1)
             first = below.run(
@@ -62,6 +66,11 @@ def take_inputs(
             rows = _rows_to_come(first)
     except StoreError as error:
         spot.add("from", str(error))
+        return None, None
+    except _Endless as error:
+        if _waiting.get():
+            raise
+        spot.add("from", error.problems[0].message)
         return None, None
     except CampaignError as error:
         spot.add("from", f'"{source}" is neither a run nor a campaign that can be flown: {error.problems[0]}')

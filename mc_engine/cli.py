@@ -15,28 +15,26 @@ from mc_engine import (
     verbs_of_object_stores,
     verbs_of_rare_events,
     verbs_of_sources,
+    verbs_of_speed,
+    verbs_of_tuning,
+    verbs_of_units,
 )
-from mc_engine.command_line import INTERRUPTED, app
+from mc_engine.command_line import app
 
-__all__ = ["app", "main"]
+__all__ = ["app"]
 
 _IN_ORDER: tuple[ModuleType, ...] = (
     verbs_before_flight,
     verbs_of_flight,
+    verbs_of_tuning,
     verbs_of_rare_events,
     verbs_after_flight,
     verbs_of_comparison,
     verbs_of_export,
     verbs_of_object_stores,
     verbs_of_sources,
+    verbs_of_speed,
+    verbs_of_units,
 )
 _MODULES = [module.__name__ for module in _IN_ORDER]
 app.registered_commands.sort(key=lambda verb: _MODULES.index(verb.callback.__module__) if verb.callback else 0)
-
-
-def main() -> None:
-    """Run the command line of this process; does not return."""
-    try:
-        app(prog_name="mc-engine")
-    except KeyboardInterrupt:  # before a verb was under way
-        raise SystemExit(INTERRUPTED) from None

@@ -4,8 +4,10 @@ Exit status: 0 done, 1 a requirement is not met (`run --judge`), 2 usage or camp
 allowed (`run --max-failed`), 4 interrupted or the disk full, and resumable, 5 store damaged or busy.
 """
 
+import errno
 import importlib
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -13,11 +15,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError
+from mc_engine.interruption import INTERRUPTED, last_words, under_way
 
 if TYPE_CHECKING:
     from mc_engine.store import Store
 
-NOT_MET, USAGE, TOO_MANY_FAILED, INTERRUPTED, DAMAGED = 1, 2, 3, 4, 5
+NOT_MET, USAGE, TOO_MANY_FAILED, DAMAGED = 1, 2, 3, 5  # and INTERRUPTED, 4
 
 app = typer.Typer(
     help="Monte Carlo dispersion campaigns for spacecraft guidance, navigation and control.",
@@ -26,6 +29,11 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
 )
+
+
+def beginning(words: Iterable[str]) -> Callable[[str], list[str]]:
+    """What the shell offers of these words."""
+    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
 
 
 def campaigns_beginning(incomplete: str) -> list[str]:
@@ -43,11 +51,44 @@ CampaignFile = Annotated[
         autocompletion=campaigns_beginning,
     ),
 ]
-RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run.")]
+
+
+def is_url(place: str) -> bool:
+    """True for what names an object store; `Path` would make a folder of it."""
+    return "://" in place
+
+
+def _on_disk(text: str, instead: str) -> Path:
+    if is_url(text):
+        leave(USAGE, f"{text}: is a URL, and what is wanted here lies on a disk; {instead}")
+    return Path(text)
+
+
+# `parser=` of an argument or option gets the text before it becomes a Path, which mangles a URL.
+def run_here(text: str) -> Path:
+    return _on_disk(text, f"`mc-engine fetch {text} DIR` makes a directory of it, and --publish keeps it up to date")
+
+
+def new_folder(text: str) -> Path:
+    return _on_disk(text, f"fly into a folder, and --publish {text} or `mc-engine publish` keeps a copy up there")
+
+
+def new_file(text: str) -> Path:
+    return _on_disk(text, "name a file here, and copy it from there")
+
+
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run.", parser=run_here)]
+RunPlace = Annotated[str, typer.Argument(metavar="RUN", help="The directory of a run, or the URL of a published one.")]
 Cases = Annotated[int | None, typer.Option(min=1, help="Number of cases, in place of the file's.")]
 Workers = Annotated[int | None, typer.Option(min=1, help="Threads or processes that fly cases; all cores by default.")]
 BackendName = Annotated[
-    str, typer.Option("--backend", metavar="NAME", help="Who flies: threading, loky (processes), dask (a cluster).")
+    str,
+    typer.Option(
+        "--backend",
+        metavar="NAME",
+        help="Who flies: threading, loky (processes), dask (a cluster).",
+        autocompletion=beginning(("threading", "loky", "dask")),
+    ),
 ]
 Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="With dask: a scheduler such as tcp://node1:8786.")
@@ -56,6 +97,10 @@ CaseSeconds = Annotated[
     float | None, typer.Option(min=0.1, help="With loky or dask: give a case up that takes longer.")
 ]
 Memory = Annotated[int | None, typer.Option(min=512, metavar="MIB", help="With loky or dask: memory of a worker.")]
+Patience = Annotated[
+    float | None,
+    typer.Option(min=1.0, metavar="S", help="With dask: give up after so long without a worker; by default 300 s."),
+]
 Publish = Annotated[
     str | None,
     typer.Option(metavar="URL", help="Keep a copy, such as s3://bucket/prefix, up to date while the run flies."),
@@ -67,7 +112,8 @@ NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the reports o
 def exit_status() -> Iterator[None]:
     """Turn what the engine raises on purpose into its sentence on stderr and an exit status."""
     try:
-        yield
+        with under_way():
+            yield
     except (RunInterrupted, DiskError) as error:  # a disk may have room again
         leave(INTERRUPTED, str(error))
     except StoreError as error:
@@ -75,9 +121,10 @@ def exit_status() -> Iterator[None]:
     except EngineError as error:  # of the campaign, the model, or a package that is missing
         leave(USAGE, str(error))
     except KeyboardInterrupt:
-        leave(INTERRUPTED, "interrupted")
+        leave(INTERRUPTED, last_words())
     except OSError as error:
-        leave(USAGE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        leave(INTERRUPTED if full else USAGE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
 
 
 def leave(status: int, message: str) -> NoReturn:
@@ -89,11 +136,45 @@ def existing_run(path: Path) -> "Store":
     """The run in `path`; a path that never was a run is a slip of the user's, not damage."""
     from mc_engine.store import is_run_directory, open_store
 
-    if not path.exists():
-        leave(USAGE, f"{path}: there is no such folder")
     if not is_run_directory(path):
-        leave(USAGE, f"{path}: is no run directory; `mc-engine run` makes one")
+        leave(USAGE, f"{path}: {_no_run(path)}")
     return open_store(path)
+
+
+def _no_run(path: Path) -> str:
+    """What is wrong with a path where a run directory is wanted, and what to do."""
+    from mc_engine.campaign_search import campaign_names
+    from mc_engine.run_folder import runs_in
+
+    if str(path) in campaign_names():
+        return f"is a campaign and no run; `mc-engine run {path}` flies it"
+    if not path.exists():
+        return "there is no such folder; `mc-engine run` makes one"
+    if runs := runs_in(path):
+        return f"is no run directory; it holds {counted(runs, 'run')}, the latest is {runs[-1]}"
+    return "is no run directory; `mc-engine run` makes one"
+
+
+def run_at(place: str) -> Path:
+    """The directory `place`; of a URL, a copy that lasts as long as this process."""
+    from mc_engine.object_store import local_copy
+
+    return local_copy(place)
+
+
+def refuse_occupied_folder(path: Path) -> None:
+    """An occupied --out is a slip of the user's; told before anything is compiled."""
+    from mc_engine.store import JOURNAL, open_store, refuse_occupied
+
+    if (path / JOURNAL).exists() and open_store(path).missing():
+        leave(USAGE, f"--out {path}: holds a run that is not complete; `mc-engine resume {path}` flies the rest")
+    try:
+        refuse_occupied(path)
+    except StoreError as error:
+        leave(USAGE, f"--out {error}")
+    existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
+    if not (existing.is_dir() and os.access(existing, os.W_OK)):
+        leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")
 
 
 def counted(things: Any, word: str) -> str:
@@ -107,4 +188,7 @@ def ranges(ranges: list[tuple[int, int]]) -> str:
 def write_reports(path: Path, formats: tuple[str, ...], **more: Any) -> list[Path]:
     # The engine imports nothing of the reports, so that it can be used and tested without them; only this verb,
     # which exists for the user's convenience, looks for them, and at the moment they are asked for.
-    return importlib.import_module("reports").write_reports(path, formats=formats, **more)
+    try:
+        return importlib.import_module("reports").write_reports(path, formats=formats, **more)
+    except DiskError as error:
+        raise DiskError(f"{error}; what was flown is safe, `mc-engine report {path}` writes the reports") from error

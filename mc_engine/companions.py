@@ -5,14 +5,17 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from mc_engine.durable_file import read_inside
+from mc_engine.errors import StoreError
+
 
 def companion_problems(run: Path, created: Mapping[str, Any]) -> list[str]:
     """A sentence for every file beside the campaign that is gone or edited; `created` are the facts of the creation."""
     problems = []
     for name, digest in created.get("companions", {}).items():
         try:
-            if sha256((run / name).read_bytes()).hexdigest() != digest:
+            if sha256(read_inside(run, name)).hexdigest() != digest:
                 problems.append(f"{name}: damaged or edited, its SHA-256 is not the one in the journal")
-        except OSError as error:
-            problems.append(f"{name}: {error.strerror}")
+        except StoreError as error:
+            problems.append(str(error).removeprefix(f"{run}/"))
     return problems

@@ -19,7 +19,9 @@ from mc_engine.distributions import column, quantiles
 from mc_engine.errors import EngineError
 from mc_engine.event_watch import watching_events
 from mc_engine.flight import fly
-from mc_engine.model_faults import naming_faults
+from mc_engine.model_contract import nominal_inputs
+from mc_engine.model_faults import MORE, fault_of
+from mc_engine.physics_trial import fixed_metrics
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 
 _CASES = 32
@@ -38,16 +40,18 @@ def faults(campaign: Campaign) -> list[str]:
     ids = np.arange(min(campaign.cases, _CASES))
     inputs = full_inputs(campaign, case_table(campaign, ids))
     try:
-        with naming_faults(campaign.model_reference, "the model"):
-            flown = _fly(campaign, inputs, ids)
-            found = [*_failed(campaign, flown), *_other_bits(campaign, inputs, ids, flown)]
-            return found or [
-                *_never_set(campaign, flown),
-                *_moving_nothing(campaign, inputs, ids),
-                *_never_crossing(campaign, inputs, ids),
-            ]
+        flown = _fly(campaign, inputs, ids)
+        found = [*_failed(campaign, flown), *_other_bits(campaign, inputs, ids, flown)]
+        return found or [
+            *_never_set(campaign, flown),
+            *_always_the_same(campaign, flown),
+            *_moving_nothing(campaign, inputs, ids),
+            *_never_crossing(campaign, inputs, ids),
+        ]
     except EngineError as error:
-        return [str(error)]
+        return [str(error).removesuffix(MORE)]
+    except Exception as error:
+        return [fault_of(error, campaign.model_reference)]
 
 
 def _fly(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
@@ -103,12 +107,33 @@ def _difference(a: Columns, b: Columns) -> tuple[int, str] | None:
 
 
 def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    """Metrics without a finite number in any case that flew."""
     ok = flown["status"] == STATUS_NAME[OK]
     for metric in campaign.model.metrics:
-        if not metric.sometimes and np.isnan(flown[metric.name][ok]).all():
+        values = flown[metric.name][ok]
+        if not metric.sometimes and not np.isfinite(values).any():
+            word = "infinite in all" if np.isinf(values).any() else "not a number in any"
             yield (
-                f'the metric "{metric.name}" is not a number in any of the {ok.sum()} cases that flew; let `evaluate` '
+                f'the metric "{metric.name}" is {word} of the {values.size} cases that flew; let `evaluate` '
                 "set it, or declare it with sometimes=True if it exists only with some settings"
+            )
+
+
+def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    """Metrics with one value in all cases that `evaluate` gives to any other flight as well.
+
+    A metric that only does not move in this campaign, such as a count that stays zero, is none of them.
+    """
+    ok = flown["status"] == STATUS_NAME[OK]
+    model = campaign.model
+    same = [one for one in model.metrics if not one.sometimes and np.unique(flown[one.name][ok]).size == 1]
+    fixed = fixed_metrics(model, *nominal_inputs(campaign)) if same else {}
+    for metric in same:
+        if metric.name in fixed:
+            value = fixed[metric.name] / metric.si_factor
+            yield (
+                f'the metric "{metric.name}" is {value:g} whatever happens; let `evaluate` work it out, leave it out, '
+                "or declare it with sometimes=True if it differs only with some settings"
             )
 
 

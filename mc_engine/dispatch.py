@@ -6,7 +6,7 @@ found that kill their worker even alone, twice.  The chunk is then flown without
 part holds the same cases whatever happened on the way.
 """
 
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,14 +14,16 @@ from pathlib import Path
 import numpy as np
 
 from mc_engine.chunks import Lost, Order
-from mc_engine.crews import Crew, Landing
+from mc_engine.crew import Crew, Landing
 from mc_engine.errors import WorkersLost
 from mc_engine.parts import Written
 from mc_engine.status import STATUS_NAME, TIME_LIMIT, WORKER_DIED
-from mc_engine.worker_process import LATE, take_note
+from mc_engine.worker_process import LATE, take_notes
 
 FEW = 16  # cases that are flown one by one rather than by halves: to begin a new worker takes longer
 LOOK_EVERY_S = 0.2  # at whether to stop
+DRAIN_S = 10.0  # without a worker, then what is under way is under way no more
+UNNOTED = 3  # deaths in which an order was not in flight as far as is known
 MOST_DEATHS = 30  # before any order has come through: it is not the cases then
 DIED = "the process flying this case died"
 NO_MEMORY = "needed more memory than its worker may have"
@@ -47,18 +49,28 @@ class Dispatch:
         self._waiting: deque[Order] = deque()
         self._under_way = 0
         self._twice: set[Order] = set()  # probes of a single case that are flown again
+        self._alone: Order | None = None  # one of them that is under way, and nothing beside it
+        self._unnoted: Counter[Order] = Counter()  # deaths with no note of what was in flight
         self._searches: dict[Order, Search] = {}  # by their probes
         self._landed = self._lost = 0
 
     def receipts(self, orders: Iterable[Order], stopped: Callable[[], bool]) -> Iterator[tuple[Order, Written]]:
-        """What the workers wrote, as it lands.  When stopped, nothing new begins and what is under way still lands."""
+        """What the workers wrote, as it lands.
+
+        When stopped, nothing new begins, and what is under way still lands while there are workers.
+        Raises WorkersLost when there is nobody to fly.
+        """
         self._waiting.extend(orders)
         while self._under_way or (self._waiting and not stopped()):
             self._fill(stopped)
             landing = self._crew.next(LOOK_EVERY_S)
             if landing is None:
+                if stopped() and self._crew.deserted_s() > DRAIN_S:
+                    return
                 continue
             self._under_way -= 1
+            if landing.order is self._alone:
+                self._alone = None
             if landing.died:
                 self._mourn(landing)
             elif landing.error is not None:
@@ -72,9 +84,18 @@ class Dispatch:
                     yield landing.order, landing.written
 
     def _fill(self, stopped: Callable[[], bool]) -> None:
-        while self._waiting and not stopped() and self._under_way < self._crew.room():
-            self._crew.begin(self._waiting.popleft())
+        while self._waiting and not stopped() and self._may_begin(self._waiting[0]):
+            order = self._waiting.popleft()
+            self._crew.begin(order)
             self._under_way += 1
+            if self._crew.shared and order in self._twice:
+                self._alone = order
+
+    def _may_begin(self, order: Order) -> bool:
+        """True where there is room; a last trial waits until nothing else flies that its worker could die of."""
+        if self._crew.shared and order in self._twice:
+            return self._under_way == 0
+        return self._alone is None and self._under_way < self._crew.room()
 
     def _mourn(self, landing: Landing) -> None:
         """A worker died of an order, or with it: fly it again, or look for the case that it dies of."""
@@ -82,18 +103,21 @@ class Dispatch:
         self._lost += 1
         if self._lost >= MOST_DEATHS and not self._landed:
             raise WorkersLost(f"the workers die whatever they fly; the last one said: {landing.error}")
-        kind, noted = take_note(self._run, flown)
+        kind, noted = take_notes(self._run, flown)
         if kind == LATE:
             fate = Lost(-1, STATUS_NAME[TIME_LIMIT], f"took longer than {self._case_seconds:g} s")
             self._suspect(order, noted, fate)
+        elif not order.suspected:
+            self._waiting.append(order.once_more())
+        elif not noted.size and self._unnoted[order] < UNNOTED:
+            self._unnoted[order] += 1  # it waited for a worker that died of another order, or was being set up
+            self._waiting.append(order)
         elif order.probe and flown.size == 1 and order not in self._twice:
             self._twice.add(order)  # the worker of an innocent case may be killed from outside, but hardly twice
             self._waiting.append(order)
-        elif order.suspected:
+        else:
             reason = NO_MEMORY if isinstance(landing.error, MemoryError) else DIED
             self._suspect(order, noted if noted.size else flown, Lost(-1, STATUS_NAME[WORKER_DIED], reason))
-        else:
-            self._waiting.append(order.once_more())
 
     def _suspect(self, order: Order, cases: np.ndarray, fate: Lost) -> None:
         """One of these cases of the order is to blame: fly them by halves, and a few one by one."""

@@ -3,25 +3,58 @@
 Content goes to a temporary name, is synced and renamed, and the folder is synced.  Temporary names start with a
 dot and end in `.tmp`, so that neither Arrow's nor DuckDB's reading of a folder takes them for parts.
 Every OSError leaves here as a DiskError that names the path, or as a StoreError where a file is gone.
+
+A directory may come from anyone: what is read or written is a regular file, never what a symbolic link leads to,
+a pipe or a device.
 """
 
+import errno
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from mc_engine.errors import DiskError, StoreError
 
+_FULL_SYNC: int | None = None  # of macOS
+if os.name != "nt":
+    import fcntl
+
+    _FULL_SYNC = getattr(fcntl, "F_FULLFSYNC", None)
+
+_LINK = "is a symbolic link; only files of its own count in a directory"
+# A pipe without a writer must not keep the reader waiting.  Windows has neither flag.
+_PLAINLY = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Turn an OSError of the block into a DiskError whose text begins with `path`; a StoreError if it is not there."""
+    """Turn an OSError of the block into a DiskError whose text begins with `path`.
+
+    A StoreError instead where no other disk would help: the file is not there, or is a symbolic link.
+    """
     try:
         yield
     except FileNotFoundError as error:
         raise StoreError(f"{path}: {error.strerror or error}") from error
     except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise StoreError(f"{path}: {_LINK}") from error
         raise DiskError(f"{path}: {error.strerror or error}") from error
+
+
+def open_regular(path: Path, flags: int) -> int:
+    """Descriptor of the file `path`, as `os.open` gives it; StoreError if it is there and no regular file."""
+    descriptor = os.open(path, flags | _PLAINLY, 0o666)
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise StoreError(f"{path}: is no regular file")
+    return descriptor
+
+
+def plainly(path: str, flags: int) -> int:
+    return open_regular(Path(path), flags)
 
 
 def temporary_name(path: Path) -> Path:
@@ -45,18 +78,30 @@ def write_synced(path: Path, content: bytes, place: Path | None = None) -> None:
     """Write a new file whose bytes, but not yet whose name, are on the disk.  `place` is for messages."""
     with naming(place or path):
         try:
-            with open(path, "wb", buffering=0) as file:
+            with open(path, "wb", buffering=0, opener=plainly) as file:
                 write_all(file.fileno(), content)
-                os.fsync(file.fileno())
+                sync(file.fileno())
         except OSError:
             _discard(path)
             raise
 
 
+def sync(descriptor: int) -> None:
+    """On return the bytes of a file, or the names in a folder, are on the disk.
+
+    The fsync of macOS leaves them in the memory of the drive; its F_FULLFSYNC does not, where the volume knows it.
+    """
+    if _FULL_SYNC is not None:
+        with suppress(OSError):
+            fcntl.fcntl(descriptor, _FULL_SYNC)
+            return
+    os.fsync(descriptor)
+
+
 def sync_file(path: Path) -> None:
     """On return the bytes of `path` are on the disk."""
-    with naming(path), open(path, "r+b", buffering=0) as file:
-        os.fsync(file.fileno())
+    with naming(path), open(path, "r+b", buffering=0, opener=plainly) as file:
+        sync(file.fileno())
 
 
 def publish(temporary: Path, path: Path) -> None:
@@ -99,12 +144,29 @@ def sync_folder(path: Path) -> None:
     with naming(path):
         descriptor = os.open(path, os.O_RDONLY)
         try:
-            os.fsync(descriptor)
+            sync(descriptor)
         finally:
             os.close(descriptor)
 
 
-def read_file(path: Path) -> bytes:
-    """The whole content of `path`."""
+def read_file(path: Path, most: int | None = None) -> bytes:
+    """The content of the regular file `path`, or its first `most` bytes."""
     with naming(path):
-        return path.read_bytes()
+        descriptor = open_regular(path, os.O_RDONLY)
+        try:
+            length = -1 if most is None else min(most, os.fstat(descriptor).st_size)
+            with open(descriptor, "rb", closefd=False) as file:
+                return file.read(length)
+        finally:
+            os.close(descriptor)
+
+
+def read_inside(folder: Path, name: str, most: int | None = None) -> bytes:
+    """The content of the file `name` of a directory, or its first `most` bytes.
+
+    name : relative to `folder`, with slashes.  StoreError if it lies elsewhere, be it by a symbolic link on the way.
+    """
+    with naming(folder / name):
+        if os.path.realpath(folder / name) != os.path.join(os.path.realpath(folder), *name.split("/")):
+            raise StoreError(f"{folder / name}: lies outside the directory, or {_LINK}")
+    return read_file(folder / name, most)

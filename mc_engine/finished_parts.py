@@ -1,7 +1,7 @@
 """Parts that workers had finished when their run was killed, before it came to count them.
 
-Such a part stands under a temporary name that ends in its SHA-256, or has its own name already and a receipt beside it.
-Where its bytes have their digest it is whole, and its cases need not be flown again.
+Such a part stands under a temporary name that ends in half its SHA-256, or has its own name already and a receipt
+beside it.  Where its bytes have their digest it is whole, and its cases need not be flown again.
 """
 
 import json
@@ -17,13 +17,15 @@ from typing import TYPE_CHECKING
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mc_engine.durable_file import read_file, sync_file, write_all
-from mc_engine.parts import Part, Written, is_part_file
+from mc_engine.durable_file import plainly, read_file, sync_file, write_all
+from mc_engine.errors import StoreError
+from mc_engine.parts import Part, Written, cases_in_name
+from mc_engine.receipts import receipt_of
 
 if TYPE_CHECKING:
     from mc_engine.store import Store
 
-_ASIDE = re.compile(r"\.(part-(\d+)-\d+\.parquet)\.[0-9a-f]{32}\.([0-9a-f]{64})\.tmp")
+_ASIDE = re.compile(r"\.(part-[^/]*\.parquet)\.[0-9a-f]{8}\.([0-9a-f]{32})\.tmp")
 
 
 _RECEIPT = "cases/.receipt.tmp"
@@ -34,7 +36,7 @@ def leave_receipt(run: Path, part: Part) -> None:
 
     Not synced, and not missed where the disk refuses: it saves a part after a kill, and nothing rests on it.
     """
-    with suppress(OSError), open(run / _RECEIPT, "wb", buffering=0) as file:
+    with suppress(OSError, StoreError), open(run / _RECEIPT, "wb", buffering=0, opener=plainly) as file:
         write_all(file.fileno(), json.dumps(asdict(part)).encode())
 
 
@@ -49,29 +51,38 @@ def count_finished(store: "Store") -> None:
 def finished_parts(run: Path) -> Iterator[Written]:
     """What is whole among the parts of `run` that it did not come to count; their bytes are on the disk."""
     noted = _noted(run)  # first: to commit a part writes another receipt
-    if noted is not None and is_part_file(noted.file) and (run / noted.file).exists():
-        part = _whole(run / noted.file, noted.file, noted.first, noted.sha256)
-        if part is not None:
-            yield Written(part, part.file)
+    if noted is not None and (part := _whole(run, noted.file, noted.file, noted.sha256)):
+        yield Written(part, part.file)
     for path in sorted((run / "cases").iterdir()):
         match = _ASIDE.fullmatch(path.name)
-        if match is not None and (part := _whole(path, f"cases/{match[1]}", int(match[2]), match[3])):
+        if match is not None and (part := _whole(run, f"cases/{path.name}", f"cases/{match[1]}", match[2])):
             yield Written(part, f"cases/{path.name}")
 
 
 def _noted(run: Path) -> Part | None:
     """The part of the last receipt; None if there is none, or it was cut off while it was written."""
     try:
-        return Part(**json.loads((run / _RECEIPT).read_bytes()))
-    except (OSError, ValueError, TypeError):
+        return receipt_of(json.loads(read_file(run / _RECEIPT)))
+    except (StoreError, ValueError, RecursionError):
         return None
 
 
-def _whole(path: Path, file: str, first: int, digest: str) -> Part | None:
-    """The receipt of the part in `path`; None if it was killed, or cut off, while it was written."""
+def _whole(run: Path, place: str, file: str, digest: str) -> Part | None:
+    """The receipt of the part `file`, which lies in `place`; None if it was killed, or cut off, while it was written.
+
+    digest : its SHA-256, or the beginning of it.
+    """
+    path, cases = run / place, cases_in_name(file)
+    if cases is None or path.is_symlink() or not path.is_file():
+        return None
     content = read_file(path)
-    if sha256(content).hexdigest() != digest:
+    ours = sha256(content).hexdigest()
+    if not ours.startswith(digest):
         return None
     sync_file(path)
-    status = pq.read_table(pa.BufferReader(content), columns=["status"], use_threads=False)["status"].to_pylist()
-    return Part(file, first, len(status), len(content), digest, dict(sorted(Counter(status).items())))
+    try:
+        status = pq.read_table(pa.BufferReader(content), columns=["status"], use_threads=False)["status"].to_pylist()
+        facts = {"file": file, "first": cases[0], "rows": len(status), "bytes": len(content), "sha256": ours}
+        return receipt_of({**facts, "status": dict(sorted(Counter(status).items()))})
+    except (pa.ArrowException, OSError, KeyError, ValueError):
+        return None

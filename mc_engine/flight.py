@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,15 +10,20 @@ from typing import Any
 import numpy as np
 
 from mc_engine.case_columns import END_TIME
+from mc_engine.errors import ModelError
 from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.kernel_parts import settings_class
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.noise import noise_key
 from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model import AdaptiveStep, FixedStep, Model, Refusals
+from mc_engine.physics_source import place_of
+from mc_engine.physics_trial import refuse_unfit
 from mc_engine.status import OK, REFUSED, STATUS_NAME
+from mc_engine.suggestions import hint
 
 Inputs = Mapping[str, Any]
+_MOST_STEPS = 10**10  # of a flight: hours of one core
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
 
@@ -55,10 +60,32 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
         words = SimpleNamespace(**{setting.symbol: settings[:, i] for i, setting in enumerate(model.settings)})
         with np.errstate(all="ignore"):  # refused cases may divide by zero on their way
             columns = model.prepare(si, words, refusals)
+    if not isinstance(columns, Mapping):
+        raise ModelError(f"{_design(model)} gives {type(columns).__name__}; it must return a dictionary of arrays by "
+                         "the fields of kernel_parameters")  # fmt: skip
     names = model.kernel_parameters._fields  # type: ignore[attr-defined]
-    rows = [np.broadcast_to(np.asarray(columns[name], dtype=np.float64), n_cases) for name in names]
+    rows = [_row(model, columns, name, n_cases) for name in names]
     tables = np.asarray(columns.get(TABLES, np.empty(0)), dtype=np.float64).ravel()
     return Prepared(np.array(rows).reshape(len(names), n_cases), settings, refusals, tables)
+
+
+def _row(model: Model, columns: Mapping[str, Any], name: str, n_cases: int) -> np.ndarray:
+    """One kernel parameter of all cases; ModelError if the design does not give it."""
+    if name not in columns:
+        source = (
+            f"{_design(model)} does not give it" if model.prepare else "no parameter has this name without its unit"
+        )
+        raise ModelError(f'kernel_parameters has the field "{name}", but {source}{hint(name, columns)}')
+    try:
+        return np.broadcast_to(np.asarray(columns[name], dtype=np.float64), n_cases)
+    except (ValueError, TypeError):
+        what = f"shape {np.shape(columns[name])}" if np.ndim(columns[name]) else type(columns[name]).__name__
+        raise ModelError(f'{_design(model)} gives "{name}" as {what}; it must be a number for each of {n_cases} '
+                         "cases") from None  # fmt: skip
+
+
+def _design(model: Model) -> str:
+    return f"{place_of(model.prepare)}: `prepare`" if model.prepare else "the model"
 
 
 def _codes(setting: Any, values: Any, n_cases: int) -> np.ndarray:
@@ -142,16 +169,22 @@ def _kernel_settings(model: Model, codes: np.ndarray, tables: np.ndarray) -> np.
 
 def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
     """(n_steps, step [s], control_every) of one flight; the last step is the one that reaches `until`."""
-    step = _number(clock.step, settings)
+    step, until, every = (_number(one, settings) for one in (clock.step, clock.until, clock.control_every))
+    if not (step > 0.0 and 0.0 < until <= _MOST_STEPS * step and every >= 1.0):
+        raise ModelError(f"the clock has steps of {step:g} s until {until:g} s, control every {every:g} steps; all "
+                         f"must be above 0, with no more than {_MOST_STEPS:,} steps")  # fmt: skip
     # a hair under the quotient, so that 300 s in steps of 0.01 s are 30 000 steps, not 30 001
-    n_steps = max(1, int(np.ceil(_number(clock.until, settings) / step - 1e-9)))
-    return n_steps, step, int(_number(clock.control_every, settings))
+    n_steps = max(1, int(np.ceil(until / step - 1e-9)))
+    return n_steps, step, int(every)
 
 
 def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tuple[np.ndarray, ...]:
     """Tables of the pair, clock and absolute tolerances, as the adaptive kernels take them."""
     pair = PAIRS[clock.method]
     numbers = [_number(one, settings) for one in (clock.until, clock.rtol, clock.control_period)]
+    if not all(number > 0.0 for number in numbers):
+        raise ModelError("the clock has until = {:g} s, rtol = {:g}, control_period = {:g} s; all must be above 0"
+                         .format(*numbers))  # fmt: skip
     numbers += [float(clock.attempts), clock.first_step, float(pair.order)]
     return *pair.tables(), np.array(numbers), np.array(np.broadcast_to(clock.atol, len(model.states)), dtype=np.float64)
 
@@ -189,20 +222,55 @@ def _call(
     history: np.ndarray,
     pace: float,
 ) -> int:
-    """Call the kernel.
+    """Call the kernel; see `_bound_kernel`."""
+    return _bound_kernel(model, folder, width, inputs, seed, case_ids, out, history, pace)()
+
+
+def _bound_kernel(
+    model: Model,
+    folder: Path | None,
+    width: int,
+    inputs: tuple[np.ndarray, np.ndarray, np.ndarray],
+    seed: int,
+    case_ids: np.ndarray,
+    out: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+    history: np.ndarray,
+    pace: float,
+) -> Callable[[], int]:
+    """The kernel with all its arguments.
 
     inputs : parameters [n_kernel_parameters, n], setting codes, tables of the cases
     pace : distance of two history rows, in steps or, if the steps are adaptive, seconds
     """
-    kernel = build_kernel(model, folder, width)
     parameters, settings, tables = inputs
+    refuse_unfit(model, parameters, settings_of(model, settings))
+    kernel = build_kernel(model, folder, width)
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
     kernel_settings = _kernel_settings(model, settings, tables)
     shared = np.ascontiguousarray(parameters), kernel_settings, np.uint64(noise_key(seed)), cases
     chosen = settings_of(model, settings)
     if isinstance(model.clock, AdaptiveStep):
-        return kernel(*shared, *adaptive_arguments(model, model.clock, chosen), *out, history, float(pace))
-    return kernel(*shared, *grid_of(model.clock, chosen), *out, history, int(pace))
+        return partial(kernel, *shared, *adaptive_arguments(model, model.clock, chosen), *out, history, float(pace))
+    return partial(kernel, *shared, *grid_of(model.clock, chosen), *out, history, int(pace))
+
+
+def bound_flight(
+    model: Model, inputs: Inputs, case_ids: np.ndarray, seed: int, *, folder: Path | None = None, width: int
+) -> tuple[Callable[[], int], np.ndarray, np.ndarray]:
+    """(function that flies by the kernel alone, its end times [s], its setting codes): what a speed is measured on.
+
+    Of the cases that can start, those flown have the settings of the first, and are a whole number of `width`.
+    Raises ModelError with the reason if no case can start.
+    """
+    ready = prepare(model, inputs, len(case_ids))
+    groups = _groups(ready)
+    if not groups:
+        raise ModelError(f"no case can start: {ready.refusals.reason[0]}")
+    chosen = np.resize(groups[0], -(-groups[0].size // width) * width)
+    out = _outputs(model, chosen.size)
+    settings = np.ascontiguousarray(ready.settings[chosen[0]])
+    cases = ready.parameters[:, chosen], settings, ready.tables
+    return _bound_kernel(model, folder, width, cases, seed, case_ids[chosen], out, _NO_HISTORY, 1.0), out[0], settings
 
 
 def fly_history(

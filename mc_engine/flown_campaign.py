@@ -19,6 +19,9 @@ def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
     """
     store.check_companions()
     recorded = store.manifest["campaign"]
+    known = {*store.manifest, *store.manifest.get("model", {}), *recorded}
+    if not {"seed_contract", "digest", "sampling_digest", "design", "seed"} <= known:
+        raise StoreError(f"{store.path}: its manifest does not say how the campaign was flown; run the campaign anew")
     cases = store.n_cases if recorded["design"] in ("lhs", *EXTENSIBLE) else None
     campaign = load_campaign(
         recorded["name"],

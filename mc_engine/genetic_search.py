@@ -10,6 +10,7 @@ import numpy as np
 
 from mc_engine.candidates import Scores
 from mc_engine.errors import EngineError
+from mc_engine.extras import how_to_install
 from mc_engine.tuning_parts import Tuning
 
 _WORST = 1e30  # stands for an objective without a number; such a candidate is infeasible anyway
@@ -71,6 +72,6 @@ def _pymoo() -> dict[str, Any]:
     except ModuleNotFoundError as error:
         if (error.name or "").split(".")[0] != "pymoo":
             raise
-        raise EngineError("tuning needs pymoo, which is not installed; `pip install 'mc-engine[tune]'`") from None
+        raise EngineError(f"tuning needs pymoo, which is not installed; {how_to_install('tune')}") from None
     names = (NSGA2, Evaluator, Problem, SBX, PM, LHS, StaticProblem)
     return {one.__name__: one for one in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}

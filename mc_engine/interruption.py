@@ -1,14 +1,115 @@
-"""Stopping a run from outside: the first Ctrl-C (or SIGTERM) lets what is in flight land, the second breaks off."""
+"""Stopping from outside, by Ctrl-C or SIGTERM.
 
+While cases fly, the first signal lets what is in flight land, the second breaks off.  At all other times of the command
+line the first one ends what it is at, the second one the process, whatever it does.  Either way the exit status is
+INTERRUPTED, and the last words are the command that goes on.  This module loads next to nothing: the command line
+listens before it loads the rest of itself.
+"""
+
+import atexit
+import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import FrameType
 from typing import Any
 
+INTERRUPTED = 4  # the exit status
+NOTHING_BEGUN = "interrupted; nothing was begun, and the same command begins it"
+ONCE_MORE = "interrupted; the same command does it all once more"
+
 # Windows has Ctrl-Break beside Ctrl-C, and SIGTERM in name only.
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name))
+
+
+class Interrupted(KeyboardInterrupt):
+    """What a signal raises.
+
+    Of a kind of its own: Python remembers a plain KeyboardInterrupt that passes through `exec`, as in the making of a
+    dataclass, and would end the process by SIGINT at the end of all, whatever its exit status.
+    """
+
+
+Advice = Callable[[], str]
+
+
+@dataclass
+class _CommandLine:
+    """What the signals of this process find: there is one set of handlers in a process, and so one of these.
+
+    heard : how many came.  under_way : a verb is at work, which an exception may unwind.  done : it has ended.
+    """
+
+    listening: bool = False
+    heard: int = 0
+    under_way: bool = False
+    done: bool = False
+    advice: Advice = lambda: NOTHING_BEGUN
+
+    def hear(self, number: int, frame: FrameType | None) -> None:
+        self.heard += 1
+        if self.heard > 1:
+            self.leave_at_once()
+        if self.done:
+            return  # all was said and written; leaving takes a moment
+        if self.under_way:
+            raise Interrupted
+        self.leave_at_once()
+
+    def leave_at_once(self) -> None:
+        # not through sys.stderr, in the middle of whose writing the signal may have come
+        os.write(2, f"{last_words()}\n".encode())
+        os._exit(INTERRUPTED)
+
+
+_COMMAND_LINE = _CommandLine()
+
+
+def listen() -> None:
+    """From here on the signals of this process are those of its command line."""
+    _COMMAND_LINE.listening = True
+    for number in SIGNALS:
+        signal.signal(number, _COMMAND_LINE.hear)
+    atexit.register(_be_deaf)  # the first one registered is the last one called
+
+
+def _be_deaf() -> None:
+    """What comes while the interpreter is taken down must not turn the exit status of work that is done."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
+@contextmanager
+def under_way() -> Iterator[None]:
+    """A verb is at work: the first signal raises KeyboardInterrupt in it."""
+    _COMMAND_LINE.advice = lambda: ONCE_MORE
+    try:
+        _COMMAND_LINE.under_way = True
+        yield
+    finally:
+        _COMMAND_LINE.under_way = False
+        _COMMAND_LINE.done = True
+
+
+def advise(advice: Advice) -> None:
+    """What the verb would say from here on, if it were interrupted."""
+    _COMMAND_LINE.advice = advice
+
+
+def last_words() -> str:
+    """The sentence to leave with after an interruption."""
+    try:
+        return _COMMAND_LINE.advice()
+    except Exception:  # in a process that was stopped in the middle of anything, with its folders in any state
+        return ONCE_MORE
+
+
+def heed() -> None:
+    """Raise KeyboardInterrupt if a signal came that nobody has heeded: after the last case, or lost in a callback."""
+    if _COMMAND_LINE.heard:
+        raise Interrupted
 
 
 @contextmanager
@@ -23,11 +124,15 @@ def stop_signal() -> Iterator[threading.Event]:
         return
 
     def ask(number: int, frame: FrameType | None) -> None:
+        if _COMMAND_LINE.listening:
+            _COMMAND_LINE.heard += 1
         if stop.is_set():
-            raise KeyboardInterrupt
+            raise Interrupted
         stop.set()
 
     before: dict[int, Any] = {number: signal.signal(number, ask) for number in SIGNALS}
+    if _COMMAND_LINE.heard:  # before there was this event to set
+        stop.set()
     try:
         yield stop
     finally:

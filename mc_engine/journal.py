@@ -6,16 +6,16 @@ readers ignore it and the next writer cuts it off.  Any other damaged line is re
 """
 
 import json
-import os
 import re
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import naming, read_file, write_all
+from mc_engine.durable_file import naming, plainly, read_file, sync, write_all
 from mc_engine.errors import StoreError
 
 _TAIL = re.compile(rb',"crc":"([0-9a-f]{8})"}')
@@ -62,9 +62,10 @@ def decode(line: bytes, number: int) -> Entry | None:
         facts = json.loads(body + b"}")
         if facts.pop("n") != number:
             return None
-        return Entry(number, facts.pop("at"), facts.pop("event"), facts)
-    except (ValueError, KeyError, AttributeError):
+        at, event = facts.pop("at"), facts.pop("event")
+    except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
         return None  # a checksum that holds over something that is no event
+    return Entry(number, at, event, facts) if isinstance(at, str) and isinstance(event, str) else None
 
 
 def scan(content: bytes) -> Scan:
@@ -92,36 +93,44 @@ class Journal:
         found = scan(read_file(path))
         if found.damaged:
             number = found.damaged[0]
-            way_out = f"; `mc-engine resume --repair {path.parent}` drops it and flies again what it told of"
-            raise StoreError(
-                f"{path}, line {number}: damaged, its checksum or its number does not hold{way_out * (number > 1)}"
-            )
+            raise damaged_line(path, number, "its checksum or its number does not hold")
         self.entries = list(found.entries)
         self.torn = found.torn
         self.certain = True  # False from an append that failed on: the file may hold a line that is not in `entries`
         self._length = found.length
 
-    def append(self, event: str, facts: dict[str, Any]) -> Entry:
-        """Write and sync one line.  After an error the line does not count and `append` may be tried again."""
+    def append(self, event: str, facts: dict[str, Any], judge: Callable[[Entry], None] | None = None) -> Entry:
+        """Write and sync one line.  After an error the line does not count and `append` may be tried again.
+
+        judge : called with the line's entry before it is written, to raise where it must not be.
+        """
         number = len(self.entries) + 1
         line = encode(number, utc_now(), event, facts)
+        entry = decode(line[:-1], number)
+        assert entry is not None  # just encoded
+        if judge is not None:
+            judge(entry)
         self.certain = False
-        with naming(self.path), open(self.path, "r+b", buffering=0) as file:
+        with naming(self.path), open(self.path, "r+b", buffering=0, opener=plainly) as file:
             file.truncate(self._length)  # a torn line, here or of an append that failed
             file.seek(self._length)
             try:
                 write_all(file.fileno(), line)
-                os.fsync(file.fileno())
+                sync(file.fileno())
             except OSError:
                 with suppress(OSError):  # a whole line whose sync failed must not count for the next reader
                     file.truncate(self._length)
                 raise
-        entry = decode(line[:-1], number)
-        assert entry is not None  # just encoded
         self._length += len(line)
         self.entries.append(entry)
         self.torn, self.certain = False, True
         return entry
+
+
+def damaged_line(path: Path, number: int, why: str) -> StoreError:
+    """What to raise of a line that cannot be trusted, with the way out where there is one."""
+    way_out = f"; `mc-engine resume --repair {path.parent}` drops it and flies again what it told of"
+    return StoreError(f"{path}, line {number}: damaged, {why}{way_out * (number > 1)}")
 
 
 def utc_now() -> str:

@@ -8,20 +8,20 @@ from typing import Any, NamedTuple
 from mc_engine.event_watch import watching_events
 from mc_engine.lanes import physics
 from mc_engine.lanes.functions import TABLES
-from mc_engine.model import AdaptiveStep, Extremum, Model, load_model
+from mc_engine.model import DIRECTIONS, AdaptiveStep, Extremum, Model, load_model
 
 # The physics of a model, and intrinsics that pick or fill fields of tuples:
 # peaks_of, lasts_of : from the quantities, the values of which peaks and last times above zero are wanted
 # best_of, when_of : the model's extrema, from what the loop tracked;  smooth_of, kinds_of, signs_of : constants
+# states_of, metrics_of : refuse to be compiled for another number of fields than the model declares
 # stops_of, switches_of : whether an event fired that ends the case, or that calls `switch`
 Functions = namedtuple(
     "Functions",
     "initial start rhs control events switch observe evaluate peaks_of lasts_of best_of when_of smooth_of kinds_of "
-    "signs_of stops_of switches_of",
+    "signs_of stops_of switches_of states_of metrics_of",
 )
 NoMemory = namedtuple("NoMemory", "unused")
 NoEvents = namedtuple("NoEvents", "unused")
-DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}
 
 
 @physics
@@ -81,7 +81,7 @@ def parts_of(reference: str, folder: str | None, watching: bool) -> Parts:
 
 def _picks(model: Model) -> list[Any]:
     from mc_engine.lanes.adaptive_step import CORNER, EVENT, LAST, PEAK
-    from mc_engine.lanes.tuples import any_of, directions, picker
+    from mc_engine.lanes.tuples import any_of, counted, directions, picker
 
     names = [quantity.name for quantity in model.quantities]
     peaks = [e for e in model.extrema if e.kind in ("max", "min")]
@@ -99,8 +99,8 @@ def _picks(model: Model) -> list[Any]:
         signs += [-1.0] * (len(kinds) - n_events)
     actions = [event.action for event in model.event_list]
     return [
-        picker(None, peak_picks),
-        picker(None, last_picks),
+        picker(None, peak_picks, len(names)),
+        picker(None, last_picks, len(names)),
         picker(best_class, best_picks),
         picker(best_class, [(i, 1.0, 0.0) for i, _, _ in best_picks]),
         directions(smooth),
@@ -108,6 +108,8 @@ def _picks(model: Model) -> list[Any]:
         directions(signs),
         any_of([i for i, action in enumerate(actions) if action == "stop"]),
         any_of([i for i, action in enumerate(actions) if action == "switch"]),
+        counted("initial", len(model.states)),
+        counted("evaluate", len(model.metrics)),
     ]
 
 

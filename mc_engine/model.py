@@ -8,6 +8,7 @@ Inside physics everything is SI and radians and a parameter loses its unit suffi
 `inclination`, in radians); outside, every column has the unit its field declares.
 """
 
+import ast
 import importlib
 import importlib.util
 import re
@@ -16,6 +17,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from hashlib import sha256
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -26,10 +28,10 @@ from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
 from mc_engine.model_faults import place_in_model
-from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_suffix
 
 Number = float | np.ndarray
+DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}  # of events, and their signs
 _USER = "mc_engine_user_"  # names of the modules that come from files
 
 
@@ -37,7 +39,7 @@ _USER = "mc_engine_user_"  # names of the modules that come from files
 class Field:
     """A named number: column name ending in its unit, the unit, a one-line meaning.
 
-    sometimes : a metric that exists only with some settings; `check` does not miss it.
+    sometimes : a metric that exists, or differs, only with some settings; `check` does not miss it.
     """
 
     name: str
@@ -208,23 +210,9 @@ class Model:
     reference: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
-        inputs: tuple[Field, ...] = (*self.parameters, *self.settings)
-        for one in (*inputs, *self.states, *self.quantities, *self.metrics):
-            if one.unit not in UNITS:
-                raise ModelError(f'"{one.name}" has the unit "{one.unit}"{hint(one.unit, UNITS)}')
-        outputs: tuple[Field, ...] = (*self.metrics, *(Field(f"end_{one.name}", "", "") for one in self.states))
-        _refuse_twice("input", [one.symbol for one in inputs])
-        _refuse_twice("column", [one.name for one in (*inputs, *outputs)])
-        _refuse_twice("quantity", [one.name for one in self.quantities])
-        _refuse_twice("extremum", [one.name for one in self.extrema])
-        known = {one.name for one in self.quantities}
-        for extremum in self.extrema:
-            if extremum.quantity not in known:
-                raise ModelError(f'extremum "{extremum.name}": there is no quantity "{extremum.quantity}"')
-        if self.event_list and self.events is None:
-            raise ModelError("event_list names events, but the model has no function `events`")
-        if any(event.action == "switch" for event in self.event_list) and self.switch is None:
-            raise ModelError('an event has action = "switch", but the model has no function `switch`')
+        from mc_engine.model_rules import refuse_contradictions  # which knows the records of this file
+
+        refuse_contradictions(self)
 
     def input(self, name: str) -> Parameter | Setting:
         """The parameter or setting called `name`; KeyError if the model has none."""
@@ -233,13 +221,6 @@ class Model:
             if item.name == name:
                 return item
         raise KeyError(name)
-
-
-def _refuse_twice(what: str, names: list[str]) -> None:
-    """ModelError if a name occurs twice; inputs are compared by their names inside SI code, without unit."""
-    for name in names:
-        if names.count(name) > 1:
-            raise ModelError(f'two {what}s of the model are called "{name}"; give each a name of its own')
 
 
 @dataclass
@@ -276,16 +257,49 @@ def load_model(reference: str, beside: Path | None = None) -> Model:
 
 
 def _module(reference: str) -> ModuleType:
+    """Import an installed module, if it is there and its source defines MODEL: a campaign file names no other code."""
     if not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", reference):
         raise ModelError(f'"{reference}" is neither a module such as "campaigns.deorbit" nor a .py file')
+    if reference.split(".")[0] in sys.stdlib_module_names:
+        raise ModelError(f'"{reference}" is a module of Python itself; a file beside the campaign ends in .py')
+    spec = _spec(reference)
+    if spec is None:
+        raise ModelError(f'there is no module "{reference}"; a file beside the campaign ends in .py')
+    if not _defines_model(spec):
+        raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
     try:
         return importlib.import_module(reference)
     except ModuleNotFoundError as error:
-        if error.name and reference.startswith(error.name):
-            raise ModelError(f'there is no module "{reference}"; a file beside the campaign ends in .py') from None
         raise ModelError(f'"{reference}" needs the package "{error.name}", which is not installed') from None
     except (Exception, SystemExit) as error:
         raise ModelError(_fault(reference, error)) from error
+
+
+def _spec(reference: str) -> ModuleSpec | None:
+    """Where a module is, None if nowhere.  Nothing is imported, not even the packages that it is in."""
+    top, *inner = reference.split(".")
+    found = (finder.find_spec(top, None) for finder in sys.meta_path if hasattr(finder, "find_spec"))
+    spec = next((one for one in found if one is not None), None)
+    for name in inner:
+        if spec is None or spec.submodule_search_locations is None:
+            return None  # a module that is no package has nothing in it
+        # without the names of its packages: a namespace package asks for the import of those that it is in
+        spec = PathFinder.find_spec(name, list(spec.submodule_search_locations))
+    return spec
+
+
+def _defines_model(spec: ModuleSpec) -> bool:
+    """Whether the source of a module gives the name MODEL a value; true where it cannot be read, for the import to
+    say why."""
+    if not spec.has_location or spec.origin is None or not spec.origin.endswith(".py"):
+        return False
+    try:
+        tree = ast.parse(Path(spec.origin).read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return True
+    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    names |= {node.asname or node.name for node in ast.walk(tree) if isinstance(node, ast.alias)}
+    return "MODEL" in names
 
 
 def _model_path(reference: str, beside: Path | None) -> Path:
@@ -342,5 +356,7 @@ def _fault(reference: str, error: BaseException) -> str:
         return f"{place}: ends the program; a model only defines MODEL"
     if isinstance(error, ModelError):
         return f"{place}: {error}"
+    if word := re.fullmatch(r"Type names and field names cannot be a keyword: '(\w+)'", str(error)):
+        return f'{place}: the name "{word[1]}" is a word of Python; take another'
     text = error.msg if isinstance(error, SyntaxError) else str(error)
     return f"{place}: {type(error).__name__}: {text}"

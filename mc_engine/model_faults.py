@@ -1,6 +1,7 @@
 """What is wrong with a model that cannot be compiled or flown, in a sentence with its place."""
 
 import re
+import sysconfig
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -8,38 +9,77 @@ from traceback import extract_tb
 
 from mc_engine.errors import EngineError, ModelError
 
+MORE = "; `mc-engine check` tells more"
+_ENGINE = Path(__file__).resolve().parent
+_PYTHON = Path(sysconfig.get_path("stdlib")).resolve()
+_LANES = "physics uses the functions of mc_engine.lanes"
+# The compiler's words, and what to do about them.
+_CAUSES = (
+    (r"function Function\(<class '(?:bool|range)'>\)", "`if`, `and`, `or`, `not` or a loop's length on a number that "
+     "differs from case to case; use where(condition, a, b)"),
+    (r"function Function\(<built-in function i?(?:add|sub|mul|truediv)>\)", "arithmetic on a truth value or a tuple; "
+     "write where(condition, 1.0, 0.0)"),
+    (r"function Function\(<built-in function i?pow>\)", "`**` takes a whole number that is written out; other powers "
+     "are pow(x, y) of mc_engine.lanes"),
+    (r"function Function\(<(?:built-in function|ufunc|class) '?(\w+)'?>\)", f"`{{0}}` takes no lanes; {_LANES}"),
+    (r"Untyped global name '(\w+)'.*<class 'function'>", "`{0}` is not marked; write @physics on the line above it"),
+    (r"Untyped global name '(\w+)'|assigned to variable '(\w+)' in globals", "`{0}` is nothing that physics can read; "
+     "it reads numbers, tuples and marked functions"),
+    (r"Unknown attribute '(\w+)' of type Module", f"`{{0}}` is a module's own; {_LANES}"),
+    (r"opcode \((?:STORE|DELETE)_GLOBAL\)", "`global` in physics; what changes is kept in the state or in the memory"),
+    (r"NRT required", "an array, a list or a text is made in physics; keep numbers in named tuples instead"),
+)  # fmt: skip
+
 
 @contextmanager
-def naming_faults(reference: str, what: str) -> Iterator[None]:
-    """Turn any error of the model's own code into a ModelError that names the model and what was being done."""
+def naming_faults(reference: str, what: str, more: str = MORE) -> Iterator[None]:
+    """Turn any error of the model's own code into a ModelError that says where it is and what was being done.
+
+    more : how the sentence ends.
+    """
     try:
         yield
     except EngineError:
         raise
+    except SystemExit as error:  # in a thread it would end the thread alone, which is then waited for
+        raise ModelError(f"{reference}: {what} cannot be flown: the model ends its process{more}") from error
     except Exception as error:
-        raise ModelError(f"{reference}: {what} cannot be flown: {_sentence(error)}") from error
+        spot, cause = _place_and_cause(error)
+        text = f"{what} cannot be flown: {spot}: {cause}" if spot else f"{reference}: {what} cannot be flown: {cause}"
+        raise ModelError(f"{text}{more}") from error
+
+
+def fault_of(error: Exception, reference: str) -> str:
+    """The error of a model's own code in one line, with its place."""
+    spot, cause = _place_and_cause(error)
+    return f"{spot or reference}: {cause}"
 
 
 def place_in_model(error: BaseException) -> str:
     """Such as "model.py, line 12": the last place outside the engine and the libraries that the error came through."""
-    engine = Path(__file__).parent
     for frame in reversed(extract_tb(error.__traceback__)):
         path = Path(frame.filename)
-        if engine not in path.parents and "site-packages" not in path.parts and path.suffix == ".py":
-            return "" if "importlib" in path.parts else f"{path.name}, line {frame.lineno}"
+        if path.suffix == ".py" and _is_the_users(path):
+            return f"{path.name}, line {frame.lineno}"
     return ""
 
 
-def _sentence(error: Exception) -> str:
-    """The error in one line; of the compiler's pages only the cause, the place and what to use instead."""
+def _is_the_users(path: Path) -> bool:
+    path = path.resolve()
+    libraries = {_ENGINE, _PYTHON} & set(path.parents) or "site-packages" in path.parts
+    return not libraries and not path.name.startswith("kernel_w")
+
+
+def _place_and_cause(error: Exception) -> tuple[str, str]:
+    """(place, or nothing; the error in one line): of the compiler's pages only the cause and what to do instead."""
     if not type(error).__module__.startswith("numba"):
-        spot = place_in_model(error)
-        return f"{spot}: {type(error).__name__}: {error}" if spot else f"{type(error).__name__}: {error}"
+        return place_in_model(error), f"{type(error).__name__}: {error}"
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]  # without colours
     cause = next((line for line in lines if line and not line.startswith("Failed in")), type(error).__name__)
-    place = next((match for line in lines if (match := re.match(r'File "([^"]+)", line (\d+)', line))), None)
-    where = f"{place[1].replace(chr(92), '/').split('/')[-1]}, line {place[2]}: " if place else ""
-    unknown = re.search(r"function Function\(<(?:built-in function|ufunc) '?(\w+)'?>\)", cause)
-    if unknown:
-        cause = f"`{unknown[1]}` takes no lanes; physics uses the functions of mc_engine.lanes"
-    return f"{where}{cause}"
+    places = [match for line in lines if (match := re.match(r'File "([^"]+)", line (\d+)', line))]
+    own = [match for match in places if _is_the_users(Path(match[1].replace("\\", "/")))]
+    spot = f"{Path(own[0][1].replace(chr(92), '/')).name}, line {own[0][2]}" if own else ""
+    for pattern, meaning in _CAUSES:
+        if match := re.search(pattern, cause):
+            return spot, meaning.format(*[group for group in match.groups() if group] or [""])
+    return spot, cause

@@ -9,6 +9,7 @@ from the environment, as fsspec and the packages below it read them.
 
 import atexit
 import json
+import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -18,11 +19,13 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import is_temporary, make_folder, read_file, write_durably
+from mc_engine.durable_file import is_temporary, make_folder, naming, read_file, sync_folder, write_durably
 from mc_engine.errors import EngineError, StoreError
+from mc_engine.extras import how_to_install
 from mc_engine.journal import Entry, Scan, scan
-from mc_engine.receipts import counted_nominal, counted_parts, history_receipts
-from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, is_part_file, is_run_directory
+from mc_engine.parts import PART_FOLDERS, is_part_file
+from mc_engine.receipts import receipts_of
+from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, is_run_directory
 from mc_engine.writer_lock import LOCK_NAME
 
 
@@ -76,9 +79,28 @@ def publish(run: Path, url: str) -> Publication:
 
 
 def fetch(url: str, folder: Path) -> Path:
-    """Copy the run at `url` to the new directory `folder`, with its reports; every part is held against the journal."""
+    """Copy the run at `url` to the new directory `folder`, with its reports; every part is held against the journal.
+
+    The copy has another name until it is whole, so that one that failed, or was cut short, leaves nothing in the way.
+    """
     if folder.exists() and any(folder.iterdir()):
         raise StoreError(f"{folder}: is not empty; choose another folder")
+    make_folder(folder.parent)
+    with naming(folder):
+        scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".tmp", dir=folder.parent))
+    try:
+        _copy(url, scratch / "run")
+        with naming(folder):
+            if folder.exists():
+                folder.rmdir()
+            os.replace(scratch / "run", folder)
+        sync_folder(folder.parent)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    return folder
+
+
+def _copy(url: str, folder: Path) -> None:
     with _reaching(url):
         remote = _Remote(url)
         journal = remote.journal()
@@ -92,9 +114,8 @@ def fetch(url: str, folder: Path) -> Path:
                 raise StoreError(f"{url}/{name}: damaged, its SHA-256 is not the one in the journal")
             _place(folder, name, content, url)
         _place(folder, JOURNAL, remote.read(JOURNAL)[: journal.length], url)
-    for part_folder in ("cases", "history"):
+    for part_folder in PART_FOLDERS:
         make_folder(folder / part_folder)
-    return folder
 
 
 def fetched(url: str) -> Path:
@@ -117,15 +138,15 @@ def refuse_unreachable(url: str) -> None:
 
 def _counted(entries: tuple[Entry, ...]) -> dict[str, str]:
     """SHA-256 by name of all that a run consists of by its journal, in the order in which it is to be sent."""
-    nominal, created = counted_nominal(entries), entries[0].facts
-    parts = [*counted_parts(entries), *([nominal] if nominal else []), *history_receipts(entries)[-1:]]
+    created = entries[0].facts
     heads = {**created.get("companions", {}), CAMPAIGN: created["campaign"], MANIFEST: created["manifest"]}
-    return {**{part.file: part.sha256 for part in parts}, **heads}
+    return {**{part.file: part.sha256 for part in receipts_of(entries)[0].all_parts()}, **heads}
 
 
 def _others(run: Path, counted: Mapping[str, str]) -> list[str]:
     """Reports and all else that lies in the run directory and is no part, no lock, no file half written."""
-    files = [path.relative_to(run).as_posix() for path in sorted(run.rglob("*")) if path.is_file()]
+    paths = [path for path in sorted(run.rglob("*")) if path.is_file() and not path.is_symlink()]
+    files = [path.relative_to(run).as_posix() for path in paths]
     ours = {*counted, JOURNAL, LOCK_NAME}
     return [name for name in files if name not in ours and not is_part_file(name) and not is_temporary(Path(name).name)]
 
@@ -133,6 +154,8 @@ def _others(run: Path, counted: Mapping[str, str]) -> list[str]:
 def _sound(found: Scan, place: Path | str) -> Scan:
     if found.damaged or not found.entries or found.entries[0].event != "created":
         raise StoreError(f"{place}, line {found.damaged[0] if found.damaged else 1}: damaged")
+    for number, why in receipts_of(found.entries)[1].items():
+        raise StoreError(f"{place}, line {number}: damaged, {why}")
     return found
 
 
@@ -203,6 +226,6 @@ def _reaching(url: str) -> Iterator[None]:
     except EngineError:
         raise
     except ImportError as error:
-        raise StoreError(f"{url}: needs a package: {error}; `pip install mc-engine[cloud]`") from error
+        raise StoreError(f"{url}: needs a package: {error}; {how_to_install('cloud')}") from error
     except Exception as error:  # every store's package has errors of its own
         raise StoreError(f"{url}: {type(error).__name__}: {error}") from error

@@ -19,11 +19,13 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mc_engine.durable_file import read_file, temporary_name, write_durably, write_synced
+from mc_engine.durable_file import read_inside, temporary_name, write_durably, write_synced
 from mc_engine.errors import StoreError
 from mc_engine.status import STATUS_NAME
 
 PART_FOLDERS = ("cases", "history")  # of a run directory
+_CASE_PART = re.compile(r"cases/part-([0-9]{10,18})-([0-9]{10,18})(?:\.r[1-9][0-9]{0,8})?\.parquet")
+_HISTORY_PART = re.compile(r"history/part-[0-9]{5,9}\.parquet")
 ARROW_TYPES = {"number": pa.float64(), "integer": pa.int64(), "word": pa.string(), "switch": pa.bool_()}
 
 
@@ -142,9 +144,22 @@ def parquet_bytes(table: pa.Table) -> bytes:
 
 
 def is_part_file(file: str) -> bool:
-    """True if `file`, relative to the run directory, has the name of a part."""
-    folder, _, name = file.rpartition("/")
-    return folder in PART_FOLDERS and name.startswith("part-") and name.endswith(".parquet")
+    """True if `file`, relative to the run directory, is the name of a part, as the engine gives them."""
+    return is_history_file(file) or cases_in_name(file) is not None
+
+
+def is_history_file(file: str) -> bool:
+    """True if `file`, relative to the run directory, is the name of retained histories."""
+    return _HISTORY_PART.fullmatch(file) is not None
+
+
+def cases_in_name(file: str) -> tuple[int, int] | None:
+    """The cases (first, stop) that a part has by its name, relative to the run; None if it is no name of one."""
+    match = _CASE_PART.fullmatch(file)
+    if match is None:
+        return None
+    first, last = int(match[1]), int(match[2])
+    return (first, last + 1) if file.startswith(f"cases/part-{first:010d}-{last:010d}.") and first <= last else None
 
 
 def part_name(first: int, rows: int) -> str:
@@ -170,15 +185,15 @@ def write_aside(
     """Write one range of cases under a temporary name of its own, for the writer of the run to publish.
 
     Needs no lock and no journal: workers of any kind write their parts so, and send the receipt alone.  The name is
-    new each time, since a chunk may be flown twice at once where a worker is taken for dead; it ends in the SHA-256,
-    by which `finished_parts` knows a part that is whole.
+    new each time, since a chunk may be flown twice at once where a worker is taken for dead; it ends in the first
+    half of the SHA-256, by which `finished_parts` knows a part that is whole.  (Windows counts 260 letters of a path.)
     file : name of the part, relative to the run directory, if not the usual one.
     """
     table = _part_table(run, columns, first, count, arrays)
     content = parquet_bytes(table)
     file = file or f"cases/{part_name(first, count)}"
     digest = sha256(content).hexdigest()
-    temporary = temporary_name((run / file).with_name(f"{Path(file).name}.{uuid.uuid4().hex}.{digest}"))
+    temporary = temporary_name((run / file).with_name(f"{Path(file).name}.{uuid.uuid4().hex[:8]}.{digest[:32]}"))
     write_synced(temporary, content, run / file)
     part = Part(file, first, count, len(content), digest, _status_counts(table))
     return Written(part, f"cases/{temporary.name}")
@@ -207,7 +222,7 @@ def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: d
 def read_part(run: Path, part: Part, names: Sequence[str] | None = None) -> pa.Table:
     """The table of a part, all columns or those in `names`; StoreError naming the file if a byte of it changed."""
     path = run / part.file
-    content = read_file(path)
+    content = read_inside(run, part.file, part.bytes + 1)
     problem = content_problem(content, part)
     if problem:
         raise StoreError(f"{path}: {problem}")
@@ -219,7 +234,9 @@ def read_part(run: Path, part: Part, names: Sequence[str] | None = None) -> pa.T
 
 def content_problem(content: bytes, part: Part) -> str:
     """What is wrong with the bytes of a part; empty if they are those that were written."""
-    if len(content) != part.bytes:
+    if len(content) > part.bytes:  # a reader stops there
+        return f"damaged, more than the {part.bytes} bytes that were written"
+    if len(content) < part.bytes:
         return f"damaged, {len(content)} bytes where {part.bytes} were written"
     if sha256(content).hexdigest() != part.sha256:
         return "damaged, its SHA-256 is not the one in the journal"

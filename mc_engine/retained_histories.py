@@ -10,8 +10,9 @@ from mc_engine.campaign import Campaign
 from mc_engine.cases import case_table, full_inputs, nominal_row
 from mc_engine.chunks import NOMINAL_NOISE
 from mc_engine.flight import fly_history
-from mc_engine.status import OK, STATUS_NAME, TIME_LIMIT, WORKER_DIED
+from mc_engine.status import OK, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
 from mc_engine.store import Store
+from mc_engine.verification import part_damage
 
 _DANGEROUS = (STATUS_NAME[WORKER_DIED], STATUS_NAME[TIME_LIMIT])
 
@@ -19,12 +20,16 @@ _DANGEROUS = (STATUS_NAME[WORKER_DIED], STATUS_NAME[TIME_LIMIT])
 def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Callable[[], bool]) -> bool:
     """Fly the retained cases again, several at once, and keep their histories; False if stopped before the end.
 
-    Cases that killed their worker, or never ended, are left out: they would do so again, here.
+    Cases that killed their worker, or never ended, are left out: they would do so again, here.  Nothing is flown where
+    the histories of these very cases are there as they were written: what a case comes to does not change.
     """
     from joblib import Parallel, delayed
 
+    retained = retained_cases(store, campaign)
+    if _are_kept(store, campaign, retained):
+        return True
     flights = [(-1, nominal_row(campaign), NOMINAL_NOISE)] if campaign.retention.nominal else []
-    for case_id in retained_cases(store, campaign):
+    for case_id in retained:
         inputs = {name: column[0] for name, column in case_table(campaign, np.array([case_id])).items()}
         flights.append((case_id, full_inputs(campaign, inputs), case_id))
 
@@ -39,6 +44,20 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     if filled:
         store.write_histories(pd.concat(filled, ignore_index=True))
     return True
+
+
+def _are_kept(store: Store, campaign: Campaign, retained: list[int]) -> bool:
+    part = store.history_part
+    if part is None or part_damage(store.path, part):
+        return False
+    wanted = {*retained, -1} if campaign.retention.nominal else {*retained}
+    return set(store.histories().get("case_id", [])) == {case for case in wanted if _began(store, case)}
+
+
+def _began(store: Store, case_id: int) -> bool:
+    """Has the case flown at all?  One that was refused has no history."""
+    row = store.nominal() if case_id < 0 else store.row(case_id)
+    return row["status"] != STATUS_NAME[REFUSED]
 
 
 def retained_cases(store: Store, campaign: Campaign) -> list[int]:

@@ -10,3 +10,9 @@ def default_folder(campaign_name: str) -> Path:
     stem = re.sub(r"[^\w.-]+", "-", campaign_name)
     path = Path("runs") / f"{stem}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
     return path if not path.exists() else path.with_name(f"{path.name}-{datetime.now(UTC):%f}")
+
+
+def runs_in(folder: Path) -> list[Path]:
+    """The run directories that lie in `folder`, the one begun last at the end."""
+    manifests = folder.glob("*/manifest.json") if folder.is_dir() else ()
+    return [file.parent for file in sorted(manifests, key=lambda file: (file.stat().st_mtime_ns, file))]

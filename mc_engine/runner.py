@@ -22,6 +22,8 @@ from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight import fly_history
 from mc_engine.flown_campaign import campaign_of, companions_of
 from mc_engine.manifest import columns_of, manifest_of
+from mc_engine.model_contract import refuse_breaches
+from mc_engine.object_store import is_url
 from mc_engine.progress import ProgressCall
 from mc_engine.repair import mend_journal
 from mc_engine.retained_histories import history_frame
@@ -45,7 +47,7 @@ class Replay:
 
 def run(
     campaign: Campaign,
-    out: Path | None = None,
+    out: str | Path | None = None,
     *,
     progress: ProgressCall | None = None,
     workers: int | None = None,
@@ -58,10 +60,14 @@ def run(
     workers : threads or processes, all cores by default.  chunk : cases that a worker flies at a time.
     backend : who flies, see `mc_engine.crews`.  shard : only these cases; `mc_engine.shards.merge` joins shards.
     A campaign that takes inputs from one that has yet to be flown has it flown first, beside `out`.
-    Raises RunInterrupted on Ctrl-C; the store then holds whole chunks, and `resume` completes it.
+    Raises StoreError if `out` is occupied or a URL, RunInterrupted on Ctrl-C; the store then holds whole chunks, and
+    `resume` completes it.
     """
+    if out is not None and is_url(out):
+        raise StoreError(f"{out}: is a URL; fly into a folder, and give that and the URL to object_store.publish")
     path = Path(out) if out is not None else default_folder(campaign.name)
     session = session_of(progress, workers, chunk, backend)
+    refuse_breaches(campaign)
     campaign = _after_first(campaign, path, session)
     manifest = manifest_of(campaign)
     if shard is not None:

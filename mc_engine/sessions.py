@@ -11,17 +11,19 @@ from dataclasses import dataclass, field
 
 from mc_engine.backends import Backend
 from mc_engine.campaign import Campaign
-from mc_engine.chunks import Order, chunk_size, chunks_of, fly_nominal, rerun_orders
+from mc_engine.chunks import Order, chunk_size, fly_nominal, rerun_orders
 from mc_engine.crews import crew_of
 from mc_engine.dispatch import Dispatch
 from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
 from mc_engine.interruption import stop_signal
+from mc_engine.part_bounds import Stretch, part_bounds, stretches
 from mc_engine.parts import Written
 from mc_engine.progress import ProgressCall
 from mc_engine.repair import withdraw_damaged
 from mc_engine.retained_histories import write_histories
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store import Store
+from mc_engine.verification import part_damage
 
 Settle = Callable[[Order, Written], None]
 
@@ -50,14 +52,12 @@ def complete(store: Store, campaign: Campaign, session: Session, repair: bool = 
     with _resumable(again), store.lock(), stop_signal() as stop:
         if repair:
             withdraw_damaged(store)
-        missing = store.missing()
-        wanted = sum(last - first for first, last in missing)
-        size = session.chunk or _chunk_of_the_run(store) or chunk_size(wanted, session.workers)
+        orders, size = _orders(store, session)
+        wanted = sum(order.stop - order.first for order in orders)
         store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=wanted)
         begin = time.perf_counter()
-        store.write_nominal(fly_nominal(campaign))  # also compiles the kernel
+        _keep_nominal(store, campaign, bool(orders))
         compiled = time.perf_counter()
-        orders = [Order(*chunk) for chunk in chunks_of(missing, size)]
         _fly(store, campaign, session, orders, lambda order, written: store.publish(written), stop.is_set, again)
         if store.missing():
             raise _interrupted(store, again)
@@ -160,7 +160,22 @@ def _keep_histories(
         raise _interrupted(store, again)
 
 
-def _chunk_of_the_run(store: Store) -> int | None:
-    """The chunk that the run began with, so that a run that was cut has the parts of one that was not."""
-    started, extended = store.notes("started"), store.notes("extended")
-    return int(started[0].facts["chunk"]) if started and not extended else None
+def _keep_nominal(store: Store, campaign: Campaign, flying: bool) -> None:
+    """Fly the nominal case where it is not there as it was written; and before others fly, to compile the kernel."""
+    part = store.nominal_part
+    sound = part is not None and not part_damage(store.path, part)
+    if flying or not sound:
+        row = fly_nominal(campaign)
+        if not sound:
+            store.write_nominal(row)
+
+
+def _orders(store: Store, session: Session) -> tuple[list[Order], int]:
+    """Orders for what is missing, and how many cases a part has."""
+    missing = store.missing()
+    along = stretches(store.notes(), min(store.wanted.stop, store.manifest["campaign"]["cases"]))
+    cases = sum(stop - first for first, stop in missing)
+    size = session.chunk or along[-1].chunk or chunk_size(cases, session.workers)
+    if session.chunk is not None:
+        along = [Stretch(store.wanted.stop, session.chunk)]
+    return [Order(*bounds) for bounds in part_bounds(missing, store.notes(), along, size)], size

@@ -77,6 +77,7 @@ def merge_shards(out: Path, folders: Sequence[Path], chunk: int | None = None) -
     stores = [open_store(folder) for folder in folders]
     _check_one_campaign(stores)
     _check_nothing_missing(stores)
+    _check_parts(stores)  # before anything is made that would be in the way of the next attempt
     pieces = list(_cover(stores))
     campaign = campaign_of(stores[0])
     run = create_store(out, manifest_of(campaign), campaign.text, columns_of(campaign), companions_of(campaign))
@@ -105,6 +106,16 @@ def _check_one_campaign(stores: Sequence[Store]) -> None:
                 f"{store.path}: is not of the campaign of {stores[0].path}: another file, seed, number of cases, "
                 "or other sources"
             )
+
+
+def _check_parts(stores: Sequence[Store]) -> None:
+    """StoreError that names the first part that is damaged, or is no part of these tables."""
+    schema = parts.arrow_schema(stores[0].columns)
+    for store in stores:
+        for part in store.parts:
+            table = parts.read_part(store.path, part)
+            if table.num_rows != part.rows or not table.schema.equals(schema, check_metadata=True):
+                raise StoreError(f"{store.path / part.file}: is no part of this table; `mc-engine verify {store.path}`")
 
 
 def _check_nothing_missing(stores: Sequence[Store]) -> None:

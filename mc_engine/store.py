@@ -11,7 +11,7 @@ journal.  A `Store` is for one thread; one process at a time may write.
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -26,18 +26,17 @@ from mc_engine.durable_file import is_temporary, make_folder, naming, publish, r
 from mc_engine.errors import StoreError
 from mc_engine.finished_parts import count_finished, leave_receipt
 from mc_engine.history_tables import history_columns, history_table
-from mc_engine.journal import Entry, Journal, encode, plain, utc_now
+from mc_engine.journal import Entry, Journal, damaged_line, encode, plain, utc_now
+from mc_engine.manifest_file import columns_in, parse_manifest
 from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
-from mc_engine.receipts import counted_nominal, counted_parts, history_receipts
+from mc_engine.receipts import Range, Receipts, receipts_of
 from mc_engine.writer_lock import LOCK_NAME, WriterLock
 
 __all__ = ["Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
 
 CAMPAIGN, MANIFEST, JOURNAL, NOMINAL = "campaign.toml", "manifest.json", "journal.jsonl", "nominal.parquet"
-FORMAT = 1  # of the directory; the manifest's "format"
+_EDITED = "damaged or edited, it is not the one this run began with; put the original back"
 _OURS_BEFORE_THE_JOURNAL = {LOCK_NAME, CAMPAIGN, MANIFEST, *PART_FOLDERS}
-
-Range = tuple[int, int]
 
 
 def create_store(
@@ -116,19 +115,21 @@ class Store:
         self.path = path
         if not is_run_directory(path):
             raise StoreError(f"{path}: is no run directory" if path.exists() else f"{path}: there is no such folder")
+        for folder in PART_FOLDERS:
+            if (path / folder).is_symlink():
+                raise StoreError(f"{path / folder}: is a symbolic link; the parts of a run lie in its own directory")
         self._lock = WriterLock(path)
+        self._counted = Receipts()
         self._read_journal()
         content = read_file(path / MANIFEST)
         if sha256(content).hexdigest() != self._created["manifest"]:
-            raise StoreError(f"{path / MANIFEST}: damaged or edited, it is not the one this run began with")
-        self.manifest: dict[str, Any] = json.loads(content)
-        if self.manifest.get("format", FORMAT) > FORMAT:
-            raise StoreError(f"{path}: was written by a newer engine; this one reads format {FORMAT}")
-        known = {field.name for field in fields(Column)}
-        self.columns = tuple(
-            Column(**{key: value for key, value in record.items() if key in known})
-            for record in self.manifest["columns"]
-        )
+            raise StoreError(f"{path / MANIFEST}: {_EDITED}")
+        try:
+            self.manifest = parse_manifest(content)
+        except ValueError as error:
+            raise StoreError(f"{path / MANIFEST}: {error}") from None
+        self.columns = columns_in(self.manifest)
+        self._count(self.manifest["campaign"]["cases"])
 
     def _read_journal(self) -> None:
         if not (self.path / JOURNAL).exists():
@@ -136,37 +137,59 @@ class Store:
         self._journal = Journal(self.path / JOURNAL)
         if not self._journal.entries or self._journal.entries[0].event != "created":
             raise StoreError(f"{self.path / JOURNAL}, line 1: damaged, a journal begins with its creation")
+        self._count(self._counted.begun_with)
+
+    def _count(self, begun_with: int | None) -> None:
+        self._counted, wrong = receipts_of(self._journal.entries, begun_with)
+        for number, why in wrong.items():
+            raise damaged_line(self.path / JOURNAL, number, why)
         self._created = self._journal.entries[0].facts
+
+    def _record(self, event: str, facts: dict[str, Any]) -> None:
+        """Put a line into the journal, unless it is one that no reader would let pass."""
+        counted = self._counted.copy()
+
+        def judge(entry: Entry) -> None:
+            try:
+                counted.take(entry)
+            except ValueError as error:
+                raise StoreError(f"{self.path / JOURNAL}: {event}: {error}") from None
+
+        self._journal.append(event, facts, judge)
+        self._counted = counted
 
     @property
     def campaign_text(self) -> str:
         """The campaign file as it was flown; StoreError if someone changed it since."""
         content = read_file(self.path / CAMPAIGN)
         if sha256(content).hexdigest() != self._created["campaign"]:
-            raise StoreError(f"{self.path / CAMPAIGN}: damaged or edited, it is not the one this run began with")
-        return content.decode()
+            raise StoreError(f"{self.path / CAMPAIGN}: {_EDITED}")
+        try:
+            return content.decode()
+        except UnicodeDecodeError as error:
+            raise StoreError(f"{self.path / CAMPAIGN}: is no text: {error}") from None
 
     def check_companions(self) -> None:
         """StoreError if a file that the campaign reads from its own folder is no more the one it was flown with."""
         for problem in companion_problems(self.path, self._created):
-            raise StoreError(f"{self.path}/{problem}")
+            raise StoreError(f"{self.path}/{problem}; put the original back")
 
     # ---- what the journal says
 
     @property
     def parts(self) -> list[Part]:
         """Receipts of all committed parts, by their first case."""
-        return sorted(counted_parts(self._journal.entries), key=lambda part: part.first)
+        return list(self._counted.parts)
 
     @property
     def nominal_part(self) -> Part | None:
         """Receipt of the nominal case, if it was written."""
-        return counted_nominal(self._journal.entries)
+        return self._counted.nominal
 
     @property
     def history_part(self) -> Part | None:
         """Receipt of the retained histories, if any were written."""
-        return next(reversed(history_receipts(self._journal.entries)), None)
+        return self._counted.histories
 
     def notes(self, event: str | None = None) -> list[Entry]:
         """Journal entries in order, all or those of one event."""
@@ -175,8 +198,7 @@ class Store:
     @property
     def n_cases(self) -> int:
         """How many cases are wanted, after all extensions."""
-        extended = self.notes("extended")
-        return int(extended[-1].facts["cases"] if extended else self.manifest["campaign"]["cases"])
+        return int(self._counted.cases or self.manifest["campaign"]["cases"])
 
     @property
     def wanted(self) -> range:
@@ -186,25 +208,12 @@ class Store:
 
     def committed(self) -> list[Range]:
         """The cases on the disk, as merged ranges in order."""
-        merged: list[Range] = []
-        for part in self.parts:
-            if merged and part.first == merged[-1][1]:
-                merged[-1] = (merged[-1][0], part.stop)
-            else:
-                merged.append((part.first, part.stop))
-        return merged
+        return self._counted.committed()
 
     def missing(self, cases: int | range | None = None) -> list[Range]:
         """The ranges not committed among `cases`: the first so many, a range, or all wanted ones."""
         wanted = self.wanted if cases is None else cases if isinstance(cases, range) else range(cases)
-        gaps, begin = [], wanted.start
-        for first, stop in self.committed():
-            if min(first, wanted.stop) > begin:
-                gaps.append((begin, min(first, wanted.stop)))
-            begin = max(begin, stop)
-        if begin < wanted.stop:
-            gaps.append((begin, wanted.stop))
-        return gaps
+        return self._counted.missing(wanted)
 
     def status_counts(self) -> dict[str, int]:
         """Committed cases by status word, without reading a part."""
@@ -281,7 +290,7 @@ class Store:
         try:
             self._read_journal()  # another writer may have been here since this object was made
             if dead is not None:
-                self._journal.append("lock-taken-over", {"from": dead})
+                self._record("lock-taken-over", {"from": dead})
                 count_finished(self)
             self.sweep()
             yield self
@@ -292,7 +301,7 @@ class Store:
         """Remove temporary files and parts without a journal line; for the holder of the lock."""
         if not self._journal.certain:
             self._read_journal()  # what an append that failed left there decides what counts
-        counted = {part.file for part in (*self.parts, *history_receipts(self._journal.entries)[-1:])}
+        counted = {part.file for part in self._counted.all_parts()}
         for folder in (self.path, *(self.path / name for name in PART_FOLDERS)):
             with naming(folder):
                 stray = [path for path in folder.iterdir() if self._is_stray(path, counted)]
@@ -317,7 +326,7 @@ class Store:
         """Count a part that `parts.write_part` put into this directory."""
         with self.lock():
             self._refuse_overlap(part.first, part.rows)
-            self._journal.append("part", asdict(part))
+            self._record("part", asdict(part))
 
     def publish(self, written: Written) -> None:
         """Commit a part that a worker wrote aside in this directory; on return it survives a power cut."""
@@ -325,13 +334,13 @@ class Store:
             self._refuse_overlap(written.part.first, written.part.rows)
             leave_receipt(self.path, written.part)
             self._name(written)
-            self._journal.append("part", asdict(written.part))
+            self._record("part", asdict(written.part))
 
     def replace(self, before: Part, written: Written) -> None:
         """Let a part written aside, of the same cases and another name, count in place of `before`."""
         with self.lock():
             self._name(written)
-            self._journal.append("part-replaced", {**asdict(written.part), "replaces": before.file})
+            self._record("part-replaced", {**asdict(written.part), "replaces": before.file})
             with suppress(OSError):  # it no longer counts, and the next writer tries again
                 (self.path / before.file).unlink(missing_ok=True)
 
@@ -346,7 +355,7 @@ class Store:
     def withdraw(self, part: Part) -> None:
         """Count a part no more, so that its cases are missing again."""
         with self.lock():
-            self._journal.append("part-withdrawn", {"file": part.file})
+            self._record("part-withdrawn", {"file": part.file})
             with suppress(OSError):
                 (self.path / part.file).unlink(missing_ok=True)
 
@@ -357,7 +366,7 @@ class Store:
     def note(self, event: str, /, **facts: Any) -> None:
         """Put an event that is no part into the journal: "started", "finished", "extended" (with cases), ..."""
         with self.lock():
-            self._journal.append(event, facts)
+            self._record(event, facts)
 
     def write_nominal(self, row: Mapping[str, Any]) -> None:
         """Keep the nominal case: a value for every column but case_id."""
@@ -366,8 +375,8 @@ class Store:
         with self.lock():
             if self.nominal_part is not None:
                 # A kill between the new file and its line must not leave the old line with the new file.
-                self._journal.append("nominal-withdrawn", {})
-            self._journal.append("nominal", asdict(parts.write_table(self.path, NOMINAL, table, first=-1)))
+                self._record("nominal-withdrawn", {})
+            self._record("nominal", asdict(parts.write_table(self.path, NOMINAL, table, first=-1)))
 
     def write_histories(self, table: "pd.DataFrame | Mapping[str, Any]") -> None:
         """Keep these histories (case_id, t_s and quantities, one row per sample) in place of any kept before."""
@@ -375,7 +384,7 @@ class Store:
         with self.lock():
             before = self.history_part
             file = f"history/part-{int(Path(before.file).stem[5:]) + 1 if before else 0:05d}.parquet"
-            self._journal.append("history", asdict(parts.write_table(self.path, file, arrow)))
+            self._record("history", asdict(parts.write_table(self.path, file, arrow)))
             if before is not None:
                 with suppress(OSError):  # it no longer counts, and the next writer tries again
                     (self.path / before.file).unlink(missing_ok=True)

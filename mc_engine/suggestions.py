@@ -44,8 +44,20 @@ _OTHER_NAMES = {
     "percent": "%",
     "radians": "rad",
     "seconds": "s",
+    "amperes": "A",
+    "arcminutes": "arcmin",
+    "arcseconds": "arcsec",
+    "joules": "J",
+    "kelvins": "K",
+    "milliradians": "mrad",
+    "newtons": "N",
+    "pascals": "Pa",
+    "teslas": "T",
+    "volts": "V",
+    "watts": "W",
 }
 _FEW = 12
+_NEAR = 3
 _SHORTEST = 3  # letters; of two-letter words, such as kg and km, too many are one slip apart
 
 
@@ -53,7 +65,7 @@ def nearest(word: str, allowed: Iterable[str]) -> str | None:
     """The allowed word that `word` was probably meant to be, or None."""
     plain = {name.lower().replace("-", "_"): name for name in allowed}
     wanted = word.lower().replace("-", "_").replace(" ", "_")
-    other = _OTHER_NAMES.get(wanted, "")
+    other = (_OTHER_NAMES.get(wanted) or _OTHER_NAMES.get(f"{wanted}s", "")).lower()
     if other and other in plain:
         return plain[other]
     if wanted in plain:
@@ -77,7 +89,7 @@ def _one_slip_apart(one: str, other: str) -> bool:
 
 
 def hint(word: str, allowed: Iterable[str]) -> str:
-    """End of a sentence about an unknown word: the nearest one, or else all of them where they are few."""
+    """End of a sentence about an unknown word: the nearest one, or else all of them, or the nearest few."""
     allowed = list(allowed)
     match = nearest(word, allowed)
     if match is not None:
@@ -85,7 +97,8 @@ def hint(word: str, allowed: Iterable[str]) -> str:
     if not allowed:
         return ""
     if len(allowed) > _FEW:
-        return f"; {len(allowed)} are known, among them {listed(allowed[:3])}"
+        near = get_close_matches(word.lower(), allowed, n=_NEAR, cutoff=0.0)
+        return f"; {len(allowed)} are known, nearest are {listed(near)}"
     return f"; known {'is' if len(allowed) == 1 else 'are'} {listed(allowed)}"
 
 

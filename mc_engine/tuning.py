@@ -62,16 +62,24 @@ def tune(
     tuning = campaign.tuning
     if tuning is None:
         raise CampaignError(
-            campaign.name, [Problem("tuning", "is missing: nothing says what is to be tuned, and for what")]
+            campaign.name,
+            [
+                Problem(
+                    "tuning",
+                    "is missing: nothing says what is to be tuned, and for what; write [tuning.parameter.NAME] and "
+                    "[tuning.objective.NAME], as flexible_satellite/stage_1 does",
+                )
+            ],
         )
     path = Path(out) if out is not None else default_folder(campaign.name)
     refuse_occupied(path)
-    plan = {
+    plan: dict[str, Any] = {
         "seed": (tuning.seed if tuning.seed is not None else campaign.seed % _SEED_RANGE) if seed is None else seed,
         "population": population or tuning.population,
         "generations": generations or tuning.generations,
         "patience": tuning.patience,
     }
+    search = GeneticSearch(tuning, plan["population"], plan["seed"])  # says so if pymoo is not there
     manifest = manifest_of(campaign)
     manifest["provenance"]["packages"]["pymoo"] = version("pymoo")
 
@@ -79,7 +87,7 @@ def tune(
         about = {**plan, "flown": len(flown), "end": end, **_wording(campaign, tuning)}
         _write(path, campaign, tuning, flown, {**manifest, "tuning": about})
 
-    flown, end = _search(campaign, tuning, plan, workers or os.cpu_count() or 1, keep, progress)
+    flown, end = _search(campaign, tuning, plan, search, workers or os.cpu_count() or 1, keep, progress)
     keep(flown, end)
     if end == "interrupted":
         raise RunInterrupted(f"interrupted after {len(flown)} of {plan['generations']} generations; they are in {path}")
@@ -90,12 +98,12 @@ def _search(
     campaign: Campaign,
     tuning: Tuning,
     plan: dict[str, Any],
+    search: GeneticSearch,
     workers: int,
     keep: Callable[[list[Generation], str], None],
     progress: ProgressCall | None,
 ) -> tuple[list[Generation], str]:
     """All generations, and why there are no more of them; `keep` stores what there is after each."""
-    search = GeneticSearch(tuning, plan["population"], plan["seed"])
     per, flown = cases_per_candidate(campaign, tuning), list[Generation]()
     signs = _signs(tuning)
     with stop_signal() as stop:

@@ -1,10 +1,13 @@
 """Units of columns and their factors to SI; the suffix that a column name carries for each unit."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import pi
 from typing import TypeVar
 
 import numpy as np
+
+from mc_engine.suggestions import nearest
 
 Number = TypeVar("Number", float, np.ndarray)
 
@@ -19,43 +22,116 @@ class Unit:
 
 
 _DAY = 86400.0
+_DEGREE = pi / 180.0
+_G0 = 9.80665  # m/s^2, exactly
+
+# SI value of one unit.  A name is told from all others without regard to upper and lower case, as column names are.
+_BY_QUANTITY: dict[str, dict[str, float]] = {
+    "number": {"": 1.0, "%": 0.01, "ppm": 1e-6},
+    "time": {"s": 1.0, "us": 1e-6, "ms": 1e-3, "min": 60.0, "h": 3600.0, "day": _DAY},
+    "rate": {"1/s": 1.0, "1/h": 1.0 / 3600.0, "1/day": 1.0 / _DAY},
+    "frequency": {"Hz": 1.0, "kHz": 1e3},
+    "length": {"m": 1.0, "um": 1e-6, "mm": 1e-3, "cm": 1e-2, "km": 1e3},
+    "area": {"m^2": 1.0, "cm^2": 1e-4, "km^2": 1e6},
+    "volume": {"m^3": 1.0, "cm^3": 1e-6},
+    "curvature": {"1/m": 1.0, "1/km": 1e-3},
+    "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/s": 1e3, "m/day": 1.0 / _DAY, "km/day": 1e3 / _DAY},
+    "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3, "g": _G0, "ug": 1e-6 * _G0},
+    "jerk": {"m/s^3": 1.0},
+    "velocity random walk": {"m/s/sqrt(s)": 1.0, "m/s/sqrt(h)": 1.0 / 60.0},
+    "specific energy": {"m^2/s^2": 1.0, "km^2/s^2": 1e6, "J/kg": 1.0, "kJ/kg": 1e3, "MJ/kg": 1e6},
+    "gravitational parameter": {"m^3/s^2": 1.0, "km^3/s^2": 1e9},
+    "specific angular momentum": {"m^2/s": 1.0, "km^2/s": 1e6},
+    "mass": {"kg": 1.0},
+    "mass flow": {"kg/s": 1.0},
+    "linear density": {"kg/m": 1.0},
+    "areal density": {"kg/m^2": 1.0},
+    "density": {"kg/m^3": 1.0},
+    "number density": {"1/m^3": 1.0},
+    "area per mass": {"m^2/kg": 1.0},
+    "first moment of mass": {"kg m": 1.0},
+    "moment of inertia": {"kg m^2": 1.0},
+    "force": {"N": 1.0, "uN": 1e-6, "mN": 1e-3, "kN": 1e3},
+    "impulse": {"N s": 1.0, "kN s": 1e3},
+    "torque": {"N m": 1.0, "uN m": 1e-6, "mN m": 1e-3, "kN m": 1e3},
+    "angular momentum": {"N m s": 1.0},
+    "stiffness": {"N/m": 1.0},
+    "damping": {"N s/m": 1.0},
+    "rotational stiffness": {"N m/rad": 1.0, "N m/deg": 1.0 / _DEGREE},
+    "rotational damping": {"N m s/rad": 1.0},
+    "pressure": {"Pa": 1.0, "hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "bar": 1e5},
+    "energy": {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "W h": 3600.0},
+    "power": {"W": 1.0, "kW": 1e3},
+    "heat flux": {"W/m^2": 1.0, "kW/m^2": 1e3, "MW/m^2": 1e6, "W/cm^2": 1e4},
+    "heat load": {"J/m^2": 1.0, "kJ/m^2": 1e3, "MJ/m^2": 1e6, "J/cm^2": 1e4},
+    "temperature": {"K": 1.0},
+    "rate of temperature": {"K/s": 1.0},
+    "thermal expansion": {"1/K": 1.0},
+    "heat capacity": {"J/K": 1.0},
+    "specific heat": {"J/(kg K)": 1.0},
+    "thermal conductance": {"W/K": 1.0},
+    "thermal conductivity": {"W/(m K)": 1.0},
+    "heat transfer": {"W/(m^2 K)": 1.0},
+    "angle": {
+        "rad": 1.0, "urad": 1e-6, "mrad": 1e-3, "deg": _DEGREE, "arcmin": _DEGREE / 60.0, "arcsec": _DEGREE / 3600.0,
+        "rev": 2.0 * pi,
+    },
+    "angular speed": {
+        "rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "deg/min": _DEGREE / 60.0, "deg/h": _DEGREE / 3600.0,
+        "deg/day": _DEGREE / _DAY, "arcsec/s": _DEGREE / 3600.0, "rpm": 2.0 * pi / 60.0,
+    },
+    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
+    "angle random walk": {"rad/sqrt(s)": 1.0, "deg/sqrt(s)": _DEGREE, "deg/sqrt(h)": _DEGREE / 60.0},
+    "angle per revolution": {"deg/rev": _DEGREE},
+    "voltage": {"V": 1.0, "mV": 1e-3},
+    "current": {"A": 1.0, "mA": 1e-3},
+    "resistance": {"Ohm": 1.0},
+    "charge": {"C": 1.0, "A h": 3600.0},
+    "magnetic flux density": {"T": 1.0, "nT": 1e-9, "uT": 1e-6, "mT": 1e-3},
+    "magnetic dipole": {"A m^2": 1.0},
+}  # fmt: skip
+_ALSO_WRITTEN = str.maketrans(
+    {"²": "2", "³": "3", "µ": "u", "μ": "u", "°": "deg", "Ω": "ohm"} | dict.fromkeys(" ^*·()_")
+)
+_SUFFIX = {"%": "_pct", "day": "_days"}
+
+
+def _suffix(unit: str) -> str:
+    """W/(m^2 K) is _w_m2_k at the end of a column's name."""
+    if unit in _SUFFIX or not unit:
+        return _SUFFIX.get(unit, "")
+    return "_" + "_".join(unit.lower().replace("^", "").translate(str.maketrans("/()", "   ")).split())
+
 
 UNITS = {
-    "": Unit(1.0, "", "number"),
-    "%": Unit(0.01, "_pct", "number"),
-    "s": Unit(1.0, "_s", "time"),
-    "min": Unit(60.0, "_min", "time"),
-    "h": Unit(3600.0, "_h", "time"),
-    "day": Unit(_DAY, "_days", "time"),
-    "m": Unit(1.0, "_m", "length"),
-    "km": Unit(1e3, "_km", "length"),
-    "m^2": Unit(1.0, "_m2", "area"),
-    "m/s": Unit(1.0, "_m_s", "speed"),
-    "km/s": Unit(1e3, "_km_s", "speed"),
-    "m/s^2": Unit(1.0, "_m_s2", "acceleration"),
-    "g": Unit(9.80665, "_g", "acceleration"),
-    "kg": Unit(1.0, "_kg", "mass"),
-    "kg/s": Unit(1.0, "_kg_s", "mass flow"),
-    "kg/m^2": Unit(1.0, "_kg_m2", "areal density"),
-    "kg/m^3": Unit(1.0, "_kg_m3", "density"),
-    "kg m^2": Unit(1.0, "_kg_m2", "moment of inertia"),
-    "N": Unit(1.0, "_n", "force"),
-    "kN": Unit(1e3, "_kn", "force"),
-    "N s": Unit(1.0, "_n_s", "impulse"),
-    "N m": Unit(1.0, "_n_m", "torque"),
-    "N m s": Unit(1.0, "_n_m_s", "angular momentum"),
-    "Pa": Unit(1.0, "_pa", "pressure"),
-    "W/m^2": Unit(1.0, "_w_m2", "heat flux"),
-    "J/m^2": Unit(1.0, "_j_m2", "heat load"),
-    "K": Unit(1.0, "_k", "temperature"),
-    "rad": Unit(1.0, "_rad", "angle"),
-    "deg": Unit(pi / 180.0, "_deg", "angle"),
-    "rad/s": Unit(1.0, "_rad_s", "angular speed"),
-    "deg/s": Unit(pi / 180.0, "_deg_s", "angular speed"),
-    "deg/day": Unit(pi / 180.0 / _DAY, "_deg_day", "angular speed"),
-    "deg/rev": Unit(pi / 180.0, "_deg_rev", "angle per revolution"),
-    "1/s": Unit(1.0, "_1_s", "rate"),
+    name: Unit(factor, _suffix(name), quantity)
+    for quantity, units in _BY_QUANTITY.items()
+    for name, factor in units.items()
 }
+
+
+def by_quantity() -> dict[str, list[str]]:
+    """The names of all units, by what they measure; the first of each is that of SI.  Plain numbers have no name."""
+    return {quantity: [name for name in units if name] for quantity, units in _BY_QUANTITY.items()}
+
+
+def nearest_unit(unit: str, allowed: Iterable[str]) -> str | None:
+    """The allowed unit that was probably meant, such as "N m" by "Nm" and "m/s^2" by "m/s²"; or None."""
+    names = [name for name in allowed if name]
+    squeezed = {_squeezed(name): name for name in names}
+    return squeezed.get(_squeezed(unit)) or nearest(unit, names)
+
+
+def unit_hint(unit: str) -> str:
+    """End of a sentence about a unit not in UNITS: the nearest one, and where all of them are."""
+    near = nearest_unit(unit, UNITS)
+    meant = f'; did you mean "{near}"?' if near else ""
+    return f"{meant}; `mc-engine units` lists all {len(UNITS)}"
+
+
+def _squeezed(unit: str) -> str:
+    """A unit as it is also written: without spaces and signs of powers and products, in lower case."""
+    return unit.lower().translate(_ALSO_WRITTEN)
 
 
 def unit_suffix(unit: str) -> str:

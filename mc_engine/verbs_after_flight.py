@@ -8,15 +8,18 @@ import typer
 from mc_engine.command_line import (
     DAMAGED,
     USAGE,
-    RunFolder,
+    RunPlace,
     app,
+    beginning,
     counted,
     existing_run,
     exit_status,
     leave,
     ranges,
+    run_at,
     write_reports,
 )
+from mc_engine.interruption import advise
 from mc_engine.verbs_of_object_stores import echo_publication
 
 REPORT_FORMATS = ("html", "pdf", "md")
@@ -28,14 +31,19 @@ def report(
     folders: Annotated[
         list[str], typer.Argument(metavar="RUN...", help="Directories of runs, or URLs of published ones.")
     ],
-    kind: Annotated[str | None, typer.Option("--format", help="html, pdf or md; html and pdf by default.")] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            "--format", help="html, pdf or md; html and pdf by default.", autocompletion=beginning(REPORT_FORMATS)
+        ),
+    ] = None,
     template: Annotated[
         Path | None,
         typer.Option(help="Markdown with Jinja expressions: sections of your own, before the others of each report."),
     ] = None,
 ) -> None:
     """Write the reports of runs, tunings or rare events anew."""
-    from mc_engine.object_store import local_copy
+    advise(lambda: f"interrupted; `mc-engine report {' '.join(folders)}` writes the reports")
     from mc_engine.rare_event_folder import is_rare_event_directory
     from mc_engine.tuning_folder import is_tuning_directory
 
@@ -45,7 +53,7 @@ def report(
         leave(USAGE, f"--template {template}: there is no such file")
     paths, published = [], {}
     for named in folders:
-        folder = local_copy(named)
+        folder = run_at(named)
         if folder != Path(named):
             published[folder] = named
         kept_apart = is_tuning_directory(folder) or is_rare_event_directory(folder)
@@ -60,7 +68,7 @@ def report(
 
 @app.command()
 @exit_status()
-def status(folder: RunFolder) -> None:
+def status(place: RunPlace) -> None:
     """How far a run is, and how its cases ended; of a tuning or a rare event, what was found."""
     from mc_engine.rare_event_folder import is_rare_event_directory, open_rare_event
     from mc_engine.rare_event_lines import outcome_lines as rare_lines
@@ -68,18 +76,19 @@ def status(folder: RunFolder) -> None:
     from mc_engine.tuning_folder import is_tuning_directory, open_tuning, outcome_lines
     from mc_engine.writer_lock import described, holder
 
+    folder = run_at(place)
     if is_tuning_directory(folder):
         record = open_tuning(folder)
-        typer.echo(f"tuning       {folder}\ncampaign     {record.manifest['campaign']['name']}")
+        typer.echo(f"tuning       {place}\ncampaign     {record.manifest['campaign']['name']}")
         typer.echo("\n".join(outcome_lines(record)))
         return
     if is_rare_event_directory(folder):
         estimate = open_rare_event(folder)
-        typer.echo(f"rare event   {folder}\ncampaign     {estimate.record['campaign']['name']}")
+        typer.echo(f"rare event   {place}\ncampaign     {estimate.record['campaign']['name']}")
         typer.echo("\n".join(rare_lines(estimate.result)))
         return
     store = existing_run(folder)
-    typer.echo(f"run       {folder}")
+    typer.echo(f"run       {place}")
     typer.echo(f"campaign  {store.manifest['campaign'].get('name', '')}")
     typer.echo(f"cases     {case_line(store)}")
     writer = holder(folder)
@@ -87,9 +96,9 @@ def status(folder: RunFolder) -> None:
     if writer is not None:
         typer.echo(f"flying    by {described(writer)}")
     elif missing:
-        typer.echo(f"missing   {ranges(missing)}; `mc-engine resume {folder}` flies them")
+        typer.echo(f"missing   {ranges(missing)}; `mc-engine resume {place}` flies them")
     elif lost := store.lost_files():
-        leave(DAMAGED, f"{folder}/{lost[0]}: is gone; `mc-engine verify {folder}` names all damage")
+        leave(DAMAGED, f"{place}/{lost[0]}: is gone; `mc-engine verify {place}` names all damage")
     else:
         typer.echo("complete")
 
@@ -97,14 +106,14 @@ def status(folder: RunFolder) -> None:
 @app.command()
 @exit_status()
 def summary(
-    folder: RunFolder,
+    place: RunPlace,
     metric: Annotated[list[str] | None, typer.Option(help="Only this metric; may be given several times.")] = None,
 ) -> None:
     """Moments and quantiles of the metrics of a run of any size, read part by part."""
     from mc_engine.run_summary import summaries, summary_lines
     from mc_engine.statistics import SAMPLING_DESIGNS
 
-    store = existing_run(folder)
+    store = existing_run(run_at(place))
     known = [column.name for column in store.columns if column.role == "metric"]
     for name in metric or ():
         if name not in known:
@@ -118,30 +127,28 @@ def summary(
 
 @app.command()
 @exit_status()
-def verify(folder: RunFolder) -> None:
+def verify(place: RunPlace) -> None:
     """Hold every byte of a run against its journal, or of a tuning or rare event against its manifest."""
     from mc_engine.rare_event_folder import is_rare_event_directory, open_rare_event
     from mc_engine.store import is_run_directory
     from mc_engine.tuning_folder import is_tuning_directory, open_tuning
-    from mc_engine.verification import damage
+    from mc_engine.verification import damages, remedies
 
+    folder = run_at(place)
     if is_tuning_directory(folder):
         open_tuning(folder)  # which reads every byte
-        typer.echo(f"{folder}: every byte is as it was written")
+        typer.echo(f"{place}: every byte is as it was written")
         return
     if is_rare_event_directory(folder):
         open_rare_event(folder)
-        typer.echo(f"{folder}: every byte is as it was written")
+        typer.echo(f"{place}: every byte is as it was written")
         return
 
     if not is_run_directory(folder):
         existing_run(folder)
-    problems = damage(folder)
+    problems = damages(folder)
     for problem in problems:
-        typer.echo(f"{folder}/{problem}", err=True)
+        typer.echo(f"{place}/{problem.what}", err=True)
     if problems:
-        leave(
-            DAMAGED,
-            f"{folder}: {counted(problems, 'problem')}; `mc-engine resume {folder} --repair` flies bad parts again",
-        )
-    typer.echo(f"{folder}: every byte is as it was written")
+        leave(DAMAGED, f"{place}: {counted(problems, 'problem')}; {'; '.join(remedies(place, problems))}")
+    typer.echo(f"{place}: every byte is as it was written")

@@ -17,12 +17,15 @@ from mc_engine.command_line import (
     counted,
     exit_status,
     leave,
+    new_file,
 )
 
 
 @app.command()
 @exit_status()
-def init(folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the new campaign is to be.")]) -> None:
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the new campaign is to be.", parser=new_file)],
+) -> None:
     """Copy the smallest campaign, a model and its file, to DIR as a start for your own."""
     from mc_engine.campaign import SHIPPED
 
@@ -102,7 +105,7 @@ def _probability(name: str, value: float | None) -> float:
     if value is None:
         leave(USAGE, f"{name} is missing; give --share and --confidence, or a campaign file")
     if not 0.0 < value < 1.0:  # also false for NaN
-        leave(USAGE, f"{name} is {value}; it must lie between 0 and 1, without them")
+        leave(USAGE, f"{name} is {value:g}; it must be above 0 and below 1, such as 0.9973")
     return value
 
 
@@ -132,7 +135,10 @@ def _plan_share(share: float, confidence: float, failures: Sequence[int], two_si
 def sample(
     file: CampaignFile,
     cases: Cases = None,
-    out: Annotated[Path | None, typer.Option(help="Write the whole table here, .parquet or .csv.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the whole table here, .parquet or .csv.", parser=new_file),
+    ] = None,
 ) -> None:
     """Draw the case table without flying it."""
     from mc_engine.campaign import load_campaign

@@ -5,7 +5,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mc_engine.command_line import USAGE, RunFolder, app, existing_run, exit_status, leave
+from mc_engine.command_line import (
+    USAGE,
+    RunPlace,
+    app,
+    beginning,
+    existing_run,
+    exit_status,
+    is_url,
+    leave,
+    new_file,
+    run_at,
+)
 from mc_engine.suggestions import hint
 
 if TYPE_CHECKING:
@@ -18,13 +29,21 @@ _OEM_COLUMNS = 6
 @app.command()
 @exit_status()
 def export(
-    folder: RunFolder,
-    kind: Annotated[str, typer.Option("--format", help="csv, or oem (CCSDS ephemerides, a point a case).")] = "csv",
+    place: RunPlace,
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--format", help="csv, or oem (CCSDS ephemerides, a point a case).", autocompletion=beginning(FORMATS)
+        ),
+    ] = "csv",
     columns: Annotated[
         str | None,
         typer.Option(help="Columns with commas between; for oem those of x, y, z and their rates."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="File to write; by default end_states.csv or .oem in RUN.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write; by default end_states.csv or .oem in RUN.", parser=new_file),
+    ] = None,
     epoch: Annotated[
         str | None, typer.Option(help="For oem: start of the flights in UTC; by default the setting epoch_utc.")
     ] = None,
@@ -34,8 +53,10 @@ def export(
     """Write where the cases ended, for other tools."""
     if kind not in FORMATS:
         leave(USAGE, f'--format "{kind}" is not known; {" or ".join(FORMATS)}')
-    store = existing_run(folder)
-    path = out if out is not None else folder / f"end_states.{kind}"
+    if out is None and is_url(place):
+        leave(USAGE, f"--out is missing: {place} is a URL; name a file here")
+    store = existing_run(run_at(place))
+    path = out if out is not None else store.path / f"end_states.{kind}"
     if not path.parent.is_dir():
         leave(USAGE, f"--out {path}: there is no folder {path.parent}")
     from mc_engine.end_states import end_columns, write_csv

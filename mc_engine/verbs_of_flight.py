@@ -1,6 +1,5 @@
-"""The verbs that fly cases: run, resume, extend, replay, tune."""
+"""The verbs that fly cases: run, resume, extend, rerun, merge, replay."""
 
-import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
@@ -19,6 +18,7 @@ from mc_engine.command_line import (
     CaseSeconds,
     Memory,
     NoReport,
+    Patience,
     Publish,
     RunFolder,
     Scheduler,
@@ -27,10 +27,14 @@ from mc_engine.command_line import (
     existing_run,
     exit_status,
     leave,
+    new_folder,
     ranges,
+    refuse_occupied_folder,
+    run_here,
     write_reports,
 )
-from mc_engine.errors import StoreError
+from mc_engine.interruption import advise, heed
+from mc_engine.next_step import after_flight, is_complete
 from mc_engine.verbs_of_object_stores import echo_publication, refuse_path
 
 if TYPE_CHECKING:
@@ -43,7 +47,10 @@ if TYPE_CHECKING:
 @exit_status()
 def run(
     file: CampaignFile,
-    out: Annotated[Path | None, typer.Option(help="Directory of the run; by default runs/<campaign>-<time>.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Directory of the run; by default runs/<campaign>-<time>.", parser=new_folder),
+    ] = None,
     cases: Cases = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
     no_report: NoReport = False,
@@ -52,11 +59,18 @@ def run(
     scheduler: Scheduler = None,
     case_seconds: CaseSeconds = None,
     memory: Memory = None,
+    patience: Patience = None,
     shard: Annotated[
         str | None, typer.Option(metavar="K/N", help="Fly the K-th of N pieces; `merge` joins the pieces.")
     ] = None,
     upstream: Annotated[
-        Path | None, typer.Option("--from", help="Run to take inputs from, in place of the one that [inputs] names.")
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="RUN",
+            help="Run to take inputs from, in place of the one that [inputs] names.",
+            parser=run_here,
+        ),
     ] = None,
     judge: Annotated[bool, typer.Option("--judge", help="Exit with 1 unless every requirement passes.")] = False,
     max_failed: Annotated[int | None, typer.Option(min=0, help="Exit with 3 if more cases fail.")] = None,
@@ -67,6 +81,7 @@ def run(
     ] = None,
 ) -> None:
     """Fly a campaign and write its reports."""
+    advise(lambda: after_flight(None))
     from mc_engine.campaign import load_campaign
     from mc_engine.run_folder import default_folder
 
@@ -78,8 +93,8 @@ def run(
     _refuse_with_shard(shard, {"--until": until, "--judge": judge or None, "--out": "missing" if out is None else None})
     campaign = load_campaign(file, cases=cases, seed=seed, upstream=upstream)
     path = out if out is not None else default_folder(campaign.name)
-    _refuse_folder(path)
-    crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    refuse_occupied_folder(path)
+    crew = _crew(path, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
     kept = _kept(path, publish)
     if until is None:
         piece = _shard(shard)
@@ -89,13 +104,21 @@ def run(
 
         refuse_undecidable(campaign)
         store = _fly(lambda _, note: fly_until_decided(campaign, path, progress=note, **crew), kept)
-    _finish(store, no_report, judge, max_failed, publish)
+    _finish(store, no_report, judge, max_failed, publish, file)
 
 
-def _backend(name: str, scheduler: str | None, case_seconds: float | None, memory: int | None) -> "Backend":
+def _backend(
+    name: str, scheduler: str | None, case_seconds: float | None, memory: int | None, patience: float | None
+) -> "Backend":
     from mc_engine.backends import Backend
 
-    return Backend(name, scheduler, case_seconds, memory)
+    return Backend(name, scheduler, case_seconds, memory, patience)
+
+
+def _crew(folder: Path, workers: int | None, backend: "Backend", url: str | None = None, rerun: bool = False) -> Any:
+    """The arguments of a flight that say who flies it; from here on an interruption names the command that goes on."""
+    advise(lambda: after_flight(folder, backend.options(), url, rerun))
+    return {"workers": workers, "backend": backend}
 
 
 def _shard(text: str | None) -> "Shard | None":
@@ -115,21 +138,6 @@ def _refuse_with_shard(shard: str | None, others: dict[str, Any]) -> None:
     for option in ("--until", "--judge"):
         if others[option] is not None:
             leave(USAGE, f"--shard and {option}: a shard alone decides nothing; judge the run that `merge` makes")
-
-
-def _refuse_folder(path: Path) -> None:
-    """An occupied --out is a slip of the user's; told before anything is compiled."""
-    from mc_engine.store import JOURNAL, open_store, refuse_occupied
-
-    if (path / JOURNAL).exists() and open_store(path).missing():
-        leave(USAGE, f"--out {path}: holds a run that is not complete; `mc-engine resume {path}` flies the rest")
-    try:
-        refuse_occupied(path)
-    except StoreError as error:
-        leave(USAGE, f"--out {error}")
-    existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
-    if not (existing.is_dir() and os.access(existing, os.W_OK)):
-        leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")
 
 
 def _refuse_publication(url: str | None) -> None:
@@ -157,11 +165,18 @@ def _fly(fly: Callable[[Any, Any], "Store"], kept: AbstractContextManager[Any] |
     with Progress() as progress, kept or nullcontext():
         if not progress.stream.isatty():
             typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
-        return fly(runner, progress)
+        store = fly(runner, progress)
+    heed()  # a signal after the last case finds nothing more to land
+    return store
 
 
 def _finish(
-    store: "Store", no_report: bool, judge: bool = False, max_failed: int | None = None, url: str | None = None
+    store: "Store",
+    no_report: bool,
+    judge: bool = False,
+    max_failed: int | None = None,
+    url: str | None = None,
+    campaign: str | None = None,
 ) -> None:
     """What every flight ends with: reports, a summary, and an exit status where one was asked for."""
     from mc_engine.run_summary import case_line, failed_cases, judgement, look_line, verdict_line
@@ -184,6 +199,9 @@ def _finish(
     if url is not None:
         echo_publication(store.path, url)
     failed = failed_cases(store)
+    if failed == sum(store.status_counts().values()):
+        named = campaign or store.path / "campaign.toml"
+        typer.echo(f"no case flew to its end; `mc-engine check {named}` looks for the reason in the model", err=True)
     _judge_failures(failed, max_failed)
     if judge and any(verdict.outcome != "pass" for verdict in judged):
         leave(NOT_MET, "not every requirement is met")
@@ -214,24 +232,38 @@ def resume(
     scheduler: Scheduler = None,
     case_seconds: CaseSeconds = None,
     memory: Memory = None,
+    patience: Patience = None,
     repair: Annotated[bool, typer.Option("--repair", help="Fly again what is damaged.")] = False,
     publish: Publish = None,
 ) -> None:
     """Complete a run that was interrupted."""
-    _refuse_publication(publish)
-    crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
     crew["repair"] = repair
+    _refuse_publication(publish)
     if repair:
         from mc_engine.repair import mend_journal
 
         mend_journal(folder)
-    if existing_run(folder).manifest.get("looks"):
+    looks = existing_run(folder).manifest.get("looks")
+    if not repair and not looks and is_complete(folder):
+        _leave_complete(folder, publish)
+        return
+    if looks:
         from mc_engine.stopping import carry_on
 
         store = _fly(lambda _, note: carry_on(folder, progress=note, **crew), _kept(folder, publish))
     else:
         store = _fly(lambda runner, note: runner.resume(folder, progress=note, **crew), _kept(folder, publish))
     _finish(store, no_report, url=publish)
+
+
+def _leave_complete(folder: Path, url: str | None) -> None:
+    typer.echo(
+        f"{folder}: is complete; `mc-engine extend {folder} --cases N` adds cases, "
+        f"`mc-engine report {folder}` writes the reports anew"
+    )
+    if url is not None:
+        echo_publication(folder, url)
 
 
 @app.command()
@@ -245,6 +277,7 @@ def extend(
     scheduler: Scheduler = None,
     case_seconds: CaseSeconds = None,
     memory: Memory = None,
+    patience: Patience = None,
     publish: Publish = None,
 ) -> None:
     """Add cases to a run; 1000 extended to 2000 are the same as 2000 from the start."""
@@ -261,7 +294,7 @@ def extend(
         leave(USAGE, f'{folder}: the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can')
     if cases <= wanted:
         leave(USAGE, f"--cases {cases}: {folder} has {wanted} cases; give the number it is to have in all")
-    crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
     store = _fly(lambda runner, note: runner.extend(folder, cases, progress=note, **crew), _kept(folder, publish))
     _finish(store, no_report, url=publish)
 
@@ -277,6 +310,7 @@ def rerun(
     scheduler: Scheduler = None,
     case_seconds: CaseSeconds = None,
     memory: Memory = None,
+    patience: Patience = None,
 ) -> None:
     """Fly failed cases of a run again, in processes: their worker may have died of something outside."""
     store = existing_run(folder)
@@ -284,15 +318,20 @@ def rerun(
         leave(USAGE, "rerun flies only failed cases again: add --failed; the others would come out with the same bits")
     if store.missing():
         leave(USAGE, f"{folder}: is not complete; `mc-engine resume {folder}` flies the rest first")
-    crew: dict[str, Any] = {"workers": workers, "backend": _backend(backend, scheduler, case_seconds, memory)}
+    if not store.status_counts().keys() - {"ok"}:
+        typer.echo(f"{folder}: no case failed; there is nothing to fly again")
+        return
+    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), rerun=True)
     _finish(_fly(lambda runner, progress: runner.rerun(folder, progress=progress, **crew)), no_report)
 
 
 @app.command()
 @exit_status()
 def merge(
-    out: Annotated[Path, typer.Argument(metavar="RUN", help="Directory of the run to be made.")],
-    shards: Annotated[list[Path], typer.Argument(metavar="SHARD...", help="Directories of `run --shard`.")],
+    out: Annotated[Path, typer.Argument(metavar="RUN", help="Directory of the run to be made.", parser=new_folder)],
+    shards: Annotated[
+        list[Path], typer.Argument(metavar="SHARD...", help="Directories of `run --shard`.", parser=run_here)
+    ],
     no_report: NoReport = False,
     chunk: Annotated[
         int | None, typer.Option(min=1, help="Cases of a part; as `run` would have it by default.")
@@ -302,12 +341,14 @@ def merge(
     """Make one run of the shards of a campaign: the same table as flown by one process."""
     for shard in shards:
         existing_run(shard)
-    _refuse_folder(out)
+    refuse_occupied_folder(out)
+    advise(lambda: after_flight(out))
     store = _fly(lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk))
     _finish(store, no_report)
 
 
-@app.command()
+# so that -1 is told to be no case, and not no option
+@app.command(context_settings={"ignore_unknown_options": True})
 @exit_status()
 def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:
     """Fly one case again, alone: compare every stored number bit for bit, and write and plot its history."""
@@ -325,43 +366,3 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
             typer.echo(str(difference), err=True)
         leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")
     typer.echo(f"case {case}: every stored number has the same bits")
-
-
-@app.command()
-@exit_status()
-def tune(
-    file: CampaignFile,
-    out: Annotated[
-        Path | None, typer.Option(help="Directory of the result; by default runs/<campaign>-<time>.")
-    ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")] = None,
-    generations: Annotated[int | None, typer.Option(min=1, help="Generations, in place of the file's.")] = None,
-    population: Annotated[int | None, typer.Option(min=4, help="Candidates in each, in place of the file's.")] = None,
-    no_report: NoReport = False,
-    workers: Workers = None,
-) -> None:
-    """Search parameters for the best metrics, as the section tuning of FILE says (needs pymoo)."""
-    from mc_engine.campaign import load_campaign
-    from mc_engine.run_folder import default_folder
-
-    campaign = load_campaign(file)
-    path = out if out is not None else default_folder(campaign.name)
-    _refuse_folder(path)
-    from mc_engine.progress import Progress
-    from mc_engine.tuning import tune
-    from mc_engine.tuning_folder import outcome_lines
-
-    with Progress() as progress:
-        record = tune(
-            campaign,
-            path,
-            seed=seed,
-            generations=generations,
-            population=population,
-            workers=workers,
-            progress=progress,
-        )
-    for line in [f"tuning       {path}", *outcome_lines(record)]:
-        typer.echo(line)
-    for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
-        typer.echo(f"report       {report_path}")

@@ -1,47 +1,80 @@
 """The verb for probabilities too small for plain cases: rare."""
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mc_engine.command_line import USAGE, CampaignFile, NoReport, Workers, app, exit_status, leave, write_reports
-from mc_engine.errors import StoreError
+from mc_engine.command_line import (
+    USAGE,
+    CampaignFile,
+    NoReport,
+    Workers,
+    app,
+    beginning,
+    exit_status,
+    leave,
+    new_folder,
+    refuse_occupied_folder,
+    write_reports,
+)
+from mc_engine.interruption import NOTHING_BEGUN, advise, heed
+from mc_engine.next_step import after_search
 
 _SECONDS_BETWEEN_LINES = 5.0
+
+if TYPE_CHECKING:
+    from mc_engine.campaign_parts import Requirement
+
+
+def _requirements_beginning(ctx: typer.Context, incomplete: str) -> list[str]:
+    """What the shell offers for a requirement: those of the campaign that stands on the line already."""
+    from mc_engine.campaign_search import requirement_names
+
+    # an option that still lacks its word leaves the argument before it unread
+    file = ctx.params.get("file") or next(iter(ctx.args), "")
+    return [name for name in requirement_names(file) if name.startswith(incomplete)]
 
 
 @app.command()
 @exit_status()
 def rare(
     file: CampaignFile,
-    requirement: Annotated[str | None, typer.Option(help="Its name; the only one by default.")] = None,
-    method: Annotated[str, typer.Option(help="subset or cross-entropy.")] = "subset",
+    requirement: Annotated[
+        str | None, typer.Option(help="Its name; the only one by default.", autocompletion=_requirements_beginning)
+    ] = None,
+    method: Annotated[
+        str, typer.Option(help="subset or cross-entropy.", autocompletion=beginning(("subset", "cross-entropy")))
+    ] = "subset",
     cases_per_level: Annotated[int, typer.Option(min=1, help="Cases that each level stands on.")] = 10_000,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Directory of the result; by default runs/<campaign>-…")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Directory of the result; by default runs/<campaign>-…", parser=new_folder),
+    ] = None,
     no_report: NoReport = False,
     workers: Workers = None,
 ) -> None:
     """The probability that a requirement of FILE is not met, down to one in millions, with its interval."""
+    advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign import load_campaign
     from mc_engine.limit_state import chosen_requirement, refuse_unmappable
     from mc_engine.rare_event import METHODS, estimate_rare_event
+    from mc_engine.rare_event_folder import RECORD
     from mc_engine.rare_event_lines import outcome_lines
     from mc_engine.run_folder import default_folder
-    from mc_engine.store import refuse_occupied
 
     if method not in METHODS:
         leave(USAGE, f'--method "{method}" is not known; {" or ".join(METHODS)}')
     campaign = load_campaign(file, seed=seed)
+    _refuse_to_choose(campaign.requirements, requirement)
     chosen_requirement(campaign, requirement)
     refuse_unmappable(campaign)
     path = out if out is not None else default_folder(f"{campaign.name}-rare")
-    try:
-        refuse_occupied(path)
-    except StoreError as error:
-        leave(USAGE, f"--out {error}")
+    refuse_occupied_folder(path)
+    advise(lambda: after_search(path, RECORD, "the estimate is"))
     typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
     found = estimate_rare_event(
         campaign,
@@ -52,10 +85,17 @@ def rare(
         workers=workers,
         progress=_Teller(),
     )
+    heed()
     for line in (f"rare event   {path}", *outcome_lines(found.result)):
         typer.echo(line)
     for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
         typer.echo(f"report       {report_path}")
+
+
+def _refuse_to_choose(requirements: Sequence["Requirement"], name: str | None) -> None:
+    if name is None and len(requirements) > 1:
+        names = ", ".join(one.name for one in requirements)
+        leave(USAGE, f"--requirement is missing: the campaign has several; choose one of {names}")
 
 
 class _Teller:

@@ -5,18 +5,33 @@ from typing import Annotated
 
 import typer
 
-from mc_engine.command_line import app, exit_status
+from mc_engine.command_line import app, exit_status, new_file
+
+
+def _campaigns_with_sources(incomplete: str) -> list[str]:
+    from mc_engine.published_table import published_files
+
+    return [path.parent.name for path in published_files() if path.parent.name.startswith(incomplete)]
 
 
 @app.command()
 @exit_status()
 def published(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Campaigns, for all values of their sources.")
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAME]...",
+            help="Campaigns, for all values of their sources.",
+            autocompletion=_campaigns_with_sources,
+        ),
     ] = None,
     write: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Put it into a Markdown file, between <!-- published --> and <!-- end -->."),
+        typer.Option(
+            parser=new_file,
+            metavar="FILE",
+            help="Put it into a Markdown file, between <!-- published --> and <!-- end -->.",
+        ),
     ] = None,
 ) -> None:
     """Published values beside ours, as Markdown, each marked reached, not reached (why) or unknown.

@@ -32,16 +32,20 @@ class Site:
 
     directory : folder of the campaign's files; the run directory has copies where that one is not to be seen.
     n_cases : how many cases the campaign has.  case_seconds : time that one case may take, or no limit.
+    memory_mib : what the worker's process may have, or no limit of ours.
     """
 
     run: str
     directory: str
     n_cases: int
     case_seconds: float | None = None
+    memory_mib: int | None = None
 
 
 def perform(site: Site, order: Order) -> Written | None:
     """Carry out one order in this process."""
+    if site.memory_mib is not None:
+        _limit_memory(site.memory_mib)
     campaign, columns = _campaign(site)
     guard = None
     if site.case_seconds is not None or order.suspected:
@@ -110,28 +114,31 @@ def _note(run: Path, kind: str, first: int, last: int) -> Path:
     return temporary_name(run / "cases" / f"{kind}-{first}-{last}")  # a name that the next writer sweeps away
 
 
-def take_note(run: Path, case_ids: np.ndarray) -> tuple[str, np.ndarray]:
-    """What a dead worker noted of some of these cases: "late", "in_flight" or nothing, and which.  Takes the note away.
+def take_notes(run: Path, case_ids: np.ndarray) -> tuple[str, np.ndarray]:
+    """What dead workers noted of some of these cases: "late", "in_flight" or nothing, and which.  Takes the notes away.
 
-    case_ids : int64[n], what the worker was flying.
+    case_ids : int64[n], what the workers were flying.
     """
-    for kind in (LATE, IN_FLIGHT):
-        for path in (run / "cases").glob(temporary_name(Path(f"{kind}-*")).name):
-            _, first, last = path.stem.split("-")
-            noted = case_ids[(case_ids >= int(first)) & (case_ids <= int(last))]
-            if noted.size:
-                path.unlink(missing_ok=True)
-                return kind, noted
-    return "", case_ids[:0]
+    found = {kind: _noted(run, kind, case_ids) for kind in (LATE, IN_FLIGHT)}
+    return next(((kind, noted) for kind, noted in found.items() if noted.size), ("", case_ids[:0]))
 
 
-def begin_process(memory_mib: int | None, parent: int) -> None:
+def _noted(run: Path, kind: str, case_ids: np.ndarray) -> np.ndarray:
+    noted = np.zeros(case_ids.size, dtype=bool)
+    for path in (run / "cases").glob(temporary_name(Path(f"{kind}-*")).name):
+        _, first, last = path.stem.split("-")
+        these = (case_ids >= int(first)) & (case_ids <= int(last))
+        if these.any():
+            path.unlink(missing_ok=True)
+            noted |= these
+    return case_ids[noted]
+
+
+def begin_process(parent: int) -> None:
     """Set up this process as a worker of process `parent`."""
     for number in SIGNALS:  # a Ctrl-C goes to all processes of a terminal; the one that asked us decides
         signal.signal(number, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    if memory_mib is not None:
-        _limit_memory(memory_mib)
 
 
 def dask_setup(worker: object) -> None:
@@ -146,6 +153,7 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
+@lru_cache(maxsize=1)
 def _limit_memory(mib: int) -> None:
     """Let allocations beyond `mib` fail, or where the system cannot, end the process that has more."""
     if sys.platform.startswith("linux"):

@@ -18,7 +18,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import naming
+from mc_engine.durable_file import naming, open_regular
 from mc_engine.errors import StoreError
 from mc_engine.journal import utc_now
 
@@ -45,7 +45,7 @@ class WriterLock:
         Raises StoreError within a second, naming the path, if another writer is at work.
         """
         with naming(self.path):
-            descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+            descriptor = open_regular(self.path, os.O_RDWR | os.O_CREAT)
             try:
                 before = self._wait(descriptor)
                 record = {"pid": os.getpid(), "host": socket.gethostname(), "since": utc_now()}
@@ -80,8 +80,8 @@ class WriterLock:
 def holder(folder: Path) -> dict[str, Any] | None:
     """The record of the writer now at work in `folder`; None if there is none."""
     try:
-        descriptor = os.open(folder / LOCK_NAME, os.O_RDWR)
-    except OSError:
+        descriptor = open_regular(folder / LOCK_NAME, os.O_RDWR)
+    except (OSError, StoreError):
         return None  # no lock file, or a directory we may only read: nobody to be told of
     try:
         return None if _take(descriptor) else (_read(descriptor) or {})
@@ -147,7 +147,7 @@ def _read(descriptor: int) -> dict[str, Any] | None:
         return None
     try:
         record = json.loads(content)
-    except ValueError:
+    except (ValueError, RecursionError):
         return {}
     return record if isinstance(record, dict) else {}
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from mc_engine.durable_file import make_folder, temporary_name, write_durably
 from mc_engine.rare_event_folder import is_rare_event_directory, open_rare_event
 from mc_engine.store import open_store
 from mc_engine.tuning_folder import is_tuning_directory, open_tuning
@@ -104,9 +105,11 @@ def _write_all(path: Path, files: Iterable[Attachment]) -> list[Path]:
 
 
 def _write(path: Path, content: bytes) -> Path:
-    # A hidden neighbour first, so that a reader never sees half a report.
-    path.parent.mkdir(exist_ok=True)
-    unfinished = path.with_name(f".{path.name}.unfinished")
-    unfinished.write_bytes(content)
-    unfinished.replace(path)
+    """Write one file, whole or not at all; DiskError or StoreError names it."""
+    make_folder(path.parent)
+    try:
+        write_durably(path, content)
+    except KeyboardInterrupt:
+        temporary_name(path).unlink(missing_ok=True)  # of a full disk it is gone already
+        raise
     return path

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mc_engine.comparison import CONFIDENCE, Comparison, VerdictChange
-from mc_engine.durable_file import naming
+from mc_engine.durable_file import write_durably
 from mc_engine.run_changes import Difference
 from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite
 from reports.contents import blocks
@@ -47,10 +47,7 @@ def write_comparison(found: Comparison, path: Path) -> Path:
     """Write the comparison to `path`, a page if it ends in .html, else a PDF; the file appears whole or not at all."""
     document = build_comparison(found)
     content = render_html(document) if path.suffix == ".html" else render_pdf(document)
-    unfinished = path.with_name(f".{path.name}.unfinished")
-    with naming(path):
-        unfinished.write_bytes(content)
-        unfinished.replace(path)
+    write_durably(path, content)
     return path
 
 

@@ -9,7 +9,7 @@ from mc_engine.statistics.designed_indices import CONFIDENCE, FEWEST_BLOCKS, Des
 from reports.document import Cell, Column, FigureBlock, Table
 from reports.figures import IndexMap
 from reports.flown import Flown
-from reports.numbers import count, number, percent
+from reports.numbers import axis_label, count, number, percent
 
 MOST_METRICS = 8
 MOST_INPUTS = 12  # in the figure, and a metric in the table
@@ -78,7 +78,7 @@ def _table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mappi
         name = found.metrics[k]
         used = f"{count(int(found.n_used[k]))} / {count(found.n_tried)} {BLOCKS[found.design]}"
         unit = flown.unit(name) if found.design == "morris" else ""
-        metric = Cell(f"{names[name]} [{unit}]" if unit else names[name], small=used)
+        metric = Cell(axis_label(names[name], unit), small=used)
         for row in np.argsort(-found.values[main][:, k], kind="stable")[:MOST_INPUTS]:
             cells = [_cell(found.values[index][row, k], found.reach[index][row, k]) for index in indices]
             rows.append((metric, Cell(flown.words(found.inputs[row])), *cells))

@@ -1,5 +1,6 @@
 """Numbers and names as a reader wants them: sensible digits, a true minus sign, units beside every name."""
 
+import re
 from math import floor, isfinite, log10
 
 from mc_engine.units import UNITS, unit_suffix
@@ -72,7 +73,7 @@ def exact(value: float | str | bool) -> str:
 
 def with_unit(text: str, unit: str) -> str:
     """The text with its unit behind it."""
-    return f"{text}{SPACE}{unit}" if unit else text
+    return f"{text}{SPACE}{typeset(unit)}" if unit else text
 
 
 def words(name: str, unit: str) -> str:
@@ -83,4 +84,11 @@ def words(name: str, unit: str) -> str:
 
 def axis_label(text: str, unit: str) -> str:
     """A label with its unit in brackets."""
-    return f"{text} [{unit}]" if unit else text
+    return f"{text} [{typeset(unit)}]" if unit else text
+
+
+def typeset(unit: str) -> str:
+    """A unit as it is printed: W/m² for W/m^2, µN for uN, deg/√h for deg/sqrt(h)."""
+    raised = re.sub(r"\^(\d+)", lambda power: power[1].translate(_SUPERSCRIPT), unit)
+    rooted = re.sub(r"sqrt\((\w)\)", r"√\1", raised)
+    return re.sub(r"\bu(?=(?:m|s|g|N|T|rad)\b)", "µ", rooted).replace("Ohm", "Ω").replace(" ", SPACE)

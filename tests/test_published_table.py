@@ -19,10 +19,10 @@ PLACES = {
         "Table 4", "Table 5", "Table 8", "Table 9", "Table 12", "worst of 100", "eq. 19", "conclusions",
     ],
     "geo_injection": [f"Table {k}" for k in range(1, 9)],
-    "geo_servicing": ["section 3.3", "section 9.1", "section 9.2", "section 9.3"],
+    "geo_servicing": ["section 3.3", "section 9.1", "section 9.2", "section 9.3", "histogram", "start of the plots"],
     "reentry": [
         "case 1", "case 4", "case 6", "TR R-11", "Rep. 1381", "Rep. 1382", "2008-1198", "Standard Atmosphere", "Ogata",
-        "eqs 7 to 13", "eqs 14 to 16", "eqs 17, 18", "chapter 2", "chapter 3",
+        "eqs 7 to 13", "eqs 14 to 16", "eqs 17, 18", "chapter 2", "chapter 3", "R-532",
     ],
 }  # fmt: skip
 
@@ -30,6 +30,20 @@ PLACES = {
 @pytest.mark.parametrize(("name", "place"), [(name, place) for name, places in PLACES.items() for place in places])
 def test_every_table_and_figure_with_results_is_there(name, place):
     assert any(place in one["source"] for one in TABLES[name])
+
+
+# numbers that stand together in a source, and how many there are of them
+TOGETHER = {
+    "flexible_satellite": {"optimum of Table 4": 5, "optimum of Table 8": 5, "optimum of Table 9": 10},
+    "geo_injection": {"iterations": 3},
+    "geo_servicing": {"3-sigma interval": 8, "histogram": 2, "coast before burn": 3, "length of burn": 3},
+    "reentry": {"Apollo final phase: range to go": 11, "steep entry: load over": 2, "Stardust": 5},
+}
+
+
+@pytest.mark.parametrize(("name", "words"), [(name, one) for name, groups in TOGETHER.items() for one in groups])
+def test_numbers_that_stand_together_are_all_there(name, words):
+    assert sum(words in one["quantity"] for one in TABLES[name]) == TOGETHER[name][words]
 
 
 def test_the_five_systems_have_published_values():

@@ -104,11 +104,3 @@ def burnt_velocity(path: DeorbitPath, a_initial, magnitude_error, angle_error, o
     radial = -path.tilt * in_plane * np.sin(alpha)
     transverse = np.sqrt(MU_EARTH / a_initial) - in_plane * np.cos(alpha)
     return radial, transverse, dv * np.sin(out_of_plane)
-
-
-def planar_elements(r, v_radial, v_transverse):
-    """(a [m], e, f [rad]) of the orbit through radius r [m] with these velocity components [m/s]."""
-    a = MU_EARTH / (2.0 * MU_EARTH / r - v_radial**2 - v_transverse**2)
-    p = (r * v_transverse) ** 2 / MU_EARTH
-    e_cos, e_sin = p / r - 1.0, v_radial * np.sqrt(p / MU_EARTH)
-    return a, np.hypot(e_cos, e_sin), np.arctan2(e_sin, e_cos)

@@ -51,15 +51,3 @@ def refuse_unphysical(inertia: np.ndarray, coupling: np.ndarray, refusals: Refus
         ~positive, "J - c0 c0^T is not positive definite: the modes carry more inertia than the whole satellite has"
     )
     return np.linalg.inv(np.where(positive[:, None, None], rigid, unit))
-
-
-def free_frequencies(inertia: np.ndarray, coupling: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
-    """Frequencies [rad/s], float64[n, 4], of the free craft, undamped: det(Lam^2 - x^2 (1 - c0^T J^-1 c0)) = 0.
-
-    frequencies : float64[n, 4], Lam, those of the appendages on a body that is held.
-    """
-    turned = np.linalg.solve(inertia, coupling)
-    mass = np.eye(4) - coupling.transpose(0, 2, 1) @ turned
-    # Lam^-1 M Lam^-1 is symmetric with eigenvalues 1 / x^2
-    scaled = mass / (frequencies[:, :, None] * frequencies[:, None, :])
-    return 1.0 / np.sqrt(np.linalg.eigvalsh(scaled)[:, ::-1])

@@ -53,8 +53,8 @@ def _report(name: str, n_cases: int = 4000) -> None:
     print(f"{'':28}" + "".join(f"{metric:>26}" for metric in SMOOTH))
     for k, dispersion in enumerate(sigmas):
         print(f"{dispersion:28}" + "".join(f"{parts[metric][k]:26.6g}" for metric in SMOOTH))
-    linear = [float(np.sqrt((parts[metric] ** 2).sum())) for metric in SMOOTH]
-    print(f"{'sigma, linear':28}" + "".join(f"{value:26.6g}" for value in linear))
+    linear = predicted_sigmas(campaign.nominal, sigmas)
+    print(f"{'sigma, linear':28}" + "".join(f"{linear[metric]:26.6g}" for metric in SMOOTH))
     print(f"{'sigma, flown':28}" + "".join(f"{np.std(flown[metric], ddof=1):26.6g}" for metric in SMOOTH))
     for metric in LENGTHS:
         spread = np.percentile(flown[metric], [50.0, 99.0])

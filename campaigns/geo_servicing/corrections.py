@@ -19,10 +19,8 @@ from campaigns.geo_servicing.dynamics import (
     longitudes,
 )
 from campaigns.geo_servicing.inspection import PAIRS, next_coast, next_pair, relative_orbit, velocity_change
-from campaigns.geo_servicing.navigation import FILTERED, RAW, Estimate, burnt, estimate_of
+from campaigns.geo_servicing.navigation import FILTERED, RAW, Estimate, burnt, estimate_of, navigated_elements
 from mc_engine.lanes import any_lane, atan, exp, maximum, physics, rint, sincos, sqrt, where
-from mc_engine.physics.frames import orbital_axes
-from mc_engine.physics.orbital_elements import equinoctial
 from mc_engine.physics.radiation import discs
 from mc_engine.physics.sun_moon import ephemeris
 
@@ -80,16 +78,7 @@ def drift_of(a):
 @physics
 def navigated(t, s, m, p):
     """(mean longitude deviation [rad], drift [rad/rev]) as navigation tells them."""
-    rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
-    x = equinoctial(
-        s.x + m.r * rx + m.s * ax,
-        s.y + m.r * ry + m.s * ay,
-        s.z + m.r * rz + m.s * az,
-        s.vx + m.u * rx + m.w * ax,
-        s.vy + m.u * ry + m.w * ay,
-        s.vz + m.u * rz + m.w * az,
-        MU,
-    )
+    x = navigated_elements(s, m)
     mean = x.mean - (p.aim + RATE * t)
     return mean - TURN * rint(mean / TURN), drift_of(x.a)
 

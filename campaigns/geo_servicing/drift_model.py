@@ -6,30 +6,10 @@ name says otherwise.  Numbers in brackets are equations of the source (`model.SO
 
 import numpy as np
 
-from campaigns.geo_servicing.dynamics import R0, RATE, TURN, V0
+from campaigns.geo_servicing.dynamics import RATE, TURN, V0
 
 DRIFT_PER_DV = -3.0 * TURN / V0  # rad/rev per m/s of a transverse impulse
 E_PER_DV = 2.0 / V0  # length of the eccentricity vector per m/s of it
-
-
-def longitude_after(y, v, e, anomaly, flown):
-    """Longitude deviation [rad] after an angle flown [rad]; y, v : of it and its drift [rad, rad/rev].  (3.36)"""
-    return y + v * flown / TURN + 4.0 * e * np.sin(0.5 * flown) * np.cos(anomaly + 0.5 * flown)
-
-
-def radius_deviation(v, e, anomaly, flown):
-    """Radius less the synchronous one [m] after an angle flown [rad].  (3.38)-(3.40)"""
-    return R0 * (-v / (1.5 * TURN) - e * np.cos(anomaly + flown))
-
-
-def relative_eccentricity(e_s, anomaly_s, e_t, anomaly_t):
-    """(length of the difference of two eccentricity vectors, anomaly on the relative ellipse [rad]).  (3.43), (3.44)
-
-    The pericentres point alike.
-    """
-    along = e_s * np.cos(anomaly_s) - e_t * np.cos(anomaly_t)
-    across = e_s * np.sin(anomaly_s) - e_t * np.sin(anomaly_t)
-    return np.hypot(along, across), np.arctan2(across, along)
 
 
 def perturbation_coefficients(transverse, radial):

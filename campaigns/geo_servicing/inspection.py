@@ -6,8 +6,8 @@ Numbers in brackets are equations of the source (`model.SOURCE`); the procedure 
 from collections import namedtuple
 
 from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, TURN
-from mc_engine.lanes import atan, atan2, floor, maximum, minimum, physics, rint, sincos, sqrt, where
-from mc_engine.physics.frames import orbital_axes
+from campaigns.geo_servicing.navigation import navigated_elements
+from mc_engine.lanes import atan2, floor, maximum, minimum, physics, rint, sqrt, where
 from mc_engine.physics.orbital_elements import equinoctial
 
 # along: mean distance ahead of the target [m], drift of it [m/rev]; e: length of the difference of the eccentricity
@@ -29,32 +29,9 @@ def correction(y, v, t, chi1, chi2, weight, sigma):
 
 
 @physics
-def coast_time(e_s, theta_s, e_t, theta_t, u, turns):
-    """Coast [s] to the place where a correction u makes the relative ellipse smaller (3.45).
-
-    e, theta : eccentricities and anomalies [rad] of the module and the target, pericentres alike;  turns : m_k
-    """
-    sine_s, cosine_s = sincos(theta_s)
-    sine_t, cosine_t = sincos(theta_t)
-    a = e_s * cosine_s - e_t * cosine_t
-    alpha = atan((e_s * sine_s - e_t * sine_t) / a)
-    sign = where(u * a > 0.0, 1.0, where(u * a < 0.0, -1.0, 0.0))
-    return SIDEREAL_DAY * (turns + 0.25 * (1.0 - sign)) - alpha / RATE
-
-
-@physics
 def relative_orbit(s, m):
     """The module's motion about the target, as navigation tells it."""
-    rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
-    one = equinoctial(
-        s.x + m.r * rx + m.s * ax,
-        s.y + m.r * ry + m.s * ay,
-        s.z + m.r * rz + m.s * az,
-        s.vx + m.u * rx + m.w * ax,
-        s.vy + m.u * ry + m.w * ay,
-        s.vz + m.u * rz + m.w * az,
-        MU,
-    )
+    one = navigated_elements(s, m)
     other = equinoctial(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz, MU)
     ahead = one.mean - other.mean
     dk, dh = one.k - other.k, one.h - other.h

@@ -13,9 +13,11 @@ R. E. Kalman, Journal of Basic Engineering 82 (1960) 35-45; G. W. Hill, American
 
 from collections import namedtuple
 
-from campaigns.geo_servicing.dynamics import RATE, Memory
+from campaigns.geo_servicing.dynamics import MU, RATE, Memory
 from mc_engine.lanes import physics, sincos, where
 from mc_engine.lanes.noise import normal_pair
+from mc_engine.physics.frames import orbital_axes
+from mc_engine.physics.orbital_elements import equinoctial
 
 # error and covariance of the estimate
 Estimate = namedtuple("Estimate", "r s u w prr prs pru prw pss psu psw puu puw pww")
@@ -148,3 +150,21 @@ def chosen(mask, a, b):
         where(mask, a.pss, b.pss), where(mask, a.psu, b.psu), where(mask, a.psw, b.psw),
         where(mask, a.puu, b.puu), where(mask, a.puw, b.puw), where(mask, a.pww, b.pww),
     )  # fmt: skip
+
+
+@physics
+def navigated_elements(s, m):
+    """Equinoctial elements of the module as navigation tells them: m.r, m.s [m] and m.u, m.w [m/s] are its errors.
+
+    r, u : outward;  s, w : ahead.
+    """
+    rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
+    return equinoctial(
+        s.x + m.r * rx + m.s * ax,
+        s.y + m.r * ry + m.s * ay,
+        s.z + m.r * rz + m.s * az,
+        s.vx + m.u * rx + m.w * ax,
+        s.vy + m.u * ry + m.w * ay,
+        s.vz + m.u * rz + m.w * az,
+        MU,
+    )

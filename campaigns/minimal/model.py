@@ -1,8 +1,6 @@
-"""An apogee raised by one burn: the smallest campaign, a start for your own.
+"""An apogee raised by one burn, an impulse at the perigee of a circular orbit: a start for a model of your own.
 
-The burn is an impulse at perigee of a circular orbit; the craft then coasts to its apogee.  Physics is written on
-plain numbers, SI and radians; a parameter `burn_dv_m_s` is `burn_dv` here.  See mc_engine.model for all that a
-model can have: control, memory, several events, designs made per case.
+Inside, all is SI and radians, and `burn_dv_m_s` is `burn_dv`; mc_engine.model says all that a model can have.
 """
 
 from collections import namedtuple
@@ -12,51 +10,37 @@ from mc_engine.model import Event, Extremum, Field, FixedStep, Model, Parameter
 from mc_engine.physics.constants import EQUATORIAL_RADIUS, MU_EARTH
 
 State = namedtuple("State", "x y vx vy")
-Parameters = namedtuple("Parameters", "altitude burn_dv magnitude_error pitch_error")  # as PARAMETERS, SI
-Memory = namedtuple("Memory", "unused")
+Parameters = namedtuple("Parameters", "altitude burn_dv magnitude_error pitch_error")
 Events = namedtuple("Events", "apogee")
 Quantities = namedtuple("Quantities", "altitude speed")
 Metrics = namedtuple("Metrics", "apogee_altitude apogee_time top_speed")
 
-PARAMETERS = (
-    Parameter("altitude_km", "km", "altitude of the circular orbit", 300.0, low=150.0, high=2000.0),
-    Parameter("burn_dv_m_s", "m/s", "size of the burn", 100.0, low=1.0),
-    Parameter("magnitude_error_pct", "%", "error of the burn's size", 0.0, low=-99.0),
-    Parameter("pitch_error_deg", "deg", "error of the burn's direction, in the orbital plane", 0.0, -90.0, 90.0),
-)
-
 
 @physics
-def initial(p, o):
-    """Just after the burn, on the x axis."""
-    r = EQUATORIAL_RADIUS + p.altitude
-    dv = p.burn_dv * (1.0 + p.magnitude_error)
+def initial(p, o):  # just after the burn, on the x axis
+    r, dv = EQUATORIAL_RADIUS + p.altitude, p.burn_dv * (1.0 + p.magnitude_error)
     return State(r, 0.0, dv * sin(p.pitch_error), sqrt(MU_EARTH / r) + dv * cos(p.pitch_error))
 
 
 @physics
-def rhs(t, s, m, p, o):
-    """Motion about a point mass."""
+def rhs(t, s, m, p, o):  # the derivative of the state: a point mass attracts
     r2 = s.x * s.x + s.y * s.y
     g = -MU_EARTH / (r2 * sqrt(r2))
     return State(s.vx, s.vy, g * s.x, g * s.y)
 
 
 @physics
-def events(t, s, m, p, o):
-    """Apogee: the distance stops growing."""
+def events(t, s, m, p, o):  # zero at the apogee, where the distance stops growing
     return Events(s.x * s.vx + s.y * s.vy)
 
 
 @physics
-def observe(t, s, m, p, o):
-    """What histories show."""
+def observe(t, s, m, p, o):  # what histories show
     return Quantities(sqrt(s.x * s.x + s.y * s.y) - EQUATORIAL_RADIUS, sqrt(s.vx * s.vx + s.vy * s.vy))
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    """What a case comes to."""
+def evaluate(t, s, m, p, o, best, when):  # what a case comes to, at its end
     return Metrics(sqrt(s.x * s.x + s.y * s.y) - EQUATORIAL_RADIUS, t, best.speed)
 
 
@@ -64,7 +48,12 @@ MODEL = Model(
     name="minimal",
     title="Apogee raised by one burn",
     source="",
-    parameters=PARAMETERS,
+    parameters=(  # name, unit, meaning, nominal value, and the range that is allowed
+        Parameter("altitude_km", "km", "altitude of the circular orbit", 300.0, low=150.0, high=2000.0),
+        Parameter("burn_dv_m_s", "m/s", "size of the burn", 100.0, low=1.0),
+        Parameter("magnitude_error_pct", "%", "error of the burn's size", 0.0, low=-99.0),
+        Parameter("pitch_error_deg", "deg", "error of the burn's direction, in the orbital plane", 0.0, -90.0, 90.0),
+    ),
     settings=(),
     states=(Field("x_m", "m", "x"), Field("y_m", "m", "y"), Field("vx_m_s", "m/s", "vx"), Field("vy_m_s", "m/s", "vy")),
     quantities=(Field("altitude_km", "km", "altitude"), Field("speed_m_s", "m/s", "speed")),

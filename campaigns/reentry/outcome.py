@@ -17,7 +17,7 @@ from campaigns.reentry.dynamics import (
     place_of,
     speed2,
 )
-from mc_engine.lanes import atan2, floor, physics, rint, sqrt, where
+from mc_engine.lanes import atan2, floor, physics, sqrt, where
 from mc_engine.model import Field
 from mc_engine.physics.frames import geodetic_latitude, spherical, velocity_angles
 
@@ -98,12 +98,6 @@ Quantities = namedtuple(
 )
 Metrics = namedtuple("Metrics", [field.name for field in METRICS])  # type: ignore[misc]
 Ground = namedtuple("Ground", "latitude longitude downrange crossrange path heading")
-
-
-@physics
-def half_turn(angle):
-    """The angle in [-pi, pi]."""
-    return angle - TAU * rint(angle * (1.0 / TAU))
 
 
 @physics

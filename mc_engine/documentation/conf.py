@@ -7,6 +7,8 @@ version = release = engine_version()
 html_title = "mc-engine" if release == "source" else f"mc-engine {release}"
 extensions = ["myst_parser"]
 html_theme = "furo"
+html_static_path = ["site_style"]
+html_css_files = ["columns.css"]
 html_copy_source = False
 html_show_copyright = False
 html_show_sphinx = False

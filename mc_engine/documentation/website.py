@@ -7,11 +7,21 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mc_engine.campaign_search import SHIPPED
-from mc_engine.documentation import campaign_pages, function_pages, schema_page, verbs_page, words_page
+from mc_engine.documentation import campaign_pages, function_pages, schema_page, units_page, verbs_page, words_page
 from mc_engine.errors import EngineError
+from mc_engine.extras import how_to_install
 
 HOME = Path(__file__).resolve().parent
 _PICTURE = SHIPPED / "deorbit" / "fuel_map.png"
+# Sections of reference/index.md, which is all there is of the reference without a site, and their pages on the site.
+_SECTIONS = {
+    "Keys of a campaign file": "campaign_file.md",
+    "The command line": "command_line.md",
+    "Columns of a run": "columns.md",
+    "Units": "units.md",
+    "Words of a report": "words.md",
+    "Functions and classes": "functions.md",
+}
 
 
 def build(folder: Path) -> bool:
@@ -24,7 +34,7 @@ def build(folder: Path) -> bool:
         importlib.import_module("myst_parser")
         importlib.import_module("furo")
     except ModuleNotFoundError as error:
-        raise EngineError(f'the site needs {error.name}; pip install "mc-engine[docs]"') from None
+        raise EngineError(f"the site needs {error.name}; {how_to_install('docs')}") from None
     with TemporaryDirectory() as scratch:
         pages = Path(scratch) / "pages"
         write_pages(pages)
@@ -38,7 +48,10 @@ def write_pages(folder: Path) -> None:
     for path in handwritten():
         target = folder / path.relative_to(HOME)
         target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(path, target)
+        if path.suffix == ".md":
+            target.write_text(_on_the_site(path.read_text(encoding="utf-8")), encoding="utf-8")
+        else:
+            shutil.copyfile(path, target)
     shutil.copyfile(_PICTURE, folder / _PICTURE.name)
     for name, text in reference_pages():
         target = folder / "reference" / name
@@ -46,9 +59,18 @@ def write_pages(folder: Path) -> None:
         target.write_text(text, encoding="utf-8")
 
 
+def _on_the_site(text: str) -> str:
+    """The text of a page with its links as the site has them: to the pages that are made, to the picture beside it."""
+    text = text.replace(f"../../campaigns/{_PICTURE.relative_to(SHIPPED).as_posix()}", _PICTURE.name)
+    for title, page in _SECTIONS.items():
+        text = text.replace(f"reference/index.md#{title.lower().replace(' ', '-')}", f"reference/{page}")
+        text = text.replace(f"\n## {title}\n", f"\n## [{title}]({page})\n") if text.startswith("# Reference") else text
+    return text
+
+
 def handwritten() -> list[Path]:
     """conf.py and the Markdown pages with the files that they show."""
-    shown = (".md", ".toml", ".yml", ".yaml", ".sh", ".sbatch", ".slurm", ".png", ".svg", ".py")
+    shown = (".md", ".css", ".toml", ".yml", ".yaml", ".sh", ".sbatch", ".slurm", ".png", ".svg", ".py")
     files = [path for path in sorted(HOME.rglob("*")) if path.suffix in shown and path.parent != HOME]
     return [HOME / "conf.py", *sorted(HOME.glob("*.md")), *(path for path in files if "__pycache__" not in path.parts)]
 
@@ -57,6 +79,7 @@ def reference_pages() -> Iterator[tuple[str, str]]:
     """(name, Markdown) of each page that comes from schema, program, models and docstrings."""
     yield "campaign_file.md", schema_page.page()
     yield "command_line.md", verbs_page.page()
+    yield "units.md", units_page.page()
     yield "words.md", words_page.page()
     yield from campaign_pages.pages()
     yield from function_pages.pages()

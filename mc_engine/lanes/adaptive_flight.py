@@ -187,7 +187,7 @@ narrow = compile_callable(_narrow)
 def _begin(f, p, o, key, case):
     """First state and memory of every lane."""
     t = case * 0.0
-    s, m = spread(f.initial(p, o), t), spread(f.start(p, o), t)
+    s, m = f.states_of(spread(f.initial(p, o), t)), spread(f.start(p, o), t)
     return s, spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
 
 
@@ -209,7 +209,7 @@ first = compile_callable(_first)
 
 def _finish(f, here, best, when, p, o):
     """Metrics of every lane, were it to end here."""
-    return spread(f.evaluate(here.t, here.s, here.m, p, o, f.best_of(best), f.when_of(when)), here.t)
+    return f.metrics_of(spread(f.evaluate(here.t, here.s, here.m, p, o, f.best_of(best), f.when_of(when)), here.t))
 
 
 finish = compile_callable(_finish)

@@ -90,7 +90,7 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
     """
     t = case * 0.0
     flying, status, rows = t == t, t, 0
-    s, m = spread(f.initial(p, o), t), spread(f.start(p, o), t)
+    s, m = f.states_of(spread(f.initial(p, o), t)), spread(f.start(p, o), t)
     m = spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
     seen = look_shared(f, t, s, m, p, o)
     v0 = v1 = best = f.peaks_of(seen)
@@ -161,7 +161,7 @@ def _fly(f, parameter_class, setting_class, width, parameters, settings, key, ca
         if must_stop:
             status = where(unstopped, _UNSTOPPED, status)
         extreme, instant = f.best_of(best + last), f.when_of(when + last)
-        values = spread(f.evaluate(t, s, m, p, o, extreme, instant), t)
+        values = f.metrics_of(spread(f.evaluate(t, s, m, p, o, extreme, instant), t))
         store(end_time, first, t)
         store(end_status, first, status)
         store_fields(end_state, first, s)

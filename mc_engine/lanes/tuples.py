@@ -12,6 +12,7 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np import arrayobj
 
+from mc_engine.errors import ModelError
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.lane_type import I1, Lanes, common_width, convert, mask_type, number_type
 from mc_engine.lanes.lowering import constant, fused, llvm_type
@@ -32,6 +33,15 @@ def _pack(context: Any, builder: Any, ty: Any, values: Sequence[Any]) -> Any:
 
 def _item(builder: Any, value: Any, i: int) -> Any:
     return builder.extract_value(value, i)
+
+
+def _refuse_other_count(what: str, fields: Any, count: int) -> None:
+    """ModelError where a tuple has not the number of fields that the kernel has room for: it trusts this number.
+
+    Models are held to their contract before; this is for one that gives other counts to the compiler.
+    """
+    if isinstance(fields, types.BaseTuple) and len(fields) != count:
+        raise ModelError(f"{what}: the physics gives {len(fields)} numbers where the model declares {count}")
 
 
 @intrinsic
@@ -62,6 +72,7 @@ def mask_like(typingctx, flag, like):
 @intrinsic
 def add_scaled(typingctx, y, h, k):
     """y + h k, field by field, each rounded once."""
+    _refuse_other_count("rhs", k, len(y))
 
     def codegen(context, builder, sig, args):
         width = common_width(*y)
@@ -86,6 +97,8 @@ def _select(context, builder, condition, ty, chosen, other):
 @intrinsic
 def select(typingctx, mask, chosen, other):
     """`chosen` in the lanes where mask holds, `other` elsewhere; for lanes, tuples of lanes, and tuples of tuples."""
+    if isinstance(chosen, types.BaseTuple):
+        _refuse_other_count("state or memory", other, len(chosen))
 
     def codegen(context, builder, sig, args):
         return _select(context, builder, args[0], chosen, args[1], args[2])
@@ -287,11 +300,26 @@ def record(typingctx, array, row, time, fields):
     return types.none(array, types.intp, time, fields), codegen
 
 
-def picker(cls: type | None, picks: Sequence[tuple[int, float, float]]) -> Any:
-    """Intrinsic taking a tuple of lanes to (sign * field - offset, ...) for each (field, sign, offset)."""
+def counted(what: str, count: int) -> Any:
+    """Intrinsic handing a tuple on that has `count` fields; ModelError when a kernel is built with another."""
+
+    @intrinsic
+    def hand_on(typingctx, fields):
+        _refuse_other_count(what, fields, count)
+        return fields(fields), lambda context, builder, sig, args: args[0]
+
+    return hand_on
+
+
+def picker(cls: type | None, picks: Sequence[tuple[int, float, float]], count: int | None = None) -> Any:
+    """Intrinsic taking a tuple of lanes to (sign * field - offset, ...) for each (field, sign, offset).
+
+    count : how many fields the tuple must have, if that is known.
+    """
 
     @intrinsic
     def pick(typingctx, fields):
+        _refuse_other_count("quantities", fields, len(fields) if count is None else count)
         result = types.BaseTuple.from_types(tuple(fields[i] for i, _, _ in picks), cls)
 
         def codegen(context, builder, sig, args):
@@ -312,6 +340,8 @@ def directions(signs: Sequence[float]) -> Any:
 
     @intrinsic
     def give(typingctx, fields):
+        _refuse_other_count("events or quantities", fields, len(signs))
+
         def codegen(context, builder, sig, args):
             values = [constant(common_width(fields[i]), sign) for i, sign in enumerate(signs)]
             return _pack(context, builder, fields, values)

@@ -13,8 +13,6 @@ M. J. Sidi, Spacecraft Dynamics and Control (1997), section 9.3.
 
 from collections import namedtuple
 
-import numpy as np
-
 from mc_engine.lanes import any_lane, copysign, exp, floor, log, maximum, minimum, physics, where
 
 # filtered: the lag's output; output: -1.0, 0.0 or 1.0; age: time since it last changed [s];
@@ -103,7 +101,7 @@ def _switched(sample, command, m):
 def _without_cycles(sample, command, m):
     """The sample with all whole cycles taken out of what is left, where it has just switched and will again.
 
-    A cycle is a pulse and a pause, see `pulse_time` and `pause_time`; after it all is as it was before.
+    A cycle is a pulse and a pause, as long as the lag takes between its thresholds; after it all is as it was before.
     """
     pulses, push = sample.pulses, m.gain * abs(command)
     pull = push - m.gain * m.level
@@ -152,37 +150,3 @@ def sampled_pulses(x, y, z, command_x, command_y, command_z, m, period):
     y, mean_y = _ended(b, period)
     z, mean_z = _ended(c, period)
     return x, y, z, mean_x, mean_y, mean_z
-
-
-def first_on_time(command, gain, time_constant, on):
-    """Time [s] from rest to the first pulse for a constant command; infinite inside the dead band."""
-    drive = np.asarray(gain * command, dtype=float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(drive > on, time_constant * np.log(drive / (drive - on)), np.inf)
-
-
-def pulse_time(command, gain, time_constant, level, on, off):
-    """Length [s] of a pulse for a constant command; infinite where the thruster fires for good."""
-    floor = np.asarray(gain * (command - level), dtype=float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(floor < off, time_constant * np.log((on - floor) / (off - floor)), np.inf)
-
-
-def pause_time(command, gain, time_constant, on, off):
-    """Length [s] of the pause between pulses for a constant command; infinite inside the dead band."""
-    drive = np.asarray(gain * command, dtype=float)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(drive > on, time_constant * np.log((drive - off) / (drive - on)), np.inf)
-
-
-def dead_band(gain, on):
-    """Constant command below which no pulse ever comes."""
-    return on / gain
-
-
-def shortest_pulse(gain, time_constant, level, on, off):
-    """Length [s] of the shortest pulse that a steady command brings, about that of a command near zero.
-
-    -T ln(1 - h / (K U)), h = on - off: the usual estimate, for the lag falling from h to 0 with a drive of -K U.
-    """
-    return -time_constant * np.log(1.0 - np.asarray(on - off, dtype=float) / (gain * level))

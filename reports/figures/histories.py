@@ -1,5 +1,6 @@
 """Quantities along the flight: percentile bands, the nominal and the worst of the retained cases, a panel each."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -40,11 +41,15 @@ class HistoryBand:
     @property
     def pairs(self) -> list[tuple[float, float, float]]:
         """(lower, upper, opacity) of each band, the widest first."""
-        low = sorted(p for p in self.curves if p < 0.5)
-        return [
-            (p, max(q for q in self.curves if abs(p + q - 1.0) < 1e-9), o)
-            for p, o in zip(low, (OUTER, INNER), strict=False)
-        ]
+        return band_pairs(self.curves)
+
+
+def band_pairs(curves: Iterable[float]) -> list[tuple[float, float, float]]:
+    """(lower, upper, opacity) of each band between curves of these probabilities, the widest first."""
+    known = sorted(curves)
+    low = [p for p in known if p < 0.5]
+    # 1 - 0.05 is not 0.95 to the last bit
+    return [(p, max(q for q in known if abs(p + q - 1.0) < 1e-9), o) for p, o in zip(low, (OUTER, INNER), strict=False)]
 
 
 def thinned(t: np.ndarray, y: np.ndarray, samples: int = SAMPLES) -> tuple[np.ndarray, np.ndarray]:

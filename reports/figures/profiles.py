@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from reports.document import Drawing, Key
 from reports.figures import paper, screen
-from reports.figures.histories import INNER, OUTER, HistoryLine, line_style
+from reports.figures.histories import OUTER, HistoryLine, band_pairs, line_style
 from reports.figures.palette import MUTED, SKY, on_paper
 from reports.numbers import count, number, percent
 
@@ -28,8 +28,7 @@ class ProfileBand:
     @property
     def pairs(self) -> list[tuple[float, float, float]]:
         """(lower, upper, opacity) of each band, the widest first."""
-        low = sorted(p for p in self.curves if p < 0.5)
-        return [(p, 1.0 - p, opacity) for p, opacity in zip(low, (OUTER, INNER), strict=False)]
+        return band_pairs(self.curves)
 
     def curve(self, probability: float) -> np.ndarray:
         """The quantile's curve; 1 - 0.05 is found although it is not 0.95 to the last bit."""

@@ -2,54 +2,25 @@
 
     python -m tests.benchmarks.lanes
 
-Only the kernel call is timed; compiling, or loading the compiled kernel, is printed apart.  The widths take
-turns at short flights and the shortest time of each counts, so that other work on the machine disturbs little.
+The measurement is that of `mc-engine bench`, on inputs that stay the same whatever becomes of the campaign files.
 """
 
 import platform
-import time
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import mc_engine
-from mc_engine import flight
 from mc_engine.campaign import load_campaign
-from mc_engine.cases import case_table, full_inputs
-from mc_engine.kernel import build_kernel
-from mc_engine.kernel_parts import settings_class
-from mc_engine.model import Model, load_model
+from mc_engine.lane_speed import Flight, campaign_flight, measure
+from mc_engine.model import load_model
 
 HERE = Path(__file__).resolve().parent
 ROCKET = Path(mc_engine.__file__).parent / "documentation" / "tutorial" / "sounding_rocket"
 WIDTHS = (1, 8, 16)
 LONG = 12  # repeats of the long flights
-
-
-@dataclass(frozen=True)
-class Flight:
-    """Cases of one model that all fly with the same settings."""
-
-    title: str
-    model: Model
-    folder: Path | None
-    inputs: flight.Inputs
-    n_cases: int
-
-
-@dataclass
-class Timing:
-    """Shortest time of a case-step [ns] and time [s] to compile or load the kernel, by width."""
-
-    ns: dict[int, float] = field(default_factory=dict)
-    ready_s: dict[int, float] = field(default_factory=dict)
-
-    def ratio(self, width: int = 8) -> float:
-        """How many times longer a step takes one case at a time."""
-        return self.ns[1] / self.ns[width]
 
 
 def orbit(n_cases: int = 256) -> Flight:
@@ -86,44 +57,7 @@ def flexible_pulses(n_cases: int = 16) -> Flight:
 
 def sounding_rocket(n_cases: int = 64) -> Flight:
     """The tutorial's campaign, from the rail to the ground: noisy control in every step, three switches, a stop."""
-    campaign = load_campaign(ROCKET)
-    inputs = full_inputs(campaign, case_table(campaign, np.arange(n_cases)))
-    return Flight("sounding rocket of the tutorial", campaign.model, ROCKET, inputs, n_cases)
-
-
-def caller(cases: Flight, width: int) -> Callable[[], float]:
-    """Function that flies all cases once and returns the time of a case-step [ns], that of the kernel call alone."""
-    ready = flight.prepare(cases.model, cases.inputs, cases.n_cases)
-    settings = np.ascontiguousarray(ready.settings[0])
-    grid = flight.grid_of(cases.model.clock, settings_class(cases.model)(*settings))
-    end_time, status = np.empty(cases.n_cases), np.empty(cases.n_cases)
-    states = np.empty((len(cases.model.states), cases.n_cases))
-    metrics = np.empty((len(cases.model.metrics), cases.n_cases))
-    numbers, key, history = np.arange(float(cases.n_cases)), np.uint64(1), np.empty((0, 0))
-    kernel = build_kernel(cases.model, cases.folder, width)
-
-    def fly() -> float:
-        start = time.perf_counter()
-        kernel(ready.parameters, settings, key, numbers, *grid, end_time, status, states, metrics, history, 1)
-        elapsed = time.perf_counter() - start
-        return elapsed / np.ceil(end_time / grid[1]).sum() * 1e9
-
-    return fly
-
-
-def measure(cases: Flight, widths: Iterable[int] = WIDTHS, repeats: int = 60) -> Timing:
-    """Timing of the kernels of several widths on the same cases."""
-    timing = Timing()
-    flights = {}
-    for width in widths:
-        start = time.perf_counter()
-        flights[width] = caller(cases, width)
-        flights[width]()
-        timing.ready_s[width] = time.perf_counter() - start
-    for _ in range(repeats):
-        for width, fly in flights.items():
-            timing.ns[width] = min(timing.ns.get(width, np.inf), fly())
-    return timing
+    return replace(campaign_flight(load_campaign(ROCKET), n_cases), title="sounding rocket of the tutorial")
 
 
 def processor() -> str:
@@ -146,7 +80,7 @@ def main() -> None:
         (sounding_rocket, LONG),
     ):
         cases = flown()
-        timing = measure(cases, repeats=repeats)
+        timing = measure(cases, WIDTHS, repeats)
         for width, ns in timing.ns.items():
             print(
                 f"{cases.title}, width {width:2d}: {ns:6.1f} ns per case-step, "

@@ -1,8 +1,10 @@
 """Eight lanes against one in the same run.  A ratio, so that it holds on a slow machine and on a busy one."""
 
 import pytest
-from lanes import LONG, deorbit, flexible, flexible_pulses, measure, orbit, sounding_rocket
+from lanes import LONG, deorbit, flexible, flexible_pulses, orbit, sounding_rocket
 from llvmlite import binding
+
+from mc_engine.lane_speed import measure
 
 ATTEMPTS = 3  # a neighbour on the machine can spoil one measurement
 # of what the registers allow: where thrusters switch, the lanes that do not switch wait for those that do, and a

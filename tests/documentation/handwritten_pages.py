@@ -27,7 +27,7 @@ def commands(page: Path) -> list[str]:
     """What follows `mc-engine` in the page's shell blocks and between its backticks."""
     prose = _FENCE.sub("", page.read_text(encoding="utf-8"))
     shown = [*blocks(page, "sh"), *blocks(page, "console")]
-    lines = [line.removeprefix("$ ") for text, _ in shown for line in text.splitlines()]
+    lines = [line.removeprefix("$ ") for text, _ in shown for line in text.replace("\\\n", " ").splitlines()]
     lines += re.findall(r"`(mc-engine [^`]+)`", prose)
     parts = [part for line in lines for part in re.split(r"\|\||&&|;", line.split(" #")[0])]
     return [found[1] for part in parts if (found := re.search(r"(?:^|\s|/)mc-engine (.*)", part.strip()))]

@@ -17,7 +17,12 @@ from mc_engine import load_campaign, open_store, runner
 from mc_engine.cli import app
 
 EXAMPLES = Path(mc_engine.__file__).parent / "documentation" / "examples"
-WORKFLOW, ARRAY = EXAMPLES / "campaign.yml", EXAMPLES / "job_array.sh"
+WORKFLOW = EXAMPLES / "campaign.yml"
+ARRAYS = {  # what the batch system tells a job
+    "job_array.sh": {"SLURM_ARRAY_TASK_ID": "{job}", "SLURM_CPUS_PER_TASK": "1"},
+    "job_array_pbs.sh": {"PBS_ARRAY_INDEX": "{job}", "PBS_O_WORKDIR": "."},
+    "job_array_lsf.sh": {"LSB_JOBINDEX": "{job}"},
+}
 VERBS = typer.main.get_command(app).commands
 
 
@@ -44,17 +49,21 @@ def test_the_workflow_fails_on_a_broken_requirement_and_on_a_change():
     assert not any(step.get("continue-on-error") for step in job["steps"])
 
 
-def test_the_job_array_flies_and_resumes_its_pieces_to_one_run(tmp_path):
-    assert subprocess.run(["bash", "-n", ARRAY], check=False).returncode == 0
-    script = tmp_path / "job_array.sh"
-    script.write_text(ARRAY.read_text().replace("CAMPAIGN=my_case", "CAMPAIGN=small").replace("PIECES=20", "PIECES=2"))
+@pytest.mark.parametrize("name", ARRAYS)
+def test_the_job_array_flies_and_resumes_its_pieces_to_one_run(tmp_path, name):
+    assert subprocess.run(["bash", "-n", EXAMPLES / name], check=False).returncode == 0
+    script, text = tmp_path / "job_array.sh", (EXAMPLES / name).read_text()
+    for line, ours in (("CAMPAIGN=my_case", "small"), ("PIECES=20", "2"), ("WORKERS=16", "1")):
+        text = text.replace(line, f"{line.split('=')[0]}={ours}")
+    script.write_text(text)
     subprocess.run(
         [sys.executable, "-m", "mc_engine", "init", "small"], cwd=tmp_path, env=_environment(tmp_path), check=True
     )
     file = tmp_path / "small" / "campaign.toml"
     file.write_text(file.read_text().replace("cases = 2000", "cases = 60"))
     for job in ("1", "2", "2"):  # the last one again, as after a kill
-        environment = {**_environment(tmp_path), "SLURM_ARRAY_TASK_ID": job, "SLURM_CPUS_PER_TASK": "1"}
+        told = {key: value.format(job=job) for key, value in ARRAYS[name].items()}
+        environment = {**_environment(tmp_path), **told}
         done = subprocess.run(["bash", script], cwd=tmp_path, env=environment, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     merged = runner.merge(tmp_path / "merged", sorted((tmp_path / "shards").iterdir()), workers=1)

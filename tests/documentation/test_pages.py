@@ -22,6 +22,58 @@ def parametrize(pages):
     return pytest.mark.parametrize("page", pages, ids=name_of)
 
 
+WIDEST = 88  # columns of code that fit beside the site's menu; commands wrap
+
+
+def broken_links(page):
+    """Links and pictures of a page as it lies among the sources that lead to no file, or to no heading of a page."""
+    text = page.read_text(encoding="utf-8")
+    for shown, link in re.findall(r"\[([^\]]*)\]\(([^)\s]+)\)", _without_code(text)):
+        path, _, place = link.partition("#")
+        if re.match(r"[a-z]+:", link):
+            continue
+        target = (page.parent / path).resolve() if path else page
+        if not shown or not target.is_file() or (place and place not in headings(target)):
+            yield link
+
+
+def headings(page):
+    """The places in a page that a forge gives to its headings."""
+    titles = re.findall(r"^#+ (.*)$", _without_code(page.read_text(encoding="utf-8")), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def _without_code(text):
+    return re.sub(r"^```.*?^```", "", text, flags=re.DOTALL | re.MULTILINE)
+
+
+@parametrize(PAGES)
+def test_links_and_pictures_lead_somewhere_where_pages_are_read_as_they_lie(page):
+    assert list(broken_links(page)) == []
+
+
+def test_a_link_without_words_to_no_file_or_to_no_heading_is_found(tmp_path):
+    page = tmp_path / "page.md"
+    page.write_text(
+        "# One more\n[](page.md) [a](none.md) ![b](none.png) [c](page.md#two) [d](#one-more) [e](https://x.org)"
+    )
+    assert list(broken_links(page)) == ["page.md", "none.md", "none.png", "page.md#two"]
+
+
+@parametrize([page for page in PAGES if page.name != "README.md"])
+def test_code_is_no_wider_than_its_column(page):
+    code = [text for kind in ("python", "toml", "jinja") for text, _ in blocks(page, kind)]
+    assert [line for text in code for line in text.splitlines() if len(line) > WIDEST] == []
+
+
+def test_the_overviews_name_every_page():
+    for folder in ("how_to", "explanation"):
+        overview = (HOME / folder / "index.md").read_text(encoding="utf-8")
+        pages = sorted(path.name for path in (HOME / folder).glob("*.md") if path.name != "index.md")
+        assert sorted(re.findall(r"\]\((\w+\.md)\)", overview)) == pages
+        assert sorted(f"{name}.md" for name in overview.split(":hidden:")[1].split("```")[0].split()) == pages
+
+
 def unknown_words(command):
     """The verb or options of a command that the program does not have."""
     words = [word for word in shlex.split(command.replace("…", "")) if word not in ("|", ">")]

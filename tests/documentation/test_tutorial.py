@@ -32,7 +32,8 @@ def flown(tmp_path_factory):
         (case / name).write_text(text, encoding="utf-8")
     run = str(here / "first")
     outputs = {}
-    for verb in (["check", str(case)], ["run", str(case), "--out", run, "--cases", "40"], ["replay", run, "17"]):
+    verbs = [["check", str(case)], ["run", str(case), "--out", run, "--cases", "40"], ["replay", run, "17"]]
+    for verb in [*verbs, ["bench", str(case), "--cases", "16", "--repeats", "3"]]:
         done = CliRunner().invoke(app, verb)
         assert done.exit_code == 0, done.output
         outputs[verb[0]] = done.output
@@ -52,9 +53,19 @@ def test_a_reader_who_types_it_gets_a_checked_campaign_a_report_and_a_bit_exact_
     assert "no problems" in outputs["check"]
     assert "every stored number has the same bits" in outputs["replay"]
     page = (here / "first" / "report.html").read_text(encoding="utf-8")
-    for title in ("Apogee over the errors of thrust and drag", "Landing and apogee", "Altitude over speed"):
+    for title in ("Apogee over thrust and drag", "Landing and apogee", "Altitude over speed"):
         assert title in page
     assert (here / "first" / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_reader_sees_what_lanes_give_in_the_words_of_the_text(flown):
+    text = (TUTORIAL / "tutorial.md").read_text(encoding="utf-8")
+    shown = text.split("$ mc-engine bench sounding_rocket\n")[1].split("```")[0]
+    without_numbers = [re.sub(r" *[\d.,]+ ", " # ", one.replace("48 cases", "16 cases")) for one in shown.splitlines()]
+    printed = flown[1]["bench"].replace("of 3", "of 20").splitlines()
+    assert [re.sub(r" *[\d.,]+ ", " # ", one) for one in printed] == without_numbers
+    # a ratio of lanes, whatever the processor and its other work; tests/benchmarks holds the seven
+    assert float(re.search(r"([\d.]+) times as fast \(as `run`\)", flown[1]["bench"])[1]) > 1.5
 
 
 def test_the_rocket_burns_out_peaks_and_lands_under_its_parachute(flown):

@@ -6,7 +6,7 @@ MonkeyPatch.
 
 import os
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from mc_engine import dispatch, durable_file, parts, store, verification
 from mc_engine.writer_lock import WriterLock
@@ -17,7 +17,7 @@ def line_before_part(patch):
 
     def publish(self, written):
         with self.lock():
-            self._journal.append("part", asdict(written.part))
+            self._record("part", asdict(written.part))
             self._name(written)
 
     patch(store.Store, "publish", publish)
@@ -26,6 +26,15 @@ def line_before_part(patch):
 def dead_worker_forgotten(patch):
     """Nobody flies again what a dead worker was flying."""
     patch(dispatch.Dispatch, "_mourn", lambda self, landing: None)
+
+
+def suspects_given_up(patch):
+    """All cases that were in flight when a worker died are blamed for its death."""
+
+    def suspect(self, order, cases, fate):
+        self._waiting.append(order.without([replace(fate, case_id=int(case)) for case in cases], None))
+
+    patch(dispatch.Dispatch, "_suspect", suspect)
 
 
 def disk_unheard(patch):
@@ -72,6 +81,7 @@ BREAKS = {
     for one in (
         line_before_part,
         dead_worker_forgotten,
+        suspects_given_up,
         disk_unheard,
         contents_unsynced,
         names_unsynced,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from trapped import campaign_folder, files_of, trapped
 
-from mc_engine import crews, load_campaign, runner
+from mc_engine import cluster_crew, load_campaign, runner
 from mc_engine.backends import Backend
 from mc_engine.chunks import Order
 from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
@@ -28,9 +28,10 @@ def whole(campaign, tmp_path_factory):
     return runner.run(campaign, tmp_path_factory.mktemp("whole") / "run", workers=2, chunk=CHUNK)
 
 
-def test_processes_write_the_bytes_of_threads(campaign, whole, tmp_path):
+def test_processes_write_the_bytes_of_threads(campaign, whole, tmp_path, record_property):
     store = runner.run(campaign, tmp_path / "run", workers=2, chunk=CHUNK, backend="loky")
     assert files_of(store.path) == files_of(whole.path)
+    record_property("files equal byte by byte", len(files_of(whole.path)))
 
 
 def test_a_model_in_a_file_flies_in_processes(tmp_path):
@@ -41,14 +42,14 @@ def test_a_model_in_a_file_flies_in_processes(tmp_path):
 
 
 def test_a_cluster_that_loses_a_worker_and_gains_one_writes_the_bytes_of_threads(
-    campaign, whole, tmp_path, monkeypatch
+    campaign, whole, tmp_path, monkeypatch, record_property
 ):
     """Over TCP, with a worker killed after the first part and another one added after the third."""
     from distributed import LocalCluster
 
     monkeypatch.setenv("STONES_SLEEP_S", "0.1")
     done_so_far = []
-    with LocalCluster(n_workers=2, threads_per_worker=1, protocol="tcp", dashboard_address=None) as cluster:
+    with LocalCluster(n_workers=2, threads_per_worker=1, protocol="tcp", dashboard_address="127.0.0.1:0") as cluster:
 
         def disturb(done, total, failed):
             done_so_far.append(done)
@@ -63,9 +64,10 @@ def test_a_cluster_that_loses_a_worker_and_gains_one_writes_the_bytes_of_threads
     assert len(done_so_far) > 4
     monkeypatch.delenv("STONES_SLEEP_S")
     assert files_of(store.path) == files_of(whole.path)
+    record_property("files equal byte by byte", len(files_of(whole.path)))
 
 
-def test_shards_in_any_order_some_killed_and_some_twice_merge_to_the_whole(campaign, whole, tmp_path):
+def test_shards_in_any_order_some_killed_and_some_twice_merge_to_the_whole(campaign, whole, tmp_path, record_property):
     rng = np.random.default_rng(8)
     shards, folders = [Shard(number, 20) for number in range(1, 21)], []
     for shard in rng.permutation(np.array(shards, dtype=object)):
@@ -79,6 +81,7 @@ def test_shards_in_any_order_some_killed_and_some_twice_merge_to_the_whole(campa
         runner.run(campaign, folders[-1], workers=2, chunk=33, shard=Shard(number, 20))
     merged = runner.merge(tmp_path / "merged", [folders[i] for i in rng.permutation(len(folders))], chunk=CHUNK)
     assert files_of(merged.path) == files_of(whole.path)
+    record_property("files equal byte by byte", len(files_of(whole.path)))
     assert merged.verify() == []
 
 
@@ -92,7 +95,7 @@ def lose_parts(folder):
 
 def test_missing_shards_are_named_with_the_commands_that_fly_them(campaign, tmp_path):
     for number in (1, 3):
-        runner.run(campaign, tmp_path / f"{number}", chunk=100, shard=Shard(number, 4))
+        runner.run(campaign, tmp_path / f"{number}", workers=1, chunk=100, shard=Shard(number, 4))
     lose_parts(tmp_path / "3")
     with pytest.raises(StoreError) as caught:
         runner.merge(tmp_path / "merged", [tmp_path / "1", tmp_path / "3"])
@@ -168,6 +171,7 @@ def test_shards_share_all_cases_evenly():
         (("loky", "tcp://node:1"), 'a scheduler is for the backend "dask"'),
         (("threading", None, 3.0), "a thread cannot be limited in time or memory"),
         (("dask", "tcp://node:1", None, 1000), "dask worker --memory-limit"),
+        (("loky", None, None, None, 60.0), 'patience is for the backend "dask", whose workers come and go'),
     ],
 )
 def test_backends_that_cannot_be_are_told(arguments, words):
@@ -200,7 +204,7 @@ def test_a_grid_without_a_seed_can_be_resumed_and_replayed(tmp_path):
 
 @pytest.mark.parametrize("address", ["no such:x", "tcp://127.0.0.1:1"])
 def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign, tmp_path, monkeypatch, address):
-    monkeypatch.setattr(crews, "START_S", 0.5)
+    monkeypatch.setattr(cluster_crew, "START_S", 0.5)
     with pytest.raises(RunInterrupted, match=r"there is no scheduler: .*`mc-engine resume .*--backend dask"):
         runner.run(campaign, tmp_path / "run", chunk=CHUNK, backend=Backend("dask", address))
     assert runner.resume(tmp_path / "run").status_counts() == {"ok": CASES}

@@ -133,7 +133,7 @@ def test_parts_whose_journal_lines_are_damaged_are_flown_again(run, flown):
     assert open_store(run).notes("mended")[0].facts["lost"] == [number + 1 for number in hit]
 
 
-@pytest.mark.parametrize("event", ["part-withdrawn", "nominal-withdrawn", "history", "started", "finished"])
+@pytest.mark.parametrize("event", ["part-withdrawn", "nominal", "history", "started", "finished"])
 def test_no_lost_line_makes_a_case_count_twice(run, flown, event):
     store = open_store(run)
     part = store.parts[2]

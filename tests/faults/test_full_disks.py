@@ -1,5 +1,6 @@
 """Disks that fill up in the middle of a run: exit status 4, a sentence with the path, and nothing committed is lost."""
 
+import shutil
 import subprocess
 import sys
 
@@ -15,7 +16,7 @@ KIB_OF_LARGEST_FILE = 6
 # The command line with a limit on the size of any file it writes, which every system of the POSIX kind keeps.
 LIMITED = f"""
 import resource, signal, sys
-from mc_engine.cli import main
+from mc_engine.__main__ import main
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # so that the write fails, as on a full disk
 resource.setrlimit(resource.RLIMIT_FSIZE, ({KIB_OF_LARGEST_FILE * 1024},) * 2)
 sys.argv[0] = "mc-engine"
@@ -63,11 +64,29 @@ def test_a_disk_that_fills_up_ends_the_run_with_status_4_and_all_that_was_commit
     done = engine("run", tmp_path / "campaign", "--out", place / "run", "--no-report", "--workers", 2)
     committed = check_stopped(done, place / "run", whole.cases())
     record_property("committed cases", committed)
-    print(f"disk of {mib} MiB: exit 4 with {committed} of {cases} cases, all readable")
+    record_property("of", cases)
     assert 0 < committed < cases
     assert "No space left" in done.stderr
     again = engine("resume", place / "run", "--no-report")  # still full
     assert check_stopped(again, place / "run", whole.cases()) >= committed
+
+
+def test_reports_on_a_full_disk_end_with_status_4_and_leave_nothing_half_written(small_disk, tmp_path, record_property):
+    place, mib = small_disk
+    stones(tmp_path / "campaign", 200)
+    run = place / "run"
+    assert engine("run", tmp_path / "campaign", "--out", run, "--no-report").returncode == 0
+    filler = place / "filler"
+    filler.write_bytes(bytes(shutil.disk_usage(place).free - 100_000))
+    before = {path.name for path in run.iterdir()}
+    done = engine("report", run)
+    assert done.returncode == 4, done.stderr
+    assert done.stderr.startswith(f"{run}/report.html: No space left on device; ")
+    assert f"`mc-engine report {run}` writes the reports" in done.stderr
+    assert {path.name for path in run.iterdir()} == before
+    filler.unlink()
+    assert engine("verify", run).returncode == 0
+    record_property("MiB", mib)
 
 
 def test_a_run_whose_files_may_not_grow_stops_in_the_same_way_and_goes_on_when_they_may(tmp_path):

@@ -46,23 +46,27 @@ def cases_of(bases, count, offset):
 
 
 @pytest.mark.parametrize("count", [FEW, pytest.param(ALL * 3 // 4, marks=pytest.mark.slow)])
-def test_a_mutated_campaign_is_refused_in_sentences_or_is_still_a_campaign(bases, count):
-    refused = 0
+def test_a_mutated_campaign_is_refused_in_sentences_or_is_still_a_campaign(bases, count, record_property):
+    refused, longest = 0, 0.0
     for number, rng, path, text in cases_of(bases, count, 0):
         kind, content = mutate(text, rng)
         path.write_bytes(content)
         status, said, duration = checked(path)
         where = f"mutation {number}, {kind}, of {path.parent.name}: {said[:500]}"
         assert status in (VALID, REFUSED), where
+        longest = max(longest, duration)
         assert duration < HANG_S, where
         assert "Traceback" not in said, where
         assert all(letter.isprintable() or letter == "\n" for letter in said), where
         refused += status == REFUSED
+    record_property("mutations", count)
+    record_property("refused", refused)
+    record_property("longest [s]", longest)
     assert refused > 0.7 * count  # the others exchange lines or values that may be exchanged
 
 
 @pytest.mark.parametrize("count", [FEW // 2, pytest.param(ALL // 4, marks=pytest.mark.slow)])
-def test_a_slip_of_one_letter_is_answered_with_the_word_that_was_meant(bases, count):
+def test_a_slip_of_one_letter_is_answered_with_the_word_that_was_meant(bases, count, record_property):
     answers, missed = Counter(), []
     for number, rng, path, text in cases_of(bases, count, ALL):
         wrong = slip(text, rng)
@@ -74,7 +78,8 @@ def test_a_slip_of_one_letter_is_answered_with_the_word_that_was_meant(bases, co
             right = f'did you mean "{wrong.meant}"' in said
             answers[right] += 1
             missed += [] if right else [f"{wrong.meant} -> {wrong.written}: {said}"]
-    print(f"{answers[True]} of {answers.total()} slips of one letter answered with the word that was meant")
+    record_property("slips refused", answers.total())
+    record_property("answered with the word that was meant", answers[True])
     assert answers.total() > 0.95 * count
     assert answers[True] >= 0.95 * answers.total(), "\n".join(missed[:20])
 

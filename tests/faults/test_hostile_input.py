@@ -134,7 +134,7 @@ def test_letters_that_deceive_the_eye_or_steer_a_terminal_do_neither(name):
 
 
 @pytest.mark.parametrize("size", [250_001, 100_000_000])
-def test_a_file_of_any_size_is_refused_within_a_second(tmp_path, size):
+def test_a_file_of_any_size_is_refused_within_a_second(tmp_path, size, record_property):
     path = tmp_path / "campaign.toml"
     with open(path, "wb") as file:
         file.write(HEAD.encode())
@@ -142,7 +142,8 @@ def test_a_file_of_any_size_is_refused_within_a_second(tmp_path, size):
     begin = time.process_time()
     with pytest.raises(CampaignError, match="is larger than 250 kB"):
         load_campaign(path)
-    assert time.process_time() - begin < SENTENCE_S
+    record_property("seconds", taken := time.process_time() - begin)
+    assert taken < SENTENCE_S
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-32", "cp037", "utf-16-le"])
@@ -155,11 +156,44 @@ def test_other_encodings_are_refused_and_a_byte_order_mark_does_no_harm(tmp_path
     assert load_campaign(path).cases == 10
 
 
+FREE = '[requirement.fuel]\nmetric = "propellant_kg"\nat_most = 2.5\n'
+
+
+@pytest.mark.parametrize(
+    "name", ["a\\u001b[31m\\nb", "../../x", "a b", "", "x" * 61, "-fuel", "fuel\\u202e", "fuel.\\u0007", "\\n"]
+)
+def test_a_requirement_whose_name_is_no_word_is_refused(name):
+    assert " is no name; use letters, digits, _ and -, 60 at most" in refused(
+        HEAD + FREE.replace("fuel", f'"{name}"', 1)
+    )
+
+
+@pytest.mark.parametrize("text", ["\\u001b]0;x\\u0007", "\\u202eevil", "two\\nlines", "x" * 200_000])
+@pytest.mark.parametrize(
+    ("head", "place"),
+    [
+        (HEAD + "title = ", "campaign.title"),
+        (HEAD + FREE + "source = ", "requirement.fuel.source"),
+        (HEAD + '[dispersion.ve_pct]\ndist = "normal"\nsigma = 1\nunit = ', "dispersion.ve_pct.unit"),
+    ],
+)
+def test_text_that_steers_a_terminal_or_fills_a_report_is_refused(head, place, text):
+    assert f"{place}: " in refused(f'{head}"{text}"\n')
+
+
+def test_a_note_may_have_lines_and_a_title_letters_of_any_language():
+    text = f'{HEAD}title = "Wiedereintritt: größte Last, 再突入"\nnote = "one\\n\\ttwo"\n{FREE}'
+    assert [one.name for one in load_campaign("x.toml", text=text).requirements] == ["fuel"]
+
+
 def test_campaigns_that_take_their_inputs_from_one_another_are_refused(tmp_path):
     text = '[campaign]\nmodel = "campaigns.reentry"\ndesign = "mc"\nseed = 1\n[inputs]\nfrom = "campaign.toml"\n'
     (tmp_path / "campaign.toml").write_text(text)
-    with pytest.raises(CampaignError, match="from one another"):
+    with pytest.raises(CampaignError) as caught:
         load_campaign(tmp_path)
+    assert [str(problem) for problem in caught.value.problems] == [
+        "inputs.from: the campaigns take their inputs from one another, round and round (campaign.toml, ...)"
+    ]
 
 
 def test_a_model_runs_only_where_the_campaign_names_it(tmp_path):

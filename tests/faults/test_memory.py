@@ -78,21 +78,23 @@ def resident(folder, cases, backend):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def check(samples, settled):
+def check(samples, settled, record_property):
     """Never a GiB; and after `settled` cases at most a MiB for every hundred thousand more."""
-    assert max(size for _, size in samples) <= 1024 * MIB
     later = [(done, size) for done, size in samples if done >= settled]
     begin, end = (sum(size for _, size in some) / len(some) for some in (later[:5], later[-5:]))
     growth = (end - begin) / (later[-1][0] - later[0][0]) * 1e5
-    print(f"main process: {max(size for _, size in samples) / MIB:.0f} MiB at most, {growth / MIB:+.2f} MiB per 1e5")
+    record_property("cases", samples[-1][0])
+    record_property("MiB at most", max(size for _, size in samples) / MIB)
+    record_property("MiB more per 1e5 cases", growth / MIB)
+    assert max(size for _, size in samples) <= 1024 * MIB
     assert growth <= 1.0 * MIB
 
 
-def test_the_main_process_grows_by_less_than_a_mib_over_a_hundred_thousand_cases(tmp_path):
-    check(resident(tmp_path, 150_000, "loky"), settled=50_000)
+def test_the_main_process_grows_by_less_than_a_mib_over_a_hundred_thousand_cases(tmp_path, record_property):
+    check(resident(tmp_path, 150_000, "loky"), 50_000, record_property)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", ["loky", "threading"])
-def test_a_million_cases_of_forty_metrics_fit_into_a_gib(tmp_path, backend):
-    check(resident(tmp_path, 1_000_000, backend), settled=200_000)
+def test_a_million_cases_of_forty_metrics_fit_into_a_gib(tmp_path, backend, record_property):
+    check(resident(tmp_path, 1_000_000, backend), 200_000, record_property)

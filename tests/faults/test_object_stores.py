@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mc_engine"))
 from small_run import block, created, filled
 from stones import stones
 
+from mc_engine import run as fly
 from mc_engine.cli import app
 from mc_engine.errors import StoreError
 from mc_engine.object_store import _Remote, fetch, publish
@@ -123,6 +124,13 @@ def test_what_is_committed_is_sent_while_the_run_flies_and_when_it_breaks_off(me
         fly()
     assert seen == [0, 10]
     assert copied(memory) == 30
+
+
+def test_a_run_is_not_flown_into_a_url(memory, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(StoreError, match=r"^memory://runs: is a URL; fly into a folder"):
+        fly(stones(tmp_path / "campaign", 4), memory)
+    assert [path.name for path in tmp_path.iterdir()] == ["campaign"]
 
 
 def copied(url):
@@ -244,6 +252,49 @@ def test_names_from_a_store_stay_inside_the_folder(memory, run, tmp_path):
     with pytest.raises(StoreError, match="lies outside the run"):
         fetch(memory, tmp_path / "back")
     assert not list(tmp_path.rglob("evil.txt"))
+
+
+def test_verbs_that_read_take_a_url_as_they_take_a_folder(memory, run, tmp_path):
+    publish(run, memory)
+    for verb in (["status"], ["summary"], ["verify"], ["compare", run]):
+        there, here = run_verb(*verb, memory), run_verb(*verb, run)
+        assert there.replace(memory, str(run)) == here
+    run_verb("export", memory, "--out", tmp_path / "end_states.csv")
+    run_verb("export", run)
+    assert (tmp_path / "end_states.csv").read_bytes() == (run / "end_states.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "instead"),
+    [
+        (["resume", "URL"], "`mc-engine fetch URL DIR`"),
+        (["extend", "URL", "--cases", "50"], "`mc-engine fetch URL DIR`"),
+        (["rerun", "--failed", "URL"], "`mc-engine fetch URL DIR`"),
+        (["replay", "URL", "3"], "`mc-engine fetch URL DIR`"),
+        (["publish", "URL", "URL"], "`mc-engine fetch URL DIR`"),
+        (["merge", "out", "URL"], "`mc-engine fetch URL DIR`"),
+        (["run", "minimal", "--from", "URL"], "`mc-engine fetch URL DIR`"),
+        (["run", "minimal", "--out", "URL"], "--publish URL"),
+        (["tune", "flexible_satellite/stage_1", "--out", "URL"], "--publish URL"),
+        (["rare", "deorbit", "--out", "URL"], "--publish URL"),
+        (["merge", "URL", "shard"], "--publish URL"),
+        (["export", "URL"], "--out is missing"),
+        (["export", "run", "--out", "URL"], "name a file here"),
+        (["compare", "a", "b", "--report", "URL"], "name a file here"),
+        (["sample", "minimal", "--out", "URL"], "name a file here"),
+        (["fetch", "URL", "URL"], "name a file here"),
+        (["init", "URL"], "name a file here"),
+    ],
+)
+def test_a_url_where_something_is_written_is_refused_with_what_to_do_instead(tmp_path, monkeypatch, words, instead):
+    monkeypatch.chdir(tmp_path)
+    url = "s3://bucket/run.csv"
+    answer = CliRunner().invoke(app, [word.replace("URL", url) for word in words])
+    assert answer.exit_code == 2
+    assert url in answer.output
+    assert instead.replace("URL", url) in answer.output
+    assert answer.output.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("url", ["here", "/tmp/x", "nosuch://x/y"])

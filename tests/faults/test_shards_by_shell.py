@@ -40,7 +40,9 @@ def killed_midway(campaign, shard, folder):
     ("of", "killed", "repeated"),
     [(2, 1, 1), pytest.param(OF, 3, 2, marks=pytest.mark.slow)],
 )
-def test_shards_of_the_shell_in_random_order_merge_to_the_bytes_of_one_run(tmp_path, of, killed, repeated):
+def test_shards_of_the_shell_in_random_order_merge_to_the_bytes_of_one_run(
+    tmp_path, of, killed, repeated, record_property
+):
     rng = np.random.default_rng(4)
     campaign = campaign_folder(tmp_path / "stones", CASES)
     numbers = rng.permutation(np.arange(1, of + 1))
@@ -64,6 +66,9 @@ def test_shards_of_the_shell_in_random_order_merge_to_the_bytes_of_one_run(tmp_p
     done(engine("merge", tmp_path / "merged", *shards, "--no-report", "--chunk", 300, env=ENVIRONMENT))
     whole = runner.run(load_campaign(campaign), tmp_path / "whole", workers=2, chunk=300)
     assert files_of(tmp_path / "merged") == files_of(whole.path)
+    for what, number in (("shards", of), ("killed", killed), ("flown twice", repeated)):
+        record_property(what, number)
+    record_property("files equal byte by byte", len(files_of(whole.path)))
 
 
 def test_a_shard_alone_is_neither_judged_nor_reported(tmp_path):

@@ -1,11 +1,14 @@
 """Ctrl-C, SIGTERM and kill -9 of a run with worker processes: what lands, what is said, and who stays behind."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 
+import numpy as np
 import psutil
 import pytest
 from trapped import ENVIRONMENT, campaign_folder
@@ -65,12 +68,14 @@ def assert_gone(processes):
         ("dask", lambda process: os.kill(process.pid, signal.SIGTERM)),
     ],
 )
-def test_one_signal_lets_what_is_in_flight_land_and_says_how_to_go_on(tmp_path, backend, send):
+def test_one_signal_lets_what_is_in_flight_land_and_says_how_to_go_on(tmp_path, backend, send, record_property):
     process = begin(tmp_path, backend, 1.0)
     processes = family(process)
     before = set((tmp_path / "run" / "cases").glob("part-*"))
     send(process)
+    begun = time.monotonic()
     errors = end(process)
+    record_property("seconds to land", time.monotonic() - begun)
     assert process.returncode == 4, errors
     option = "" if backend == "threading" else f" --backend {backend}"
     assert f"`mc-engine resume {tmp_path / 'run'}{option}` flies the rest" in errors
@@ -85,7 +90,7 @@ def test_one_signal_lets_what_is_in_flight_land_and_says_how_to_go_on(tmp_path, 
 
 
 @pytest.mark.parametrize("backend", ["loky", pytest.param("threading", marks=pytest.mark.slow), "dask"])
-def test_the_second_signal_ends_at_once(tmp_path, backend):
+def test_the_second_signal_ends_at_once(tmp_path, backend, record_property):
     process = begin(tmp_path, backend, 12.0)
     processes = family(process)
     process.send_signal(signal.SIGINT)
@@ -95,18 +100,77 @@ def test_the_second_signal_ends_at_once(tmp_path, backend):
     process.send_signal(signal.SIGINT)
     errors = end(process)
     assert process.returncode == 4, errors
+    record_property("seconds to the end", took := time.monotonic() - begun)
     assert "Traceback" not in errors
-    assert time.monotonic() - begun < 9.0  # the flights under way would take longer
+    assert f"`mc-engine resume {tmp_path / 'run'}" in errors
+    assert took < 9.0  # the flights under way would take longer
     assert_gone(processes)
     assert open_store(tmp_path / "run").missing()
 
 
+# The command line, which says when it has begun to hear; before that Python itself begins, which does not.
+LISTENING = """
+import sys
+from mc_engine.interruption import listen
+listen()
+print("listening", flush=True)
+from mc_engine.__main__ import main
+sys.argv[0] = "mc-engine"
+main()
+"""
+
+
+def whole_run(folder, signal_after_s=None, number=signal.SIGTERM):
+    """(exit status, last words, seconds from the signal on, where one is sent) of a run with its reports."""
+    shutil.rmtree(folder / "run", ignore_errors=True)
+    words = ["run", str(folder / "campaign"), "--out", str(folder / "run")]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    process = subprocess.Popen([sys.executable, "-c", LISTENING, *words], env=ENVIRONMENT, **pipes)
+    assert process.stdout.readline() == "listening\n"
+    if signal_after_s is not None:
+        time.sleep(signal_after_s)
+        process.send_signal(number)
+    begun = time.monotonic()
+    said = end(process).splitlines()
+    return process.returncode, said[-1] if said else "", time.monotonic() - begun
+
+
+@pytest.mark.parametrize("count", [3, pytest.param(100, marks=pytest.mark.slow)])
+def test_a_signal_at_any_time_of_a_run_ends_it_with_the_command_that_goes_on(tmp_path, count, record_property):
+    campaign_folder(tmp_path / "campaign", CASES)
+    whole_run(tmp_path)  # also compiles
+    run, (status, _, whole_s) = tmp_path / "run", whole_run(tmp_path)
+    assert status == 0
+    rng, outcomes, longest = np.random.default_rng(1), Counter(), 0.0
+    for i in range(count):
+        after_s = (i + rng.uniform()) / count * whole_s
+        status, said, took = whole_run(tmp_path, after_s, (signal.SIGINT, signal.SIGTERM)[i % 2])
+        if status == 0:  # it was done before
+            outcomes["were done before"] += 1
+            assert (run / "report.pdf").exists()
+            continue
+        assert status == 4, (after_s, said)
+        longest = max(longest, took)
+        assert not list(run.glob(".report*"))
+        begun = (run / "journal.jsonl").exists()
+        verb = said.split("`mc-engine ")[1].split()[0] if begun else "run"
+        assert said.startswith("interrupted")
+        assert f"`mc-engine {verb} {run}`" in said if begun else "nothing was begun" in said
+        outcomes[f"were told to {verb}"] += 1
+    for words, times in sorted(outcomes.items()):
+        record_property(words, times)
+    record_property("seconds to the end at most", longest)
+
+
 @pytest.mark.parametrize("backend", ["loky", pytest.param("dask", marks=pytest.mark.slow)])
-def test_no_worker_outlives_a_killed_run(tmp_path, backend):
+def test_no_worker_outlives_a_killed_run(tmp_path, backend, record_property):
     process = begin(tmp_path, backend, 1.0)
     processes = family(process)
     assert len(processes) > 2
     process.send_signal(signal.SIGKILL)
     process.wait()
     process.stderr.close()
+    begun = time.monotonic()
     assert_gone(processes)
+    record_property("workers", len(processes) - 1)
+    record_property("seconds till all were gone", time.monotonic() - begun)

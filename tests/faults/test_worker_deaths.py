@@ -2,86 +2,119 @@
 
 import os
 import signal
-import threading
+import subprocess
+import sys
 import time
 
 import numpy as np
 import psutil
 import pytest
+from killed_runs import FORKING
 from trapped import files_of, trapped
 
-from mc_engine import runner
+from mc_engine import open_store, runner
 from mc_engine.backends import Backend
+from mc_engine.errors import EngineError, ModelError
 
 SLEEP_S = 0.2  # of every flight: a chunk takes long enough to be hit in the middle
 CHUNK = 50
+LONGEST_S = 300.0  # of a command with few cases; a run that waits for ever is ended here
+WORKERS = {"loky": "popen_loky_posix", "dask": "spawn_main"}  # words of their command lines
+
+# The command line, with chunks of so many cases, and on a build that is broken where one is named.
+COMMAND = """
+import runpy, sys
+import broken_builds
+from mc_engine import sessions
+
+chunk, broken = int(sys.argv[1]), sys.argv[2]
+sessions.chunk_size = lambda cases, workers: chunk
+if broken:
+    broken_builds.BREAKS[broken](setattr)
+sys.argv[:3] = ["mc-engine"]
+runpy.run_module("mc_engine", run_name="__main__")
+"""
 
 
-def loky_workers():
-    """The worker processes of this process."""
+def command(*words, broken="", **environment):
+    """The process of a command of the engine."""
+    arguments = [sys.executable, "-c", COMMAND, f"{CHUNK}", broken, *map(str, words)]
+    return subprocess.Popen(arguments, env={**FORKING, **environment}, stderr=subprocess.PIPE, text=True)
+
+
+def completed(process, longest_s=LONGEST_S):
+    """The process must come to its end by itself, with exit status 0."""
+    try:
+        errors = process.communicate(timeout=longest_s)[1]
+    finally:
+        process.kill()
+    assert process.returncode == 0, errors
+    assert "Traceback" not in errors
+
+
+def workers_of(process, backend):
+    """The worker processes of a command."""
     found = []
-    for child in psutil.Process().children():
+    for child in psutil.Process(process.pid).children():
         try:
-            if "popen_loky_posix" in " ".join(child.cmdline()):
+            if WORKERS[backend] in " ".join(child.cmdline()):
                 found.append(child)
         except psutil.NoSuchProcess:
             pass
     return found
 
 
-class Killer:
-    """Kills a worker of this process some time after a part has landed, so that the run goes on in between."""
+def kill_at_random(process, run, backend, seed, kills):
+    """Kill a worker of the command some time after a part has landed, so that the run goes on in between.
 
-    def __init__(self, seed, kills):
-        self.left, self._rng, self._landed = kills, np.random.default_rng(seed), threading.Event()
-        self._thread = threading.Thread(target=self._work, daemon=True)
-        self._thread.start()
-
-    def _work(self):
-        while self.left:
-            self._landed.wait()
-            self._landed.clear()
-            time.sleep(self._rng.uniform(0.0, 2.0 * SLEEP_S))
-            workers = loky_workers()
-            os.kill(workers[self._rng.integers(len(workers))].pid, signal.SIGKILL)
-            self.left -= 1
-
-    def __call__(self, done, total, failed):
-        if done:
-            self._landed.set()
+    Returns how many kills are left when the command comes to its end.
+    """
+    rng, seen = np.random.default_rng(seed), 0
+    while kills and process.poll() is None:
+        landed = len(list(run.glob("cases/part-*")))
+        if landed == seen:
+            time.sleep(0.01)
+            continue
+        seen = landed
+        time.sleep(rng.uniform(0.0, 2.0 * SLEEP_S))
+        if workers := workers_of(process, backend):
+            os.kill(workers[rng.integers(len(workers))].pid, signal.SIGKILL)
+            kills -= 1
+    return kills
 
 
-def killed_at_random(folder, monkeypatch, seed, kills, cases):
-    """A run of two workers that are killed so many times."""
-    monkeypatch.setenv("STONES_SLEEP_S", f"{SLEEP_S}")
-    killer = Killer(seed, kills)
-    campaign = trapped(folder / "campaign", cases)
-    store = runner.run(campaign, folder / "run", workers=2, chunk=CHUNK, backend="loky", progress=killer)
-    assert killer.left == 0
-    return store
+def check_kills(folder, backend, seed, kills, cases, broken=""):
+    campaign, run = trapped(folder / "campaign", cases), folder / "run"
+    options = ["--out", run, "--workers", 2, "--backend", backend, "--no-report"]
+    process = command("run", folder / "campaign", *options, broken=broken, STONES_SLEEP_S=f"{SLEEP_S}")
+    left = kill_at_random(process, run, backend, seed, kills)
+    completed(process, longest_s=3600.0)
+    assert left == 0
+    whole = runner.run(campaign, folder / "whole", workers=2, chunk=CHUNK)
+    assert files_of(run) == files_of(whole.path)
+    assert open_store(run).verify() == []
 
 
-def check_kills(folder, monkeypatch, seed, kills, cases):
-    store = killed_at_random(folder, monkeypatch, seed, kills, cases)
-    monkeypatch.delenv("STONES_SLEEP_S")
-    whole = runner.run(trapped(folder / "campaign", cases), folder / "whole", workers=2, chunk=CHUNK)
-    assert files_of(store.path) == files_of(whole.path)
-    assert store.verify() == []
-
-
-def test_workers_killed_at_random_instants_lose_nothing_and_repeat_nothing(tmp_path, monkeypatch):
-    check_kills(tmp_path, monkeypatch, seed=1, kills=5, cases=1500)
+def test_workers_killed_at_random_instants_lose_nothing_and_repeat_nothing(tmp_path, record_property):
+    check_kills(tmp_path, "loky", seed=1, kills=5, cases=1500)
+    record_property("kills", 5)
+    record_property("cases lost or doubled", "0 of 1500")
 
 
 @pytest.mark.slow
-def test_a_hundred_kills_of_workers_lose_nothing(tmp_path, monkeypatch):
-    check_kills(tmp_path, monkeypatch, seed=2, kills=100, cases=30_000)
+@pytest.mark.parametrize(("backend", "kills", "cases"), [("loky", 100, 30_000), ("dask", 30, 9_000)])
+def test_many_kills_of_workers_lose_nothing(tmp_path, backend, kills, cases, record_property):
+    check_kills(tmp_path, backend, seed=2, kills=kills, cases=cases)
+    record_property("kills", kills)
+    record_property("cases lost or doubled", f"0 of {cases}")
 
 
-def check_isolated(folder, cases, killers):
+def check_isolated(folder, cases, killers, backend, broken="", longest_s=LONGEST_S):
     """All killers are found, with their inputs; all other rows are those of the same stones without traps."""
-    run = runner.run(trapped(folder / "campaign", cases, dict.fromkeys(killers, 1)), folder / "run", workers=2,
-                     backend="loky")  # fmt: skip
+    trapped(folder / "campaign", cases, dict.fromkeys(killers, 1))
+    options = ["--out", folder / "run", "--workers", 2, "--backend", backend, "--no-report"]
+    completed(command("run", folder / "campaign", *options, broken=broken), longest_s)
+    run = open_store(folder / "run")
     plain = runner.run(trapped(folder / "plain", cases), folder / "plain_run", workers=2).cases()
     frame = run.cases()
     assert sorted(frame["case_id"][frame["status"] == "worker-died"]) == sorted(killers)
@@ -96,34 +129,53 @@ def check_isolated(folder, cases, killers):
     return run
 
 
-def test_two_cases_that_kill_their_worker_are_isolated_and_fly_when_asked_again(tmp_path, monkeypatch):
-    run = check_isolated(tmp_path, 1000, [7, 640])
-    parts_before = files_of(run.path)
-    monkeypatch.setenv("TRAPS_OFF", "1")
-    again = runner.rerun(run.path, workers=1, backend="loky")
-    assert again.status_counts() == {"ok": 1000}
-    assert again.verify() == []
-    frame = again.cases()
-    plain = runner.open_store(tmp_path / "plain_run").cases()
-    assert frame.drop(columns="trap").equals(plain.drop(columns="trap"))
-    kept = {name for name, content in files_of(again.path).items() if parts_before.get(name) == content}
-    assert len([name for name in kept if name.startswith("cases/")]) == len(again.parts) - 2
-    runner.rerun(run.path, workers=1)  # nothing failed: nothing flies, nothing changes
-    assert {name: content for name, content in files_of(again.path).items() if name.startswith("cases/")} == {
-        f"cases/{path.name}": path.read_bytes() for path in (run.path / "cases").iterdir()
-    }
+def rerun(run, backend, **environment):
+    """Fly the failed cases of a run again on the command line; the parts of before and of after, by name."""
+    before = parts_of(run)
+    completed(command("rerun", "--failed", run, "--workers", 2, "--backend", backend, "--no-report", **environment))
+    assert open_store(run).verify() == []
+    return before, parts_of(run)
+
+
+def parts_of(run):
+    return {path.name: path.read_bytes() for path in (run / "cases").iterdir()}
+
+
+@pytest.mark.parametrize(("backend", "cases", "killers"), [("loky", 400, [7, 260]), ("dask", 300, [260])])
+def test_cases_that_kill_their_worker_are_isolated_and_fly_when_asked_again(
+    tmp_path, backend, cases, killers, record_property
+):
+    run = check_isolated(tmp_path, cases, killers, backend).path
+    record_property("killing cases found", f"{len(killers)} of {len(killers)} in {cases}")
+    before, after = rerun(run, backend, TRAPS_OFF="1")
+    again = open_store(run)
+    assert again.status_counts() == {"ok": cases}
+    assert again.cases().drop(columns="trap").equals(open_store(tmp_path / "plain_run").cases().drop(columns="trap"))
+    assert len(before.items() & after.items()) == len(again.parts) - len(killers)
+    runner.rerun(run, workers=1)  # nothing failed: nothing flies, nothing changes
+    assert parts_of(run) == after
 
 
 @pytest.mark.slow
-def test_ten_killing_cases_in_ten_thousand_are_isolated(tmp_path):
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_cases_that_kill_whenever_they_fly_keep_their_rows(tmp_path, backend):
+    run = check_isolated(tmp_path, 400, [7, 260], backend).path
+    before, after = rerun(run, backend)
+    assert before == after
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_ten_killing_cases_in_ten_thousand_are_isolated(tmp_path, backend):
     killers = np.random.default_rng(3).choice(10_000, 10, replace=False)
-    check_isolated(tmp_path, 10_000, [int(case) for case in killers])
+    check_isolated(tmp_path, 10_000, [int(case) for case in killers], backend, longest_s=3600.0)
 
 
-def test_a_case_that_takes_too_long_and_one_that_eats_its_memory_are_given_up(tmp_path):
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_a_case_that_takes_too_long_and_one_that_eats_its_memory_are_given_up(tmp_path, backend):
     campaign = trapped(tmp_path / "campaign", 200, {33: 2, 150: 3})
-    backend = Backend("loky", case_seconds=3.0, memory_mib=2048)
-    run = runner.run(campaign, tmp_path / "run", workers=2, backend=backend)
+    limits = Backend(backend, case_seconds=3.0, memory_mib=2048)
+    run = runner.run(campaign, tmp_path / "run", workers=2, backend=limits)
     frame = run.cases()
     assert frame.loc[33, ["status", "reason"]].tolist() == ["time-limit", "took longer than 3 s"]
     assert frame.loc[150, ["status", "reason"]].tolist() == [
@@ -137,7 +189,12 @@ def test_a_case_that_takes_too_long_and_one_that_eats_its_memory_are_given_up(tm
 
 
 def test_a_thread_cannot_be_limited():
-    from mc_engine.errors import EngineError
-
     with pytest.raises(EngineError, match="a thread cannot be limited in time or memory"):
         Backend("threading", case_seconds=1.0)
+
+
+@pytest.mark.parametrize("backend", ["threading", "loky"])
+def test_a_model_that_calls_exit_is_told_and_not_waited_for(tmp_path, backend):
+    campaign = trapped(tmp_path / "campaign", 100, {70: 4})
+    with pytest.raises(ModelError, match="the model ends its process"):
+        runner.run(campaign, tmp_path / "run", workers=2, backend=backend)

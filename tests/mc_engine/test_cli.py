@@ -153,7 +153,7 @@ def test_plan_gives_the_classic_sample_sizes(here):
 
 @pytest.mark.parametrize(("share", "confidence"), [("1", "0.9"), ("0", "0.9"), ("0.9", "1.5"), ("nan", "0.9")])
 def test_plan_refuses_what_is_no_probability(share, confidence):
-    fails_with(2, call("plan", "--share", share, "--confidence", confidence), "must lie between 0 and 1")
+    fails_with(2, call("plan", "--share", share, "--confidence", confidence), "it must be above 0 and below 1")
 
 
 def test_list_names_every_shipped_campaign():

@@ -78,7 +78,11 @@ def test_parameters_move_the_nominal_value_that_a_distribution_is_about():
         ('dist = "normal"\nsigma = 1\nlower = 5\nupper = 5', "lower", "5 is not below upper = 5"),
         ('dist = "normal"\nsigma = 1\nlower = 50', "lower", "the bounds leave nothing of the distribution"),
         ('dist = "normal"\nsigma = 1\nupper = -50', "upper", "the bounds leave nothing of the distribution"),
-        ('dist = "normal"\nsigma = 1\nunit = "kg"', "unit", '"kg" is not a unit of length; known are "m", "km"'),
+        (
+            'dist = "normal"\nsigma = 1\nunit = "kg"',
+            "unit",
+            '"kg" is not a unit of length; known are "m", "um", "mm", "cm", "km"',
+        ),
         ('dist = "normal"\nsigma = 1\nunit = "Km"', "unit", '"Km" is not a unit of length; did you mean "km"?'),
         ('dist = "uniform"\nlower = 2', "", MIXTURE),
         ('dist = "uniform"\nhalf_range = 1\nupper = 2', "", MIXTURE),

@@ -220,10 +220,10 @@ def test_a_kill_while_the_nominal_is_replaced_leaves_no_nominal_rather_than_dama
     store.write_nominal(row(7))
     append = Journal.append
 
-    def killed(journal, event, facts):
+    def killed(journal, event, *facts):
         if event == "nominal":
             raise KeyboardInterrupt
-        return append(journal, event, facts)
+        return append(journal, event, *facts)
 
     monkeypatch.setattr(Journal, "append", killed)
     with pytest.raises(KeyboardInterrupt):

@@ -2,8 +2,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
-from mc_engine.units import UNITS, compatible, convert
+from mc_engine.cli import app
+from mc_engine.model import Field
+from mc_engine.units import UNITS, by_quantity, compatible, convert, nearest_unit, unit_hint
 
 
 @pytest.mark.parametrize(
@@ -15,10 +18,16 @@ from mc_engine.units import UNITS, compatible, convert
         (2.0, "h", "min", 120.0),
         (1.0, "g", "m/s^2", 9.80665),
         (20.0, "%", "", 0.2),
+        (3600.0, "arcsec", "deg", 1.0),
+        (60.0, "rpm", "rad/s", 2.0 * np.pi),
+        (1.0, "W h", "kJ", 3.6),
+        (1.0, "deg/h", "arcsec/s", 1.0),
+        (1.0, "deg/sqrt(h)", "deg/sqrt(s)", 1.0 / 60.0),
+        (398600.4418, "km^3/s^2", "m^3/s^2", 3.986004418e14),
     ],
 )
 def test_a_number_in_one_unit_becomes_the_number_in_another(value, unit, to, expected):
-    assert convert(value, unit, to) == expected
+    assert convert(value, unit, to) == pytest.approx(expected, rel=1e-15)
 
 
 @given(value=st.floats(-1e9, 1e9), unit=st.sampled_from(sorted(UNITS)), data=st.data())
@@ -28,9 +37,43 @@ def test_there_and_back_is_the_same_number(value, unit, data):
 
 
 def test_only_units_of_the_same_quantity_are_compatible():
-    assert compatible("km/s") == ["m/s", "km/s"]
-    assert set(compatible("deg")) == {"rad", "deg"}
+    assert compatible("kN") == ["N", "uN", "mN", "kN"]
+    assert set(compatible("deg")) == {"rad", "urad", "mrad", "deg", "arcmin", "arcsec", "rev"}
 
 
 def test_a_whole_column_is_converted():
     assert convert(np.array([1.0, 2.0]), "km", "m").tolist() == [1000.0, 2000.0]
+
+
+@pytest.mark.parametrize(
+    "unit", ["J", "W", "V", "A", "mrad", "arcsec", "T", "m^3", "kg/m", "N m/rad", "deg/h", "A m^2"]
+)
+def test_what_a_gnc_engineer_writes_is_there(unit):
+    assert unit in UNITS
+
+
+def test_names_differ_in_more_than_the_size_of_letters_and_the_first_of_a_quantity_is_si():
+    assert len({name.lower() for name in UNITS}) == len(UNITS)
+    assert [names[0] for names in by_quantity().values() if UNITS[names[0]].factor != 1.0] == ["%", "deg/rev"]
+
+
+def test_the_end_of_a_name_is_its_unit_in_letters():
+    assert UNITS["W/(m^2 K)"].suffix == "_w_m2_k"
+    assert (UNITS["%"].suffix, UNITS["day"].suffix, UNITS[""].suffix) == ("_pct", "_days", "")
+    assert Field("drift_deg_sqrt_h", "deg/sqrt(h)", "angle random walk").symbol == "drift"
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [("Nm", "N m"), ("m/s²", "m/s^2"), ("m/s2", "m/s^2"), ("µrad", "urad"), ("Tesla", "T"), ("volts", "V"),
+     ("arcseconds", "arcsec"), ("w/m2", "W/m^2"), ("kilometres", "km"), ("furlong", None)],
+)  # fmt: skip
+def test_the_unit_that_was_meant_is_found(written, meant):
+    assert nearest_unit(written, UNITS) == meant
+
+
+def test_an_unknown_unit_is_answered_with_the_command_that_lists_them():
+    assert unit_hint("furlong") == f"; `mc-engine units` lists all {len(UNITS)}"
+    assert unit_hint("Nm").startswith('; did you mean "N m"?; `mc-engine units`')
+    listed = CliRunner().invoke(app, ["units"]).output
+    assert "torque                     N m, uN m, mN m, kN m\n" in listed

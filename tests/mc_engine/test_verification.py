@@ -1,10 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_run import block, created, filled, row
 
 from mc_engine import parts, verification
 from mc_engine.errors import StoreError
-from mc_engine.journal import Journal
 from mc_engine.store import open_store
 
 
@@ -89,23 +90,38 @@ def test_verify_names_a_part_that_is_gone(store):
         store.cases()
 
 
-def test_verify_finds_a_part_whose_rows_or_cases_are_not_those_of_the_journal(store):
+def test_verify_finds_a_part_whose_rows_cases_or_ends_are_not_those_of_the_journal(store):
     store.append(0, 10, block(0, 10))
     part = store.parts[0]
-    journal = Journal(store.path / "journal.jsonl")
-    claim = {"file": part.file, "bytes": part.bytes, "sha256": part.sha256, "status": {}}
-    journal.append("part", {**claim, "first": 5, "rows": 11})
-    text = "\n".join(store.verify())
-    assert "10 rows where the journal says 11" in text
-    assert "does not count from 5 to 15" in text
-    assert "repeats cases of" in text
+    store.withdraw(part)
+    claims = [
+        replace(part, file="cases/part-0000000010-0000000020.parquet", first=10, rows=11, status={"ok": 11}),
+        replace(part, file="cases/part-0000000030-0000000039.parquet", first=30),
+        replace(part, status={"ok": 10}),
+    ]
+    with store.lock():
+        for claim in claims:
+            (store.path / claim.file).write_bytes(block_bytes(store))
+            store.commit(claim)
+    assert store.verify() == [
+        f"{claims[2].file}: its cases did not end as the journal says",
+        f"{claims[0].file}: 10 rows where the journal says 11",
+        f"{claims[1].file}: its case_id does not count from 30 to 39",
+    ]
+
+
+def block_bytes(store):
+    """The bytes of the part of the first ten cases."""
+    arrays = {**block(0, 10), "case_id": np.arange(10)}
+    return parts.parquet_bytes(parts.arrow_table(store.columns, arrays, 10, store.path))
 
 
 def test_verify_finds_a_part_with_other_columns(store):
-    other = parts.write_part(
-        store.path, store.columns[:4], 0, 10, {k: block(0, 10)[k] for k in ("status", "reason", "ve_pct")}
-    )
-    store._journal.append("part", other.__dict__)
+    with store.lock():
+        other = parts.write_part(
+            store.path, store.columns[:4], 0, 10, {k: block(0, 10)[k] for k in ("status", "reason", "ve_pct")}
+        )
+        store.commit(other)
     assert any("its columns are not those of the manifest" in problem for problem in store.verify())
 
 

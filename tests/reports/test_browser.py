@@ -159,3 +159,24 @@ def test_what_users_write_stays_text_in_the_browser(browser, tmp_path):
     assert browser.run("window.struck === undefined")
     assert browser.logged == []
     assert browser.requests == []
+
+
+@pytest.mark.parametrize("width", [1020, 1100, 1199, 1210, 1300])
+def test_the_verdicts_are_in_sight_in_a_narrow_window(browser, file, width):
+    browser.ask("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=False)
+    try:
+        browser.open(file)
+        # the widest row of the entry campaign
+        words = ["dynamic-pressure<small>peak-dynamic-pressure-pa</small>", "at most 20_000_Pa", "99.73_%",
+                 "10_000 / 10_000", "99.99_%<small>[99.73_%, 100.00_%]</small>", "19_999.9_Pa<small>margin 12_345_Pa",
+                 "<span class='badge open'>not demonstrable</span>"]  # fmt: skip
+        beyond = browser.run(
+            "(() => { const s = document.querySelector('#requirements .scroll');"
+            f" const row = s.querySelector('tbody tr'), words = {words};"
+            " words.forEach((text, k) => { row.cells[k].innerHTML = text.replaceAll('_', '\\u202f'); });"
+            " return [s.querySelector('th:last-child').textContent, s.scrollWidth - s.clientWidth]; })()"
+        )
+    finally:
+        browser.ask("Emulation.clearDeviceMetricsOverride")
+    assert beyond[0].startswith("Verdict")
+    assert beyond[1] <= 0

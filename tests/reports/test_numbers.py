@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from reports.numbers import axis_label, count, exact, interval, number, percent, words
+from reports.numbers import axis_label, count, exact, interval, number, percent, typeset, with_unit, words
 
 
 @pytest.mark.parametrize(
@@ -61,3 +61,14 @@ def test_a_column_name_becomes_words_without_its_unit():
     assert words("correction_impulse_m_s", "m/s") == "correction impulse"
     assert words("odd_name", "furlong") == "odd name"
     assert axis_label("propellant", "kg") == "propellant [kg]"
+
+
+@pytest.mark.parametrize(
+    ("unit", "printed"),
+    [("W/m^2", "W/m²"), ("km^3/s^2", "km³/s²"), ("kg m^2", "kg\u202fm²"), ("uN", "µN"), ("deg/sqrt(h)", "deg/√h"),
+     ("Ohm", "Ω"), ("us", "µs"), ("bar", "bar"), ("m/s", "m/s")],
+)  # fmt: skip
+def test_units_are_printed_with_raised_powers_and_greek_letters(unit, printed):
+    assert typeset(unit) == printed
+    assert axis_label("load", unit) == f"load [{printed}]"
+    assert with_unit("1", unit) == f"1\u202f{printed}"

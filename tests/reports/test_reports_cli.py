@@ -36,7 +36,7 @@ def test_both_reports_are_written_beside_the_data(run_path):
     assert [path.name for path in written] == ["report.html", "report.pdf"]
     assert written[0].read_bytes().startswith(b"<!doctype html>")
     assert written[1].read_bytes().startswith(b"%PDF")
-    assert not list(run_path.glob(".*unfinished"))
+    assert not list(run_path.glob(".report*"))
 
 
 def test_one_format_is_enough_if_asked_for(run_path):

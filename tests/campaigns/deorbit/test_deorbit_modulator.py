@@ -8,7 +8,8 @@ from deorbit_flights import PULSED, fly_one, pulses
 
 from mc_engine.flight import fly
 from mc_engine.model import load_model
-from mc_engine.physics.pulse_modulators import first_on_time, lag_rate, pause_time, pulse_time
+from mc_engine.physics.pulse_modulators import lag_rate
+from tests.campaigns.pulse_trains import first_on_time, pause_time, pulse_time
 
 FOLDER = Path(__file__).resolve().parent / "modulator"
 # Command 20 N, gain 1, level 30 N, on at 10 N, off at 5 N, time constant 5 s.  From the lag's exponential:

@@ -8,15 +8,8 @@ from flexible_flights import MODEL, NOMINAL, SEED, TABLE_4, TABLE_8, TABLE_9, fl
 from scipy.integrate import solve_ivp
 
 from mc_engine.flight import fly
-from mc_engine.physics.pulse_modulators import (
-    at_rest,
-    dead_band,
-    first_on_time,
-    pause_time,
-    pulse_time,
-    sampled_pulses,
-    shortest_pulse,
-)
+from mc_engine.physics.pulse_modulators import at_rest, sampled_pulses
+from tests.campaigns.pulse_trains import dead_band, first_on_time, pause_time, pulse_time, shortest_pulse
 
 _BOUNDS = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
 GAIN, TAU, OFF, HYSTERESIS, LEVEL = 7.39, 0.713, 0.117, 0.225, 1.07  # Table 8

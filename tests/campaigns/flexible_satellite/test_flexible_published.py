@@ -8,12 +8,15 @@ import pytest
 from flexible_flights import FOLDER, MODEL, NOMINAL, TABLE_4, TABLE_8, TABLE_9, fly_campaign, fly_one, history
 
 from mc_engine.campaign import load_campaign
-from mc_engine.physics.pulse_modulators import shortest_pulse
+from tests.campaigns.pulse_trains import shortest_pulse
 
 RECORDS = tomllib.loads((FOLDER / "published.toml").read_text(encoding="utf-8"))["published"]
 STATUSES = {"legible", "restored", "near", "not reproduced", "not printed"}
 MISSED = {"near", "not reproduced"}
 IDS = [record["quantity"] for record in RECORDS]
+# test_flexible_tuning searches for these
+TUNED = [record for record in RECORDS if "optimum of Table" in record["quantity"]]
+FLOWN = [record for record in RECORDS if record not in TUNED]
 COLUMNS = {f"q{i}": f"q{i}" for i in range(4)} | {f"η_{i}": f"eta_{i}" for i in (1, 2, 3, 4)}
 COLUMNS |= {f"ω_{axis}": f"omega_{axis}_rad_s" for axis in "xyz"}
 
@@ -56,20 +59,39 @@ COMPUTED |= {f"standard deviation of {symbol}": f for symbol, f in of_table_12(l
 COMPUTED |= {f"{symbol} of the case farthest from the mean": f for symbol, f in of_table_12(farthest).items()}
 
 
+def largest_last_rate():
+    row = fly_one(actuator="ideal")
+    return max(abs(row[f"omega_{axis}_rad_s"]) for axis in "xyz")
+
+
+def oscillating():
+    """The words of the source, if they are true of every mode from 200 s on."""
+    seen = history(**TABLE_8)
+    modes = [seen[f"eta_{k}"][seen["t_s"] > 200.0] for k in (1, 2, 3, 4)]
+    changes = [np.count_nonzero(np.diff(np.sign(mode))) for mode in modes]
+    centred = [abs(mode.mean()) < 0.03 * np.abs(mode).max() for mode in modes]
+    return "oscillate about zero" if min(changes) >= 30 and all(centred) else "do not"
+
+
+COMPUTED["largest rate about an axis at the end, no actuator"] = largest_last_rate
+COMPUTED["modal displacements, thrusters of Table 8"] = oscillating
+
+
 def computed(record):
     if "column" in record:
         return fly_one(**record["at"])[record["column"]]
     return COMPUTED[record["quantity"]]()
 
 
-@pytest.mark.parametrize("record", RECORDS, ids=IDS)
+@pytest.mark.parametrize("record", FLOWN, ids=lambda r: r["quantity"])
 def test_our_number_is_what_the_campaign_computes(record):
-    assert computed(record) == pytest.approx(record["ours"], rel=5e-7)  # written to seven digits
+    ours = record["ours"]
+    assert computed(record) == (ours if isinstance(ours, str) else pytest.approx(ours, rel=5e-7))  # seven digits
 
 
 @pytest.mark.parametrize("record", [record for record in RECORDS if "tolerance" in record], ids=lambda r: r["quantity"])
 def test_our_number_lies_in_the_tolerance_unless_it_is_said_not_to(record):
-    inside = abs(computed(record) - record["published"]) <= record["tolerance"]
+    inside = abs((record["ours"] if record in TUNED else computed(record)) - record["published"]) <= record["tolerance"]
     assert inside == (record["status"] not in MISSED)
 
 
@@ -88,7 +110,7 @@ def test_each_record_is_complete_and_in_the_unit_of_its_column(record):
     if "column" in record:
         assert {field.name: field.unit for field in MODEL.metrics}[record["column"]] == record["unit"]
     else:
-        assert record["quantity"] in COMPUTED
+        assert record["quantity"] in COMPUTED or record in TUNED
 
 
 def test_every_number_of_table_12_says_which_statistic_of_which_column_it_is():
@@ -106,13 +128,18 @@ def test_words_in_the_print_are_true_of_our_number():
     words = [record for record in RECORDS if "at_most" in record]
     for record in words:
         assert (record["ours"] <= record["at_most"]) == (record["status"] not in MISSED)
+        if record["published"] == "zero":
+            assert record["at_most"] == pytest.approx(0.02 * 0.1)  # of the largest rate
+            continue
         said = re.fullmatch(r"(?:below|within) ([\d.]+)( s)?", record["published"])
         assert record["at_most"] == pytest.approx(
             float(said[1]) if said else fly_one(**TABLE_8, pwpf_pairing="B")[record["column"]], rel=5e-7
         )
-    assert len(words) == 11
+    assert len(words) == 12
     assert {one["quantity"] for one in RECORDS if isinstance(one["published"], str)} == {
-        one["quantity"] for one in RECORDS if "at_most" in one or one["status"] == "not printed"
+        one["quantity"]
+        for one in RECORDS
+        if "at_most" in one or one["status"] == "not printed" or isinstance(one["ours"], str)
     }
 
 
@@ -132,7 +159,7 @@ def test_the_readme_marks_the_means_and_deviations_of_table_12_as_the_records_do
 
 
 def test_what_is_not_reproduced_is_said_openly():
-    missed = {record["quantity"] for record in RECORDS if record["status"] == "not reproduced"}
+    missed = {record["quantity"] for record in FLOWN if record["status"] == "not reproduced"}
     assert missed == {
         "attitude reached, no actuator",
         "attitude reached, thrusters of Table 8",

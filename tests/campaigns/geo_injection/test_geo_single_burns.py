@@ -1,5 +1,6 @@
 """The source's single burns: the example of table 1, and the burns between its stated orbits."""
 
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -21,10 +22,20 @@ SOURCE = {
 
 def burn_s(name, number):
     """Least time [s] of a burn of the staged sequence, counted from 0."""
+    return sequence(*SOURCE[name][:2]).time_unit * staged_burns(name)[number].burn.duration
+
+
+def iterations(name):
+    """Steps of the search of each burn of the staged sequence."""
+    return [one.burn.iterations for one in staged_burns(name)]
+
+
+@cache
+def staged_burns(name):
+    """The burns of a sequence over the source's orbits."""
     burns, inclination, between = SOURCE[name]
     orbits = tuple(Orbit(1e3 * a / PARKING, e, np.radians(i)) for a, e, i in between)
-    one = sequence(burns, inclination)
-    return one.time_unit * staged(one.problem(), orbits)[number].burn.duration
+    return staged(sequence(burns, inclination).problem(), orbits)
 
 
 def first_burn_s(name):

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from first_order import coast_time
 from procedure_twin import settled_ranges
 from servicing_flights import INSPECTION, MODEL, NOMINAL, fly_cases, fly_one, history
 from servicing_twin import R0, RATE, SIDEREAL_DAY, Twin, elements
 
-from campaigns.geo_servicing.inspection import Relative, coast_time, correction, wait_until
+from campaigns.geo_servicing.inspection import Relative, correction, wait_until
 from mc_engine.flight import prepare
 
 EPOCH, DAY = 58828.0, 86_400.0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from first_order import longitude_after, radius_deviation, relative_eccentricity
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from servicing_flights import KEPLER, NOMINAL, fly_one
@@ -92,11 +93,11 @@ def test_first_order_longitude_and_radius_are_those_of_the_ellipse(e, anomaly, f
     mean = start - e * np.sin(start) + 2.0 * np.pi * t / period
     eccentric, end = true(mean)
     moved = np.angle(np.exp(1j * (end - anomaly - flown)))
-    expected = drift.longitude_after(0.0, v, e, anomaly, flown)
+    expected = longitude_after(0.0, v, e, anomaly, flown)
     second_order = 30.0 * (e + abs(v)) ** 2 + 4.0 * e * abs(v) * (flown + 1.0)
     assert np.angle(np.exp(1j * (expected - moved))) == pytest.approx(0.0, abs=second_order + 1e-9)
     height = a * (1.0 - e * np.cos(eccentric)) - R0
-    assert drift.radius_deviation(v, e, anomaly, flown) == pytest.approx(height, abs=R0 * second_order + 1.0)
+    assert radius_deviation(v, e, anomaly, flown) == pytest.approx(height, abs=R0 * second_order + 1.0)
 
 
 def test_brake_only_gives_the_first_coast_of_the_digest():
@@ -124,7 +125,7 @@ def test_two_impulses_and_the_fastest_profile_end_at_the_place_without_drift():
 
 
 def test_the_relative_ellipse_is_the_triangle_of_both_eccentricity_vectors():
-    e, alpha = drift.relative_eccentricity(3.25e-4, np.radians(54.99), 3.15e-4, np.radians(55.0))
+    e, alpha = relative_eccentricity(3.25e-4, np.radians(54.99), 3.15e-4, np.radians(55.0))
     assert e == pytest.approx(1.0e-5, rel=1e-3)
     cosine_rule = 3.25e-4**2 + 3.15e-4**2 - 2 * 3.25e-4 * 3.15e-4 * np.cos(np.radians(0.01))
     assert e**2 == pytest.approx(cosine_rule, rel=1e-6)

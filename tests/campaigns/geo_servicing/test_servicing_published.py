@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from servicing_flights import MODEL, NOMINAL, fly_one
+from servicing_flights import MODEL, NOMINAL, PUBLISHED, fly_one, history
+from test_servicing_plan import PERFECT, craft_of
 
 import campaigns.geo_servicing
+from campaigns.geo_servicing.phasing_plan import design
 from mc_engine.campaign import load_campaign
 from mc_engine.cases import case_table, full_inputs
 from mc_engine.flight import fly
@@ -58,6 +60,49 @@ def test_our_share_inside_the_tolerances_is_that_of_the_campaign_file():
     inside = (np.abs(row["mean_longitude_deviation_deg"]) < 0.05) & (np.abs(row["period_error_s"]) < 5.0)
     inside &= row["eccentricity"] < 4e-4
     assert 100.0 * inside.mean() == pytest.approx(record["ours"], abs=0.05)
+
+
+def of(quantity):
+    """The record of a quantity."""
+    (record,) = [one for one in RECORDS if one["quantity"] == quantity]
+    return record
+
+
+@pytest.mark.parametrize(
+    ("name", "column"),
+    [
+        ("longitude deviation", "mean_longitude_deviation_deg"),
+        ("drift", "drift_rate_deg_rev"),
+        ("period deviation", "period_error_s"),
+        ("eccentricity", "eccentricity"),
+    ],
+)
+def test_our_intervals_are_three_standard_deviations_about_the_mean_of_the_campaign_file(name, column):
+    values = flown("published_per_run")[column]
+    for end, sign in (("low", -1.0), ("high", 1.0)):
+        record = of(f"{name}, {end} end of the 3-sigma interval, one error a run")
+        assert values.mean() + 3.0 * sign * values.std(ddof=1) == pytest.approx(record["ours"], rel=DIGITS)
+
+
+def test_our_histogram_of_the_eccentricity_spans_that_of_the_campaign_file():
+    values = flown("published_per_run")["eccentricity"]
+    for word, value in (("smallest", values.min()), ("largest", values.max())):
+        assert value == pytest.approx(of(f"eccentricity, {word} of the histogram, one error a run")["ours"], rel=DIGITS)
+
+
+def test_our_drift_at_the_start_is_the_first_of_the_history():
+    assert history(rows=11, **PUBLISHED)["drift_rate_deg_rev"][0] == pytest.approx(
+        of("drift at the start")["ours"], rel=1e-6
+    )
+
+
+def test_our_coasts_and_burns_are_those_of_the_designed_plan():
+    craft = craft_of(**PERFECT, sunlight=False)
+    plan, _ = design(craft.o, craft)
+    for k, (coast, burn) in enumerate(zip(plan.coasts, craft.burn_times(plan.dv), strict=True), start=1):
+        # the cost hardly depends on where between its limits a burn lies
+        assert coast == pytest.approx(of(f"coast before burn {k}")["ours"], rel=1e-3)
+        assert burn == pytest.approx(of(f"length of burn {k}")["ours"], rel=1e-2)
 
 
 @pytest.mark.parametrize("record", RECORDS, ids=[record["quantity"] for record in RECORDS])

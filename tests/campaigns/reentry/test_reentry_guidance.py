@@ -45,6 +45,7 @@ def test_spreads_and_loads_of_the_laws_are_those_of_the_published_table(flown):
         ours[f"spread of the range taken away by law {k} without range"] = taken
     for name, law in (("open loop", "none"), ("law 1", "law1")):
         ours[f"largest load of all cases, {name}"] = flown[law]["peak_load_g"].max()
+    ours["bias of the range, law 3 with range"] = abs(flown["law3r"]["downrange_km"].mean() - REFERENCE_KM)
     records = {one["quantity"]: one["ours"] for one in MODEL.published if one["quantity"] in ours}
     assert records == pytest.approx(ours, rel=1e-7)
 

@@ -1,10 +1,11 @@
-"""A stone that falls, and cases that take their worker with them: `trap` kills it, hangs it, or eats its memory.
+"""A stone that falls, and cases that take their worker with them: `trap` kills it, hangs it, eats its memory or exits.
 
 The traps stand where a model's own Python runs, in `prepare`; those named in the environment variable TRAPS_OFF
 (their numbers, with commas) do nothing.  STONES_SLEEP_S makes every chunk take so long.
 """
 
 import os
+import sys
 import time
 from collections import namedtuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from mc_engine.lanes import physics
 from mc_engine.model import Field, FixedStep, Model, Parameter
 
-KILLS, HANGS, EATS = 1.0, 2.0, 3.0
+KILLS, HANGS, EATS, EXITS = 1.0, 2.0, 3.0, 4.0
 
 State = namedtuple("State", "z v")
 Parameters = namedtuple("Parameters", "height speed")
@@ -33,6 +34,8 @@ def prepare(inputs, settings, refusals):
         time.sleep(1000.0)
     if EATS in armed:
         np.ones(2 * 10**9)
+    if EXITS in armed:
+        sys.exit()
     return {"height": inputs.height, "speed": inputs.speed}
 
 
@@ -67,7 +70,7 @@ MODEL = Model(
     parameters=(
         Parameter("height_m", "m", "height at the start", 100.0),
         Parameter("speed_m_s", "m/s", "speed at the start, upwards", 0.0),
-        Parameter("trap", "", "0, or what befalls the worker", 0.0, low=0.0, high=3.0),
+        Parameter("trap", "", "0, or what befalls the worker", 0.0, low=0.0, high=4.0),
     ),
     settings=(),
     states=(Field("z_m", "m", "height"), Field("v_m_s", "m/s", "speed, upwards")),

@@ -91,7 +91,7 @@ def test_the_error_falls_with_the_order_of_the_method(orbit, method, order, long
     errors = []
     for step in (longest, longest / 2.0):
         clock = replace(orbit.clock, method=method, atol=1e9, control_period=step, first_step=step)
-        end = flown(replace(orbit, clock=clock, extrema=()), speed_m_s=8000.0, duration_s=4000.0)
+        end = flown(replace(orbit, clock=clock), speed_m_s=8000.0, duration_s=4000.0)
         errors.append(np.hypot(*(np.array([end["end_x_m"][0], end["end_y_m"][0]]) - kepler(4000.0))))
     assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.7)
 
@@ -193,7 +193,7 @@ def test_the_step_is_chosen_for_the_tolerance_not_far_below_it(wave):
     def needed(tolerance):
         def flies(attempts):
             clock = replace(wave.clock, attempts=attempts, control_period=np.inf, atol=tolerance)
-            quiet = replace(wave, clock=clock, extrema=())
+            quiet = replace(wave, clock=clock)
             return flown(quiet, stop_s=99.0, level_m=9.0, tolerance=tolerance)["status"][0] == "ok"
 
         return next(n for n in range(20, 1000, 4) if flies(n))

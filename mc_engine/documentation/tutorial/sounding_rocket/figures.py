@@ -3,7 +3,7 @@
 from mc_engine.figures import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure
 
 FIGURES = (
-    MapFigure("apogee_km", "thrust_pct", "drag_pct", "Apogee over the errors of thrust and drag"),
+    MapFigure("apogee_km", "thrust_pct", "drag_pct", "Apogee over thrust and drag"),
     ScatterFigure("landing_distance_km", "apogee_km", "Landing and apogee"),
     ProfileFigure("speed_m_s", "altitude_km", "Altitude over speed"),
     HistoryFigure(("altitude_km", "pitch_deg", "nozzle_deg"), "Flight and control"),

@@ -1,8 +1,8 @@
 """A sounding rocket in the vertical plane of its launcher, from the rail to the ground.
 
-A rigid rocket with a swivelling nozzle burns, coasts to its apogee, and comes down on a drogue and a main parachute.
-Flat Earth at rest, an atmosphere of one exponential layer, no moments from the air: good for dispersions up to some
-100 km, not for the loads of the ascent.
+A rigid rocket with a swivelling nozzle burns, coasts to its apogee, and comes down on a
+drogue and a main parachute.  Flat Earth at rest, air of one exponential layer, no
+moments from the air: good for dispersions up to 100 km, not for loads of the ascent.
 """
 
 from collections import namedtuple
@@ -22,25 +22,36 @@ NOZZLE_ARM, BODY_DRAG_AREA, INERTIA = 1.5, 0.04, 600.0
 DROGUE_AREA, MAIN_AREA, MAIN_ALTITUDE = 2.0, 30.0, 3000.0
 MASS_FLOW, EXHAUST_SPEED = 10.0, 2250.0  # kg/s, m/s
 RAIL = 6.0  # m
-# The attitude control: attitude to be held, rad; rad of the nozzle per rad, and per rad/s, of its error; stop, rad.
+# Attitude to be held, rad; rad of the nozzle per rad, and per rad/s, of error; stop
 HELD = radians(5.0)
 PROPORTIONAL, DERIVATIVE, NOZZLE_STOP = 0.3, 0.11, 0.1
 ATTITUDE_NOISE, RATE_NOISE = 0.002, 0.005  # rad, rad/s, one sigma of a sample
 
 PARAMETERS = (
-    Parameter("launcher_deg", "deg", "launcher's angle from the vertical, downrange", 5.0, low=0.0, high=30.0),
-    Parameter("thrust_pct", "%", "error of the thrust, at the nominal mass flow", 0.0, low=-50.0, high=50.0),
-    Parameter("drag_pct", "%", "error of the drag area of the body", 0.0, low=-90.0, high=200.0),
-    Parameter("wind_m_s", "m/s", "wind at the ground, positive downrange; fades aloft", 0.0, low=-40.0, high=40.0),
-    Parameter("misalignment_deg", "deg", "thrust's angle from the nozzle's axis", 0.0, low=-3.0, high=3.0),
+    Parameter(
+        "launcher_deg", "deg", "launcher's angle from the vertical", 5.0, 0.0, 30.0
+    ),
+    Parameter(
+        "thrust_pct", "%", "error of the thrust, not of the flow", 0.0, -50.0, 50.0
+    ),
+    Parameter("drag_pct", "%", "error of the body's drag area", 0.0, -90.0, 200.0),
+    Parameter("wind_m_s", "m/s", "wind at the ground, downrange", 0.0, -40.0, 40.0),
+    Parameter(
+        "misalignment_deg", "deg", "of the thrust, from the nozzle", 0.0, -3.0, 3.0
+    ),
 )
 
-State = namedtuple("State", "downrange altitude vx vz pitch rate mass")  # m, m/s, rad from the vertical, rad/s, kg
-Parameters = namedtuple("Parameters", "launcher thrust drag wind misalignment")  # as PARAMETERS, in SI
+# m, m/s, rad from the vertical, rad/s, kg
+State = namedtuple("State", "downrange altitude vx vz pitch rate mass")
+# as PARAMETERS, in SI
+Parameters = namedtuple("Parameters", "launcher thrust drag wind misalignment")
 Memory = namedtuple("Memory", "nozzle burning drag_area")  # rad; 1 or 0; m^2
 Events = namedtuple("Events", "burn_out apogee main ground")
-Quantities = namedtuple("Quantities", "altitude downrange speed dynamic_pressure pitch nozzle")
-Metrics = namedtuple("Metrics", "apogee apogee_time top_speed peak_pressure landing_distance landing_speed")
+Quantities = namedtuple("Quantities", "altitude downrange speed pressure pitch nozzle")
+Metrics = namedtuple(
+    "Metrics",
+    "apogee apogee_time top_speed peak_pressure landing_distance landing_speed",
+)
 
 
 @physics
@@ -67,14 +78,14 @@ def start(p, o):
 
 @physics
 def air(s, p):
-    """(density [kg/m^3], velocity through the air [m/s]); the wind fades with a scale height of 8 km."""
+    """(density [kg/m^3], velocity through the air [m/s]); the wind fades in 8 km."""
     rho = exponential(s.altitude, 1.225, 0.0, 7200.0)
     return rho, s.vx - p.wind * exp(s.altitude * (-1.0 / 8000.0)), s.vz
 
 
 @physics
 def rhs(t, s, m, p, o):
-    """Thrust along the nozzle, drag against the velocity through the air, gravity; the nozzle turns the body."""
+    """Thrust along the nozzle, which turns the body; drag against the air; gravity."""
     rho, ux, uz = air(s, p)
     drag = 0.5 * rho * m.drag_area * sqrt(ux * ux + uz * uz)
     force = m.burning * thrust_of(p)
@@ -94,22 +105,23 @@ def rhs(t, s, m, p, o):
 
 @physics
 def control(t, s, m, p, o, draws):
-    """Turn the nozzle against the errors of attitude and rate, of which every sample has fresh noise."""
+    """Turn the nozzle against errors of attitude and rate; every sample has noise."""
     n1, n2 = normal_pair(draws, 0)
     error = s.pitch + ATTITUDE_NOISE * n1 - HELD
     nozzle = -PROPORTIONAL * error - DERIVATIVE * (s.rate + RATE_NOISE * n2)
-    return Memory(minimum(maximum(nozzle, -NOZZLE_STOP), NOZZLE_STOP), m.burning, m.drag_area)
+    nozzle = minimum(maximum(nozzle, -NOZZLE_STOP), NOZZLE_STOP)
+    return Memory(nozzle, m.burning, m.drag_area)
 
 
 @physics
 def events(t, s, m, p, o):
-    """Zeros: the propellant is gone, the climb ends, the main parachute's altitude, the ground."""
+    """Zeros: no propellant left, end of the climb, main parachute, ground."""
     return Events(s.mass - DRY_MASS, s.vz, s.altitude - MAIN_ALTITUDE, s.altitude)
 
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """Burn-out stops the engine; the drogue opens at the apogee, the main parachute at its altitude."""
+    """Burn-out stops the engine; the drogue opens at the apogee, the main one lower."""
     burning = where(hit.burn_out > 0.5, 0.0, m.burning)
     area = where(hit.apogee > 0.5, DROGUE_AREA, m.drag_area)
     area = where(hit.main > 0.5, MAIN_AREA, area)
@@ -120,16 +132,17 @@ def switch(t, s, m, p, o, hit):
 def observe(t, s, m, p, o):
     """What histories show, and what extremes are taken of."""
     rho, ux, uz = air(s, p)
-    square = ux * ux + uz * uz
+    pressure = 0.5 * rho * (ux * ux + uz * uz)
     speed = sqrt(s.vx * s.vx + s.vz * s.vz)
-    return Quantities(s.altitude, s.downrange, speed, 0.5 * rho * square, s.pitch, m.burning * m.nozzle)
+    nozzle = m.burning * m.nozzle
+    return Quantities(s.altitude, s.downrange, speed, pressure, s.pitch, nozzle)
 
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
     """What a flight comes to."""
-    speed = sqrt(s.vx * s.vx + s.vz * s.vz)
-    return Metrics(best.apogee, when.apogee, best.speed, best.pressure, s.downrange, speed)
+    x, speed = s.downrange, sqrt(s.vx * s.vx + s.vz * s.vz)
+    return Metrics(best.apogee, when.apogee, best.speed, best.pressure, x, speed)
 
 
 MODEL = Model(
@@ -151,7 +164,7 @@ MODEL = Model(
         Field("altitude_km", "km", "altitude"),
         Field("downrange_km", "km", "distance along the ground"),
         Field("speed_m_s", "m/s", "speed over the ground"),
-        Field("dynamic_pressure_pa", "Pa", "dynamic pressure"),
+        Field("pressure_pa", "Pa", "dynamic pressure"),
         Field("pitch_deg", "deg", "body axis from the vertical"),
         Field("nozzle_deg", "deg", "angle of the nozzle"),
     ),
@@ -182,7 +195,7 @@ MODEL = Model(
     extrema=(
         Extremum("apogee", "altitude_km"),
         Extremum("speed", "speed_m_s"),
-        Extremum("pressure", "dynamic_pressure_pa"),
+        Extremum("pressure", "pressure_pa"),
     ),
     figures=FIGURES,
 )

@@ -1,0 +1,146 @@
+"""What a model's own record must keep before it flies: names, units, words of events, numbers of the clock."""
+
+from collections.abc import Iterable
+from keyword import iskeyword
+from math import inf, isnan
+from typing import Any
+
+import numpy as np
+
+from mc_engine.errors import ModelError
+from mc_engine.model import DIRECTIONS, AdaptiveStep, Event, Extremum, Field, FixedStep, Model, Parameter, Setting
+from mc_engine.suggestions import hint
+from mc_engine.units import UNITS, unit_hint, unit_suffix
+
+_ACTIONS = ("stop", "switch")
+_EXTREMA = ("max", "min", "last_above")
+_METHODS = {"FixedStep": ("rk4",), "AdaptiveStep": ("dop853", "dp54")}
+
+
+def refuse_contradictions(model: Model) -> None:
+    """ModelError with one sentence if the model contradicts itself or names what there is not."""
+    _refuse_other_records(model)
+    inputs: tuple[Field, ...] = (*model.parameters, *model.settings)
+    for one in (*inputs, *model.states, *model.quantities, *model.metrics):
+        _refuse_name(one)
+    outputs: tuple[Field, ...] = (*model.metrics, *(Field(f"end_{one.name}", "", "") for one in model.states))
+    _refuse_twice("input", [one.symbol for one in inputs])
+    _refuse_twice("column", [one.name for one in (*inputs, *outputs)])
+    _refuse_twice("quantity", [one.name for one in model.quantities])
+    _refuse_twice("extremum", [one.name for one in model.extrema])
+    _refuse_twice("event", [one.name for one in model.event_list])
+    for parameter in model.parameters:
+        _refuse_range(parameter)
+    for extremum in model.extrema:
+        _refuse_extremum(extremum, [one.name for one in model.quantities])
+    if model.event_list and model.events is None:
+        raise ModelError("event_list names events, but the model has no function `events`")
+    for event in model.event_list:
+        _refuse_event(event, model.switch is not None)
+    _refuse_clock(model.clock, [one.symbol for one in model.settings], len(model.states))
+
+
+def _refuse_other_records(model: Model) -> None:
+    """ModelError unless each list of the model is a tuple of its own kind of record, and none is empty that must not
+    be."""
+    kinds = {"parameters": Parameter, "settings": Setting, "states": Field, "quantities": Field, "metrics": Field,
+             "event_list": Event, "extrema": Extremum}  # fmt: skip
+    for name, kind in kinds.items():
+        items = getattr(model, name)
+        if not isinstance(items, tuple) or not all(isinstance(one, kind) for one in items):
+            raise ModelError(f"`{name}` must be a tuple of {kind.__name__}; one alone needs its comma, "
+                             f"({kind.__name__}(...),)")  # fmt: skip
+        if not items and name in ("states", "quantities", "metrics"):
+            raise ModelError(f"`{name}` is empty; a model has one at least")
+    if not hasattr(model.kernel_parameters, "_fields"):
+        raise ModelError("kernel_parameters must be a named tuple, whose fields are the parameters' names without unit")
+
+
+def _refuse_name(one: Field) -> None:
+    if one.unit not in UNITS:
+        raise ModelError(f'"{one.name}" has the unit "{one.unit}"{unit_hint(one.unit)}')
+    suffix = unit_suffix(one.unit)
+    if not one.name.endswith(suffix):
+        raise ModelError(f'"{one.name}" has the unit "{one.unit}", so that its name must end in "{suffix}"; '
+                         "change the name or the unit")  # fmt: skip
+    _refuse_word("name", one.symbol)
+
+
+def _refuse_range(parameter: Parameter) -> None:
+    for value in (parameter.default, parameter.low, parameter.high):
+        if not isinstance(value, int | float | np.number) or isinstance(value, bool) or isnan(value):
+            raise ModelError(f'parameter "{parameter.name}" has {value!r} where a number is wanted, without quotes')
+
+
+def _refuse_word(what: str, name: str) -> None:
+    """ModelError for a name that no field of a named tuple can have."""
+    if not name.isidentifier() or iskeyword(name) or name.startswith("_"):
+        raise ModelError(f'the {what} "{name}" is no name for a number in Python; take letters, digits and "_", '
+                         "begin with a letter, and leave out words such as lambda and class")  # fmt: skip
+
+
+def _refuse_extremum(extremum: Extremum, quantities: list[str]) -> None:
+    spot = f'extremum "{extremum.name}"'
+    _refuse_word("extremum", extremum.name)
+    if extremum.quantity not in quantities:
+        raise ModelError(f'{spot}: there is no quantity "{extremum.quantity}"{hint(extremum.quantity, quantities)}')
+    _refuse_unknown(f"{spot} has the kind", extremum.kind, _EXTREMA)
+
+
+def _refuse_event(event: Event, switches: bool) -> None:
+    spot = f'event "{event.name}"'
+    _refuse_word("event", event.name)
+    _refuse_unknown(f"{spot} has the direction", event.direction, DIRECTIONS)
+    _refuse_unknown(f"{spot} has the action", event.action, _ACTIONS)
+    if event.action == "switch" and not switches:
+        raise ModelError(f'{spot} has the action "switch", but the model has no function `switch`')
+
+
+def _refuse_unknown(what: str, word: Any, known: Iterable[str]) -> None:
+    if word not in tuple(known):
+        raise ModelError(f'{what} "{word}"{hint(str(word), known)}')
+
+
+def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], n_states: int) -> None:
+    """ModelError for numbers by which nothing can fly.  settings : symbols that a clock may name."""
+    kind = type(clock).__name__
+    if kind not in _METHODS:
+        raise ModelError("`clock` must be a FixedStep(...) or an AdaptiveStep(...)")
+    _refuse_unknown("the clock has the method", clock.method, _METHODS[kind])
+    _refuse_time("until", clock.until, settings)
+    if isinstance(clock, FixedStep):
+        _refuse_time("step", clock.step, settings)
+        _refuse_time("control_every", clock.control_every, settings, least=1.0)
+        return
+    _refuse_time("rtol", clock.rtol, settings)
+    if not callable(clock.control_period):
+        _refuse_time("control_period", clock.control_period, settings, most=inf)
+    _refuse_time("attempts", clock.attempts, [], least=1.0)
+    _refuse_time("first_step", clock.first_step, [], least=0.0)
+    tolerances = clock.atol if isinstance(clock.atol, tuple) else (clock.atol,) * n_states
+    if len(tolerances) != n_states:
+        raise ModelError(f"the clock's `atol` has {len(tolerances)} numbers, the model {n_states} states")
+    for one in tolerances:
+        _refuse_time("atol", one, [], least=0.0)
+
+
+def _refuse_time(name: str, value: Any, settings: list[str], least: float | None = None, most: float = 1e300) -> None:
+    """ModelError unless a number of the clock is positive, or at least `least`, or the symbol of a setting."""
+    if isinstance(value, str):
+        if value not in settings:
+            known = f"{hint(value, settings)}" if settings else "; write a number without quotes"
+            raise ModelError(
+                f'the clock\'s `{name}` is "{value}", and no setting has this name without its unit{known}'
+            )
+        return
+    allowed = "above 0" if least is None else f"at least {least:g}"
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not number or not (0.0 < value <= most if least is None else least <= value <= most):
+        raise ModelError(f"the clock's `{name}` is {value!r}; it must be a number {allowed}")
+
+
+def _refuse_twice(what: str, names: list[str]) -> None:
+    """ModelError if a name occurs twice; inputs are compared by their names inside SI code, without unit."""
+    for name in names:
+        if names.count(name) > 1:
+            raise ModelError(f'two {what}s of the model are called "{name}"; give each a name of its own')

@@ -1,0 +1,265 @@
+"""A model's physics run through once, interpreted, on the numbers of a few cases: what it gives must be what the model
+declares.
+
+The numbers are arrays, as the lanes will hand them over, so that what takes one number only is found here.  A kernel
+trusts the counts that the model declares: nothing is flown that has not passed.
+"""
+
+import dis
+import re
+from collections import namedtuple
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mc_engine import lanes
+from mc_engine.errors import ModelError
+from mc_engine.kernel_parts import NoMemory
+from mc_engine.lanes.functions import TABLES
+from mc_engine.lanes.noise import Draws, noise_key
+from mc_engine.model import Model
+from mc_engine.model_faults import MORE, place_in_model
+from mc_engine.physics_source import is_shipped, place_of, source_faults
+from mc_engine.suggestions import listed
+
+FEW = 3  # cases on arrays
+# what the fields of each function's result are declared by
+_FIELDS = {"initial": "states", "rhs": "states", "observe": "quantities", "events": "event_list", "evaluate": "metrics"}
+_MANY = 128  # values of everything that `evaluate` is handed
+_passed: set[Model] = set()
+
+
+class Breach(ModelError):
+    """One breach of the contract; its text is the sentence."""
+
+
+def refuse_unfit(model: Model, parameters: np.ndarray, settings: Any) -> None:
+    """ModelError with the first breach of a model that is about to be flown; asked once per model and process.
+
+    parameters : float64[n_kernel_parameters, n], SI, n > 0.  settings : as `mc_engine.flight.settings_of` gives them.
+    """
+    if model in _passed:
+        return
+    found = [] if is_shipped(model) else source_faults(model)
+    if not found:
+        first = np.repeat(parameters[:, :1], FEW, axis=1)
+        try:
+            with np.errstate(all="ignore"):
+                run_through(model, model.kernel_parameters(*first), settings)
+        except Breach as breach:
+            found = [str(breach)]
+    if found:
+        raise ModelError(f"{found[0]}{MORE}")
+    _passed.add(model)
+
+
+def run_through(model: Model, p: Any, o: Any, seed: int = 0, *, finite: bool = False) -> None:
+    """Breach at the first function that breaks, or gives other numbers than the model declares.
+
+    p : named tuple of arrays [FEW].  o : the settings.  finite : the start and its derivative must be finite, too.
+    """
+    # as in kernels: dividing by zero gives an infinity
+    o = type(o)(*(value if name == TABLES else np.float64(value) for name, value in zip(o._fields, o, strict=True)))
+    t = np.zeros(FEW)
+    s = _call(model, "initial", p, o)
+    m = NoMemory(0.0) if model.start is None else _call(model, "start", p, o)
+    if model.control is not None:
+        sampled = _call(model, "control", t, s, m, p, o, Draws(noise_key(seed), 0.0, 0.0))
+        _same_record(model.control, "control", sampled, "start", m, "memory")
+        m = sampled
+    if finite:
+        _refuse_infinite("initial", s, "the state")
+    derivative = _call(model, "rhs", t, s, m, p, o)
+    _same_record(model.rhs, "rhs", derivative, "initial", s, "named tuple")
+    if finite:
+        _refuse_infinite("rhs", derivative, "the derivative", model.rhs)
+    seen = _call(model, "observe", t, s, m, p, o)
+    if model.events is not None:
+        values = _call(model, "events", t, s, m, p, o)
+        if model.switch is not None:
+            _try_switch(model, s, m, (t, s, m, p, o, type(values)(*(np.zeros(FEW) for _ in values))))
+    best = namedtuple("Best", [one.name for one in model.extrema] or ["unused"])  # type: ignore[misc]
+    names = [quantity.name for quantity in model.quantities]
+    looks = [seen[names.index(one.quantity)] for one in model.extrema] or [t]
+    _call(model, "evaluate", t, s, m, p, o, best(*looks), best(*[0.0 * look for look in looks]))
+
+
+def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
+    """Metrics, by name, in SI, that `evaluate` gives the same value whatever it is handed.
+
+    p, o : as in `run_through`, which the model has passed.  Everything that a flight or an input could change is given
+    many values of either sign, over some orders of magnitude; a function that breaks on them is not judged.
+    """
+    spread = np.random.default_rng(0)
+
+    def many(value: Any) -> Any:
+        if hasattr(value, "_fields"):
+            return type(value)(*(many(one) for one in value))
+        scale = np.exp(spread.normal(0.0, 3.0, (2, _MANY))) * spread.choice([-1.0, 1.0], (2, _MANY))
+        return scale[0] * np.ravel(value)[0] + scale[1] * spread.integers(0, 2, _MANY)
+
+    s, m = model.initial(p, o), NoMemory(0.0) if model.start is None else model.start(p, o)
+    best = namedtuple("Best", [one.name for one in model.extrema] or ["unused"])  # type: ignore[misc]
+    looks = best(*(1.0 for _ in best._fields))
+    values = []
+    for more in (0.0, 1.0, 2.0):
+        own = type(o)(*(value if name == TABLES else value + more for name, value in zip(o._fields, o, strict=True)))
+        try:
+            with np.errstate(all="ignore"):
+                given = model.evaluate(many(1.0), many(s), many(m), many(p), own, many(looks), many(looks))
+                values.append([np.broadcast_to(np.asarray(one, dtype=np.float64), _MANY) for one in given])
+        except Exception:
+            return {}  # no finding: the functions are judged by the trial itself
+    rows = np.concatenate(values, axis=1)  # [n_metrics, 3 * _MANY]
+    return {one.name: row[0] for one, row in zip(model.metrics, rows, strict=True) if (row == row[0]).all()}
+
+
+def _try_switch(model: Model, s: Any, m: Any, arguments: tuple[Any, ...]) -> None:
+    assert model.switch is not None
+    result = _run(model.switch, "switch", arguments)
+    if not isinstance(result, tuple) or len(result) != 2 or hasattr(result, "_fields"):
+        raise Breach(
+            f"{place_of(model.switch)}: `switch` gives {_shape(result)}; it must give state and memory, (s, m)"
+        )
+    for given, wanted, source in zip(result, (s, m), ("initial", "start"), strict=True):
+        _same_record(model.switch, "switch", given, source, wanted, "named tuple")
+        _refuse_other_than_numbers(model.switch, "switch", given)
+
+
+def _same_record(function: Callable[..., Any], name: str, given: Any, source: str, wanted: Any, what: str) -> None:
+    if getattr(given, "_fields", None) != wanted._fields:
+        raise Breach(f"{place_of(function)}: `{name}` gives {_shape(given)}, `{source}` {_shape(wanted)}; both must "
+                     f"give the same {what}")  # fmt: skip
+
+
+def _call(model: Model, name: str, *arguments: Any) -> Any:
+    """The result of one function of the model, a named tuple with a field for each that the model declares."""
+    function = getattr(model, name)
+    result = _run(function, name, arguments)
+    if not hasattr(result, "_fields"):
+        kind = "nothing" if result is None else type(result).__name__
+        raise Breach(f"{place_of(function)}: `{name}` gives {kind}; it must return a named tuple")
+    declared = _FIELDS.get(name)
+    if declared is not None:
+        _compare(
+            function,
+            name,
+            result,
+            declared,
+            [(one.name, getattr(one, "symbol", one.name)) for one in getattr(model, declared)],
+        )
+    _refuse_other_than_numbers(function, name, result)
+    return result
+
+
+def _run(function: Callable[..., Any], name: str, arguments: tuple[Any, ...]) -> Any:
+    """What a function gives on arrays; on numbers where it negates a mask, which lanes can and arrays cannot."""
+    try:
+        try:
+            return function(*arguments)
+        except ValueError as error:
+            if not _negates(error):
+                raise
+            return function(*(_first(one) for one in arguments))
+    except Exception as error:
+        raise Breach(fault_sentence(name, error)) from None
+
+
+def _negates(error: ValueError) -> bool:
+    """Whether the error came from `not` alone: not from `if`, nor from `and` or `or`."""
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    if place is None or "truth value of an array" not in str(error):
+        return False
+    steps = [one for one in dis.get_instructions(place.tb_frame.f_code) if one.offset >= place.tb_lasti]
+    return next(one.opname for one in steps if one.opname != "TO_BOOL") == "UNARY_NOT"
+
+
+def _first(value: Any) -> Any:
+    """The numbers of the first case: of an array, of a named tuple of arrays, or the number itself."""
+    if hasattr(value, "_fields"):
+        return value if TABLES in value._fields else type(value)(*(_first(one) for one in value))
+    return float(value[0]) if np.ndim(value) == 1 else value
+
+
+def _compare(function: Callable[..., Any], name: str, result: Any, declared: str, named: list[tuple[str, str]]) -> None:
+    """Breach if the result has not one field for each declared one, in their order.
+
+    named : the declared names with and without their units; fields may have names of their own, but not one another's.
+    """
+    fields, symbols = list(result._fields), [symbol for _, symbol in named]
+    if len(fields) != len(symbols):
+        missing = [one for one in symbols if one not in fields]
+        more = [one for one in fields if one not in symbols]
+        which = f"; {listed(missing)} is missing" if missing else (f"; {listed(more)} is too many" if more else "")
+        raise Breach(f"{place_of(function)}: `{name}` gives {len(fields)} numbers, the model declares {len(symbols)} "
+                     f"in `{declared}`{which}")  # fmt: skip
+    displaced = [f not in own for f, own in zip(fields, named, strict=True)]
+    swapped = set(fields) == {full for full, _ in named}
+    if any(out and (swapped or f in symbols) for f, out in zip(fields, displaced, strict=True)):
+        raise Breach(f"{place_of(function)}: `{name}` gives {listed(fields)}; `{declared}` declares them in the order "
+                     f"{listed(symbols)}")  # fmt: skip
+    if name == "events" and fields != symbols:
+        raise Breach(f"{place_of(function)}: `events` gives {listed(fields)}, event_list names {listed(symbols)}; use "
+                     "the same names")  # fmt: skip
+
+
+def _refuse_other_than_numbers(function: Callable[..., Any], name: str, result: Any) -> None:
+    """Breach unless every field is one real number, or one for each case."""
+    for field, value in zip(result._fields, result, strict=True):
+        try:
+            array = np.asarray(value)
+        except ValueError:
+            array = np.asarray(None)
+        if array.dtype == bool:
+            fix = ('give a number that crosses zero, such as a difference' if name == "events"
+                   else "write where(condition, 1.0, 0.0)")  # fmt: skip
+            raise Breach(f'{place_of(function)}: `{name}` gives a truth value for "{field}"; {fix}')
+        if array.dtype.kind not in "iuf" or array.shape not in ((), (FEW,)):
+            what = f"{value!r}" if array.ndim == 0 and len(repr(value)) < 40 else type(value).__name__
+            raise Breach(f'{place_of(function)}: `{name}` gives {what} for "{field}"; it must be one number')
+
+
+def _refuse_infinite(name: str, result: Any, what: str, function: Callable[..., Any] | None = None) -> None:
+    for field, value in zip(result._fields, result, strict=True):
+        if not np.isfinite(value).all():
+            bad = np.ravel(value)[~np.isfinite(np.ravel(value))][0]
+            place = f"{place_of(function)}: " if function is not None else ""
+            raise Breach(f'{place}`{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal case; '
+                         "keep square roots, logarithms and divisions in range")  # fmt: skip
+
+
+def _shape(result: Any) -> str:
+    fields = getattr(result, "_fields", None)
+    return type(result).__name__ if fields is None else f"{type(result).__name__}({', '.join(fields)})"
+
+
+def fault_sentence(name: str, error: Exception) -> str:
+    """The error of the model's own code, at the line of the model that it comes from."""
+    return f"{place_in_model(error) or 'the model'}: `{name}`: {_cause(error)}"
+
+
+def _cause(error: Exception) -> str:
+    """What the error of interpreted physics means, with the fix."""
+    text = str(error)
+    if "truth value of an array" in text:
+        return "`if`, `and`, `or` or `not` on a number that differs from case to case; use where(condition, a, b)"
+    if "only integer scalar arrays" in text or "cannot be interpreted as an integer" in text:
+        return "a loop over a number that differs from case to case; loop over a fixed number, with where() inside"
+    if "only length-1 arrays" in text or "only 0-dimensional arrays" in text or "must be real number, not" in text:
+        return ("a function of `math`, or int() or float(), on a number that differs from case to case; take it from "
+                "mc_engine.lanes")  # fmt: skip
+    if isinstance(error, UnboundLocalError):
+        name = text.split("'")[1] if text.count("'") == 2 else "a name"
+        return f'"{name}" is set in one branch only; set it always, with where(condition, a, b)'
+    if isinstance(error, NameError):
+        ours = error.name in lanes.__all__
+        return f'"{error.name}" is not defined; {"import it from mc_engine.lanes" if ours else "define or import it"}'
+    if isinstance(error, AttributeError) and error.obj is not None and hasattr(error.obj, "_fields"):
+        return f'there is no "{error.name}" in {_shape(error.obj)}'
+    made = re.match(r"(?:\w+\.)*(\w+)\.__new__\(\) missing \d+ required positional arguments?: (.*)", text)
+    if made:
+        return f"{made[1]} is made without {made[2]}; give every field"
+    return f"{type(error).__name__}: {text}"

@@ -1,0 +1,110 @@
+"""What the command line says to do next: where a word was a slip, where nothing is left to do, and to the shell."""
+
+import subprocess
+import sys
+
+import pytest
+from cart import CAMPAIGN, MODEL, call, fails_with, small_store
+from small_run import ENVIRONMENT
+
+from mc_engine import tuning
+from mc_engine.errors import EngineError
+from mc_engine.store import open_store
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """A working folder with a campaign of a cart in `cart/`, which has two requirements."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cart").mkdir()
+    (tmp_path / "cart" / "model.py").write_text(MODEL)
+    second = '[requirement.stop]\nmetric = "range_m"\nat_most = 9.0\n'
+    (tmp_path / "cart" / "campaign.toml").write_text(CAMPAIGN + second)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["status", "deorbit"], "deorbit: is a campaign and no run; `mc-engine run deorbit` flies it"),
+        (["status", "runs"], "runs: is no run directory; it holds 2 runs, the latest is runs/a"),
+        (["status", "cart"], "cart: is no run directory; `mc-engine run` makes one"),
+        (["run", "runs"], "holds no campaign.toml; `mc-engine init DIR` makes a campaign in a new folder"),
+        (["run", "other"], "holds no campaign.toml, but other/case.toml"),
+        (["run", "nowhere.toml"], "there is no such file; `mc-engine list` names the shipped campaigns"),
+        (["tune", "cart"], "write [tuning.parameter.NAME] and [tuning.objective.NAME], as flexible_satellite/stage_1"),
+        (["rare", "cart"], "--requirement is missing: the campaign has several; choose one of reach, stop"),
+        (["replay", "runs/a", "-1"], "Invalid value for 'CASE'"),
+        (["plan", "--share", "2", "--confidence", "0.9"], "--share is 2; it must be above 0 and below 1"),
+    ],
+)
+def test_a_slip_is_answered_with_what_is_there_or_the_next_command(here, words, said):
+    for name in ("b", "a"):
+        small_store(here / "runs" / name)
+    (here / "other").mkdir()
+    (here / "other" / "case.toml").write_text("")
+    fails_with(2, call(*words), said)
+
+
+def test_a_run_that_is_complete_is_not_flown_again(here):
+    store = small_store(here / "flown")
+    store.note("finished")
+    before = len(open_store("flown").notes())
+    answer = call("resume", "flown")
+    assert answer.exit_code == 0
+    assert answer.stdout.startswith("flown: is complete; `mc-engine extend flown --cases N` adds cases, ")
+    assert "`mc-engine report flown` writes the reports anew" in answer.stdout
+    assert len(open_store("flown").notes()) == before
+    assert not (here / "flown" / "report.html").exists()
+
+
+def test_without_a_failed_case_nothing_is_flown_again(here):
+    answer = call("run", "minimal", "--cases", 20, "--out", "flown", "--no-report")
+    assert answer.exit_code == 0, answer.output
+    assert call("rerun", "--failed", "flown").stdout == "flown: no case failed; there is nothing to fly again\n"
+
+
+def test_a_run_without_a_case_that_flew_names_the_check_of_its_model(here, monkeypatch):
+    monkeypatch.setattr("mc_engine.run_summary.failed_cases", lambda store: 20)
+    answer = call("run", "minimal", "--cases", 20, "--out", "flown", "--no-report")
+    assert answer.exit_code == 0, answer.output
+    assert "no case flew to its end; `mc-engine check minimal` looks for the reason in the model" in answer.stderr
+    monkeypatch.undo()
+    monkeypatch.chdir(here)
+    assert "no case flew" not in call("run", "minimal", "--cases", 20, "--out", "again", "--no-report").stderr
+
+
+def test_tuning_without_its_package_is_a_sentence(here, monkeypatch):
+    from importlib.metadata import PackageNotFoundError
+
+    def missing(name):
+        raise PackageNotFoundError(name)
+
+    def refused(*words):
+        raise EngineError("tuning needs pymoo, which is not installed")
+
+    monkeypatch.setattr(tuning, "version", missing)
+    monkeypatch.setattr(tuning, "GeneticSearch", refused)
+    fails_with(2, call("tune", "flexible_satellite/stage_1", "--out", "tuned"), "tuning needs pymoo")
+    assert not (here / "tuned").exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("run cart --backend ", ["threading", "loky", "dask"]),
+        ("report x --format h", ["html"]),
+        ("export x --format ", ["csv", "oem"]),
+        ("rare cart --requirement ", ["reach", "stop"]),
+        ("rare nowhere --requirement ", []),
+        ("rare cart --method c", ["cross-entropy"]),
+        ("published d", ["deorbit"]),
+    ],
+)
+def test_the_shell_completes_the_words_of_options(here, line, offered):
+    words = f"mc-engine {line}"
+    shell = {"_MC_ENGINE_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split(" ")) - 1)}
+    done = subprocess.run(
+        [sys.executable, "-m", "mc_engine"], capture_output=True, text=True, env={**ENVIRONMENT, **shell}
+    )
+    assert done.stdout.split() == offered

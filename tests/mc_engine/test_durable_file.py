@@ -1,0 +1,54 @@
+import os
+import sys
+
+import pytest
+
+from mc_engine import durable_file
+from mc_engine.durable_file import read_file, read_inside, write_durably
+from mc_engine.errors import StoreError
+
+links = pytest.mark.skipif(sys.platform == "win32", reason="links need rights")
+
+
+def test_a_file_is_read_whole_or_as_far_as_asked(tmp_path):
+    write_durably(tmp_path / "a", b"0123456789")
+    assert read_file(tmp_path / "a") == b"0123456789"
+    assert read_file(tmp_path / "a", 4) == b"0123"
+    assert read_inside(tmp_path, "a", 2**60) == b"0123456789"
+
+
+@links
+def test_neither_reading_nor_writing_follows_a_link(tmp_path):
+    (tmp_path / "outside").write_bytes(b"mine")
+    (tmp_path / "run" / "folder").mkdir(parents=True)
+    (tmp_path / "run" / "link").symlink_to(tmp_path / "outside")
+    (tmp_path / "run" / ".new.tmp").symlink_to(tmp_path / "outside")
+    (tmp_path / "run" / "away").symlink_to(tmp_path)
+    for read in (lambda: read_file(tmp_path / "run" / "link"), lambda: read_inside(tmp_path / "run", "away/outside")):
+        with pytest.raises(StoreError, match="symbolic link"):
+            read()
+    with pytest.raises(StoreError, match="symbolic link"):
+        write_durably(tmp_path / "run" / "new", b"theirs")
+    with pytest.raises(StoreError, match="no regular file"):
+        read_file(tmp_path / "run" / "folder")
+    assert (tmp_path / "outside").read_bytes() == b"mine"
+    (tmp_path / "alias").symlink_to(tmp_path / "run")  # the way to the directory is the user's own
+    write_durably(tmp_path / "run" / "b", b"b")
+    assert read_inside(tmp_path / "alias", "b") == b"b"
+
+
+@links
+@pytest.mark.parametrize("known", [True, False])
+def test_on_a_system_with_a_sync_of_the_drive_that_one_is_asked_for_first(tmp_path, monkeypatch, known):
+    asked = []
+
+    def control(descriptor, command):
+        asked.append(command)
+        if not known:
+            raise OSError(25, "Inappropriate ioctl for device")
+
+    monkeypatch.setattr(durable_file, "_FULL_SYNC", 51)
+    monkeypatch.setattr(durable_file.fcntl, "fcntl", control)
+    monkeypatch.setattr(os, "fsync", lambda descriptor: asked.append("fsync"))
+    write_durably(tmp_path / "a", b"0")
+    assert asked == [51, 51] if known else [51, "fsync", 51, "fsync"]

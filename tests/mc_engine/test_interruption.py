@@ -1,0 +1,143 @@
+"""Ctrl-C and SIGTERM outside of the flight itself: exit status 4, and the command that goes on as the last words."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pytest
+from cart import small_store
+from small_run import ENVIRONMENT
+
+from mc_engine.interruption import NOTHING_BEGUN, ONCE_MORE
+from mc_engine.next_step import after_flight, after_search, is_complete
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
+
+# A process of the command line in which a function of the engine is exchanged for one that ends it.
+SCRIPT = """
+import importlib, os, signal, sys, time
+from mc_engine.__main__ import main
+
+def send(count=1):
+    for _ in range(count):
+        os.kill(os.getpid(), signal.{signal})
+        time.sleep(0.01)
+
+def victim(*arguments, **options):
+    {body}
+
+module, name = {place!r}.rsplit(".", 1)
+original = getattr(importlib.import_module(module), name)
+setattr(importlib.import_module(module), name, victim)
+sys.argv = ["mc-engine", *{arguments!r}]
+{then}
+main()
+"""
+CAMPAIGN, REPORTS = "mc_engine.campaign.load_campaign", "reports.write_reports"
+
+
+def command(place, body, *arguments, by="SIGTERM", then=""):
+    """A command in which `body` stands for the function at `place`, and which does `then` before it begins.
+
+    As a module: only then Python's own way of ending after an interruption matters.
+    """
+    script = SCRIPT.format(signal=by, body=body, place=place, arguments=[str(word) for word in arguments], then=then)
+    with TemporaryDirectory() as folder:
+        (Path(folder) / "exchanged.py").write_text(script)
+        path = os.pathsep.join([folder, ENVIRONMENT["PYTHONPATH"]])
+        done = subprocess.run([sys.executable, "-m", "exchanged"], capture_output=True, text=True, timeout=60,
+                              env={**ENVIRONMENT, "PYTHONPATH": path})  # fmt: skip
+    assert "Traceback" not in done.stderr, done.stderr
+    return done
+
+
+def ended(*words, **options):
+    """Exit status of such a command, and its last words."""
+    done = command(*words, **options)
+    return done.returncode, done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("by", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize(
+    "body",
+    [
+        pytest.param("send()", id="in a call"),
+        pytest.param('exec("send()", {"send": send})', id="in generated code"),
+        pytest.param("send(2)", id="twice"),
+    ],
+)
+def test_a_signal_before_anything_is_there_says_so(tmp_path, body, by):
+    said = ended(CAMPAIGN, body, "run", "minimal", "--out", tmp_path / "run", by=by)
+    assert said == (4, NOTHING_BEGUN)
+
+
+def test_a_signal_that_a_library_swallows_stops_the_flight_that_follows(tmp_path):
+    body = "\n    ".join(["try: send()", "except BaseException: pass", "return original('minimal', cases=20)"])
+    run = tmp_path / "run"
+    status, said = ended(CAMPAIGN, body, "run", "minimal", "--out", run)
+    assert (status, said) == (4, f"interrupted with 0 of 20 cases; `mc-engine resume {run}` flies the rest")
+
+
+@pytest.mark.parametrize("body", ["send()", "\n    ".join(["try: send()", "finally: send()"])])
+def test_a_signal_while_the_reports_are_written_names_the_command_that_writes_them(tmp_path, body):
+    run = tmp_path / "run"
+    status, said = ended(REPORTS, body, "run", "minimal", "--cases", 20, "--out", run)
+    assert (status, said) == (4, f"interrupted; all cases are there, `mc-engine report {run}` writes the reports")
+    assert is_complete(run)
+    assert ended(REPORTS, body, "report", run) == (4, f"interrupted; `mc-engine report {run}` writes the reports")
+
+
+def test_a_signal_to_a_verb_that_keeps_nothing_says_to_give_it_again():
+    assert ended(CAMPAIGN, "send()", "check", "minimal") == (4, ONCE_MORE)
+
+
+def test_a_signal_after_all_was_said_changes_nothing(tmp_path):
+    small_store(tmp_path / "flown").note("finished")
+    later = "import atexit\natexit.register(send)"
+    done = command(CAMPAIGN, "pass", "status", tmp_path / "flown", then=later)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.endswith("complete\n")
+
+
+def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun():
+    """The first module of it that is loaded after `listen` never comes to its end."""
+    script = (
+        "import os, signal, sys, time\n"
+        "class Finder:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'mc_engine.cli':\n"
+        "            os.kill(os.getpid(), signal.SIGTERM)\n"
+        "            time.sleep(30.0)\n"
+        "from mc_engine.__main__ import main\n"
+        "sys.meta_path.insert(0, Finder())\nmain()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, timeout=60)
+    assert (done.returncode, done.stderr) == (4, f"{NOTHING_BEGUN}\n")
+
+
+# ---- what the journal says
+
+
+def test_the_words_follow_the_journal(tmp_path):
+    assert after_flight(None) == after_flight(tmp_path / "none") == NOTHING_BEGUN
+    run = tmp_path / "run"
+    store = small_store(run)
+    assert after_flight(run, " --backend loky").endswith(f"`mc-engine resume {run} --backend loky` flies the rest")
+    store.note("finished")
+    assert f"`mc-engine report {run}` writes the reports" in after_flight(run)
+    assert f"`mc-engine publish {run} s3://b/x` sends" in after_flight(run, url="s3://b/x")
+    store.note("extended", cases=60)
+    assert f"`mc-engine resume {run}`" in after_flight(run)
+    store.note("finished")
+    store.note("rerun", cases=4)
+    assert f"`mc-engine rerun --failed {run}` flies the rest" in after_flight(run, rerun=True)
+
+
+def test_the_words_on_a_search_follow_its_record(tmp_path):
+    assert after_search(tmp_path, "tuning.json", "the generations are") == NOTHING_BEGUN
+    (tmp_path / "tuning.json").write_text("{}")
+    assert f"the generations are in {tmp_path}, `mc-engine report" in after_search(
+        tmp_path, "tuning.json", "the generations are"
+    )
