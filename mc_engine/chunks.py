@@ -113,11 +113,6 @@ def _unguarded(cases: np.ndarray) -> AbstractContextManager[None]:
     return nullcontext()
 
 
-def fly_chunk(campaign: Campaign, first: int, stop: int) -> Columns:
-    """All columns but case_id of the cases first to stop - 1."""
-    return fly_cases(campaign, np.arange(first, stop, dtype=np.int64))
-
-
 def fly_cases(campaign: Campaign, case_ids: np.ndarray, batch: int | None = None, guard: Guard = _unguarded) -> Columns:
     """All columns but case_id of some cases.  case_ids : int64[n], n > 0.  batch : cases at a time."""
     table = case_table(campaign, case_ids)

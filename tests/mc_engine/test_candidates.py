@@ -9,7 +9,7 @@ from apogee_tuning import apogee_and_speed, apogee_campaign
 
 from mc_engine.candidates import cases_per_candidate, commonest_failure, fly_candidates, quantile_rank
 from mc_engine.cases import case_table
-from mc_engine.chunks import fly_chunk
+from mc_engine.chunks import fly_cases
 from mc_engine.kernel import build_kernel
 
 CHOICES = np.array([[300.0, 100.0], [250.0, 60.0], [600.0, 200.0], [400.0, 150.0], [200.0, 50.0]])
@@ -55,7 +55,7 @@ def test_threads_that_find_no_kernel_yet_do_not_write_it_together(tmp_path, monk
 def test_a_quantile_is_an_order_statistic_of_the_campaigns_own_cases(limit, rank):
     """0.2 of 10 cases: the third smallest where small is bad, the second where large is."""
     campaign = apogee_campaign(ROBUST.format(0.2, limit))
-    flown = fly_chunk(campaign, 0, 10)["apogee_altitude_km"]  # the untuned choice, 300 km and 100 m/s
+    flown = fly_cases(campaign, np.arange(10))["apogee_altitude_km"]  # the untuned choice, 300 km and 100 m/s
     scores = scores_of(campaign, CHOICES[:1])
     assert scores.limited[0, 0] == np.sort(flown)[rank]
     assert len(np.unique(case_table(campaign, np.arange(10))["magnitude_error_pct"])) == 10

@@ -16,16 +16,6 @@ from mc_engine.store import open_store
 
 
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A working folder with a campaign of a cart in `cart/`."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "cart").mkdir()
-    (tmp_path / "cart" / "model.py").write_text(MODEL)
-    (tmp_path / "cart" / "campaign.toml").write_text(CAMPAIGN)
-    return tmp_path
-
-
-@pytest.fixture
 def calls(monkeypatch):
     """The calls that reach runner and reports, which are stand-ins here; `calls.fail` is raised in flight."""
     seen = SimpleNamespace(runner=[], reports=[], fail=None, equal=True)

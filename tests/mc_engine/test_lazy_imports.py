@@ -2,18 +2,8 @@ import subprocess
 import sys
 
 import pytest
-from cart import CAMPAIGN, MODEL, small_store
+from cart import small_store
 from small_run import ENVIRONMENT
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A working folder with a campaign of a cart in `cart/`."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "cart").mkdir()
-    (tmp_path / "cart" / "model.py").write_text(MODEL)
-    (tmp_path / "cart" / "campaign.toml").write_text(CAMPAIGN)
-    return tmp_path
 
 
 def loaded_by(*arguments):

@@ -1,17 +1,6 @@
 """The verbs that plan for requirements, and fly until they are decided."""
 
-import pytest
-from cart import CAMPAIGN, MODEL, call, fails_with
-
-
-@pytest.fixture
-def here(tmp_path, monkeypatch):
-    """A working folder with a campaign of a cart in `cart/`."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "cart").mkdir()
-    (tmp_path / "cart" / "model.py").write_text(MODEL)
-    (tmp_path / "cart" / "campaign.toml").write_text(CAMPAIGN)
-    return tmp_path
+from cart import CAMPAIGN, call, fails_with
 
 
 def test_plan_reads_the_requirements_of_a_campaign(here):

@@ -19,17 +19,6 @@ from mc_engine.errors import StoreError
 from mc_engine.journal import Journal
 from mc_engine.store import Column, create_store, is_run_directory, open_store
 
-
-@pytest.fixture
-def run(tmp_path):
-    return tmp_path / "run"
-
-
-@pytest.fixture
-def store(run):
-    return created(run)
-
-
 # ---- a store gives back what was put in
 
 

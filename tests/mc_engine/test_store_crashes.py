@@ -5,21 +5,11 @@ import sys
 
 import pandas as pd
 import pytest
-from small_run import COLUMNS, ENVIRONMENT, MANIFEST, TEXT, block, created, filled
+from small_run import COLUMNS, ENVIRONMENT, MANIFEST, TEXT, block, filled
 
 from mc_engine import parts
 from mc_engine.errors import StoreError
 from mc_engine.store import create_store, open_store
-
-
-@pytest.fixture
-def run(tmp_path):
-    return tmp_path / "run"
-
-
-@pytest.fixture
-def store(run):
-    return created(run)
 
 
 def fail_at(monkeypatch, n, target):

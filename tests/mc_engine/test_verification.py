@@ -2,21 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_run import block, created, filled, row
+from small_run import block, filled, row
 
 from mc_engine import parts, verification
 from mc_engine.errors import StoreError
 from mc_engine.store import open_store
-
-
-@pytest.fixture
-def run(tmp_path):
-    return tmp_path / "run"
-
-
-@pytest.fixture
-def store(run):
-    return created(run)
 
 
 def test_an_intact_run_has_no_damage(store):

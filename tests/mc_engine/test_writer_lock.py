@@ -5,21 +5,11 @@ import sys
 import time
 
 import pytest
-from small_run import ENVIRONMENT, block, created
+from small_run import ENVIRONMENT, block
 
 from mc_engine.errors import StoreError
 from mc_engine.store import open_store
 from mc_engine.writer_lock import WriterLock, holder
-
-
-@pytest.fixture
-def run(tmp_path):
-    return tmp_path / "run"
-
-
-@pytest.fixture
-def store(run):
-    return created(run)
 
 
 def test_a_second_writer_is_refused_within_a_second_and_told_who_is_first(store):
