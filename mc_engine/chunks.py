@@ -16,7 +16,7 @@ from mc_engine.cases import case_table, full_inputs, nominal_row
 from mc_engine.flight import fly
 from mc_engine.kernel import usual_width
 from mc_engine.model_faults import naming_faults
-from mc_engine.parts import Column, Part, Written, read_part, revised_name, write_aside
+from mc_engine.parts import CASE_COLUMNS, Column, Part, Written, read_part, revised_name, write_aside
 from mc_engine.status import OK, STATUS_NAME
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
@@ -188,7 +188,7 @@ def rerun_orders(run: Path, counted: Sequence[Part]) -> list[Order]:
     orders = []
     for part in counted:
         if set(part.status) - {STATUS_NAME[OK]}:
-            table = read_part(run, part, ["case_id", "status"])
+            table = read_part(run, part, CASE_COLUMNS[:2])
             failed = table["status"].to_numpy(zero_copy_only=False) != STATUS_NAME[OK]
             cases = tuple(int(case) for case in table["case_id"].to_numpy()[failed])
             orders.append(Order(part.first, part.stop, base=part, failed=cases))

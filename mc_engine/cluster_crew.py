@@ -3,6 +3,7 @@
 The cluster is that of a scheduler that somebody started, or one of this machine, begun for the run and ended with it.
 """
 
+import atexit
 import logging
 import time
 from collections.abc import Iterator
@@ -102,7 +103,11 @@ class _LocalWorkers:
     def __init__(self, workers: int, held: ExitStack):
         import dask
         from distributed import LocalCluster
+        from distributed.deploy.spec import close_clusters
 
+        # At the end of Python it would close a cluster that a second signal left half made, and raise; ours is closed
+        # by `_close`, and its processes end with this one.
+        atexit.unregister(close_clusters)
         held.enter_context(dask.config.set(OUR_CLUSTER))
         self._workers = workers
         self.cluster = LocalCluster(

@@ -1,11 +1,10 @@
 """Files that a campaign reads from its own folder, as the run directory keeps them."""
 
 from collections.abc import Mapping
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import read_inside
+from mc_engine.durable_file import sha256_inside
 from mc_engine.errors import StoreError
 
 
@@ -14,7 +13,7 @@ def companion_problems(run: Path, created: Mapping[str, Any]) -> list[str]:
     problems = []
     for name, digest in created.get("companions", {}).items():
         try:
-            if sha256(read_inside(run, name)).hexdigest() != digest:
+            if sha256_inside(run, name) != digest:
                 problems.append(f"{name}: damaged or edited, its SHA-256 is not the one in the journal")
         except StoreError as error:
             problems.append(str(error).removeprefix(f"{run}/"))

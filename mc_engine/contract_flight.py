@@ -26,7 +26,8 @@ from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 
 _CASES = 32
 _CUT = 5  # cases of the smaller part when they are flown in two
-_EDGES = np.array([0.05, 0.95])  # where along its distribution an input is tried
+# where along its distribution an input is tried: not at its edges alone, where what works evenly does the same
+_PLACES = np.array([0.05, 0.8, 0.95])
 _PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
 _ZERO = 1e-6  # of an event function's reach: a flight that stops there has reached the zero
 
@@ -138,7 +139,7 @@ def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
 
 
 def _moving_nothing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
-    """Dispersions whose edges change no metric: neither of the nominal case, nor of some dispersed ones."""
+    """Dispersions whose values all give the same metrics: of the nominal case and of some dispersed ones."""
     idle = [one for one in campaign.dispersions if not _moves(campaign, one, campaign.nominal)]
     for one in idle:
         rows = [{k: v[i] if np.ndim(v) else v for k, v in inputs.items()} for i in range(min(_PARTNERS, ids.size))]
@@ -147,24 +148,24 @@ def _moving_nothing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarr
 
 
 def _moves(campaign: Campaign, one: Dispersion, others: Mapping[str, Any]) -> bool:
-    """Whether the two edges of a dispersion give different results; one that has but one value does."""
-    edges = _edges(campaign, one)
-    if edges[0] == edges[-1]:
+    """Whether some values of a dispersion give different results; one that has but one value does."""
+    places = _places(campaign, one)
+    if np.unique(places).size == 1:
         return True
-    flown = _fly(campaign, {**others, one.name: edges}, np.zeros(len(edges), dtype=np.int64))
+    flown = _fly(campaign, {**others, one.name: places}, np.zeros(len(places), dtype=np.int64))
     names = ["status", *(metric.name for metric in campaign.model.metrics)]
-    low, high = ({name: flown[name][[i]] for name in names} for i in (0, -1))
-    return _difference(low, high) is not None
+    rows = [{name: flown[name][[i]] for name in names} for i in range(len(places))]
+    return any(_difference(rows[0], row) is not None for row in rows[1:])
 
 
-def _edges(campaign: Campaign, one: Dispersion) -> np.ndarray:
+def _places(campaign: Campaign, one: Dispersion) -> np.ndarray:
     if campaign.upstream is None and campaign.design != "table":
         if one.levels:
-            return column(one.levels)[[0, -1]]
+            return column(one.levels)
         assert one.distribution is not None  # a loaded campaign has one for every random design
-        return quantiles(one.distribution, _EDGES)
+        return quantiles(one.distribution, _PLACES)
     values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[one.name]
-    return np.sort(values)[[0, -1]]
+    return np.sort(values)[[0, 3 * values.size // 4, -1]]
 
 
 def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:

@@ -9,6 +9,7 @@ a pipe or a device.
 """
 
 import errno
+import hashlib
 import os
 import stat
 from collections.abc import Iterator
@@ -22,6 +23,9 @@ if os.name != "nt":
     import fcntl
 
     _FULL_SYNC = getattr(fcntl, "F_FULLFSYNC", None)
+
+# A file that someone made longer than any of its kind must not fill the memory of whoever reads it whole.
+MOST_OF_TEXT, MOST_OF_JOURNAL, MOST_OF_FILE = 2**28, 2**30, 2**34  # bytes
 
 _LINK = "is a symbolic link; only files of its own count in a directory"
 # A pipe without a writer must not keep the reader waiting.  Windows has neither flag.
@@ -44,9 +48,21 @@ def naming(path: Path) -> Iterator[None]:
         raise DiskError(f"{path}: {error.strerror or error}") from error
 
 
+@contextmanager
+def _refusing_folder(path: Path) -> Iterator[None]:
+    """Where the system refuses, in whatever words, because `path` is a folder, a StoreError that says so."""
+    try:
+        yield
+    except OSError as error:
+        if path.is_dir() and not path.is_symlink():
+            raise StoreError(f"{path}: is a folder, and a file has to be there; move it away") from error
+        raise
+
+
 def open_regular(path: Path, flags: int) -> int:
     """Descriptor of the file `path`, as `os.open` gives it; StoreError if it is there and no regular file."""
-    descriptor = os.open(path, flags | _PLAINLY, 0o666)
+    with _refusing_folder(path):
+        descriptor = os.open(path, flags | _PLAINLY, 0o666)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
         raise StoreError(f"{path}: is no regular file")
@@ -108,11 +124,18 @@ def publish(temporary: Path, path: Path) -> None:
     """Give a synced file its name, in place of what had it; on return the name is on the disk."""
     with naming(path):
         try:
-            os.replace(temporary, path)
-        except OSError:
+            with _refusing_folder(path):
+                os.replace(temporary, path)
+        except (OSError, StoreError):
             _discard(temporary)
             raise
     sync_folder(path.parent)
+
+
+def remove_file(path: Path) -> None:
+    """Remove the file `path`, if it is there."""
+    with naming(path), _refusing_folder(path):
+        path.unlink(missing_ok=True)
 
 
 def _discard(path: Path) -> None:
@@ -149,16 +172,36 @@ def sync_folder(path: Path) -> None:
             os.close(descriptor)
 
 
-def read_file(path: Path, most: int | None = None) -> bytes:
-    """The content of the regular file `path`, or its first `most` bytes."""
-    with naming(path):
-        descriptor = open_regular(path, os.O_RDONLY)
+def read_file(path: Path, most: int | None = None, limit: int = MOST_OF_FILE) -> bytes:
+    """The content of the regular file `path`, or its first `most` bytes.
+
+    limit : StoreError if there are more bytes to be read than that, or than the memory takes.
+    """
+    with naming(path), open(path, "rb", opener=plainly) as file:
+        size = os.fstat(file.fileno()).st_size
+        wanted = size if most is None else min(most, size)
+        if wanted > limit:
+            raise StoreError(f"{path}: damaged, {size:,} bytes where no such file has more than {limit:,}")
         try:
-            length = -1 if most is None else min(most, os.fstat(descriptor).st_size)
-            with open(descriptor, "rb", closefd=False) as file:
-                return file.read(length)
-        finally:
-            os.close(descriptor)
+            return file.read() if most is None else file.read(wanted)
+        except MemoryError as error:
+            raise StoreError(f"{path}: has {size:,} bytes, which the memory does not take") from error
+
+
+def read_short(path: Path) -> bytes:
+    """The content of a file that people read too, such as a campaign or a manifest."""
+    return read_file(path, limit=MOST_OF_TEXT)
+
+
+def sha256_inside(folder: Path, name: str) -> str:
+    """SHA-256 of the file `name` of a directory, read piece by piece; errors as those of `read_inside`."""
+    _check_inside(folder, name)
+    path = folder / name
+    with naming(path), open(path, "rb", buffering=0, opener=plainly) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > MOST_OF_FILE:
+            raise StoreError(f"{path}: damaged, {size:,} bytes where no such file has more than {MOST_OF_FILE:,}")
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_inside(folder: Path, name: str, most: int | None = None) -> bytes:
@@ -166,7 +209,11 @@ def read_inside(folder: Path, name: str, most: int | None = None) -> bytes:
 
     name : relative to `folder`, with slashes.  StoreError if it lies elsewhere, be it by a symbolic link on the way.
     """
+    _check_inside(folder, name)
+    return read_file(folder / name, most)
+
+
+def _check_inside(folder: Path, name: str) -> None:
     with naming(folder / name):
         if os.path.realpath(folder / name) != os.path.join(os.path.realpath(folder), *name.split("/")):
             raise StoreError(f"{folder / name}: lies outside the directory, or {_LINK}")
-    return read_file(folder / name, most)

@@ -4,12 +4,16 @@ from pathlib import Path
 
 from mc_engine.campaign import Campaign, load_campaign
 from mc_engine.designs import EXTENSIBLE
-from mc_engine.errors import StoreError
+from mc_engine.errors import CampaignError, Problem, StoreError
+from mc_engine.files_read import data_read
 from mc_engine.kernel import source_digest
 from mc_engine.manifest import sampling_digest
+from mc_engine.model_sources import sources_beside
 from mc_engine.store import Store
 from mc_engine.streams import SEED_CONTRACT
 from mc_engine.upstream import COMPANION
+
+_OWN = ("cases", "history")  # folders of a run directory
 
 
 def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
@@ -47,7 +51,14 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
     if campaign.table_path is not None:
         paths.add(campaign.table_path)
     if campaign.model_reference.endswith(".py"):
-        paths.update((campaign.directory / campaign.model_reference).resolve().parent.glob("*.py"))
+        model = (campaign.directory / campaign.model_reference).resolve()
+        paths.update([*sources_beside(model), *data_read(model.parent)])
     base = campaign.directory.resolve()
     contents = {path.resolve().relative_to(base).as_posix(): path.read_bytes() for path in sorted(paths)}
+    for name in contents:
+        if name.split("/")[0] in _OWN:
+            sentence = (
+                f'{name}: every run has a folder "{name.split("/")[0]}" of its own; give the model\'s another name'
+            )
+            raise CampaignError(campaign.name, [Problem("campaign.model", sentence)])
     return contents if campaign.upstream is None else {**contents, COMPANION: campaign.upstream.rows.content}

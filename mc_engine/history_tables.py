@@ -8,7 +8,8 @@ import numpy as np
 import pyarrow as pa
 
 from mc_engine import parts
-from mc_engine.parts import CASE_COLUMNS, Column
+from mc_engine.errors import StoreError
+from mc_engine.parts import CASE_COLUMNS, Column, Part
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -20,8 +21,8 @@ def history_columns(names: Sequence[str], quantities: Sequence[Mapping[str, str]
     columns = [CASE_COLUMNS[0], Column("t_s", "s", "time", "time since the start of the case")]
     for name in names:
         if name not in ("case_id", "t_s"):
-            quantity = known.get(name, {"unit": "", "description": ""})
-            columns.append(Column(name, quantity["unit"], "quantity", quantity["description"]))
+            quantity = known.get(name, {})
+            columns.append(Column(name, quantity.get("unit", ""), "quantity", quantity.get("description", "")))
     return tuple(columns)
 
 
@@ -32,6 +33,31 @@ def history_table(
     arrays = {name: np.asarray(table[name]) for name in table}
     columns = history_columns(list(arrays), quantities)
     return parts.arrow_table(columns, arrays, len(arrays.get("t_s", ())), place)
+
+
+def read_histories(run: Path, part: Part, quantities: Sequence[Mapping[str, str]]) -> pa.Table:
+    """The histories that a run keeps; StoreError naming the file if a byte of it changed, or it holds no histories."""
+    table = parts.read_part(run, part)
+    problem = history_problem(table, quantities)
+    if problem:
+        raise StoreError(f"{run / part.file}: {problem}; `mc-engine verify {run}` names all damage")
+    return table
+
+
+def history_problem(table: pa.Table, quantities: Sequence[Mapping[str, str]]) -> str:
+    """What is wrong with the columns of a table of histories; empty if they are case_id, t_s and quantities."""
+    names = table.column_names
+    for name in ("case_id", "t_s"):
+        if name not in names:
+            return f'its columns are not those of histories, "{name}" is missing'
+    known = {"case_id", "t_s", *(quantity["name"] for quantity in quantities)}
+    strange = [name for name in names if name not in known] if quantities else []
+    if strange:
+        return f'its columns are not those of histories, "{strange[0]}" is no quantity of the model'
+    wanted = parts.arrow_schema(history_columns(names, quantities))
+    if len({*names}) < len(names) or not table.schema.equals(wanted, check_metadata=True):
+        return "its columns are not those of histories"
+    return ""
 
 
 def history_bytes(

@@ -15,11 +15,12 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import naming, plainly, read_file, sync, write_all
+from mc_engine.durable_file import MOST_OF_JOURNAL, naming, plainly, read_file, sync, write_all
 from mc_engine.errors import StoreError
 
 _TAIL = re.compile(rb',"crc":"([0-9a-f]{8})"}')
 _TAIL_LENGTH = len(b',"crc":"00000000"}')
+_SHORTEST = len(b'{"n":1,"at":"","event":"","crc":"00000000"}')  # bytes of a line
 
 
 @dataclass(frozen=True)
@@ -54,34 +55,59 @@ def encode(number: int, at: str, event: str, facts: dict[str, Any]) -> bytes:
 
 def decode(line: bytes, number: int) -> Entry | None:
     """The entry of a line without its newline; None unless its checksum holds and its number is `number`."""
+    entry = _decoded(line)
+    return entry if entry is not None and entry.number == number else None
+
+
+def _decoded(line: bytes) -> Entry | None:
+    """The entry of a line, whatever its number; None unless its checksum holds."""
     tail = _TAIL.fullmatch(line[-_TAIL_LENGTH:])
     body = line[:-_TAIL_LENGTH]
     if tail is None or int(tail[1], 16) != zlib.crc32(body):
         return None
     try:
         facts = json.loads(body + b"}")
-        if facts.pop("n") != number:
-            return None
-        at, event = facts.pop("at"), facts.pop("event")
+        number, at, event = facts.pop("n"), facts.pop("at"), facts.pop("event")
     except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
         return None  # a checksum that holds over something that is no event
-    return Entry(number, at, event, facts) if isinstance(at, str) and isinstance(event, str) else None
+    plausible = type(number) is int and isinstance(at, str) and isinstance(event, str)
+    return Entry(number, at, event, facts) if plausible else None
 
 
 def scan(content: bytes) -> Scan:
-    """Judge every line of a journal's bytes."""
+    """Judge every line of a journal's bytes.
+
+    A flipped bit can join two lines, or cut one: the numbers that the lines have tell which are lost, and one that
+    counts on from the last good one is good wherever it stands.
+    """
     lines = content.split(b"\n")
     rest = lines.pop()  # after the last newline: empty, or a torn line
-    entries = [decode(line, number) for number, line in enumerate(lines, start=1)]
+    entries: list[Entry] = []
+    damaged: list[int] = []
+    last = unread = 0  # number of the last good line, lines since then
+    for line in lines:
+        entry = _decoded(line)
+        # The last condition bounds what a number that someone made up can cost.
+        if entry is None or entry.number < last + 1 + (unread > 0) or entry.number * _SHORTEST > len(content):
+            unread += 1
+            continue
+        damaged += range(last + 1, entry.number)
+        entries.append(entry)
+        last, unread = entry.number, 0
     torn = bool(rest)
     length = len(content) - len(rest)
-    if not torn and entries and entries[-1] is None:
+    if not torn and unread:
         # The newline of a torn write can reach the disk before the sectors in front of it.
         torn = True
         length -= len(lines[-1]) + 1
-        entries.pop()
-    damaged = tuple(number for number, entry in enumerate(entries, start=1) if entry is None)
-    return Scan(tuple(entry for entry in entries if entry is not None), length, torn, damaged)
+        unread -= 1
+    damaged += range(last + 1, last + 1 + unread)
+    return Scan(tuple(entries), length, torn, tuple(damaged))
+
+
+def read_journal(path: Path) -> bytes:
+    """The bytes of a journal file; StoreError if it is longer than any."""
+    return read_file(path, limit=MOST_OF_JOURNAL)
 
 
 class Journal:
@@ -90,7 +116,7 @@ class Journal:
     def __init__(self, path: Path):
         """Read `path`; StoreError with the line's number if a line that is not the last is damaged."""
         self.path = path
-        found = scan(read_file(path))
+        found = scan(read_journal(path))
         if found.damaged:
             number = found.damaged[0]
             raise damaged_line(path, number, "its checksum or its number does not hold")

@@ -16,8 +16,10 @@ from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
 
+from mc_engine.files_read import data_at_load
 from mc_engine.kernel_parts import Functions
 from mc_engine.model import AdaptiveStep, Model
+from mc_engine.model_sources import sources_beside, sources_of_module
 
 WIDTH = 8  # one register of eight doubles
 _FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
@@ -66,17 +68,12 @@ def kernel(
 
 
 def model_sources(model: Model, folder: Path | None) -> list[Path]:
-    """Source files that decide the model's numbers: its package, or the Python files beside it.
-
-    More than the model may import; an edit of a file it does not need costs a compilation, no wrong number.
-    """
+    """Files that decide the model's numbers, see `mc_engine.model_sources`; with them the data that a `.py` model reads
+    when it is imported, which its kernel may hold.  folder : of a `.py` model."""
     if model.reference.endswith(".py"):
-        return sorted(((folder or Path.cwd()) / model.reference).resolve().parent.glob("*.py"))
-    module = sys.modules[model.reference]
-    assert module.__file__ is not None  # a model's module always comes from a file
-    home = Path(module.__file__)
-    inside_package = home.name == "__init__.py" or "." in model.reference
-    return sorted(home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py"))
+        file = ((folder or Path.cwd()) / model.reference).resolve()
+        return [*sources_beside(file), *data_at_load(file)]
+    return sources_of_module(model.reference)
 
 
 def source_digest(model: Model, folder: Path | None) -> str:

@@ -118,6 +118,12 @@ def parse_manifest(content: bytes) -> dict[str, Any]:
     return dict(record)
 
 
+def cases_in(manifest: dict[str, Any], n_cases: int) -> range:
+    """The cases that a run of `n_cases` holds in its directory: all of them, or those of its shard."""
+    shard = manifest.get("shard")
+    return range(shard["first"], shard["stop"]) if shard else range(n_cases)
+
+
 def columns_in(manifest: dict[str, Any]) -> tuple[Column, ...]:
     """Columns of the case table by a manifest that `parse_manifest` let pass."""
     known = Column.__dataclass_fields__

@@ -13,8 +13,7 @@ import importlib
 import importlib.util
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from importlib.machinery import ModuleSpec, PathFinder
@@ -27,12 +26,15 @@ import numpy as np
 from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
+from mc_engine.files_beside import importable
+from mc_engine.files_read import USER, has_changed, note_load, watch
 from mc_engine.model_faults import place_in_model
+from mc_engine.model_sources import sources_beside
+from mc_engine.syntax_tree import parse
 from mc_engine.units import UNITS, unit_suffix
 
 Number = float | np.ndarray
 DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}  # of events, and their signs
-_USER = "mc_engine_user_"  # names of the modules that come from files
 
 
 @dataclass(frozen=True)
@@ -294,7 +296,7 @@ def _defines_model(spec: ModuleSpec) -> bool:
     if not spec.has_location or spec.origin is None or not spec.origin.endswith(".py"):
         return False
     try:
-        tree = ast.parse(Path(spec.origin).read_bytes())
+        tree = parse(Path(spec.origin).read_bytes())
     except (OSError, SyntaxError, ValueError):
         return True
     names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
@@ -312,11 +314,12 @@ def _model_path(reference: str, beside: Path | None) -> Path:
 def _module_from_file(path: Path) -> ModuleType:
     """Import a user's file under a name that depends on its text, so that an edited file is a new module.
 
-    The files beside it can be imported, and count as its text.
+    The files and packages beside it can be imported, and count as its text.
     """
-    texts = b"".join(file.read_bytes() for file in sorted(path.parent.glob("*.py")))
-    name = f"{_USER}{path.stem}_{sha256(texts + str(path).encode()).hexdigest()[:12]}"
-    if name in sys.modules:
+    texts = b"".join(file.read_bytes() for file in sources_beside(path))
+    mark = sha256(texts + str(path).encode()).hexdigest()[:12]
+    name = f"{USER}{path.stem}_{mark}"
+    if name in sys.modules and not has_changed(path):
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None  # a .py path always has a loader
@@ -324,27 +327,14 @@ def _module_from_file(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
-        with _importable(path.parent):
+        with importable(path.parent, mark):
+            watch(path.parent)
             spec.loader.exec_module(module)
+            note_load(path)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise ModelError(_fault(path.name, error)) from error
     return module
-
-
-@contextmanager
-def _importable(folder: Path) -> Iterator[None]:
-    """Let the files of `folder` be imported, and forget them again: another campaign's may have the same names."""
-    before = set(sys.modules)
-    sys.path.insert(0, str(folder))
-    try:
-        yield
-    finally:
-        sys.path.remove(str(folder))
-        for name in set(sys.modules) - before:
-            file = getattr(sys.modules[name], "__file__", None)
-            if file is not None and Path(file).parent == folder and not name.startswith(_USER):
-                del sys.modules[name]
 
 
 def _fault(reference: str, error: BaseException) -> str:

@@ -69,12 +69,14 @@ def nominal_inputs(campaign: Campaign) -> tuple[Any, Any]:
     """(p, o) of a few nominal cases as physics sees them: arrays, and the numbers that all share."""
     model = campaign.model
     try:
+        doing = "prepare"
         ready = prepare(model, campaign.nominal, FEW)
+        doing = "tables"
         settings = settings_of(model, ready.settings[0])
     except EngineError:
         raise
     except Exception as error:
-        raise Breach(fault_sentence("prepare", error)) from None
+        raise Breach(fault_sentence(doing, error)) from None
     if ready.refusals.mask[0]:
         raise Breach(f"the nominal case is refused: {ready.refusals.reason[0]}")
     for name, row in zip(model.kernel_parameters._fields, ready.parameters, strict=True):  # type: ignore[attr-defined]

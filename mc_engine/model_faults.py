@@ -21,6 +21,9 @@ _CAUSES = (
      "write where(condition, 1.0, 0.0)"),
     (r"function Function\(<built-in function i?pow>\)", "`**` takes a whole number that is written out; other powers "
      "are pow(x, y) of mc_engine.lanes"),
+    (r"function Function\(<built-in function i?mod>\)", "`%` takes no lanes; write x - y * floor(x / y)"),
+    (r"function Function\(<built-in function i?floordiv>\)", "`//` takes no lanes; write floor(x / y)"),
+    (r"function Function\(<built-in function invert>\)", "`~` takes no lanes; write `not mask`"),
     (r"function Function\(<(?:built-in function|ufunc|class) '?(\w+)'?>\)", f"`{{0}}` takes no lanes; {_LANES}"),
     (r"Untyped global name '(\w+)'.*<class 'function'>", "`{0}` is not marked; write @physics on the line above it"),
     (r"Untyped global name '(\w+)'|assigned to variable '(\w+)' in globals", "`{0}` is nothing that physics can read; "

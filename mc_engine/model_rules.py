@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
+from mc_engine.figures import KINDS
 from mc_engine.model import DIRECTIONS, AdaptiveStep, Event, Extremum, Field, FixedStep, Model, Parameter, Setting
 from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_hint, unit_suffix
 
+_CASE_COLUMNS = ("case_id", "status", "reason", "end_time_s")  # the engine's own, of cases and of histories
+_HISTORY_COLUMNS = ("case_id", "t_s")
 _ACTIONS = ("stop", "switch")
 _EXTREMA = ("max", "min", "last_above")
 _METHODS = {"FixedStep": ("rk4",), "AdaptiveStep": ("dop853", "dp54")}
@@ -24,6 +27,8 @@ def refuse_contradictions(model: Model) -> None:
     for one in (*inputs, *model.states, *model.quantities, *model.metrics):
         _refuse_name(one)
     outputs: tuple[Field, ...] = (*model.metrics, *(Field(f"end_{one.name}", "", "") for one in model.states))
+    _refuse_taken("column", [one.name for one in (*inputs, *model.metrics)], _CASE_COLUMNS)
+    _refuse_taken("quantity", [one.name for one in model.quantities], _HISTORY_COLUMNS)
     _refuse_twice("input", [one.symbol for one in inputs])
     _refuse_twice("column", [one.name for one in (*inputs, *outputs)])
     _refuse_twice("quantity", [one.name for one in model.quantities])
@@ -31,8 +36,13 @@ def refuse_contradictions(model: Model) -> None:
     _refuse_twice("event", [one.name for one in model.event_list])
     for parameter in model.parameters:
         _refuse_range(parameter)
+    for setting in model.settings:
+        _refuse_choice(setting)
     for extremum in model.extrema:
         _refuse_extremum(extremum, [one.name for one in model.quantities])
+    if model.control is not None and model.start is None:
+        raise ModelError("the model has `control`, but no function `start`; write start(p, o), which gives the first "
+                         "memory")  # fmt: skip
     if model.event_list and model.events is None:
         raise ModelError("event_list names events, but the model has no function `events`")
     for event in model.event_list:
@@ -45,6 +55,10 @@ def _refuse_other_records(model: Model) -> None:
     be."""
     kinds = {"parameters": Parameter, "settings": Setting, "states": Field, "quantities": Field, "metrics": Field,
              "event_list": Event, "extrema": Extremum}  # fmt: skip
+    for figure in model.figures if isinstance(model.figures, tuple) else (model.figures,):
+        if not isinstance(figure, tuple(KINDS.values())):
+            known = ", ".join(kind.__name__ for kind in KINDS.values())
+            raise ModelError(f"`figures` holds {figure!r}; it must be a tuple of figures of mc_engine.figures: {known}")
     for name, kind in kinds.items():
         items = getattr(model, name)
         if not isinstance(items, tuple) or not all(isinstance(one, kind) for one in items):
@@ -70,6 +84,23 @@ def _refuse_range(parameter: Parameter) -> None:
     for value in (parameter.default, parameter.low, parameter.high):
         if not isinstance(value, int | float | np.number) or isinstance(value, bool) or isnan(value):
             raise ModelError(f'parameter "{parameter.name}" has {value!r} where a number is wanted, without quotes')
+
+
+def _refuse_choice(setting: Setting) -> None:
+    """ModelError for a setting whose own value is none of its words."""
+    if not isinstance(setting.choices, tuple) or not all(isinstance(word, str) for word in setting.choices):
+        raise ModelError(f'setting "{setting.name}" has the choices {setting.choices!r}; they must be a tuple of '
+                         'words, ("one", "other")')  # fmt: skip
+    if setting.choices and str(setting.default) not in setting.choices:
+        raise ModelError(f'setting "{setting.name}" has the default {setting.default!r}'
+                         f"{hint(str(setting.default), setting.choices)}")  # fmt: skip
+
+
+def _refuse_taken(what: str, names: list[str], taken: tuple[str, ...]) -> None:
+    """ModelError for a name that the engine's own columns have."""
+    for name in names:
+        if name in taken:
+            raise ModelError(f'the {what} "{name}" has the name of a column that every table has; take another')
 
 
 def _refuse_word(what: str, name: str) -> None:

@@ -22,7 +22,7 @@ from typing import Any
 from mc_engine.durable_file import is_temporary, make_folder, naming, read_file, sync_folder, write_durably
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.extras import how_to_install
-from mc_engine.journal import Entry, Scan, scan
+from mc_engine.journal import Entry, Scan, read_journal, scan
 from mc_engine.parts import PART_FOLDERS, is_part_file
 from mc_engine.receipts import receipts_of
 from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, is_run_directory
@@ -52,7 +52,7 @@ def publish(run: Path, url: str) -> Publication:
     """
     if not is_run_directory(run):
         raise StoreError(f"{run}: is no run directory")
-    journal = _sound(scan(read_file(run / JOURNAL)), run / JOURNAL)
+    journal = _sound(scan(read_journal(run / JOURNAL)), run / JOURNAL)
     counted = _counted(journal.entries)
     contents = {**counted, JOURNAL: None, **dict.fromkeys(_others(run, counted))}
     with _reaching(url):

@@ -219,17 +219,52 @@ def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: d
     return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), status or {})
 
 
-def read_part(run: Path, part: Part, names: Sequence[str] | None = None) -> pa.Table:
-    """The table of a part, all columns or those in `names`; StoreError naming the file if a byte of it changed."""
+def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) -> pa.Table:
+    """The table of a part, all it has or these columns; StoreError naming the file if a byte of it changed.
+
+    The same where the bytes are those that were written, and the table is not what receipt and columns say.
+    """
     path = run / part.file
     content = read_inside(run, part.file, part.bytes + 1)
     problem = content_problem(content, part)
     if problem:
         raise StoreError(f"{path}: {problem}")
     try:
-        return pq.read_table(pa.BufferReader(content), columns=names, use_threads=False)
+        table = parquet_table(content, None if columns is None else [column.name for column in columns])
+    except ValueError as error:
+        raise StoreError(f"{path}: {error}") from None
+    problem = table_problem(table, part, columns)
+    if problem:
+        raise StoreError(f"{path}: {problem}; `mc-engine verify {run}` names all damage")
+    return table
+
+
+def parquet_table(content: bytes, names: Sequence[str] | None = None) -> pa.Table:
+    """The table in the bytes of a Parquet file, all columns or those of `names` that it has; ValueError if it is none.
+
+    `pyarrow.parquet.read_table` would leave a thread behind, which can abort a process that is about to end.
+    """
+    try:
+        file = pq.ParquetFile(pa.BufferReader(content), pre_buffer=False, page_checksum_verification=True)
+        return file.read(names, use_threads=False)
     except (pa.ArrowException, OSError, KeyError) as error:
-        raise StoreError(f"{path}: no readable Parquet file: {error}") from error
+        raise ValueError(f"no readable Parquet file: {next(iter(str(error).splitlines()), '')}") from error
+
+
+def table_problem(table: pa.Table, part: Part, columns: Sequence[Column] | None) -> str:
+    """What is wrong with a table by the receipt of its part, and by its columns where they are known; else empty."""
+    if table.num_rows != part.rows:
+        return f"{table.num_rows} rows where the journal says {part.rows}"
+    names, wanted = table.column_names, None if columns is None else arrow_schema(columns)
+    if wanted is not None and not table.schema.equals(wanted):
+        missing = [name for name in wanted.names if name not in names]
+        told = f', "{missing[0]}" is missing' if missing else ""
+        return f"its columns are not those of the manifest{told}"
+    if "case_id" not in names or cases_in_name(part.file) is None:
+        return ""
+    if names.count("case_id") > 1 or not np.array_equal(table["case_id"].to_numpy(), np.arange(part.first, part.stop)):
+        return f"its case_id does not count from {part.first} to {part.stop - 1}"
+    return ""
 
 
 def content_problem(content: bytes, part: Part) -> str:

@@ -7,6 +7,7 @@ follow is left to the trial and to the compiler.
 import ast
 import builtins
 import inspect
+import random
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
@@ -14,8 +15,11 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
+import numpy as np
+
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model import Model
+from mc_engine.syntax_tree import parse
 
 # The arguments that the engine hands to each function of a model.
 ARGUMENTS = {
@@ -34,8 +38,13 @@ INTERPRETED = ("prepare", "tables")  # NumPy, a whole chunk at a time
 _ENGINE = Path(__file__).resolve().parent
 _ALLOCATING = {"array", "arange", "empty", "zeros", "ones", "full", "linspace", "stack", "concatenate", "list", "dict"}
 _READ = (ast.Name, ast.Attribute, ast.Call, ast.List, ast.ListComp, ast.Dict, ast.DictComp, ast.Set, ast.SetComp,
-         ast.While, ast.Global, ast.Nonlocal)  # fmt: skip
-_BUILTINS = {"abs", "bool", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "tuple", "zip"}
+         ast.While, ast.Global, ast.Nonlocal, ast.Import, ast.ImportFrom, ast.Subscript, ast.Compare)  # fmt: skip
+_AT_DEFINITION = {"annotation", "returns", "defaults", "kw_defaults", "decorator_list"}  # run once, by Python alone
+_BUILTINS = {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range",
+             "round", "sum", "tuple", "zip"}  # fmt: skip
+_RECORD = {"_replace": "write State(...) with every field", "_asdict": "name the fields one by one",
+           "_make": "write State(...) with every field"}  # fmt: skip
+_MOST_TIMES = 1_000_000  # of a loop, in one step
 _FOREIGN = {"numpy", "numba", *sys.stdlib_module_names}
 _OWN = "a case must depend on its inputs and case_id alone"
 _KEEP = "what changes is kept in the state or in the memory"
@@ -44,7 +53,7 @@ _KEEP = "what changes is kept in the state or in the memory"
 def source_faults(model: Model) -> list[str]:
     """Sentences on functions without decorator or with other arguments, and on what physics cannot do."""
     found = list(_wrong_functions(model))
-    reader = _Reader()
+    reader = _Reader({one.symbol: one.choices for one in model.settings})
     for name, function in _functions(model):
         if name not in INTERPRETED and isinstance(function, PhysicsFunction):
             reader.read(function, name, ())
@@ -93,7 +102,7 @@ def _wrong_functions(model: Model) -> Iterator[str]:
 @lru_cache(maxsize=64)
 def _definitions(file: str, changed: float) -> Mapping[tuple[str, int], ast.AST]:
     """The functions of a file by name and first line, decorators included.  changed : when the file was written."""
-    tree = ast.parse(Path(file).read_bytes())
+    tree = parse(Path(file).read_bytes())
     nodes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in nodes}
 
@@ -108,27 +117,31 @@ def _definition(code: CodeType) -> ast.AST | None:
 
 
 class _Reader:
-    """Reads functions, each once, and gathers the faults."""
+    """Reads functions, each once, and gathers the faults.  settings : their choices by symbol."""
 
-    def __init__(self) -> None:
+    def __init__(self, settings: Mapping[str, tuple[str, ...]]) -> None:
         self.found: list[str] = []
-        self._read: set[CodeType] = set()
+        self._settings = settings
+        self._read: set[PhysicsFunction] = set()
         self._said: set[tuple[CodeType, str]] = set()
 
-    def read(self, physics: PhysicsFunction, name: str, callers: tuple[CodeType, ...]) -> None:
-        """Faults of a function and of the physics that it calls.  callers : the functions that it is called from."""
+    def read(self, physics: PhysicsFunction, name: str, callers: tuple[PhysicsFunction, ...]) -> None:
+        """Faults of a function and of the physics that it calls.  callers : the functions that it is called from.
+
+        Functions are told apart by themselves, not by their code, which all that one factory makes share.
+        """
         code = _code(physics)
         if code is None or _ENGINE in Path(code.co_filename).parents:
             return
-        if code in callers:
+        if physics in callers:
             self._add(code, code.co_firstlineno, f"`{name}` calls itself; physics has no recursion, unroll it")
             return
-        tree = None if code in self._read else _definition(code)
-        self._read.add(code)
+        tree = None if physics in self._read else _definition(code)
+        self._read.add(physics)
         if tree is None:
             return
-        nodes = list(ast.walk(tree))
-        scope = _Scope(inspect.unwrap(physics.function), nodes)
+        nodes = list(_running(tree))
+        scope = _Scope(inspect.unwrap(physics.function), nodes, self._settings)
         for node in nodes:
             if not isinstance(node, _READ):
                 continue
@@ -136,7 +149,7 @@ class _Reader:
                 self._add(code, getattr(node, "lineno", code.co_firstlineno), sentence)
             called = scope.value(node)
             if isinstance(called, PhysicsFunction):
-                self.read(called, called.function.__name__, (*callers, code))
+                self.read(called, called.function.__name__, (*callers, physics))
             elif isinstance(node, ast.Call) and _is_unmarked(scope.value(node.func)):
                 helper = scope.value(node.func)
                 sentence = f"`{helper.__name__}` is not marked, and `{name}` calls it; write @physics on the line above"
@@ -148,15 +161,32 @@ class _Reader:
             self.found.append(f"{Path(code.co_filename).name}, line {line}: {sentence}")
 
 
+def _running(node: ast.AST) -> Iterator[ast.AST]:
+    """The nodes under a function that are run when it is called, in the order of the text."""
+    for field, value in ast.iter_fields(node):
+        if field in _AT_DEFINITION:
+            continue
+        for child in value if isinstance(value, list) else [value]:
+            if isinstance(child, ast.AST):
+                yield child
+                yield from _running(child)
+
+
+# What the attributes of may be read: nothing of it runs code of the user's.
+_FOLLOWED = (ModuleType, np.random.Generator, np.random.RandomState, random.Random)
+
+
 class _Scope:
     """What the names of a function stand for, as far as they come from outside of it."""
 
-    def __init__(self, function: Any, nodes: list[ast.AST]):
+    def __init__(self, function: Any, nodes: list[ast.AST], settings: Mapping[str, tuple[str, ...]]):
+        self.settings = settings
         cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
         self._closed = {name: cell.cell_contents for name, cell in cells}
         self._outside = function.__globals__
         own = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
         own |= {node.arg for node in nodes if isinstance(node, ast.arg)}
+        own |= {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
         self._own = own - {name for node in nodes if isinstance(node, ast.Global) for name in node.names}
 
     def value(self, node: ast.AST) -> Any:
@@ -169,15 +199,19 @@ class _Scope:
             return self._outside.get(node.id, getattr(builtins, node.id, None))
         if isinstance(node, ast.Attribute):
             owner = self.value(node.value)
-            return getattr(owner, node.attr, None) if isinstance(owner, ModuleType) else None
+            return getattr(owner, node.attr, None) if isinstance(owner, _FOLLOWED) else None
         return None
+
+    def is_constant(self, node: ast.AST) -> bool:
+        """Whether an expression is the same in every case and step: it names nothing but what is outside."""
+        return all(self.value(one) is not None for one in ast.walk(node) if isinstance(one, ast.Name))
 
 
 def _faults(node: ast.AST, name: str, scope: _Scope) -> Iterator[str]:
     """Sentences on one node of the function `name`."""
     if isinstance(node, ast.List | ast.ListComp | ast.Dict | ast.DictComp | ast.Set | ast.SetComp):
         yield f"a list, dictionary or set is made in every step of `{name}`; keep numbers in named tuples instead"
-    elif isinstance(node, ast.While):
+    elif isinstance(node, ast.While) and not _counts(node, scope):
         yield f"`while` in `{name}` may never end for some case; write for k in range(most) and where(condition, a, b)"
     elif isinstance(node, ast.Global | ast.Nonlocal):
         yield f"`{ast.unparse(node)}` in `{name}`: {_OWN}; {_KEEP}"
@@ -185,13 +219,107 @@ def _faults(node: ast.AST, name: str, scope: _Scope) -> Iterator[str]:
         kind = type(scope.value(node)).__name__
         yield f"`{node.id}` in `{name}` is a {kind} outside of it; physics reads numbers and tuples, {_KEEP}"
     elif isinstance(node, ast.Call):
-        yield from _wrong_call(ast.unparse(node.func), scope.value(node.func), name)
+        if _times(node, scope) > _MOST_TIMES:  # minutes of a step, or more
+            yield f"`{ast.unparse(node)}` in `{name}` goes round more than {_MOST_TIMES:,} times a step; shorten it"
+        constant = all(scope.is_constant(one) for one in [*node.args, *(one.value for one in node.keywords)])
+        yield from _wrong_call(ast.unparse(node.func), scope.value(node.func), name, constant)
+    elif isinstance(node, ast.Import | ast.ImportFrom):
+        yield f"`{ast.unparse(node)}` in `{name}`; move the import to the top of the file"
+    elif isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load):
+        if not isinstance(scope.value(node.value), list | dict | set):  # which is a mistake of its own
+            yield f"`{ast.unparse(node)}` is written in `{name}`, where arrays and tuples are only read; {_KEEP}"
+    elif isinstance(node, ast.Compare):
+        yield from _compared_with_a_text(node, name, scope)
 
 
-def _wrong_call(text: str, called: Any, name: str) -> Iterator[str]:
+def _times(node: ast.Call, scope: _Scope) -> int:
+    """How often a loop over range(...) goes round, 0 where that is not known."""
+    if scope.value(node.func) is not range or node.keywords:
+        return 0
+    bounds = [_whole(one, scope) for one in node.args]
+    known = [one for one in bounds if one is not None]
+    if len(known) < len(bounds) or not 1 <= len(known) <= 3 or known[2:] == [0]:
+        return 0
+    ends = range(*known)
+    return max(0, (ends.stop - ends.start) // ends.step)
+
+
+def _whole(node: ast.AST, scope: _Scope) -> int | None:
+    """The whole number that is written, or named, or a power or product of such; None for anything else."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow | ast.Mult):
+        left, right = _whole(node.left, scope), _whole(node.right, scope)
+        if left is None or right is None:
+            return None
+        if isinstance(node.op, ast.Mult):
+            return left * right
+        return left**right if 0 <= right <= 64 and abs(left) <= _MOST_TIMES else None
+    value = node.value if isinstance(node, ast.Constant) else scope.value(node)
+    return value if isinstance(value, int) else None
+
+
+def _counts(loop: ast.While, scope: _Scope) -> bool:
+    """Whether a loop goes on until a counter, which it only steps, passes a bound that it leaves alone."""
+    test = loop.test
+    if not (isinstance(test, ast.Compare) and len(test.ops) == 1 and isinstance(test.left, ast.Name)):
+        return False
+    step = ast.Add if isinstance(test.ops[0], ast.Lt | ast.LtE) else ast.Sub
+    if not isinstance(test.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
+        return False
+    end = test.comparators[0]
+    most = end.value if isinstance(end, ast.Constant) else _whole(end, scope)
+    if isinstance(most, int | float) and abs(most) > _MOST_TIMES:
+        return False
+    nodes = [node for line in loop.body for node in ast.walk(line)]
+    written = [node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
+    bound = {node.id for node in ast.walk(end) if isinstance(node, ast.Name)}
+    steps = [
+        line
+        for line in loop.body
+        if isinstance(line, ast.AugAssign)
+        and isinstance(line.target, ast.Name)
+        and line.target.id == test.left.id
+        and isinstance(line.op, step)
+        and isinstance(line.value, ast.Constant)
+        and isinstance(line.value.value, int | float)
+        and line.value.value > 0
+    ]
+    skipped = any(isinstance(node, ast.Continue) for node in nodes)
+    return bool(steps) and written.count(test.left.id) == 1 and not bound & set(written) and not skipped
+
+
+def _compared_with_a_text(node: ast.Compare, name: str, scope: _Scope) -> Iterator[str]:
+    """One sentence if a setting is compared with a word, for which kernels have a number."""
+    for one, other in zip([node.left, *node.comparators], [*node.comparators, node.left], strict=True):
+        for setting, word in ((one, other), (other, one)):
+            texts = [_text(part, scope) for part in getattr(word, "elts", [word])]
+            if not isinstance(setting, ast.Attribute) or setting.attr not in scope.settings or None in texts:
+                continue
+            if texts and scope.value(_root(setting)) is None:
+                choices, text = scope.settings[setting.attr], texts[0]
+                place = f"; {text!r} is {choices.index(text)}.0, its place in `choices`" if text in choices else ""
+                yield f"`{ast.unparse(node)}` in `{name}` compares with a text; in physics a setting is a number{place}"
+                return
+
+
+def _text(node: ast.AST, scope: _Scope) -> str | None:
+    value = node.value if isinstance(node, ast.Constant) else scope.value(node)
+    return value if isinstance(value, str) else None
+
+
+def _root(node: ast.expr) -> ast.expr:
+    """What an attribute, or an attribute of one, is of."""
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return node
+
+
+def _wrong_call(text: str, called: Any, name: str, constant: bool) -> Iterator[str]:
+    """constant : whether all that it is called with is the same in every case."""
     last, home = text.split(".")[-1], _home(called)
     if last in _ALLOCATING and (called is None or home[0] in ("numpy", "builtins")):
         yield f"`{text}` makes an array or list in every step of `{name}`; keep numbers in named tuples instead"
+    elif last in _RECORD and "." in text:
+        yield f"`{text}` in `{name}`: compiled physics makes a named tuple anew; {_RECORD[last]}"
     elif called is None or isinstance(called, PhysicsFunction) or hasattr(called, "_fields"):
         return
     elif called is print:
@@ -202,7 +330,7 @@ def _wrong_call(text: str, called: Any, name: str) -> Iterator[str]:
         home[0] in sys.stdlib_module_names and home[0] not in ("builtins", "math")
     ):
         yield f"`{text}` in `{name}`: {_OWN}; noise comes from the `draws` of `control`"
-    elif home[0] == "numpy" and not isinstance(called, type):
+    elif home[0] == "numpy" and not isinstance(called, type) and not constant:
         yield f"`{text}` in `{name}` is for arrays; physics uses the functions of mc_engine.lanes"
 
 

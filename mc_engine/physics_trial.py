@@ -9,6 +9,7 @@ import dis
 import re
 from collections import namedtuple
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -27,11 +28,16 @@ FEW = 3  # cases on arrays
 # what the fields of each function's result are declared by
 _FIELDS = {"initial": "states", "rhs": "states", "observe": "quantities", "events": "event_list", "evaluate": "metrics"}
 _MANY = 128  # values of everything that `evaluate` is handed
+_DECADES = (-9.0, 15.0)  # powers of ten that they reach over: from nanometres to light years, in SI
 _passed: set[Model] = set()
 
 
 class Breach(ModelError):
     """One breach of the contract; its text is the sentence."""
+
+
+class _ByZero(Exception):
+    """A function divided a plain number by zero, where kernels go on with an infinity: it is left unjudged."""
 
 
 def refuse_unfit(model: Model, parameters: np.ndarray, settings: Any) -> None:
@@ -59,6 +65,12 @@ def run_through(model: Model, p: Any, o: Any, seed: int = 0, *, finite: bool = F
 
     p : named tuple of arrays [FEW].  o : the settings.  finite : the start and its derivative must be finite, too.
     """
+    _refuse_other_tables(model, o)
+    with suppress(_ByZero):
+        _run_through(model, p, o, seed, finite)
+
+
+def _run_through(model: Model, p: Any, o: Any, seed: int, finite: bool) -> None:
     # as in kernels: dividing by zero gives an infinity
     o = type(o)(*(value if name == TABLES else np.float64(value) for name, value in zip(o._fields, o, strict=True)))
     t = np.zeros(FEW)
@@ -70,43 +82,49 @@ def run_through(model: Model, p: Any, o: Any, seed: int = 0, *, finite: bool = F
         m = sampled
     if finite:
         _refuse_infinite("initial", s, "the state")
-    derivative = _call(model, "rhs", t, s, m, p, o)
-    _same_record(model.rhs, "rhs", derivative, "initial", s, "named tuple")
-    if finite:
-        _refuse_infinite("rhs", derivative, "the derivative", model.rhs)
+    with suppress(_ByZero):
+        derivative = _call(model, "rhs", t, s, m, p, o)
+        _same_record(model.rhs, "rhs", derivative, "initial", s, "named tuple")
+        if finite:
+            _refuse_infinite("rhs", derivative, "the derivative", model.rhs)
+    with suppress(_ByZero):
+        _try_events(model, t, s, m, p, o)
     seen = _call(model, "observe", t, s, m, p, o)
-    if model.events is not None:
-        values = _call(model, "events", t, s, m, p, o)
-        if model.switch is not None:
-            _try_switch(model, s, m, (t, s, m, p, o, type(values)(*(np.zeros(FEW) for _ in values))))
+    best = _looks(model, seen)
+    _call(model, "evaluate", t, s, m, p, o, best, type(best)(*(np.zeros(FEW) for _ in best)))
+
+
+def _looks(model: Model, seen: Any) -> Any:
+    """What `evaluate` is handed as `best` where the quantities stay what they are.  seen : result of `observe`."""
     best = namedtuple("Best", [one.name for one in model.extrema] or ["unused"])  # type: ignore[misc]
     names = [quantity.name for quantity in model.quantities]
-    looks = [seen[names.index(one.quantity)] for one in model.extrema] or [t]
-    _call(model, "evaluate", t, s, m, p, o, best(*looks), best(*[0.0 * look for look in looks]))
+    return best(*[seen[names.index(one.quantity)] for one in model.extrema] or [np.zeros(FEW)])
 
 
 def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
     """Metrics, by name, in SI, that `evaluate` gives the same value whatever it is handed.
 
     p, o : as in `run_through`, which the model has passed.  Everything that a flight or an input could change is given
-    many values of either sign, over some orders of magnitude; a function that breaks on them is not judged.
+    many values of either sign, near those of the start and over all the orders of magnitude of SI; a function that
+    breaks on them is not judged.
     """
     spread = np.random.default_rng(0)
 
     def many(value: Any) -> Any:
         if hasattr(value, "_fields"):
             return type(value)(*(many(one) for one in value))
-        scale = np.exp(spread.normal(0.0, 3.0, (2, _MANY))) * spread.choice([-1.0, 1.0], (2, _MANY))
-        return scale[0] * np.ravel(value)[0] + scale[1] * spread.integers(0, 2, _MANY)
+        signs = spread.choice([-1.0, 1.0], (2, _MANY))
+        near = signs[0] * np.exp(spread.normal(0.0, 3.0, _MANY))
+        anywhere = signs[1] * 10.0 ** spread.uniform(*_DECADES, _MANY)
+        return near * np.ravel(value)[0] + anywhere * spread.integers(0, 2, _MANY)
 
-    s, m = model.initial(p, o), NoMemory(0.0) if model.start is None else model.start(p, o)
-    best = namedtuple("Best", [one.name for one in model.extrema] or ["unused"])  # type: ignore[misc]
-    looks = best(*(1.0 for _ in best._fields))
     values = []
     for more in (0.0, 1.0, 2.0):
         own = type(o)(*(value if name == TABLES else value + more for name, value in zip(o._fields, o, strict=True)))
         try:
             with np.errstate(all="ignore"):
+                s, m = model.initial(p, o), NoMemory(0.0) if model.start is None else model.start(p, o)
+                looks = _looks(model, model.observe(np.zeros(FEW), s, m, p, o))
                 given = model.evaluate(many(1.0), many(s), many(m), many(p), own, many(looks), many(looks))
                 values.append([np.broadcast_to(np.asarray(one, dtype=np.float64), _MANY) for one in given])
         except Exception:
@@ -115,8 +133,13 @@ def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
     return {one.name: row[0] for one, row in zip(model.metrics, rows, strict=True) if (row == row[0]).all()}
 
 
-def _try_switch(model: Model, s: Any, m: Any, arguments: tuple[Any, ...]) -> None:
-    assert model.switch is not None
+def _try_events(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any) -> None:
+    if model.events is None:
+        return
+    values = _call(model, "events", t, s, m, p, o)
+    if model.switch is None:
+        return
+    arguments = (t, s, m, p, o, type(values)(*(np.zeros(FEW) for _ in values)))
     result = _run(model.switch, "switch", arguments)
     if not isinstance(result, tuple) or len(result) != 2 or hasattr(result, "_fields"):
         raise Breach(
@@ -162,6 +185,8 @@ def _run(function: Callable[..., Any], name: str, arguments: tuple[Any, ...]) ->
             if not _negates(error):
                 raise
             return function(*(_first(one) for one in arguments))
+    except ZeroDivisionError as error:
+        raise _ByZero from error
     except Exception as error:
         raise Breach(fault_sentence(name, error)) from None
 
@@ -220,6 +245,19 @@ def _refuse_other_than_numbers(function: Callable[..., Any], name: str, result: 
         if array.dtype.kind not in "iuf" or array.shape not in ((), (FEW,)):
             what = f"{value!r}" if array.ndim == 0 and len(repr(value)) < 40 else type(value).__name__
             raise Breach(f'{place_of(function)}: `{name}` gives {what} for "{field}"; it must be one number')
+
+
+def _refuse_other_tables(model: Model, o: Any) -> None:
+    """Breach unless the tables are numbers in one row.  o : the settings, with the tables as an array."""
+    if model.tables is None:
+        return
+    if o.tables.ndim != 1 or o.tables.size == 0:
+        what = f"an array of shape {o.tables.shape}"
+    elif o.tables.size == 1 and np.isnan(o.tables[0]):  # what NumPy makes of None
+        what = "no number"
+    else:
+        return
+    raise Breach(f"{place_of(model.tables)}: `tables` gives {what}; it must give float64[n], numbers in one row")
 
 
 def _refuse_infinite(name: str, result: Any, what: str, function: Callable[..., Any] | None = None) -> None:

@@ -14,13 +14,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from mc_engine.durable_file import make_folder, read_file, write_durably
 from mc_engine.errors import StoreError
 from mc_engine.journal import plain
-from mc_engine.parts import Column, arrow_table, attributes, parquet_bytes
+from mc_engine.parts import Column, arrow_table, attributes, parquet_bytes, parquet_table
 
 RECORD, TEXT, CASES = "rare.json", "rare.toml", "cases.parquet"
 FORMAT = 1  # of the directory; the record's "format"
@@ -82,6 +80,6 @@ def open_rare_event(path: str | Path) -> RareEventRecord:
     for name, digest in record["files"].items():
         if sha256(content[name]).hexdigest() != digest:
             raise StoreError(f"{path / name}: damaged, its SHA-256 is not the one in {RECORD}")
-    cases = pq.read_table(pa.BufferReader(content[CASES]), use_threads=False).to_pandas()
+    cases = parquet_table(content[CASES]).to_pandas(use_threads=False)
     cases.attrs.update(attributes([Column(**column) for column in record["columns"]]))
     return RareEventRecord(path, record, cases)

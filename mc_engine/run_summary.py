@@ -94,8 +94,9 @@ def _metric_parts(store: Store, names: Sequence[str]) -> "Iterator[dict[str, np.
 
     from mc_engine.parts import read_part
 
+    columns = [column for column in store.columns if column.name in ("status", *names)]
     for part in store.parts:
-        table = read_part(store.path, part, ["status", *names])
+        table = read_part(store.path, part, columns)
         ok = table["status"].to_numpy() == STATUS_NAME[OK]
         yield {name: np.where(ok, table[name].to_numpy().astype(np.float64, copy=False), np.nan) for name in names}
 

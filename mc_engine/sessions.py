@@ -17,13 +17,13 @@ from mc_engine.dispatch import Dispatch
 from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
 from mc_engine.interruption import stop_signal
 from mc_engine.part_bounds import Stretch, part_bounds, stretches
+from mc_engine.part_contents import nominal_problems
 from mc_engine.parts import Written
 from mc_engine.progress import ProgressCall
 from mc_engine.repair import withdraw_damaged
 from mc_engine.retained_histories import write_histories
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store import Store
-from mc_engine.verification import part_damage
 
 Settle = Callable[[Order, Written], None]
 
@@ -163,7 +163,7 @@ def _keep_histories(
 def _keep_nominal(store: Store, campaign: Campaign, flying: bool) -> None:
     """Fly the nominal case where it is not there as it was written; and before others fly, to compile the kernel."""
     part = store.nominal_part
-    sound = part is not None and not part_damage(store.path, part)
+    sound = part is not None and not nominal_problems(store.path, part, store.manifest)
     if flying or not sound:
         row = fly_nominal(campaign)
         if not sound:

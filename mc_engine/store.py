@@ -22,12 +22,12 @@ import pyarrow as pa
 
 from mc_engine import parts
 from mc_engine.companions import companion_problems
-from mc_engine.durable_file import is_temporary, make_folder, naming, publish, read_file, write_durably
+from mc_engine.durable_file import is_temporary, make_folder, naming, publish, read_short, remove_file, write_durably
 from mc_engine.errors import StoreError
 from mc_engine.finished_parts import count_finished, leave_receipt
-from mc_engine.history_tables import history_columns, history_table
+from mc_engine.history_tables import history_columns, history_table, read_histories
 from mc_engine.journal import Entry, Journal, damaged_line, encode, plain, utc_now
-from mc_engine.manifest_file import columns_in, parse_manifest
+from mc_engine.manifest_file import cases_in, columns_in, parse_manifest
 from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
 from mc_engine.receipts import Range, Receipts, receipts_of
 from mc_engine.writer_lock import LOCK_NAME, WriterLock
@@ -35,6 +35,7 @@ from mc_engine.writer_lock import LOCK_NAME, WriterLock
 __all__ = ["Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
 
 CAMPAIGN, MANIFEST, JOURNAL, NOMINAL = "campaign.toml", "manifest.json", "journal.jsonl", "nominal.parquet"
+NO_FOLDER = "the folder is gone"
 _EDITED = "damaged or edited, it is not the one this run began with; put the original back"
 _OURS_BEFORE_THE_JOURNAL = {LOCK_NAME, CAMPAIGN, MANIFEST, *PART_FOLDERS}
 
@@ -121,7 +122,7 @@ class Store:
         self._lock = WriterLock(path)
         self._counted = Receipts()
         self._read_journal()
-        content = read_file(path / MANIFEST)
+        content = read_short(path / MANIFEST)
         if sha256(content).hexdigest() != self._created["manifest"]:
             raise StoreError(f"{path / MANIFEST}: {_EDITED}")
         try:
@@ -161,7 +162,7 @@ class Store:
     @property
     def campaign_text(self) -> str:
         """The campaign file as it was flown; StoreError if someone changed it since."""
-        content = read_file(self.path / CAMPAIGN)
+        content = read_short(self.path / CAMPAIGN)
         if sha256(content).hexdigest() != self._created["campaign"]:
             raise StoreError(f"{self.path / CAMPAIGN}: {_EDITED}")
         try:
@@ -203,8 +204,7 @@ class Store:
     @property
     def wanted(self) -> range:
         """The cases that this directory is to hold: all of the campaign's, or those of a shard."""
-        shard = self.manifest.get("shard")
-        return range(shard["first"], shard["stop"]) if shard else range(self.n_cases)
+        return cases_in(self.manifest, self.n_cases)
 
     def committed(self) -> list[Range]:
         """The cases on the disk, as merged ranges in order."""
@@ -224,8 +224,9 @@ class Store:
         return counts
 
     def lost_files(self) -> list[str]:
-        """Parts that the journal counts and whose file is gone; `verify` looks for all other damage too."""
-        return [part.file for part in self.parts if not (self.path / part.file).exists()]
+        """Folders, and parts that the journal counts, that are gone; `verify` looks for all other damage too."""
+        files = [*PART_FOLDERS, *(part.file for part in self._counted.all_parts())]
+        return [file for file in files if not (self.path / file).exists()]
 
     @property
     def units(self) -> dict[str, str]:
@@ -240,8 +241,7 @@ class Store:
         `attrs["units"]`, `["descriptions"]` and `["roles"]` hold what the columns are.
         """
         wanted = self.columns if columns is None else tuple(self._column(name) for name in columns)
-        names = [column.name for column in wanted]
-        tables = [parts.read_part(self.path, part, names) for part in self.parts]
+        tables = [parts.read_part(self.path, part, wanted) for part in self.parts]
         return _frame(tables, wanted)
 
     def _column(self, name: str) -> Column:
@@ -253,18 +253,18 @@ class Store:
         """One case by column name; StoreError if it is not there."""
         for part in self.parts:
             if part.first <= case_id < part.stop:
-                return parts.read_part(self.path, part).slice(case_id - part.first, 1).to_pylist()[0]
+                return parts.read_part(self.path, part, self.columns).slice(case_id - part.first, 1).to_pylist()[0]
         raise StoreError(f"{self.path}: case {case_id} is not there")
 
     def nominal(self) -> dict[str, Any]:
         """The nominal case by column name (case_id is -1); empty if none was written."""
         receipt = self.nominal_part
-        return parts.read_part(self.path, receipt).to_pylist()[0] if receipt else {}
+        return parts.read_part(self.path, receipt, self.columns).to_pylist()[0] if receipt else {}
 
     def histories(self) -> pd.DataFrame:
         """The retained histories: case_id, t_s and the quantities; no rows if none were written."""
         quantities, receipt = self.manifest.get("quantities", []), self.history_part
-        tables = [parts.read_part(self.path, receipt)] if receipt else []
+        tables = [read_histories(self.path, receipt, quantities)] if receipt else []
         names = tables[0].column_names if tables else [quantity["name"] for quantity in quantities]
         return _frame(tables, history_columns(names, quantities))
 
@@ -303,11 +303,12 @@ class Store:
             self._read_journal()  # what an append that failed left there decides what counts
         counted = {part.file for part in self._counted.all_parts()}
         for folder in (self.path, *(self.path / name for name in PART_FOLDERS)):
+            if not folder.exists():
+                raise StoreError(f"{folder}: {NO_FOLDER}; `mc-engine resume {self.path} --repair` makes it anew")
             with naming(folder):
                 stray = [path for path in folder.iterdir() if self._is_stray(path, counted)]
             for path in stray:
-                with naming(path):
-                    path.unlink(missing_ok=True)
+                remove_file(path)
 
     def _is_stray(self, path: Path, counted: set[str]) -> bool:
         file = path.relative_to(self.path).as_posix()
@@ -392,6 +393,6 @@ class Store:
 
 def _frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> pd.DataFrame:
     table = pa.concat_tables(tables) if tables else parts.arrow_schema(columns).empty_table()
-    frame = table.to_pandas()
+    frame = table.to_pandas(use_threads=False)
     frame.attrs.update(parts.attributes(columns))
     return frame

@@ -16,13 +16,11 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from mc_engine.durable_file import make_folder, read_file, write_durably
 from mc_engine.errors import StoreError
 from mc_engine.journal import plain
-from mc_engine.parts import Column, arrow_table, attributes, parquet_bytes
+from mc_engine.parts import Column, arrow_table, attributes, parquet_bytes, parquet_table
 
 MANIFEST, TEXT = "tuning.json", "tuning.toml"
 TABLES = ("evaluations", "generations", "front")
@@ -117,7 +115,7 @@ def _whole(file: Path, digest: str) -> bytes:
 
 def _table(path: Path, name: str, record: Mapping[str, Any]) -> pd.DataFrame:
     content = _whole(path / record["file"], record["sha256"])
-    frame = pq.read_table(pa.BufferReader(content), use_threads=False).to_pandas()
+    frame = parquet_table(content).to_pandas(use_threads=False)
     frame.attrs.update(attributes([Column(**column) for column in record["columns"]]))
     return frame
 

@@ -14,8 +14,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from mc_engine.campaign_file import InputsSection
 from mc_engine.campaign_problems import Findings
@@ -24,7 +22,7 @@ from mc_engine.distributions import Scalar
 from mc_engine.errors import StoreError
 from mc_engine.input_values import inputs_of
 from mc_engine.model import Model
-from mc_engine.parts import CASE_COLUMNS, Column, arrow_table, parquet_bytes
+from mc_engine.parts import CASE_COLUMNS, Column, arrow_table, parquet_bytes, parquet_table
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store import is_run_directory, open_store
 from mc_engine.suggestions import hint
@@ -118,9 +116,9 @@ def _rows_of_run(path: Path) -> Rows:
 
 def _rows_of_copy(path: Path) -> Rows:
     try:
-        table = pq.read_table(pa.BufferReader(path.read_bytes()), use_threads=False)
+        table = parquet_table(path.read_bytes())
         facts = json.loads(table.schema.metadata[_FACTS])
-    except (pa.ArrowException, OSError, KeyError, TypeError, ValueError) as error:
+    except (OSError, KeyError, TypeError, ValueError) as error:
         raise StoreError(f"{path}: no copy of an upstream run: {error}") from error
     columns = tuple(Column(**record) for record in facts.pop("columns"))
     nominal = facts.pop("nominal")

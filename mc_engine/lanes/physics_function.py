@@ -17,8 +17,8 @@ class PhysicsFunction:
         self.function = function
         functools.update_wrapper(self, function)
 
-    def __call__(self, *args: Any) -> Any:
-        return self.function(*args)
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        return self.function(*args, **named)
 
     @functools.cached_property
     def compiled(self) -> Any:

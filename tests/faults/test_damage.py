@@ -5,9 +5,14 @@ import shutil
 import numpy as np
 import pytest
 from stones import results, stones
+from typer.testing import CliRunner
 
 from mc_engine import open_store, runner
+from mc_engine.cli import app
 from mc_engine.errors import StoreError
+from mc_engine.journal import encode, scan
+from mc_engine.repair import mend_journal
+from mc_engine.shards import Shard
 from mc_engine.verification import damage
 
 CASES, CHUNK = 200, 40
@@ -161,3 +166,164 @@ def test_what_cannot_be_flown_again_is_refused_by_name(run):
     with pytest.raises(StoreError, match=r"journal\.jsonl, line 1: damaged"):
         runner.resume(run, repair=True)
     assert journal.read_bytes().startswith(b"?\n")
+
+
+# ---- extensions, of which a line of the journal alone tells
+
+
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory):
+    """A run that was extended twice: 200, 290 and 350 cases."""
+    folder = tmp_path_factory.mktemp("grown")
+    runner.run(stones(folder / "campaign", CASES), folder / "whole", workers=2, chunk=CHUNK)
+    runner.extend(folder / "whole", 290, workers=2, chunk=35)
+    return runner.extend(folder / "whole", 350, workers=2, chunk=30)
+
+
+def all_bytes(run):
+    return {name: path.read_bytes() for name, path in files_of(run).items() if name.startswith(RECOMPUTED)}
+
+
+def spoilt(run, spoil, *events):
+    """Spoil all lines of these events; their numbers."""
+    journal = run / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    hit = [number for number, entry in enumerate(scan(b"".join(lines)).entries) if entry.event in events]
+    journal.write_bytes(b"".join(spoil(line) if number in hit else line for number, line in enumerate(lines)))
+    return [number + 1 for number in hit]
+
+
+def flipped(line):
+    return line[:30] + bytes([line[30] ^ 1]) + line[31:]
+
+
+@pytest.mark.parametrize("which", [0, 1, slice(None)], ids=["first", "second", "both"])
+@pytest.mark.parametrize("spoil", [flipped, lambda line: b"?\n"], ids=["one-bit", "whole-line"])
+def test_a_lost_extension_costs_no_case(grown, tmp_path, which, spoil):
+    run = tmp_path / "run"
+    shutil.copytree(grown.path, run)
+    before = all_bytes(run)
+    stamps = {name: (run / name).stat().st_mtime_ns for name in before}
+    extensions = [entry.number for entry in grown.notes("extended")]
+    numbers = np.atleast_1d(extensions[which]).tolist()
+    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    content = [spoil(line) if number in numbers else line for number, line in enumerate(lines, start=1)]
+    (run / "journal.jsonl").write_bytes(b"".join(content))
+    assert damage(run) == [f"journal.jsonl, line {number}: damaged" for number in numbers]
+    store = runner.resume(run, workers=2, repair=True)
+    assert [entry.facts["cases"] for entry in store.notes("extended")] == [290, 350]
+    assert store.verify() == []
+    assert all_bytes(run) == before
+    assert {name: (run / name).stat().st_mtime_ns for name in before} == stamps
+
+
+@pytest.mark.parametrize("flown_parts", [0, 1])
+def test_an_extension_that_was_broken_off_is_repaired_to_as_many_cases_as_it_was_to_have(grown, tmp_path, flown_parts):
+    """The session behind the lost line had 60 cases to fly, and was killed before or after the first 30."""
+    run = tmp_path / "run"
+    shutil.copytree(grown.path, run)
+    entries = list(scan((run / "journal.jsonl").read_bytes()).entries)
+    second = grown.notes("extended")[1].number
+    kept = [encode(entry.number, entry.at, entry.event, entry.facts) for entry in entries[: second + 1 + flown_parts]]
+    assert [entry.event for entry in entries[second : len(kept)]] == ["started", "part"][: 1 + flown_parts]
+    kept[second - 1] = flipped(kept[second - 1])
+    (run / "journal.jsonl").write_bytes(b"".join(kept))
+    store = runner.resume(run, workers=2, repair=True)
+    assert store.n_cases == 350
+    assert store.verify() == []
+    assert results(run) == results(grown.path)
+
+
+def test_a_lost_extension_and_a_lost_part_before_it_cost_the_part_alone(grown, tmp_path):
+    run = tmp_path / "run"
+    shutil.copytree(grown.path, run)
+    before = all_bytes(run)
+    extended, part = grown.notes("extended")[1].number, grown.notes("part")[1].number
+    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    content = [flipped(line) if number in (extended, part) else line for number, line in enumerate(lines, start=1)]
+    (run / "journal.jsonl").write_bytes(b"".join(content))
+    assert runner.resume(run, workers=2, repair=True).n_cases == 350
+    assert all_bytes(run) == before
+
+
+def test_no_flipped_bit_in_the_line_of_an_extension_takes_a_case_away(grown, tmp_path):
+    """Nor one in its newline, which joins it to the next line, nor one that makes a newline in it."""
+    run = tmp_path / "run"
+    shutil.copytree(grown.path, run)
+    journal, number = run / "journal.jsonl", grown.notes("extended")[1].number
+    whole = journal.read_bytes()
+    begin = sum(len(line) + 1 for line in whole.split(b"\n")[: number - 1])
+    length = len(whole.split(b"\n")[number - 1])
+    cut = begin + length // 2
+    flips = [(place, 1 << place % 8) for place in range(begin, begin + length)]
+    flips += [(begin - 1, 4), *((begin + length, 1 << bit) for bit in range(8))]  # of the newlines
+    contents = [whole[:place] + bytes([whole[place] ^ bit]) + whole[place + 1 :] for place, bit in flips]
+    for content in [*contents, whole[:cut] + b"\n" + whole[cut + 1 :]]:
+        journal.write_bytes(content)
+        assert [problem for problem in damage(run) if problem.startswith("journal.jsonl, line")]
+        mend_journal(run)
+        store = open_store(run)
+        assert store.n_cases == 350
+        assert store.parts == grown.parts
+        journal.write_bytes(whole)
+
+
+def test_a_lost_withdrawal_is_no_extension(run, flown):
+    (run / open_store(run).parts[4].file).unlink()
+    runner.resume(run, workers=2, repair=True)
+    assert spoilt(run, flipped, "part-withdrawn")
+    repaired(run, flown)
+    assert open_store(run).n_cases == CASES
+
+
+def test_cases_that_no_line_asked_for_are_withdrawn(grown, run, flown):
+    """A part beyond the last case, with a good line, in a journal that has lost none."""
+    part = grown.parts[5]
+    shutil.copy(grown.path / part.file, run / part.file)
+    facts, content = vars(part), (run / "journal.jsonl").read_bytes()
+    number = len(scan(content).entries) + 1
+    (run / "journal.jsonl").write_bytes(content + encode(number, "2026-01-01T00:00:00.000Z", "part", facts))
+    assert f"{part.file}: has cases that are not of the run, which has 0 to {CASES - 1}" in damage(run)
+    runner.resume(run, workers=2, repair=True)
+    assert results(run) == results(flown.path)
+
+
+# ---- shards, and folders
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_cases_of_another_shard_are_named_and_withdrawn(tmp_path, number):
+    campaign = stones(tmp_path / "campaign", CASES)
+    shards = [runner.run(campaign, tmp_path / f"s{n}", workers=1, chunk=CHUNK, shard=Shard(n, 2)) for n in (1, 2)]
+    mine, other = shards[number - 1], shards[2 - number]
+    run, part = mine.path, other.parts[0]
+    before = {part.file for part in mine.parts}
+    shutil.copy(other.path / part.file, run / part.file)
+    entries = list(scan((run / "journal.jsonl").read_bytes()).entries)
+    events = [(entry.at, entry.event, entry.facts) for entry in entries]
+    events.insert(-1, (events[-1][0], "part", vars(part)))
+    (run / "journal.jsonl").write_bytes(b"".join(encode(n, *event) for n, event in enumerate(events, start=1)))
+    first, last = mine.wanted.start, mine.wanted.stop - 1
+    assert damage(run) == [f"{part.file}: has cases that are not of the shard, which has {first} to {last}"]
+    store = runner.resume(run, workers=1, repair=True)
+    assert damage(run) == []
+    assert {part.file for part in store.parts} == before
+    assert len(store.cases()) == len(store.wanted)
+
+
+@pytest.mark.parametrize("folder", ["cases", "history"])
+def test_a_folder_that_is_gone_is_named_and_made_anew(run, flown, folder):
+    shutil.rmtree(run / folder)
+    shell = CliRunner()
+    for verb in ("verify", "status"):
+        said = shell.invoke(app, [verb, str(run)])
+        assert said.exit_code == 5
+        assert f"{folder}: " in said.stderr
+        assert "put back" not in said.stderr
+        assert "--repair" in said.stderr or "verify" in said.stderr
+    said = shell.invoke(app, ["resume", str(run), "--no-report"])
+    assert said.exit_code == 5
+    assert f"{folder}: the folder is gone; `mc-engine resume {run} --repair`" in said.stderr
+    assert shell.invoke(app, ["resume", str(run), "--repair", "--no-report"]).exit_code == 0
+    assert open_store(run).verify() == []
+    assert results(run) == results(flown.path)

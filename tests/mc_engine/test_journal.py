@@ -91,6 +91,28 @@ def test_a_scan_names_every_damaged_line():
     assert [entry.number for entry in found.entries] == [1, 3, 5]
 
 
+@pytest.mark.parametrize("line", [0, 1, 2])
+def test_a_flipped_newline_costs_the_two_lines_it_joins_alone(line):
+    lines = [*LINES, encode(5, AT, "z", {}), encode(6, AT, "z", {})]
+    lines[line] = lines[line][:-1] + b"\x0b"
+    found = scan(b"".join(lines))
+    assert found.damaged == (line + 1, line + 2)
+    assert [entry.number for entry in found.entries] == sorted({1, 2, 3, 4, 5, 6} - {line + 1, line + 2})
+    assert not found.torn
+
+
+def test_a_newline_within_a_line_costs_that_line_alone():
+    found = scan(LINES[0] + LINES[1][:20] + b"\n" + LINES[1][21:] + LINES[2] + LINES[3])
+    assert found.damaged == (2,)
+    assert [entry.number for entry in found.entries] == [1, 3, 4]
+
+
+def test_a_line_that_stands_twice_is_damage_and_so_is_a_number_beyond_all_lines():
+    assert scan(LINES[0] + LINES[1] + LINES[1] + LINES[2] + LINES[3]).damaged == (3,)
+    far = encode(10**15, AT, "z", {})
+    assert scan(LINES[0] + far + LINES[2]).damaged == (2,)
+
+
 def test_an_appended_line_is_there_for_the_next_reader(path):
     journal = Journal(path)
     journal.append("finished", {"seconds": 2.5})

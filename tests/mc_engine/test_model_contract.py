@@ -109,7 +109,11 @@ FLOWN = {
     ),
     "what only the compiler knows": (
         [(ACCELERATION, f"{ACCELERATION} * (s.x // 1e9 + 1.0)")],
-        "`floordiv` takes no lanes; physics uses the functions of mc_engine.lanes",
+        "`//` takes no lanes; write floor(x / y)",
+    ),
+    "a remainder": (
+        [(ACCELERATION, f"{ACCELERATION} * (1.0 + s.x % 2.0)")],
+        "`%` takes no lanes; write x - y * floor(x / y)",
     ),
     "dispersion that moves nothing": (
         [("cos(p.pitch_error)", "1.0"), ("sin(p.pitch_error)", "0.0")],

@@ -1,0 +1,40 @@
+"""Python sources as syntax trees."""
+
+import ast
+import threading
+from collections.abc import Iterator
+from functools import lru_cache
+
+_LOCK = threading.Lock()
+
+
+def parse(source: bytes | str) -> ast.Module:
+    """The tree of a source; SyntaxError or ValueError where it is none.
+
+    One at a time: in Python 3.11 trees that are made in two threads at once disturb each other (SystemError).
+    """
+    with _LOCK:
+        return ast.parse(source)
+
+
+@lru_cache(maxsize=512)
+def imported_names(source: bytes, package: str = "") -> frozenset[str]:
+    """Dotted names of all that a source may import, the modules and what is taken from them; none of broken ones.
+
+    package : that the source belongs to, for relative imports.
+    """
+    try:
+        tree = parse(source)
+    except (SyntaxError, ValueError):
+        return frozenset()
+    return frozenset(name for node in ast.walk(tree) for name in _names(node, package))
+
+
+def _names(node: ast.AST, package: str) -> Iterator[str]:
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+        home = ".".join([*above, *([node.module] if node.module else [])])
+        yield home
+        yield from (f"{home}.{alias.name}" for alias in node.names)

@@ -1,0 +1,101 @@
+"""Correct models that are written in unusual ways: neither `check` nor a flight may refuse them."""
+
+import pytest
+from mistaken_campaign import campaign_with
+
+from mc_engine.contract_flight import faults
+from mc_engine.model_contract import breaches
+
+IMPORTS = "from mc_engine.lanes import"
+RHS = "@physics\ndef rhs"
+ACCELERATION = "    g = -MU_EARTH / (r2 * sqrt(r2))\n"
+WHERE = ("sin, sqrt", "maximum, sin, sqrt, where")
+ALTITUDE = ('Extremum("speed", "speed_m_s"),', 'Extremum("speed", "speed_m_s"), Extremum("altitude", "altitude_km"),')
+
+
+def then(line):
+    """An edit: one more line in `rhs`."""
+    return (ACCELERATION, f"{ACCELERATION}    {line}\n")
+
+
+def before(text):
+    """An edit: more text before `rhs`."""
+    return (RHS, f"{text}\n\n\n{RHS}")
+
+
+def with_metric(expression):
+    """Edits: one metric more, of the time or the largest altitude."""
+    return [
+        WHERE,
+        ALTITUDE,
+        ('top_speed")', 'top_speed more")'),
+        ("t, best.speed)", f"t, best.speed, {expression})"),
+        ('"largest speed"),\n', '"largest speed"),\n        Field("more", "", "what it came to"),\n'),
+    ]
+
+
+def with_setting(name):
+    """Edits: one setting, which is zero."""
+    return [
+        ("    settings=(),", f'    settings=(Setting("{name}", "", "a number", 0.0),),'),
+        ("Model, Parameter", "Model, Parameter, Setting"),
+    ]
+
+
+COMPOSED = """def composed(f, g):
+    @physics
+    def h(x):
+        return f(g(x))
+
+    return h
+
+
+TWICE = composed(composed(sin, cos), sqrt)"""
+UNUSUAL = {
+    "a function in the signature": [
+        (IMPORTS, f"from collections.abc import Callable\n{IMPORTS}"),
+        before("@physics\ndef applied(f: Callable[[float], float], x: float) -> float:\n    return f(x)"),
+        then("g = g + 0.0 * applied(sin, s.x)"),
+    ],
+    "two functions of one factory": [before(COMPOSED), then("g = g + 0.0 * TWICE(r2)")],
+    "an argument by its name": [
+        before("@physics\ndef scaled(x, k=1.0):\n    return x * k"),
+        then("g = g + scaled(s.x, k=0.0)"),
+    ],
+    "a division by the root of a setting that is zero": [
+        *with_setting("drag"),
+        WHERE,
+        then("g = where(o.drag > 0.0, g / sqrt(o.drag), g)"),
+    ],
+    "a division by a number outside that is zero": [
+        before("DRAG = 0.0"),
+        WHERE,
+        then("g = where(DRAG > 0.0, 1.0 / DRAG, g)"),
+    ],
+    "numpy on numbers that are written out": [
+        (IMPORTS, f"import numpy as np\n\n{IMPORTS}"),
+        then("g = g * np.sqrt(2.0) * np.sqrt(0.5)"),
+    ],
+    "a sum": [then("g = g + 0.0 * sum((s.x, s.y)) + 0.0 * divmod(7, 2)[0]")],
+    "a counted while": [then("k = 0\n    while k < 3:\n        g = g + 0.0 * k\n        k += 1")],
+    "not on a mask": [WHERE, then("far = r2 > 1e14\n    g = where(not far, g, 0.0)")],
+    "a text outside": [before('MODE = "fast"'), then('if MODE == "fast":\n        g = g + 0.0')],
+    "a flag that no case raises": with_metric("where(best.altitude > 2.0e6, 1.0, 0.0)"),
+    "an excess that no case has": with_metric("maximum(0.0, t - 1.0e6)"),
+    "an input that works evenly": [("dv * sin(p.pitch_error)", "0.0")],
+}
+
+
+@pytest.mark.parametrize("way", UNUSUAL)
+def test_an_unusual_way_is_no_breach(way, tmp_path):
+    assert breaches(campaign_with(tmp_path, *UNUSUAL[way])) == []
+
+
+def test_the_unusual_ways_fly(tmp_path):
+    edits = [edit for way, edits in UNUSUAL.items() if "excess" not in way for edit in edits]
+    flag = edits.index(WHERE)
+    assert faults(campaign_with(tmp_path, *(e for i, e in enumerate(edits) if e != WHERE or i == flag))) == []
+
+
+def test_an_excess_that_no_case_has_is_no_fixed_metric(tmp_path):
+    assert faults(campaign_with(tmp_path, *UNUSUAL["an excess that no case has"])) == []
