@@ -236,11 +236,11 @@ class Store:
     # ---- reading
 
     def cases(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
-        """One row per committed case, by case_id; all columns or the named ones.
+        """One row per committed case, by case_id; all columns or the named ones, each once.
 
         `attrs["units"]`, `["descriptions"]` and `["roles"]` hold what the columns are.
         """
-        wanted = self.columns if columns is None else tuple(self._column(name) for name in columns)
+        wanted = self.columns if columns is None else tuple(self._column(name) for name in dict.fromkeys(columns))
         tables = [parts.read_part(self.path, part, wanted) for part in self.parts]
         return _frame(tables, wanted)
 

@@ -8,7 +8,7 @@ import os
 from contextlib import suppress
 from dataclasses import asdict, replace
 
-from mc_engine import dispatch, durable_file, parts, store, verification
+from mc_engine import dispatch, durable_file, part_contents, parts, store
 from mc_engine.writer_lock import WriterLock
 
 
@@ -68,7 +68,7 @@ def names_unsynced(patch):
 def digests_unread(patch):
     """The bytes of a part are not held against the journal."""
     patch(parts, "content_problem", lambda content, part: "")
-    patch(verification, "content_problem", lambda content, part: "")
+    patch(part_contents, "content_problem", lambda content, part: "")
 
 
 def unlocked(patch):

@@ -194,7 +194,7 @@ def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
     [
         (
             "s.y // 2.0",
-            r"cannot be flown: model.py, line \d+: `floordiv` takes no lanes; physics uses .* mc_engine.lanes",
+            r"cannot be flown: model.py, line \d+: `//` takes no lanes; write floor\(x / y\)",
         ),
         (
             "s.y**0.5",

@@ -362,3 +362,10 @@ def test_storing_costs_at_most_four_times_a_synced_file_of_the_same_table(wide, 
     with store.lock():
         ours = shortest(lambda repeat: store.append(5000 * repeat, 5000, arrays))
     assert ours < 4.0 * shortest(plain)
+
+
+def test_columns_come_in_the_order_asked_for_each_once(store):
+    filled(store)
+    names = list(store.units)
+    asked = [names[3], names[1], names[3]]
+    assert store.cases(columns=asked).columns.tolist() == [names[3], names[1]]
