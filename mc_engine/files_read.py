@@ -6,6 +6,9 @@ hook of the interpreter notes every file that is opened, below code of a model, 
 
 import os
 import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -13,24 +16,31 @@ from typing import Any
 USER = "mc_engine_user_"  # begins the name of every module from a campaign's folder
 _READ: dict[str, set[Path]] = {}  # by folder
 _AT_LOAD: dict[Path, dict[Path, bytes]] = {}  # by model file: what its import read, with the contents
+_LOADING = threading.local()  # .found : what the import that is under way in this thread has read
 _SOURCES = (".py", ".pyc")
 
 
-def watch(folder: Path) -> None:
-    """Note from now on what models read below `folder`."""
+@contextmanager
+def loading(model: Path) -> Iterator[None]:
+    """Within, the model in this file is imported: remember what that reads, and note from now on what it reads later.
+
+    Only what this import reads counts as its source: what others read from the folder, or it reads in flight, is not
+    known to the process that carries a run on.
+    """
     if not _READ:
         sys.addaudithook(_note)
-    _READ.setdefault(str(folder), set())
+    _READ.setdefault(str(model.parent), set())
+    _LOADING.found = set()
+    try:
+        yield
+        _AT_LOAD[model] = {path: path.read_bytes() for path in sorted(_LOADING.found) if path.is_file()}
+    finally:
+        del _LOADING.found
 
 
 def data_read(folder: Path) -> list[Path]:
     """Files below `folder` that models have read in this process and that are still there."""
     return sorted(path for path in _READ.get(str(folder), ()) if path.is_file())
-
-
-def note_load(model: Path) -> None:
-    """Remember what the import of the model in this file has read just now, `watch` having been called before."""
-    _AT_LOAD[model] = {path: path.read_bytes() for path in data_read(model.parent)}
 
 
 def data_at_load(model: Path) -> list[Path]:
@@ -50,6 +60,7 @@ def _note(event: str, arguments: tuple[Any, ...]) -> None:
     for folder, found in list(_READ.items()):
         if path.startswith(folder + os.sep) and not path.endswith(_SOURCES) and _below_a_model(sys._getframe(1)):
             found.add(Path(path))
+            getattr(_LOADING, "found", found).add(Path(path))
 
 
 def _below_a_model(frame: FrameType | None) -> bool:

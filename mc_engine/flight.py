@@ -199,7 +199,7 @@ def _fly_group(
     out = _outputs(model, padded)
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
     cases = ready.parameters[:, index], settings, ready.tables
-    _call(model, folder, width, cases, seed, case_ids[index], out, _NO_HISTORY, 1.0)
+    _bound_kernel(model, folder, width, cases, seed, case_ids[index], out, _NO_HISTORY, 1.0)()
     time, status, states, metrics = out
     return time[:n], status[:n], states[:, :n], metrics[:, :n]
 
@@ -209,21 +209,6 @@ _NO_HISTORY = np.empty((0, 0))
 
 def _outputs(model: Model, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return np.empty(n), np.empty(n), np.empty((len(model.states), n)), np.empty((len(model.metrics), n))
-
-
-def _call(
-    model: Model,
-    folder: Path | None,
-    width: int,
-    inputs: tuple[np.ndarray, np.ndarray, np.ndarray],
-    seed: int,
-    case_ids: np.ndarray,
-    out: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    history: np.ndarray,
-    pace: float,
-) -> int:
-    """Call the kernel; see `_bound_kernel`."""
-    return _bound_kernel(model, folder, width, inputs, seed, case_ids, out, history, pace)()
 
 
 def _bound_kernel(
@@ -300,7 +285,7 @@ def fly_history(
     history = np.empty((n_rows, len(names)))
     ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
     cases = parameters, settings, ready.tables
-    n = _call(model, folder, width, cases, seed, ids, _outputs(model, width), history, pace)
+    n = _bound_kernel(model, folder, width, cases, seed, ids, _outputs(model, width), history, pace)()
     factors = [1.0, *(quantity.si_factor for quantity in model.quantities)]
     return columns, {name: history[:n, i] / factors[i] for i, name in enumerate(names)}
 

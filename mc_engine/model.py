@@ -27,7 +27,7 @@ from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
 from mc_engine.files_beside import importable
-from mc_engine.files_read import USER, has_changed, note_load, watch
+from mc_engine.files_read import USER, has_changed, loading
 from mc_engine.model_faults import place_in_model
 from mc_engine.model_sources import sources_beside
 from mc_engine.syntax_tree import parse
@@ -327,10 +327,8 @@ def _module_from_file(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     try:
-        with importable(path.parent, mark):
-            watch(path.parent)
+        with importable(path.parent, mark), loading(path):
             spec.loader.exec_module(module)
-            note_load(path)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
         raise ModelError(_fault(path.name, error)) from error

@@ -52,10 +52,10 @@ def soak(folder, seconds, backend, every):
     return [json.loads(line) for line in done.stdout.splitlines()]
 
 
-def check(samples, memory_mib, record_property, objects=0.1):
+def check(samples, memory_mib, record_property):
     """The last third of the samples holds no more than the second: counts alike, memory within so many MiB.
 
-    The first third belongs to imports, pools and the allocator, which settle.  objects : that a run may leave.
+    The first third belongs to imports, pools and the allocator, which settle.
     """
     third = len(samples) // 3
     before, after = samples[third : 2 * third], samples[2 * third :]
@@ -66,7 +66,7 @@ def check(samples, memory_mib, record_property, objects=0.1):
     record_property(f"over the last {runs}: MiB", growth["memory"] / MIB)
     for name in ("objects", *COUNTED):
         record_property(name, f"{growth[name]:+d}")
-    allowed = {name: 0 for name in COUNTED} | {"objects": objects * runs + 50, "memory": memory_mib * MIB}
+    allowed = {name: 0 for name in COUNTED} | {"objects": 0.1 * runs + 50, "memory": memory_mib * MIB}
     assert {name: grown for name, grown in growth.items() if grown > allowed[name]} == {}
 
 
@@ -74,8 +74,10 @@ def test_tiny_runs_leave_nothing_behind(tmp_path, record_property):
     check(soak(tmp_path, 20.0, "threading", every=3), 4.0, record_property)
 
 
+GAP = pytest.mark.xfail(reason="loky notes each of its pools for the interpreter's exit: three small objects")
+
+
 @pytest.mark.slow
-# loky notes each of its pools for the interpreter's exit, three objects of some 200 bytes that cannot be taken back
-@pytest.mark.parametrize(("backend", "objects"), [("threading", 0.1), ("loky", 5.0)])
-def test_an_hour_of_tiny_runs_leaves_nothing_behind(tmp_path, backend, objects, record_property):
-    check(soak(tmp_path, HOUR_S / 2, backend, every=20), 8.0, record_property, objects)
+@pytest.mark.parametrize("backend", ["threading", pytest.param("loky", marks=GAP)])
+def test_an_hour_of_tiny_runs_leaves_nothing_behind(tmp_path, backend, record_property):
+    check(soak(tmp_path, HOUR_S / 2, backend, every=20), 8.0, record_property)

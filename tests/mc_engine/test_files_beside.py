@@ -9,7 +9,7 @@ from small_run import ENVIRONMENT
 from mc_engine.campaign import SHIPPED, load_campaign
 from mc_engine.errors import CampaignError
 from mc_engine.flown_campaign import companions_of
-from mc_engine.kernel import source_digest
+from mc_engine.kernel import model_sources, source_digest
 
 MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()
@@ -143,6 +143,21 @@ def test_an_edited_table_of_numbers_is_read_again_in_the_same_process(tmp_path):
         assert campaign.model.rhs.function.__globals__["MU"] == float(number)
         digests.add(source_digest(campaign.model, tmp_path))
     assert len(digests) == 2
+
+
+def test_what_another_model_of_the_folder_reads_is_no_source_of_this_one(tmp_path):
+    one = MODEL.replace("State = namedtuple", AERO + "\nMU = float(FACTORS[0])\nState = namedtuple", 1)
+    for name, text in {"a.csv": "3.9e14,0.0\n", "b.csv": "3.8e14,0.0\n"}.items():
+        (tmp_path / name).write_text(text)
+    for name in ("a", "b"):
+        model = one.replace("factors.csv", f"{name}.csv").replace(PULL, "g = -MU / (r2 * sqrt(r2))")
+        (tmp_path / f"model_{name}.py").write_text(model)
+        (tmp_path / f"{name}.toml").write_text(CAMPAIGN.replace("model.py", f"model_{name}.py"))
+    read = {}
+    for name in ("a", "b"):
+        campaign = load_campaign(tmp_path / f"{name}.toml")
+        read[name] = [path.name for path in model_sources(campaign.model, tmp_path) if path.suffix == ".csv"]
+    assert read == {"a": ["a.csv"], "b": ["b.csv"]}
 
 
 def test_folders_of_a_model_cannot_have_the_names_of_those_of_a_run(tmp_path):
