@@ -7,41 +7,23 @@ One thread, so that the time in the kernels can be taken away from the whole.
 
 import tempfile
 import time
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from mc_engine import flight, load_campaign, runner
+from mc_engine import load_campaign, runner
 from mc_engine.campaign import Retention
-
-
-@contextmanager
-def kernel_clock():
-    """A list that collects the seconds spent in each kernel call."""
-    spent, call = [], flight._call
-
-    def timed(*arguments):
-        begin = time.perf_counter()
-        rows = call(*arguments)
-        spent.append(time.perf_counter() - begin)
-        return rows
-
-    flight._call = timed
-    try:
-        yield spent
-    finally:
-        flight._call = call
+from tests.benchmarks.kernel_clock import KernelClock
 
 
 def microseconds_per_case(name="deorbit", cases=100_000):
     """Microseconds a case of a run without histories, less those in the kernels."""
     campaign = replace(load_campaign(name, cases=cases), retention=Retention(nominal=False))
-    with tempfile.TemporaryDirectory() as folder, kernel_clock() as spent:
+    with tempfile.TemporaryDirectory() as folder, KernelClock() as kernels:
         runner.run(replace(campaign, cases=64), Path(folder) / "warm", workers=1)
-        spent.clear()
+        kernels.spent = 0.0
         begin = time.perf_counter()
         runner.run(campaign, Path(folder) / "run", workers=1)
-        return 1e6 * (time.perf_counter() - begin - sum(spent)) / cases
+        return 1e6 * (time.perf_counter() - begin - kernels.spent) / cases
 
 
 if __name__ == "__main__":

@@ -4,7 +4,6 @@ python -m tests.benchmarks.phasing [cases] [threads]
 """
 
 import sys
-import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 
@@ -12,28 +11,7 @@ import numpy as np
 
 from mc_engine import flight, load_campaign
 from mc_engine.cases import case_table
-
-
-class KernelClock:
-    """Processor seconds that all threads together spend in kernels while it stands in the place of the call."""
-
-    def __init__(self):
-        self.spent, self._call, self._lock = 0.0, flight._call, threading.Lock()
-
-    def __enter__(self):
-        flight._call = self._timed
-        return self
-
-    def __exit__(self, *_):
-        flight._call = self._call
-
-    def _timed(self, *arguments):
-        begin = time.thread_time()
-        try:
-            return self._call(*arguments)
-        finally:
-            with self._lock:
-                self.spent += time.thread_time() - begin
+from tests.benchmarks.kernel_clock import KernelClock
 
 
 def flown(cases, threads=1):
@@ -46,7 +24,7 @@ def flown(cases, threads=1):
 
     part(np.arange(8))  # compiled and planned before
     parts = np.array_split(np.arange(cases), max(threads, cases // 1000))
-    with KernelClock() as clock, ThreadPoolExecutor(threads) as pool:
+    with KernelClock(time.thread_time) as clock, ThreadPoolExecutor(threads) as pool:
         begin = time.perf_counter()
         columns = list(pool.map(part, parts))[-1]
         return columns, clock.spent, time.perf_counter() - begin
