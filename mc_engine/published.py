@@ -3,6 +3,7 @@
 [source]
 campaign = "de-orbit"         # the campaign in two words
 work = "Divsalar, Nadafi, Kabganian 2016"
+continued_in = ["published/fuel_map.toml"]    # files beside it with more records, where it would be too long
 
 [[published]]
 quantity = "semi-major axis of the desired path"
@@ -59,13 +60,24 @@ class Source:
 
 
 def read_published(path: Path) -> tuple[dict[str, Any], ...]:
-    """The records of a published.toml; ModelError names a record with an unknown or missing key."""
-    records = _read(path).get("published", [])
+    """The records of a published.toml and of the files beside it that its `continued_in` names, in this order.
+
+    ModelError names a record with an unknown or missing key.
+    """
+    first = _read(path)
+    records = _checked(path, first)
+    for name in first.get("source", {}).get("continued_in", []):
+        records += _checked(path.parent / name, _read(path.parent / name))
+    return tuple(records)
+
+
+def _checked(path: Path, contents: Mapping[str, Any]) -> list[dict[str, Any]]:
+    records: list[dict[str, Any]] = contents.get("published", [])
     for number, record in enumerate(records, start=1):
         wrong = sorted(record.keys() - _KEYS) + sorted(f"no {key}" for key in _NEEDED - record.keys())
         if wrong:
             raise ModelError(f"{path.name}, record {number}: {', '.join(wrong)}; known are {', '.join(sorted(_KEYS))}")
-    return tuple(records)
+    return records
 
 
 def read_source(path: Path) -> Source:

@@ -54,3 +54,11 @@ def test_the_public_names_are_these():
     assert sorted(mc_engine.__all__) == names.split()
     for name in mc_engine.__all__:
         assert getattr(mc_engine, name) is not None
+
+
+def test_no_file_is_longer_than_400_lines():
+    roots = [ROOT / name for name in ("mc_engine", "campaigns", "reports", "tests")]
+    written = [path for root in roots for path in root.rglob("*") if path.suffix in {".py", ".toml", ".md", ".css"}]
+    assert len(written) > 500
+    lines = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8").count("\n") for path in written}
+    assert {name: number for name, number in lines.items() if number > 400} == {}

@@ -1,6 +1,5 @@
 """The table of published values: every number of ours is computed again, every verdict is held."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +7,10 @@ import pytest
 from deorbit_flights import DEMONSTRATION, MODEL, NOMINAL, PULSED, fly_one, history, pulses, table_2_entry
 
 import campaigns.deorbit
+from mc_engine.published import read_published
 
 FILE = Path(campaigns.deorbit.__file__).with_name("published.toml")
-RECORDS = tomllib.loads(FILE.read_text(encoding="utf-8"))["published"]
+RECORDS = read_published(FILE)
 STATUSES = {"legible", "restored", "read so", "not reproduced", "curve lost", "lost"}
 KEYS = {"quantity", "published", "unit", "source", "column", "at", "ours", "tolerance", "status", "note"}
 KEYS |= {"headline", "at_most"}
@@ -93,7 +93,7 @@ def test_each_record_is_complete_and_in_the_unit_of_its_column(record):
 
 
 def test_the_model_carries_the_records_into_its_reports():
-    assert MODEL.published == tuple(RECORDS)
+    assert MODEL.published == RECORDS
 
 
 def test_the_quantities_are_told_apart_by_their_names():

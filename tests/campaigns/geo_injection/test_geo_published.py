@@ -1,6 +1,5 @@
 """The table of published values: ours computed again, and every verdict held."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +12,10 @@ import campaigns.geo_injection
 from campaigns.geo_injection.avoidance import AVOIDANCE, analytic_guess, burn_of, converged
 from campaigns.geo_injection.design import program_for
 from campaigns.geo_injection.kept_programs import SEQUENCES
+from mc_engine.published import read_published
 
 FILE = Path(campaigns.geo_injection.__file__).with_name("published.toml")
-RECORDS = {one["quantity"]: one for one in tomllib.loads(FILE.read_text(encoding="utf-8"))["published"]}
+RECORDS = {one["quantity"]: one for one in read_published(FILE)}
 STATUSES = {"legible", "restored", "not reproduced", "lost"}
 DIGITS = 2e-7  # ours is written to seven digits and more
 FLOWN = [name for name, one in RECORDS.items() if "column" in one]

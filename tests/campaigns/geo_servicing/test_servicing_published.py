@@ -1,6 +1,5 @@
 """The table of published values: ours computed again, every verdict held."""
 
-import tomllib
 from functools import lru_cache
 from pathlib import Path
 
@@ -14,9 +13,10 @@ from campaigns.geo_servicing.phasing_plan import design
 from mc_engine.campaign import load_campaign
 from mc_engine.cases import case_table, full_inputs
 from mc_engine.flight import fly
+from mc_engine.published import read_published
 
 FILE = Path(campaigns.geo_servicing.__file__).with_name("published.toml")
-RECORDS = tomllib.loads(FILE.read_text(encoding="utf-8"))["published"]
+RECORDS = read_published(FILE)
 STATUSES = {"legible", "re-derived", "not reproduced", "lost"}
 ERRORS = {"one error a run": "published_per_run", "errors fresh in every burn": "published_per_burn"}
 STATISTICS = [record for record in RECORDS if "statistic" in record]
@@ -116,7 +116,7 @@ def test_each_record_is_complete_and_in_the_unit_of_its_column(record):
 
 
 def test_the_model_carries_the_records_into_its_reports():
-    assert MODEL.published == tuple(RECORDS)
+    assert MODEL.published == RECORDS
     assert len({record["quantity"] for record in RECORDS}) == len(RECORDS)
 
 
