@@ -28,7 +28,7 @@ from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
 from mc_engine.files_beside import importable
 from mc_engine.files_read import USER, has_changed, loading
-from mc_engine.model_faults import place_in_model
+from mc_engine.model_faults import place_in_model, wrong_record
 from mc_engine.model_sources import sources_beside
 from mc_engine.syntax_tree import parse
 from mc_engine.units import UNITS, unit_suffix
@@ -346,5 +346,7 @@ def _fault(reference: str, error: BaseException) -> str:
         return f"{place}: {error}"
     if word := re.fullmatch(r"Type names and field names cannot be a keyword: '(\w+)'", str(error)):
         return f'{place}: the name "{word[1]}" is a word of Python; take another'
+    if words := wrong_record(error):
+        return f"{place}: {words}"
     text = error.msg if isinstance(error, SyntaxError) else str(error)
     return f"{place}: {type(error).__name__}: {text}"

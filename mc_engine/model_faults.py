@@ -4,10 +4,12 @@ import re
 import sysconfig
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from pathlib import Path
-from traceback import extract_tb
+from traceback import extract_tb, walk_tb
 
 from mc_engine.errors import EngineError, ModelError
+from mc_engine.suggestions import hint
 
 MORE = "; `mc-engine check` tells more"
 _ENGINE = Path(__file__).resolve().parent
@@ -64,6 +66,24 @@ def place_in_model(error: BaseException) -> str:
         path = Path(frame.filename)
         if path.suffix == ".py" and _is_the_users(path):
             return f"{path.name}, line {frame.lineno}"
+    return ""
+
+
+def wrong_record(error: BaseException) -> str:
+    """What is wrong with the arguments that a record of the model, such as a Field, is made with; "" for others."""
+    text = str(error)
+    record = re.match(r"(\w+)\.__(?:init|new)__\(\) ", text)
+    if not isinstance(error, TypeError) or not record:
+        return ""
+    *_, (frame, _) = walk_tb(error.__traceback__)
+    made = (frame.f_globals | frame.f_locals).get(record[1])
+    known = [one.name for one in fields(made)] if isinstance(made, type) and is_dataclass(made) else []
+    if unknown := re.search(r"unexpected keyword argument '(\w+)'", text):
+        return f"{record[1]} has no `{unknown[1]}`{hint(unknown[1], known)}"
+    if missing := re.search(r"missing \d+ required (?:positional|keyword-only) arguments?: (.+)", text):
+        return f"{record[1]} needs {missing[1].replace(chr(39), '`')}"
+    if re.search(r"takes (?:from \d+ to )?\d+ positional arguments? but", text):
+        return f"{record[1]} has too many arguments; it takes {', '.join(known)}" if known else ""
     return ""
 
 

@@ -22,6 +22,9 @@ _METHODS = {"FixedStep": ("rk4",), "AdaptiveStep": ("dop853", "dp54")}
 
 def refuse_contradictions(model: Model) -> None:
     """ModelError with one sentence if the model contradicts itself or names what there is not."""
+    for word in ("name", "title", "source"):
+        if not isinstance(getattr(model, word), str):
+            raise ModelError(f"the model's `{word}` is {getattr(model, word)!r}; it must be a text")
     _refuse_other_records(model)
     inputs: tuple[Field, ...] = (*model.parameters, *model.settings)
     for one in (*inputs, *model.states, *model.quantities, *model.metrics):
@@ -71,6 +74,9 @@ def _refuse_other_records(model: Model) -> None:
 
 
 def _refuse_name(one: Field) -> None:
+    for word, value in (("name", one.name), ("unit", one.unit), ("description", one.description)):
+        if not isinstance(value, str):
+            raise ModelError(f'"{one.name}" has {value!r} as its {word}; it must be a text')
     if one.unit not in UNITS:
         raise ModelError(f'"{one.name}" has the unit "{one.unit}"{unit_hint(one.unit)}')
     suffix = unit_suffix(one.unit)
@@ -142,6 +148,8 @@ def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], n_states
     if isinstance(clock, FixedStep):
         _refuse_time("step", clock.step, settings)
         _refuse_time("control_every", clock.control_every, settings, least=1.0)
+        if not isinstance(clock.control_every, str) and clock.control_every % 1 != 0:
+            raise ModelError(f"the clock's `control_every` is {clock.control_every}; it counts steps, in whole numbers")
         return
     _refuse_time("rtol", clock.rtol, settings)
     if not callable(clock.control_period):

@@ -9,6 +9,8 @@ import functools
 from collections.abc import Callable
 from typing import Any
 
+from mc_engine.errors import ModelError
+
 
 class PhysicsFunction:
     """A function on numbers that kernels can compile.  `compiled` is its numba dispatcher."""
@@ -33,6 +35,10 @@ class PhysicsFunction:
         return self.compiled._numba_type_
 
 
-def physics(function: Callable[..., Any]) -> PhysicsFunction:
+def physics(function: Callable[..., Any] | None = None) -> PhysicsFunction:
     """Mark `function` as physics: numbers and named tuples in and out, functions from `mc_engine.lanes` inside."""
+    if function is None:
+        raise ModelError("@physics stands alone on the line above a function, without brackets")
+    if not callable(function):
+        raise ModelError(f"physics marks a function, not {function!r}")
     return PhysicsFunction(function)

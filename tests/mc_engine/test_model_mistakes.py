@@ -281,6 +281,11 @@ CONTRADICTIONS = {
                           ("    settings=(),", '    settings=(Setting("law", "", "law", "c", choices=("a", "b")),),'),
                           'setting "law" has the default \'c\'; known are "a", "b"'),
     "a text as a default": (("300.0, low", '"300", low'), "\"altitude_km\" has '300' where a number is wanted"),
+    "sampling between steps": ((CLOCK, "FixedStep(step=1.0, until=5.0, control_every=1.5)"), "it counts steps, in"),
+    "no unit": (('"km", "altitude of the c', 'None, "altitude of the c'), '"altitude_km" has None as its unit; it'),
+    "number as a text": (('"largest speed"', "3"), '"top_speed_m_s" has 3 as its description; it must be a text'),
+    "number as the source": (('source=""', "source=3"), "the model's `source` is 3; it must be a text"),
+    "wrong keyword": (("metrics=(", "metrix=("), 'Model has no `metrix`; did you mean "metrics"?'),
 }  # fmt: skip
 
 
@@ -291,6 +296,29 @@ def test_a_contradiction_is_named_where_the_model_is_made(mistake, tmp_path):
         campaign_with(tmp_path, *edits)
     (problem,) = error.value.problems
     assert problem.message.startswith(f"model.py, line {line_of(tmp_path, 'MODEL = Model(')}: ")
+    assert sentence in problem.message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "spot", "sentence"),
+    [
+        ("low=150.0", "lo=150.0", "Parameter(", 'Parameter has no `lo`; did you mean "low"?'),
+        (CLOCK, "FixedStep(step=10.0)", "clock=", "FixedStep needs `until`"),
+        (
+            CLOCK,
+            "FixedStep(1.0, 9.0, 1, 'rk4', 5)",
+            "clock=",
+            "FixedStep has too many arguments; it takes step, until,",
+        ),
+        ("@physics\ndef initial", "@physics()\ndef initial", "@physics()", "stands alone on the line above a function"),
+        ("@physics\ndef initial", "physics(3)\ndef initial", "physics(3)", "physics marks a function, not 3"),
+    ],
+)
+def test_a_record_made_wrongly_is_named_at_its_line(old, new, spot, sentence, tmp_path):
+    with pytest.raises(CampaignError) as error:
+        campaign_with(tmp_path, (old, new))
+    (problem,) = error.value.problems
+    assert problem.message.startswith(f"model.py, line {line_of(tmp_path, spot)}: ")
     assert sentence in problem.message
 
 
