@@ -4,14 +4,16 @@ import sys
 from pathlib import Path
 
 from mc_engine.interruption import listen
+from mc_engine.user_streams import user_streams
 
 
 def main() -> None:
     """Run the command line of this process; does not return."""
     listen()  # to Ctrl-C also while the rest is loaded
-    from mc_engine.cli import app
+    with user_streams():
+        from mc_engine.cli import app
 
-    app(prog_name="mc-engine")
+        app(prog_name="mc-engine")
 
 
 def _forget_working_folder() -> None:

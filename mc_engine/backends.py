@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from mc_engine.errors import EngineError
 from mc_engine.extras import how_to_install
+from mc_engine.shell_words import shell_word
 
 BACKENDS = ("threading", "loky", "dask")
 
@@ -54,7 +55,7 @@ class Backend:
             "memory": self.memory_mib,
             "patience": patience,
         }
-        return "".join(f" --{key} {value}" for key, value in words.items() if value is not None)
+        return "".join(f" --{key} {shell_word(str(value))}" for key, value in words.items() if value is not None)
 
 
 def memory_can_be_limited() -> bool:

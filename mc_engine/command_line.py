@@ -16,6 +16,7 @@ import typer
 
 from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError
 from mc_engine.interruption import INTERRUPTED, last_words, under_way
+from mc_engine.shell_words import shell_word
 
 if TYPE_CHECKING:
     from mc_engine.store import Store
@@ -66,11 +67,13 @@ def _on_disk(text: str, instead: str) -> Path:
 
 # `parser=` of an argument or option gets the text before it becomes a Path, which mangles a URL.
 def run_here(text: str) -> Path:
-    return _on_disk(text, f"`mc-engine fetch {text} DIR` makes a directory of it, and --publish keeps it up to date")
+    fetch = f"`mc-engine fetch {shell_word(text)} DIR`"
+    return _on_disk(text, f"{fetch} makes a directory of it, and --publish keeps it up to date")
 
 
 def new_folder(text: str) -> Path:
-    return _on_disk(text, f"fly into a folder, and --publish {text} or `mc-engine publish` keeps a copy up there")
+    publish = f"--publish {shell_word(text)} or `mc-engine publish`"
+    return _on_disk(text, f"fly into a folder, and {publish} keeps a copy up there")
 
 
 def new_file(text: str) -> Path:
@@ -147,7 +150,7 @@ def _no_run(path: Path) -> str:
     from mc_engine.run_folder import runs_in
 
     if str(path) in campaign_names():
-        return f"is a campaign and no run; `mc-engine run {path}` flies it"
+        return f"is a campaign and no run; `mc-engine run {shell_word(path)}` flies it"
     if not path.exists():
         return "there is no such folder; `mc-engine run` makes one"
     if runs := runs_in(path):
@@ -167,11 +170,14 @@ def refuse_occupied_folder(path: Path) -> None:
     from mc_engine.store import JOURNAL, open_store, refuse_occupied
 
     if (path / JOURNAL).exists() and open_store(path).missing():
-        leave(USAGE, f"--out {path}: holds a run that is not complete; `mc-engine resume {path}` flies the rest")
+        resume = f"`mc-engine resume {shell_word(path)}`"
+        leave(USAGE, f"--out {path}: holds a run that is not complete; {resume} flies the rest")
     try:
         refuse_occupied(path)
     except StoreError as error:
         leave(USAGE, f"--out {error}")
+    if run := next((one for one in path.absolute().parents if os.path.isfile(one / JOURNAL)), None):
+        leave(USAGE, f"--out {path}: lies inside the run {run.name}; choose another folder")
     existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
         leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")
@@ -191,4 +197,5 @@ def write_reports(path: Path, formats: tuple[str, ...], **more: Any) -> list[Pat
     try:
         return importlib.import_module("reports").write_reports(path, formats=formats, **more)
     except DiskError as error:
-        raise DiskError(f"{error}; what was flown is safe, `mc-engine report {path}` writes the reports") from error
+        report = f"`mc-engine report {shell_word(path)}`"
+        raise DiskError(f"{error}; what was flown is safe, {report} writes the reports") from error

@@ -10,6 +10,7 @@ import pyarrow as pa
 from mc_engine import parts
 from mc_engine.errors import StoreError
 from mc_engine.parts import CASE_COLUMNS, Column, Part
+from mc_engine.shell_words import shell_word
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +41,7 @@ def read_histories(run: Path, part: Part, quantities: Sequence[Mapping[str, str]
     table = parts.read_part(run, part)
     problem = history_problem(table, quantities)
     if problem:
-        raise StoreError(f"{run / part.file}: {problem}; `mc-engine verify {run}` names all damage")
+        raise StoreError(f"{run / part.file}: {problem}; `mc-engine verify {shell_word(run)}` names all damage")
     return table
 
 

@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
 from typing import Any
@@ -60,7 +60,8 @@ class _CommandLine:
 
     def leave_at_once(self) -> None:
         # not through sys.stderr, in the middle of whose writing the signal may have come
-        os.write(2, f"{last_words()}\n".encode())
+        with suppress(OSError):
+            os.write(2, f"{last_words()}\n".encode())
         os._exit(INTERRUPTED)
 
 

@@ -17,6 +17,7 @@ from typing import Any
 
 from mc_engine.durable_file import MOST_OF_JOURNAL, naming, plainly, read_file, sync, write_all
 from mc_engine.errors import StoreError
+from mc_engine.shell_words import shell_word
 
 _TAIL = re.compile(rb',"crc":"([0-9a-f]{8})"}')
 _TAIL_LENGTH = len(b',"crc":"00000000"}')
@@ -155,7 +156,7 @@ class Journal:
 
 def damaged_line(path: Path, number: int, why: str) -> StoreError:
     """What to raise of a line that cannot be trusted, with the way out where there is one."""
-    way_out = f"; `mc-engine resume --repair {path.parent}` drops it and flies again what it told of"
+    way_out = f"; `mc-engine resume --repair {shell_word(path.parent)}` drops it and flies again what it told of"
     return StoreError(f"{path}, line {number}: damaged, {why}{way_out * (number > 1)}")
 
 

@@ -8,14 +8,17 @@ the model's sources, the compiler's versions and the processor.  A changed sourc
 import importlib.util
 import os
 import platform
+import stat
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
 
+from mc_engine.errors import DiskError
 from mc_engine.files_read import data_at_load
 from mc_engine.kernel_parts import Functions
 from mc_engine.model import AdaptiveStep, Model
@@ -104,7 +107,26 @@ def cache_folder() -> Path:
             return folder
     except OSError:
         pass  # a read-only home: kernels are then compiled once per temporary folder
-    return Path(tempfile.gettempdir()) / "mc-engine"
+    return _own_temporary_folder()
+
+
+def _own_temporary_folder() -> Path:
+    """A temporary folder of this user alone, since what stands in it is run."""
+    user = os.getuid() if hasattr(os, "getuid") else 0  # Windows has a temporary folder for every user
+    folder = Path(tempfile.gettempdir()) / f"mc-engine-{user}"
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        about = folder.lstat()
+        if not hasattr(os, "getuid") or (about.st_uid == user and stat.S_ISDIR(about.st_mode)):
+            return folder
+    except OSError:
+        pass  # somebody else's file has the name
+    return _temporary_folder_of_this_process()
+
+
+@cache
+def _temporary_folder_of_this_process() -> Path:
+    return Path(tempfile.mkdtemp(prefix="mc-engine-"))
 
 
 def usual_width(model: Model) -> int:
@@ -143,12 +165,22 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
         width=width,
         names=", ".join(Functions._fields),
     )
-    if not path.exists():
+    _write(path, text)
+    return _import(path, f"mc_engine_kernel_{digest[:20]}_w{width}").kernel
+
+
+def _write(path: Path, text: str) -> None:
+    """Write the source of a kernel, unless it is there; DiskError with the folder's variable where the disk refuses."""
+    try:
+        if path.exists() and path.read_text(encoding="utf-8") == text:
+            return
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.{os.getpid()}")
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}")
         temporary.write_text(text, encoding="utf-8")
         os.replace(temporary, path)
-    return _import(path, f"mc_engine_kernel_{digest[:20]}_w{width}").kernel
+    except OSError as error:
+        raise DiskError(f"{path.parent}: {error.strerror or error}; compiled kernels are kept there, name another "
+                        "folder in MC_ENGINE_CACHE") from error  # fmt: skip
 
 
 def _processor() -> str:

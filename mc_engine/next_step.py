@@ -7,6 +7,7 @@ signal broke off the loading of.
 from pathlib import Path
 
 from mc_engine.interruption import NOTHING_BEGUN
+from mc_engine.shell_words import shell_word
 
 _JOURNAL, _MANIFEST = "journal.jsonl", "manifest.json"
 _UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that only `finished` makes good
@@ -25,11 +26,11 @@ def after_flight(run: Path | None, options: str = "", url: str | None = None, re
     # a run that is judged on the way is complete when the verdict has come, which `resume` finds out
     if manifest.get("looks") or not _is_finished(events):
         verb = "rerun --failed" if rerun and "rerun" in events else "resume"
-        return f"interrupted; what was committed is safe, `mc-engine {verb} {run}{options}` flies the rest"
+        return f"interrupted; what was committed is safe, `mc-engine {verb} {shell_word(run)}{options}` flies the rest"
     if manifest.get("shard"):
         return f"interrupted; all cases of the shard are in {run}, `mc-engine merge RUN SHARD...` joins the shards"
-    copy = f", `mc-engine publish {run} {url}` sends them and the cases" if url else ""
-    return f"interrupted; all cases are there, `mc-engine report {run}` writes the reports{copy}"
+    copy = f", `mc-engine publish {shell_word(run)} {shell_word(url)}` sends them and the cases" if url else ""
+    return f"interrupted; all cases are there, `mc-engine report {shell_word(run)}` writes the reports{copy}"
 
 
 def is_complete(run: Path) -> bool:
@@ -55,4 +56,4 @@ def after_search(folder: Path | None, record: str, words: str) -> str:
     """The sentence for a search whose result is the file `record` of `folder`.  words : what is there, if it is."""
     if folder is None or not (folder / record).is_file():
         return NOTHING_BEGUN
-    return f"interrupted; {words} in {folder}, `mc-engine report {folder}` writes the report"
+    return f"interrupted; {words} in {folder}, `mc-engine report {shell_word(folder)}` writes the report"

@@ -25,6 +25,7 @@ from mc_engine.extras import how_to_install
 from mc_engine.journal import Entry, Scan, read_journal, scan
 from mc_engine.parts import PART_FOLDERS, is_part_file
 from mc_engine.receipts import receipts_of
+from mc_engine.shell_words import shell_word
 from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, is_run_directory
 from mc_engine.writer_lock import LOCK_NAME
 
@@ -67,7 +68,7 @@ def publish(run: Path, url: str) -> Publication:
                 content = content[: journal.length]  # the run may have flown on since
             digest = sha256(content).hexdigest()
             if counted.get(name, digest) != digest:
-                raise StoreError(f"{run / name}: damaged; `mc-engine verify {run}` names all damage")
+                raise StoreError(f"{run / name}: damaged; `mc-engine verify {shell_word(run)}` names all damage")
             if not remote.holds(name, content, trusted.get(name) == digest):
                 remote.write(name, content)
                 sent.append(name)

@@ -22,6 +22,7 @@ import pandas as pd
 from mc_engine.errors import StoreError
 from mc_engine.replay_files import history_figure
 from mc_engine.run_summary import case_line, judgement, summaries, verdict_line
+from mc_engine.shell_words import shell_word
 from mc_engine.store import Store, open_store
 
 if TYPE_CHECKING:
@@ -84,7 +85,8 @@ class Run:
         """One case by its number; -1 is the nominal one.  StoreError if it is not there."""
         row = self.store.nominal() if case_id == NOMINAL else self.store.row(case_id)
         if not row:
-            raise StoreError(f"{self.path}: the nominal case is not there; `mc-engine resume {self.path}` flies it")
+            resume = f"`mc-engine resume {shell_word(self.path)}`"
+            raise StoreError(f"{self.path}: the nominal case is not there; {resume} flies it")
         return Case(self.store, case_id, row)
 
     def __repr__(self) -> str:

@@ -21,6 +21,7 @@ import pyarrow.parquet as pq
 
 from mc_engine.durable_file import read_inside, temporary_name, write_durably, write_synced
 from mc_engine.errors import StoreError
+from mc_engine.shell_words import shell_word
 from mc_engine.status import STATUS_NAME
 
 PART_FOLDERS = ("cases", "history")  # of a run directory
@@ -235,7 +236,7 @@ def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) ->
         raise StoreError(f"{path}: {error}") from None
     problem = table_problem(table, part, columns)
     if problem:
-        raise StoreError(f"{path}: {problem}; `mc-engine verify {run}` names all damage")
+        raise StoreError(f"{path}: {problem}; `mc-engine verify {shell_word(run)}` names all damage")
     return table
 
 

@@ -22,6 +22,7 @@ from mc_engine.parts import Written
 from mc_engine.progress import ProgressCall
 from mc_engine.repair import withdraw_damaged
 from mc_engine.retained_histories import write_histories
+from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store import Store
 
@@ -48,7 +49,7 @@ def session_of(
 
 def complete(store: Store, campaign: Campaign, session: Session, repair: bool = False) -> Store:
     """Fly what is missing, then the histories.  repair : parts that are damaged are missing, too."""
-    again = f"mc-engine resume {store.path}{session.backend.options()}"
+    again = f"mc-engine resume {shell_word(store.path)}{session.backend.options()}"
     with _resumable(again), store.lock(), stop_signal() as stop:
         if repair:
             withdraw_damaged(store)
@@ -79,8 +80,9 @@ def _resumable(again: str) -> Iterator[None]:
 def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
     """Fly the cases again that did not come to their end; a part in which nothing changes stays as it is."""
     if store.missing():
-        raise StoreError(f"{store.path}: is not complete; `mc-engine resume {store.path}` flies the rest first")
-    again = f"mc-engine rerun --failed {store.path}{session.backend.options()}"
+        resume = f"`mc-engine resume {shell_word(store.path)}`"
+        raise StoreError(f"{store.path}: is not complete; {resume} flies the rest first")
+    again = f"mc-engine rerun --failed {shell_word(store.path)}{session.backend.options()}"
     with _resumable(again), store.lock(), stop_signal() as stop:
         orders = rerun_orders(store.path, store.parts)
         cases = sum(len(order.failed) for order in orders)

@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,10 @@ from mc_engine.errors import StoreError
 from mc_engine.flown_campaign import campaign_of, companions_of
 from mc_engine.manifest import columns_of, manifest_of
 from mc_engine.parts import Part
+from mc_engine.shell_words import shell_word
 from mc_engine.store import Store, create_store, open_store
+
+_MOST_COMMANDS = 100  # that a sentence names
 
 
 @dataclass(frozen=True)
@@ -33,14 +37,14 @@ class Shard:
     @classmethod
     def parse(cls, text: str) -> "Shard":
         """The shard "3/20"; ValueError with a sentence if it is none."""
-        match = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text)
+        match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
         shard = cls(*map(int, match.groups())) if match else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
             raise ValueError(f'"{text}" is no shard; the third of twenty is 3/20')
         return shard
 
     def cases(self, n_cases: int) -> range:
-        """Its share of so many cases; the shards differ by one case at most."""
+        """Its share of so many cases, which may be none; the shards differ by one case at most."""
         return range(n_cases * (self.number - 1) // self.of, n_cases * self.number // self.of)
 
     def record(self, n_cases: int) -> dict[str, int]:
@@ -115,7 +119,8 @@ def _check_parts(stores: Sequence[Store]) -> None:
         for part in store.parts:
             table = parts.read_part(store.path, part)
             if table.num_rows != part.rows or not table.schema.equals(schema, check_metadata=True):
-                raise StoreError(f"{store.path / part.file}: is no part of this table; `mc-engine verify {store.path}`")
+                verify = f"`mc-engine verify {shell_word(store.path)}`"
+                raise StoreError(f"{store.path / part.file}: is no part of this table; {verify}")
 
 
 def _check_nothing_missing(stores: Sequence[Store]) -> None:
@@ -123,7 +128,7 @@ def _check_nothing_missing(stores: Sequence[Store]) -> None:
     missing = _gaps([piece for store in stores for piece in store.committed()], stores[0].n_cases)
     if not missing:
         return
-    commands = {store.path: f"mc-engine resume {store.path}" for store in stores if store.missing()}
+    commands = {store.path: f"mc-engine resume {shell_word(store.path)}" for store in stores if store.missing()}
     unfinished = [_within(missing, store.wanted) for store in stores if store.missing()]
     lines = [f"`{command}`" for command, there in zip(commands.values(), unfinished, strict=True) if there]
     lines += _commands_of_absent(stores, missing)
@@ -136,20 +141,33 @@ def _within(missing: Sequence[tuple[int, int]], wanted: range) -> bool:
 
 
 def _commands_of_absent(stores: Sequence[Store], missing: Sequence[tuple[int, int]]) -> list[str]:
-    """A command for every shard, of as many as the given ones say there are, that has missing cases and no folder."""
+    """A command for each shard, of as many as the given ones say there are, that has missing cases and no folder; for
+    the first of them where they are many."""
     records = [store.manifest.get("shard") for store in stores]
     counts = {record["of"] for record in records if record}
     campaign = stores[0].manifest["campaign"]
+    n_cases = stores[0].n_cases
     commands = []
     for of in counts:
         there = {record["number"] for record in records if record and record["of"] == of}
-        for number in sorted(set(range(1, of + 1)) - there):
-            if _within(missing, Shard(number, of).cases(stores[0].n_cases)):
-                commands.append(
-                    f"`mc-engine run {campaign['name']} --cases {stores[0].n_cases} --seed {campaign['seed']} "
-                    f"--shard {number}/{of} --out DIR`"
-                )
-    return commands
+        absent = (shard for shard in _shards_of(of, missing, n_cases) if shard.number not in there)
+        commands += [
+            f"`mc-engine run {shell_word(campaign['name'])} --cases {n_cases} --seed {campaign['seed']} "
+            f"--shard {shard.number}/{of} --out DIR`"
+            for shard in islice(absent, _MOST_COMMANDS + 1)
+        ]
+    return [*commands[:_MOST_COMMANDS], *["and more"] * (len(commands) > _MOST_COMMANDS)]
+
+
+def _shards_of(of: int, ranges: Sequence[tuple[int, int]], n_cases: int) -> Iterator[Shard]:
+    """The shards that hold any case of the ranges, which are in order."""
+    last = 0
+    for case, stop in ranges:
+        while case < stop:
+            shard = Shard(-(-of * (case + 1) // n_cases), of)
+            if shard.number > last:
+                yield shard
+            last, case = shard.number, shard.cases(n_cases).stop
 
 
 def _gaps(ranges: Sequence[tuple[int, int]], n_cases: int) -> list[tuple[int, int]]:

@@ -30,6 +30,7 @@ from mc_engine.journal import Entry, Journal, damaged_line, encode, plain, utc_n
 from mc_engine.manifest_file import cases_in, columns_in, parse_manifest
 from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
 from mc_engine.receipts import Range, Receipts, receipts_of
+from mc_engine.shell_words import shell_word
 from mc_engine.writer_lock import LOCK_NAME, WriterLock
 
 __all__ = ["Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
@@ -98,8 +99,7 @@ def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
 
 def is_run_directory(path: str | Path) -> bool:
     """True if `path` is or was a run directory, whole or damaged."""
-    path = Path(path)
-    return (path / JOURNAL).is_file() or (path / MANIFEST).is_file()
+    return any((Path(path) / name).is_file() for name in (JOURNAL, MANIFEST))
 
 
 def open_store(path: str | Path) -> "Store":
@@ -304,7 +304,8 @@ class Store:
         counted = {part.file for part in self._counted.all_parts()}
         for folder in (self.path, *(self.path / name for name in PART_FOLDERS)):
             if not folder.exists():
-                raise StoreError(f"{folder}: {NO_FOLDER}; `mc-engine resume {self.path} --repair` makes it anew")
+                repair = f"`mc-engine resume {shell_word(self.path)} --repair`"
+                raise StoreError(f"{folder}: {NO_FOLDER}; {repair} makes it anew")
             with naming(folder):
                 stray = [path for path in folder.iterdir() if self._is_stray(path, counted)]
             for path in stray:

@@ -23,6 +23,7 @@ from mc_engine.errors import StoreError
 from mc_engine.input_values import inputs_of
 from mc_engine.model import Model
 from mc_engine.parts import CASE_COLUMNS, Column, arrow_table, parquet_bytes, parquet_table
+from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store import is_run_directory, open_store
 from mc_engine.suggestions import hint
@@ -104,7 +105,7 @@ def _rows_of_run(path: Path) -> Rows:
     if store.manifest.get("shard") is not None:
         raise StoreError(f"{path}: is a shard; `mc-engine merge` makes a run of all shards")
     if store.missing():
-        raise StoreError(f"{path}: is not complete; `mc-engine resume {path}` flies the rest")
+        raise StoreError(f"{path}: is not complete; `mc-engine resume {shell_word(path)}` flies the rest")
     frame = store.cases()
     table = {name: frame[name].to_numpy() for name in frame.columns}
     campaign = store.manifest["campaign"]

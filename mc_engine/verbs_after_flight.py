@@ -20,6 +20,7 @@ from mc_engine.command_line import (
     write_reports,
 )
 from mc_engine.interruption import advise
+from mc_engine.shell_words import shell_word
 from mc_engine.verbs_of_object_stores import echo_publication
 
 REPORT_FORMATS = ("html", "pdf", "md")
@@ -43,7 +44,7 @@ def report(
     ] = None,
 ) -> None:
     """Write the reports of runs, tunings or rare events anew."""
-    advise(lambda: f"interrupted; `mc-engine report {' '.join(folders)}` writes the reports")
+    advise(lambda: f"interrupted; `mc-engine report {' '.join(map(shell_word, folders))}` writes the reports")
     from mc_engine.rare_event_folder import is_rare_event_directory
     from mc_engine.tuning_folder import is_tuning_directory
 
@@ -96,9 +97,9 @@ def status(place: RunPlace) -> None:
     if writer is not None:
         typer.echo(f"flying    by {described(writer)}")
     elif missing:
-        typer.echo(f"missing   {ranges(missing)}; `mc-engine resume {place}` flies them")
+        typer.echo(f"missing   {ranges(missing)}; `mc-engine resume {shell_word(place)}` flies them")
     elif lost := store.lost_files():
-        leave(DAMAGED, f"{place}/{lost[0]}: is gone; `mc-engine verify {place}` names all damage")
+        leave(DAMAGED, f"{place}/{lost[0]}: is gone; `mc-engine verify {shell_word(place)}` names all damage")
     else:
         typer.echo("complete")
 

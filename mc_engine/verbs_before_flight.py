@@ -19,6 +19,7 @@ from mc_engine.command_line import (
     leave,
     new_file,
 )
+from mc_engine.shell_words import shell_word
 
 
 @app.command()
@@ -39,9 +40,10 @@ def init(
             shutil.copyfile(SHIPPED / "minimal" / name, folder / name)
     except OSError as error:
         leave(USAGE, f"{error.filename or folder}: {error.strerror}")
+    named = shell_word(folder)
     typer.echo(
-        f"{folder}: campaign.toml and model.py\nnext: `mc-engine run {folder}` flies them; change them, and "
-        f"`mc-engine check {folder}` says what is wrong"
+        f"{folder}: campaign.toml and model.py\nnext: `mc-engine run {named}` flies them; change them, and "
+        f"`mc-engine check {named}` says what is wrong"
     )
 
 

@@ -35,6 +35,7 @@ from mc_engine.command_line import (
 )
 from mc_engine.interruption import advise, heed
 from mc_engine.next_step import after_flight, is_complete
+from mc_engine.shell_words import shell_word
 from mc_engine.verbs_of_object_stores import echo_publication, refuse_path
 
 if TYPE_CHECKING:
@@ -200,7 +201,7 @@ def _finish(
         echo_publication(store.path, url)
     failed = failed_cases(store)
     if failed == sum(store.status_counts().values()):
-        named = campaign or store.path / "campaign.toml"
+        named = shell_word(campaign or store.path / "campaign.toml")
         typer.echo(f"no case flew to its end; `mc-engine check {named}` looks for the reason in the model", err=True)
     _judge_failures(failed, max_failed)
     if judge and any(verdict.outcome != "pass" for verdict in judged):
@@ -258,9 +259,10 @@ def resume(
 
 
 def _leave_complete(folder: Path, url: str | None) -> None:
+    named = shell_word(folder)
     typer.echo(
-        f"{folder}: is complete; `mc-engine extend {folder} --cases N` adds cases, "
-        f"`mc-engine report {folder}` writes the reports anew"
+        f"{folder}: is complete; `mc-engine extend {named} --cases N` adds cases, "
+        f"`mc-engine report {named}` writes the reports anew"
     )
     if url is not None:
         echo_publication(folder, url)
@@ -317,7 +319,7 @@ def rerun(
     if not failed:
         leave(USAGE, "rerun flies only failed cases again: add --failed; the others would come out with the same bits")
     if store.missing():
-        leave(USAGE, f"{folder}: is not complete; `mc-engine resume {folder}` flies the rest first")
+        leave(USAGE, f"{folder}: is not complete; `mc-engine resume {shell_word(folder)}` flies the rest first")
     if not store.status_counts().keys() - {"ok"}:
         typer.echo(f"{folder}: no case failed; there is nothing to fly again")
         return

@@ -7,6 +7,7 @@ import typer
 
 from mc_engine.command_line import USAGE, RunFolder, app, counted, existing_run, exit_status, is_url, leave, new_file
 from mc_engine.interruption import advise
+from mc_engine.shell_words import shell_word
 
 Url = Annotated[str, typer.Argument(metavar="URL", help="Such as s3://bucket/runs/deorbit.")]
 
@@ -15,7 +16,7 @@ Url = Annotated[str, typer.Argument(metavar="URL", help="Such as s3://bucket/run
 @exit_status()
 def publish(folder: RunFolder, url: Url) -> None:
     """Copy a run to an object store; only what is missing there or differs travels (needs fsspec, s3fs)."""
-    advise(lambda: f"interrupted; `mc-engine publish {folder} {url}` sends the rest")
+    advise(lambda: f"interrupted; `mc-engine publish {shell_word(folder)} {shell_word(url)}` sends the rest")
     existing_run(folder)
     echo_publication(folder, url)
 

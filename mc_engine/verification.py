@@ -20,6 +20,7 @@ from mc_engine.manifest_file import cases_in, parse_manifest
 from mc_engine.part_contents import case_problems, history_problems, nominal_problems
 from mc_engine.parts import PART_FOLDERS, Part, is_part_file, read_part
 from mc_engine.receipts import Receipts, receipts_of
+from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, NO_FOLDER, NOMINAL, is_run_directory
 from mc_engine.writer_lock import LOCK_NAME, holder
@@ -58,7 +59,7 @@ def remedies(run: Path | str, found: list[Damage]) -> list[str]:
     for remedy in (ORIGINAL, AWAY, IN_THE_WAY, REPAIR):
         files = list(dict.fromkeys(one.file for one in found if one.mended_by == remedy))
         if files:
-            sentences.append(remedy.format(run, ", ".join(files)))
+            sentences.append(remedy.format(shell_word(run), ", ".join(files)))
     return sentences
 
 

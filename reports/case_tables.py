@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.shell_words import shell_word
 from reports.document import Cell, Column, Table
 from reports.flown import ColumnFacts, Flown
 from reports.numbers import axis_label, count, exact, number, with_unit
@@ -97,9 +98,8 @@ def _case_table(flown: Flown, caption: str, metric: str | None, rows: np.ndarray
             else Cell(number(values[row]), float(values[row]))
         )
         drawn = (_input_cell(flown.cases[fact.name].iloc[row]) for fact in shown)
-        cells.append(
-            (Cell(count(case), case, case=case), outcome, *drawn, Cell(f"mc-engine replay {flown.name} {case}"))
-        )
+        replay = Cell(f"mc-engine replay {shell_word(flown.name)} {case}")
+        cells.append((Cell(count(case), case, case=case), outcome, *drawn, replay))
     hidden = len(inputs) - len(shown)
     note = f"{hidden} more dispersed inputs stand in the case table." if hidden > 0 else ""
     return Table(caption, columns, tuple(cells), note)

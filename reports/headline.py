@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from mc_engine.figures import MapFigure
+from mc_engine.shell_words import shell_word
 from mc_engine.statistics import Verdict
 from reports.document import Card
 from reports.flown import CONFIDENCE, Flown
@@ -90,7 +91,7 @@ def warnings(flown: Flown) -> tuple[str, ...]:
     if missing > 0:
         found.append(
             f"The run is not complete: {count(missing)} of {count(flown.n_wanted)} cases are missing; "
-            f"mc-engine resume {flown.name} flies them."
+            f"mc-engine resume {shell_word(flown.name)} flies them."
         )
     if flown.n_tried and not flown.ok.any():
         found.append(f"All {count(flown.n_tried)} cases failed: no metric has a number.")

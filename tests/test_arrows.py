@@ -40,6 +40,7 @@ def test_reports_know_of_the_engine_only_what_a_store_and_its_statistics_are():
         "rare_event_folder",
         "comparison",
         "run_changes",
+        "shell_words",
     }
     used = {name.split(".")[1] for _, name in imported("reports") if name.startswith("mc_engine.")}
     assert used <= known

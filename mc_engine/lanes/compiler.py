@@ -6,6 +6,7 @@ from typing import Any
 from numba import njit
 
 from mc_engine.lanes import lowering as _lowering  # registers the lane type and its functions
+from mc_engine.lanes.kernel_cache import keep_on_disk
 from mc_engine.lanes.linked import LinkedCompiler
 
 # numpy's error model: 1/0 is infinite, as in the vector instructions.  No fastmath and no contraction:
@@ -35,4 +36,4 @@ def compile_callable(function: Callable[..., Any]) -> Any:
 
 def compile_kernel(function: Callable[..., Any]) -> Any:
     """Dispatcher for a kernel: cached beside its file, and free of the interpreter lock while it runs."""
-    return njit(nogil=True, cache=True, **STRICT)(function)
+    return keep_on_disk(njit(nogil=True, **STRICT)(function))

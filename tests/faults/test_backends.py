@@ -108,6 +108,17 @@ def test_missing_shards_are_named_with_the_commands_that_fly_them(campaign, tmp_
     assert not (tmp_path / "merged").exists()
 
 
+def test_the_absent_of_a_hundred_million_shards_are_named_at_once(tmp_path):
+    campaign = load_campaign("minimal", cases=500)
+    runner.run(campaign, tmp_path / "one", workers=1, shard=Shard(1, 10**8))
+    with pytest.raises(StoreError) as caught:
+        runner.merge(tmp_path / "merged", [tmp_path / "one"])
+    text = str(caught.value)
+    assert "cases 0 to 499 are missing" in text
+    assert "--shard 200000/100000000 --out DIR`" in text  # the first that has a case
+    assert text.endswith("and more")
+
+
 def test_shards_that_differ_or_are_of_another_campaign_are_not_merged(campaign, tmp_path):
     for number in (1, 2):
         runner.run(campaign, tmp_path / f"{number}", shard=Shard(number, 2))
@@ -151,7 +162,7 @@ def test_a_shard_is_no_run_to_extend_or_to_take_inputs_from(campaign, tmp_path):
         load_campaign("chain", text=text, directory=tmp_path)
 
 
-@pytest.mark.parametrize("text", ["0/3", "4/3", "3", "-1/3", "1/2/3", "x/y", ""])
+@pytest.mark.parametrize("text", ["0/3", "4/3", "3", "-1/3", "1/2/3", "x/y", "", "１/３"])
 def test_what_is_no_shard_is_told(text):
     with pytest.raises(ValueError, match="the third of twenty is 3/20"):
         Shard.parse(text)

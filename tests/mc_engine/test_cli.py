@@ -251,6 +251,7 @@ def test_an_occupied_folder_is_refused_before_flying(here, calls):
     small_store(here / "flown")
     fails_with(2, call("run", "cart", "--out", "flown"), "--out flown: holds a run already")
     fails_with(2, call("run", "cart", "--out", "cart"), "--out cart: is not empty and holds no run")
+    fails_with(2, call("run", "cart", "--out", "flown/cases/in"), "--out flown/cases/in: lies inside the run flown")
     assert calls.runner == []
 
 

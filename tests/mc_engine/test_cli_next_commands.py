@@ -1,7 +1,10 @@
 """What the command line says to do next: where a word was a slip, where nothing is left to do, and to the shell."""
 
+import re
+import shlex
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
@@ -9,6 +12,9 @@ from small_run import ENVIRONMENT
 
 from mc_engine import tuning
 from mc_engine.errors import EngineError
+from mc_engine.journal import damaged_line
+from mc_engine.next_step import after_flight, after_search
+from mc_engine.shell_words import shell_word
 from mc_engine.store import open_store
 
 
@@ -72,6 +78,48 @@ def test_a_run_without_a_case_that_flew_names_the_check_of_its_model(here, monke
     monkeypatch.undo()
     monkeypatch.chdir(here)
     assert "no case flew" not in call("run", "minimal", "--cases", 20, "--out", "again", "--no-report").stderr
+
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows' shells quote in another way")
+PLAIN = ["runs/deorbit-20260101T000000Z", "/tmp/a.b_c", "../x", "s3://bucket/runs/x", "flexible_satellite/stage_1"]
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_a_plain_name_is_a_word_of_the_shell_as_it_is(name):
+    assert shell_word(name) == name
+
+
+def commands_in(text):
+    """The words of all commands that a text names, as a shell takes them."""
+    return [shlex.split(command)[1:] for command in re.findall("`(mc-engine [^`]*)`", text)]
+
+
+@posix
+@pytest.mark.parametrize("name", ["a c", "-dash", "it's $HOME; ls"])
+def test_a_command_that_is_named_can_be_given_as_it_stands_whatever_the_folder_is_called(here, name):
+    assert call("run", "minimal", "--cases", 20, "--out", f"./{name}", "--no-report").exit_code == 0
+    run = Path(name)
+    part = next((run / "cases").iterdir())
+    part.write_bytes(part.read_bytes()[:-1])
+    [repair] = commands_in(call("verify", f"./{name}").stderr)
+    answer = call(*repair, "--no-report")
+    assert answer.exit_code == 0, answer.output
+    assert call("verify", f"./{name}").exit_code == 0
+    texts = [call("resume", f"./{name}").stdout, str(damaged_line(run / "journal.jsonl", 2, "torn"))]
+    texts += [after_flight(run), after_flight(run, url="s3://b/x y"), after_search(run, "manifest.json", "x")]
+    commands = [command for text in texts for command in commands_in(text)]
+    assert [command[0] for command in commands] == [
+        "extend",
+        "report",
+        "resume",
+        "report",
+        "report",
+        "publish",
+        "report",
+    ]
+    for command in commands:
+        assert f"./{name}" in command or (name in command and not name.startswith("-"))
+    assert commands[5][-1] == "s3://b/x y"
 
 
 def test_tuning_without_its_package_is_a_sentence(here, monkeypatch):

@@ -117,6 +117,15 @@ def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun()
     assert (done.returncode, done.stderr) == (4, f"{NOTHING_BEGUN}\n")
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
+def test_last_words_that_nobody_can_be_told_leave_the_exit_status_as_it_is():
+    script = "import os, signal\nfrom mc_engine.interruption import listen\nlisten()\n"
+    script += "os.kill(os.getpid(), signal.SIGTERM)\nsignal.pause()\n"
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([sys.executable, "-c", script], stderr=full, env=ENVIRONMENT, timeout=60)
+    assert done.returncode == 4
+
+
 # ---- what the journal says
 
 

@@ -1,6 +1,8 @@
 """Compiled kernels and their cache: one per model, width and state of the sources, and quick the second time."""
 
+import errno
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -9,11 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba.core.caching import IndexDataCacheFile
 from small_run import ENVIRONMENT
 
 import mc_engine
 from mc_engine import kernel
 from mc_engine.campaign import SHIPPED
+from mc_engine.errors import DiskError
 from mc_engine.flight import fly
 from mc_engine.model import load_model
 
@@ -181,7 +185,50 @@ def test_the_cache_lies_where_the_user_says_or_where_the_system_keeps_such_thing
     # a home that is a file can hold no folder
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert kernel.cache_folder() == Path(tempfile.gettempdir()) / "mc-engine"
+    temporary = Path(tempfile.gettempdir())
+    assert kernel.cache_folder() == temporary / f"mc-engine-{os.getuid()}"
+    assert kernel.cache_folder().stat().st_mode & 0o077 == 0  # what stands in it is run, so nobody else writes there
+    # another user may have made a folder of this name
+    monkeypatch.setattr(os, "getuid", lambda: 4_000_000_000)
+    (temporary / "mc-engine-4000000000").mkdir()
+    try:
+        private = kernel.cache_folder()
+        assert private.parent == temporary
+        assert private.name != "mc-engine-4000000000"
+        assert private == kernel.cache_folder()
+        private.rmdir()
+    finally:
+        (temporary / "mc-engine-4000000000").rmdir()
+
+
+@pytest.mark.parametrize("ending", [".nbi", ".nbc"])
+def test_a_broken_file_of_the_cache_costs_a_compilation_and_no_flight(folder, ending):
+    in_another_process(folder)
+    for path in (folder / "cache").rglob(f"*{ending}"):
+        path.write_bytes(path.read_bytes()[:100])
+    assert in_another_process(folder)["speed"] == 18.0
+    assert in_another_process(folder)["hits"] == 1
+
+
+def test_a_full_disk_of_the_cache_is_told_and_the_cases_fly(tmp_path, monkeypatch, caplog):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (tmp_path / "model.py").write_text(fall(4.0))
+    monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(IndexDataCacheFile, "_save_data", full)
+    assert speed(tmp_path, "model.py") == 72.0
+    (told,) = [record.getMessage() for record in caplog.records if record.name == "mc_engine"]
+    assert told.startswith(str(tmp_path / "cache"))
+    assert "No space left on device; compiled kernels cannot be kept there" in told
+
+
+def test_a_cache_that_cannot_be_is_named_with_its_variable(tmp_path, monkeypatch):
+    (tmp_path / "model.py").write_text(fall(5.0))
+    (tmp_path / "cache").touch()
+    monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path / "cache"))
+    with pytest.raises(DiskError, match=r"cache.*: Not a directory; .* name another folder in MC_ENGINE_CACHE"):
+        speed(tmp_path, "model.py")
 
 
 def test_the_same_campaign_under_the_same_relative_path_elsewhere_flies_from_the_cache(tmp_path):

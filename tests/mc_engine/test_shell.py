@@ -1,14 +1,18 @@
-"""The command line as a shell meets it: the list of campaigns, completion, the time that help takes."""
+"""The command line as a shell meets it: the list of campaigns, completion, the time help takes, streams that refuse."""
 
+import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 from cart import call, fails_with
 from small_run import ENVIRONMENT
 
 import mc_engine
+from mc_engine.store import open_store
 
 
 def test_list_names_the_source_of_each_system_once_below_its_campaigns():
@@ -55,3 +59,65 @@ def test_a_sentence_about_what_is_missing_names_the_next_command(tmp_path):
     fails_with(2, call("status", tmp_path), "`mc-engine run` makes one")
     made = call("init", tmp_path / "new")
     assert f"`mc-engine check {tmp_path / 'new'}`" in made.output
+
+
+# ---- streams that refuse what is written to them
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows has neither such devices nor such shells")
+full = pytest.param("/dev/full", marks=pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has it"))
+refusing = pytest.mark.parametrize("place", [full, pytest.param("pipe", marks=posix)])
+RUN = ("run", "minimal", "--cases", "20", "--no-report", "--out")
+
+
+@contextmanager
+def refusal(place):
+    """The number of a file that refuses what is written: a full device, or a pipe without a reader."""
+    if place == "pipe":
+        reader, number = os.pipe()
+        os.close(reader)
+    else:
+        number = os.open(place, os.O_WRONLY)
+    try:
+        yield number
+    finally:
+        os.close(number)
+
+
+def engine(*words, **streams):
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
+    command = [sys.executable, "-m", "mc_engine", *map(str, words)]
+    return subprocess.run(command, text=True, env=ENVIRONMENT, timeout=60, **streams)
+
+
+@refusing
+def test_a_standard_error_that_refuses_words_changes_no_exit_status_and_stops_no_run(tmp_path, place):
+    with refusal(place) as number:
+        done = engine(*RUN, tmp_path / "run", stderr=number)
+        assert (done.returncode, open_store(tmp_path / "run").missing()) == (0, [])
+        assert engine("verify", tmp_path / "nowhere", stderr=number).returncode == 2
+        assert engine("no_such_verb", stderr=number).returncode == 2
+
+
+@posix
+@pytest.mark.parametrize("words", ["units", "--help"])
+def test_a_reader_that_has_gone_away_is_no_error(words):
+    with refusal("pipe") as number:
+        done = engine(words, stdout=number)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("place", [full])
+@pytest.mark.parametrize("words", ["units", "--help"])
+def test_a_full_disk_behind_standard_output_is_a_sentence_and_no_success(words, place):
+    with refusal(place) as number:
+        done = engine(words, stdout=number)
+    assert done.returncode == 4
+    assert done.stderr == "standard output: No space left on device; not all was printed, all else is done\n"
+
+
+@posix
+def test_streams_that_the_shell_closed_are_those_of_no_file(tmp_path):
+    command = [sys.executable, "-m", "mc_engine", *RUN, str(tmp_path / "run")]
+    closed = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", *command]
+    assert subprocess.run(closed, env=ENVIRONMENT, timeout=60).returncode == 0
+    assert open_store(tmp_path / "run").verify() == []
