@@ -139,6 +139,7 @@ def existing_run(path: Path) -> "Store":
     """The run in `path`; a path that never was a run is a slip of the user's, not damage."""
     from mc_engine.store import is_run_directory, open_store
 
+    _refuse_unreadable(path)
     if not is_run_directory(path):
         leave(USAGE, f"{path}: {_no_run(path)}")
     return open_store(path)
@@ -162,16 +163,26 @@ def run_at(place: str) -> Path:
     """The directory `place`; of a URL, a copy that lasts as long as this process."""
     from mc_engine.object_store import local_copy
 
-    return local_copy(place)
+    folder = local_copy(place)
+    _refuse_unreadable(folder)
+    return folder
+
+
+def _refuse_unreadable(path: Path) -> None:
+    if os.path.isdir(path) and not os.access(path, os.R_OK | os.X_OK):
+        leave(USAGE, f"{path}: is a folder that this user may not read")
 
 
 def refuse_occupied_folder(path: Path) -> None:
     """An occupied --out is a slip of the user's; told before anything is compiled."""
     from mc_engine.store import JOURNAL, open_store, refuse_occupied
+    from mc_engine.writer_lock import LOCK_NAME
 
     if (path / JOURNAL).exists() and open_store(path).missing():
         resume = f"`mc-engine resume {shell_word(path)}`"
         leave(USAGE, f"--out {path}: holds a run that is not complete; {resume} flies the rest")
+    if (path / LOCK_NAME).exists() and not (path / JOURNAL).exists():
+        return  # a creation that was cut short, it seems; whoever makes the run knows which files it left
     try:
         refuse_occupied(path)
     except StoreError as error:

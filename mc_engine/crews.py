@@ -24,6 +24,7 @@ from mc_engine.parts import Written
 from mc_engine.store import Store
 from mc_engine.worker_process import Site, begin_process, perform
 
+_MOST_THREADS = 1024  # a system has room for some ten thousand, and no machine has as many cores
 THREADS_INSIDE = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
@@ -50,8 +51,8 @@ class ThreadCrew(Crew):
         from multiprocessing.pool import ThreadPool
 
         super().__init__()
-        self._perform, self._workers = perform, workers
-        self._pool = ThreadPool(workers)  # whose threads do not hold up the end of the process
+        self._perform, self._workers = perform, min(workers, _MOST_THREADS)
+        self._pool = ThreadPool(self._workers)  # whose threads do not hold up the end of the process
 
     def room(self) -> int:
         return self._workers + 1  # one waits, so that none of them has to

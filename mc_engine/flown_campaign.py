@@ -54,7 +54,7 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
         model = (campaign.directory / campaign.model_reference).resolve()
         paths.update([*sources_beside(model), *data_read(model.parent)])
     base = campaign.directory.resolve()
-    contents = {path.resolve().relative_to(base).as_posix(): path.read_bytes() for path in sorted(paths)}
+    contents = {_name_in(base, path): path.read_bytes() for path in sorted(paths)}
     for name in contents:
         if name.split("/")[0] in _OWN:
             sentence = (
@@ -62,3 +62,8 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
             )
             raise CampaignError(campaign.name, [Problem("campaign.model", sentence)])
     return contents if campaign.upstream is None else {**contents, COMPANION: campaign.upstream.rows.content}
+
+
+def _name_in(folder: Path, path: Path) -> str:
+    """The name that a file has in a folder; of a link that leads out of it the link's."""
+    return (path if path.is_relative_to(folder) else path.resolve()).relative_to(folder).as_posix()

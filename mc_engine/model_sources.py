@@ -4,6 +4,7 @@ More than the model may need; an edit of a file that it does not need costs a co
 """
 
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -15,11 +16,26 @@ _ENGINE = "mc_engine"  # its own sources are counted apart
 
 def sources_beside(file: Path) -> list[Path]:
     """Sources of a model that is a file: all beside it, and the folders beside it that they import, whole."""
-    folder = file.parent
-    beside = sorted(folder.glob("*.py"))
-    roots = {name.split(".")[0] for path in beside for name in imported_names(path.read_bytes())}
-    packages = [folder / root for root in sorted(roots) if (folder / root).is_dir()]
-    return [*beside, *(path for package in packages for path in sorted(package.rglob("*.py")))]
+    beside = _sources(file.parent.glob("*.py"))
+    packages = [path for name in _imported_beside(file) for path in _sources((file.parent / name).rglob("*.py"))]
+    return [*beside, *packages]
+
+
+def _sources(paths: Iterable[Path]) -> list[Path]:
+    """Those that can be read: a pipe or a folder of such a name is no source."""
+    return sorted(path for path in paths if path.is_file())
+
+
+def _imported_beside(file: Path) -> list[str]:
+    """Folders beside a model that it, or others beside it, import; a file that nothing imports is not parsed."""
+    waiting: list[Path] = [file]
+    seen: set[str] = set()
+    while waiting:
+        roots = {name.split(".")[0] for name in imported_names(waiting.pop().read_bytes())} - seen - {""}
+        seen |= roots
+        waiting += _sources(file.parent / f"{root}.py" for root in roots)
+        waiting += [path for root in roots for path in _sources((file.parent / root).rglob("*.py"))]
+    return sorted(name for name in seen if (file.parent / name).is_dir())
 
 
 def sources_of_module(name: str) -> list[Path]:

@@ -20,7 +20,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from mc_engine.durable_file import read_inside, temporary_name, write_durably, write_synced
-from mc_engine.errors import StoreError
+from mc_engine.errors import DiskError, StoreError
 from mc_engine.shell_words import shell_word
 from mc_engine.status import STATUS_NAME
 
@@ -225,18 +225,21 @@ def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) ->
 
     The same where the bytes are those that were written, and the table is not what receipt and columns say.
     """
-    path = run / part.file
-    content = read_inside(run, part.file, part.bytes + 1)
-    problem = content_problem(content, part)
-    if problem:
-        raise StoreError(f"{path}: {problem}")
+    path, more = run / part.file, f"; `mc-engine verify {shell_word(run)}` names all damage"
+    try:
+        content = read_inside(run, part.file, part.bytes + 1)
+    except DiskError:
+        raise
+    except StoreError as error:
+        raise StoreError(f"{error}{more}") from None
+    if problem := content_problem(content, part):
+        raise StoreError(f"{path}: {problem}{more}")
     try:
         table = parquet_table(content, None if columns is None else [column.name for column in columns])
     except ValueError as error:
-        raise StoreError(f"{path}: {error}") from None
-    problem = table_problem(table, part, columns)
-    if problem:
-        raise StoreError(f"{path}: {problem}; `mc-engine verify {shell_word(run)}` names all damage")
+        raise StoreError(f"{path}: {error}{more}") from None
+    if problem := table_problem(table, part, columns):
+        raise StoreError(f"{path}: {problem}{more}")
     return table
 
 

@@ -14,6 +14,8 @@ from mc_engine.store import Store
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_LARGEST = 1e100  # of any unit; what a flight that is lost holds beyond it, no axis can have ticks for
+
 
 def write_replay(store: Store, case_id: int, history: pd.DataFrame) -> list[Path]:
     """Write `RUN/replay/case-<id>.parquet` and `.png`; the two paths."""
@@ -40,7 +42,8 @@ def history_figure(history: pd.DataFrame, quantities: Sequence[Mapping[str, str]
     figure = Figure(figsize=(10.0, 1.0 + 1.8 * rows), layout="constrained")
     axes = figure.subplots(rows, 2, sharex=True, squeeze=False)
     for axis, column in zip(axes.flat, columns, strict=False):
-        axis.plot(history["t_s"], history[column.name], linewidth=0.9)
+        drawn = history[column.name].where(history[column.name].abs() < _LARGEST)
+        axis.plot(history["t_s"], drawn, linewidth=0.9)
         axis.set_ylabel(f"{column.name} [{column.unit}]" if column.unit else column.name, fontsize="small")
         axis.grid(alpha=0.3)
     for axis in axes.flat[len(columns) :]:

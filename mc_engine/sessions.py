@@ -49,7 +49,8 @@ def session_of(
 
 def complete(store: Store, campaign: Campaign, session: Session, repair: bool = False) -> Store:
     """Fly what is missing, then the histories.  repair : parts that are damaged are missing, too."""
-    again = f"mc-engine resume {shell_word(store.path)}{session.backend.options()}"
+    verb = "resume --repair" if repair else "resume"
+    again = f"mc-engine {verb} {shell_word(store.path)}{session.backend.options()}"
     with _resumable(again), store.lock(), stop_signal() as stop:
         if repair:
             withdraw_damaged(store)

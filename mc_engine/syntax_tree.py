@@ -25,7 +25,7 @@ def imported_names(source: bytes, package: str = "") -> frozenset[str]:
     """
     try:
         tree = parse(source)
-    except (SyntaxError, ValueError):
+    except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: nested too deep
         return frozenset()
     return frozenset(name for node in ast.walk(tree) for name in _names(node, package))
 

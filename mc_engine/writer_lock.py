@@ -163,4 +163,5 @@ def described(record: dict[str, Any] | None) -> str:
     """The holder of a lock in words."""
     if not record:
         return "another writer"
-    return f"process {record.get('pid')} on {record.get('host')} (since {record.get('since')})"
+    pid, host, since = (json.dumps(str(record.get(name))[:100])[1:-1] for name in ("pid", "host", "since"))
+    return f"process {pid} on {host} (since {since})"

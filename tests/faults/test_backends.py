@@ -9,6 +9,7 @@ from trapped import campaign_folder, files_of, trapped
 from mc_engine import cluster_crew, load_campaign, runner
 from mc_engine.backends import Backend
 from mc_engine.chunks import Order
+from mc_engine.crews import ThreadCrew
 from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
 from mc_engine.shards import Shard
 from mc_engine.verification import damage
@@ -227,3 +228,11 @@ def test_a_worker_of_other_sources_is_refused(campaign, whole):
         with pytest.raises(StoreError, match="was flown by other sources"):
             perform(site, Order(0, 10))
     assert perform(site, Order(0, 10, probe=(3,))) is None
+
+
+def test_threads_by_the_hundred_thousand_are_as_many_as_a_system_has_room_for(tmp_path):
+    crew = ThreadCrew(lambda order: None, 100_000)
+    try:
+        assert 2 < crew.room() < 10_000
+    finally:
+        crew.close(at_once=True)

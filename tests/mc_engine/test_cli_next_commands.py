@@ -1,7 +1,9 @@
 """What the command line says to do next: where a word was a slip, where nothing is left to do, and to the shell."""
 
+import os
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +12,9 @@ import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
 from small_run import ENVIRONMENT
 
-from mc_engine import tuning
-from mc_engine.errors import EngineError
+from mc_engine import sessions, store, tuning
+from mc_engine.campaign import SHIPPED
+from mc_engine.errors import DiskError, EngineError, StoreError
 from mc_engine.journal import damaged_line
 from mc_engine.next_step import after_flight, after_search
 from mc_engine.shell_words import shell_word
@@ -62,6 +65,50 @@ def test_a_run_that_is_complete_is_not_flown_again(here):
     assert "`mc-engine report flown` writes the reports anew" in answer.stdout
     assert len(open_store("flown").notes()) == before
     assert not (here / "flown" / "report.html").exists()
+
+
+def test_a_creation_that_the_disk_cut_short_is_begun_again_by_the_same_command(here, monkeypatch):
+    durably = store.write_durably
+
+    def full(path, content):
+        if path.name == store.JOURNAL:
+            raise DiskError(f"{path}: No space left on device")
+        return durably(path, content)
+
+    shutil.copytree(SHIPPED / "minimal", here / "mine")
+    flight = ("run", "mine", "--cases", "8", "--no-report", "--out", "flown")
+    with monkeypatch.context() as patch:
+        patch.setattr(store, "write_durably", full)
+        fails_with(4, call(*flight), "journal.jsonl: No space left on device")
+    assert (here / "flown" / "model.py").exists()  # which its creation left, and only a run of this model expects
+    (here / "flown" / "mine.txt").touch()
+    fails_with(5, call(*flight), "flown: is not empty and holds no run")
+    (here / "flown" / "mine.txt").unlink()
+    assert call(*flight).exit_code == 0
+
+
+def test_a_folder_that_may_not_be_read_is_named(here, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda *_: False)
+    for verb in ("verify", "status"):
+        fails_with(2, call(verb, "cart"), "cart: is a folder that this user may not read")
+
+
+def test_a_part_that_is_gone_is_named_with_the_verb_that_names_all_damage(here):
+    small_store(here / "flown")
+    part = next((here / "flown" / "cases").iterdir())
+    part.unlink()
+    fails_with(5, call("summary", "flown"), "`mc-engine verify flown` names all damage")
+    with pytest.raises(StoreError, match=r"No such file or directory; `mc-engine verify .*flown` names all damage"):
+        open_store(here / "flown").cases()
+
+
+def test_a_repair_that_the_disk_broke_off_is_to_be_repeated_as_a_repair(here, monkeypatch):
+    def full(_):
+        raise DiskError("journal.jsonl: No space left on device")
+
+    assert call("run", "minimal", "--cases", "8", "--no-report", "--out", "flown").exit_code == 0
+    monkeypatch.setattr(sessions, "withdraw_damaged", full)
+    fails_with(4, call("resume", "--repair", "flown"), "`mc-engine resume --repair flown` flies the rest")
 
 
 def test_without_a_failed_case_nothing_is_flown_again(here):

@@ -1,5 +1,6 @@
 """Models whose physics stands in several files: beside the model, in packages there, or in an installed package."""
 
+import os
 import subprocess
 import sys
 
@@ -165,3 +166,34 @@ def test_folders_of_a_model_cannot_have_the_names_of_those_of_a_run(tmp_path):
                 "from cases.dyn import pull")  # fmt: skip
     with pytest.raises(CampaignError, match=r"cases/constants.py: every run has a folder"):
         companions_of(load_campaign(tmp_path / "campaign.toml"))
+
+
+@pytest.mark.parametrize("other", ["pipe", "folder", "lost link", "deep", "signs"])
+def test_what_lies_beside_a_model_and_is_not_its_own_hinders_nothing(other, tmp_path):
+    folder = campaign_in(tmp_path / "mine", BESIDE, "from dynamics import pull")
+    stranger = folder / "stranger.py"
+    make = {
+        "pipe": lambda: os.mkfifo(stranger),
+        "folder": stranger.mkdir,
+        "lost link": lambda: stranger.symlink_to(tmp_path / "nowhere.py"),
+        "deep": lambda: stranger.write_text("x = " + "(" * 100_000),
+        "signs": lambda: stranger.write_text("x = " + "-" * 50_000 + "1"),
+    }
+    make[other]()
+    companions = companions_of(load_campaign(folder, cases=4))
+    assert {"model.py", "dynamics.py", "constants.py"} <= set(companions)
+    assert ("stranger.py" in companions) == (other in ("deep", "signs"))
+
+
+def test_a_nested_source_that_is_imported_is_told_in_a_sentence(tmp_path):
+    files = {**BESIDE, "constants.py": f"{MU}x = {'(' * 100_000}"}
+    with pytest.raises(CampaignError, match=r"(?s)constants.py|too many nested|MemoryError"):
+        load_campaign(campaign_in(tmp_path, files, "from dynamics import pull"), cases=4)
+
+
+def test_a_source_that_is_a_link_out_of_the_folder_goes_with_the_run_under_the_links_name(tmp_path):
+    (tmp_path / "library.py").write_text(MU)
+    files = {name: text for name, text in BESIDE.items() if name != "constants.py"}
+    folder = campaign_in(tmp_path / "mine", files, "from dynamics import pull")
+    (folder / "constants.py").symlink_to(tmp_path / "library.py")
+    assert companions_of(load_campaign(folder, cases=4))["constants.py"] == MU.encode()

@@ -9,7 +9,7 @@ from small_run import ENVIRONMENT, block
 
 from mc_engine.errors import StoreError
 from mc_engine.store import open_store
-from mc_engine.writer_lock import WriterLock, holder
+from mc_engine.writer_lock import WriterLock, described, holder
 
 
 def test_a_second_writer_is_refused_within_a_second_and_told_who_is_first(store):
@@ -110,3 +110,9 @@ def test_a_lock_is_empty_when_given_back_and_none_is_lost_by_releasing_twice(run
     lock.release()
     lock.release()
     assert (run / ".lock").read_bytes() == b""
+
+
+def test_a_record_of_somebody_elses_making_cannot_steer_the_terminal():
+    text = described({"pid": 1, "host": "a\n\x1b[31mforged", "since": "x" * 4096})
+    assert text.isprintable()
+    assert len(text) < 300
