@@ -17,6 +17,7 @@ from mc_engine.errors import MOST_SHOWN
 from mc_engine.input_values import accepted_range, check_value, inputs_of, number
 from mc_engine.model import Model, Parameter, Refusals, Setting
 from mc_engine.model_faults import naming_faults
+from mc_engine.preparation import call_prepare
 from mc_engine.suggestions import hint, listed
 
 _CASES_PER_CORRELATED = 10  # a Latin hypercube with fewer may not have room for the correlations asked for
@@ -98,9 +99,8 @@ def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
     inputs = {p.symbol: np.array([float(values[p.name]) * p.si_factor]) for p in model.parameters}
     settings = {s.symbol: np.array([s.code(values[s.name])]) for s in model.settings}
     refusals = Refusals.none(1)
-    # a refused case may divide by zero on its way
-    with np.errstate(all="ignore"), naming_faults(model.reference, "the nominal case", ""):
-        model.prepare(SimpleNamespace(**inputs), SimpleNamespace(**settings), refusals)
+    with naming_faults(model.reference, "the nominal case", ""):
+        call_prepare(model, SimpleNamespace(**inputs), SimpleNamespace(**settings), refusals)
     return str(refusals.reason[0])
 
 

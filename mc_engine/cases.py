@@ -12,8 +12,11 @@ from mc_engine.dispersions import Dispersion
 from mc_engine.distributions import Scalar, column, quantiles
 from mc_engine.errors import CampaignError, Problem
 from mc_engine.input_values import number
+from mc_engine.units import convert
 
 _UNITLESS_KEYS = ("log_sigma", "alpha", "beta")
+_SIGMAS = ("sigma", "three_sigma")
+_SIGMA_DIGITS = 5
 
 
 def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray]:
@@ -88,8 +91,8 @@ def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
                 "unit": item.unit,
                 "description": item.description,
                 "nominal": campaign.nominal[one.name],
-                "distribution": _distribution_text(campaign, one, one.spec.get("unit", item.unit)),
-                "bounds": _bounds_text(one, one.spec.get("unit", item.unit)),
+                "distribution": _distribution_text(campaign, one, item.unit),
+                "bounds": _bounds_text(one, item.unit),
                 "source": one.source,
                 "note": one.note,
             }
@@ -98,12 +101,14 @@ def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
 
 
 def _distribution_text(campaign: Campaign, one: Dispersion, unit: str) -> str:
-    """Such as "normal, 3σ = 20 %", in the words and the unit of the campaign file."""
+    """Such as "normal, 3σ = 20 %", in the words of the campaign file and the unit of the input's row.
+
+    A sigma has five digits at most: it may come of a covariance, or of another unit.
+    """
     if campaign.design == "table":
         return f"column of {campaign.table_path.name}" if campaign.table_path else ""
     if one.levels:
         levels = [_scalar_text(value) for value in one.levels]
-        unit = campaign.model.input(one.name).unit
         inside = levels if len(levels) <= 6 else [levels[0], levels[1], "...", levels[-1]]
         return _with_unit(f"{len(levels)} level{'s' if len(levels) > 1 else ''}: {', '.join(inside)}", unit)
     signs = {"three_sigma": "3σ", "sigma": "σ", "log_sigma": "σ of ln", "half_range": "±"}
@@ -112,19 +117,30 @@ def _distribution_text(campaign: Campaign, one: Dispersion, unit: str) -> str:
     for key in (*keys, "alpha", "beta", "value", "values", "weights", "file", "column"):
         if key in one.spec:
             plain = key in (*_UNITLESS_KEYS, "weights", "file", "column")
-            value = _with_unit(_scalar_text(one.spec[key]), "" if plain else unit)
+            given = one.spec[key] if plain else _in_unit(one, one.spec[key], unit)
+            text = f"{given:.{_SIGMA_DIGITS}g}" if key in _SIGMAS else _scalar_text(given)
+            value = _with_unit(text, "" if plain else unit)
             parts.append(f"±{value}" if key == "half_range" else f"{signs.get(key, key)} = {value}")
     return ", ".join(parts)
 
 
 def _bounds_text(one: Dispersion, unit: str) -> str:
     """Such as "-10 to 10 %", or empty where the file sets no bounds."""
-    lower, upper = one.spec.get("lower"), one.spec.get("upper")
+    lower, upper = (_in_unit(one, one.spec.get(key), unit) for key in ("lower", "upper"))
     if lower is not None and upper is not None:
         return _with_unit(f"{number(lower)} to {number(upper)}", unit)
     if lower is not None:
         return f"from {_with_unit(number(lower), unit)}"
     return f"up to {_with_unit(number(upper), unit)}" if upper is not None else ""
+
+
+def _in_unit(one: Dispersion, value: Any, unit: str) -> Any:
+    """A number (or list of numbers) of the campaign file in `unit`; words and switches as they are."""
+    if isinstance(value, list):
+        return [_in_unit(one, item, unit) for item in value]
+    written = one.spec.get("unit", unit)
+    other = isinstance(value, int | float) and not isinstance(value, bool) and written != unit
+    return convert(float(value), written, unit) if other else value
 
 
 def _scalar_text(value: Any) -> str:

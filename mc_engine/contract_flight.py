@@ -6,42 +6,55 @@ own, which a model may kill or hang.
 """
 
 import json
+import os
 import sys
+import threading
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mc_engine.campaign import Campaign, load_campaign
-from mc_engine.cases import case_table, full_inputs
+from mc_engine.cases import case_table, full_inputs, nominal_row
+from mc_engine.chunks import NOMINAL_NOISE
 from mc_engine.dispersions import Dispersion
 from mc_engine.distributions import column, quantiles
 from mc_engine.errors import EngineError
 from mc_engine.event_watch import watching_events
-from mc_engine.flight import fly
+from mc_engine.flight import fly, grid_of
+from mc_engine.model import AdaptiveStep, FixedStep
 from mc_engine.model_contract import nominal_inputs
 from mc_engine.model_faults import MORE, fault_of
 from mc_engine.physics_trial import fixed_metrics
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 
 _CASES = 32
+_BLOCKS = 4  # of lanes that they fill at most
 _CUT = 5  # cases of the smaller part when they are flown in two
 # where along its distribution an input is tried: not at its edges alone, where what works evenly does the same
 _PLACES = np.array([0.05, 0.8, 0.95])
 _PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
+LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
 _ZERO = 1e-6  # of an event function's reach: a flight that stops there has reached the zero
 
 Columns = Mapping[str, np.ndarray]
 
 
 def faults(campaign: Campaign) -> list[str]:
-    """Sentences on what a flight of a few cases shows to be wrong; empty if nothing."""
+    """Sentences on what a flight of a few cases shows to be wrong; empty if nothing.
+
+    A flight that takes far too long ends the process, after its sentence is printed as by `main`.
+    """
     if campaign.first is not None:
         return []  # its inputs come from a run that is not there yet
     ids = np.arange(min(campaign.cases, _CASES))
     inputs = full_inputs(campaign, case_table(campaign, ids))
     try:
-        flown = _fly(campaign, inputs, ids)
+        _fly_nominal(campaign)
+        with _landing_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
+            flown = _fly(campaign, inputs, ids)
         found = [*_failed(campaign, flown), *_other_bits(campaign, inputs, ids, flown)]
         return found or [
             *_never_set(campaign, flown),
@@ -53,6 +66,45 @@ def faults(campaign: Campaign) -> list[str]:
         return [str(error).removesuffix(MORE)]
     except Exception as error:
         return [fault_of(error, campaign.model_reference)]
+
+
+def _fly_nominal(campaign: Campaign) -> None:
+    """Fly the nominal case, after a single step of it that compiles the kernel; end the process with a sentence if it
+    does not land."""
+    clock, inputs, ids = campaign.model.clock, nominal_row(campaign), np.array([NOMINAL_NOISE])
+    one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
+    fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
+    with _landing_within(LONGEST_S, "the nominal case has", campaign):
+        _fly(campaign, inputs, ids)
+
+
+@contextmanager
+def _landing_within(seconds: float, who: str, campaign: Campaign) -> Iterator[None]:
+    """A kernel cannot be broken off: where the block takes longer, the process ends with a sentence."""
+
+    def give_up() -> None:
+        _answer([f"{who} not landed after {seconds:.0f} s: {_length(campaign)}"])
+        os._exit(0)
+
+    timer = threading.Timer(seconds, give_up)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _length(campaign: Campaign) -> str:
+    """What the clock allows, and what to do about a flight that takes too long."""
+    clock, (_, settings) = campaign.model.clock, nominal_inputs(campaign)
+    if isinstance(clock, FixedStep):
+        n_steps, step, _ = grid_of(clock, settings)
+        what, fix = f"{n_steps:,} steps of {step:g} s", "take longer steps, or an earlier `until`"
+    else:
+        what, fix = f"up to {clock.attempts:,} attempts", "take a larger `rtol` or fewer `attempts`"
+    stops = "; look whether its stopping event crosses zero" if campaign.model.event_list else ""
+    return f"its clock allows {what}; {fix}{stops}, or leave the flight out with `mc-engine check --no-model`"
 
 
 def _fly(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
@@ -188,7 +240,11 @@ def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarr
 
 def main() -> None:
     """Print the sentences on the campaign named on the command line as a JSON list."""
-    print(json.dumps(faults(load_campaign(sys.argv[1]))))
+    _answer(faults(load_campaign(sys.argv[1])))
+
+
+def _answer(sentences: list[str]) -> None:
+    print(json.dumps(sentences), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
 """Figures that a model asks of every report, as data: what to draw, not how.
 
-The run's manifest keeps them, so that a report can be made years later without the model.
+The run's manifest keeps them, so that a report can be made years later without the model.  Columns are those of the
+table of cases: inputs, metrics, `end_` states; a figure over an input that a run does not disperse is left out of its
+report.  Where `upstream` is True, x and y may be columns of the run that a campaign takes its inputs from.
 """
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 
@@ -15,6 +17,7 @@ class MapFigure:
     x: str
     y: str
     title: str
+    upstream: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,7 @@ class ScatterFigure:
     x: str
     y: str
     title: str
+    upstream: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -68,9 +72,11 @@ class CorridorFigure:
     y: str
     metrics: tuple[str, ...]
     title: str
+    upstream: bool = field(default=False, kw_only=True)
 
 
-KINDS = {
+Figure = MapFigure | HistoryFigure | ScatterFigure | FootprintFigure | ProfileFigure | CorridorFigure
+KINDS: dict[str, type[Figure]] = {
     "map": MapFigure,
     "history": HistoryFigure,
     "scatter": ScatterFigure,
@@ -89,4 +95,5 @@ def to_record(figure: Any) -> dict[str, Any]:
 def from_record(record: dict[str, Any]) -> Any:
     """The figure that `to_record` wrote."""
     values = {key: tuple(value) if isinstance(value, list) else value for key, value in record.items() if key != "kind"}
-    return KINDS[record["kind"]](**values)
+    kind: Any = KINDS[record["kind"]]
+    return kind(**values)

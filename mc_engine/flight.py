@@ -19,11 +19,12 @@ from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model import AdaptiveStep, FixedStep, Model, Refusals
 from mc_engine.physics_source import place_of
 from mc_engine.physics_trial import refuse_unfit
+from mc_engine.preparation import call_prepare
 from mc_engine.status import OK, REFUSED, STATUS_NAME
 from mc_engine.suggestions import hint
 
 Inputs = Mapping[str, Any]
-_MOST_STEPS = 10**10  # of a flight: hours of one core
+_MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
 
@@ -58,8 +59,7 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
     columns: Mapping[str, np.ndarray] = vars(si)
     if model.prepare is not None:
         words = SimpleNamespace(**{setting.symbol: settings[:, i] for i, setting in enumerate(model.settings)})
-        with np.errstate(all="ignore"):  # refused cases may divide by zero on their way
-            columns = model.prepare(si, words, refusals)
+        columns = call_prepare(model, si, words, refusals)
     if not isinstance(columns, Mapping):
         raise ModelError(f"{_design(model)} gives {type(columns).__name__}; it must return a dictionary of arrays by "
                          "the fields of kernel_parameters")  # fmt: skip
@@ -77,11 +77,23 @@ def _row(model: Model, columns: Mapping[str, Any], name: str, n_cases: int) -> n
         )
         raise ModelError(f'kernel_parameters has the field "{name}", but {source}{hint(name, columns)}')
     try:
-        return np.broadcast_to(np.asarray(columns[name], dtype=np.float64), n_cases)
-    except (ValueError, TypeError):
-        what = f"shape {np.shape(columns[name])}" if np.ndim(columns[name]) else type(columns[name]).__name__
-        raise ModelError(f'{_design(model)} gives "{name}" as {what}; it must be a number for each of {n_cases} '
-                         "cases") from None  # fmt: skip
+        column = np.asarray(columns[name])
+    except ValueError:  # of rows that differ in length
+        column = np.asarray(None)
+    # one number counts for all cases; an array of one would do so by mistake
+    if column.dtype.kind in "biuf" and column.shape in ((), (n_cases,)):
+        return np.broadcast_to(column.astype(np.float64, copy=False), n_cases)
+    raise ModelError(f'{_design(model)} gives "{name}" as {_described(columns[name], column)}; it must be a number for '
+                     f"each of {n_cases} cases")  # fmt: skip
+
+
+def _described(value: Any, column: np.ndarray) -> str:
+    """What is wrong with a column."""
+    if column.dtype.kind == "c":
+        return "complex numbers"
+    if column.ndim == 0:
+        return type(value).__name__
+    return f"shape {column.shape}" if column.dtype.kind in "biuf" else f"an array of {column.dtype.name}"
 
 
 def _design(model: Model) -> str:
@@ -102,11 +114,13 @@ def fly(
     *,
     folder: Path | None = None,
     width: int | None = None,
+    clock: FixedStep | AdaptiveStep | None = None,
 ) -> dict[str, np.ndarray]:
     """Results of some cases as columns: status, reason, `end_...` states and metrics in declared units.
 
     case_ids : int64[n], the addresses of the noise.  Cases of different settings may be mixed.
     width : cases at a time, 1, 8 or 16; what is fastest for the model unless said.
+    clock : another one of the kind of the model's own; the kernel is the same.
     """
     n, width = len(case_ids), width or usual_width(model)
     ready = prepare(model, inputs, n)
@@ -115,7 +129,7 @@ def fly(
     states = np.full((len(model.states), n), np.nan)
     metrics = np.full((len(model.metrics), n), np.nan)
     for chosen in _groups(ready):
-        flight = _fly_group(model, ready, chosen, case_ids, seed, folder, width)
+        flight = _fly_group(model, clock or model.clock, ready, chosen, case_ids, seed, folder, width)
         time[chosen], status[chosen], states[:, chosen], metrics[:, chosen] = flight
     metrics[:, status != OK] = np.nan
     columns: dict[str, np.ndarray] = {
@@ -190,16 +204,23 @@ def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tupl
 
 
 def _fly_group(
-    model: Model, ready: Prepared, chosen: np.ndarray, case_ids: np.ndarray, seed: int, folder: Path | None, width: int
+    model: Model,
+    clock: FixedStep | AdaptiveStep,
+    ready: Prepared,
+    chosen: np.ndarray,
+    case_ids: np.ndarray,
+    seed: int,
+    folder: Path | None,
+    width: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     n = chosen.size
     # blocks on a fixed grid are filled up; adaptive lanes take the cases in turn, and want one each to begin with
-    padded = max(n, width) if isinstance(model.clock, AdaptiveStep) else -(-n // width) * width
+    padded = max(n, width) if isinstance(clock, AdaptiveStep) else -(-n // width) * width
     index = np.concatenate([chosen, np.full(padded - n, chosen[-1])])
     out = _outputs(model, padded)
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
     cases = ready.parameters[:, index], settings, ready.tables
-    _bound_kernel(model, folder, width, cases, seed, case_ids[index], out, _NO_HISTORY, 1.0)()
+    _bound_kernel(model, clock, folder, width, cases, seed, case_ids[index], out, _NO_HISTORY, 1.0)()
     time, status, states, metrics = out
     return time[:n], status[:n], states[:, :n], metrics[:, :n]
 
@@ -213,6 +234,7 @@ def _outputs(model: Model, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, 
 
 def _bound_kernel(
     model: Model,
+    clock: FixedStep | AdaptiveStep,
     folder: Path | None,
     width: int,
     inputs: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -234,9 +256,9 @@ def _bound_kernel(
     kernel_settings = _kernel_settings(model, settings, tables)
     shared = np.ascontiguousarray(parameters), kernel_settings, np.uint64(noise_key(seed)), cases
     chosen = settings_of(model, settings)
-    if isinstance(model.clock, AdaptiveStep):
-        return partial(kernel, *shared, *adaptive_arguments(model, model.clock, chosen), *out, history, float(pace))
-    return partial(kernel, *shared, *grid_of(model.clock, chosen), *out, history, int(pace))
+    if isinstance(clock, AdaptiveStep):
+        return partial(kernel, *shared, *adaptive_arguments(model, clock, chosen), *out, history, float(pace))
+    return partial(kernel, *shared, *grid_of(clock, chosen), *out, history, int(pace))
 
 
 def bound_flight(
@@ -255,7 +277,8 @@ def bound_flight(
     out = _outputs(model, chosen.size)
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
     cases = ready.parameters[:, chosen], settings, ready.tables
-    return _bound_kernel(model, folder, width, cases, seed, case_ids[chosen], out, _NO_HISTORY, 1.0), out[0], settings
+    ids = case_ids[chosen]
+    return _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, _NO_HISTORY, 1.0), out[0], settings
 
 
 def fly_history(
@@ -285,7 +308,7 @@ def fly_history(
     history = np.empty((n_rows, len(names)))
     ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
     cases = parameters, settings, ready.tables
-    n = _bound_kernel(model, folder, width, cases, seed, ids, _outputs(model, width), history, pace)()
+    n = _bound_kernel(model, model.clock, folder, width, cases, seed, ids, _outputs(model, width), history, pace)()
     factors = [1.0, *(quantity.si_factor for quantity in model.quantities)]
     return columns, {name: history[:n, i] / factors[i] for i, name in enumerate(names)}
 

@@ -4,12 +4,17 @@ While cases fly, the first signal lets what is in flight land, the second breaks
 line the first one ends what it is at, the second one the process, whatever it does.  Either way the exit status is
 INTERRUPTED, and the last words are the command that goes on.  This module loads next to nothing: the command line
 listens before it loads the rest of itself.
+
+Python hands signals to its main thread, between two steps of its own; a kernel that flies there holds them off for as
+long as it flies.  So a thread of the command line hears them too: it says at once that the first one was heard, and
+ends the process where the main thread does not heed the second.
 """
 
 import atexit
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -19,6 +24,12 @@ from typing import Any
 INTERRUPTED = 4  # the exit status
 NOTHING_BEGUN = "interrupted; nothing was begun, and the same command begins it"
 ONCE_MORE = "interrupted; the same command does it all once more"
+LANDING = "interrupted; what flies lands first, a second signal ends it at once"
+BUSY = "interrupted; what is being worked out ends first, a second signal ends it at once"
+
+_PROMPT_S = 0.5  # what the main thread may take to heed a signal
+_LEAVING_S = 5.0  # and to end its workers after the second one
+_ONE_SIGNAL_S = 0.05  # what comes so soon after another was sent along with it: to the process, and to its group
 
 # Windows has Ctrl-Break beside Ctrl-C, and SIGTERM in name only.
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name))
@@ -39,12 +50,16 @@ Advice = Callable[[], str]
 class _CommandLine:
     """What the signals of this process find: there is one set of handlers in a process, and so one of these.
 
-    heard : how many came.  under_way : a verb is at work, which an exception may unwind.  done : it has ended.
+    heard : how many the main thread has heeded.  noticed : how many came, as the watch counts them.
+    under_way : a verb is at work, which an exception may unwind.  landing : what flies is let land before.
+    done : the verb has ended.
     """
 
     listening: bool = False
     heard: int = 0
+    noticed: int = 0
     under_way: bool = False
+    landing: bool = False
     done: bool = False
     advice: Advice = lambda: NOTHING_BEGUN
 
@@ -59,10 +74,41 @@ class _CommandLine:
         self.leave_at_once()
 
     def leave_at_once(self) -> None:
-        # not through sys.stderr, in the middle of whose writing the signal may have come
-        with suppress(OSError):
-            os.write(2, f"{last_words()}\n".encode())
+        _tell(last_words())
         os._exit(INTERRUPTED)
+
+    def notice(self) -> None:
+        """What the watch does about a signal; the main thread may be free to hear it, or not."""
+        self.noticed += 1
+        if self.noticed == 1 and self.landing:
+            _tell(LANDING)
+        elif self.noticed == 1:
+            _later(_PROMPT_S, self._tell_unless_heeded)
+        elif self.noticed == 2:
+            _later(_PROMPT_S, self._leave_unless_heeded)
+
+    def _tell_unless_heeded(self) -> None:
+        if not self.heard and not self.done:
+            _tell(BUSY)
+
+    def _leave_unless_heeded(self) -> None:
+        if self.heard > 1:
+            time.sleep(_LEAVING_S)
+        if not self.done:
+            self.leave_at_once()
+
+
+def _tell(words: str) -> None:
+    """A line on standard error; not through sys.stderr, in the middle of whose writing a signal may have come."""
+    with suppress(OSError):
+        begin = "\n" if os.isatty(2) else ""  # behind ^C and a bar of progress
+        os.write(2, f"{begin}{words}\n".encode())
+
+
+def _later(seconds: float, act: Callable[[], None]) -> None:
+    timer = threading.Timer(seconds, act)
+    timer.daemon = True
+    timer.start()
 
 
 _COMMAND_LINE = _CommandLine()
@@ -73,7 +119,34 @@ def listen() -> None:
     _COMMAND_LINE.listening = True
     for number in SIGNALS:
         signal.signal(number, _COMMAND_LINE.hear)
+    _begin_watch()
     atexit.register(_be_deaf)  # the first one registered is the last one called
+
+
+def _begin_watch() -> None:
+    """Begin the thread that hears the signals whatever the main thread is at; without one where the system refuses."""
+    reading, writing = os.pipe()
+    try:
+        if os.name == "posix":
+            os.set_blocking(writing, False)  # as Python asks for; on Windows pipes have no such thing
+        signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
+    except (OSError, ValueError):
+        return
+    threading.Thread(target=_watch, args=(reading,), name="signals", daemon=True).start()
+
+
+def _watch(reading: int) -> None:
+    """Notice every signal whose number Python writes into the pipe the moment it comes."""
+    if hasattr(signal, "pthread_sigmask"):  # they are for the main thread, whose waiting they end
+        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+    last = -_ONE_SIGNAL_S
+    while numbers := os.read(reading, 64):
+        if not set(numbers) & set(SIGNALS):
+            continue
+        now = time.monotonic()
+        if now - last >= _ONE_SIGNAL_S:
+            _COMMAND_LINE.notice()
+        last = now
 
 
 def _be_deaf() -> None:
@@ -132,11 +205,13 @@ def stop_signal() -> Iterator[threading.Event]:
         stop.set()
 
     before: dict[int, Any] = {number: signal.signal(number, ask) for number in SIGNALS}
+    _COMMAND_LINE.landing = True
     if _COMMAND_LINE.heard:  # before there was this event to set
         stop.set()
     try:
         yield stop
     finally:
+        _COMMAND_LINE.landing = False
         for number, handler in before.items():
             signal.signal(number, handler)
 

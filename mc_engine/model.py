@@ -28,7 +28,7 @@ from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
 from mc_engine.files_beside import importable
 from mc_engine.files_read import USER, has_changed, loading
-from mc_engine.model_faults import place_in_model, wrong_record
+from mc_engine.model_faults import place_in_model, relative_import, wrong_record
 from mc_engine.model_sources import sources_beside
 from mc_engine.syntax_tree import parse
 from mc_engine.units import UNITS, unit_suffix
@@ -41,6 +41,8 @@ DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}  # of events, and t
 class Field:
     """A named number: column name ending in its unit, the unit, a one-line meaning.
 
+    Axes of figures say the name in words: `sun_angle_deg` is "sun angle [deg]"; of an input that is a symbol, such as
+    `ve_pct`, the meaning up to a comma or semicolon too.
     sometimes : a metric that exists, or differs, only with some settings; `check` does not miss it.
     """
 
@@ -120,6 +122,8 @@ class Event:
 
     direction : "rising", "falling" or "either".  action : "stop" ends the case, "switch" calls the model's `switch`.
     rare : it may never happen in ordinary cases, or only with some settings; `check` does not miss it.
+    In a model with a stopping event, a case that reaches the clock's `until` has not come to its end: its status is
+    no-stop, which counts as failed.  Where the time is a good end too, let it be an event, t - limit, before `until`.
     """
 
     name: str
@@ -132,7 +136,8 @@ class Event:
 class FixedStep:
     """Classical Runge-Kutta of fourth order on a common grid; control is sampled every `control_every` steps.
 
-    step, until : SI numbers, or the symbols of settings that hold them.
+    step, until : SI numbers, or the symbols of settings that hold them; 1e9 steps at most.  `until` ends the flight;
+        in a model with a stopping event, see Event.
     """
 
     step: float | str
@@ -145,13 +150,13 @@ class FixedStep:
 class AdaptiveStep:
     """An embedded Runge-Kutta pair whose step every case chooses by itself, to the tolerances.
 
-    until : time limit [s], or the symbol of a setting that holds it
+    until : time limit [s], or the symbol of a setting that holds it; in a model with a stopping event, see Event
     rtol : error of a step in the state's own size, or the symbol of a setting
     atol : the same in SI, one number for all states or one for each
     control_period : time [s] from one sample of `control` to the next, the symbol of a setting, or a function of the
         settings; steps end there
     method : "dop853" (order 8), or "dp54" (order 5)
-    attempts : a case that needs more steps, good or rejected, ends as step-limit
+    attempts : a case that needs more steps, good or rejected, ends as step-limit; 1e9 at most
     first_step : length [s] of the first attempt; 0 chooses it
     """
 
@@ -168,8 +173,10 @@ class AdaptiveStep:
 class Model:
     """A flyable system.  All functions are physics (see `mc_engine.lanes`) unless said otherwise.
 
-    prepare(inputs, settings, refusals) : NumPy, whole chunk.  SI arrays and setting codes by symbol in; SI arrays
-        by the field names of `kernel_parameters` out; cases that cannot start join `refusals`.  Default: pass on.
+    prepare(inputs, settings, refusals) : NumPy, whole chunk.  In: SI arrays and setting codes, attributes by symbol,
+        `inputs.altitude` for altitude_km.  Out: a dictionary of SI arrays, or of numbers for all cases, by the field
+        names of `kernel_parameters`, such as {**vars(inputs), "burn_dv": dv}.  Cases that cannot start join by
+        refusals.add(mask, "why").  Default: pass on.
         An array "tables" [n, k] goes behind the model's tables: a parameter must say where each case's begins.
     initial(p, o) -> State
     rhs(t, s, m, p, o) -> State of derivatives
@@ -346,7 +353,7 @@ def _fault(reference: str, error: BaseException) -> str:
         return f"{place}: {error}"
     if word := re.fullmatch(r"Type names and field names cannot be a keyword: '(\w+)'", str(error)):
         return f'{place}: the name "{word[1]}" is a word of Python; take another'
-    if words := wrong_record(error):
+    if words := wrong_record(error) or relative_import(error):
         return f"{place}: {words}"
     text = error.msg if isinstance(error, SyntaxError) else str(error)
     return f"{place}: {type(error).__name__}: {text}"

@@ -1,39 +1,19 @@
 """What is wrong with a model that cannot be compiled or flown, in a sentence with its place."""
 
 import re
-import sysconfig
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from traceback import extract_tb, walk_tb
+from traceback import walk_tb
+from types import TracebackType
 
+from mc_engine.compiler_faults import compiler_fault, is_the_users
 from mc_engine.errors import EngineError, ModelError
 from mc_engine.suggestions import hint
 
 MORE = "; `mc-engine check` tells more"
-_ENGINE = Path(__file__).resolve().parent
-_PYTHON = Path(sysconfig.get_path("stdlib")).resolve()
-_LANES = "physics uses the functions of mc_engine.lanes"
-# The compiler's words, and what to do about them.
-_CAUSES = (
-    (r"function Function\(<class '(?:bool|range)'>\)", "`if`, `and`, `or`, `not` or a loop's length on a number that "
-     "differs from case to case; use where(condition, a, b)"),
-    (r"function Function\(<built-in function i?(?:add|sub|mul|truediv)>\)", "arithmetic on a truth value or a tuple; "
-     "write where(condition, 1.0, 0.0)"),
-    (r"function Function\(<built-in function i?pow>\)", "`**` takes a whole number that is written out; other powers "
-     "are pow(x, y) of mc_engine.lanes"),
-    (r"function Function\(<built-in function i?mod>\)", "`%` takes no lanes; write x - y * floor(x / y)"),
-    (r"function Function\(<built-in function i?floordiv>\)", "`//` takes no lanes; write floor(x / y)"),
-    (r"function Function\(<built-in function invert>\)", "`~` takes no lanes; write `not mask`"),
-    (r"function Function\(<(?:built-in function|ufunc|class) '?(\w+)'?>\)", f"`{{0}}` takes no lanes; {_LANES}"),
-    (r"Untyped global name '(\w+)'.*<class 'function'>", "`{0}` is not marked; write @physics on the line above it"),
-    (r"Untyped global name '(\w+)'|assigned to variable '(\w+)' in globals", "`{0}` is nothing that physics can read; "
-     "it reads numbers, tuples and marked functions"),
-    (r"Unknown attribute '(\w+)' of type Module", f"`{{0}}` is a module's own; {_LANES}"),
-    (r"opcode \((?:STORE|DELETE)_GLOBAL\)", "`global` in physics; what changes is kept in the state or in the memory"),
-    (r"NRT required", "an array, a list or a text is made in physics; keep numbers in named tuples instead"),
-)  # fmt: skip
+_COMPILER = ("numba", "llvmlite")
 
 
 @contextmanager
@@ -62,11 +42,18 @@ def fault_of(error: Exception, reference: str) -> str:
 
 def place_in_model(error: BaseException) -> str:
     """Such as "model.py, line 12": the last place outside the engine and the libraries that the error came through."""
-    for frame in reversed(extract_tb(error.__traceback__)):
-        path = Path(frame.filename)
-        if path.suffix == ".py" and _is_the_users(path):
-            return f"{path.name}, line {frame.lineno}"
-    return ""
+    spot = spot_in_model(error)
+    return f"{Path(spot.tb_frame.f_code.co_filename).name}, line {spot.tb_lineno}" if spot else ""
+
+
+def spot_in_model(error: BaseException) -> TracebackType | None:
+    """Where `place_in_model` is, as an entry of the traceback."""
+    found, spot = None, error.__traceback__
+    while spot is not None:
+        path = Path(spot.tb_frame.f_code.co_filename)
+        found = spot if path.suffix == ".py" and is_the_users(path) else found
+        spot = spot.tb_next
+    return found
 
 
 def wrong_record(error: BaseException) -> str:
@@ -87,22 +74,24 @@ def wrong_record(error: BaseException) -> str:
     return ""
 
 
-def _is_the_users(path: Path) -> bool:
-    path = path.resolve()
-    libraries = {_ENGINE, _PYTHON} & set(path.parents) or "site-packages" in path.parts
-    return not libraries and not path.name.startswith("kernel_w")
+def relative_import(error: BaseException) -> str:
+    """What is wrong with an import that begins with a dot, in a model that is a file; "" for other errors."""
+    if not isinstance(error, ImportError) or "relative import with no known parent" not in str(error):
+        return ""
+    return "an import from a dot, which a model's file cannot have; leave the dot out, as in from guidance import ..."
 
 
 def _place_and_cause(error: Exception) -> tuple[str, str]:
     """(place, or nothing; the error in one line): of the compiler's pages only the cause and what to do instead."""
-    if not type(error).__module__.startswith("numba"):
-        return place_in_model(error), f"{type(error).__name__}: {error}"
-    lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]  # without colours
-    cause = next((line for line in lines if line and not line.startswith("Failed in")), type(error).__name__)
-    places = [match for line in lines if (match := re.match(r'File "([^"]+)", line (\d+)', line))]
-    own = [match for match in places if _is_the_users(Path(match[1].replace("\\", "/")))]
-    spot = f"{Path(own[0][1].replace(chr(92), '/')).name}, line {own[0][2]}" if own else ""
-    for pattern, meaning in _CAUSES:
-        if match := re.search(pattern, cause):
-            return spot, meaning.format(*[group for group in match.groups() if group] or [""])
-    return spot, cause
+    if _of_the_compiler(error):
+        return compiler_fault(str(error))
+    return place_in_model(error), " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def _of_the_compiler(error: Exception) -> bool:
+    """Whether an error is the compiler's, or broke out of it on the way."""
+    *_, (frame, _) = [(None, 0), *walk_tb(error.__traceback__)]
+    if isinstance(error, OSError | MemoryError):
+        return False  # the machine's
+    broken = frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in _COMPILER
+    return broken or type(error).__module__.split(".")[0] in _COMPILER

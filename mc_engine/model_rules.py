@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
-from mc_engine.figures import KINDS
+from mc_engine.figure_rules import refuse_false_figures
 from mc_engine.model import DIRECTIONS, AdaptiveStep, Event, Extremum, Field, FixedStep, Model, Parameter, Setting
 from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_hint, unit_suffix
@@ -17,6 +17,7 @@ _CASE_COLUMNS = ("case_id", "status", "reason", "end_time_s")  # the engine's ow
 _HISTORY_COLUMNS = ("case_id", "t_s")
 _ACTIONS = ("stop", "switch")
 _EXTREMA = ("max", "min", "last_above")
+_MOST_ATTEMPTS = 1e9  # of a case, as there are steps on a fixed grid: minutes of one core
 _METHODS = {"FixedStep": ("rk4",), "AdaptiveStep": ("dop853", "dp54")}
 
 
@@ -50,6 +51,7 @@ def refuse_contradictions(model: Model) -> None:
         raise ModelError("event_list names events, but the model has no function `events`")
     for event in model.event_list:
         _refuse_event(event, model.switch is not None)
+    refuse_false_figures(model)
     _refuse_clock(model.clock, [one.symbol for one in model.settings], len(model.states))
 
 
@@ -58,10 +60,6 @@ def _refuse_other_records(model: Model) -> None:
     be."""
     kinds = {"parameters": Parameter, "settings": Setting, "states": Field, "quantities": Field, "metrics": Field,
              "event_list": Event, "extrema": Extremum}  # fmt: skip
-    for figure in model.figures if isinstance(model.figures, tuple) else (model.figures,):
-        if not isinstance(figure, tuple(KINDS.values())):
-            known = ", ".join(kind.__name__ for kind in KINDS.values())
-            raise ModelError(f"`figures` holds {figure!r}; it must be a tuple of figures of mc_engine.figures: {known}")
     for name, kind in kinds.items():
         items = getattr(model, name)
         if not isinstance(items, tuple) or not all(isinstance(one, kind) for one in items):
@@ -154,7 +152,7 @@ def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], n_states
     _refuse_time("rtol", clock.rtol, settings)
     if not callable(clock.control_period):
         _refuse_time("control_period", clock.control_period, settings, most=inf)
-    _refuse_time("attempts", clock.attempts, [], least=1.0)
+    _refuse_time("attempts", clock.attempts, [], least=1.0, most=_MOST_ATTEMPTS)
     _refuse_time("first_step", clock.first_step, [], least=0.0)
     tolerances = clock.atol if isinstance(clock.atol, tuple) else (clock.atol,) * n_states
     if len(tolerances) != n_states:
@@ -173,6 +171,7 @@ def _refuse_time(name: str, value: Any, settings: list[str], least: float | None
             )
         return
     allowed = "above 0" if least is None else f"at least {least:g}"
+    allowed += f", and {most:,.0f} at most" if most <= _MOST_ATTEMPTS else ""
     number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     if not number or not (0.0 < value <= most if least is None else least <= value <= most):
         raise ModelError(f"the clock's `{name}` is {value!r}; it must be a number {allowed}")

@@ -24,6 +24,7 @@ from mc_engine.replay_files import history_figure
 from mc_engine.run_summary import case_line, judgement, summaries, verdict_line
 from mc_engine.shell_words import shell_word
 from mc_engine.store import Store, open_store
+from mc_engine.suggestions import hint
 
 if TYPE_CHECKING:
     from mc_engine.runner import Replay
@@ -36,6 +37,17 @@ _DIGITS = 6
 def open_run(path: str | Path) -> "Run":
     """The run in directory `path`; StoreError if there is none, or it is damaged."""
     return Run(open_store(path))
+
+
+class _Metrics(dict[str, "Summary"]):
+    """Summaries by metric; a name that is not there is answered with the nearest."""
+
+    def __init__(self, path: Path, found: "dict[str, Summary]"):
+        super().__init__(found)
+        self._path = path
+
+    def __missing__(self, name: str) -> "Summary":
+        raise StoreError(f'{self._path}: there is no metric "{name}"{hint(str(name), self)}')
 
 
 @dataclass(frozen=True)
@@ -73,8 +85,8 @@ class Run:
 
     @cached_property
     def metrics(self) -> "dict[str, Summary]":
-        """Moments and quantiles of every metric, with n_used of n_tried."""
-        return summaries(self.store)
+        """Moments and quantiles of every metric, with n_used of n_tried; StoreError for a name that is no metric."""
+        return _Metrics(self.store.path, summaries(self.store))
 
     @property
     def nominal(self) -> "Case":
@@ -82,7 +94,10 @@ class Run:
         return self.case(NOMINAL)
 
     def case(self, case_id: int) -> "Case":
-        """One case by its number; -1 is the nominal one.  StoreError if it is not there."""
+        """One case by its number; -1 is the nominal one.  StoreError if it is not there, or no number."""
+        if not isinstance(case_id, int | np.integer) or isinstance(case_id, bool):
+            raise StoreError(f"{self.path}: case {case_id!r} is not there; cases are whole numbers, from 0 to "
+                             f"{self.store.n_cases - 1}, and {NOMINAL} is the nominal one")  # fmt: skip
         row = self.store.nominal() if case_id == NOMINAL else self.store.row(case_id)
         if not row:
             resume = f"`mc-engine resume {shell_word(self.path)}`"

@@ -7,19 +7,16 @@ follow is left to the trial and to the compiler.
 import ast
 import builtins
 import inspect
-import random
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import CodeType, FunctionType
 from typing import Any
-
-import numpy as np
 
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model import Model
-from mc_engine.syntax_tree import parse
+from mc_engine.physics_loops import MOST_TIMES, counts, times
+from mc_engine.physics_scope import Scope, code_of, definition_of, running, shortened
 
 # The arguments that the engine hands to each function of a model.
 ARGUMENTS = {
@@ -37,14 +34,11 @@ ARGUMENTS = {
 INTERPRETED = ("prepare", "tables")  # NumPy, a whole chunk at a time
 _ENGINE = Path(__file__).resolve().parent
 _ALLOCATING = {"array", "arange", "empty", "zeros", "ones", "full", "linspace", "stack", "concatenate", "list", "dict"}
-_READ = (ast.Name, ast.Attribute, ast.Call, ast.List, ast.ListComp, ast.Dict, ast.DictComp, ast.Set, ast.SetComp,
-         ast.While, ast.Global, ast.Nonlocal, ast.Import, ast.ImportFrom, ast.Subscript, ast.Compare)  # fmt: skip
-_AT_DEFINITION = {"annotation", "returns", "defaults", "kw_defaults", "decorator_list"}  # run once, by Python alone
+_MADE = ast.List | ast.ListComp | ast.Dict | ast.DictComp | ast.Set | ast.SetComp
 _BUILTINS = {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range",
              "round", "sum", "tuple", "zip"}  # fmt: skip
 _RECORD = {"_replace": "write State(...) with every field", "_asdict": "name the fields one by one",
            "_make": "write State(...) with every field"}  # fmt: skip
-_MOST_TIMES = 1_000_000  # of a loop, in one step
 _FOREIGN = {"numpy", "numba", *sys.stdlib_module_names}
 _OWN = "a case must depend on its inputs and case_id alone"
 _KEEP = "what changes is kept in the state or in the memory"
@@ -62,13 +56,13 @@ def source_faults(model: Model) -> list[str]:
 
 def is_shipped(model: Model) -> bool:
     """Whether the model is one of the project's own campaigns, which its tests hold to the contract."""
-    code = _code(model.rhs)
+    code = code_of(model.rhs)
     return code is not None and _ENGINE.with_name("campaigns") in Path(code.co_filename).resolve().parents
 
 
 def place_of(function: Callable[..., Any]) -> str:
     """Such as "model.py, line 12"."""
-    code = _code(function)
+    code = code_of(function)
     return f"{Path(code.co_filename).name}, line {code.co_firstlineno}" if code else "the model"
 
 
@@ -77,10 +71,6 @@ def _functions(model: Model) -> Iterator[tuple[str, Callable[..., Any]]]:
         function = getattr(model, name)
         if function is not None:
             yield name, function
-
-
-def _code(function: Callable[..., Any]) -> CodeType | None:
-    return getattr(inspect.unwrap(getattr(function, "function", function)), "__code__", None)
 
 
 def _wrong_functions(model: Model) -> Iterator[str]:
@@ -99,23 +89,6 @@ def _wrong_functions(model: Model) -> Iterator[str]:
             yield f"{place_of(function)}: `{name}` takes ({given}); the engine gives it ({wanted})"
 
 
-@lru_cache(maxsize=64)
-def _definitions(file: str, changed: float) -> Mapping[tuple[str, int], ast.AST]:
-    """The functions of a file by name and first line, decorators included.  changed : when the file was written."""
-    tree = parse(Path(file).read_bytes())
-    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-    return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in nodes}
-
-
-def _definition(code: CodeType) -> ast.AST | None:
-    """The syntax tree of a function; None where there is no source, as in an interactive session."""
-    try:
-        known = _definitions(code.co_filename, Path(code.co_filename).stat().st_mtime)
-    except (OSError, SyntaxError, ValueError):
-        return None
-    return known.get((code.co_name, code.co_firstlineno))
-
-
 class _Reader:
     """Reads functions, each once, and gathers the faults.  settings : their choices by symbol."""
 
@@ -130,21 +103,22 @@ class _Reader:
 
         Functions are told apart by themselves, not by their code, which all that one factory makes share.
         """
-        code = _code(physics)
+        code = code_of(physics)
         if code is None or _ENGINE in Path(code.co_filename).parents:
             return
         if physics in callers:
             self._add(code, code.co_firstlineno, f"`{name}` calls itself; physics has no recursion, unroll it")
             return
-        tree = None if physics in self._read else _definition(code)
+        tree = None if physics in self._read else definition_of(code)
         self._read.add(physics)
         if tree is None:
             return
-        nodes = list(_running(tree))
-        scope = _Scope(inspect.unwrap(physics.function), nodes, self._settings)
+        if isinstance(tree, ast.AsyncFunctionDef):
+            self._add(code, code.co_firstlineno, f"`{name}` is an async def; write def, physics waits for nothing")
+            return
+        nodes = list(running(tree))
+        scope = Scope(inspect.unwrap(physics.function), nodes, self._settings)
         for node in nodes:
-            if not isinstance(node, _READ):
-                continue
             for sentence in _faults(node, name, scope):
                 self._add(code, getattr(node, "lineno", code.co_firstlineno), sentence)
             called = scope.value(node)
@@ -161,66 +135,20 @@ class _Reader:
             self.found.append(f"{Path(code.co_filename).name}, line {line}: {sentence}")
 
 
-def _running(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes under a function that are run when it is called, in the order of the text."""
-    for field, value in ast.iter_fields(node):
-        if field in _AT_DEFINITION:
-            continue
-        for child in value if isinstance(value, list) else [value]:
-            if isinstance(child, ast.AST):
-                yield child
-                yield from _running(child)
-
-
-# What the attributes of may be read: nothing of it runs code of the user's.
-_FOLLOWED = (ModuleType, np.random.Generator, np.random.RandomState, random.Random)
-
-
-class _Scope:
-    """What the names of a function stand for, as far as they come from outside of it."""
-
-    def __init__(self, function: Any, nodes: list[ast.AST], settings: Mapping[str, tuple[str, ...]]):
-        self.settings = settings
-        cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
-        self._closed = {name: cell.cell_contents for name, cell in cells}
-        self._outside = function.__globals__
-        own = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
-        own |= {node.arg for node in nodes if isinstance(node, ast.arg)}
-        own |= {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
-        self._own = own - {name for node in nodes if isinstance(node, ast.Global) for name in node.names}
-
-    def value(self, node: ast.AST) -> Any:
-        """The object that a name, or an attribute of a module, stands for; None where that is not known."""
-        if isinstance(node, ast.Name):
-            if node.id in self._own:
-                return None
-            if node.id in self._closed:
-                return self._closed[node.id]
-            return self._outside.get(node.id, getattr(builtins, node.id, None))
-        if isinstance(node, ast.Attribute):
-            owner = self.value(node.value)
-            return getattr(owner, node.attr, None) if isinstance(owner, _FOLLOWED) else None
-        return None
-
-    def is_constant(self, node: ast.AST) -> bool:
-        """Whether an expression is the same in every case and step: it names nothing but what is outside."""
-        return all(self.value(one) is not None for one in ast.walk(node) if isinstance(one, ast.Name))
-
-
-def _faults(node: ast.AST, name: str, scope: _Scope) -> Iterator[str]:
+def _faults(node: ast.AST, name: str, scope: Scope) -> Iterator[str]:
     """Sentences on one node of the function `name`."""
-    if isinstance(node, ast.List | ast.ListComp | ast.Dict | ast.DictComp | ast.Set | ast.SetComp):
+    if isinstance(node, _MADE):
         yield f"a list, dictionary or set is made in every step of `{name}`; keep numbers in named tuples instead"
-    elif isinstance(node, ast.While) and not _counts(node, scope):
+    elif isinstance(node, ast.While) and not counts(node, scope):
         yield f"`while` in `{name}` may never end for some case; write for k in range(most) and where(condition, a, b)"
     elif isinstance(node, ast.Global | ast.Nonlocal):
         yield f"`{ast.unparse(node)}` in `{name}`: {_OWN}; {_KEEP}"
-    elif isinstance(node, ast.Name) and isinstance(scope.value(node), list | dict | set):
+    elif isinstance(node, ast.Name | ast.Attribute) and isinstance(scope.value(node), list | dict | set):
         kind = type(scope.value(node)).__name__
-        yield f"`{node.id}` in `{name}` is a {kind} outside of it; physics reads numbers and tuples, {_KEEP}"
+        yield f"`{ast.unparse(node)}` in `{name}` is a {kind} outside of it; physics reads numbers and tuples, {_KEEP}"
     elif isinstance(node, ast.Call):
-        if _times(node, scope) > _MOST_TIMES:  # minutes of a step, or more
-            yield f"`{ast.unparse(node)}` in `{name}` goes round more than {_MOST_TIMES:,} times a step; shorten it"
+        if times(node, scope) > MOST_TIMES:  # minutes of a step, or more
+            yield f"`{ast.unparse(node)}` in `{name}` goes round more than {MOST_TIMES:,} times a step; shorten it"
         constant = all(scope.is_constant(one) for one in [*node.args, *(one.value for one in node.keywords)])
         yield from _wrong_call(ast.unparse(node.func), scope.value(node.func), name, constant)
     elif isinstance(node, ast.Import | ast.ImportFrom):
@@ -230,68 +158,54 @@ def _faults(node: ast.AST, name: str, scope: _Scope) -> Iterator[str]:
             yield f"`{ast.unparse(node)}` is written in `{name}`, where arrays and tuples are only read; {_KEEP}"
     elif isinstance(node, ast.Compare):
         yield from _compared_with_a_text(node, name, scope)
+        yield from _compared_by_identity(node, name, scope)
+    else:
+        yield from _beyond_physics(node, name, scope)
 
 
-def _times(node: ast.Call, scope: _Scope) -> int:
-    """How often a loop over range(...) goes round, 0 where that is not known."""
-    if scope.value(node.func) is not range or node.keywords:
-        return 0
-    bounds = [_whole(one, scope) for one in node.args]
-    known = [one for one in bounds if one is not None]
-    if len(known) < len(bounds) or not 1 <= len(known) <= 3 or known[2:] == [0]:
-        return 0
-    ends = range(*known)
-    return max(0, (ends.stop - ends.start) // ends.step)
+def _beyond_physics(node: ast.AST, name: str, scope: Scope) -> Iterator[str]:
+    """One sentence on what Python can do and a kernel cannot."""
+    text = shortened(ast.unparse(node)) if isinstance(node, ast.expr) else ""
+    if isinstance(node, ast.GeneratorExp):
+        yield f"`{text}` in `{name}` is a generator, which kernels cannot run; write its terms out, or loop with `for`"
+    elif isinstance(node, ast.Yield | ast.YieldFrom | ast.Await):
+        yield f"`{text}` in `{name}`: physics gives its result once, and at its end; write `return`"
+    elif isinstance(node, ast.Starred) and isinstance(node.ctx, ast.Store):
+        yield f"`{text}` in `{name}` takes the rest of a tuple; name each part, or cut it out, as s[2:]"
+    elif isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
+        yield f"`{text}` is set in `{name}`, where records are only read; make another, State(...) with every field"
+    elif isinstance(node, ast.With | ast.AsyncWith):
+        context = ", ".join(ast.unparse(item.context_expr) for item in node.items)
+        if not any(isinstance(item.context_expr, ast.Call) and ast.unparse(item.context_expr.func) == "open"
+                   for item in node.items):  # fmt: skip
+            yield f"`with {shortened(context)}` in `{name}` is not for physics, which only computes; leave it out"
+    elif isinstance(node, ast.Try | ast.TryStar) and not _is_plain(node, scope):
+        yield (f"`try` in `{name}`: physics raises nothing, it goes on with an infinity or with what is not a number; "
+               "keep arguments in range with where(condition, a, b)")  # fmt: skip
 
 
-def _whole(node: ast.AST, scope: _Scope) -> int | None:
-    """The whole number that is written, or named, or a power or product of such; None for anything else."""
-    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow | ast.Mult):
-        left, right = _whole(node.left, scope), _whole(node.right, scope)
-        if left is None or right is None:
-            return None
-        if isinstance(node.op, ast.Mult):
-            return left * right
-        return left**right if 0 <= right <= 64 and abs(left) <= _MOST_TIMES else None
-    value = node.value if isinstance(node, ast.Constant) else scope.value(node)
-    return value if isinstance(value, int) else None
+def _is_plain(node: ast.Try | ast.TryStar, scope: Scope) -> bool:
+    """Whether it is a `try` that kernels have: one that asks for no error by its kind."""
+    kinds = [scope.value(one.type) for one in node.handlers if one.type is not None]
+    return isinstance(node, ast.Try) and all(kind is Exception for kind in kinds)
 
 
-def _counts(loop: ast.While, scope: _Scope) -> bool:
-    """Whether a loop goes on until a counter, which it only steps, passes a bound that it leaves alone."""
-    test = loop.test
-    if not (isinstance(test, ast.Compare) and len(test.ops) == 1 and isinstance(test.left, ast.Name)):
-        return False
-    step = ast.Add if isinstance(test.ops[0], ast.Lt | ast.LtE) else ast.Sub
-    if not isinstance(test.ops[0], ast.Lt | ast.LtE | ast.Gt | ast.GtE):
-        return False
-    end = test.comparators[0]
-    most = end.value if isinstance(end, ast.Constant) else _whole(end, scope)
-    if isinstance(most, int | float) and abs(most) > _MOST_TIMES:
-        return False
-    nodes = [node for line in loop.body for node in ast.walk(line)]
-    written = [node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)]
-    bound = {node.id for node in ast.walk(end) if isinstance(node, ast.Name)}
-    steps = [
-        line
-        for line in loop.body
-        if isinstance(line, ast.AugAssign)
-        and isinstance(line.target, ast.Name)
-        and line.target.id == test.left.id
-        and isinstance(line.op, step)
-        and isinstance(line.value, ast.Constant)
-        and isinstance(line.value.value, int | float)
-        and line.value.value > 0
-    ]
-    skipped = any(isinstance(node, ast.Continue) for node in nodes)
-    return bool(steps) and written.count(test.left.id) == 1 and not bound & set(written) and not skipped
+def _compared_by_identity(node: ast.Compare, name: str, scope: Scope) -> Iterator[str]:
+    """One sentence on `is` between values of a case, which are never one object: it holds in none."""
+    sides = [node.left, *node.comparators]
+    if not any(isinstance(one, ast.Is | ast.IsNot) for one in node.ops) or all(map(scope.is_constant, sides)):
+        return
+    if any(isinstance(side, ast.Constant) and side.value is None for side in sides):
+        return  # of an argument that may be left out
+    fix = "a condition stands alone, or behind `not`; numbers are compared with == or !="
+    yield f"`{shortened(ast.unparse(node))}` in `{name}` compares objects, not values; {fix}"
 
 
-def _compared_with_a_text(node: ast.Compare, name: str, scope: _Scope) -> Iterator[str]:
+def _compared_with_a_text(node: ast.Compare, name: str, scope: Scope) -> Iterator[str]:
     """One sentence if a setting is compared with a word, for which kernels have a number."""
     for one, other in zip([node.left, *node.comparators], [*node.comparators, node.left], strict=True):
         for setting, word in ((one, other), (other, one)):
-            texts = [_text(part, scope) for part in getattr(word, "elts", [word])]
+            texts = [scope.text(part) for part in getattr(word, "elts", [word])]
             if not isinstance(setting, ast.Attribute) or setting.attr not in scope.settings or None in texts:
                 continue
             if texts and scope.value(_root(setting)) is None:
@@ -299,11 +213,6 @@ def _compared_with_a_text(node: ast.Compare, name: str, scope: _Scope) -> Iterat
                 place = f"; {text!r} is {choices.index(text)}.0, its place in `choices`" if text in choices else ""
                 yield f"`{ast.unparse(node)}` in `{name}` compares with a text; in physics a setting is a number{place}"
                 return
-
-
-def _text(node: ast.AST, scope: _Scope) -> str | None:
-    value = node.value if isinstance(node, ast.Constant) else scope.value(node)
-    return value if isinstance(value, str) else None
 
 
 def _root(node: ast.expr) -> ast.expr:

@@ -6,7 +6,6 @@ trusts the counts that the model declares: nothing is flown that has not passed.
 """
 
 import dis
-import re
 from collections import namedtuple
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,15 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine import lanes
 from mc_engine.errors import ModelError
 from mc_engine.kernel_parts import NoMemory
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.noise import Draws, noise_key
 from mc_engine.model import Model
-from mc_engine.model_faults import MORE, place_in_model
+from mc_engine.model_faults import MORE
 from mc_engine.physics_source import is_shipped, place_of, source_faults
 from mc_engine.suggestions import listed
+from mc_engine.trial_faults import fault_sentence, shape_of
 
 FEW = 3  # cases on arrays
 # what the fields of each function's result are declared by
@@ -143,7 +142,7 @@ def _try_events(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any) -> None:
     result = _run(model.switch, "switch", arguments)
     if not isinstance(result, tuple) or len(result) != 2 or hasattr(result, "_fields"):
         raise Breach(
-            f"{place_of(model.switch)}: `switch` gives {_shape(result)}; it must give state and memory, (s, m)"
+            f"{place_of(model.switch)}: `switch` gives {shape_of(result)}; it must give state and memory, (s, m)"
         )
     for given, wanted, source in zip(result, (s, m), ("initial", "start"), strict=True):
         _same_record(model.switch, "switch", given, source, wanted, "named tuple")
@@ -152,8 +151,8 @@ def _try_events(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any) -> None:
 
 def _same_record(function: Callable[..., Any], name: str, given: Any, source: str, wanted: Any, what: str) -> None:
     if getattr(given, "_fields", None) != wanted._fields:
-        raise Breach(f"{place_of(function)}: `{name}` gives {_shape(given)}, `{source}` {_shape(wanted)}; both must "
-                     f"give the same {what}")  # fmt: skip
+        raise Breach(f"{place_of(function)}: `{name}` gives {shape_of(given)}, `{source}` {shape_of(wanted)}; both "
+                     f"must give the same {what}")  # fmt: skip
 
 
 def _call(model: Model, name: str, *arguments: Any) -> Any:
@@ -267,37 +266,3 @@ def _refuse_infinite(name: str, result: Any, what: str, function: Callable[..., 
             place = f"{place_of(function)}: " if function is not None else ""
             raise Breach(f'{place}`{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal case; '
                          "keep square roots, logarithms and divisions in range")  # fmt: skip
-
-
-def _shape(result: Any) -> str:
-    fields = getattr(result, "_fields", None)
-    return type(result).__name__ if fields is None else f"{type(result).__name__}({', '.join(fields)})"
-
-
-def fault_sentence(name: str, error: Exception) -> str:
-    """The error of the model's own code, at the line of the model that it comes from."""
-    return f"{place_in_model(error) or 'the model'}: `{name}`: {_cause(error)}"
-
-
-def _cause(error: Exception) -> str:
-    """What the error of interpreted physics means, with the fix."""
-    text = str(error)
-    if "truth value of an array" in text:
-        return "`if`, `and`, `or` or `not` on a number that differs from case to case; use where(condition, a, b)"
-    if "only integer scalar arrays" in text or "cannot be interpreted as an integer" in text:
-        return "a loop over a number that differs from case to case; loop over a fixed number, with where() inside"
-    if "only length-1 arrays" in text or "only 0-dimensional arrays" in text or "must be real number, not" in text:
-        return ("a function of `math`, or int() or float(), on a number that differs from case to case; take it from "
-                "mc_engine.lanes")  # fmt: skip
-    if isinstance(error, UnboundLocalError):
-        name = text.split("'")[1] if text.count("'") == 2 else "a name"
-        return f'"{name}" is set in one branch only; set it always, with where(condition, a, b)'
-    if isinstance(error, NameError):
-        ours = error.name in lanes.__all__
-        return f'"{error.name}" is not defined; {"import it from mc_engine.lanes" if ours else "define or import it"}'
-    if isinstance(error, AttributeError) and error.obj is not None and hasattr(error.obj, "_fields"):
-        return f'there is no "{error.name}" in {_shape(error.obj)}'
-    made = re.match(r"(?:\w+\.)*(\w+)\.__new__\(\) missing \d+ required positional arguments?: (.*)", text)
-    if made:
-        return f"{made[1]} is made without {made[2]}; give every field"
-    return f"{type(error).__name__}: {text}"

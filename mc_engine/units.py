@@ -24,6 +24,7 @@ class Unit:
 _DAY = 86400.0
 _DEGREE = pi / 180.0
 _G0 = 9.80665  # m/s^2, exactly
+_EV = 1.602176634e-19  # J, exactly
 
 # SI value of one unit.  A name is told from all others without regard to upper and lower case, as column names are.
 _BY_QUANTITY: dict[str, dict[str, float]] = {
@@ -43,7 +44,7 @@ _BY_QUANTITY: dict[str, dict[str, float]] = {
     "gravitational parameter": {"m^3/s^2": 1.0, "km^3/s^2": 1e9},
     "specific angular momentum": {"m^2/s": 1.0, "km^2/s": 1e6},
     "mass": {"kg": 1.0},
-    "mass flow": {"kg/s": 1.0},
+    "mass flow": {"kg/s": 1.0, "mg/s": 1e-6, "g/s": 1e-3},
     "linear density": {"kg/m": 1.0},
     "areal density": {"kg/m^2": 1.0},
     "density": {"kg/m^3": 1.0},
@@ -52,16 +53,17 @@ _BY_QUANTITY: dict[str, dict[str, float]] = {
     "first moment of mass": {"kg m": 1.0},
     "moment of inertia": {"kg m^2": 1.0},
     "force": {"N": 1.0, "uN": 1e-6, "mN": 1e-3, "kN": 1e3},
-    "impulse": {"N s": 1.0, "kN s": 1e3},
+    "impulse": {"N s": 1.0, "uN s": 1e-6, "mN s": 1e-3, "kN s": 1e3},
     "torque": {"N m": 1.0, "uN m": 1e-6, "mN m": 1e-3, "kN m": 1e3},
-    "angular momentum": {"N m s": 1.0},
+    "angular momentum": {"N m s": 1.0, "mN m s": 1e-3},
     "stiffness": {"N/m": 1.0},
     "damping": {"N s/m": 1.0},
     "rotational stiffness": {"N m/rad": 1.0, "N m/deg": 1.0 / _DEGREE},
     "rotational damping": {"N m s/rad": 1.0},
     "pressure": {"Pa": 1.0, "hPa": 1e2, "kPa": 1e3, "MPa": 1e6, "bar": 1e5},
-    "energy": {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "W h": 3600.0},
-    "power": {"W": 1.0, "kW": 1e3},
+    "energy": {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "W h": 3600.0, "eV": _EV, "keV": 1e3 * _EV, "MeV": 1e6 * _EV},
+    "power": {"W": 1.0, "mW": 1e-3, "kW": 1e3},
+    "thrust per power": {"N/W": 1.0, "mN/kW": 1e-6},
     "heat flux": {"W/m^2": 1.0, "kW/m^2": 1e3, "MW/m^2": 1e6, "W/cm^2": 1e4},
     "heat load": {"J/m^2": 1.0, "kJ/m^2": 1e3, "MJ/m^2": 1e6, "J/cm^2": 1e4},
     "temperature": {"K": 1.0},
@@ -83,17 +85,23 @@ _BY_QUANTITY: dict[str, dict[str, float]] = {
     "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
     "angle random walk": {"rad/sqrt(s)": 1.0, "deg/sqrt(s)": _DEGREE, "deg/sqrt(h)": _DEGREE / 60.0},
     "angle per revolution": {"deg/rev": _DEGREE},
-    "voltage": {"V": 1.0, "mV": 1e-3},
+    "voltage": {"V": 1.0, "mV": 1e-3, "kV": 1e3},
     "current": {"A": 1.0, "mA": 1e-3},
     "resistance": {"Ohm": 1.0},
     "charge": {"C": 1.0, "A h": 3600.0},
     "magnetic flux density": {"T": 1.0, "nT": 1e-9, "uT": 1e-6, "mT": 1e-3},
-    "magnetic dipole": {"A m^2": 1.0},
+    "rate of magnetic flux density": {"T/s": 1.0, "nT/s": 1e-9},
+    "magnetic dipole": {"A m^2": 1.0, "mA m^2": 1e-3},
 }  # fmt: skip
 _ALSO_WRITTEN = str.maketrans(
     {"²": "2", "³": "3", "µ": "u", "μ": "u", "°": "deg", "Ω": "ohm"} | dict.fromkeys(" ^*·()_")
 )
 _SUFFIX = {"%": "_pct", "day": "_days"}
+
+
+def other_endings() -> dict[str, str]:
+    """Units that a column's name does not end in letter by letter, with what it ends in: "_days" for day."""
+    return dict(_SUFFIX)
 
 
 def _suffix(unit: str) -> str:

@@ -43,6 +43,8 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
 
 
 def _runs(flown: Flown, name: str) -> tuple[RunningEstimate, ...]:
+    if flown.summaries[name].constant:
+        return ()
     values = flown.values(name)
     outer = HIGH if flown.large_is_bad(name) else LOW
     found = running_mean(values, CONFIDENCE), running_quantile(values, outer, CONFIDENCE)

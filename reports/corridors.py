@@ -13,7 +13,7 @@ from reports.document import Cell, Column, FigureBlock, Table
 from reports.drawings import nominal_point, thinned_rows
 from reports.figures import CorridorDrawing, LimitLine
 from reports.flown import Flown
-from reports.numbers import axis_label, count, number, percent, with_unit
+from reports.numbers import count, number, percent, with_unit
 from reports.tables import limit_text
 
 CONFIDENCE = 0.95
@@ -25,7 +25,7 @@ MOST_CLASSES = 7  # colours that can be told apart, "inside" among them
 def corridor_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     """The model's corridors; nothing where the campaign sets no requirement on their metrics."""
     for figure in flown.figures:
-        if isinstance(figure, CorridorFigure):
+        if isinstance(figure, CorridorFigure) and not (figure.upstream and flown.absence(figure.x, figure.y)):
             verdicts = [verdict for verdict in flown.verdicts if verdict.metric in figure.metrics]
             if verdicts:
                 violated = np.array([_violated(flown, verdict) for verdict in verdicts])
@@ -43,7 +43,8 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     placed = np.isfinite(x) & np.isfinite(y)
     used = np.flatnonzero(placed)
     if not used.size:
-        return f"{figure.title}: not drawn; none of {count(flown.n_tried)} cases has both {figure.x} and {figure.y}."
+        lacking = f"none of {count(flown.n_tried)} cases has both {figure.x} and {figure.y}"
+        return f"{figure.title}: not drawn; {flown.absence(figure.x, figure.y) or lacking}."
     words, member = _classes([verdict.name for verdict in verdicts], violated)
     # every violation stays in the picture, as far as there is room
     rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
@@ -54,8 +55,8 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
         member=member[rows],
         classes=tuple((word, int(np.count_nonzero(member[used] == k))) for k, word in enumerate(words)),
         limits=tuple(_limit_lines(flown, figure, verdicts, violated)),
-        x_label=axis_label(flown.words(figure.x), flown.unit(figure.x)),
-        y_label=axis_label(flown.words(figure.y), flown.unit(figure.y)),
+        x_label=flown.axis(figure.x),
+        y_label=flown.axis(figure.y),
         n_used=int(used.size),
         n_tried=flown.n_tried,
         nominal=nominal_point(flown, figure.x, figure.y),

@@ -6,13 +6,15 @@ import numpy as np
 
 from mc_engine.figures import HistoryFigure, MapFigure, ScatterFigure
 from mc_engine.statistics import map_metric
+from mc_engine.statistics.maps import FEWEST
+from mc_engine.statistics.summary import nearly_equal
 from reports.case_tables import FEW_CASES, input_words
 from reports.cloud_regions import cloud_regions
 from reports.document import FigureBlock
 from reports.figures import DistributionPanel, Distributions, Histories, HistoryLine, MapDrawing, ScatterDrawing
 from reports.flown import Flown
 from reports.history_bands import fair_cases, history_bands
-from reports.numbers import axis_label, number, words
+from reports.numbers import axis_label, count, number, words
 from reports.outcomes import INSIDE, case_outcomes, outcome_names
 from reports.published import published_law
 
@@ -36,20 +38,30 @@ def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN)
 
 
 def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
-    """The model's maps over inputs of this run; a sentence in place of one that cannot be drawn."""
-    for figure in flown.figures:
-        if isinstance(figure, MapFigure) and {figure.x, figure.y} <= set(flown.cases.columns):
+    """The model's maps; a sentence in place of one that cannot be drawn, one for all over inputs not dispersed."""
+    elsewhere = []
+    for figure in (one for one in flown.figures if isinstance(one, MapFigure)):
+        absent = flown.absence(figure.x, figure.y)
+        if not absent:
             yield _map_block(flown, figure)
+        elif not figure.upstream:
+            elsewhere.append(f"{figure.title} ({absent})")
+    if elsewhere:
+        yield f"Not drawn: {'; '.join(elsewhere)}."
 
 
 def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
     x, y, z = (flown.values(name) for name in (figure.x, figure.y, figure.metric))
-    if np.isfinite(z).sum() > 1 and np.nanmin(z) == np.nanmax(z):
-        return f"{figure.title}: not drawn; it is {number(np.nanmin(z))} in all cases."
+    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z))
+    reason = flown.absence(figure.metric) or _no_map(figure, x[used], y[used], z[used])
+    if reason:
+        return f"{figure.title}: not drawn; {reason}."
     surface = map_metric(x, y, z)
     if surface is None or not np.isfinite(surface.value).any():
-        return f"{figure.title}: not drawn; the run has too few cases over {figure.x} and {figure.y} for a map."
-    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z))
+        few = f"the run has too few cases over {figure.x} and {figure.y} for a map"
+        unsure = (f"nowhere is its surface over {figure.x} and {figure.y} sure enough: other inputs scatter it, the "
+                  f"{count(used.size)} cases are too few, or they lie on a line")  # fmt: skip
+        return f"{figure.title}: not drawn; {few if used.size < FEWEST else unsure}."
     rows = thinned_rows(used, flown.worst(figure.metric, WORST_RANKS))
     drawing = MapDrawing(
         surface=surface,
@@ -67,15 +79,25 @@ def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
     return FigureBlock(caption, drawing, "wide")
 
 
+def _no_map(figure: MapFigure, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> str:
+    """Why there is nothing to map in the cases that have all three numbers; empty if there is."""
+    if not z.size:
+        return f"no case has a number for {figure.metric}, {figure.x} and {figure.y}"
+    if z.size > 1 and nearly_equal(z.min(), z.max()):
+        return f"{figure.metric} is {number(z[0])} in all cases"
+    flat = [name for name, values in ((figure.x, x), (figure.y, y)) if nearly_equal(values.min(), values.max())]
+    return f"{flat[0]} is the same in all cases" if z.size > 1 and flat else ""
+
+
 def nominal_point(flown: Flown, x: str, y: str) -> tuple[float, float] | None:
     place = flown.nominal_value(x), flown.nominal_value(y)
     return None if place[0] is None or place[1] is None else (place[0], place[1])
 
 
 def scatter_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
-    """The model's scatter figures; a sentence in place of an empty one."""
+    """The model's scatter figures; a sentence in place of an empty one, none where the run upstream is another."""
     for figure in flown.figures:
-        if isinstance(figure, ScatterFigure):
+        if isinstance(figure, ScatterFigure) and not (figure.upstream and flown.absence(figure.x, figure.y)):
             yield _scatter_block(flown, figure)
 
 
@@ -83,7 +105,8 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
     x, y = flown.values(figure.x), flown.values(figure.y)
     used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     if not used.size:
-        return f"{figure.title}: not drawn; no case has both {figure.x} and {figure.y}."
+        reason = flown.absence(figure.x, figure.y) or f"no case has both {figure.x} and {figure.y}"
+        return f"{figure.title}: not drawn; {reason}."
     ends = [int(used[pick(values[used])]) for values in (x, y) for pick in (np.argmin, np.argmax)]
     outcome = case_outcomes(flown)
     rows = thinned_rows(used, np.union1d(ends, np.flatnonzero(outcome != INSIDE)[:POINTS_SHOWN]))
@@ -164,6 +187,7 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     cases = history_cases(flown)
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
     constant = []
+    missing = [name for figure in wanted for name in figure.quantities if name not in flown.histories.columns]
     for figure in wanted:
         known = [name for name in figure.quantities if name in flown.histories.columns]
         names = [name for name in known if not _is_constant(flown.histories[name].to_numpy())]
@@ -179,11 +203,13 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
             yield FigureBlock(figure.title, Histories(lines, labels, bands), "half")
     if constant:
         yield f"Not drawn, the same all through in every retained case: {', '.join(constant)}."
+    if missing:
+        yield f"Not drawn, the histories have no such quantity: {', '.join(dict.fromkeys(missing))}."
 
 
 def _is_constant(values: np.ndarray) -> bool:
     numbers = values[np.isfinite(values)]
-    return not numbers.size or numbers.min() == numbers.max()
+    return not numbers.size or nearly_equal(numbers.min(), numbers.max())
 
 
 def history_cases(flown: Flown) -> dict[int, tuple[str, int | None]]:
@@ -208,7 +234,7 @@ def _worst_reasons(flown: Flown) -> dict[int, tuple[int, str]]:
     if flown.n_tried <= FEW_CASES:
         return {int(case): (row, input_words(flown, row)) for row, case in enumerate(flown.case_ids)}
     reasons: dict[int, tuple[int, str]] = {}
-    for order, metric in enumerate(flown.key_metrics):
+    for order, metric in enumerate(name for name in flown.key_metrics if not flown.summaries[name].constant):
         which = "largest" if flown.large_is_bad(metric) else "smallest"
         for place, row in enumerate(flown.worst(metric, WORST_RANKS), start=1):
             text = f"{which} {flown.words(metric)}" + (f", no. {place}" if place > 1 else "")

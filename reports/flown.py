@@ -11,10 +11,9 @@ import pandas as pd
 from mc_engine.figures import KINDS, MapFigure, ScatterFigure, from_record
 from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
-from reports.numbers import axis_label, words
+from reports.numbers import axis_label, named, words
 
 CONFIDENCE = 0.90
-LONGEST_LABEL = 52
 
 
 class Run(Protocol):
@@ -87,12 +86,20 @@ class Flown:
         return words(name, self.unit(name))
 
     def axis(self, name: str) -> str:
-        """An axis label: an input's meaning up to a comma (its name is often a symbol), else the column's name."""
-        fact = self.columns.get(name)
-        meaning = fact.description.split(",")[0] if fact and fact.role == "dispersion" else ""
-        if fact and 0 < len(meaning) <= LONGEST_LABEL:
-            return axis_label(meaning, fact.unit)
-        return axis_label(self.words(name), self.unit(name))
+        """An axis label: the column's name in words with its unit; of an input that is a symbol, its meaning too."""
+        # Of the inputs' own records: the columns of a run upstream have its name before their meaning.
+        meanings = {
+            str(record["name"]): str(record.get("description", "")) for record in self.manifest.get("inputs", [])
+        }
+        return axis_label(named(self.words(name), meanings.get(name, "")), self.unit(name))
+
+    def absence(self, *names: str) -> str:
+        """Why the table of cases lacks one of the columns, as the end of a sentence; empty if it lacks none."""
+        shared = {record["name"] for key in ("parameters", "settings") for record in self.manifest.get(key, [])}
+        for name in names:
+            if name not in self.cases.columns:
+                return f"the run does not disperse {name}" if name in shared else f"the run has no column {name}"
+        return ""
 
     @cached_property
     def figures(self) -> list[Any]:

@@ -80,6 +80,10 @@ def footprint_contents(flown: Flown) -> FootprintContents:
 
 def _landing(flown: Flown, figure: FootprintFigure) -> _Landing | str:
     """The footprint, or the sentence that says why there is none."""
+    above_of = () if figure.ends_below is None else figure.ends_below[:1]
+    absent = flown.absence(figure.latitude, figure.longitude, *above_of)
+    if absent:
+        return f"{figure.title}: not drawn; {absent}."
     latitude, longitude = flown.values(figure.latitude), flown.values(figure.longitude)
     placed = np.isfinite(latitude) & np.isfinite(longitude) & (np.abs(latitude) <= 90.0)
     down = placed & _down(flown, figure)
@@ -293,7 +297,7 @@ def _distance_table(flown: Flown, landing: _Landing) -> Table | None:
         *(Column(f"{title} [km]", "number", 1.8) for title in titles),
         Column("Largest [km]", "number", 1.2),
     )
-    spread = summary.sd
+    spread = summary.spread
     cells = [
         Cell(
             number(item.value, 4, spread), item.value, interval(item.lower, item.upper, spread) if flown.random else ""

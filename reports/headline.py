@@ -65,7 +65,10 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         if summary.minimum is None or summary.maximum is None:
             yield Card(flown.words(name), "no number", f"{used} have one", "open")
             continue
-        large, spread = flown.large_is_bad(name), summary.sd
+        if summary.constant and summary.n_used > 1:
+            yield Card(flown.words(name), *_same(flown, name, used))
+            continue
+        large, spread = flown.large_is_bad(name), summary.spread
         end = summary.maximum if large else summary.minimum
         tail = summary.at(HIGH if large else LOW)
         limit = None if tail is None else (tail.upper if large else tail.lower)
@@ -82,6 +85,14 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         else:
             answer = f"{side} {with_unit(number(end, 4, spread), unit)} in the cases flown"
         yield Card(flown.words(name), answer, f"{'; '.join(rest)}.")
+
+
+def _same(flown: Flown, name: str, used: str) -> tuple[str, str]:
+    """Answer and detail of a metric that does not differ from case to case."""
+    summary, nominal = flown.summaries[name], flown.nominal_value(name)
+    begun = f"nominal {number(nominal)}; " if nominal is not None else ""
+    where = "in all cases" if summary.n_used == summary.n_tried else "in all cases with a number"
+    return f"{with_unit(number(summary.mean), flown.unit(name))} {where}", f"{begun}the same in {used}."
 
 
 def warnings(flown: Flown) -> tuple[str, ...]:

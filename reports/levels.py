@@ -103,11 +103,15 @@ def _level_table(
     for place, (level, group) in enumerate(zip(levels, rows, strict=True)):
         summary = summarize(values[group], probabilities=(0.5, 0.95), confidence=CONFIDENCE)
         cells = [
-            Cell(number(item.value, 4, summary.sd), item.value, _limits(flown, item.lower, item.upper, summary.sd))
+            Cell(
+                number(item.value, 4, summary.spread),
+                item.value,
+                _limits(flown, item.lower, item.upper, summary.spread),
+            )
             for item in summary.quantiles
         ] or [Cell("–"), Cell("–")]
         used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
-        largest = Cell(number(summary.maximum, 4, summary.sd), summary.maximum)
+        largest = Cell(number(summary.maximum, 4, summary.spread), summary.maximum)
         against = _difference_cells(flown, values, matched, place)
         body.append((Cell(level), used, *cells, largest, *against))
     title = f"{axis_label(flown.words(metric), flown.unit(metric))} by {flown.words(name)}"

@@ -7,6 +7,8 @@ from mc_engine.units import UNITS, unit_suffix
 
 SPACE = "\u202f"  # narrow, no-break: groups digits and stands before a unit
 MOST_DIGITS = 8  # of one number in a table
+LONGEST_SYMBOL = 3  # letters
+LONGEST_LABEL = 44  # letters of an axis label, without its unit
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
@@ -80,6 +82,18 @@ def words(name: str, unit: str) -> str:
     """A column name as words, without its unit suffix: correction_impulse_m_s is "correction impulse"."""
     suffix = unit_suffix(unit) if unit in UNITS else ""
     return (name.removesuffix(suffix) or name).replace("_", " ").strip()
+
+
+def named(name: str, meaning: str) -> str:
+    """A name in words; one that is a mere symbol, such as "ve", with its meaning up to a comma or semicolon.
+
+    A symbol has no word of more than three letters.  A meaning too long for an axis is left out.
+    """
+    clause = re.split("[,;]", meaning)[0].strip()
+    if not clause or any(len(word) > LONGEST_SYMBOL for word in name.split()):
+        return name
+    text = clause if clause.lower().startswith(name.lower()) else f"{name}: {clause}"
+    return text if len(text) <= LONGEST_LABEL else name
 
 
 def axis_label(text: str, unit: str) -> str:

@@ -38,9 +38,9 @@ def summary_table(flown: Flown) -> Table:
     rows = []
     for name, summary in flown.summaries.items():
         nominal = flown.nominal_value(name)
-        cells = [(value, number(value, scale=summary.sd)) for value in (nominal, summary.mean)]
-        cells += [(summary.sd, number(summary.sd, scale=summary.sd))]
-        cells += [(value, number(value, scale=summary.sd)) for value in (summary.minimum, summary.maximum)]
+        cells = [(value, number(value, scale=summary.spread)) for value in (nominal, summary.mean)]
+        cells += [(summary.sd, "0" if summary.constant and summary.sd else number(summary.sd, scale=summary.spread))]
+        cells += [(value, number(value, scale=summary.spread)) for value in (summary.minimum, summary.maximum)]
         used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
         rows.append(
             (metric_cell(flown, name), used, *(Cell(text, value) for value, text in cells), shape_cell(summary))
@@ -60,7 +60,7 @@ def metric_cell(flown: Flown, name: str) -> Cell:
 def shape_cell(summary: Summary) -> Cell:
     """Skewness and kurtosis in words."""
     if summary.constant:
-        return Cell("constant")
+        return Cell("constant", small="" if summary.minimum == summary.maximum else "but for rounding")
     if summary.shape is None:
         return Cell("–")
     shape = summary.shape
@@ -82,9 +82,9 @@ def quantile_table(flown: Flown) -> Table | None:
     for name, summary in drawn.items():
         cells = [
             Cell(
-                number(item.value, scale=summary.sd),
+                number(item.value, scale=summary.spread),
                 item.value,
-                interval(item.lower, item.upper, summary.sd) if flown.random else "",
+                interval(item.lower, item.upper, summary.spread) if flown.random else "",
             )
             for item in summary.quantiles
         ]

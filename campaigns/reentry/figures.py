@@ -42,7 +42,7 @@ FIGURES = (
         "entry_speed_error_m_s",
         "Largest load over the entry errors",
     ),
-    MapFigure("miss_km", "ve_pct", "oe_pct", "Landing miss over the errors of the de-orbit burn"),
+    MapFigure("miss_km", "ve_pct", "oe_pct", "Landing miss over the errors of the de-orbit burn", upstream=True),
     HistoryFigure(("altitude_km", "speed_m_s", "flight_path_angle_deg"), "Altitude, speed and flight-path angle"),
     HistoryFigure(("load_g", "heat_rate_w_m2", "dynamic_pressure_pa"), "Load, heat rate and dynamic pressure"),
     HistoryFigure(("downrange_km", "crossrange_km", "bank_deg"), "Distances over ground and bank"),

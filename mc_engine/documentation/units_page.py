@@ -6,7 +6,8 @@ from mc_engine.units import UNITS, by_quantity
 _HEAD = """# Units
 
 What a model may declare, and a campaign file may give as `unit` of a dispersion in place of the parameter's own.
-Inside, all is SI and radians. The name of a column ends in its unit; the name inside physics does not.
+Inside, all is SI and radians. The name of a column ends in its unit (`_days` for day, `_pct` for %); the name inside
+physics does not.
 `mc-engine units` prints the list.
 """
 

@@ -6,6 +6,7 @@ from typing import Any
 from numba import njit
 
 from mc_engine.lanes import lowering as _lowering  # registers the lane type and its functions
+from mc_engine.lanes import namespaces as _namespaces  # registers classes that hold constants
 from mc_engine.lanes.kernel_cache import keep_on_disk
 from mc_engine.lanes.linked import LinkedCompiler
 
@@ -22,6 +23,7 @@ _UNWRAPPED: dict[str, Any] = {
 }
 
 assert _lowering
+assert _namespaces
 
 
 def compile_inline(function: Callable[..., Any]) -> Any:

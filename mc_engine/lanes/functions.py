@@ -10,6 +10,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from mc_engine.errors import ModelError
+
 
 def sqrt(x):
     """Square root; NaN below zero.  Correctly rounded."""
@@ -49,7 +51,13 @@ def copysign(x, y):
 
 
 def where(mask, x, y):
-    """x where mask holds, y elsewhere.  Both are computed, so their arguments must be in range."""
+    """x where mask holds, y elsewhere.  Both are computed, so their arguments must be in range.
+
+    mask : truth values, as a comparison gives them.  x, y : numbers.  ModelError for others, which kernels refuse, too.
+    """
+    _refuse_number(mask, "where")
+    if _is_condition(x) or _is_condition(y):
+        raise ModelError("`where` chooses between numbers; between conditions, write (mask & x) | ((not mask) & y)")
     return _plain(np.where(mask, x, y))
 
 
@@ -85,8 +93,21 @@ def look_up(tables, place):
 
 
 def any_lane(mask):
-    """True if mask holds in at least one lane."""
+    """True if mask holds in at least one lane.  mask : as in `where`."""
+    _refuse_number(mask, "any_lane")
     return bool(np.any(mask))
+
+
+_TRUTH = np.dtype(bool)
+
+
+def _is_condition(x):
+    return isinstance(x, bool) or getattr(x, "dtype", None) == _TRUTH
+
+
+def _refuse_number(mask, name):
+    if not _is_condition(mask):
+        raise ModelError(f"`{name}` wants a condition first, and this is none; compare the number, such as x > 0.5")
 
 
 def _plain(x):

@@ -15,6 +15,13 @@ from mc_engine.statistics.normality import Normality
 from mc_engine.statistics.order_statistics import QUANTILES, Quantile, quantile, ranked_quantile, ranks_read
 from mc_engine.statistics.selection import PASSES, Selection
 
+_ROUNDING = 1e-12  # of the size of two numbers; a zero that the integration finds differs by a few 1e-16
+
+
+def nearly_equal(low: float, high: float) -> bool:
+    """Whether two numbers are the same but for rounding."""
+    return bool(high == low or abs(high - low) <= _ROUNDING * max(abs(low), abs(high)))
+
 
 @dataclass(frozen=True)
 class Summary:
@@ -32,8 +39,14 @@ class Summary:
 
     @property
     def constant(self) -> bool:
-        """All values that there are have the same bits."""
-        return self.n_used > 0 and self.minimum == self.maximum
+        """All values that there are are the same, but for rounding."""
+        return self.minimum is not None and self.maximum is not None and nearly_equal(self.minimum, self.maximum)
+
+    @property
+    def spread(self) -> float | None:
+        """sd, or None where it is that of rounding or nothing: the digits of a number that it would ask for mean
+        nothing."""
+        return None if self.constant else self.sd
 
     def at(self, probability: float) -> Quantile | None:
         """The quantile for `probability`, or None without one."""

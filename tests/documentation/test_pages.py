@@ -9,11 +9,16 @@ import pytest
 from handwritten_pages import PAGES, blocks, commands, name_of
 
 import mc_engine
+from mc_engine.campaign import SHIPPED
+from mc_engine.chunks import fly_nominal
 from mc_engine.documentation.verbs_page import commands as verbs
 from mc_engine.documentation.website import HOME
+from mc_engine.model_contract import breaches
+from mc_engine.status import STATUS_NAME
 
 RECIPES = [
-    HOME / "how_to" / f"{name}.md" for name in ("tables", "notebook", "correlated_covariances", "own_distributions")
+    HOME / "how_to" / f"{name}.md"
+    for name in ("tables", "notebook", "correlated_covariances", "own_distributions", "prepare_and_end_cases")
 ]
 HEAD = '[campaign]\nmodel = "{model}"\ncases = 1000\ndesign = "mc"\nseed = 1\n\n'
 
@@ -119,6 +124,32 @@ def test_recipes_run_from_top_to_bottom_and_their_campaigns_load(page, flown, mo
     if page.stem == "correlated_covariances":
         assert printed.strip() == blocks(page, "toml")[-1][0].strip()
     check_campaigns(page, flown)
+
+
+def test_the_page_on_how_cases_end_knows_every_status():
+    text = (HOME / "how_to" / "prepare_and_end_cases.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w-]+)` \| .* \| (yes|no) \|$", text, re.MULTILINE)
+    assert dict(rows) == {name: "no" if name == "ok" else "yes" for name in STATUS_NAME.values()}
+
+
+def test_the_prepared_campaign_keeps_the_contract_and_reaches_its_target(tmp_path):
+    """The page's function and parameter in the smallest model."""
+    (function, parameter, *_) = (text for text, _ in blocks(HOME / "how_to" / "prepare_and_end_cases.md", "python"))
+    text = (SHIPPED / "minimal" / "model.py").read_text()
+    (burn,) = [line for line in text.splitlines() if 'Parameter("burn_dv_m_s"' in line]
+    for old, new in (
+        (burn, f"        {parameter.splitlines()[-1]},"),
+        ("@physics\ndef initial", f"{function}\n\n@physics\ndef initial"),
+        ("    initial=initial,", "    prepare=prepare,\n    initial=initial,"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "model.py").write_text(text)
+    (tmp_path / "campaign.toml").write_text((SHIPPED / "minimal" / "campaign.toml").read_text())
+    campaign = mc_engine.load_campaign(tmp_path / "campaign.toml")
+    assert breaches(campaign) == []
+    hundred_metres = 0.1
+    assert fly_nominal(campaign)["apogee_altitude_km"] == pytest.approx(650.0, abs=hundred_metres)
 
 
 @parametrize(

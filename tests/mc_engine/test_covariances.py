@@ -10,7 +10,7 @@ from cart import call, fails_with
 
 import mc_engine
 from mc_engine import load_campaign, open_store, runner
-from mc_engine.cases import case_table
+from mc_engine.cases import case_table, dispersion_records
 from mc_engine.correlation import normal_correlation
 from mc_engine.errors import CampaignError
 from mc_engine.orbit_messages import AXES, MessageFault, read_message
@@ -131,6 +131,12 @@ def campaign_covariance(campaign):
         i, j = names.index(one.first), names.index(one.second)
         matrix[i, j] = matrix[j, i] = normal_correlation(one.rank)
     return matrix * np.outer(sigma, sigma)
+
+
+def test_a_record_says_sigma_in_the_unit_of_its_row_with_few_digits(folder):
+    texts = [record["distribution"] for record in dispersion_records(load_campaign(folder))]
+    assert texts[0] == "normal, σ = 18.252 m"  # the square root of 3.33e-4 km^2
+    assert texts[3] == "normal, σ = 0.020727 m/s"
 
 
 def test_the_campaign_draws_with_the_covariance_of_the_message(folder):

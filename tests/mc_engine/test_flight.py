@@ -1,13 +1,15 @@
 """The bit promise: a case comes to the same bytes at every width, in every chunk, thread and order, and alone."""
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from mc_engine.errors import ModelError
 from mc_engine.flight import fly, fly_history, grid_of, prepare
-from mc_engine.model import FixedStep, load_model
+from mc_engine.model import AdaptiveStep, FixedStep, load_model
 
 SEED = 20160421
 N_CASES = 1000
@@ -164,3 +166,23 @@ def test_the_grid_has_the_steps_of_the_quotient_and_one_more_for_a_rest(step, un
     assert grid_of(FixedStep(step, until), None) == (n_steps, step, 1)
     settings = SimpleNamespace(dt=step, limit=until, every=4.0)
     assert grid_of(FixedStep("dt", "limit", "every"), settings) == (n_steps, step, 4)
+
+
+def test_a_flight_has_a_billion_steps_at_most_which_is_enough_for_ten_days_of_a_hundredth_of_a_second(model):
+    day = 86_400.0
+    assert grid_of(FixedStep(0.01, 10 * day), None)[0] == 86_400_000
+    assert grid_of(FixedStep(1e-3, 1e6), None)[0] == 10**9
+    with pytest.raises(ModelError, match=r"no more than 1,000,000,000 steps"):
+        grid_of(FixedStep(1e-3, 1.1e6), None)
+    assert replace(model, clock=AdaptiveStep(day, attempts=10**9)).clock.attempts == 10**9
+    with pytest.raises(
+        ModelError, match=r"`attempts` is 1000000001; it must be a number at least 1, and 1,000,000,000"
+    ):
+        replace(model, clock=AdaptiveStep(day, attempts=10**9 + 1))
+
+
+def test_another_clock_of_the_same_kind_flies_with_the_same_kernel(model):
+    """Such as the single step by which `check` compiles."""
+    nominal = {item.name: item.default for item in (*model.parameters, *model.settings)}
+    short = fly(model, nominal, np.array([0]), SEED, clock=replace(model.clock, until=model.clock.step))
+    assert (short["status"][0], short["end_time_s"][0]) == ("no-stop", nominal["step_s"])

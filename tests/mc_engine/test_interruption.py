@@ -10,20 +10,25 @@ import pytest
 from cart import small_store
 from small_run import ENVIRONMENT
 
-from mc_engine.interruption import NOTHING_BEGUN, ONCE_MORE
+from mc_engine.interruption import BUSY, LANDING, NOTHING_BEGUN, ONCE_MORE
 from mc_engine.next_step import after_flight, after_search, is_complete
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
 
 # A process of the command line in which a function of the engine is exchanged for one that ends it.
 SCRIPT = """
-import importlib, os, signal, sys, time
+import hashlib, importlib, os, signal, sys, threading, time
 from mc_engine.__main__ import main
 
 def send(count=1):
     for _ in range(count):
         os.kill(os.getpid(), signal.{signal})
         time.sleep(0.01)
+
+def work(*pauses_s, rounds=10**9):
+    "Code that leaves the interpreter alone, as a kernel does, for minutes, while a signal comes after each pause."
+    threading.Thread(target=lambda: [(time.sleep(pause), send()) for pause in pauses_s]).start()
+    hashlib.pbkdf2_hmac("sha256", b"", b"", rounds)
 
 def victim(*arguments, **options):
     {body}
@@ -36,6 +41,7 @@ sys.argv = ["mc-engine", *{arguments!r}]
 main()
 """
 CAMPAIGN, REPORTS = "mc_engine.campaign.load_campaign", "reports.write_reports"
+NOMINAL = "mc_engine.sessions.fly_nominal"
 
 
 def command(place, body, *arguments, by="SIGTERM", then=""):
@@ -91,6 +97,29 @@ def test_a_signal_while_the_reports_are_written_names_the_command_that_writes_th
 
 def test_a_signal_to_a_verb_that_keeps_nothing_says_to_give_it_again():
     assert ended(CAMPAIGN, "send()", "check", "minimal") == (4, ONCE_MORE)
+
+
+@pytest.mark.parametrize("pauses_s", [(0.5, 1.0), (0.5, 0.2, 0.2, 0.2)])
+def test_two_signals_end_what_python_cannot_interrupt_while_it_flies(tmp_path, pauses_s):
+    run = tmp_path / "run"
+    done = command(NOMINAL, f"work{pauses_s}", "run", "minimal", "--out", run)
+    rest = f"interrupted; what was committed is safe, `mc-engine resume {run}` flies the rest"
+    assert done.returncode == 4
+    assert done.stderr.splitlines()[-2:] == [LANDING, rest]
+
+
+def test_two_signals_end_what_python_cannot_interrupt_at_other_times():
+    done = command(CAMPAIGN, "work(0.5, 1.0)", "check", "minimal")
+    assert (done.returncode, done.stderr.splitlines()) == (4, [BUSY, ONCE_MORE])
+
+
+def test_a_signal_that_is_sent_twice_at_once_is_one(tmp_path):
+    """As by `timeout`, to the process and to its group: what flies still lands."""
+    body = "\n    ".join(["work(0.2, 0.0, rounds=4_000_000)", "return original(*arguments)"])
+    run = tmp_path / "run"
+    status, said = ended(NOMINAL, body, "run", "minimal", "--cases", 20, "--out", run)
+    assert (status, said) == (4, f"interrupted with 0 of 20 cases; `mc-engine resume {run}` flies the rest")
+    assert (run / "nominal.parquet").exists()
 
 
 def test_a_signal_after_all_was_said_changes_nothing(tmp_path):

@@ -29,6 +29,11 @@ INTERPRETED = {
         "`rhs` takes (t, s, p, o); the engine gives it (t, s, m, p, o)",
     ),
     "no decorator": ([("@physics\ndef rhs", "def rhs")], "def rhs", "`rhs` is not marked; write @physics"),
+    "async def": (
+        [("@physics\ndef rhs", "@physics\nasync def rhs")],
+        "@physics\nasync def rhs",
+        "`rhs` is an async def; write def, physics waits for nothing",
+    ),
     "missing parameter": (
         [('"altitude burn_dv magnitude_error pitch_error"', '"altitude burn_dv magnitude_error"')],
         "    return State(r, 0.0, dv",

@@ -94,7 +94,7 @@ MISTAKES = {
     "and": ([then("g = g if r2 > 1e10 and s.x > 0.0 else 2.0 * g")], "    g = g if", "use where(condition, a, b)"),
     "if on the time": ([then("g = g if t > 1.0 else 0.0")], "    g = g if", "use where(condition, a, b)"),
     "a comparison in two parts": ([then("g = g * (0.0 < s.x < 5.0)")], "    g = g * (", "use where(condition, a, b)"),
-    "max": ([then("g = g + 0.0 * max(s.x, 0.0)")], "    g = g + ", "use where(condition, a, b)"),
+    "max": ([then("g = g + 0.0 * max(s.x, 0.0)")], "    g = g + ", "use maximum(a, b) of mc_engine.lanes"),
     "int": ([then("g = g + 0.0 * int(s.x)")], "    g = g + ", "or int() or float(), on a number that differs"),
     "range of a number of each case": (
         [then("for _ in range(r2):\n        g = g + 0.0")],
@@ -274,7 +274,6 @@ CONTRADICTIONS = {
     "a metric of the engine's name": (('Field("apogee_time_s", "s"', 'Field("case_id", ""'),
                                       'the column "case_id" has the name of a column that every table has'),
     "a quantity of the engine's name": (('Field("speed_m_s", "m/s"', 'Field("t_s", "s"'), 'the quantity "t_s" has the'),
-    "figures": (("    settings=(),", "    settings=(),\n    figures=(1,),"), "`figures` holds 1; it must be a tuple"),
     "control without a memory": (("    initial=initial", "    control=rhs,\n    initial=initial"),
                                  "the model has `control`, but no function `start`; write start(p, o)"),
     "default of nobody": (("Model, Parameter", "Model, Parameter, Setting"),

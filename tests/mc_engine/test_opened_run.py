@@ -66,6 +66,18 @@ def test_a_case_that_is_not_there_is_refused(run):
         mc_engine.open_run(run.path / "nowhere")
 
 
+def test_a_metric_or_a_case_by_a_wrong_name_is_answered_with_the_right_one(run):
+    with pytest.raises(StoreError, match='there is no metric "apogee_altitude"; did you mean "apogee_altitude_km"'):
+        run.metrics["apogee_altitude"]
+    assert run.metrics.get("apogee_altitude") is None
+    assert run.case(np.int64(17)).case_id == 17
+    for wrong in ("a", 17.0, True, None):
+        with pytest.raises(
+            StoreError, match=f"case {wrong!r} is not there; cases are whole numbers, from 0 to 149, and"
+        ):
+            run.case(wrong)
+
+
 def test_text_of_a_run_is_never_read_as_html(run):
     row = {**run.case(1).row, "status": "failed", "reason": "<script>"}
     page = mc_engine.Case(run.store, 1, row)._repr_html_()

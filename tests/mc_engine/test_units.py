@@ -19,6 +19,9 @@ from mc_engine.units import UNITS, by_quantity, compatible, convert, nearest_uni
         (1.0, "g", "m/s^2", 9.80665),
         (20.0, "%", "", 0.2),
         (3600.0, "arcsec", "deg", 1.0),
+        (2.5, "mg/s", "kg/s", 2.5e-6),
+        (1.0, "keV", "J", 1.602176634e-16),
+        (60.0, "mN/kW", "N/W", 6e-5),
         (60.0, "rpm", "rad/s", 2.0 * np.pi),
         (1.0, "W h", "kJ", 3.6),
         (1.0, "deg/h", "arcsec/s", 1.0),
@@ -46,7 +49,27 @@ def test_a_whole_column_is_converted():
 
 
 @pytest.mark.parametrize(
-    "unit", ["J", "W", "V", "A", "mrad", "arcsec", "T", "m^3", "kg/m", "N m/rad", "deg/h", "A m^2"]
+    "unit",
+    [
+        "J",
+        "W",
+        "V",
+        "A",
+        "mrad",
+        "arcsec",
+        "T",
+        "m^3",
+        "kg/m",
+        "N m/rad",
+        "deg/h",
+        "A m^2",
+        "mg/s",
+        "mN s",
+        "mN m s",
+        "nT/s",
+        "keV",
+        "kV",
+    ],
 )
 def test_what_a_gnc_engineer_writes_is_there(unit):
     assert unit in UNITS
@@ -76,4 +99,6 @@ def test_an_unknown_unit_is_answered_with_the_command_that_lists_them():
     assert unit_hint("furlong") == f"; `mc-engine units` lists all {len(UNITS)}"
     assert unit_hint("Nm").startswith('; did you mean "N m"?; `mc-engine units`')
     listed = CliRunner().invoke(app, ["units"]).output
-    assert "torque                     N m, uN m, mN m, kN m\n" in listed
+    lines = [line.split("  ") for line in listed.splitlines()]
+    assert ["torque", "N m, uN m, mN m, kN m"] in [[one[0], one[-1].strip()] for one in lines]
+    assert "Two end otherwise: _pct for %, _days for day\n" in listed

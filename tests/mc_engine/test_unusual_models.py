@@ -51,6 +51,16 @@ COMPOSED = """def composed(f, g):
 
 
 TWICE = composed(composed(sin, cos), sqrt)"""
+GRAVITY = """class Gravity:
+    MU, POWERS = 2.0, (1.0, 2.0)
+
+    class Sun:
+        FAR = True
+
+    @staticmethod
+    @physics
+    def halved(x):
+        return x / Gravity.MU"""
 UNUSUAL = {
     "a function in the signature": [
         (IMPORTS, f"from collections.abc import Callable\n{IMPORTS}"),
@@ -80,6 +90,21 @@ UNUSUAL = {
     "a counted while": [then("k = 0\n    while k < 3:\n        g = g + 0.0 * k\n        k += 1")],
     "not on a mask": [WHERE, then("far = r2 > 1e14\n    g = where(not far, g, 0.0)")],
     "a text outside": [before('MODE = "fast"'), then('if MODE == "fast":\n        g = g + 0.0')],
+    "a class for numbers and functions": [
+        before(GRAVITY),
+        then("g = Gravity.halved(g) * Gravity.POWERS[1] if Gravity.Sun.FAR else g"),
+    ],
+    "a namespace of numbers": [
+        (IMPORTS, f"from types import SimpleNamespace\n\n{IMPORTS}"),
+        before("EARTH = SimpleNamespace(scale=1.0)"),
+        then("g = g * EARTH.scale"),
+    ],
+    "an argument that is left out": [
+        before("@physics\ndef kept(x, k=None):\n    return x if k is None else x * k"),
+        then("g = kept(g)"),
+    ],
+    "a try that never fails": [then("try:\n        g = g * 1.0\n    except Exception:\n        g = 0.0")],
+    "a tuple cut and handed on": [then("x, y = s[:2]\n    g = g + 0.0 * State(*s).x + 0.0 * x * y")],
     "a flag that no case raises": with_metric("where(best.altitude > 2.0e6, 1.0, 0.0)"),
     "an excess that no case has": with_metric("maximum(0.0, t - 1.0e6)"),
     "an input that works evenly": [("dv * sin(p.pitch_error)", "0.0")],

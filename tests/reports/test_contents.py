@@ -1,8 +1,17 @@
 """What a report says, before it is drawn."""
 
+import numpy as np
 import pytest
 from synthetic_run import synthetic_run
 
+from mc_engine.figures import (
+    CorridorFigure,
+    HistoryFigure,
+    MapFigure,
+    ProfileFigure,
+    ScatterFigure,
+    to_record,
+)
 from reports.contents import build
 from reports.document import FigureBlock, Table, blocks_of
 from reports.figures import MapDrawing
@@ -88,7 +97,56 @@ def test_the_map_says_that_it_is_smoothed_and_from_how_many_cases(document):
 def test_a_map_of_what_is_the_same_in_all_cases_is_a_sentence():
     run = synthetic_run(n=200)
     run.table["propellant_kg"] = 1.5
-    assert "not drawn; it is 1.5 in all cases" in said(build(run, RUN))
+    assert "not drawn; propellant_kg is 1.5 in all cases" in said(build(run, RUN))
+
+
+def test_a_metric_that_differs_by_rounding_is_one_short_number_that_is_the_same_in_all_cases():
+    run = synthetic_run(n=200, failed=5)
+    run.table["propellant_kg"] = np.where(run.table["status"] == "ok", 1.5 + 2e-16 * run.table["case_id"] % 2, np.nan)
+    run.nominal_row["propellant_kg"] = 1.5 - 2**-52
+    document = build(run, RUN)
+    (card,) = [one for one in document.costs if one.label == "propellant"]
+    assert (card.answer, card.detail) == (
+        "1.5\u202fkg in all cases with a number", "nominal 1.5; the same in 195 of 200 cases.",
+    )  # fmt: skip
+    row = next(row for row in cells(tables(document)["Metrics: how many, where, how wide"]) if "propellant" in row[0])
+    assert row[2:] == ["1.5", "1.5", "0", "1.5", "1.5", "constant"]
+    assert "Cases with the largest propellant" not in tables(document)
+
+
+@pytest.mark.parametrize(
+    ("figure", "sentence"),
+    [
+        (MapFigure("apogee_km", "ve_pct", "oe_pct", "T"), "T: not drawn; the run has no column apogee_km."),
+        (MapFigure("propellant_kg", "ve_pct", "isp_s", "T"), "Not drawn: T (the run does not disperse isp_s)."),
+        (MapFigure("propellant_kg", "ve_pct", "oe", "T"), "Not drawn: T (the run has no column oe)."),
+        (
+            MapFigure("propellant_kg", "ve_pct", "pulse_count", "T"),
+            "T: not drawn; pulse_count is the same in all cases.",
+        ),
+        (MapFigure("settling_time_s", "ve_pct", "oe_pct", "T"), "no case has a number for settling_time_s, ve_pct and"),
+        (MapFigure("entry_speed_m_s", "ve_pct", "oe_pct", "T"), "nowhere is its surface over ve_pct and oe_pct sure"),
+        (ScatterFigure("isp_s", "ve_pct", "T"), "T: not drawn; the run does not disperse isp_s."),
+        (CorridorFigure("ve", "oe_pct", ("propellant_kg",), "T"), "T: not drawn; the run has no column ve."),
+        (HistoryFigure(("force_n", "force"), "T"), "Not drawn, the histories have no such quantity: force."),
+        (ProfileFigure("force", "force_n", "T"), "T: not drawn; the histories have no quantity force."),
+    ],
+)
+def test_a_figure_that_is_not_drawn_says_the_true_reason(figure, sentence):
+    run = synthetic_run(n=60, failed=0, figures=[to_record(figure)])
+    run.table["settling_time_s"] = np.nan
+    run.table["pulse_count"] = 3.0
+    run.table["entry_speed_m_s"] = np.random.Generator(np.random.Philox(key=2)).normal(7800.0, 5.0, 60)
+    assert sentence in said(build(run, RUN))
+
+
+def test_a_figure_over_the_columns_of_another_run_is_left_out_without_that_run():
+    figures = [
+        MapFigure("propellant_kg", "a_km", "oe_pct", "T", upstream=True),
+        ScatterFigure("a_km", "b", "T", upstream=True),
+    ]
+    document = build(synthetic_run(n=60, figures=[to_record(one) for one in figures]), RUN)
+    assert not {"maps", "scatter"} & {section.anchor for section in document.sections}
 
 
 def test_every_figure_has_an_alternative_text_a_key_and_units_on_its_axes(document):
@@ -136,7 +194,8 @@ def test_cases_of_a_grid_are_not_sold_as_probabilities():
 def test_hardly_any_cases_make_a_report_that_says_so(n):
     document = build(synthetic_run(n, failed=0), RUN)
     assert {card.answer for card in document.verdicts} == {"not demonstrable"}
-    assert any("too few cases" in text for text in _sentences(document))
+    wanted = "too few cases" if n else "not drawn; no case has a number for propellant_kg, ve_pct and oe_pct."
+    assert any(wanted in text for text in _sentences(document))
 
 
 def test_all_failed_is_said_first():

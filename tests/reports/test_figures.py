@@ -8,7 +8,7 @@ from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document import FigureBlock, blocks_of
-from reports.figures import paper, screen
+from reports.figures import MapDrawing, paper, screen
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
 
@@ -76,13 +76,16 @@ def test_numbers_that_differ_by_little_stay_different_on_the_screen():
 
 
 def test_dollar_signs_in_names_are_no_mathematics():
-    drawing = next(blocks_of(build(_with_name("cost $x$ of $\\frac{1}{0}$"), "run"), FigureBlock)).drawing
-    assert "<svg" in paper.svg(drawing.printed)
+    drawn = [block.drawing for block in blocks_of(build(_with_name("cost $x$ of $\\nosuch$"), "run"), FigureBlock)]
+    labelled = [one for one in drawn if isinstance(one, MapDrawing) and "$x$" in one.x_label]
+    assert labelled
+    for one in labelled:
+        assert "<svg" in paper.svg(one.printed)
 
 
 def _with_name(name):
     run = synthetic_run(200, failed=0)
-    for column in run.manifest["columns"]:
-        if column["name"] == "ve_pct":
-            column["description"] = name
+    for one in run.manifest["inputs"]:
+        if one["name"] == "ve_pct":
+            one["description"] = name
     return run

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from reports.numbers import axis_label, count, exact, interval, number, percent, typeset, with_unit, words
+from reports.numbers import axis_label, count, exact, interval, named, number, percent, typeset, with_unit, words
 
 
 @pytest.mark.parametrize(
@@ -55,6 +55,22 @@ def test_an_interval_says_when_the_cases_are_too_few():
 @pytest.mark.parametrize(("value", "text"), [(246.0, "246"), (0.0175, "0.0175"), (True, "yes"), ("off", "off")])
 def test_an_input_is_written_as_it_was_given(value, text):
     assert exact(value) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "meaning", "label"),
+    [
+        ("sun right ascension", "of the Sun", "sun right ascension"),
+        ("failure time", "when one engine fails; beyond the landing, none", "failure time"),
+        ("misalignment", "of the thrust, from the nozzle", "misalignment"),
+        ("ve", "VE: error of the burn's magnitude", "VE: error of the burn's magnitude"),
+        ("tip x", "tip-off rate; about x", "tip x: tip-off rate"),
+        ("kp", "", "kp"),
+        ("kp", "a meaning that is longer than there is room for on an axis", "kp"),
+    ],
+)
+def test_an_axis_says_the_name_in_words_and_of_a_symbol_the_meaning_too(name, meaning, label):
+    assert named(name, meaning) == label
 
 
 def test_a_column_name_becomes_words_without_its_unit():

@@ -38,6 +38,17 @@ def test_a_constant_metric_keeps_its_bits_and_has_no_spread():
     assert (found.mean, found.sd, found.at(0.5).value, found.shape) == (0.1, 0.0, 0.1, None)
 
 
+@pytest.mark.parametrize(
+    ("values", "constant"),
+    [([7000.000000000001, 7000.000000000012], True), ([-0.3, -0.2999999999999999], True), ([0.0, 0.0], True),
+     ([7000.0, 7000.0001], False), ([0.0, 1e-17], False), ([-0.3, 0.3], False)],
+)  # fmt: skip
+def test_what_differs_by_rounding_alone_is_constant_and_has_no_spread(values, constant):
+    found = summarize(np.array(values))
+    assert found.constant is constant
+    assert found.spread == (None if constant else found.sd)
+
+
 @pytest.mark.parametrize("values", [[], [np.nan], [np.nan] * 500])
 def test_without_a_number_there_is_no_statistic_and_no_warning(values):
     found = summarize(np.array(values))

@@ -1,0 +1,110 @@
+"""What the figures of a model must keep before it flies: fields of the right kind, names of what the model has."""
+
+from collections.abc import Iterator
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any
+
+from mc_engine.errors import ModelError
+from mc_engine.figures import (
+    KINDS,
+    CorridorFigure,
+    Figure,
+    FootprintFigure,
+    HistoryFigure,
+    MapFigure,
+    ProfileFigure,
+    ScatterFigure,
+)
+from mc_engine.suggestions import hint, nearest
+
+if TYPE_CHECKING:
+    from mc_engine.model import Model
+
+_OF_EVERY_CASE = ("case_id", "end_time_s")
+_LISTS = ("quantities", "metrics")  # fields that hold any number of names
+
+
+def refuse_false_figures(model: "Model") -> None:
+    """ModelError if a figure of the model has a field of the wrong kind, or names what the model does not have."""
+    if not isinstance(model.figures, tuple):
+        raise ModelError("`figures` must be a tuple of figures of mc_engine.figures; one alone needs its comma, "
+                         "(MapFigure(...),)")  # fmt: skip
+    for figure in model.figures:
+        if not isinstance(figure, Figure):
+            kinds = ", ".join(kind.__name__ for kind in KINDS.values())
+            raise ModelError(f"`figures` holds {figure!r}; it must be a tuple of figures of mc_engine.figures: {kinds}")
+        spot = f'the {type(figure).__name__} "{figure.title}"'
+        _refuse_kinds(figure, spot)
+        for word, name, known in _names(figure, model):
+            if name not in known:
+                raise ModelError(f'{spot}: there is no {word} "{name}"{_other_table(name, word, model)}'
+                                 f"{_hint(name, known)}")  # fmt: skip
+
+
+def _refuse_kinds(figure: Figure, spot: str) -> None:
+    for one in fields(figure):
+        value = getattr(figure, one.name)
+        wanted = "" if value is None and one.default is None else _wanted(one.name, value)
+        if wanted:
+            raise ModelError(f"{spot} has {value!r} as its `{one.name}`; it must be {wanted}")
+
+
+def _wanted(name: str, value: Any) -> str:
+    """What a field must hold, if it holds anything else; else empty."""
+    if name in _LISTS:
+        return "" if _is_tuple_of(value, str) and value else 'a tuple of names; one alone needs its comma, ("name",)'
+    if name == "target":
+        return "" if _is_tuple_of(value, str, str) else 'two names, ("latitude", "longitude")'
+    if name == "ends_below":
+        pair = _is_tuple_of(value, str, (int, float)) and not isinstance(value[1], bool)
+        return "" if pair else 'a name and a number, ("altitude_km", 35.0)'
+    if name == "upstream":
+        return "" if isinstance(value, bool) else "True or False"
+    return "" if isinstance(value, str) else "a text"
+
+
+def _is_tuple_of(value: Any, *kinds: Any) -> bool:
+    """Whether it is a tuple (or list) with one item of each kind, or any number of items of the only one."""
+    if not isinstance(value, tuple | list):
+        return False
+    wanted = kinds if len(kinds) > 1 else kinds * len(value)
+    return len(value) == len(wanted) and all(isinstance(one, kind) for one, kind in zip(value, wanted, strict=True))
+
+
+def _names(figure: Figure, model: "Model") -> Iterator[tuple[str, str, list[str]]]:
+    """Every name in the figure that the model must have: what it is, the name, all that there are."""
+    inputs = [one.name for one in (*model.parameters, *model.settings)]
+    metrics = [one.name for one in model.metrics]
+    columns = [*inputs, *metrics, *(f"end_{one.name}" for one in model.states), *_OF_EVERY_CASE]
+    quantities = [one.name for one in model.quantities]
+    if isinstance(figure, MapFigure):
+        yield "column", figure.metric, columns
+    if isinstance(figure, CorridorFigure):
+        yield from (("metric", name, metrics) for name in figure.metrics)
+    if isinstance(figure, MapFigure | ScatterFigure | CorridorFigure) and not figure.upstream:
+        yield from (("column", name, columns) for name in (figure.x, figure.y))
+    if isinstance(figure, HistoryFigure):
+        yield from (("quantity", name, quantities) for name in figure.quantities)
+    if isinstance(figure, ProfileFigure):
+        yield from (("quantity", name, ["t_s", *quantities]) for name in (figure.x, figure.y))
+    if isinstance(figure, FootprintFigure):
+        above = () if figure.ends_below is None else figure.ends_below[:1]
+        yield from (("column", str(name), columns) for name in (figure.latitude, figure.longitude, *above))
+        yield from (("column", name, columns) for name in figure.target or ())
+        if figure.planet:
+            yield "setting", figure.planet, [one.name for one in model.settings]
+
+
+def _hint(name: str, known: list[str]) -> str:
+    """`hint`, where a name with the same end, which is its unit, comes first."""
+    alike = [one for one in known if one.rpartition("_")[2] == name.rpartition("_")[2]]
+    return hint(name, alike if nearest(name, alike) else known)
+
+
+def _other_table(name: str, word: str, model: "Model") -> str:
+    """Why a name that the model has is not for this figure: histories and the table of cases are two tables."""
+    if word == "quantity" and name in [one.name for one in (*model.parameters, *model.settings, *model.metrics)]:
+        return " (it is a column of the table of cases, histories do not have it)"
+    if word in ("column", "metric") and name in [one.name for one in model.quantities]:
+        return " (it is a quantity of histories, the table of cases does not have it)"
+    return ""
