@@ -4,15 +4,10 @@ numba's own cache takes every failure of the disk for the program's; its files s
 """
 
 import logging
-import pickle
 from contextlib import suppress
 from typing import Any
 
 from numba.core.caching import FunctionCache
-
-# what unpickling a file that was cut, or overwritten, ends in
-_BROKEN = (OSError, EOFError, pickle.UnpicklingError, ValueError, TypeError, KeyError, IndexError, AttributeError,
-           ImportError, MemoryError)  # fmt: skip
 
 
 class KernelCache(FunctionCache):
@@ -22,7 +17,7 @@ class KernelCache(FunctionCache):
         """The compiled function; None, to be compiled, where a file of the cache is broken."""
         try:
             return super().load_overload(sig, target_context)
-        except _BROKEN:
+        except Exception:  # a file that was cut or overwritten ends in errors of almost any kind
             self._forget()
             return None
 
