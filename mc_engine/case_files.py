@@ -7,6 +7,7 @@ import csv
 import io
 import json
 import math
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,18 +30,25 @@ class FileFault(Exception):
 
 
 def resolve_beside(directory: Path, reference: str) -> Path:
-    """The file `reference`, which must stand in `directory` or below it."""
+    """The file `reference`, which must stand in `directory` or below it, and be named from there.
+
+    A run directory holds a copy of it under the same name, which must lead to the copy; so a link keeps its own name.
+    """
+    home = directory.resolve()
     name = json.dumps(reference if len(reference) <= _LONGEST_NAME else f"{reference[:57]}...", ensure_ascii=False)
     try:
-        path = (directory / reference).resolve()
+        path = (home / reference).resolve()
         is_file = path.is_file()
     except (OSError, ValueError, RuntimeError):  # too long, with a zero byte, links that go round
         raise FileFault(f"{name} is no name that a file can have") from None
-    if not path.is_relative_to(directory.resolve()):
+    if not path.is_relative_to(home):
         raise FileFault(f"{name} lies outside the folder of the campaign file; put it beside that file")
+    if os.path.isabs(reference) or os.path.normpath(reference).startswith(".."):
+        here = json.dumps(path.relative_to(home).as_posix(), ensure_ascii=False)
+        raise FileFault(f"{name} leads through other folders than that of the campaign file; write {here}")
     if not is_file:
         raise FileFault(f"there is no file {name} beside the campaign file")
-    return path
+    return home / os.path.normpath(reference)
 
 
 def read_columns(path: Path) -> dict[str, np.ndarray]:

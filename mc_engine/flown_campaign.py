@@ -1,5 +1,6 @@
 """The campaign of a run directory, as it was flown: what resumes, replays and workers begin with."""
 
+import os
 from pathlib import Path
 
 from mc_engine.campaign import Campaign, load_campaign
@@ -47,13 +48,13 @@ def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
 def companions_of(campaign: Campaign) -> dict[str, bytes]:
     """Files that the campaign reads from its own folder, by their names there: a run directory stands alone."""
     files = {one.spec["file"] for one in campaign.dispersions if one.dist == "empirical"} | set(campaign.messages)
-    paths = {campaign.directory / file for file in files}
+    base = campaign.directory.resolve()
+    paths = {base / file for file in files}
     if campaign.table_path is not None:
         paths.add(campaign.table_path)
     if campaign.model_reference.endswith(".py"):
-        model = (campaign.directory / campaign.model_reference).resolve()
+        model = Path(os.path.normpath(base / campaign.model_reference))
         paths.update([*sources_beside(model), *data_read(model.parent)])
-    base = campaign.directory.resolve()
     contents = {_name_in(base, path): path.read_bytes() for path in sorted(paths)}
     for name in contents:
         if name.split("/")[0] in _OWN:
@@ -65,5 +66,6 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
 
 
 def _name_in(folder: Path, path: Path) -> str:
-    """The name that a file has in a folder; of a link that leads out of it the link's."""
-    return (path if path.is_relative_to(folder) else path.resolve()).relative_to(folder).as_posix()
+    """The name that a file has in a folder; of a link the link's, by which it is called."""
+    plain = Path(os.path.normpath(path))
+    return (plain if plain.is_relative_to(folder) else path.resolve()).relative_to(folder).as_posix()

@@ -74,7 +74,7 @@ def model_sources(model: Model, folder: Path | None) -> list[Path]:
     """Files that decide the model's numbers, see `mc_engine.model_sources`; with them the data that a `.py` model reads
     when it is imported, which its kernel may hold.  folder : of a `.py` model."""
     if model.reference.endswith(".py"):
-        file = ((folder or Path.cwd()) / model.reference).resolve()
+        file = Path(os.path.normpath((folder or Path.cwd()).resolve() / model.reference))
         return [*sources_beside(file), *data_at_load(file)]
     return sources_of_module(model.reference)
 

@@ -11,6 +11,8 @@ from mc_engine.campaign import SHIPPED, load_campaign
 from mc_engine.errors import CampaignError
 from mc_engine.flown_campaign import companions_of
 from mc_engine.kernel import model_sources, source_digest
+from mc_engine.runner import extend, replay, run
+from mc_engine.store import open_store
 
 MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()
@@ -197,3 +199,46 @@ def test_a_source_that_is_a_link_out_of_the_folder_goes_with_the_run_under_the_l
     folder = campaign_in(tmp_path / "mine", files, "from dynamics import pull")
     (folder / "constants.py").symlink_to(tmp_path / "library.py")
     assert companions_of(load_campaign(folder, cases=4))["constants.py"] == MU.encode()
+
+
+EMPIRICAL = """[campaign]
+model = "{model}"
+design = "mc"
+cases = 8
+seed = 1
+[dispersion.magnitude_error_pct]
+dist = "empirical"
+file = "{file}"
+column = "error"
+"""
+
+
+def named_campaign(folder, model, file):
+    """The minimal model with an input from a file, under names that lead to them in some way or other."""
+    (folder / "lib").mkdir(parents=True)
+    (folder / "lib" / "model.py").write_text(MODEL)
+    (folder / "lib" / "errors.csv").write_text("error\n1.0\n-1.0\n0.5\n")
+    (folder / "model.py").symlink_to("lib/model.py")
+    (folder / "errors.csv").symlink_to("lib/errors.csv")
+    (folder / "campaign.toml").write_text(EMPIRICAL.format(model=model, file=file))
+
+
+@pytest.mark.parametrize(
+    ("model", "file"), [("model.py", "lib/../lib/errors.csv"), ("lib/../lib/model.py", "errors.csv")]
+)
+def test_a_run_stands_alone_whatever_way_the_campaign_names_its_files(model, file, tmp_path, monkeypatch):
+    named_campaign(tmp_path / "mine", model, file)
+    monkeypatch.chdir(tmp_path)
+    run(load_campaign(tmp_path / "mine"), tmp_path / "flown", workers=1)
+    (tmp_path / "mine").rename(tmp_path / "away")
+    assert open_store(tmp_path / "flown").verify() == []
+    assert replay(tmp_path / "flown", 3).equal
+    assert extend(tmp_path / "flown", 12, workers=1).n_cases == 12
+
+
+@pytest.mark.parametrize("way", ["../mine/lib/errors.csv", "{folder}/lib/errors.csv"])
+def test_a_name_that_leads_out_of_the_folder_and_back_is_refused_with_the_straight_one(way, tmp_path):
+    folder = tmp_path / "mine"
+    named_campaign(folder, "model.py", way.format(folder=folder))
+    with pytest.raises(CampaignError, match=r'leads through other folders than .*; write "lib/errors.csv"'):
+        load_campaign(folder)
