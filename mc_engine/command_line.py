@@ -181,12 +181,12 @@ def refuse_occupied_folder(path: Path) -> None:
     if (path / JOURNAL).exists() and open_store(path).missing():
         resume = f"`mc-engine resume {shell_word(path)}`"
         leave(USAGE, f"--out {path}: holds a run that is not complete; {resume} flies the rest")
-    if (path / LOCK_NAME).exists() and not (path / JOURNAL).exists():
-        return  # a creation that was cut short, it seems; whoever makes the run knows which files it left
-    try:
-        refuse_occupied(path)
-    except StoreError as error:
-        leave(USAGE, f"--out {error}")
+    # of a creation that was cut short, it seems, whoever makes the run knows which files it left
+    if not (path / LOCK_NAME).exists() or (path / JOURNAL).exists():
+        try:
+            refuse_occupied(path)
+        except StoreError as error:
+            leave(USAGE, f"--out {error}")
     if run := next((one for one in path.absolute().parents if os.path.isfile(one / JOURNAL)), None):
         leave(USAGE, f"--out {path}: lies inside the run {run.name}; choose another folder")
     existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())

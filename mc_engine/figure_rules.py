@@ -64,8 +64,8 @@ def _wanted(name: str, value: Any) -> str:
 
 
 def _is_tuple_of(value: Any, *kinds: Any) -> bool:
-    """Whether it is a tuple (or list) with one item of each kind, or any number of items of the only one."""
-    if not isinstance(value, tuple | list):
+    """Whether it is a tuple with one item of each kind, or any number of items of the only one."""
+    if not isinstance(value, tuple):
         return False
     wanted = kinds if len(kinds) > 1 else kinds * len(value)
     return len(value) == len(wanted) and all(isinstance(one, kind) for one, kind in zip(value, wanted, strict=True))

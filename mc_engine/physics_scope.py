@@ -52,6 +52,10 @@ class Scope:
             return getattr(owner, node.attr, None) if isinstance(owner, _FOLLOWED) else None
         return None
 
+    def is_own(self, node: ast.AST) -> bool:
+        """Whether it is a name of the function's own: an argument, a variable, a function made in it."""
+        return isinstance(node, ast.Name) and node.id in self._own
+
     def text(self, node: ast.AST) -> str | None:
         """The text that is written, or named; None for anything else."""
         value = node.value if isinstance(node, ast.Constant) else self.value(node)

@@ -116,6 +116,8 @@ class _Reader:
         if isinstance(tree, ast.AsyncFunctionDef):
             self._add(code, code.co_firstlineno, f"`{name}` is an async def; write def, physics waits for nothing")
             return
+        if isinstance(tree, ast.FunctionDef) and tree.args.kwonlyargs:
+            self._add(code, code.co_firstlineno, _behind_a_star(name, tree.args))
         nodes = list(running(tree))
         scope = Scope(inspect.unwrap(physics.function), nodes, self._settings)
         for node in nodes:
@@ -150,7 +152,11 @@ def _faults(node: ast.AST, name: str, scope: Scope) -> Iterator[str]:
         if times(node, scope) > MOST_TIMES:  # minutes of a step, or more
             yield f"`{ast.unparse(node)}` in `{name}` goes round more than {MOST_TIMES:,} times a step; shorten it"
         constant = all(scope.is_constant(one) for one in [*node.args, *(one.value for one in node.keywords)])
-        yield from _wrong_call(ast.unparse(node.func), scope.value(node.func), name, constant)
+        if not scope.is_own(node.func):
+            yield from _wrong_call(ast.unparse(node.func), scope.value(node.func), name, constant)
+            yield from _left_to_a_default(node, scope.value(node.func), name)
+    elif isinstance(node, ast.FunctionDef | ast.Lambda) and node.args.kwonlyargs:
+        yield _behind_a_star(getattr(node, "name", "a lambda"), node.args)
     elif isinstance(node, ast.Import | ast.ImportFrom):
         yield f"`{ast.unparse(node)}` in `{name}`; move the import to the top of the file"
     elif isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load):
@@ -161,6 +167,20 @@ def _faults(node: ast.AST, name: str, scope: Scope) -> Iterator[str]:
         yield from _compared_by_identity(node, name, scope)
     else:
         yield from _beyond_physics(node, name, scope)
+
+
+def _behind_a_star(name: str, arguments: ast.arguments) -> str:
+    words = ", ".join(f"`{one.arg}`" for one in arguments.kwonlyargs)
+    return f"`{name}` has {words} behind a `*`, and kernels hand arguments over by their places; leave the star out"
+
+
+def _left_to_a_default(node: ast.Call, called: Any, name: str) -> Iterator[str]:
+    """One sentence on a named tuple made without some of its fields, whose defaults the compiler does not know."""
+    given = len(node.args) + len(node.keywords)
+    starred = any(isinstance(one, ast.Starred) for one in node.args) or any(one.arg is None for one in node.keywords)
+    if isinstance(called, type) and getattr(called, "_field_defaults", None) and not starred:
+        if given < len(getattr(called, "_fields", ())):
+            yield f"`{shortened(ast.unparse(node))}` in `{name}` leaves a field to its default; write every field"
 
 
 def _beyond_physics(node: ast.AST, name: str, scope: Scope) -> Iterator[str]:

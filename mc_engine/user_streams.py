@@ -53,6 +53,9 @@ class _Outlet(io.RawIOBase):
 def user_streams() -> Iterator[None]:
     """What the block writes to standard output and error may be refused; for the process that ends with it."""
     _open_what_was_closed()
+    if not (hasattr(sys.stdout, "buffer") and hasattr(sys.stderr, "buffer")):
+        yield  # somebody gathers the words in memory, where nothing refuses them
+        return
     told, said = _outlet_of(sys.stdout), _outlet_of(sys.stderr)
     sys.stdout, sys.stderr = _over(told, sys.stdout), _over(said, sys.stderr)
     try:

@@ -15,7 +15,7 @@ from mc_engine.statistics.normality import Normality
 from mc_engine.statistics.order_statistics import QUANTILES, Quantile, quantile, ranked_quantile, ranks_read
 from mc_engine.statistics.selection import PASSES, Selection
 
-_ROUNDING = 1e-12  # of the size of two numbers; a zero that the integration finds differs by a few 1e-16
+_ROUNDING = 1e-12  # of the size of two numbers: more than rounding adds up to over thousands of steps
 
 
 def nearly_equal(low: float, high: float) -> bool:

@@ -26,7 +26,6 @@ def with_figures(folder, figures):
         'MapFigure("end_x_m", "pitch_error_deg", "burn_dv_m_s", "t")',
         'MapFigure("apogee_time_s", "ve_pct", "oe_pct", "t", upstream=True)',
         'HistoryFigure(("altitude_km", "speed_m_s"), "t")',
-        'HistoryFigure(["altitude_km"], "t")',
         'ScatterFigure("end_time_s", "top_speed_m_s", "t")',
         'ProfileFigure("t_s", "altitude_km", "t")',
         'CorridorFigure("pitch_error_deg", "end_vx_m_s", ("top_speed_m_s",), "t")',
@@ -47,6 +46,7 @@ MISTAKES = {
         MAP.replace("apogee_altitude", "apogee").replace('"t")', '"t", upstream=True)'), 'no column "apogee_km"; did'),
     "a text in place of a tuple": ('HistoryFigure("altitude_km", "t")', "has 'altitude_km' as its `quantities`; it "
                                    'must be a tuple of names; one alone needs its comma, ("name",)'),
+    "a list in place of a tuple": ('HistoryFigure(["altitude_km"], "t")', "it must be a tuple of names; one alone"),
     "nothing to draw": ('HistoryFigure((), "t")', "has () as its `quantities`; it must be a tuple of names"),
     "a quantity": ('HistoryFigure(("altitude_km", "spedd_m_s"), "t")', 'no quantity "spedd_m_s"; did you mean "spe'),
     "a metric in time": ('HistoryFigure(("top_speed_m_s",), "t")', 'there is no quantity "top_speed_m_s" (it is a '

@@ -1,4 +1,3 @@
-import resource
 import subprocess
 import sys
 
@@ -18,14 +17,6 @@ def loaded_by(*arguments):
     return set(done.stdout.split("LOADED\n")[1].split())
 
 
-def processor_seconds(command):
-    """Processor time [s] of a process; of the clock on the wall it is a small part where the machine is busy."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run(command, capture_output=True, check=True, env=ENVIRONMENT)
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -43,10 +34,8 @@ def test_help_list_schema_and_plan_load_neither_numba_nor_matplotlib(arguments):
 
 
 @pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["verify", "--help"], ["check", "--help"]])
-def test_help_loads_no_numpy_either_and_comes_in_less_than_150_ms(arguments):
+def test_help_loads_no_numpy_and_no_pydantic_either(arguments):
     assert not {"numpy", "pandas", "pyarrow", "pydantic"} & loaded_by(*arguments)
-    command = [sys.executable, "-m", "mc_engine", *arguments]
-    assert any(processor_seconds(command) < 0.15 for _ in range(12))
 
 
 def test_check_and_status_load_neither_numba_nor_matplotlib(here):

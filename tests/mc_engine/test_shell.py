@@ -45,9 +45,10 @@ def test_the_shell_completes_campaigns_by_name_and_by_path(tmp_path, begun, offe
     assert done.stdout.split() == offered
 
 
-def test_help_takes_less_than_150_ms_of_a_processor():
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["check", "--help"]])
+def test_help_takes_less_than_150_ms_of_a_processor(words):
     """User time of the whole process, the best of some tries; a fresh one, as in a shell."""
-    script = "import resource; from mc_engine.cli import app\ntry: app(['--help'])\nfinally: print(chr(10), "
+    script = f"import resource; from mc_engine.cli import app\ntry: app({words})\nfinally: print(chr(10), "
     script += "resource.getrusage(resource.RUSAGE_SELF).ru_utime)"
     command = [sys.executable, "-c", script]
     tries = [subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT).stdout for _ in range(5)]
@@ -121,3 +122,14 @@ def test_streams_that_the_shell_closed_are_those_of_no_file(tmp_path):
     closed = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", *command]
     assert subprocess.run(closed, env=ENVIRONMENT, timeout=60).returncode == 0
     assert open_store(tmp_path / "run").verify() == []
+
+
+def test_words_that_are_gathered_in_memory_are_those_of_the_command_line():
+    script = (
+        "import contextlib, io, runpy, sys\nsys.argv = ['mc-engine', 'units']\nwords = io.StringIO()\n"
+        "with contextlib.redirect_stdout(words), contextlib.suppress(SystemExit):\n"
+        "    runpy.run_module('mc_engine', run_name='__main__')\nprint(len(words.getvalue().splitlines()))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert int(done.stdout) > 20

@@ -47,6 +47,16 @@ HABITS = {
         "@physics\nasync def kept",
         "`kept` is an async def; write def, physics waits for nothing",
     ),
+    "an argument behind a star": (
+        [(RHS, f"@physics\ndef kept(x, *, gain=1.0):\n    return x * gain\n\n\n{RHS}"), then("a = kept(g)")],
+        "@physics\ndef kept",
+        "`kept` has `gain` behind a `*`, and kernels hand arguments over by their places; leave the star out",
+    ),
+    "a field that is left to its default": (
+        [(RHS, f'Pair = namedtuple("Pair", "a b", defaults=(1.0,))\n\n\n{RHS}'), then("a = Pair(g)")],
+        "    a = Pair(g)",
+        "`Pair(g)` in `rhs` leaves a field to its default; write every field",
+    ),
     "is False": (
         [WHERE, then("g = where((s.x > 0.0) is False, g, g)")],
         "    g = where",

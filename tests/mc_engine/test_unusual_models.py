@@ -88,6 +88,16 @@ UNUSUAL = {
     ],
     "a sum": [then("g = g + 0.0 * sum((s.x, s.y)) + 0.0 * divmod(7, 2)[0]")],
     "a counted while": [then("k = 0\n    while k < 3:\n        g = g + 0.0 * k\n        k += 1")],
+    "a while that counts in other words": [
+        before("STEP = 2"),
+        then("n = 0\n    while n < 5:\n        n = n + 1\n    while 9 > n:\n        n += STEP\n    g = g + 0.0 * n"),
+    ],
+    "functions of its own by the names of NumPy's": [
+        then(
+            "def full(a):\n        return a * 2.0\n\n    stack = lambda a: a * 0.5\n    array = stack\n"
+            "    g = array(full(stack(full(g))))"
+        )
+    ],
     "not on a mask": [WHERE, then("far = r2 > 1e14\n    g = where(not far, g, 0.0)")],
     "a text outside": [before('MODE = "fast"'), then('if MODE == "fast":\n        g = g + 0.0')],
     "a class for numbers and functions": [
