@@ -1,8 +1,12 @@
 """A run of stones that takes a tenth of a second, and what must be said of it after any fault."""
 
+import shutil
+
 import numpy as np
+from typer.testing import CliRunner
 
 from mc_engine import load_campaign, open_store, runner
+from mc_engine.cli import app
 from mc_engine.durable_file import is_temporary
 
 TEXT = """[campaign]
@@ -30,6 +34,21 @@ def stones(folder, cases):
     folder.mkdir(exist_ok=True)
     (folder / "campaign.toml").write_text(TEXT.format(cases=cases))
     return load_campaign(folder / "campaign.toml")
+
+
+def flown_stones(folder, cases, chunk):
+    """The unbroken run in `folder`, in parts of so many cases."""
+    return runner.run(stones(folder / "campaign", cases), folder / "whole", workers=2, chunk=chunk)
+
+
+def copy_of(store, folder):
+    """A copy of a run, to be broken."""
+    return shutil.copytree(store.path, folder / "run")
+
+
+def call(verb, run, *options):
+    """What the command line makes of a run."""
+    return CliRunner().invoke(app, [verb, str(run), *options])
 
 
 def results(run):

@@ -4,11 +4,9 @@ import shutil
 
 import numpy as np
 import pytest
-from stones import results, stones
-from typer.testing import CliRunner
+from stones import call, copy_of, flown_stones, results, stones
 
 from mc_engine import open_store, runner
-from mc_engine.cli import app
 from mc_engine.errors import StoreError
 from mc_engine.journal import encode, scan
 from mc_engine.repair import mend_journal
@@ -21,16 +19,13 @@ RECOMPUTED = ("cases/", "history/", "nominal.parquet")  # what repair can fly ag
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("stones")
-    campaign = stones(folder / "campaign", CASES)
-    return runner.run(campaign, folder / "whole", workers=2, chunk=CHUNK)
+    return flown_stones(tmp_path_factory.mktemp("stones"), CASES, CHUNK)
 
 
 @pytest.fixture
 def run(flown, tmp_path):
     """A copy of the run, to be damaged."""
-    shutil.copytree(flown.path, tmp_path / "run")
-    return tmp_path / "run"
+    return copy_of(flown, tmp_path)
 
 
 def files_of(run):
@@ -314,16 +309,15 @@ def test_cases_of_another_shard_are_named_and_withdrawn(tmp_path, number):
 @pytest.mark.parametrize("folder", ["cases", "history"])
 def test_a_folder_that_is_gone_is_named_and_made_anew(run, flown, folder):
     shutil.rmtree(run / folder)
-    shell = CliRunner()
     for verb in ("verify", "status"):
-        said = shell.invoke(app, [verb, str(run)])
+        said = call(verb, run)
         assert said.exit_code == 5
         assert f"{folder}: " in said.stderr
         assert "put back" not in said.stderr
         assert "--repair" in said.stderr or "verify" in said.stderr
-    said = shell.invoke(app, ["resume", str(run), "--no-report"])
+    said = call("resume", run, "--no-report")
     assert said.exit_code == 5
     assert f"{folder}: the folder is gone; `mc-engine resume {run} --repair`" in said.stderr
-    assert shell.invoke(app, ["resume", str(run), "--repair", "--no-report"]).exit_code == 0
+    assert call("resume", run, "--repair", "--no-report").exit_code == 0
     assert open_store(run).verify() == []
     assert results(run) == results(flown.path)

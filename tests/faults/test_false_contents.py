@@ -5,7 +5,6 @@ folders and pipes where a file has to be.
 """
 
 import os
-import shutil
 import subprocess
 import sys
 from hashlib import sha256
@@ -15,11 +14,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from stones import results, stones
-from typer.testing import CliRunner
+from stones import call, copy_of, flown_stones, results, stones
 
 from mc_engine import load_campaign, open_store, runner
-from mc_engine.cli import app
 from mc_engine.journal import encode, scan
 from mc_engine.parts import parquet_bytes
 from mc_engine.shards import Shard
@@ -30,19 +27,13 @@ CASES, CHUNK = 120, 40
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("stones")
-    return runner.run(stones(folder / "campaign", CASES), folder / "whole", workers=2, chunk=CHUNK)
+    return flown_stones(tmp_path_factory.mktemp("stones"), CASES, CHUNK)
 
 
 @pytest.fixture
 def run(flown, tmp_path):
     """A copy of the run, to be falsified."""
-    shutil.copytree(flown.path, tmp_path / "run")
-    return tmp_path / "run"
-
-
-def call(verb, run, *options):
-    return CliRunner().invoke(app, [verb, str(run), *options])
+    return copy_of(flown, tmp_path)
 
 
 def assert_a_sentence(done, *words):

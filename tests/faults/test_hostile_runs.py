@@ -15,12 +15,10 @@ from zlib import crc32
 
 import pyarrow.parquet as pq
 import pytest
-from stones import results, stones
-from typer.testing import CliRunner
+from stones import call, copy_of, flown_stones, results, stones
 
 from mc_engine import open_store, runner
 from mc_engine.campaign_file import MOST_CASES
-from mc_engine.cli import app
 from mc_engine.errors import StoreError
 from mc_engine.journal import encode, scan
 from mc_engine.receipts import MOST_CASES as MOST_OF_A_RUN
@@ -33,15 +31,13 @@ READERS = (("verify",), ("status",), ("summary",), ("resume", "--no-report"))
 
 @pytest.fixture(scope="module")
 def flown(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("stones")
-    return runner.run(stones(folder / "campaign", CASES), folder / "whole", workers=2, chunk=CHUNK)
+    return flown_stones(tmp_path_factory.mktemp("stones"), CASES, CHUNK)
 
 
 @pytest.fixture
 def run(flown, tmp_path):
     """A copy of the run, to be tampered with."""
-    shutil.copytree(flown.path, tmp_path / "run")
-    return tmp_path / "run"
+    return copy_of(flown, tmp_path)
 
 
 @pytest.fixture
@@ -50,10 +46,6 @@ def victim(tmp_path):
     (tmp_path / "victim").mkdir()
     (tmp_path / "victim" / "file.txt").write_text("mine")
     return tmp_path / "victim" / "file.txt"
-
-
-def call(verb, run, *options):
-    return CliRunner().invoke(app, [verb, str(run), *options])
 
 
 def written(run, events):
