@@ -138,6 +138,6 @@ class MapDrawing(Drawing):
         bar = figure.colorbar(
             field, ax=axis, label=paper.literal(self.metric_label), pad=0.02, aspect=32, format=paper.PlainNumbers()
         )
-        bar.outline.set_visible(False)
+        bar.ax.spines["outline"].set_visible(False)
         paper.add_key(figure, self.key, columns=1)
         return figure
