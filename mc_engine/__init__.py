@@ -4,8 +4,8 @@ The public names load what they need when they are first used: the command line 
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # not from `typing`, for which `python -m mc_engine` would look in the working folder
 if TYPE_CHECKING:
     from mc_engine.campaign import Campaign, list_campaigns, load_campaign
     from mc_engine.cases import case_table
@@ -65,7 +65,7 @@ __all__ = [  # noqa: RUF022 - by module, as above
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _MODULE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value = getattr(import_module(f"{__name__}.{_MODULE[name]}"), name)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mc_engine.campaign_file import MOST_CASES, CampaignSection, schema
+from mc_engine.campaign_file import CampaignSection, schema
 from mc_engine.campaign_parts import (
     Correlation,
     Requirement,
@@ -40,6 +40,7 @@ from mc_engine.errors import CampaignError, ModelError, Problem
 from mc_engine.input_values import inputs_of
 from mc_engine.model import AdaptiveStep, Model, load_model
 from mc_engine.sobol import MAX_DIMENSIONS
+from mc_engine.status import MOST_CASES
 from mc_engine.suggestions import hint
 from mc_engine.tuning_parts import Tuning, check_tuning
 

@@ -11,8 +11,9 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Discriminator, Field
 from pydantic_core import PydanticCustomError
 
 from mc_engine.distributions import Scalar
+from mc_engine.numbers_in_text import LEAST_SHARE
+from mc_engine.status import MOST_CASES
 
-MOST_CASES = 1_000_000_000
 MOST_LEVELS = 1_000_000
 MOST_STEPS = 10**12
 LONGEST_LINE, LONGEST_NOTE = 300, 5000  # letters
@@ -61,7 +62,7 @@ Value = Annotated[
 ]
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST), AfterValidator(_not_tiny)]
-Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+Share = Annotated[float, Field(ge=LEAST_SHARE, le=1.0 - LEAST_SHARE)]
 
 
 class Section(BaseModel):
@@ -177,7 +178,7 @@ class ExponentialDispersion(DispersionSection):
 class DiscreteDispersion(DispersionSection):
     dist: Literal["discrete"]
     values: list[Value] = Field(min_length=1, description="what is drawn")
-    weights: list[Annotated[float, Field(ge=0.0)]] | None = Field(
+    weights: list[Annotated[float, Field(ge=0.0, le=LARGEST)]] | None = Field(
         default=None, description="equal unless said; need not sum to 1"
     )
 

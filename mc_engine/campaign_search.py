@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mc_engine.errors import CampaignError, ModelError, Problem
+from mc_engine.run_folder import NO_TEXT, readable
 from mc_engine.suggestions import hint
+from mc_engine.urls import is_url, without_secrets
 
 SHIPPED = Path(__file__).resolve().parents[1] / "campaigns"
 
@@ -73,13 +75,14 @@ def find_campaign(reference: str | Path) -> Path:
         return shipped[text]
     path = Path(text)
     try:
-        if path.is_dir() and (path / "campaign.toml").is_file():
-            return path / "campaign.toml"
-        if path.is_file():
-            return path
+        found = path / "campaign.toml" if path.is_dir() else path
+        if found.is_file():
+            if (place := str(found.resolve())) != readable(place):
+                raise CampaignError(readable(text), [Problem("", NO_TEXT)])
+            return found
     except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
         pass
-    raise CampaignError(text, [Problem("", _not_found(text, path, list(shipped)))])
+    raise CampaignError(without_secrets(text), [Problem("", _not_found(text, path, list(shipped)))])
 
 
 def requirement_names(reference: str) -> list[str]:
@@ -135,7 +138,7 @@ def _not_found(text: str, path: Path, names: list[str]) -> str:
         return (
             "there is no such file; `mc-engine list` names the shipped campaigns, `mc-engine init DIR` makes a new one"
         )
-    if "://" in text:
+    if is_url(text):
         return "is a URL; a campaign is read from a file here"
     if "/" not in text and not text.startswith("."):
         near = hint(text, names)

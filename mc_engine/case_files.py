@@ -1,6 +1,7 @@
 """Tables that stand beside a campaign file: the cases of the design "table", the numbers of "empirical".
 
-CSV (comma, first line the names) or Parquet.  Every fault is a sentence with file, line and column.
+CSV (comma, first line the names) or Parquet.  Every fault is a sentence with file, line and column.  What is read has
+bounds, so that no file fills the memory: of its size before it is opened, of its cells while it is read.
 """
 
 import csv
@@ -8,15 +9,26 @@ import io
 import json
 import math
 import os
-from collections.abc import Sequence
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
+
+from mc_engine.campaign_file import LARGEST
+from mc_engine.durable_file import open_regular
+from mc_engine.errors import StoreError
+from mc_engine.numbers_in_text import is_real, real
 
 if TYPE_CHECKING:
     import pandas as pd
 
+MOST_CSV_BYTES, MOST_CSV_CELLS, MOST_OF_LINE = 2**28, 20_000_000, 2**20
+MOST_PARQUET_BYTES, MOST_PARQUET_CELLS = 2**32, 2**28
+MOST_COLUMNS = 10_000
 _MOST_LINES = 5  # named in one sentence
 _LONGEST_NAME = 60  # written out in one
 
@@ -61,41 +73,75 @@ def read_columns(path: Path) -> dict[str, np.ndarray]:
 
 
 def _read_parquet(path: Path) -> dict[str, np.ndarray]:
-    import pyarrow
-    import pyarrow.parquet
+    from mc_engine.parts import parquet_table
 
     try:
-        table = pyarrow.parquet.ParquetFile(path).read(use_threads=False)
-    except (pyarrow.ArrowException, OSError) as error:
+        with open_beside(path, MOST_PARQUET_BYTES) as file:
+            table = parquet_table(file, most=MOST_PARQUET_CELLS)
+    except ValueError as error:
         raise FileFault(f'"{path.name}" is not a Parquet file that can be read: {error}') from None
-    repeated = sorted({name for name in table.column_names if table.column_names.count(name) > 1})
-    if repeated:
-        raise FileFault(f'"{path.name}" has the column "{repeated[0]}" twice')
+    _check_names(path, table.column_names)
     return {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
 
 
-def _read_csv(path: Path) -> dict[str, np.ndarray]:
+@contextmanager
+def open_beside(path: Path, most: int) -> Iterator[Any]:
+    """The file, to be read as bytes; FileFault where it has more than `most`, or the system refuses."""
     try:
-        text = path.read_text(encoding="utf-8-sig")
-        rows = list(csv.reader(io.StringIO(text), strict=True))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FileFault(f'"{path.name}" is not CSV text in UTF-8: {error}') from None
-    numbered = [(line, row) for line, row in enumerate(rows, start=1) if any(cell.strip() for cell in row)]
-    if not numbered:
+        with os.fdopen(open_regular(path, os.O_RDONLY), "rb") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > most:
+                raise FileFault(f'"{path.name}" has {size:,} bytes; at most {most:,} are read of such a file')
+            yield file
+    except (OSError, StoreError) as error:
+        raise FileFault(f'"{path.name}" cannot be read: {getattr(error, "strerror", None) or error}') from None
+
+
+def _read_csv(path: Path) -> dict[str, np.ndarray]:
+    with open_beside(path, MOST_CSV_BYTES) as binary:
+        lines = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
+        try:
+            return _columns(path, csv.reader(_short(path, lines), strict=True))
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise FileFault(f'"{path.name}" is not CSV text in UTF-8: {error}') from None
+
+
+def _short(path: Path, lines: TextIO) -> Iterator[str]:
+    """The lines, none of which fills the memory."""
+    while line := lines.readline(MOST_OF_LINE):
+        if len(line) == MOST_OF_LINE:
+            raise FileFault(f'"{path.name}" has a line of more than {MOST_OF_LINE:,} letters')
+        yield line
+
+
+def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
+    """The columns, gathered row by row; FileFault where they are more than a table of cases may have."""
+    filled = ((line, row) for line, row in enumerate(rows, start=1) if any(cell.strip() for cell in row))
+    names = [_as_meant(cell) for cell in next(filled, (0, []))[1]]
+    if not names:
         raise FileFault(f'"{path.name}" is empty')
-    names = [_as_meant(cell) for cell in numbered[0][1]]
     _check_names(path, names)
-    ragged = [(line, len(row)) for line, row in numbered[1:] if len(row) != len(names)]
+    columns: list[list[str]] = [[] for _ in names]
+    most, ragged = MOST_CSV_CELLS // len(names), []
+    for line, row in filled:
+        if len(row) != len(names):
+            ragged.append(f"line {line}: {len(row)} fields")
+        elif len(columns[0]) == most:
+            raise FileFault(f'"{path.name}" has more than {MOST_CSV_CELLS:,} cells; a Parquet file may have more')
+        for column, cell in zip(columns, row, strict=False):
+            column.append(sys.intern(_as_meant(cell)))  # most tables repeat themselves
+        if len(ragged) > _MOST_LINES:
+            break
     if ragged:
-        lines = ", ".join(f"line {line}: {count} fields" for line, count in ragged[:_MOST_LINES])
-        more = f" and {len(ragged) - _MOST_LINES} lines more" if len(ragged) > _MOST_LINES else ""
-        raise FileFault(f'"{path.name}", {lines}{more} where {len(names)} columns are named')
-    return {
-        name: np.array([_as_meant(row[k]) for _, row in numbered[1:]], dtype=object) for k, name in enumerate(names)
-    }
+        more = " and more" if len(ragged) > _MOST_LINES else ""
+        told = ", ".join(ragged[:_MOST_LINES])
+        raise FileFault(f'"{path.name}", {told}{more} where {len(names)} columns are named')
+    return {name: np.array(column, dtype=object) for name, column in zip(names, columns, strict=True)}
 
 
 def _check_names(path: Path, names: list[str]) -> None:
+    if len(names) > MOST_COLUMNS:
+        raise FileFault(f'"{path.name}" has {len(names):,} columns; at most {MOST_COLUMNS:,} are read')
     for name in names:
         if not name:
             raise FileFault(f'"{path.name}" has a column without a name in its first line')
@@ -133,15 +179,22 @@ def _as_meant(cell: str) -> str:
 
 def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
     """float64[n]: the cells as finite numbers."""
-    values = np.empty(len(cells))
-    for row, cell in enumerate(cells):
-        try:
-            values[row] = math.nan if isinstance(cell, bool | np.bool_) or cell is None else float(cell)
-        except (TypeError, ValueError):
-            values[row] = math.nan
-        if not math.isfinite(values[row]):
-            raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{cell}" is not a finite number')
+    values = cells.astype(np.float64) if cells.dtype.kind in "fiu" else np.array([_number(cell) for cell in cells])
+    wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    if wrong.size:
+        row = wrong[0]
+        what = f"is beyond {LARGEST:g}" if np.isfinite(values[row]) else "is not a finite number"
+        raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{str(cells[row])[:_LONGEST_NAME]}" {what}')
     return values
+
+
+def _number(cell: Any) -> float:
+    """A cell as a number; NaN for one that is none."""
+    if isinstance(cell, str):
+        return real(cell) if is_real(cell) else math.nan
+    return (
+        float(cell) if isinstance(cell, float | np.floating | Decimal) else math.nan
+    )  # others are arrays of their own
 
 
 def words(path: Path, name: str, cells: np.ndarray, choices: Sequence[str]) -> np.ndarray:
@@ -166,15 +219,8 @@ def empirical_numbers(path: Path, column: str | None) -> tuple[float, ...]:
     if name not in columns:
         raise FileFault(f'"{path.name}" has no column "{name}"; it has {", ".join(columns)}')
     cells = columns[name]
-    if column is None and _is_number(name):
+    if column is None and is_real(name):
         cells = np.array([name, *cells], dtype=object)
     if len(cells) == 0:
         raise FileFault(f'"{path.name}" has no numbers below its first line')
     return tuple(sorted(numbers(path, name, cells).tolist()))
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False

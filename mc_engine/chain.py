@@ -13,6 +13,7 @@ from mc_engine.campaign_problems import Findings, Sections
 from mc_engine.designs import BY_LEVELS, IN_BLOCKS, RANDOM
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.model import Model
+from mc_engine.urls import without_secrets
 
 if TYPE_CHECKING:
     from mc_engine.campaign import Campaign
@@ -73,7 +74,8 @@ def take_inputs(
         spot.add("from", error.problems[0].message)
         return None, None
     except CampaignError as error:
-        spot.add("from", f'"{source}" is neither a run nor a campaign that can be flown: {error.problems[0]}')
+        named = without_secrets(source)
+        spot.add("from", f'"{named}" is neither a run nor a campaign that can be flown: {error.problems[0]}')
         return None, None
     random = rows.facts["design"] in RANDOM
     if design is not None and (design in (*BY_LEVELS, *IN_BLOCKS) or (design != "table" and not random)):

@@ -15,6 +15,7 @@ from mc_engine.backends import Backend
 from mc_engine.chunks import Order
 from mc_engine.crew import Crew, Landing, landing_of
 from mc_engine.errors import WorkersLost
+from mc_engine.safe_path import safe_import_path
 from mc_engine.worker_process import Site, perform
 
 COUNT_AGAIN_S = 2.0  # a cluster grows and shrinks
@@ -108,6 +109,7 @@ class _LocalWorkers:
         # At the end of Python it would close a cluster that a second signal left half made, and raise; ours is closed
         # by `_close`, and its processes end with this one.
         atexit.unregister(close_clusters)
+        held.enter_context(safe_import_path())
         held.enter_context(dask.config.set(OUR_CLUSTER))
         self._workers = workers
         self.cluster = LocalCluster(

@@ -1,7 +1,8 @@
 """What all verbs of the command line share: the application, exit statuses, kinds of arguments.
 
 Exit status: 0 done, 1 a requirement is not met (`run --judge`), 2 usage or campaign file, 3 more failed cases than
-allowed (`run --max-failed`), 4 interrupted or the disk full, and resumable, 5 store damaged or busy.
+allowed (`run --max-failed`), 4 interrupted or the disk full, and resumable, 5 store damaged or busy, 6 an error that
+nobody foresaw, or too little memory: a sentence, and a log file with the traceback.
 """
 
 import errno
@@ -9,22 +10,55 @@ import importlib
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from copy import copy
+from functools import partial
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError
 from mc_engine.interruption import INTERRUPTED, last_words, under_way
+from mc_engine.numbers_in_text import LARGEST_WHOLE, is_real, is_whole
+from mc_engine.run_folder import NO_TEXT, readable
 from mc_engine.shell_words import shell_word
+from mc_engine.unforeseen import UNFORESEEN, unforeseen
+from mc_engine.urls import is_url, store_url
 
 if TYPE_CHECKING:
     from mc_engine.store import Store
 
 NOT_MET, USAGE, TOO_MANY_FAILED, DAMAGED = 1, 2, 3, 5  # and INTERRUPTED, 4
 
+
+class _Commands(TyperGroup):
+    """The commands, whose options take numbers as people write them, and no other."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        command = super().get_command(ctx, cmd_name)
+        for param in command.params if command is not None else ():
+            kind = copy(param.type)
+            if kind.name.startswith(("int", "float")):
+                kind.convert = partial(_converted, param.type)
+                param.type = kind
+        return command
+
+
+def _converted(kind: Any, value: Any, param: Any, ctx: Any) -> Any:
+    whole = kind.name.startswith("int")
+    if isinstance(value, str) and not (is_whole(value) if whole else is_real(value) and isfinite(float(value))):
+        most = f" of at most {LARGEST_WHOLE:,}" if whole else ", such as 0.5 or 1e-3"
+        kind.fail(f"{value!a} is not a {'whole ' if whole else ''}number{most}", param, ctx)
+    return kind.convert(value, param, ctx)
+
+
 app = typer.Typer(
+    cls=_Commands,
     help="Monte Carlo dispersion campaigns for spacecraft guidance, navigation and control.",
+    epilog="Exit status: 0 done, 1 a requirement not met, 2 wrong usage or campaign, 3 too many failed cases, "
+    "4 interrupted or disk full, 5 damaged or busy directory, 6 unforeseen error or too little memory.",
     no_args_is_help=True,
     rich_markup_mode=None,  # plain help: rich's would take twice as long to load as all else
     pretty_exceptions_enable=False,
@@ -54,26 +88,29 @@ CampaignFile = Annotated[
 ]
 
 
-def is_url(place: str) -> bool:
-    """True for what names an object store; `Path` would make a folder of it."""
-    return "://" in place
+# `parser=` of an argument or option gets the text before it becomes a Path, which mangles a URL.
+def object_store(text: str) -> str:
+    try:
+        return store_url(text)
+    except EngineError as error:
+        leave(USAGE, str(error))
 
 
 def _on_disk(text: str, instead: str) -> Path:
     if is_url(text):
-        leave(USAGE, f"{text}: is a URL, and what is wanted here lies on a disk; {instead}")
+        url = object_store(text)
+        leave(USAGE, f"{url}: is a URL, and what is wanted here lies on a disk; {instead.format(shell_word(url))}")
+    if text != readable(text):
+        leave(USAGE, f"{readable(text)}: {NO_TEXT}")
     return Path(text)
 
 
-# `parser=` of an argument or option gets the text before it becomes a Path, which mangles a URL.
 def run_here(text: str) -> Path:
-    fetch = f"`mc-engine fetch {shell_word(text)} DIR`"
-    return _on_disk(text, f"{fetch} makes a directory of it, and --publish keeps it up to date")
+    return _on_disk(text, "`mc-engine fetch {} DIR` makes a directory of it, and --publish keeps it up to date")
 
 
 def new_folder(text: str) -> Path:
-    publish = f"--publish {shell_word(text)} or `mc-engine publish`"
-    return _on_disk(text, f"fly into a folder, and {publish} keeps a copy up there")
+    return _on_disk(text, "fly into a folder, and --publish {} or `mc-engine publish` keeps a copy up there")
 
 
 def new_file(text: str) -> Path:
@@ -83,7 +120,9 @@ def new_file(text: str) -> Path:
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run.", parser=run_here)]
 RunPlace = Annotated[str, typer.Argument(metavar="RUN", help="The directory of a run, or the URL of a published one.")]
 Cases = Annotated[int | None, typer.Option(min=1, help="Number of cases, in place of the file's.")]
-Workers = Annotated[int | None, typer.Option(min=1, help="Threads or processes that fly cases; all cores by default.")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, max=100_000, help="Threads or processes that fly cases; all cores by default.")
+]
 BackendName = Annotated[
     str,
     typer.Option(
@@ -97,16 +136,20 @@ Scheduler = Annotated[
     str | None, typer.Option(metavar="ADDRESS", help="With dask: a scheduler such as tcp://node1:8786.")
 ]
 CaseSeconds = Annotated[
-    float | None, typer.Option(min=0.1, help="With loky or dask: give a case up that takes longer.")
+    float | None, typer.Option(min=0.1, max=1e8, help="With loky or dask: give a case up that takes longer.")
 ]
-Memory = Annotated[int | None, typer.Option(min=512, metavar="MIB", help="With loky or dask: memory of a worker.")]
+Memory = Annotated[
+    int | None, typer.Option(min=512, max=2**30, metavar="MIB", help="With loky or dask: memory of a worker.")
+]
 Patience = Annotated[
     float | None,
-    typer.Option(min=1.0, metavar="S", help="With dask: give up after so long without a worker; by default 300 s."),
+    typer.Option(
+        min=1.0, max=1e8, metavar="S", help="With dask: give up after so long without a worker; by default 300 s."
+    ),
 ]
 Publish = Annotated[
     str | None,
-    typer.Option(metavar="URL", help="Keep a copy, such as s3://bucket/prefix, up to date while the run flies."),
+    typer.Option(metavar="URL", parser=object_store, help="Keep a copy, such as s3://bucket/x, up to date in flight."),
 ]
 NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the reports out.")]
 
@@ -126,8 +169,14 @@ def exit_status() -> Iterator[None]:
     except KeyboardInterrupt:
         leave(INTERRUPTED, last_words())
     except OSError as error:
+        if error.errno == errno.ENOMEM:
+            leave(UNFORESEEN, unforeseen(error))
         full = error.errno in (errno.ENOSPC, errno.EDQUOT)
         leave(INTERRUPTED if full else USAGE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    except (typer.Exit, typer.Abort, typer.BadParameter, SystemExit):
+        raise
+    except BaseException as error:  # a panic of a library in Rust is no Exception
+        leave(UNFORESEEN, unforeseen(error))
 
 
 def leave(status: int, message: str) -> NoReturn:
@@ -175,20 +224,22 @@ def _refuse_unreadable(path: Path) -> None:
 
 def refuse_occupied_folder(path: Path) -> None:
     """An occupied --out is a slip of the user's; told before anything is compiled."""
-    from mc_engine.store import JOURNAL, open_store, refuse_occupied
+    from mc_engine.directory_kinds import RUN, kind_of
+    from mc_engine.store import JOURNAL, is_run_directory, open_store, refuse_occupied
     from mc_engine.writer_lock import LOCK_NAME
 
-    if (path / JOURNAL).exists() and open_store(path).missing():
+    if (path / JOURNAL).exists() and is_run_directory(path) and open_store(path).missing():
         resume = f"`mc-engine resume {shell_word(path)}`"
         leave(USAGE, f"--out {path}: holds a run that is not complete; {resume} flies the rest")
     # of a creation that was cut short, it seems, whoever makes the run knows which files it left
-    if not (path / LOCK_NAME).exists() or (path / JOURNAL).exists():
+    whole = (path / JOURNAL).exists() or kind_of(path) not in (None, RUN)
+    if whole or not (path / LOCK_NAME).exists():
         try:
             refuse_occupied(path)
         except StoreError as error:
             leave(USAGE, f"--out {error}")
     if run := next((one for one in path.absolute().parents if os.path.isfile(one / JOURNAL)), None):
-        leave(USAGE, f"--out {path}: lies inside the run {run.name}; choose another folder")
+        leave(USAGE, f"--out {path}: lies inside the {kind_of(run)} {run.name}; choose another folder")
     existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
         leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")

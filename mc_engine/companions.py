@@ -1,20 +1,17 @@
-"""Files that a campaign reads from its own folder, as the run directory keeps them."""
+"""Files that a run is made with and that never change: campaign, manifest, and what the campaign reads beside it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from mc_engine.durable_file import sha256_inside
 from mc_engine.errors import StoreError
 
 
-def companion_problems(run: Path, created: Mapping[str, Any]) -> list[str]:
-    """A sentence for every file beside the campaign that is gone or edited; `created` are the facts of the creation."""
-    problems = []
-    for name, digest in created.get("companions", {}).items():
+def edited_files(run: Path, digests: Mapping[str, str]) -> Iterator[str]:
+    """A sentence for every one of these files that is gone or edited.  digests : SHA-256 by name."""
+    for name, digest in digests.items():
         try:
             if sha256_inside(run, name) != digest:
-                problems.append(f"{name}: damaged or edited, its SHA-256 is not the one in the journal")
+                yield f"{name}: damaged or edited, its SHA-256 is not the one in the journal"
         except StoreError as error:
-            problems.append(str(error).removeprefix(f"{run}/"))
-    return problems
+            yield str(error).removeprefix(f"{run}/")

@@ -24,11 +24,13 @@ from mc_engine.distributions import column, quantiles
 from mc_engine.errors import EngineError
 from mc_engine.event_watch import watching_events
 from mc_engine.flight import fly, grid_of
+from mc_engine.lost_numbers import first_lost
 from mc_engine.model import AdaptiveStep, FixedStep
 from mc_engine.model_contract import nominal_inputs
 from mc_engine.model_faults import MORE, fault_of
 from mc_engine.physics_trial import fixed_metrics
-from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
+from mc_engine.repeatability import influences, note_environment, numbers
+from mc_engine.status import NOT_FINITE, OK, STATUS_NAME, STATUS_TEXT
 
 _CASES = 32
 _BLOCKS = 4  # of lanes that they fill at most
@@ -52,10 +54,11 @@ def faults(campaign: Campaign) -> list[str]:
     ids = np.arange(min(campaign.cases, _CASES))
     inputs = full_inputs(campaign, case_table(campaign, ids))
     try:
-        _fly_nominal(campaign)
+        nominal = _fly_nominal(campaign)
         with _landing_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
             flown = _fly(campaign, inputs, ids)
-        found = [*_failed(campaign, flown), *_other_bits(campaign, inputs, ids, flown)]
+        lost = _not_finite(campaign, inputs, ids, flown, nominal)
+        found = [*(lost or _failed(campaign, flown)), *_other_bits(campaign, inputs, ids, flown)]
         return found or [
             *_never_set(campaign, flown),
             *_always_the_same(campaign, flown),
@@ -68,14 +71,14 @@ def faults(campaign: Campaign) -> list[str]:
         return [fault_of(error, campaign.model_reference)]
 
 
-def _fly_nominal(campaign: Campaign) -> None:
+def _fly_nominal(campaign: Campaign) -> Columns:
     """Fly the nominal case, after a single step of it that compiles the kernel; end the process with a sentence if it
     does not land."""
     clock, inputs, ids = campaign.model.clock, nominal_row(campaign), np.array([NOMINAL_NOISE])
     one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
     fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
     with _landing_within(LONGEST_S, "the nominal case has", campaign):
-        _fly(campaign, inputs, ids)
+        return _fly(campaign, inputs, ids)
 
 
 @contextmanager
@@ -126,6 +129,22 @@ def _failed(campaign: Campaign, flown: Columns) -> Iterator[str]:
         text = f"no stopping event crosses zero before the time limit, of {', '.join(stops)}; look at its function, "
         text += "its direction and the clock's `until`"
     yield f"{sentence} ({reasons[0] if word == 'refused' and reasons else text})"
+
+
+def _not_finite(
+    campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns, nominal: Columns
+) -> list[str]:
+    """One sentence with the line of the model if a flight ended not-finite: the nominal one, or the first of these."""
+    word = STATUS_NAME[NOT_FINITE]
+    bad = np.flatnonzero(flown["status"] == word)
+    own: tuple[Mapping[str, Any], int, str] = nominal_row(campaign), NOMINAL_NOISE, "the nominal case"
+    if nominal["status"][0] != word:
+        if not bad.size:
+            return []
+        row = {name: value[bad[0]] if np.ndim(value) else value for name, value in inputs.items()}
+        own = row, int(ids[bad[0]]), f"case {ids[bad[0]]}"
+    found = first_lost(campaign.model, own[0], own[1], campaign.seed, own[2])
+    return [f"{found}; {bad.size} of the first {ids.size} cases end {word}"] if found else []
 
 
 def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
@@ -239,8 +258,14 @@ def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarr
 
 
 def main() -> None:
-    """Print the sentences on the campaign named on the command line as a JSON list."""
-    _answer(faults(load_campaign(sys.argv[1])))
+    """Print the sentences on the campaign named on the command line as a JSON list.
+
+    Behind the name may stand the `numbers` of another process, as JSON.
+    """
+    note_environment()
+    campaign = load_campaign(sys.argv[1])
+    there = numbers(campaign)
+    _answer(influences(json.loads(sys.argv[2]) if sys.argv[2:] else there, there) or faults(campaign))
 
 
 def _answer(sentences: list[str]) -> None:

@@ -15,9 +15,10 @@ import numpy as np
 
 from mc_engine.campaign_file import CovarianceSection
 from mc_engine.campaign_problems import Findings, read, shown
-from mc_engine.case_files import FileFault, resolve_beside
+from mc_engine.case_files import FileFault, open_beside, resolve_beside
 from mc_engine.orbit_messages import AXES, MessageFault, UncertainState, read_message, same_epoch
 
+_MOST_OF_MESSAGE = 2**26  # bytes
 _UNITS = ("km", "km", "km", "km/s", "km/s", "km/s")
 _LEAST_EIGENVALUE = 1e-8  # of the matrix of correlations: below it, it is singular for the digits of a message
 
@@ -47,9 +48,10 @@ def spread_covariances(document: dict[str, Any], directory: Path, found: Finding
 def _matrix(section: CovarianceSection, directory: Path, found: Findings) -> np.ndarray | None:
     """The covariance in the axes asked for, or None with what is wrong noted."""
     try:
-        text = resolve_beside(directory, section.file).read_text(encoding="utf-8")
+        with open_beside(resolve_beside(directory, section.file), _MOST_OF_MESSAGE) as file:
+            text = file.read().decode()
         matrix = _chosen(read_message(text), section).covariance_in(section.frame)
-    except (FileFault, MessageFault, UnicodeDecodeError, OSError) as fault:
+    except (FileFault, MessageFault, UnicodeDecodeError) as fault:
         about = str(fault) if isinstance(fault, FileFault) else f'"{section.file}": {fault}'
         found.add("file", about)
         return None

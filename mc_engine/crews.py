@@ -10,6 +10,7 @@ nothing else but orders and receipts travels.
 
 import os
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from mc_engine.cluster_crew import ClusterCrew
 from mc_engine.crew import Crew, Landing, landing_of
 from mc_engine.interruption import unsignalled_children
 from mc_engine.parts import Written
+from mc_engine.safe_path import safe_import_path
 from mc_engine.store import Store
 from mc_engine.worker_process import Site, begin_process, perform
 
@@ -75,6 +77,8 @@ class ProcessCrew(Crew):
     def __init__(self, site: Site, workers: int):
         super().__init__()
         self._site, self._workers = site, workers
+        self._held = ExitStack()
+        self._held.enter_context(safe_import_path())
         self._executors: list[Any] = []
         self._idle: list[Any] = []
         self._busy: dict[Order, Any] = {}
@@ -123,5 +127,6 @@ class ProcessCrew(Crew):
         return landing
 
     def close(self, at_once: bool) -> None:
-        for executor in self._executors:
-            executor.shutdown(wait=True, kill_workers=at_once)
+        with self._held:
+            for executor in self._executors:
+                executor.shutdown(wait=True, kill_workers=at_once)

@@ -15,6 +15,7 @@ import numpy as np
 from mc_engine import correlation
 from mc_engine.halton import scrambled_halton
 from mc_engine.sobol import scrambled_sobol
+from mc_engine.status import MOST_CASES
 from mc_engine.streams import uniforms
 
 RANDOM = ("mc", "lhs", "sobol", "halton")
@@ -71,6 +72,8 @@ def block_size(design: str, n_dispersions: int) -> int:
 
 def block_problem(design: str, n_dispersions: int, n_cases: int) -> str:
     """Why a design cannot have so many cases, as a sentence; empty if it can."""
+    if n_cases > MOST_CASES:
+        return f"{n_cases} is not allowed; it must be at most {MOST_CASES}"
     if design not in IN_BLOCKS or not n_dispersions or n_cases % block_size(design, n_dispersions) == 0:
         return ""
     size = block_size(design, n_dispersions)

@@ -1,20 +1,23 @@
-"""Files that are whole or absent, also after a power cut.
+"""Files that are whole or absent, also after a power cut; and the one place where the engine writes.
 
 Content goes to a temporary name, is synced and renamed, and the folder is synced.  Temporary names start with a
 dot and end in `.tmp`, so that neither Arrow's nor DuckDB's reading of a folder takes them for parts.
 Every OSError leaves here as a DiskError that names the path, or as a StoreError where a file is gone.
 
-A directory may come from anyone: what is read or written is a regular file, never what a symbolic link leads to,
-a pipe or a device.
+A directory may come from anyone.  All that lies in one is read, written, replaced and removed by functions that take
+the directory, as the user named it, and a name in it, with slashes.  The directory itself may be a symbolic link.
+Below it no link is followed: each folder is opened from the one around it, where the system can do that, and its path
+is resolved and compared where it cannot.  What is read or written is a regular file, never a pipe or a device.
 """
 
 import errno
 import hashlib
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import NamedTuple
 
 from mc_engine.errors import DiskError, StoreError
 
@@ -30,6 +33,8 @@ MOST_OF_TEXT, MOST_OF_JOURNAL, MOST_OF_FILE = 2**28, 2**30, 2**34  # bytes
 _LINK = "is a symbolic link; only files of its own count in a directory"
 # A pipe without a writer must not keep the reader waiting.  Windows has neither flag.
 _PLAINLY = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
+_HOLDS_FOLDERS = os.open in os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")  # not on Windows
 
 
 @contextmanager
@@ -59,23 +64,111 @@ def _refusing_folder(path: Path) -> Iterator[None]:
         raise
 
 
-def open_regular(path: Path, flags: int) -> int:
+# ---- where a name leads
+
+
+class _Folder(NamedTuple):
+    """A folder, with its descriptor where the system opens files by that."""
+
+    path: Path
+    descriptor: int | None
+
+    def of(self, name: str) -> str:
+        """What the system is given, beside the descriptor, for a name in this folder."""
+        return str(self.path / name) if self.descriptor is None else name
+
+
+def inner_names(name: str) -> list[str]:
+    """The folders on the way to a file of a directory, and its own name; ValueError if it can lie elsewhere."""
+    names = name.split("/")
+    strange = "\0\\:" if os.name == "nt" else "\0"
+    if any(one in ("", ".", "..") or {*one} & {*strange} for one in names):
+        raise ValueError("lies outside the directory")
+    return names
+
+
+@contextmanager
+def _place(root: Path, name: str, told: str | None = None, make: bool = False) -> Iterator[tuple[_Folder, str]]:
+    """The folder that the file `name` of a directory lies in, and its name there.
+
+    told : name for messages, if not this one.  make : create the folders on the way.
+    """
+    path = root / (told or name)
+    try:
+        *folders, last = inner_names(name)
+    except ValueError as error:
+        raise StoreError(f"{path}: {error}") from None
+    with naming(path), _held(root, folders, make) as folder:
+        yield folder, last
+
+
+@contextmanager
+def _held(root: Path, folders: Sequence[str] = (), make: bool = False) -> Iterator[_Folder]:
+    if not _HOLDS_FOLDERS:
+        yield _resolved(root, folders, make)
+        return
+    path, descriptor = root, os.open(root, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        for name in folders:
+            inner = _entered(_Folder(path, descriptor), name, make)
+            os.close(descriptor)
+            path, descriptor = path / name, inner
+        yield _Folder(path, descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _entered(folder: _Folder, name: str, make: bool) -> int:
+    """Descriptor of a folder in this one."""
+    if make:
+        with suppress(FileExistsError):
+            os.mkdir(name, dir_fd=folder.descriptor)
+            _sync_names(folder)
+    try:
+        return os.open(name, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=folder.descriptor)
+    except NotADirectoryError:
+        is_link = stat.S_ISLNK(os.stat(name, dir_fd=folder.descriptor, follow_symlinks=False).st_mode)
+        raise StoreError(f"{folder.path / name}: {_LINK if is_link else 'is no folder'}") from None
+
+
+def _resolved(root: Path, folders: Sequence[str], make: bool) -> _Folder:
+    path = root.joinpath(*folders)
+    if os.path.realpath(path) != os.path.join(os.path.realpath(root), *folders):
+        raise StoreError(f"{path}: lies outside the directory, or {_LINK}")
+    if make:
+        path.mkdir(parents=True, exist_ok=True)
+    return _Folder(path, None)
+
+
+def open_regular(path: Path, flags: int, folder: _Folder | None = None) -> int:
     """Descriptor of the file `path`, as `os.open` gives it; StoreError if it is there and no regular file."""
+    folder = folder or _Folder(path.parent, None)
     with _refusing_folder(path):
-        descriptor = os.open(path, flags | _PLAINLY, 0o666)
+        descriptor = os.open(folder.of(path.name), flags | _PLAINLY, 0o666, dir_fd=folder.descriptor)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
         raise StoreError(f"{path}: is no regular file")
     return descriptor
 
 
-def plainly(path: str, flags: int) -> int:
-    return open_regular(Path(path), flags)
+@contextmanager
+def _opened(root: Path, name: str, flags: int, told: str | None = None) -> Iterator[int]:
+    """Descriptor of the file `name` of a directory."""
+    with _place(root, name, told) as (folder, last):
+        descriptor = open_regular(folder.path / last, flags, folder)
+        try:
+            yield descriptor
+        finally:
+            os.close(descriptor)
 
 
-def temporary_name(path: Path) -> Path:
-    """Where the content of `path` stands until it is whole."""
-    return path.with_name(f".{path.name}.tmp")
+# ---- writing
+
+
+def temporary_name(name: str) -> str:
+    """Where the content of the file `name` stands until it is whole."""
+    folder, slash, last = name.rpartition("/")
+    return f"{folder}{slash}.{last}.tmp"
 
 
 def is_temporary(name: str) -> bool:
@@ -84,22 +177,77 @@ def is_temporary(name: str) -> bool:
 
 
 def write_durably(path: Path, content: bytes) -> None:
-    """Replace `path` by `content`; on return both the bytes and the name are on the disk."""
-    temporary = temporary_name(path)
-    write_synced(temporary, content, path)
-    publish(temporary, path)
+    """Replace the file `path`, as the user named it; on return both the bytes and the name are on the disk."""
+    write_inside(path.parent, path.name, content)
 
 
-def write_synced(path: Path, content: bytes, place: Path | None = None) -> None:
-    """Write a new file whose bytes, but not yet whose name, are on the disk.  `place` is for messages."""
-    with naming(place or path):
+def write_inside(root: Path, name: str, content: bytes) -> None:
+    """Replace the file `name` of a directory; on return both the bytes and the name are on the disk."""
+    write_synced(root, temporary_name(name), content, name)
+    publish(root, temporary_name(name), name)
+
+
+def write_synced(root: Path, name: str, content: bytes, told: str | None = None) -> None:
+    """Write a new file whose bytes, but not yet whose name, are on the disk.  told : name for messages."""
+    try:
+        with _opened(root, name, _NEW, told) as descriptor:
+            write_all(descriptor, content)
+            sync(descriptor)
+    except DiskError:
+        _discard(root, name)
+        raise
+
+
+def leave(root: Path, name: str, content: bytes = b"") -> None:
+    """Write a note that nothing rests on: a power cut may take it."""
+    with _opened(root, name, _NEW) as descriptor:
+        write_all(descriptor, content)
+
+
+def append_synced(root: Path, name: str, at: int, content: bytes) -> None:
+    """Put `content` behind the first `at` bytes of a file, where it ends after an error; it is then on the disk."""
+    with _opened(root, name, os.O_RDWR) as descriptor:
+        os.ftruncate(descriptor, at)
+        os.lseek(descriptor, at, os.SEEK_SET)
         try:
-            with open(path, "wb", buffering=0, opener=plainly) as file:
-                write_all(file.fileno(), content)
-                sync(file.fileno())
+            write_all(descriptor, content)
+            sync(descriptor)
         except OSError:
-            _discard(path)
+            with suppress(OSError):  # what was written whole, and not synced, must not count for the next reader
+                os.ftruncate(descriptor, at)
             raise
+
+
+def publish(root: Path, temporary: str, name: str) -> None:
+    """Give a synced file its name in the same folder, in place of what had it; on return the name is on the disk."""
+    with _place(root, name) as (folder, last):
+        before, held = temporary.rpartition("/")[2], folder.descriptor
+        try:
+            with _refusing_folder(folder.path / last):
+                os.replace(folder.of(before), folder.of(last), src_dir_fd=held, dst_dir_fd=held)
+        except (OSError, StoreError):
+            _discard(root, temporary)
+            raise
+        _sync_names(folder)
+
+
+def remove_file(root: Path, name: str) -> None:
+    """Remove the file `name` of a directory, if it is there; of a symbolic link, the link."""
+    with _place(root, name) as (folder, last), _refusing_folder(folder.path / last), suppress(FileNotFoundError):
+        os.unlink(folder.of(last), dir_fd=folder.descriptor)
+
+
+def _discard(root: Path, name: str) -> None:
+    """A full disk gets its space back; the first error is the one to report."""
+    with suppress(StoreError):
+        remove_file(root, name)
+
+
+def write_all(descriptor: int, content: bytes) -> None:
+    """Write every byte; the system may take fewer at a time."""
+    view = memoryview(content)
+    while view:
+        view = view[os.write(descriptor, view) :]
 
 
 def sync(descriptor: int) -> None:
@@ -114,45 +262,14 @@ def sync(descriptor: int) -> None:
     os.fsync(descriptor)
 
 
-def sync_file(path: Path) -> None:
-    """On return the bytes of `path` are on the disk."""
-    with naming(path), open(path, "r+b", buffering=0, opener=plainly) as file:
-        sync(file.fileno())
-
-
-def publish(temporary: Path, path: Path) -> None:
-    """Give a synced file its name, in place of what had it; on return the name is on the disk."""
-    with naming(path):
-        try:
-            with _refusing_folder(path):
-                os.replace(temporary, path)
-        except (OSError, StoreError):
-            _discard(temporary)
-            raise
-    sync_folder(path.parent)
-
-
-def remove_file(path: Path) -> None:
-    """Remove the file `path`, if it is there."""
-    with naming(path), _refusing_folder(path):
-        path.unlink(missing_ok=True)
-
-
-def _discard(path: Path) -> None:
-    """A full disk gets its space back; the first error is the one to report."""
-    with suppress(OSError):
-        os.unlink(path)
-
-
-def write_all(descriptor: int, content: bytes) -> None:
-    """Write every byte; the system may take fewer at a time."""
-    view = memoryview(content)
-    while view:
-        view = view[os.write(descriptor, view) :]
+def sync_file(root: Path, name: str) -> None:
+    """On return the bytes of the file `name` of a directory are on the disk."""
+    with _opened(root, name, os.O_RDWR) as descriptor:
+        sync(descriptor)
 
 
 def make_folder(path: Path) -> None:
-    """Create `path` with its parents and sync the names that are new."""
+    """Create the folder `path`, as the user named it, with its parents, and sync the names that are new."""
     new = [folder for folder in (path, *path.parents) if not folder.exists()]
     with naming(path):
         path.mkdir(parents=True, exist_ok=True)
@@ -160,32 +277,39 @@ def make_folder(path: Path) -> None:
         sync_folder(folder.parent)
 
 
+def make_way(root: Path, name: str) -> None:
+    """Create the folders on the way to the file `name` of a directory, and sync their names."""
+    with _place(root, name, make=True):
+        pass
+
+
 def sync_folder(path: Path) -> None:
-    """Make the names in `path` durable.  Windows cannot open a folder; its renames are journaled by the system."""
-    if os.name == "nt":
-        return
-    with naming(path):
-        descriptor = os.open(path, os.O_RDONLY)
-        try:
-            sync(descriptor)
-        finally:
-            os.close(descriptor)
+    """Make the names in the folder `path`, as the user named it, durable."""
+    with naming(path), _held(path) as folder:
+        _sync_names(folder)
+
+
+def _sync_names(folder: _Folder) -> None:
+    """Windows cannot open a folder; its renames are journaled by the system."""
+    if folder.descriptor is not None:
+        sync(folder.descriptor)
+
+
+# ---- reading
+
+
+def names_in(root: Path, inner: str = "") -> list[str]:
+    """Names of all that lies in the folder `inner` of a directory, or in the directory itself."""
+    with _place(root, f"{inner}/*".lstrip("/"), inner or ".") as (folder, _):
+        return sorted(os.listdir(folder.path if folder.descriptor is None else folder.descriptor))
 
 
 def read_file(path: Path, most: int | None = None, limit: int = MOST_OF_FILE) -> bytes:
-    """The content of the regular file `path`, or its first `most` bytes.
+    """The content of the regular file `path`, as the user named it, or its first `most` bytes.
 
     limit : StoreError if there are more bytes to be read than that, or than the memory takes.
     """
-    with naming(path), open(path, "rb", opener=plainly) as file:
-        size = os.fstat(file.fileno()).st_size
-        wanted = size if most is None else min(most, size)
-        if wanted > limit:
-            raise StoreError(f"{path}: damaged, {size:,} bytes where no such file has more than {limit:,}")
-        try:
-            return file.read() if most is None else file.read(wanted)
-        except MemoryError as error:
-            raise StoreError(f"{path}: has {size:,} bytes, which the memory does not take") from error
+    return read_inside(path.parent, path.name, most, limit)
 
 
 def read_short(path: Path) -> bytes:
@@ -193,27 +317,27 @@ def read_short(path: Path) -> bytes:
     return read_file(path, limit=MOST_OF_TEXT)
 
 
-def sha256_inside(folder: Path, name: str) -> str:
-    """SHA-256 of the file `name` of a directory, read piece by piece; errors as those of `read_inside`."""
-    _check_inside(folder, name)
-    path = folder / name
-    with naming(path), open(path, "rb", buffering=0, opener=plainly) as file:
-        size = os.fstat(file.fileno()).st_size
-        if size > MOST_OF_FILE:
-            raise StoreError(f"{path}: damaged, {size:,} bytes where no such file has more than {MOST_OF_FILE:,}")
-        return hashlib.file_digest(file, "sha256").hexdigest()
+def read_inside(root: Path, name: str, most: int | None = None, limit: int = MOST_OF_FILE) -> bytes:
+    """The content of the file `name` of a directory, or its first `most` bytes; limit : as of `read_file`."""
+    with _opened(root, name, os.O_RDONLY) as descriptor:
+        size = _size(descriptor, root / name, most, limit)
+        try:
+            with os.fdopen(descriptor, "rb", closefd=False) as file:
+                return file.read() if most is None else file.read(min(most, size))
+        except MemoryError as error:
+            raise StoreError(f"{root / name}: has {size:,} bytes, which the memory does not take") from error
 
 
-def read_inside(folder: Path, name: str, most: int | None = None) -> bytes:
-    """The content of the file `name` of a directory, or its first `most` bytes.
+def sha256_inside(root: Path, name: str) -> str:
+    """SHA-256 of the file `name` of a directory, read piece by piece."""
+    with _opened(root, name, os.O_RDONLY) as descriptor:
+        _size(descriptor, root / name, None, MOST_OF_FILE)
+        with os.fdopen(descriptor, "rb", buffering=0, closefd=False) as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
 
-    name : relative to `folder`, with slashes.  StoreError if it lies elsewhere, be it by a symbolic link on the way.
-    """
-    _check_inside(folder, name)
-    return read_file(folder / name, most)
 
-
-def _check_inside(folder: Path, name: str) -> None:
-    with naming(folder / name):
-        if os.path.realpath(folder / name) != os.path.join(os.path.realpath(folder), *name.split("/")):
-            raise StoreError(f"{folder / name}: lies outside the directory, or {_LINK}")
+def _size(descriptor: int, path: Path, most: int | None, limit: int) -> int:
+    size = os.fstat(descriptor).st_size
+    if (size if most is None else min(most, size)) > limit:
+        raise StoreError(f"{path}: damaged, {size:,} bytes where no such file has more than {limit:,}")
+    return size

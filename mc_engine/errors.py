@@ -9,9 +9,10 @@ EngineError
   WorkersLost       there is nobody to fly cases: workers that cannot be reached, or die whatever they do
 """
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+
+from mc_engine.text import clean
 
 _LONGEST = 2000  # letters of one sentence
 MOST_SHOWN = 100  # problems of one campaign file; a reader mends the first ones first
@@ -19,6 +20,9 @@ MOST_SHOWN = 100  # problems of one campaign file; a reader mends the first ones
 
 class EngineError(Exception):
     """Base of all errors that the engine raises on purpose; its text is one or more plain sentences."""
+
+    def __str__(self) -> str:
+        return clean(super().__str__())  # for those who call the engine from Python, and print it
 
 
 @dataclass(frozen=True)
@@ -29,14 +33,8 @@ class Problem:
     message: str
 
     def __str__(self) -> str:
-        return _for_a_terminal(f"{self.place}: {self.message}" if self.place else self.message)
-
-
-def _for_a_terminal(text: str) -> str:
-    """The text without letters that steer a terminal, and of a length that a person reads."""
-    if len(text) > _LONGEST:
-        text = f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
-    return "".join(letter if letter.isprintable() or letter == "\n" else json.dumps(letter)[1:-1] for letter in text)
+        text = f"{self.place}: {self.message}" if self.place else self.message
+        return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
 
 
 class CampaignError(EngineError):

@@ -34,14 +34,15 @@ def refuse_false_figures(model: "Model") -> None:
             kinds = ", ".join(kind.__name__ for kind in KINDS.values())
             raise ModelError(f"`figures` holds {figure!r}; it must be a tuple of figures of mc_engine.figures: {kinds}")
         spot = f'the {type(figure).__name__} "{figure.title}"'
-        _refuse_kinds(figure, spot)
+        refuse_kinds(figure, spot)
         for word, name, known in _names(figure, model):
             if name not in known:
                 raise ModelError(f'{spot}: there is no {word} "{name}"{_other_table(name, word, model)}'
                                  f"{_hint(name, known)}")  # fmt: skip
 
 
-def _refuse_kinds(figure: Figure, spot: str) -> None:
+def refuse_kinds(figure: Figure, spot: str) -> None:
+    """ModelError, which begins with `spot`, if a field of the figure is of the wrong kind."""
     for one in fields(figure):
         value = getattr(figure, one.name)
         wanted = "" if value is None and one.default is None else _wanted(one.name, value)

@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mc_engine.durable_file import plainly, read_file, read_short, sync_file, write_all
+from mc_engine.durable_file import MOST_OF_TEXT, leave, names_in, read_inside, sync_file
 from mc_engine.errors import StoreError
 from mc_engine.parts import Part, Written, cases_in_name, parquet_table
 from mc_engine.receipts import receipt_of
@@ -33,8 +33,8 @@ def leave_receipt(run: Path, part: Part) -> None:
 
     Not synced, and not missed where the disk refuses: it saves a part after a kill, and nothing rests on it.
     """
-    with suppress(OSError, StoreError), open(run / _RECEIPT, "wb", buffering=0, opener=plainly) as file:
-        write_all(file.fileno(), json.dumps(asdict(part)).encode())
+    with suppress(StoreError):
+        leave(run, _RECEIPT, json.dumps(asdict(part)).encode())
 
 
 def count_finished(store: "Store") -> None:
@@ -50,16 +50,16 @@ def finished_parts(run: Path) -> Iterator[Written]:
     noted = _noted(run)  # first: to commit a part writes another receipt
     if noted is not None and (part := _whole(run, noted.file, noted.file, noted.sha256)):
         yield Written(part, part.file)
-    for path in sorted((run / "cases").iterdir()):
-        match = _ASIDE.fullmatch(path.name)
-        if match is not None and (part := _whole(run, f"cases/{path.name}", f"cases/{match[1]}", match[2])):
-            yield Written(part, f"cases/{path.name}")
+    for name in names_in(run, "cases"):
+        match = _ASIDE.fullmatch(name)
+        if match is not None and (part := _whole(run, f"cases/{name}", f"cases/{match[1]}", match[2])):
+            yield Written(part, f"cases/{name}")
 
 
 def _noted(run: Path) -> Part | None:
     """The part of the last receipt; None if there is none, or it was cut off while it was written."""
     try:
-        return receipt_of(json.loads(read_short(run / _RECEIPT)))
+        return receipt_of(json.loads(read_inside(run, _RECEIPT, limit=MOST_OF_TEXT)))
     except (StoreError, ValueError, RecursionError):
         return None
 
@@ -69,17 +69,17 @@ def _whole(run: Path, place: str, file: str, digest: str) -> Part | None:
 
     digest : its SHA-256, or the beginning of it.
     """
-    path, cases = run / place, cases_in_name(file)
-    if cases is None or path.is_symlink() or not path.is_file():
+    cases = cases_in_name(file)
+    if cases is None:
         return None
     try:
-        content = read_file(path)
-    except StoreError:  # longer than any
+        content = read_inside(run, place)
+    except StoreError:  # not there, no file, or longer than any
         return None
     ours = sha256(content).hexdigest()
     if not ours.startswith(digest):
         return None
-    sync_file(path)
+    sync_file(run, place)
     try:
         status = parquet_table(content, ["status"])["status"].to_pylist()
         facts = {"file": file, "first": cases[0], "rows": len(status), "bytes": len(content), "sha256": ours}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from mc_engine.physics_trial import refuse_unfit
 from mc_engine.preparation import call_prepare
 from mc_engine.status import OK, REFUSED, STATUS_NAME
 from mc_engine.suggestions import hint
+
+if TYPE_CHECKING:
+    from mc_engine.lanes.interpreted import InterpretedFlight
 
 Inputs = Mapping[str, Any]
 _MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
@@ -171,14 +174,14 @@ def _settings_of(model: Model, codes: tuple[float, ...]) -> Any:
 
 
 def _kernel_settings(model: Model, codes: np.ndarray, tables: np.ndarray) -> np.ndarray:
-    """The same as one array, as kernels take it: codes, then the last place of the tables, then the tables.
+    """The same as one array, as kernels take it: codes, then NaN, the last place of the tables, and the tables.
 
     tables : of the cases, behind those of the model.
     """
     if model.tables is None:
         return codes
     shared = settings_of(model, codes).tables
-    return np.concatenate([codes, [shared.size + tables.size - 1.0], shared, tables])
+    return np.concatenate([codes, [np.nan, shared.size + tables.size - 1.0], shared, tables])
 
 
 def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
@@ -243,15 +246,17 @@ def _bound_kernel(
     out: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     history: np.ndarray,
     pace: float,
+    kernel: Callable[..., int] | None = None,
 ) -> Callable[[], int]:
     """The kernel with all its arguments.
 
     inputs : parameters [n_kernel_parameters, n], setting codes, tables of the cases
     pace : distance of two history rows, in steps or, if the steps are adaptive, seconds
+    kernel : in place of the model's own
     """
     parameters, settings, tables = inputs
     refuse_unfit(model, parameters, settings_of(model, settings))
-    kernel = build_kernel(model, folder, width)
+    kernel = kernel or build_kernel(model, folder, width)
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
     kernel_settings = _kernel_settings(model, settings, tables)
     shared = np.ascontiguousarray(parameters), kernel_settings, np.uint64(noise_key(seed)), cases
@@ -279,6 +284,24 @@ def bound_flight(
     cases = ready.parameters[:, chosen], settings, ready.tables
     ids = case_ids[chosen]
     return _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, _NO_HISTORY, 1.0), out[0], settings
+
+
+def fly_interpreted(
+    model: Model, inputs: Inputs, case_id: int, seed: int, seconds: float
+) -> tuple[tuple[np.ndarray, ...], "InterpretedFlight"]:
+    """((time, status, states, metrics) of one case in SI, what its flight knows of numbers that are not finite).
+
+    By Python, some thousand times as long as by a kernel.  OutOfTime after so many seconds.  The case must be able to start.
+    """
+    from mc_engine.lanes.interpreted import InterpretedFlight  # which loads the compiler
+
+    ready = prepare(model, inputs, 1)
+    settings, out = np.ascontiguousarray(ready.settings[0]), _outputs(model, 1)
+    flight = InterpretedFlight(model, seconds)
+    cases = ready.parameters, settings, ready.tables
+    ids = np.array([case_id])
+    _bound_kernel(model, model.clock, None, 1, cases, seed, ids, out, _NO_HISTORY, 1.0, flight.kernel)()
+    return out, flight
 
 
 def fly_history(

@@ -4,17 +4,20 @@ import os
 from pathlib import Path
 
 from mc_engine.campaign import Campaign, load_campaign
+from mc_engine.derived_files import FIGURES, REPLAYS
 from mc_engine.designs import EXTENSIBLE
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.files_read import data_read
 from mc_engine.kernel import source_digest
-from mc_engine.manifest import sampling_digest
-from mc_engine.model_sources import sources_beside
+from mc_engine.manifest import columns_of, sampling_digest
+from mc_engine.model import sources_of
+from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS
+from mc_engine.run_folder import readable
 from mc_engine.store import Store
 from mc_engine.streams import SEED_CONTRACT
 from mc_engine.upstream import COMPANION
 
-_OWN = ("cases", "history")  # folders of a run directory
+_OWN = (*PART_FOLDERS, FIGURES, REPLAYS)  # folders of a run directory
 
 
 def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
@@ -24,8 +27,9 @@ def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
     """
     store.check_companions()
     recorded = store.manifest["campaign"]
-    known = {*store.manifest, *store.manifest.get("model", {}), *recorded}
-    if not {"seed_contract", "digest", "sampling_digest", "design", "seed"} <= known:
+    model, contract = store.manifest.get("model", {}), store.manifest.get("seed_contract")
+    flown_by = model.get("digest"), model.get("sampling_digest"), contract
+    if None in (*flown_by, recorded.get("digest"), recorded.get("design"), recorded.get("seed")):
         raise StoreError(f"{store.path}: its manifest does not say how the campaign was flown; run the campaign anew")
     cases = store.n_cases if recorded["design"] in ("lhs", *EXTENSIBLE) else None
     campaign = load_campaign(
@@ -34,13 +38,12 @@ def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
         seed=recorded["seed"],
         text=store.campaign_text,
         directory=directory or store.path,
-        upstream=store.path / COMPANION if store.manifest.get("upstream") is not None else None,
+        upstream=store.path / COMPANION,  # also where the manifest has none: a run leads nowhere else
     )
     if campaign.digest != recorded["digest"]:
         raise StoreError(f"{store.path}: a file of the campaign was edited; run the campaign anew")
     ours = source_digest(campaign.model, campaign.directory), sampling_digest(), SEED_CONTRACT
-    model, contract = store.manifest["model"], store.manifest["seed_contract"]
-    if ours != (model["digest"], model["sampling_digest"], contract):
+    if ours != flown_by or (*CASE_COLUMNS, *columns_of(campaign)) != store.columns:
         raise StoreError(f"{store.path}: was flown by other sources of engine or model; run the campaign anew")
     return campaign
 
@@ -52,11 +55,16 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
     paths = {base / file for file in files}
     if campaign.table_path is not None:
         paths.add(campaign.table_path)
+    known: dict[Path, bytes] = {}
     if campaign.model_reference.endswith(".py"):
-        model = Path(os.path.normpath(base / campaign.model_reference))
-        paths.update([*sources_beside(model), *data_read(model.parent)])
-    contents = {_name_in(base, path): path.read_bytes() for path in sorted(paths)}
+        sources = sources_of(campaign.model)
+        known = {**sources.files, **sources.late}
+        paths.update([*known, *data_read(sources.home)])
+    contents = {_name_in(base, path): known[path] if path in known else path.read_bytes() for path in sorted(paths)}
     for name in contents:
+        if name != readable(name):
+            sentence = f"reads {name!a}, whose name is no text in UTF-8; give it another"
+            raise CampaignError(campaign.name, [Problem("campaign.model", sentence)])
         if name.split("/")[0] in _OWN:
             sentence = (
                 f'{name}: every run has a folder "{name.split("/")[0]}" of its own; give the model\'s another name'

@@ -59,10 +59,3 @@ def history_problem(table: pa.Table, quantities: Sequence[Mapping[str, str]]) ->
     if len({*names}) < len(names) or not table.schema.equals(wanted, check_metadata=True):
         return "its columns are not those of histories"
     return ""
-
-
-def history_bytes(
-    table: "pd.DataFrame | Mapping[str, Any]", quantities: Sequence[Mapping[str, str]], place: Path
-) -> bytes:
-    """A Parquet file of histories that are kept outside the run's own; `place` is for messages."""
-    return parts.parquet_bytes(history_table(table, quantities, place))

@@ -13,15 +13,19 @@ ends the process where the main thread does not heed the second.
 import atexit
 import os
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
+
+from mc_engine.text import clean
 
 INTERRUPTED = 4  # the exit status
+_MODEL_FAULT = 2  # the exit status of all that is wrong with a model
 NOTHING_BEGUN = "interrupted; nothing was begun, and the same command begins it"
 ONCE_MORE = "interrupted; the same command does it all once more"
 LANDING = "interrupted; what flies lands first, a second signal ends it at once"
@@ -44,18 +48,21 @@ class Interrupted(KeyboardInterrupt):
 
 
 Advice = Callable[[], str]
+_leave = os._exit
 
 
 @dataclass
 class _CommandLine:
     """What the signals of this process find: there is one set of handlers in a process, and so one of these.
 
-    heard : how many the main thread has heeded.  noticed : how many came, as the watch counts them.
+    process : that listens.  heard : how many the main thread has heeded.  noticed : how many came, as the watch
+    counts them.
     under_way : a verb is at work, which an exception may unwind.  landing : what flies is let land before.
     done : the verb has ended.
     """
 
     listening: bool = False
+    process: int = 0
     heard: int = 0
     noticed: int = 0
     under_way: bool = False
@@ -75,7 +82,7 @@ class _CommandLine:
 
     def leave_at_once(self) -> None:
         _tell(last_words())
-        os._exit(INTERRUPTED)
+        _leave(INTERRUPTED)
 
     def notice(self) -> None:
         """What the watch does about a signal; the main thread may be free to hear it, or not."""
@@ -102,7 +109,7 @@ def _tell(words: str) -> None:
     """A line on standard error; not through sys.stderr, in the middle of whose writing a signal may have come."""
     with suppress(OSError):
         begin = "\n" if os.isatty(2) else ""  # behind ^C and a bar of progress
-        os.write(2, f"{begin}{words}\n".encode())
+        os.write(2, f"{begin}{clean(words)}\n".encode())
 
 
 def _later(seconds: float, act: Callable[[], None]) -> None:
@@ -116,11 +123,22 @@ _COMMAND_LINE = _CommandLine()
 
 def listen() -> None:
     """From here on the signals of this process are those of its command line."""
-    _COMMAND_LINE.listening = True
+    _COMMAND_LINE.listening, _COMMAND_LINE.process = True, os.getpid()
     for number in SIGNALS:
         signal.signal(number, _COMMAND_LINE.hear)
+    os._exit = _exit_with_a_word
     _begin_watch()
     atexit.register(_be_deaf)  # the first one registered is the last one called
+
+
+def _exit_with_a_word(status: int) -> NoReturn:
+    """In place of `os._exit`, by which a model would end a command with its own status and without a word."""
+    if os.getpid() == _COMMAND_LINE.process:  # not in a process that was forked from it
+        caller = sys._getframe(1)
+        place = f"{os.path.basename(caller.f_code.co_filename)}, line {caller.f_lineno}"
+        _tell(f"{place}: os._exit({status}) ends the program; a model only computes")
+        status = _MODEL_FAULT
+    _leave(status)
 
 
 def _begin_watch() -> None:

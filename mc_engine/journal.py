@@ -6,16 +6,16 @@ readers ignore it and the next writer cuts it off.  Any other damaged line is re
 """
 
 import json
+import os
 import re
 import zlib
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import MOST_OF_JOURNAL, naming, plainly, read_file, sync, write_all
+from mc_engine.durable_file import MOST_OF_JOURNAL, append_synced, read_file
 from mc_engine.errors import StoreError
 from mc_engine.shell_words import shell_word
 
@@ -117,14 +117,15 @@ class Journal:
     def __init__(self, path: Path):
         """Read `path`; StoreError with the line's number if a line that is not the last is damaged."""
         self.path = path
-        found = scan(read_journal(path))
+        content = read_journal(path)
+        found = scan(content)
         if found.damaged:
             number = found.damaged[0]
             raise damaged_line(path, number, "its checksum or its number does not hold")
         self.entries = list(found.entries)
         self.torn = found.torn
         self.certain = True  # False from an append that failed on: the file may hold a line that is not in `entries`
-        self._length = found.length
+        self._length, self._size = found.length, len(content)  # up to the last good line, and in all
 
     def append(self, event: str, facts: dict[str, Any], judge: Callable[[Entry], None] | None = None) -> Entry:
         """Write and sync one line.  After an error the line does not count and `append` may be tried again.
@@ -137,18 +138,11 @@ class Journal:
         assert entry is not None  # just encoded
         if judge is not None:
             judge(entry)
+        if self.certain and os.path.getsize(self.path) != self._size:
+            raise StoreError(f"{self.path}: another process has written here; this one stops, and adds nothing")
         self.certain = False
-        with naming(self.path), open(self.path, "r+b", buffering=0, opener=plainly) as file:
-            file.truncate(self._length)  # a torn line, here or of an append that failed
-            file.seek(self._length)
-            try:
-                write_all(file.fileno(), line)
-                sync(file.fileno())
-            except OSError:
-                with suppress(OSError):  # a whole line whose sync failed must not count for the next reader
-                    file.truncate(self._length)
-                raise
-        self._length += len(line)
+        append_synced(self.path.parent, self.path.name, self._length, line)  # over a torn line, or one that failed
+        self._length = self._size = self._length + len(line)
         self.entries.append(entry)
         self.torn, self.certain = False, True
         return entry

@@ -5,7 +5,6 @@ a small file of its own, in a folder named by a digest of everything the kernel 
 the model's sources, the compiler's versions and the processor.  A changed source is a new folder.
 """
 
-import importlib.util
 import os
 import platform
 import stat
@@ -16,13 +15,11 @@ from collections.abc import Callable
 from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
-from types import ModuleType
 
 from mc_engine.errors import DiskError
-from mc_engine.files_read import data_at_load
-from mc_engine.kernel_parts import Functions
-from mc_engine.model import AdaptiveStep, Model
-from mc_engine.model_sources import sources_beside, sources_of_module
+from mc_engine.kernel_parts import Functions, parts_of
+from mc_engine.model import AdaptiveStep, Model, sources_of
+from mc_engine.model_imports import new_module
 
 WIDTH = 8  # one register of eight doubles
 _FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
@@ -30,11 +27,11 @@ _ENGINE = ("kernel.py", "kernel_parts.py", "event_watch.py", "model.py", "dates.
 
 _FIXED = '''"""Kernel of {reference}, {width} cases at a time.  Written by the engine; edit the model instead."""
 
-from mc_engine.kernel_parts import Functions, parts_of
+from mc_engine.kernel_parts import Functions
 from mc_engine.lanes.compiler import compile_kernel
 from mc_engine.lanes.fixed_step import fly
 
-_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = parts_of({reference!r}, {folder!r}, {watching!r})
+_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = PARTS
 {names} = _F
 
 
@@ -48,11 +45,11 @@ _ADAPTIVE = '''"""Kernel of {reference}, {width} cases at a time.  Written by th
 
 import numpy as np
 
-from mc_engine.kernel_parts import Functions, parts_of
+from mc_engine.kernel_parts import Functions
 from mc_engine.lanes.adaptive_flight import fly
 from mc_engine.lanes.compiler import compile_kernel
 
-_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = parts_of({reference!r}, {folder!r}, {watching!r})
+_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = PARTS
 {names} = _F
 
 
@@ -70,23 +67,16 @@ def kernel(
 '''
 
 
-def model_sources(model: Model, folder: Path | None) -> list[Path]:
-    """Files that decide the model's numbers, see `mc_engine.model_sources`; with them the data that a `.py` model reads
-    when it is imported, which its kernel may hold.  folder : of a `.py` model."""
-    if model.reference.endswith(".py"):
-        file = Path(os.path.normpath((folder or Path.cwd()).resolve() / model.reference))
-        return [*sources_beside(file), *data_at_load(file)]
-    return sources_of_module(model.reference)
-
-
 def source_digest(model: Model, folder: Path | None) -> str:
-    """SHA-256 over the engine's compiled sources and the model's, in a fixed order."""
+    """SHA-256 over the engine's compiled sources and the model's, in a fixed order.  folder : see `sources_of`."""
     engine = Path(__file__).parent
     files = [*sorted(engine.glob("lanes/*.py")), *sorted(engine.glob("physics/*.py"))]
     files += [engine / name for name in _ENGINE]
     digest = sha256()
-    for path in [*files, *model_sources(model, folder)]:
+    for path in files:
         digest.update(f"{path.name}\n".encode() + path.read_bytes())
+    for name, content in sources_of(model, folder).named():
+        digest.update(f"{name}\n{len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
@@ -146,37 +136,34 @@ def usual_width(model: Model) -> int:
 def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -> Callable[..., int]:
     """The kernel of `model` for `width` cases at a time: 1 (plain float64), 8 or 16.
 
-    folder : where a `.py` model lies.  The first call compiles or loads from the cache.
+    folder : see `sources_of`.  The first call compiles or loads from the cache.
     """
     import llvmlite
     import numba
 
-    # a module is the same from everywhere; a file is not, and a relative folder means another one from elsewhere
-    folder = (folder or Path.cwd()).resolve() if model.reference.endswith(".py") else None
+    module = sources_of(model, folder).module
     versions = f"{numba.__version__} {llvmlite.__version__} {platform.machine()} {sys.version_info[:2]} {_processor()}"
-    what = f"{model.reference} {source_digest(model, folder)} {versions} {folder} {model.watching}"
+    what = f"{module.__name__} {source_digest(model, folder)} {versions} {module.__file__} {model.watching}"
     digest = sha256(what.encode()).hexdigest()
     path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
     template = _ADAPTIVE if isinstance(model.clock, AdaptiveStep) else _FIXED
-    text = template.format(
-        reference=model.reference,
-        folder=str(folder) if folder else None,
-        watching=model.watching,
-        width=width,
-        names=", ".join(Functions._fields),
-    )
+    text = template.format(reference=model.reference, width=width, names=", ".join(Functions._fields)).encode()
     _write(path, text)
-    return _import(path, f"mc_engine_kernel_{digest[:20]}_w{width}").kernel
+    name, parts = f"mc_engine_kernel_{digest[:20]}_w{width}", parts_of(module.MODEL, model.watching)
+    return new_module(name, path, text, PARTS=parts).kernel
 
 
-def _write(path: Path, text: str) -> None:
-    """Write the source of a kernel, unless it is there; DiskError with the folder's variable where the disk refuses."""
+def _write(path: Path, text: bytes) -> None:
+    """Write the source of a kernel, unless it is there; DiskError with the folder's variable where the disk refuses.
+
+    It is for numba, which keeps its files beside one, and for people: what runs is `text`.
+    """
     try:
-        if path.exists() and path.read_text(encoding="utf-8") == text:
+        if path.exists() and path.read_bytes() == text:
             return
         path.parent.mkdir(parents=True, exist_ok=True)
         temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}")
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_bytes(text)
         os.replace(temporary, path)
     except OSError as error:
         raise DiskError(f"{path.parent}: {error.strerror or error}; compiled kernels are kept there, name another "
@@ -187,13 +174,3 @@ def _processor() -> str:
     from llvmlite import binding
 
     return str(binding.get_host_cpu_name())
-
-
-def _import(path: Path, name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None  # a .py path always has a loader
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module

@@ -2,13 +2,12 @@
 
 from collections import namedtuple
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from mc_engine.event_watch import watching_events
 from mc_engine.lanes import physics
 from mc_engine.lanes.functions import TABLES
-from mc_engine.model import DIRECTIONS, AdaptiveStep, Extremum, Model, load_model
+from mc_engine.model import DIRECTIONS, AdaptiveStep, Extremum, Model
 
 # The physics of a model, and intrinsics that pick or fill fields of tuples:
 # peaks_of, lasts_of : from the quantities, the values of which peaks and last times above zero are wanted
@@ -60,12 +59,19 @@ def settings_class(model: Model) -> type:
     return namedtuple("Settings", [*names, TABLES] if model.tables else names)
 
 
-def parts_of(reference: str, folder: str | None, watching: bool) -> Parts:
-    """Functions, tuple classes and flags of the model that a kernel file names; `watching` : of its events."""
-    model = load_model(reference, Path(folder) if folder else None)
+def parts_of(model: Model, watching: bool) -> Parts:
+    """Functions, tuple classes and flags of the model that a kernel is for; `watching` : of its events."""
     model = watching_events(model) if watching else model
     actions = [event.action for event in model.event_list]
-    functions = Functions(
+    settings = settings_class(model)
+    return Parts(functions_of(model), model.kernel_parameters, settings, bool(actions), "stop" in actions)
+
+
+def functions_of(model: Model, makers: Any = None) -> Functions:
+    """The physics of a model and the picks of its fields.  makers : of the latter, `mc_engine.lanes.tuples` unless said"""
+    from mc_engine.lanes import tuples
+
+    return Functions(
         model.initial,
         model.start or _no_start,
         model.rhs,
@@ -74,14 +80,12 @@ def parts_of(reference: str, folder: str | None, watching: bool) -> Parts:
         model.switch or _no_switch,
         model.observe,
         model.evaluate,
-        *_picks(model),
+        *_picks(model, makers or tuples),
     )
-    return Parts(functions, model.kernel_parameters, settings_class(model), bool(actions), "stop" in actions)
 
 
-def _picks(model: Model) -> list[Any]:
+def _picks(model: Model, makers: Any) -> list[Any]:
     from mc_engine.lanes.adaptive_step import CORNER, EVENT, LAST, PEAK
-    from mc_engine.lanes.tuples import any_of, counted, directions, picker
 
     names = [quantity.name for quantity in model.quantities]
     peaks = [e for e in model.extrema if e.kind in ("max", "min")]
@@ -99,17 +103,17 @@ def _picks(model: Model) -> list[Any]:
         signs += [-1.0] * (len(kinds) - n_events)
     actions = [event.action for event in model.event_list]
     return [
-        picker(None, peak_picks, len(names)),
-        picker(None, last_picks, len(names)),
-        picker(best_class, best_picks),
-        picker(best_class, [(i, 1.0, 0.0) for i, _, _ in best_picks]),
-        directions(smooth),
-        directions(kinds),
-        directions(signs),
-        any_of([i for i, action in enumerate(actions) if action == "stop"]),
-        any_of([i for i, action in enumerate(actions) if action == "switch"]),
-        counted("initial", len(model.states)),
-        counted("evaluate", len(model.metrics)),
+        makers.picker(None, peak_picks, len(names)),
+        makers.picker(None, last_picks, len(names)),
+        makers.picker(best_class, best_picks),
+        makers.picker(best_class, [(i, 1.0, 0.0) for i, _, _ in best_picks]),
+        makers.directions(smooth),
+        makers.directions(kinds),
+        makers.directions(signs),
+        makers.any_of([i for i, action in enumerate(actions) if action == "stop"]),
+        makers.any_of([i for i, action in enumerate(actions) if action == "switch"]),
+        makers.counted("initial", len(model.states)),
+        makers.counted("evaluate", len(model.metrics)),
     ]
 
 

@@ -3,38 +3,47 @@
 What is in it when the engine writes it, `mc_engine.manifest` says.
 """
 
-import json
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import from_json
 
+from mc_engine.campaign_file import Share
+from mc_engine.errors import ModelError
+from mc_engine.figure_rules import refuse_kinds
+from mc_engine.figures import KINDS, from_record
 from mc_engine.parts import CASE_COLUMNS, Column
-from mc_engine.receipts import MOST_CASES
+from mc_engine.receipts import first_mistake
+from mc_engine.status import MOST_CASES
 
 FORMAT = 1  # of the directory; the manifest's "format"
 
 CaseNumber = Annotated[int, Field(ge=0, le=MOST_CASES)]
+Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
+Value = float | str | bool  # of an input
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(strict=True, extra="allow")
+class Record(BaseModel):
+    """A record of a file of ours: declared members have their types, and an engine of tomorrow may add others."""
+
+    model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
 
 
-class _Named(_Section):
+class _Named(Record):
     name: str
 
 
-class _Campaign(_Section):
-    name: str
+class _Campaign(_Named):
     cases: Annotated[int, Field(ge=1, le=MOST_CASES)]
     title: str = ""
     model: str = ""
     design: str = "mc"
-    seed: int | None = None
+    seed: Seed | None = None
     digest: str = ""
 
 
-class _Model(_Section):
+class _Model(Record):
     name: str = ""
     title: str = ""
     source: str = ""
@@ -42,7 +51,7 @@ class _Model(_Section):
     sampling_digest: str = ""
 
 
-class _Shard(_Section):
+class _Shard(Record):
     number: CaseNumber
     of: CaseNumber
     first: CaseNumber
@@ -55,12 +64,26 @@ class _Shard(_Section):
         return self
 
 
-class _Described(_Named):
+class Described(_Named):
     unit: str = ""
     description: str = ""
 
 
-class _Column(_Described):
+class _Input(Described):
+    nominal: Value = ""
+    distribution: str = ""
+    bounds: str = ""
+    source: str = ""
+    note: str = ""
+
+
+class _Shared(Described):
+    value: Value = ""
+    overridden: bool = False
+    choices: list[Value] = []
+
+
+class ColumnRecord(Described):
     unit: str
     role: str
     description: str
@@ -69,53 +92,150 @@ class _Column(_Described):
 
 class _Requirement(_Named):
     metric: str
-    share: float | None = None
-    confidence: float | None = None
+    share: Share
+    confidence: Share
     at_most: float | None = None
     at_least: float | None = None
+    source: str = ""
 
 
-class _Manifest(_Section):
-    format: Annotated[int, Field(ge=1)] = FORMAT
-    campaign: _Campaign
-    model: _Model = _Model()
-    shard: _Shard | None = None
-    columns: list[_Column]
-    inputs: list[_Described] = []
-    parameters: list[_Described] = []
-    settings: list[_Described] = []
-    quantities: list[_Described] = []
-    requirements: list[_Requirement] = []
-    looks: list[CaseNumber] = []
-    figures: list[dict[str, Any]] = []
-    published: list[dict[str, Any]] = []
-    upstream: dict[str, Any] | None = None
-    status_texts: dict[str, str] = {}
-    provenance: dict[str, Any] = {}
+class _Figure(Record):
+    kind: str
 
     @model_validator(mode="after")
-    def _names_every_column_once(self) -> "_Manifest":
-        names = [column.name for column in self.columns]
-        if names[: len(CASE_COLUMNS)] != [column.name for column in CASE_COLUMNS] or len({*names}) < len(names):
-            raise ValueError("its columns are not those of a case table")
+    def _can_be_drawn(self) -> "_Figure":
+        try:
+            if self.kind in KINDS:  # of another kind, an engine of tomorrow knows what it is
+                refuse_kinds(from_record(self.model_dump()), "it")
+        except (ModelError, TypeError) as error:
+            raise ValueError(f"is no figure: {error}") from None
         return self
 
 
-def parse_manifest(content: bytes) -> dict[str, Any]:
+class _Published(Record):
+    quantity: str
+    published: Value
+    unit: str = ""
+    source: str = ""
+    status: str = ""
+    note: str = ""
+    column: str | None = None
+    computed_column: str | None = None
+    ours: Value | None = None
+    at: dict[str, Value] | None = None
+    tolerance: float | None = None
+    statistic: str | None = None
+    of: str = ""
+    over: list[str] = []
+    cases: CaseNumber | None = None
+
+    @model_validator(mode="after")
+    def _gives_a_number_of_many_cases(self) -> "_Published":
+        if self.statistic is not None and not (self.of and type(self.published) is float):
+            raise ValueError("has a statistic, and so needs a number and the column that it is of")
+        return self
+
+
+class _Upstream(_Campaign):
+    failed: CaseNumber = 0
+    links: dict[str, str] = {}
+
+
+class _Git(Record):
+    commit: str = ""
+    dirty: bool = False
+
+
+class _Provenance(Record):
+    python: str = ""
+    platform: str = ""
+    cpu: str = ""
+    numba: str = ""
+    llvm: str = ""
+    packages: dict[str, str] = {}
+    git: _Git | None = None
+
+
+def _each_once(columns: list[ColumnRecord]) -> list[ColumnRecord]:
+    names = [column.name for column in columns]
+    if names[: len(CASE_COLUMNS)] != [column.name for column in CASE_COLUMNS] or len({*names}) < len(names):
+        raise ValueError("its columns are not those of a case table")
+    return columns
+
+
+class Head(Record):
+    """What the manifest of a run has in common with the records of a tuning and of a rare event."""
+
+    format: Annotated[int, Field(ge=1)] = FORMAT
+    engine: str = ""
+    created_utc: str = ""
+    seed_contract: int = 0
+    campaign: _Campaign
+    model: _Model = _Model()
+    inputs: list[_Input] = []
+    parameters: list[_Shared] = []
+    settings: list[_Shared] = []
+    quantities: list[Described] = []
+    requirements: list[_Requirement] = []
+    looks: list[CaseNumber] = []
+    figures: list[_Figure] = []
+    published: list[_Published] = []
+    upstream: _Upstream | None = None
+    status_texts: dict[str, str] = {}
+    provenance: _Provenance = _Provenance()
+
+
+class _Manifest(Head):
+    shard: _Shard | None = None
+    columns: Annotated[list[ColumnRecord], AfterValidator(_each_once)]
+
+    @model_validator(mode="after")
+    def _requires_of_its_columns(self) -> "_Manifest":
+        numbers = {column.name for column in self.columns if column.kind == "number"}
+        if strange := [one.name for one in self.requirements if one.metric not in numbers]:
+            raise ValueError(f"the requirement {strange[0]!a} is on no column of numbers")
+        return self
+
+
+class _UpstreamFacts(_Campaign):
+    """What a copy of the run upstream says of itself; a case, also the nominal one, may have NaN for a metric."""
+
+    cases: CaseNumber = 0
+    columns: Annotated[list[ColumnRecord], AfterValidator(_each_once)]
+    nominal: dict[str, Annotated[float, Field(allow_inf_nan=True)] | int | str | bool]
+    figures: list[_Figure] = []
+    inputs: list[_Input] = []
+    design: str
+    seed: Seed
+
+
+def parse_manifest(content: bytes | str) -> dict[str, Any]:
     """What the bytes of a manifest say; ValueError with a sentence if no engine can have written them."""
+    return checked_record(content, _Manifest, FORMAT)[0]
+
+
+def parse_upstream(content: bytes | str) -> dict[str, Any]:
+    """What a copy of the run upstream says of itself; ValueError with a sentence if no engine can have written it."""
+    return _checked(_UpstreamFacts, from_json(content))[0]
+
+
+_Kind = TypeVar("_Kind", bound=Record)
+
+
+def checked_record(content: bytes | str, kind: type[_Kind], newest: int) -> tuple[dict[str, Any], _Kind]:
+    """A JSON record as it stands and as it was understood; ValueError with a sentence if it is none of this kind."""
+    record = from_json(content, allow_inf_nan=False)
+    if isinstance(record, dict) and isinstance(record.get("format"), int) and record["format"] > newest:
+        raise ValueError(f"was written by a newer engine; this one reads format {newest}")
+    return _checked(kind, record)
+
+
+def _checked(kind: type[_Kind], record: Any) -> tuple[dict[str, Any], _Kind]:
     try:
-        record = json.loads(content)
-        if isinstance(record, dict) and isinstance(record.get("format"), int) and record["format"] > FORMAT:
-            raise ValueError(f"was written by a newer engine; this one reads format {FORMAT}")
-        _Manifest.model_validate(record)
+        understood = kind.model_validate(record)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-        place = ".".join(str(one) for one in first["loc"])
-        message = first["msg"].removeprefix("Value error, ")
-        raise ValueError(f"{place!a}: {message[:1].lower()}{message[1:]}") from None
-    except RecursionError:
-        raise ValueError("it is nested too deep") from None
-    return dict(record)
+        raise ValueError(first_mistake(error)) from None
+    return dict(record), understood
 
 
 def cases_in(manifest: dict[str, Any], n_cases: int) -> range:
@@ -124,7 +244,7 @@ def cases_in(manifest: dict[str, Any], n_cases: int) -> range:
     return range(shard["first"], shard["stop"]) if shard else range(n_cases)
 
 
-def columns_in(manifest: dict[str, Any]) -> tuple[Column, ...]:
+def columns_in(manifest: Mapping[str, Any]) -> tuple[Column, ...]:
     """Columns of the case table by a manifest that `parse_manifest` let pass."""
     known = Column.__dataclass_fields__
     return tuple(

@@ -9,16 +9,12 @@ Inside physics everything is SI and radians and a parameter loses its unit suffi
 """
 
 import ast
-import importlib
-import importlib.util
 import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from hashlib import sha256
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.machinery import ModuleSpec
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -26,10 +22,9 @@ import numpy as np
 from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
-from mc_engine.files_beside import importable
-from mc_engine.files_read import USER, has_changed, loading
 from mc_engine.model_faults import place_in_model, relative_import, wrong_record
-from mc_engine.model_sources import sources_beside
+from mc_engine.model_imports import find_unimported
+from mc_engine.model_sources import Sources, sources_of_file, sources_of_module
 from mc_engine.syntax_tree import parse
 from mc_engine.units import UNITS, unit_suffix
 
@@ -217,6 +212,7 @@ class Model:
     watching: bool = False  # see mc_engine.event_watch
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
+    sources: Sources | None = field(default=None, compare=False, repr=False)  # of one that `load_model` gave
 
     def __post_init__(self) -> None:
         from mc_engine.model_rules import refuse_contradictions  # which knows the records of this file
@@ -257,44 +253,48 @@ def load_model(reference: str, beside: Path | None = None) -> Model:
 
     Raises ModelError with one sentence when the module, the file or its MODEL is missing or broken.
     """
-    module = _module_from_file(_model_path(reference, beside)) if reference.endswith(".py") else _module(reference)
-    model = getattr(module, "MODEL", None)
+    sources = _from_file(reference, beside) if reference.endswith(".py") else _from_module(reference)
+    model = getattr(sources.module, "MODEL", None)
     if not isinstance(model, Model):
         raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
     object.__setattr__(model, "reference", reference)
+    object.__setattr__(model, "sources", sources)
     return model
 
 
-def _module(reference: str) -> ModuleType:
-    """Import an installed module, if it is there and its source defines MODEL: a campaign file names no other code."""
+def sources_of(model: Model, folder: Path | None = None) -> Sources:
+    """What a model was made of.  folder : of a `.py` model that was not loaded by `load_model`."""
+    return model.sources or sources_of(load_model(model.reference, folder))
+
+
+def _from_file(reference: str, beside: Path | None) -> Sources:
+    try:
+        path = resolve_beside(beside or Path.cwd(), reference)
+    except FileFault as fault:
+        raise ModelError(str(fault)) from None
+    try:
+        return sources_of_file(path)
+    except (Exception, SystemExit) as error:
+        raise ModelError(_fault(path.name, error)) from error
+
+
+def _from_module(reference: str) -> Sources:
+    """An installed module, if it is there and its source defines MODEL: a campaign file names no other code."""
     if not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", reference):
         raise ModelError(f'"{reference}" is neither a module such as "campaigns.deorbit" nor a .py file')
     if reference.split(".")[0] in sys.stdlib_module_names:
         raise ModelError(f'"{reference}" is a module of Python itself; a file beside the campaign ends in .py')
-    spec = _spec(reference)
+    spec = find_unimported(reference)
     if spec is None:
         raise ModelError(f'there is no module "{reference}"; a file beside the campaign ends in .py')
     if not _defines_model(spec):
         raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
     try:
-        return importlib.import_module(reference)
+        return sources_of_module(reference)
     except ModuleNotFoundError as error:
         raise ModelError(f'"{reference}" needs the package "{error.name}", which is not installed') from None
     except (Exception, SystemExit) as error:
         raise ModelError(_fault(reference, error)) from error
-
-
-def _spec(reference: str) -> ModuleSpec | None:
-    """Where a module is, None if nowhere.  Nothing is imported, not even the packages that it is in."""
-    top, *inner = reference.split(".")
-    found = (finder.find_spec(top, None) for finder in sys.meta_path if hasattr(finder, "find_spec"))
-    spec = next((one for one in found if one is not None), None)
-    for name in inner:
-        if spec is None or spec.submodule_search_locations is None:
-            return None  # a module that is no package has nothing in it
-        # without the names of its packages: a namespace package asks for the import of those that it is in
-        spec = PathFinder.find_spec(name, list(spec.submodule_search_locations))
-    return spec
 
 
 def _defines_model(spec: ModuleSpec) -> bool:
@@ -309,37 +309,6 @@ def _defines_model(spec: ModuleSpec) -> bool:
     names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
     names |= {node.asname or node.name for node in ast.walk(tree) if isinstance(node, ast.alias)}
     return "MODEL" in names
-
-
-def _model_path(reference: str, beside: Path | None) -> Path:
-    try:
-        return resolve_beside(beside or Path.cwd(), reference)
-    except FileFault as fault:
-        raise ModelError(str(fault)) from None
-
-
-def _module_from_file(path: Path) -> ModuleType:
-    """Import a user's file under a name that depends on its text, so that an edited file is a new module.
-
-    The files and packages beside it can be imported, and count as its text.
-    """
-    texts = b"".join(file.read_bytes() for file in sources_beside(path))
-    mark = sha256(texts + str(path).encode()).hexdigest()[:12]
-    name = f"{USER}{path.stem}_{mark}"
-    if name in sys.modules and not has_changed(path):
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None  # a .py path always has a loader
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        with importable(path.parent, mark), loading(path):
-            spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        del sys.modules[name]
-        raise ModelError(_fault(path.name, error)) from error
-    return module
 
 
 def _fault(reference: str, error: BaseException) -> str:

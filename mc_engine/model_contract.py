@@ -20,6 +20,7 @@ from mc_engine.model import FixedStep
 from mc_engine.model_faults import MORE
 from mc_engine.physics_source import is_shipped, source_faults
 from mc_engine.physics_trial import FEW, Breach, fault_sentence, run_through
+from mc_engine.safe_path import SAFE_PATH
 
 _PATIENCE = 600.0  # s, for all flights and compilation; one case has a limit of its own
 
@@ -47,19 +48,20 @@ def _trial_faults(campaign: Campaign) -> list[str]:
     return []
 
 
-def flight_faults(file: str) -> list[str]:
+def flight_faults(campaign: Campaign, file: str) -> list[str]:
     """What `mc_engine.contract_flight` finds in a process of its own, which the model may kill or hang."""
-    command = [sys.executable, "-P", "-m", "mc_engine.contract_flight", file]
-    # the same packages as here, and nothing from the working folder
-    path = os.pathsep.join(one or os.getcwd() for one in sys.path)
+    from mc_engine.repeatability import numbers  # which knows this module
+
+    command = [sys.executable, "-m", "mc_engine.contract_flight", file, json.dumps(numbers(campaign))]
+    path = os.pathsep.join(one or os.getcwd() for one in sys.path)  # the same packages as here
+    other = {"PYTHONHASHSEED": "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0", "TZ": "UTC-14"}
+    environment = {**os.environ, **SAFE_PATH, **other, "PYTHONPATH": path}
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=_PATIENCE, env={**os.environ, "PYTHONPATH": path}
-        )
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, env=environment)
     except subprocess.TimeoutExpired:
         return [f"flights of a few cases have not ended after {_PATIENCE:.0f} s; shorten the clock's `until`, look for "
                 "a loop without end, or leave them out with `mc-engine check --no-model`"]  # fmt: skip
-    if done.returncode:
+    if done.returncode or not done.stdout:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
         return [f"a flight of a few cases killed its process: {last}"]
     return [str(one) for one in json.loads(done.stdout.splitlines()[-1])]
@@ -75,6 +77,8 @@ def nominal_inputs(campaign: Campaign) -> tuple[Any, Any]:
         settings = settings_of(model, ready.settings[0])
     except EngineError:
         raise
+    except SystemExit:
+        raise Breach(f"`{doing}` ends the process; a model only computes") from None
     except Exception as error:
         raise Breach(fault_sentence(doing, error)) from None
     if ready.refusals.mask[0]:

@@ -1,5 +1,6 @@
 """What a model's own record must keep before it flies: names, units, words of events, numbers of the clock."""
 
+import json
 from collections.abc import Iterable
 from keyword import iskeyword
 from math import inf, isnan
@@ -27,6 +28,7 @@ def refuse_contradictions(model: Model) -> None:
         if not isinstance(getattr(model, word), str):
             raise ModelError(f"the model's `{word}` is {getattr(model, word)!r}; it must be a text")
     _refuse_other_records(model)
+    _refuse_half_letters(model)
     inputs: tuple[Field, ...] = (*model.parameters, *model.settings)
     for one in (*inputs, *model.states, *model.quantities, *model.metrics):
         _refuse_name(one)
@@ -69,6 +71,18 @@ def _refuse_other_records(model: Model) -> None:
             raise ModelError(f"`{name}` is empty; a model has one at least")
     if not hasattr(model.kernel_parameters, "_fields"):
         raise ModelError("kernel_parameters must be a named tuple, whose fields are the parameters' names without unit")
+
+
+def _refuse_half_letters(model: Model) -> None:
+    """ModelError for text that no file can hold: half of a pair of UTF-16."""
+    records = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
+    texts = [model.name, model.title, model.source, model.figures, model.published, *map(vars, records)]
+    try:
+        json.dumps(texts, ensure_ascii=False, default=str).encode()
+    except UnicodeEncodeError as error:
+        before = error.object[: error.start][-30:].rpartition('"')[2]
+        letter = error.object[error.start]
+        raise ModelError(f'a text has {letter!a} after "{before}", which is no character; leave it out') from None
 
 
 def _refuse_name(one: Field) -> None:

@@ -1,69 +1,142 @@
 """The source files that decide a model's numbers: those of its package or folder, and what they import.
 
-More than the model may need; an edit of a file that it does not need costs a compilation, no wrong number.
+More than the model may need; an edit of a file that it does not need costs a compilation, no wrong number.  Each file
+is read once: its content is what runs, what the digest is of, and what a run directory keeps.
 """
 
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
+from mc_engine.files_read import USER, data_within
 from mc_engine.lanes.physics_function import PhysicsFunction
+from mc_engine.model_imports import PACKAGES, CapturedLoader, importable, new_module
 from mc_engine.syntax_tree import imported_names
 
 _ENGINE = "mc_engine"  # its own sources are counted apart
 
 
-def sources_beside(file: Path) -> list[Path]:
+@dataclass(frozen=True)
+class Sources:
+    """A model's module and the files that it was made of, as they were read.
+
+    home : folder that the names of the files begin in.  late : those that only the import of the model has asked for,
+    such as its data.
+    """
+
+    module: ModuleType
+    home: Path
+    files: Mapping[Path, bytes]
+    late: Mapping[Path, bytes]
+
+    def named(self) -> Iterator[tuple[str, bytes]]:
+        """Names, such as "lib/guidance.py", and contents in a fixed order."""
+        contents = {**self.files, **self.late}
+        for path in sorted(contents):
+            name = path.relative_to(self.home).as_posix() if path.is_relative_to(self.home) else path.name
+            yield name, contents[path]
+
+    def data_has_changed(self) -> bool:
+        """Whether a file that only the import has asked for has other contents now."""
+        return any(_content(path) != content for path, content in self.late.items())
+
+
+_OF_FILES: dict[str, Sources] = {}  # by the name of the module
+
+
+def sources_of_file(path: Path) -> Sources:
+    """Import a user's file under a name that depends on its text, so that an edited file is a new module.
+
+    The files and packages beside it can be imported, and count as its text.
+    """
+    files, late = sources_beside(path), dict[Path, bytes]()
+    texts = (f"{file}\n{len(text)}\n".encode() + text for file, text in files.items())
+    mark = sha256(str(path).encode() + b"".join(texts)).hexdigest()[:12]
+    name = f"{USER}{path.stem}_{mark}"
+    known = _OF_FILES.get(name)
+    if known is not None and not known.data_has_changed():
+        return known
+
+    def read(file: Path) -> bytes | None:
+        content = files.get(file, late.get(file))
+        if content is None and (content := _content(file)) is not None:
+            late[file] = content
+        return content
+
+    with importable(path.parent, mark, read), data_within(path.parent, late):
+        module = new_module(name, path, files[path])
+    remaining = {file: content for file, content in late.items() if file.is_file()}
+    _OF_FILES[name] = Sources(module, path.parent, files, remaining)
+    return _OF_FILES[name]
+
+
+def sources_beside(file: Path) -> dict[Path, bytes]:
     """Sources of a model that is a file: all beside it, and the folders beside it that they import, whole."""
-    beside = _sources(file.parent.glob("*.py"))
-    packages = [path for name in _imported_beside(file) for path in _sources((file.parent / name).rglob("*.py"))]
-    return [*beside, *packages]
-
-
-def _sources(paths: Iterable[Path]) -> list[Path]:
-    """Those that can be read: a pipe or a folder of such a name is no source."""
-    return sorted(path for path in paths if path.is_file())
-
-
-def _imported_beside(file: Path) -> list[str]:
-    """Folders beside a model that it, or others beside it, import; a file that nothing imports is not parsed."""
-    waiting: list[Path] = [file]
-    seen: set[str] = set()
+    found = {**_contents(file.parent.glob("*.py")), file: file.read_bytes()}
+    waiting, seen = [file], set[str]()
     while waiting:
-        roots = {name.split(".")[0] for name in imported_names(waiting.pop().read_bytes())} - seen - {""}
-        seen |= roots
-        waiting += _sources(file.parent / f"{root}.py" for root in roots)
-        waiting += [path for root in roots for path in _sources((file.parent / root).rglob("*.py"))]
-    return sorted(name for name in seen if (file.parent / name).is_dir())
+        for root in {name.split(".")[0] for name in imported_names(found[waiting.pop()])} - seen - {""}:
+            seen.add(root)
+            package = _contents((file.parent / root).rglob("*.py"))
+            found |= package
+            waiting += [*package, *([beside] if (beside := file.parent / f"{root}.py") in found else [])]
+    return dict(sorted(found.items()))
 
 
-def sources_of_module(name: str) -> list[Path]:
-    """Sources of a model in an imported module: its folder, and what it reaches of its package or of other physics."""
-    module = sys.modules[name]
+def _contents(paths: Iterable[Path]) -> dict[Path, bytes]:
+    return {path: content for path in paths if (content := _content(path)) is not None}
+
+
+def _content(path: Path) -> bytes | None:
+    """None where it cannot be read: a pipe or a folder of such a name is no source."""
+    try:
+        return path.read_bytes() if path.is_file() else None
+    except OSError:
+        return None
+
+
+def sources_of_module(name: str) -> Sources:
+    """Import a module with its model: its folder, and what it reaches of its package or of other physics.
+
+    What a program has imported before, by itself, counts as what its files say now.
+    """
+    root = name.partition(".")[0]
+    with PACKAGES.loading(root):
+        module = import_module(name)
     assert module.__file__ is not None  # a model's module always comes from a file
     home = Path(module.__file__)
     inside_package = home.name == "__init__.py" or "." in name
-    found = set(home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py"))
+    beside = home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py")
+    found = {path: PACKAGES.read(root, path) for path in beside if path.is_file()}
     waiting, seen = [name], {name}
     while waiting:
         for reached in _imports(waiting.pop()):
             if reached not in seen and _decides(reached, name):
                 seen.add(reached)
                 waiting.append(reached)
-                found.add(Path(str(sys.modules[reached].__file__)))
-    return sorted(found)
+                found[Path(str(sys.modules[reached].__file__))] = _source(reached)
+    base = home.parents[name.count(".") + (home.name == "__init__.py")]
+    return Sources(module, base, found, {})
 
 
 def _imports(name: str) -> list[str]:
     """Modules, by name, that a loaded one imports."""
     module = sys.modules[name]
-    names = imported_names(Path(str(module.__file__)).read_bytes(), _package(module))
-    return [one for one in names if one in sys.modules]
+    package = module.__name__ if hasattr(module, "__path__") else module.__name__.rpartition(".")[0]
+    return [one for one in imported_names(_source(name), package) if one in sys.modules]
 
 
-def _package(module: ModuleType) -> str:
-    return module.__name__ if hasattr(module, "__path__") else module.__name__.rpartition(".")[0]
+def _source(name: str) -> bytes:
+    """What a loaded module was made of."""
+    module = sys.modules[name]
+    loader = getattr(module, "__loader__", None)
+    if isinstance(loader, CapturedLoader):
+        return loader.content
+    return PACKAGES.read(name.partition(".")[0], Path(str(module.__file__)))
 
 
 def _decides(name: str, model: str) -> bool:

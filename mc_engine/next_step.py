@@ -34,11 +34,13 @@ def after_flight(run: Path | None, options: str = "", url: str | None = None, re
 
 
 def is_complete(run: Path) -> bool:
-    """True if the run in `run` was flown to its end, and has all files that its cases are in."""
+    """True if the run in `run` was flown to its end, and has all files that its cases are in, and no others."""
     from mc_engine.store import open_store
+    from mc_engine.writer_lock import is_left_by_dead
 
     store = open_store(run)
-    return _is_finished(_events(run)) and not store.missing() and not store.lost_files()
+    whole = _is_finished(_events(run)) and not store.missing() and not store.lost_files()
+    return whole and not is_left_by_dead(run)
 
 
 def _events(run: Path) -> list[str]:

@@ -3,8 +3,8 @@
 A run is flown in a local directory, where files can be synced and renamed; an object store can do neither.  What the
 journal counts is copied: parts first, then campaign and manifest, then the journal that names them, reports last.  So
 the copy can be loaded at every moment, also while the run still flies, and one that was cut short is completed by
-publishing again: only what is missing or differs travels.  Every byte that was sent is read back.  Credentials come
-from the environment, as fsspec and the packages below it read them.
+publishing again: only what is missing or differs travels.  What lies there is listed and read back before it counts
+as published.  Credentials come from the environment, as fsspec and the packages below it read them.
 """
 
 import atexit
@@ -13,12 +13,14 @@ import os
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from mc_engine.counted_files import CountedFiles
+from mc_engine.derived_files import derived_files
 from mc_engine.durable_file import is_temporary, make_folder, naming, read_file, sync_folder, write_durably
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.extras import how_to_install
@@ -27,7 +29,8 @@ from mc_engine.parts import PART_FOLDERS, is_part_file
 from mc_engine.receipts import receipts_of
 from mc_engine.shell_words import shell_word
 from mc_engine.store import CAMPAIGN, JOURNAL, MANIFEST, is_run_directory
-from mc_engine.writer_lock import LOCK_NAME
+from mc_engine.urls import is_url, store_url
+from mc_engine.writer_lock import LOCK_FILES, WriterLock
 
 
 @dataclass(frozen=True)
@@ -40,30 +43,28 @@ class Publication:
     kept: int
 
 
-def is_url(place: str | Path) -> bool:
-    """True for what names an object store, and no local path."""
-    return "://" in str(place)
+def publish(run: Path, url: str, trusting: bool = False) -> Publication:
+    """Copy the run in directory `run` to `url`; on return all of it is listed there, and was read back from there.
 
-
-def publish(run: Path, url: str) -> Publication:
-    """Copy the run in directory `run` to `url`; on return all of it is there, byte by byte.
-
-    Parts up there that the journal counts no more are removed.  StoreError if the store cannot be reached, or holds
-    anything else than an earlier state of this run.
+    trusting : of what lies there already under the digest in its journal, only the size is looked at, for a copy
+    that is kept up to date.  Parts up there that the journal counts no more are removed.  StoreError if the store
+    cannot be reached, or holds anything else than an earlier state of this run; EngineError if `url` is incomplete.
     """
     if not is_run_directory(run):
         raise StoreError(f"{run}: is no run directory")
     journal = _sound(scan(read_journal(run / JOURNAL)), run / JOURNAL)
     counted = _counted(journal.entries)
-    contents = {**counted, JOURNAL: None, **dict.fromkeys(_others(run, counted))}
+    derived = derived_files(run)
+    made = derived.read_with_journal()
+    contents = {**counted, JOURNAL: None, **dict.fromkeys(_others(run, counted, derived)), **made}
     with _reaching(url):
         remote = _Remote(url)
         before = remote.journal()
         _refuse_another_run(remote, before, journal, set(contents))
-        trusted = {} if before is None else _counted(before.entries)
-        sent, sent_bytes = [], 0
+        trusted = _counted(before.entries) if before is not None and trusting else {}
+        sent, sizes = [], {}
         for name in contents:
-            content = read_file(run / name)
+            content = made[name] if name in made else read_file(run / name)
             if name == JOURNAL:
                 content = content[: journal.length]  # the run may have flown on since
             digest = sha256(content).hexdigest()
@@ -72,33 +73,60 @@ def publish(run: Path, url: str) -> Publication:
             if not remote.holds(name, content, trusted.get(name) == digest):
                 remote.write(name, content)
                 sent.append(name)
-                sent_bytes += len(content)
+            sizes[name] = len(content)
         for name in remote.sizes:
-            if is_part_file(name) and name not in contents:
+            if (is_part_file(name) or derived.are_called(name)) and name not in contents:
                 remote.remove(name)
-    return Publication(url, tuple(sent), sent_bytes, len(contents) - len(sent))
+        listed = remote.listed()
+    if lost := [name for name, size in sizes.items() if listed.get(name) != size]:
+        raise StoreError(f"{remote.url}/{lost[0]}: was sent and does not lie there; publish again")
+    return Publication(remote.url, tuple(sent), sum(sizes[name] for name in sent), len(contents) - len(sent))
 
 
 def fetch(url: str, folder: Path) -> Path:
     """Copy the run at `url` to the new directory `folder`, with its reports; every part is held against the journal.
 
-    The copy has another name until it is whole, so that one that failed, or was cut short, leaves nothing in the way.
+    The copy has another name until it is whole, so that one that failed leaves nothing in the way.  What one that was
+    killed has left is cleared away by the next; StoreError while another process copies to the same place.
     """
+    url = store_url(url)
     if folder.exists() and any(folder.iterdir()):
         raise StoreError(f"{folder}: is not empty; choose another folder")
-    make_folder(folder.parent)
-    with naming(folder):
-        scratch = Path(tempfile.mkdtemp(prefix=f".{folder.name}.", suffix=".tmp", dir=folder.parent))
-    try:
-        _copy(url, scratch / "run")
+    with _scratch(folder) as scratch:
+        _copy(url, scratch)
         with naming(folder):
             if folder.exists():
                 folder.rmdir()
-            os.replace(scratch / "run", folder)
+            os.replace(scratch, folder)
         sync_folder(folder.parent)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
     return folder
+
+
+@contextmanager
+def _scratch(folder: Path) -> Iterator[Path]:
+    """Where a copy lies until it becomes `folder`; what processes that were killed have left beside it is removed."""
+    prefix, suffix = f".{folder.name}.", ".tmp"
+    make_folder(folder.parent)
+    with naming(folder):
+        left = [one for one in folder.parent.iterdir() if one.name.startswith(prefix) and one.suffix == suffix]
+        around = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=folder.parent))
+    for one in left:
+        with suppress(StoreError), _locked(one):  # of a process that is at work it cannot be
+            pass
+    with _locked(around):
+        yield around / "run"
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """A folder of this process alone, which goes with the block."""
+    lock = WriterLock(folder)
+    lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _copy(url: str, folder: Path) -> None:
@@ -123,7 +151,7 @@ def fetched(url: str) -> Path:
     """A copy of the run at `url` in a directory that lasts as long as this process."""
     scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))
     atexit.register(shutil.rmtree, scratch, ignore_errors=True)
-    return fetch(url, scratch / (url.rstrip("/").rpartition("/")[2] or "run"))
+    return fetch(url, scratch / url.rstrip("/").rpartition("/")[2])
 
 
 def local_copy(place: str | Path) -> Path:
@@ -144,12 +172,13 @@ def _counted(entries: tuple[Entry, ...]) -> dict[str, str]:
     return {**{part.file: part.sha256 for part in receipts_of(entries)[0].all_parts()}, **heads}
 
 
-def _others(run: Path, counted: Mapping[str, str]) -> list[str]:
-    """Reports and all else that lies in the run directory and is no part, no lock, no file half written."""
+def _others(run: Path, counted: Mapping[str, str], derived: CountedFiles) -> list[str]:
+    """All that lies in the run directory and is no part, no report or replay, no lock, no file half written."""
     paths = [path for path in sorted(run.rglob("*")) if path.is_file() and not path.is_symlink()]
     files = [path.relative_to(run).as_posix() for path in paths]
-    ours = {*counted, JOURNAL, LOCK_NAME}
-    return [name for name in files if name not in ours and not is_part_file(name) and not is_temporary(Path(name).name)]
+    ours = {*counted, JOURNAL, *LOCK_FILES}
+    left = [name for name in files if name not in ours and not is_part_file(name) and not derived.are_called(name)]
+    return [name for name in left if not is_temporary(Path(name).name)]
 
 
 def _sound(found: Scan, place: Path | str) -> Scan:
@@ -185,12 +214,16 @@ class _Remote:
     def __init__(self, url: str):
         from fsspec.core import url_to_fs
 
-        self.url = url.rstrip("/")
+        self.url = store_url(url)
         self._files, root = url_to_fs(self.url, use_listings_cache=False)
         self._root = str(root).rstrip("/")
+        self.sizes = self.listed()
+
+    def listed(self) -> dict[str, int]:
+        """What lies there at this moment."""
         self._files.invalidate_cache()
         listed: dict[str, dict[str, Any]] = self._files.find(self._root, detail=True)
-        self.sizes = {path[len(self._root) :].lstrip("/"): int(facts["size"]) for path, facts in listed.items()}
+        return {path[len(self._root) :].lstrip("/"): int(facts["size"]) for path, facts in listed.items()}
 
     def journal(self) -> Scan | None:
         """The journal that lies there, or None."""

@@ -25,6 +25,7 @@ from mc_engine.run_summary import case_line, judgement, summaries, verdict_line
 from mc_engine.shell_words import shell_word
 from mc_engine.store import Store, open_store
 from mc_engine.suggestions import hint
+from mc_engine.text import clean
 
 if TYPE_CHECKING:
     from mc_engine.runner import Replay
@@ -106,7 +107,7 @@ class Run:
 
     def __repr__(self) -> str:
         lines = [f"Run {self.path}: {self.title}", f"  {case_line(self.store)}"]
-        return "\n".join([*lines, *(f"  {verdict_line(one, self.store.units)}" for one in self.verdicts)])
+        return clean("\n".join([*lines, *(f"  {verdict_line(one, self.store.units)}" for one in self.verdicts)]))
 
     def _repr_html_(self) -> str:
         units = self.store.units
@@ -119,7 +120,7 @@ class Run:
         ]
         return "".join(
             [
-                f"<h4>{escape(self.title)}</h4><p>{escape(case_line(self.store))}</p>",
+                f"<h4>{_html(self.title)}</h4><p>{_html(case_line(self.store))}</p>",
                 _table(["requirement", "verdict", "on which cases"], verdicts),
                 _table(["metric", "unit", "cases with a number", "mean", "sd", "smallest", "largest"], metrics),
             ]
@@ -198,14 +199,14 @@ class Case:
 
     def __repr__(self) -> str:
         numbers = ", ".join(f"{name}={_text(value)}" for name, value in {**self.inputs, **self.metrics}.items())
-        return f"{self.name} of {self.store.path}: {self.status}; {numbers}"
+        return clean(f"{self.name} of {self.store.path}: {self.status}; {numbers}")
 
     def _repr_html_(self) -> str:
         units = self.store.units
         rows = [[what, name, value, units[name]] for what, columns in (("input", self.inputs), ("metric", self.metrics))
                 for name, value in columns.items()]  # fmt: skip
-        why = f" ({escape(self.reason)})" if self.reason else ""
-        head = f"<h4>{escape(self.name)}: {escape(self.status)}{why}</h4>"
+        why = f" ({_html(self.reason)})" if self.reason else ""
+        head = f"<h4>{_html(self.name)}: {_html(self.status)}{why}</h4>"
         return head + _table(["", "column", "value", "unit"], rows) + self._picture()
 
     def _picture(self) -> str:
@@ -217,14 +218,18 @@ class Case:
         figure = history_figure(history, self.store.manifest.get("quantities", []), self.name)
         figure.savefig(image, format="png", dpi=60)
         data = b64encode(image.getvalue()).decode()
-        return f'<img alt="history of {escape(self.name)}" src="data:image/png;base64,{data}">'
+        return f'<img alt="history of {_html(self.name)}" src="data:image/png;base64,{data}">'
+
+
+def _html(text: str) -> str:
+    return escape(clean(text))
 
 
 def _table(heads: list[str], rows: list[list[Any]]) -> str:
     if not rows:
         return ""
-    head = "".join(f"<th>{escape(one)}</th>" for one in heads)
-    body = "".join("<tr>" + "".join(f"<td>{escape(_text(cell))}</td>" for cell in row) + "</tr>" for row in rows)
+    head = "".join(f"<th>{_html(one)}</th>" for one in heads)
+    body = "".join("<tr>" + "".join(f"<td>{_html(_text(cell))}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 

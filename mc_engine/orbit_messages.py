@@ -13,6 +13,8 @@ from datetime import datetime
 
 import numpy as np
 
+from mc_engine.numbers_in_text import real
+
 AXES = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 LOCAL = ("RTN", "TNW")
 _SAME = {"RSW": "RTN", "RIC": "RTN"}  # other names of the same axes
@@ -145,7 +147,7 @@ def _plain_frame(name: str) -> str:
 
 def _number(line: int, text: str) -> float:
     try:
-        value = float(text)
+        value = real(text)
     except ValueError:
         value = np.nan
     if not np.isfinite(value):

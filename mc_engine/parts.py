@@ -9,7 +9,7 @@ import json
 import re
 import uuid
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -19,12 +19,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from mc_engine.durable_file import read_inside, temporary_name, write_durably, write_synced
+from mc_engine.durable_file import read_inside, temporary_name, write_inside, write_synced
 from mc_engine.errors import DiskError, StoreError
 from mc_engine.shell_words import shell_word
 from mc_engine.status import STATUS_NAME
 
+MOST_CELLS = 2**30  # of a Parquet file that is read whole
 PART_FOLDERS = ("cases", "history")  # of a run directory
+_SEE = "; `mc-engine verify"
 _CASE_PART = re.compile(r"cases/part-([0-9]{10,18})-([0-9]{10,18})(?:\.r[1-9][0-9]{0,8})?\.parquet")
 _HISTORY_PART = re.compile(r"history/part-[0-9]{5,9}\.parquet")
 ARROW_TYPES = {"number": pa.float64(), "integer": pa.int64(), "word": pa.string(), "switch": pa.bool_()}
@@ -194,10 +196,9 @@ def write_aside(
     content = parquet_bytes(table)
     file = file or f"cases/{part_name(first, count)}"
     digest = sha256(content).hexdigest()
-    temporary = temporary_name((run / file).with_name(f"{Path(file).name}.{uuid.uuid4().hex[:8]}.{digest[:32]}"))
-    write_synced(temporary, content, run / file)
-    part = Part(file, first, count, len(content), digest, _status_counts(table))
-    return Written(part, f"cases/{temporary.name}")
+    temporary = temporary_name(f"{file}.{uuid.uuid4().hex[:8]}.{digest[:32]}")
+    write_synced(run, temporary, content, file)
+    return Written(Part(file, first, count, len(content), digest, _status_counts(table)), temporary)
 
 
 def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> pa.Table:
@@ -216,7 +217,7 @@ def _status_counts(table: pa.Table) -> dict[str, int]:
 def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: dict[str, int] | None = None) -> Part:
     """Write any table durably as `run`/`file`."""
     content = parquet_bytes(table)
-    write_durably(run / file, content)
+    write_inside(run, file, content)
     return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), status or {})
 
 
@@ -225,7 +226,7 @@ def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) ->
 
     The same where the bytes are those that were written, and the table is not what receipt and columns say.
     """
-    path, more = run / part.file, f"; `mc-engine verify {shell_word(run)}` names all damage"
+    path, more = run / part.file, f"{_SEE} {shell_word(run)}` names all damage"
     try:
         content = read_inside(run, part.file, part.bytes + 1)
     except DiskError:
@@ -243,16 +244,36 @@ def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) ->
     return table
 
 
-def parquet_table(content: bytes, names: Sequence[str] | None = None) -> pa.Table:
-    """The table in the bytes of a Parquet file, all columns or those of `names` that it has; ValueError if it is none.
+def problem_of(path: Path, read: Callable[[], object]) -> str:
+    """What `read` says is wrong with the part in `path`; empty if it can be read."""
+    try:
+        read()
+    except StoreError as error:
+        return str(error).removeprefix(f"{path}: ").partition(_SEE)[0]
+    return ""
 
+
+def parquet_table(content: Any, names: Sequence[str] | None = None, most: int = MOST_CELLS) -> pa.Table:
+    """The table in a Parquet file, its bytes or open; all columns or those of `names` that it has.
+
+    ValueError if it is none, or has more cells than `most` by its own account, which is read before all else.
     `pyarrow.parquet.read_table` would leave a thread behind, which can abort a process that is about to end.
     """
     try:
-        file = pq.ParquetFile(pa.BufferReader(content), pre_buffer=False, page_checksum_verification=True)
-        return file.read(names, use_threads=False)
-    except (pa.ArrowException, OSError, KeyError) as error:
+        source = pa.BufferReader(content) if isinstance(content, bytes) else content
+        file = pq.ParquetFile(source, pre_buffer=False, page_checksum_verification=True)
+        _refuse_size(file.metadata, most)
+        table = file.read(names, use_threads=False)
+        table.validate(full=True)  # words are UTF-8, and offsets lie inside
+        return table
+    except (pa.ArrowException, OSError, KeyError, OverflowError) as error:
         raise ValueError(f"no readable Parquet file: {next(iter(str(error).splitlines()), '')}") from error
+
+
+def _refuse_size(metadata: Any, most: int) -> None:
+    sizes = [metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups)]
+    if max(metadata.num_rows * metadata.num_columns, *sizes, sum(sizes) // 16, 0) > most:
+        raise ValueError(f"it has more than the {most:,} cells that are read at once")
 
 
 def table_problem(table: pa.Table, part: Part, columns: Sequence[Column] | None) -> str:

@@ -5,15 +5,13 @@ import builtins
 import inspect
 import random
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
-from pathlib import Path
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from mc_engine.lanes.physics_function import PhysicsFunction
-from mc_engine.syntax_tree import parse
+from mc_engine.syntax_tree import tree_of_file
 
 _AT_DEFINITION = {"annotation", "returns", "defaults", "kw_defaults", "decorator_list"}  # run once, by Python alone
 # What the attributes of may be read: nothing of it runs code of the user's.
@@ -88,21 +86,17 @@ def code_of(function: Callable[..., Any]) -> CodeType | None:
     return getattr(inspect.unwrap(getattr(function, "function", function)), "__code__", None)
 
 
-@lru_cache(maxsize=64)
-def _definitions(file: str, changed: float) -> Mapping[tuple[str, int], ast.AST]:
-    """The functions of a file by name and first line, decorators included.  changed : when the file was written."""
-    tree = parse(Path(file).read_bytes())
-    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
-    return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in nodes}
-
-
 def definition_of(code: CodeType) -> ast.AST | None:
     """The syntax tree of a function; None where there is no source, as in an interactive session."""
     try:
-        known = _definitions(code.co_filename, Path(code.co_filename).stat().st_mtime)
-    except (OSError, SyntaxError, ValueError):
+        tree = tree_of_file(code.co_filename)
+    except (SyntaxError, ValueError):
         return None
-    return known.get((code.co_name, code.co_firstlineno))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == code.co_name:
+            if min([node.lineno, *(one.lineno for one in node.decorator_list)]) == code.co_firstlineno:
+                return node
+    return None
 
 
 def shortened(text: str) -> str:

@@ -17,6 +17,8 @@ from mc_engine.errors import ModelError
 from mc_engine.kernel_parts import NoMemory
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.noise import Draws, noise_key
+from mc_engine.lanes.number import calling
+from mc_engine.lost_numbers import sentence
 from mc_engine.model import Model
 from mc_engine.model_faults import MORE
 from mc_engine.physics_source import is_shipped, place_of, source_faults
@@ -80,12 +82,12 @@ def _run_through(model: Model, p: Any, o: Any, seed: int, finite: bool) -> None:
         _same_record(model.control, "control", sampled, "start", m, "memory")
         m = sampled
     if finite:
-        _refuse_infinite("initial", s, "the state")
+        _refuse_infinite("initial", model.initial, (p, o), s, "the state")
     with suppress(_ByZero):
         derivative = _call(model, "rhs", t, s, m, p, o)
         _same_record(model.rhs, "rhs", derivative, "initial", s, "named tuple")
         if finite:
-            _refuse_infinite("rhs", derivative, "the derivative", model.rhs)
+            _refuse_infinite("rhs", model.rhs, (t, s, m, p, o), derivative, "the derivative")
     with suppress(_ByZero):
         _try_events(model, t, s, m, p, o)
     seen = _call(model, "observe", t, s, m, p, o)
@@ -259,10 +261,13 @@ def _refuse_other_tables(model: Model, o: Any) -> None:
     raise Breach(f"{place_of(model.tables)}: `tables` gives {what}; it must give float64[n], numbers in one row")
 
 
-def _refuse_infinite(name: str, result: Any, what: str, function: Callable[..., Any] | None = None) -> None:
+def _refuse_infinite(
+    name: str, function: Callable[..., Any], arguments: tuple[Any, ...], result: Any, what: str
+) -> None:
     for field, value in zip(result._fields, result, strict=True):
         if not np.isfinite(value).all():
             bad = np.ravel(value)[~np.isfinite(np.ravel(value))][0]
-            place = f"{place_of(function)}: " if function is not None else ""
-            raise Breach(f'{place}`{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal case; '
+            lost = getattr(calling(name, function, *(_first(one) for one in arguments)), field)
+            first = sentence(lost.origin) if getattr(lost, "origin", None) else f"{place_of(function)}: out of range"
+            raise Breach(f'{first}; so `{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal case; '
                          "keep square roots, logarithms and divisions in range")  # fmt: skip

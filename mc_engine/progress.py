@@ -6,6 +6,8 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, TextIO
 
+from mc_engine.user_streams import Words
+
 ProgressCall = Callable[[int, int, int], None]  # cases done, wanted, failed
 SECONDS_BETWEEN_LINES = 5.0
 
@@ -59,8 +61,10 @@ class Progress:
         from rich.progress import Progress as Bar
 
         columns = (BarColumn(), TextColumn("{task.description}", markup=False))
-        self._bar = Bar(*columns, console=Console(file=self.stream), transient=True)
+        stream: Any = self.stream.steering() if isinstance(self.stream, Words) else self.stream
+        self._bar = Bar(*columns, console=Console(file=stream), transient=True)
         self._bar.start()
+        sys.stdout, sys.stderr = Words(sys.stdout), Words(sys.stderr)  # the bar has taken them, until it stops
         self._task = self._bar.add_task("preparing", total=None)
 
     def __call__(self, done: int, total: int, failed: int) -> None:

@@ -9,6 +9,7 @@ from typing import Self
 from mc_engine.errors import EngineError
 from mc_engine.object_store import publish
 from mc_engine.store import is_run_directory
+from mc_engine.urls import store_url
 
 PATIENCE = 10.0  # waits so many times as long as the last copy took, so that copying takes at most a tenth of the time
 
@@ -21,7 +22,7 @@ class Publisher:
     """
 
     def __init__(self, run: Path, url: str, every_s: float = 30.0):
-        self._run, self._url, self._every_s = run, url, every_s
+        self._run, self._url, self._every_s = run, store_url(url), every_s
         self._done = threading.Event()
         self._thread = threading.Thread(target=self._keep_up, name="publisher", daemon=True)
 
@@ -45,7 +46,7 @@ class Publisher:
     def _copy(self) -> EngineError | None:
         if is_run_directory(self._run):
             try:
-                publish(self._run, self._url)
+                publish(self._run, self._url, trusting=True)
             except EngineError as error:
                 return error
         return None

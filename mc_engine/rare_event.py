@@ -15,17 +15,20 @@ import numpy as np
 
 from mc_engine.campaign import Campaign
 from mc_engine.case_columns import input_column
+from mc_engine.directory_kinds import RARE_EVENT
 from mc_engine.errors import CampaignError, Problem, RunInterrupted
 from mc_engine.interruption import stop_signal
 from mc_engine.limit_state import LimitState, chosen_requirement
 from mc_engine.manifest import manifest_of
 from mc_engine.parts import Column
-from mc_engine.rare_event_folder import RareEventRecord, open_rare_event, write_rare_event
+from mc_engine.rare_event_folder import RareEventRecord, open_rare_event
+from mc_engine.result_folder import write_result
 from mc_engine.run_folder import default_folder
 from mc_engine.statistics.importance_sampling import cross_entropy
 from mc_engine.statistics.rare_events import RareEvent
 from mc_engine.statistics.subset_simulation import subset_simulation
 from mc_engine.store import refuse_occupied
+from mc_engine.writer_lock import writer_of_new
 
 METHODS: dict[str, Callable[..., RareEvent]] = {"subset": subset_simulation, "cross-entropy": cross_entropy}
 CASES_PER_LEVEL = 10_000
@@ -49,10 +52,9 @@ def estimate_rare_event(
     cases flown and failed.  Raises RunInterrupted on Ctrl-C; nothing is stored then.
     """
     path = Path(out) if out is not None else default_folder(f"{campaign.name}-rare")
-    refuse_occupied(path)
     one = chosen_requirement(campaign, requirement)
     manifest = manifest_of(campaign)
-    with stop_signal() as stop:
+    with writer_of_new(path, lambda: refuse_occupied(path)) as lock, stop_signal() as stop:
 
         def watch(flown: int, failed: int) -> None:
             if stop.is_set():
@@ -70,9 +72,10 @@ def estimate_rare_event(
             )
         except ValueError as error:
             raise CampaignError(campaign.name, [Problem("--cases-per-level", str(error))]) from None
-    columns, arrays = _case_table(limit, found)
-    facts = {"asked": {"method": method, "cases_per_level": cases_per_level}, **_facts(limit, found)}
-    write_rare_event(path, campaign.text, {**manifest, "rare_event": facts}, columns, arrays)
+        columns, arrays = _case_table(limit, found)
+        facts = {"asked": {"method": method, "cases_per_level": cases_per_level}, **_facts(limit, found)}
+        record = {**manifest, "rare_event": facts}
+        write_result(path, RARE_EVENT, campaign.text, record, {"cases": (columns, arrays)}, lock)
     return open_rare_event(path)
 
 

@@ -67,12 +67,12 @@ def _input_lines(result: dict[str, Any]) -> Iterator[str]:
     if not result["inputs"]:
         return
     width = max(len(one["name"]) for one in result["inputs"])
-    across = "across" in result["inputs"][0]
+    across = result["inputs"][0].get("across") is not None
     yield f"failed cases, by input: mean and spread in sigmas; the likeliest{', and the one across' * across}"
     for one in sorted(result["inputs"], key=lambda one: -abs(one["likeliest_sigma"])):
         texts = [
             f"{one[what]:.5g}{' ' * bool(one['unit'])}{one['unit']} ({one[f'{what}_sigma']:+.2f} σ)"
             for what in ("likeliest", "across")
-            if what in one
+            if one.get(what) is not None
         ]
         yield f"  {one['name']:<{width}}  {one['mean_sigma']:+.2f} ± {one['spread_sigma']:.2f} σ;  {'; '.join(texts)}"

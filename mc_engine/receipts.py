@@ -6,26 +6,17 @@ an engine writes, so that names of files are those of parts, and numbers can be.
 """
 
 from bisect import bisect_right
-from collections.abc import Iterable, Mapping
-from pathlib import PurePosixPath, PureWindowsPath
+from collections.abc import Collection, Iterable, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
+from mc_engine.durable_file import inner_names
 from mc_engine.journal import Entry
 from mc_engine.parts import Part, cases_in_name, is_history_file
-from mc_engine.status import STATUS_NAME
-
-MOST_CASES = 1_000_000_000  # of a run
-_STATUS_WORDS = frozenset(STATUS_NAME.values())
+from mc_engine.status import MOST_CASES
 
 Range = tuple[int, int]
-
-
-def _status_word(word: str) -> str:
-    if word not in _STATUS_WORDS:
-        raise ValueError("is no status")
-    return word
 
 
 def _part_file(file: str) -> str:
@@ -41,9 +32,7 @@ def _history_file(file: str) -> str:
 
 
 def _inner_file(name: str) -> str:
-    ways = (PurePosixPath(name), PureWindowsPath(name))
-    if not name or "\0" in name or any(way.is_absolute() or way.drive or ".." in way.parts for way in ways):
-        raise ValueError("lies outside the run")
+    inner_names(name)
     return name
 
 
@@ -67,7 +56,7 @@ class _Receipt(_Event):
     rows: int = Field(ge=0, le=2**40)
     bytes: int = Field(ge=1, le=2**50)
     sha256: Digest
-    status: dict[Annotated[str, AfterValidator(_status_word)], Annotated[int, Field(ge=1)]]
+    status: dict[str, Annotated[int, Field(ge=1)]]
 
 
 class _CaseReceipt(_Receipt):
@@ -120,10 +109,15 @@ def _checked(kind: type[_Event], facts: Any) -> Any:
     try:
         return kind.model_validate(facts)
     except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-        place = ".".join(str(one) for one in first["loc"] if one != "[key]")
-        message = first["msg"].removeprefix("Value error, ")
-        raise ValueError(f"{place!a}: {message[:1].lower()}{message[1:]}") from None
+        raise ValueError(first_mistake(error)) from None
+
+
+def first_mistake(error: ValidationError) -> str:
+    """Where the first mistake of a record stands, and what it is, in a sentence without the record's own text."""
+    first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+    place = ".".join(str(one) for one in first["loc"] if one != "[key]")
+    message = first["msg"].removeprefix("Value error, ")
+    return f"{place!a}: {message[:1].lower()}{message[1:]}"
 
 
 def _part(record: _Receipt) -> Part:
@@ -228,3 +222,19 @@ def receipts_of(entries: Iterable[Entry], begun_with: int | None = None) -> tupl
         except ValueError as error:
             wrong[entry.number] = f"{entry.event!a} as no engine writes it, {error}"
     return counted, wrong
+
+
+def without_lost(entries: Iterable[Entry], lost: Collection[int], begun_with: int | None) -> list[Entry]:
+    """The lines that can be trusted, without those `lost`.
+
+    Where they name cases beyond those that they ask for, the line of an extension is lost: it stands again, in place of
+    the last lost one, up to the last of these cases.  What it asked for beyond them has to be asked for anew.
+    """
+    kept = [entry for entry in entries if entry.number not in lost]
+    counted = receipts_of(kept, begun_with)[0]
+    stop = max((part.stop for part in counted.parts), default=0)
+    if lost and counted.cases is not None and stop > counted.cases:
+        at = max(lost)
+        before = next((entry.at for entry in reversed(kept) if entry.number < at), "")
+        kept = sorted([*kept, Entry(at, before, "extended", {"cases": stop})], key=lambda entry: entry.number)
+    return kept

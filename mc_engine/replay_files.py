@@ -1,5 +1,6 @@
-"""What `replay` leaves beside a run: the history of one case as Parquet, and a picture of it."""
+"""What `replay` leaves in a run: the history of one case as Parquet, and a picture of it."""
 
+import re
 from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -7,9 +8,14 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from mc_engine.durable_file import make_folder, write_durably
-from mc_engine.history_tables import history_bytes, history_columns
+from mc_engine.derived_files import REPLAYS, derived_files
+from mc_engine.durable_file import names_in
+from mc_engine.errors import StoreError
+from mc_engine.history_tables import history_columns, history_problem, history_table
+from mc_engine.parts import parquet_bytes, parquet_table
+from mc_engine.shell_words import shell_word
 from mc_engine.store import Store
+from mc_engine.text import clean
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,15 +25,37 @@ _LARGEST = 1e100  # of any unit; what a flight that is lost holds beyond it, no 
 
 def write_replay(store: Store, case_id: int, history: pd.DataFrame) -> list[Path]:
     """Write `RUN/replay/case-<id>.parquet` and `.png`; the two paths."""
-    folder = store.path / "replay"
-    make_folder(folder)
-    table, picture = folder / f"case-{case_id}.parquet", folder / f"case-{case_id}.png"
+    table, picture = _table(case_id), f"{REPLAYS}/case-{case_id}.png"
     quantities = store.manifest.get("quantities", [])
-    write_durably(table, history_bytes(history, quantities, table))
-    image = BytesIO()
+    content, image = parquet_bytes(history_table(history, quantities, store.path / table)), BytesIO()
     history_figure(history, quantities, f"case {case_id}").savefig(image, format="png", dpi=150)
-    write_durably(picture, image.getvalue())
-    return [table, picture]
+    derived_files(store.path).write({table: content, picture: image.getvalue()})
+    return [store.path / table, store.path / picture]
+
+
+def _table(case_id: int) -> str:
+    return f"{REPLAYS}/case-{case_id}.parquet"
+
+
+def replayed_cases(run: Path) -> list[int]:
+    """The cases of which a replay lies in the run, in order."""
+    names = names_in(run, REPLAYS) if (run / REPLAYS).exists() else []
+    found = [re.fullmatch(r"case-([0-9]{1,10})\.parquet", name) for name in names]
+    return sorted(int(match[1]) for match in found if match)
+
+
+def read_replay(run: Path, case_id: int, quantities: Sequence[Mapping[str, str]]) -> pd.DataFrame:
+    """The history of a case that was replayed; StoreError if a byte of it changed."""
+    name = _table(case_id)
+    try:
+        table = parquet_table(derived_files(run).read([name])[name])
+        problem = history_problem(table, quantities)
+    except (StoreError, ValueError) as error:
+        problem = str(error).removeprefix(f"{run / name}: ")
+    if problem:
+        again = f"`mc-engine replay {shell_word(run)} {case_id}` makes it anew"
+        raise StoreError(f"{run / name}: {problem}; {again}")
+    return table.to_pandas(use_threads=False)
 
 
 def history_figure(history: pd.DataFrame, quantities: Sequence[Mapping[str, str]], title: str) -> "Figure":
@@ -44,7 +72,8 @@ def history_figure(history: pd.DataFrame, quantities: Sequence[Mapping[str, str]
     for axis, column in zip(axes.flat, columns, strict=False):
         drawn = history[column.name].where(history[column.name].abs() < _LARGEST)
         axis.plot(history["t_s"], drawn, linewidth=0.9)
-        axis.set_ylabel(f"{column.name} [{column.unit}]" if column.unit else column.name, fontsize="small")
+        label = clean(f"{column.name} [{column.unit}]" if column.unit else column.name)
+        axis.set_ylabel(label, fontsize="small", parse_math=False)
         axis.grid(alpha=0.3)
     for axis in axes.flat[len(columns) :]:
         axis.set_axis_off()

@@ -10,7 +10,7 @@ from mc_engine.campaign import Campaign
 from mc_engine.cases import case_table, full_inputs, nominal_row
 from mc_engine.chunks import NOMINAL_NOISE
 from mc_engine.flight import fly_history
-from mc_engine.part_contents import history_problems
+from mc_engine.parts import problem_of
 from mc_engine.status import OK, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
 from mc_engine.store import Store
 
@@ -48,7 +48,7 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
 
 def _are_kept(store: Store, campaign: Campaign, retained: list[int]) -> bool:
     part = store.history_part
-    if part is None or history_problems(store.path, part, store.manifest, store.n_cases):
+    if part is None or problem_of(store.path / part.file, store.histories):
         return False
     wanted = {*retained, -1} if campaign.retention.nominal else {*retained}
     return set(store.histories().get("case_id", [])) == {case for case in wanted if _began(store, case)}

@@ -1,8 +1,16 @@
 """Where a run goes when the user names no folder."""
 
+import os
 import re
 from datetime import UTC, datetime
 from pathlib import Path
+
+NO_TEXT = "lies where a name is no text in UTF-8; rename the folder or file"
+
+
+def readable(name: str) -> str:
+    """The name of a file or folder as text that every file and stream takes, whatever bytes the disk has for it."""
+    return os.fsencode(name).decode("utf-8", "replace")
 
 
 def default_folder(campaign_name: str) -> Path:

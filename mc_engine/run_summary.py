@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from mc_engine.errors import StoreError
-from mc_engine.status import OK, STATUS_NAME
+from mc_engine.parts import CASE_COLUMNS, read_part
+from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 from mc_engine.store import Store
 
 if TYPE_CHECKING:
@@ -16,6 +17,16 @@ if TYPE_CHECKING:
 def failed_cases(store: Store) -> int:
     """How many committed cases did not fly to their end."""
     return sum(count for word, count in store.status_counts().items() if word != STATUS_NAME[OK])
+
+
+def first_not_finite(store: Store) -> int | None:
+    """The first committed case that ended not-finite, if one did."""
+    for part in store.parts:
+        if part.status.get(STATUS_NAME[NOT_FINITE]):
+            table = read_part(store.path, part, CASE_COLUMNS[:2])
+            lost = table["status"].to_numpy(zero_copy_only=False) == STATUS_NAME[NOT_FINITE]
+            return int(table["case_id"].to_numpy()[lost][0])
+    return None
 
 
 def case_line(store: Store) -> str:

@@ -21,9 +21,9 @@ from mc_engine.designs import EXTENSIBLE, block_problem
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight import fly_history
 from mc_engine.flown_campaign import campaign_of, companions_of
+from mc_engine.lost_numbers import first_lost, may_be_lost
 from mc_engine.manifest import columns_of, manifest_of
 from mc_engine.model_contract import refuse_breaches
-from mc_engine.object_store import is_url
 from mc_engine.progress import ProgressCall
 from mc_engine.repair import mend_journal
 from mc_engine.retained_histories import history_frame
@@ -31,18 +31,23 @@ from mc_engine.run_folder import default_folder
 from mc_engine.sessions import Session, complete, fly_failed, session_of
 from mc_engine.shards import Shard, merge_shards
 from mc_engine.store import JOURNAL, Store, create_store, open_store
+from mc_engine.urls import is_url
 
 THREADS = Backend()
 
 
 @dataclass(frozen=True)
 class Replay:
-    """One case flown again.  `differences` names each stored number that came out with other bits."""
+    """One case flown again.  `differences` names each stored number that came out with other bits.
+
+    lost : what made the state or a metric not finite: file, line and values; empty where all are.
+    """
 
     equal: bool
     differences: tuple[str, ...]
     history: pd.DataFrame
     row: dict[str, Any]
+    lost: str = ""
 
 
 def run(
@@ -187,24 +192,20 @@ def replay(path: str | Path, case_id: int) -> Replay:
     """Fly one case of a run alone, through the plain float64 build, and compare every stored number bit for bit."""
     store = open_store(path)
     campaign = campaign_of(store)
-    inputs = case_table(campaign, np.array([case_id]))
-    flight, history = fly_history(
-        campaign.model,
-        full_inputs(campaign, _scalars(inputs)),
-        case_id,
-        campaign.seed,
-        folder=campaign.directory,
-        width=1,
-    )
+    table = case_table(campaign, np.array([case_id]))
+    inputs = full_inputs(campaign, _scalars(table))
+    flown = campaign.model, inputs, case_id, campaign.seed
+    flight, history = fly_history(*flown, folder=campaign.directory, width=1)
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
-    again = {**inputs, **flight}
+    again = {**table, **flight}
     differences = [
         f"case {case_id}, {name}: stored {stored[name]!r}, now {value!r}"
         for name, value in ((name, column[0]) for name, column in again.items())
         if not _same_bits(stored[name], value)
     ]
-    return Replay(not differences, tuple(differences), history_frame(case_id, history), stored)
+    lost = first_lost(*flown, f"case {case_id}") if may_be_lost(campaign.model, flight) else ""
+    return Replay(not differences, tuple(differences), history_frame(case_id, history), stored, lost)
 
 
 def _same_bits(stored: Any, value: Any) -> bool:

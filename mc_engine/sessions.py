@@ -4,6 +4,7 @@ One process writes at a time; it counts the parts that the workers of its crew w
 """
 
 import os
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -14,17 +15,17 @@ from mc_engine.campaign import Campaign
 from mc_engine.chunks import Order, chunk_size, fly_nominal, rerun_orders
 from mc_engine.crews import crew_of
 from mc_engine.dispatch import Dispatch
+from mc_engine.durable_file import remove_file
 from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
 from mc_engine.interruption import stop_signal
 from mc_engine.part_bounds import Stretch, part_bounds, stretches
-from mc_engine.part_contents import nominal_problems
-from mc_engine.parts import Written
+from mc_engine.parts import Written, problem_of
 from mc_engine.progress import ProgressCall
 from mc_engine.repair import withdraw_damaged
 from mc_engine.retained_histories import write_histories
 from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
-from mc_engine.store import Store
+from mc_engine.store import JOURNAL, Store
 
 Settle = Callable[[Order, Written], None]
 
@@ -49,9 +50,7 @@ def session_of(
 
 def complete(store: Store, campaign: Campaign, session: Session, repair: bool = False) -> Store:
     """Fly what is missing, then the histories.  repair : parts that are damaged are missing, too."""
-    verb = "resume --repair" if repair else "resume"
-    again = f"mc-engine {verb} {shell_word(store.path)}{session.backend.options()}"
-    with _resumable(again), store.lock(), stop_signal() as stop:
+    with _resumable(store, "resume --repair" if repair else "resume", session) as stop:
         if repair:
             withdraw_damaged(store)
         orders, size = _orders(store, session)
@@ -60,22 +59,33 @@ def complete(store: Store, campaign: Campaign, session: Session, repair: bool = 
         begin = time.perf_counter()
         _keep_nominal(store, campaign, bool(orders))
         compiled = time.perf_counter()
-        _fly(store, campaign, session, orders, lambda order, written: store.publish(written), stop.is_set, again)
+        _fly(store, campaign, session, orders, lambda order, written: store.publish(written), stop.is_set)
         if store.missing():
-            raise _interrupted(store, again)
+            raise _interrupted(store)
         flown = time.perf_counter()
-        _keep_histories(store, campaign, session, stop.is_set, again)
+        _keep_histories(store, campaign, session, stop.is_set)
         store.note("finished", prepare_s=round(compiled - begin, 3), fly_s=round(flown - compiled, 3))
     return store
 
 
 @contextmanager
-def _resumable(again: str) -> Iterator[None]:
-    """Where the disk refuses, say how to go on once it does no more."""
+def _resumable(store: Store, verb: str, session: Session) -> Iterator[threading.Event]:
+    """Be the writer of the run, with what a signal sets; whatever stops it, say with which command it goes on."""
+    place = shell_word(store.path)
     try:
-        yield
-    except DiskError as error:
-        raise RunInterrupted(f"{error}; what was committed is safe, `{again}` flies the rest") from error
+        with store.lock(), stop_signal() as stop:
+            yield stop
+    except (StoreError, RunInterrupted, KeyboardInterrupt) as error:
+        why = str(error)
+        if not (store.path / JOURNAL).exists():
+            why = f"{store.path}: was moved or removed while the run was flying; what was committed is in it still,"
+            place = "NEW_PLACE"
+        elif isinstance(error, DiskError):
+            why += "; what was committed is safe,"
+        elif not isinstance(error, RunInterrupted):
+            raise
+        again = f"mc-engine {verb} {place}{session.backend.options()}"
+        raise RunInterrupted(f"{why} `{again}` flies the rest") from error
 
 
 def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
@@ -83,8 +93,7 @@ def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
     if store.missing():
         resume = f"`mc-engine resume {shell_word(store.path)}`"
         raise StoreError(f"{store.path}: is not complete; {resume} flies the rest first")
-    again = f"mc-engine rerun --failed {shell_word(store.path)}{session.backend.options()}"
-    with _resumable(again), store.lock(), stop_signal() as stop:
+    with _resumable(store, "rerun --failed", session) as stop:
         orders = rerun_orders(store.path, store.parts)
         cases = sum(len(order.failed) for order in orders)
         store.note("rerun", backend=session.backend.name, workers=session.workers, cases=cases)
@@ -95,14 +104,14 @@ def fly_failed(store: Store, campaign: Campaign, session: Session) -> Store:
             assert order.base is not None  # each of these orders has one
             left.discard(order.base.file)
             if written.part.sha256 == order.base.sha256:
-                (store.path / written.temporary).unlink(missing_ok=True)
+                remove_file(store.path, written.temporary)
             else:
                 store.replace(order.base, written)
 
-        _fly(store, campaign, session, orders, settle, stop.is_set, again)
+        _fly(store, campaign, session, orders, settle, stop.is_set)
         if left:
-            raise _interrupted(store, again)
-        _keep_histories(store, campaign, session, stop.is_set, again)
+            raise _interrupted(store)
+        _keep_histories(store, campaign, session, stop.is_set)
         store.note("finished")
     return store
 
@@ -114,7 +123,6 @@ def _fly(
     orders: Iterable[Order],
     settle: Settle,
     stopped: Callable[[], bool],
-    again: str,
 ) -> None:
     """Have the orders carried out, settle each as it lands, and tell of the progress."""
     counts = store.status_counts()
@@ -137,7 +145,7 @@ def _fly(
         at_once = False
     except WorkersLost as error:
         store.note("interrupted", cases=done)
-        raise RunInterrupted(f"{error}; {done:,} of {total:,} cases are safe, `{again}` flies the rest") from error
+        raise RunInterrupted(f"{error}; {done:,} of {total:,} cases are safe,") from error
     finally:
         if crew is not None:
             crew.close(at_once)
@@ -148,25 +156,23 @@ def _failed(status: dict[str, int]) -> int:
     return sum(count for word, count in status.items() if word != STATUS_NAME[OK])
 
 
-def _interrupted(store: Store, again: str) -> RunInterrupted:
+def _interrupted(store: Store) -> RunInterrupted:
     done, total = sum(store.status_counts().values()), len(store.wanted)
     store.note("interrupted", cases=done)
-    return RunInterrupted(f"interrupted with {done:,} of {total:,} cases; `{again}` flies the rest")
+    return RunInterrupted(f"interrupted with {done:,} of {total:,} cases;")
 
 
-def _keep_histories(
-    store: Store, campaign: Campaign, session: Session, stopped: Callable[[], bool], again: str
-) -> None:
+def _keep_histories(store: Store, campaign: Campaign, session: Session, stopped: Callable[[], bool]) -> None:
     """A shard has none: which cases are the worst is known when all have been flown."""
     whole = len(store.wanted) == store.n_cases
     if whole and not write_histories(store, campaign, session.workers, stopped):
-        raise _interrupted(store, again)
+        raise _interrupted(store)
 
 
 def _keep_nominal(store: Store, campaign: Campaign, flying: bool) -> None:
     """Fly the nominal case where it is not there as it was written; and before others fly, to compile the kernel."""
     part = store.nominal_part
-    sound = part is not None and not nominal_problems(store.path, part, store.manifest)
+    sound = part is not None and not problem_of(store.path / part.file, store.nominal)
     if flying or not sound:
         row = fly_nominal(campaign)
         if not sound:

@@ -100,9 +100,9 @@ def merge_shards(out: Path, folders: Sequence[Path], chunk: int | None = None) -
 
 def _check_one_campaign(stores: Sequence[Store]) -> None:
     def identity(store: Store) -> tuple[object, ...]:
-        campaign, model = store.manifest["campaign"], store.manifest["model"]
-        digests = campaign["digest"], model["digest"], model["sampling_digest"]
-        return *digests, store.manifest["seed_contract"], campaign["seed"], store.n_cases
+        campaign, model = store.manifest["campaign"], store.manifest.get("model", {})
+        digests = campaign.get("digest"), model.get("digest"), model.get("sampling_digest")
+        return *digests, store.manifest.get("seed_contract"), campaign.get("seed"), store.n_cases
 
     for store in stores:
         if identity(store) != identity(stores[0]):
@@ -152,7 +152,7 @@ def _commands_of_absent(stores: Sequence[Store], missing: Sequence[tuple[int, in
         there = {record["number"] for record in records if record and record["of"] == of}
         absent = (shard for shard in _shards_of(of, missing, n_cases) if shard.number not in there)
         commands += [
-            f"`mc-engine run {shell_word(campaign['name'])} --cases {n_cases} --seed {campaign['seed']} "
+            f"`mc-engine run {shell_word(campaign['name'])} --cases {n_cases} --seed {campaign.get('seed')} "
             f"--shard {shard.number}/{of} --out DIR`"
             for shard in islice(absent, _MOST_COMMANDS + 1)
         ]

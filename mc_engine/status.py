@@ -3,6 +3,8 @@
 A failed case is data.  Its row keeps the inputs, the status and the last state; metrics are NaN.
 """
 
+MOST_CASES = 1_000_000_000  # of a run
+
 OK = 0
 NOT_FINITE = 1
 STEP_LIMIT = 2
@@ -25,7 +27,8 @@ STATUS_NAME = {
 
 STATUS_TEXT = {
     OK: "flown to its end",
-    NOT_FINITE: "the state became infinite or not a number; the row holds the last finite state",
+    NOT_FINITE: "the state became infinite or not a number, or an event's function not a number; the row holds the last "
+    "finite state",
     STEP_LIMIT: "the cap on integration steps was reached",
     EVENT_LIMIT: "more events in one step than the engine follows; the control chatters",
     NO_STOP: "the flight reached its time limit before the event that should end it",

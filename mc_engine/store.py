@@ -20,10 +20,11 @@ import numpy as np
 import pandas as pd
 import pyarrow as pa
 
+from mc_engine import durable_file as disk
 from mc_engine import parts
-from mc_engine.companions import companion_problems
-from mc_engine.durable_file import is_temporary, make_folder, naming, publish, read_short, remove_file, write_durably
-from mc_engine.errors import StoreError
+from mc_engine.companions import edited_files
+from mc_engine.directory_kinds import JOURNAL, MANIFEST, RUN, kind_of
+from mc_engine.errors import ModelError, StoreError
 from mc_engine.finished_parts import count_finished, leave_receipt
 from mc_engine.history_tables import history_columns, history_table, read_histories
 from mc_engine.journal import Entry, Journal, damaged_line, encode, plain, utc_now
@@ -31,14 +32,15 @@ from mc_engine.manifest_file import cases_in, columns_in, parse_manifest
 from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
 from mc_engine.receipts import Range, Receipts, receipts_of
 from mc_engine.shell_words import shell_word
-from mc_engine.writer_lock import LOCK_NAME, WriterLock
+from mc_engine.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock, writer_of_new
 
-__all__ = ["Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
+__all__ = ["JOURNAL", "Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
 
-CAMPAIGN, MANIFEST, JOURNAL, NOMINAL = "campaign.toml", "manifest.json", "journal.jsonl", "nominal.parquet"
+CAMPAIGN, NOMINAL = "campaign.toml", "nominal.parquet"
 NO_FOLDER = "the folder is gone"
 _EDITED = "damaged or edited, it is not the one this run began with; put the original back"
-_OURS_BEFORE_THE_JOURNAL = {LOCK_NAME, CAMPAIGN, MANIFEST, *PART_FOLDERS}
+_OURS_BEFORE_THE_JOURNAL = {*LOCK_FILES, CAMPAIGN, MANIFEST, *PART_FOLDERS}
+CUT_SHORT = {disk.temporary_name(name) for name in (CAMPAIGN, MANIFEST, JOURNAL, NOMINAL)}
 
 
 def create_store(
@@ -55,30 +57,28 @@ def create_store(
     anything, except what a creation that was cut short left there.
     """
     path, companions = Path(path), companions or {}
-    refuse_occupied(path, companions)
-    make_folder(path)
-    lock = WriterLock(path)
-    lock.acquire()
-    try:
-        refuse_occupied(path, companions)  # again: two may have come this far
+    with writer_of_new(path, lambda: refuse_occupied(path, companions)) as lock:
         names = {column.name for column in CASE_COLUMNS}
         columns = [*CASE_COLUMNS, *(column for column in columns if column.name not in names)]
         record = {**manifest, "columns": [asdict(column) for column in columns]}
         content = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False, default=plain).encode()
+        try:
+            parse_manifest(content)  # what this engine would not read, it does not write
+        except ValueError as error:
+            raise ModelError(f"what the model says of itself fits into no manifest: {error}") from error
         text = campaign_text.encode()
         for name, companion in companions.items():
-            make_folder((path / name).parent)
-            write_durably(path / name, companion)
-        write_durably(path / CAMPAIGN, text)
-        write_durably(path / MANIFEST, content)
+            disk.make_way(path, name)
+            disk.write_inside(path, name, companion)
+        disk.write_inside(path, CAMPAIGN, text)
+        disk.write_inside(path, MANIFEST, content)
         for folder in PART_FOLDERS:
-            make_folder(path / folder)
+            disk.make_way(path, f"{folder}/*")
         # The journal comes last: with it the store exists.
         digests: dict[str, Any] = {"manifest": sha256(content).hexdigest(), "campaign": sha256(text).hexdigest()}
         digests["companions"] = {name: sha256(companion).hexdigest() for name, companion in companions.items()}
-        write_durably(path / JOURNAL, encode(1, utc_now(), "created", digests))
-    finally:
-        lock.release()
+        lock.check()
+        disk.write_inside(path, JOURNAL, encode(1, utc_now(), "created", digests))
     return Store(path)
 
 
@@ -88,18 +88,18 @@ def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
     companions : files that an earlier attempt, cut short, may have left there.
     """
     expected = _OURS_BEFORE_THE_JOURNAL | {Path(name).parts[0] for name in companions}
-    with naming(path):
+    with disk.naming(path):
         names = {entry.name for entry in path.iterdir()} if path.exists() else set()
-    if JOURNAL in names:
+    if JOURNAL in names and is_run_directory(path):
         raise StoreError(f"{path}: holds a run already; `resume` or `extend` it, or choose another folder")
-    cut_short = LOCK_NAME in names and all(name in expected or is_temporary(name) for name in names)
+    cut_short = LOCK_NAME in names and all(name in expected or disk.is_temporary(name) for name in names)
     if names and not cut_short:
         raise StoreError(f"{path}: is not empty and holds no run; choose another folder")
 
 
 def is_run_directory(path: str | Path) -> bool:
     """True if `path` is or was a run directory, whole or damaged."""
-    return any((Path(path) / name).is_file() for name in (JOURNAL, MANIFEST))
+    return kind_of(path) == RUN
 
 
 def open_store(path: str | Path) -> "Store":
@@ -116,21 +116,21 @@ class Store:
         self.path = path
         if not is_run_directory(path):
             raise StoreError(f"{path}: is no run directory" if path.exists() else f"{path}: there is no such folder")
-        for folder in PART_FOLDERS:
-            if (path / folder).is_symlink():
-                raise StoreError(f"{path / folder}: is a symbolic link; the parts of a run lie in its own directory")
         self._lock = WriterLock(path)
         self._counted = Receipts()
         self._read_journal()
-        content = read_short(path / MANIFEST)
-        if sha256(content).hexdigest() != self._created["manifest"]:
-            raise StoreError(f"{path / MANIFEST}: {_EDITED}")
         try:
-            self.manifest = parse_manifest(content)
+            self.manifest = parse_manifest(self._original(MANIFEST, "manifest"))
         except ValueError as error:
             raise StoreError(f"{path / MANIFEST}: {error}") from None
         self.columns = columns_in(self.manifest)
         self._count(self.manifest["campaign"]["cases"])
+
+    def _original(self, name: str, fact: str) -> bytes:
+        content = disk.read_short(self.path / name)
+        if sha256(content).hexdigest() != self._created[fact]:
+            raise StoreError(f"{self.path / name}: {_EDITED}")
+        return content
 
     def _read_journal(self) -> None:
         if not (self.path / JOURNAL).exists():
@@ -156,23 +156,21 @@ class Store:
             except ValueError as error:
                 raise StoreError(f"{self.path / JOURNAL}: {event}: {error}") from None
 
+        self._lock.check()
         self._journal.append(event, facts, judge)
         self._counted = counted
 
     @property
     def campaign_text(self) -> str:
         """The campaign file as it was flown; StoreError if someone changed it since."""
-        content = read_short(self.path / CAMPAIGN)
-        if sha256(content).hexdigest() != self._created["campaign"]:
-            raise StoreError(f"{self.path / CAMPAIGN}: {_EDITED}")
         try:
-            return content.decode()
+            return self._original(CAMPAIGN, "campaign").decode()
         except UnicodeDecodeError as error:
             raise StoreError(f"{self.path / CAMPAIGN}: is no text: {error}") from None
 
     def check_companions(self) -> None:
         """StoreError if a file that the campaign reads from its own folder is no more the one it was flown with."""
-        for problem in companion_problems(self.path, self._created):
+        for problem in edited_files(self.path, self._created.get("companions", {})):
             raise StoreError(f"{self.path}/{problem}; put the original back")
 
     # ---- what the journal says
@@ -284,36 +282,32 @@ class Store:
         removed; StoreError if another writer is at work.
         """
         if self._lock.held:
+            self._lock.check()
             yield self
             return
-        dead = self._lock.acquire()
-        try:
+        with self._lock as dead:
             self._read_journal()  # another writer may have been here since this object was made
             if dead is not None:
                 self._record("lock-taken-over", {"from": dead})
                 count_finished(self)
             self.sweep()
             yield self
-        finally:
-            self._lock.release()
 
     def sweep(self) -> None:
         """Remove temporary files and parts without a journal line; for the holder of the lock."""
+        self._lock.check()
         if not self._journal.certain:
             self._read_journal()  # what an append that failed left there decides what counts
         counted = {part.file for part in self._counted.all_parts()}
-        for folder in (self.path, *(self.path / name for name in PART_FOLDERS)):
-            if not folder.exists():
+        for folder in PART_FOLDERS:
+            if not (self.path / folder).exists():
                 repair = f"`mc-engine resume {shell_word(self.path)} --repair`"
-                raise StoreError(f"{folder}: {NO_FOLDER}; {repair} makes it anew")
-            with naming(folder):
-                stray = [path for path in folder.iterdir() if self._is_stray(path, counted)]
-            for path in stray:
-                remove_file(path)
-
-    def _is_stray(self, path: Path, counted: set[str]) -> bool:
-        file = path.relative_to(self.path).as_posix()
-        return is_temporary(path.name) or (is_part_file(file) and file not in counted)
+                raise StoreError(f"{self.path / folder}: {NO_FOLDER}; {repair} makes it anew")
+            for file in (f"{folder}/{name}" for name in disk.names_in(self.path, folder)):
+                if disk.is_temporary(Path(file).name) or (is_part_file(file) and file not in counted):
+                    disk.remove_file(self.path, file)
+        for name in CUT_SHORT:  # not all temporary files: another process may be writing reports
+            disk.remove_file(self.path, name)
 
     def append(self, first: int, count: int, columns: Mapping[str, Any]) -> None:
         """Commit the cases first .. first + count - 1; on return they survive a power cut.
@@ -343,8 +337,11 @@ class Store:
         with self.lock():
             self._name(written)
             self._record("part-replaced", {**asdict(written.part), "replaces": before.file})
-            with suppress(OSError):  # it no longer counts, and the next writer tries again
-                (self.path / before.file).unlink(missing_ok=True)
+            self._remove(before)
+
+    def _remove(self, before: Part) -> None:
+        with suppress(StoreError):  # it no longer counts, and the next writer tries again
+            disk.remove_file(self.path, before.file)
 
     def _name(self, written: Written) -> None:
         if not (self.path / written.temporary).exists():
@@ -352,14 +349,13 @@ class Store:
                 f"{self.path / written.part.file}: a worker has written it, and it is not here; all workers must see "
                 "the run directory under the same path"
             )
-        publish(self.path / written.temporary, self.path / written.part.file)
+        disk.publish(self.path, written.temporary, written.part.file)
 
     def withdraw(self, part: Part) -> None:
         """Count a part no more, so that its cases are missing again."""
         with self.lock():
             self._record("part-withdrawn", {"file": part.file})
-            with suppress(OSError):
-                (self.path / part.file).unlink(missing_ok=True)
+            self._remove(part)
 
     def _refuse_overlap(self, first: int, count: int) -> None:
         if count > 0 and self.missing(range(first, first + count)) != [(first, first + count)]:
@@ -388,8 +384,7 @@ class Store:
             file = f"history/part-{int(Path(before.file).stem[5:]) + 1 if before else 0:05d}.parquet"
             self._record("history", asdict(parts.write_table(self.path, file, arrow)))
             if before is not None:
-                with suppress(OSError):  # it no longer counts, and the next writer tries again
-                    (self.path / before.file).unlink(missing_ok=True)
+                self._remove(before)
 
 
 def _frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> pd.DataFrame:

@@ -1,6 +1,7 @@
 """Python sources as syntax trees."""
 
 import ast
+import linecache
 import threading
 from collections.abc import Iterator
 from functools import lru_cache
@@ -15,6 +16,17 @@ def parse(source: bytes | str) -> ast.Module:
     """
     with _LOCK:
         return ast.parse(source)
+
+
+def tree_of_file(file: str) -> ast.Module:
+    """The tree of a source that was imported: of a model, as it was read then.  Not to be changed."""
+    linecache.checkcache(file)
+    return _tree("".join(linecache.getlines(file)))
+
+
+@lru_cache(maxsize=64)
+def _tree(source: str) -> ast.Module:
+    return parse(source)
 
 
 @lru_cache(maxsize=512)

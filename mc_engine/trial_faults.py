@@ -8,7 +8,6 @@ not enough.
 import ast
 import re
 from collections.abc import Iterator
-from functools import lru_cache
 from itertools import islice
 from pathlib import Path
 from types import CodeType, TracebackType
@@ -19,9 +18,10 @@ import numpy as np
 from mc_engine import lanes
 from mc_engine.compiler_faults import LANES, LOOKED_UP, ONE_BY_ONE
 from mc_engine.errors import ModelError
+from mc_engine.lanes.number import Place
 from mc_engine.model_faults import place_in_model, spot_in_model
 from mc_engine.physics_scope import shortened
-from mc_engine.syntax_tree import parse
+from mc_engine.syntax_tree import tree_of_file
 
 _ENGINE = Path(__file__).resolve().parent
 _DIFFERS = "a number that differs from case to case"
@@ -49,7 +49,7 @@ def shape_of(result: Any) -> str:
 
 def _cause(error: Exception) -> str:
     spot, text = spot_in_model(error), str(error)
-    chain = _chain(spot) if spot is not None else []
+    chain = chain_at(spot) if spot is not None else []
     node = chain[0] if chain else None
     if isinstance(error, ModelError):
         return _with_its_argument(text, node)
@@ -157,7 +157,7 @@ def _text(node: ast.AST) -> str:
     return shortened(ast.unparse(node))
 
 
-def _chain(spot: TracebackType) -> Chain:
+def chain_at(spot: TracebackType | Place) -> Chain:
     """The smallest piece of source at the place of an error, and all that it stands in; nothing without the source."""
     code = spot.tb_frame.f_code
     place = next(islice(code.co_positions(), spot.tb_lasti // 2, None), None)
@@ -165,8 +165,8 @@ def _chain(spot: TracebackType) -> Chain:
         return []
     first, last, left, right = place
     try:
-        tree = _tree(code.co_filename, Path(code.co_filename).stat().st_mtime)
-    except (OSError, SyntaxError, ValueError):
+        tree = tree_of_file(code.co_filename)
+    except (SyntaxError, ValueError):
         return []
     nodes = (node for node in ast.walk(tree) if isinstance(node, ast.expr | ast.stmt))
     around: Chain = [
@@ -175,8 +175,3 @@ def _chain(spot: TracebackType) -> Chain:
         if (node.lineno, node.col_offset) <= (first, left) and (node.end_lineno, node.end_col_offset) >= (last, right)
     ]
     return around[::-1]  # `walk` goes from the outside in
-
-
-@lru_cache(maxsize=8)
-def _tree(file: str, changed: float) -> ast.Module:
-    return parse(Path(file).read_bytes())

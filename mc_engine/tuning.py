@@ -15,17 +15,20 @@ import numpy as np
 
 from mc_engine.campaign import Campaign
 from mc_engine.candidates import Scores, cases_per_candidate, fly_candidates
+from mc_engine.directory_kinds import TUNING
 from mc_engine.errors import CampaignError, Problem, RunInterrupted
 from mc_engine.genetic_search import GeneticSearch
 from mc_engine.interruption import stop_signal
 from mc_engine.manifest import manifest_of
 from mc_engine.pareto import hypervolume, non_dominated
 from mc_engine.parts import Column
+from mc_engine.result_folder import ColumnsAndArrays, write_result
 from mc_engine.run_folder import default_folder
 from mc_engine.runner import ProgressCall
 from mc_engine.store import refuse_occupied
-from mc_engine.tuning_folder import UNFINISHED, TuningRecord, open_tuning, write_tuning
+from mc_engine.tuning_folder import UNFINISHED, TuningRecord, open_tuning
 from mc_engine.tuning_parts import Constraint, Objective, Tuning
+from mc_engine.writer_lock import WriterLock, writer_of_new
 
 _SEED_RANGE = 2**32  # what the search takes
 _NEWS = 1e-3  # a smaller growth of the dominated volume, or fall of the violation, is no progress
@@ -72,7 +75,6 @@ def tune(
             ],
         )
     path = Path(out) if out is not None else default_folder(campaign.name)
-    refuse_occupied(path)
     plan: dict[str, Any] = {
         "seed": (tuning.seed if tuning.seed is not None else campaign.seed % _SEED_RANGE) if seed is None else seed,
         "population": population or tuning.population,
@@ -85,10 +87,11 @@ def tune(
 
     def keep(flown: list[Generation], end: str) -> None:
         about = {**plan, "flown": len(flown), "end": end, **_wording(campaign, tuning)}
-        _write(path, campaign, tuning, flown, {**manifest, "tuning": about})
+        _write(path, campaign, tuning, flown, {**manifest, "tuning": about}, lock)
 
-    flown, end = _search(campaign, tuning, plan, search, workers or os.cpu_count() or 1, keep, progress)
-    keep(flown, end)
+    with writer_of_new(path, lambda: refuse_occupied(path)) as lock:
+        flown, end = _search(campaign, tuning, plan, search, workers or os.cpu_count() or 1, keep, progress)
+        keep(flown, end)
     if end == "interrupted":
         raise RunInterrupted(f"interrupted after {len(flown)} of {plan['generations']} generations; they are in {path}")
     return open_tuning(path)
@@ -169,18 +172,25 @@ def dominated_shares(fronts: Sequence[np.ndarray]) -> np.ndarray:
 # ---- the tables
 
 
-def _write(path: Path, campaign: Campaign, tuning: Tuning, flown: list[Generation], manifest: dict[str, Any]) -> None:
+def _write(
+    path: Path,
+    campaign: Campaign,
+    tuning: Tuning,
+    flown: list[Generation],
+    manifest: dict[str, Any],
+    lock: WriterLock,
+) -> None:
     columns, arrays = _evaluations(campaign, tuning, flown)
     small = _signs(tuning) * np.column_stack([arrays[one.name] for one in tuning.objectives])
     front = np.flatnonzero(non_dominated(np.where(arrays["feasible"][:, None], small, np.nan)))
     front = front[np.argsort(small[front, 0], kind="stable")]
     ended = manifest["tuning"]["end"] != UNFINISHED
-    tables = {
+    tables: dict[str, ColumnsAndArrays] = {
         "evaluations": (columns, arrays),
         "generations": _generations(flown, ended),
         "front": (columns, {name: values[front] for name, values in arrays.items()}),
     }
-    write_tuning(path, campaign.text, manifest, tables, "" if ended else f"-{len(flown)}")
+    write_result(path, TUNING, campaign.text, manifest, tables, lock)
 
 
 def _evaluations(

@@ -1,31 +1,21 @@
 """The directory of a tuning: what `mc-engine tune` leaves behind.
 
-    tuning.toml   tuning.json   evaluations.parquet   generations.parquet   front.parquet   report.html   report.pdf
+    tuning.toml   tuning.json   evaluations.parquet   generations.parquet   front.parquet   journal.jsonl
 
-`tuning.json`, the manifest, names each table and holds its digest.  While a search goes on, the tables are written
-anew after each generation, as `evaluations-12.parquet`; then the manifest is replaced, and last the tables of the
-generation before are removed: whenever the search is killed, the manifest and the tables that it names are whole.
+All of them are replaced together after each generation: whenever the search is killed, what counts is whole.
 """
 
-import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
-from hashlib import sha256
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from mc_engine.durable_file import make_folder, read_file, write_durably
-from mc_engine.errors import StoreError
-from mc_engine.journal import plain
-from mc_engine.parts import Column, arrow_table, attributes, parquet_bytes, parquet_table
+from mc_engine.directory_kinds import TUNING
+from mc_engine.result_folder import read_result
 
-MANIFEST, TEXT = "tuning.json", "tuning.toml"
-TABLES = ("evaluations", "generations", "front")
 UNFINISHED = "not ended"  # instead of why the search ended
-FORMAT = 1  # of the directory; the manifest's "format"
 
 
 @dataclass(frozen=True)
@@ -48,76 +38,10 @@ class TuningRecord:
         return len(self.front) > 0
 
 
-def write_tuning(
-    path: Path,
-    text: str,
-    manifest: Mapping[str, Any],
-    tables: Mapping[str, tuple[Sequence[Column], Mapping[str, np.ndarray]]],
-    mark: str = "",
-) -> None:
-    """Write a tuning into `path`, in place of what is there of the same search.
-
-    tables : columns and arrays of each of TABLES;  mark : what their files' names end in, none for the last ones.
-    """
-    make_folder(path)
-    write_durably(path / TEXT, text.encode())
-    records = {}
-    for name in TABLES:
-        columns, arrays = tables[name]
-        file = f"{name}{mark}.parquet"
-        rows = len(next(iter(arrays.values())))
-        content = parquet_bytes(arrow_table(columns, arrays, rows, path / file))
-        write_durably(path / file, content)
-        records[name] = {
-            "file": file,
-            "rows": rows,
-            "sha256": sha256(content).hexdigest(),
-            "columns": [asdict(column) for column in columns],
-        }
-    record = {**manifest, "format": FORMAT, "text_sha256": sha256(text.encode()).hexdigest(), "tables": records}
-    content = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False, default=plain).encode()
-    write_durably(path / MANIFEST, content)
-    for name in TABLES:
-        for old in path.glob(f"{name}-*.parquet"):
-            if old.name != records[name]["file"]:
-                old.unlink()
-
-
-def is_tuning_directory(path: str | Path) -> bool:
-    """True if `path` holds a tuning, ended or not."""
-    return (Path(path) / MANIFEST).is_file()
-
-
 def open_tuning(path: str | Path) -> TuningRecord:
     """The tuning in directory `path`; StoreError if there is none, or a byte of it changed."""
-    path = Path(path)
-    if not is_tuning_directory(path):
-        raise StoreError(
-            f"{path}: is no directory of a tuning" if path.exists() else f"{path}: there is no such folder"
-        )
-    try:
-        manifest = json.loads(read_file(path / MANIFEST))
-    except ValueError as error:
-        raise StoreError(f"{path / MANIFEST}: damaged, {error}") from None
-    if manifest.get("format", FORMAT) > FORMAT:
-        raise StoreError(f"{path}: was written by a newer engine; this one reads format {FORMAT}")
-    _whole(path / TEXT, manifest["text_sha256"])
-    return TuningRecord(path, manifest, **{name: _table(path, name, manifest["tables"][name]) for name in TABLES})
-
-
-def _whole(file: Path, digest: str) -> bytes:
-    """The bytes of a file; StoreError if they are not those of the digest."""
-    content = read_file(file)
-    if sha256(content).hexdigest() != digest:
-        raise StoreError(f"{file}: damaged, its SHA-256 is not the one in {MANIFEST}")
-    return content
-
-
-def _table(path: Path, name: str, record: Mapping[str, Any]) -> pd.DataFrame:
-    content = _whole(path / record["file"], record["sha256"])
-    frame = parquet_table(content).to_pandas(use_threads=False)
-    frame.attrs.update(attributes([Column(**column) for column in record["columns"]]))
-    return frame
+    manifest, tables = read_result(Path(path), TUNING)
+    return TuningRecord(Path(path), manifest, **tables)
 
 
 def outcome_lines(record: TuningRecord) -> list[str]:

@@ -14,18 +14,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
 
 from mc_engine.campaign_file import InputsSection
 from mc_engine.campaign_problems import Findings
 from mc_engine.case_columns import input_column
 from mc_engine.distributions import Scalar
+from mc_engine.durable_file import read_file
 from mc_engine.errors import StoreError
 from mc_engine.input_values import inputs_of
+from mc_engine.manifest_file import columns_in, parse_upstream
 from mc_engine.model import Model
-from mc_engine.parts import CASE_COLUMNS, Column, arrow_table, parquet_bytes, parquet_table
+from mc_engine.parts import CASE_COLUMNS, Column, arrow_schema, arrow_table, parquet_bytes, parquet_table
 from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
-from mc_engine.store import is_run_directory, open_store
+from mc_engine.store import JOURNAL, is_run_directory, open_store
 from mc_engine.suggestions import hint
 from mc_engine.units import compatible, convert
 
@@ -97,7 +101,7 @@ class Upstream:
 
 def read_rows(path: Path) -> Rows:
     """The rows of a complete run, or of the copy that a run directory keeps; StoreError if it is neither."""
-    return _rows_of_copy(path) if path.is_file() else _rows_of_run(path)
+    return _rows_of_copy(path) if path.name == COMPANION else _rows_of_run(path)
 
 
 def _rows_of_run(path: Path) -> Rows:
@@ -117,18 +121,39 @@ def _rows_of_run(path: Path) -> Rows:
 
 def _rows_of_copy(path: Path) -> Rows:
     try:
-        table = parquet_table(path.read_bytes())
-        facts = json.loads(table.schema.metadata[_FACTS])
-    except (OSError, KeyError, TypeError, ValueError) as error:
+        table = parquet_table(read_file(path))
+        facts = parse_upstream((table.schema.metadata or {}).get(_FACTS, b"null"))
+        columns = columns_in(facts)
+        if problem := _copy_problem(table, columns, facts["nominal"]):
+            raise ValueError(problem)
+    except (OSError, ValueError) as error:
         raise StoreError(f"{path}: no copy of an upstream run: {error}") from error
-    columns = tuple(Column(**record) for record in facts.pop("columns"))
-    nominal = facts.pop("nominal")
     arrays = {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
-    return Rows(facts, columns, arrays, nominal)
+    nominal = facts["nominal"]
+    return Rows({key: facts[key] for key in facts.keys() - {"columns", "nominal"}}, columns, arrays, nominal)
+
+
+def _copy_problem(table: pa.Table, columns: tuple[Column, ...], nominal: Mapping[str, Any]) -> str:
+    """What no engine writes into a copy; empty if every column is there, of its kind, and no value is missing."""
+    if not table.schema.equals(arrow_schema(columns)) or any(one.null_count for one in table.columns):
+        return "its columns are not those that it names, or have missing values"
+    if not np.array_equal(table["case_id"].to_numpy(), np.arange(table.num_rows)):
+        return "its case_id does not count from 0"
+    if not {*pc.unique(table["status"]).to_pylist()} <= {*STATUS_NAME.values()}:
+        return "it has a status that there is not"
+    kinds = {"number": (int, float), "integer": (int,), "word": (str,), "switch": (bool,)}
+    if table.num_rows and not all(type(nominal.get(one.name)) in kinds[one.kind] for one in columns):
+        return "its nominal case has not a value of the right kind for every column"
+    return ""
 
 
 def find_run(reference: str, directory: Path) -> Path | None:
-    """The run directory that `reference` names: beside the campaign file, or from the working folder."""
+    """The run directory that `reference` names: beside the campaign file, or from the working folder.
+
+    The campaign file of a run directory, which may come from anyone, leads to the copy in that directory alone.
+    """
+    if (directory / JOURNAL).is_file():
+        return directory / COMPANION
     try:
         return next((path for path in (directory / reference, Path(reference)) if is_run_directory(path)), None)
     except (OSError, ValueError):  # a name too long, or with a zero byte, is no path

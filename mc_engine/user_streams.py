@@ -1,67 +1,75 @@
 """The streams by which a process of the command line talks to its user, and what becomes of words that they refuse.
 
+All text goes out here, and goes out clean: of commands, help, progress, warnings and libraries.  What a stream's
+encoding lacks is written as an escape.
+
 Words are not the work: a reader that has gone away (`| head`), a full disk behind a log, or a stream that the shell
 closed neither stop a flight nor change its exit status.  Only a full disk behind standard output, where the words may
 be what was asked for, is told, and is no success.
 """
 
-import errno
-import io
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TextIO
+from typing import Any
 
 from mc_engine.interruption import INTERRUPTED
+from mc_engine.text import clean
 
 
-class _Outlet(io.RawIOBase):
-    """Writes to `raw`, and takes what is refused for written.
+class Words:
+    """Writes to a text stream, and takes what is refused for written; what follows a refusal is written nowhere.
 
-    At the bottom of a stream, so that it serves all that writes there: verbs, help, progress, warnings, libraries.
-    refusal : the last one that was not for want of a reader.
+    refusal : the first one that was not for want of a reader.  There is no `buffer`: bytes would not be clean.
     """
 
-    def __init__(self, raw: Any):
-        self._raw = raw
+    buffer: Any = None
+
+    def __init__(self, stream: Any, form: Callable[[str], str] = clean):
+        self._stream, self._form = stream, form
         self.refusal: OSError | None = None
 
-    def write(self, content: Any) -> int:
+    def steering(self) -> "Words":
+        """The same for a bar, whose text moves the cursor."""
+        return Words(self._stream, str)
+
+    def write(self, text: str) -> int:
+        self._attempt(self._stream.write, self._form(text))
+        return len(text)
+
+    def flush(self) -> None:
+        self._attempt(self._stream.flush)
+
+    def _attempt(self, act: Callable[..., Any], *words: str) -> None:
         try:
-            written: int | None = self._raw.write(content)
-            if written is not None:
-                return written
-            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))  # a full pipe that does not wait
-        except BrokenPipeError:
-            pass
+            act(*words)
         except OSError as error:
-            self.refusal = error
-        return len(content)
+            if not isinstance(error, BrokenPipeError):
+                self.refusal = error
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self._stream.fileno())  # for what is still in the stream's memory, too
+            os.close(nowhere)
 
-    def writable(self) -> bool:
-        return True
-
-    def fileno(self) -> int:
-        return int(self._raw.fileno())
-
-    def isatty(self) -> bool:
-        return bool(self._raw.isatty())
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
 
 
 @contextmanager
 def user_streams() -> Iterator[None]:
     """What the block writes to standard output and error may be refused; for the process that ends with it."""
     _open_what_was_closed()
-    if not (hasattr(sys.stdout, "buffer") and hasattr(sys.stderr, "buffer")):
+    if not (hasattr(sys.stdout, "reconfigure") and hasattr(sys.stderr, "reconfigure")):
         yield  # somebody gathers the words in memory, where nothing refuses them
         return
-    told, said = _outlet_of(sys.stdout), _outlet_of(sys.stderr)
-    sys.stdout, sys.stderr = _over(told, sys.stdout), _over(said, sys.stderr)
+    for stream in (sys.stdout, sys.stderr):
+        stream.reconfigure(errors="backslashreplace")
+    told = Words(sys.stdout)
+    sys.stdout, sys.stderr = told, Words(sys.stderr)
     try:
         yield
     except SystemExit as leaving:
-        sys.stdout.flush()
+        told.flush()
         if told.refusal is None:
             raise
         done = "" if leaving.code else ", all else is done"
@@ -78,17 +86,3 @@ def _open_what_was_closed() -> None:
             stream = open(number, mode, encoding="utf-8", closefd=False)
             setattr(sys, name, stream)
             setattr(sys, f"__{name}__", stream)  # where it stays when another takes its place
-
-
-def _outlet_of(stream: TextIO) -> _Outlet:
-    return _Outlet(getattr(stream.buffer, "raw", stream.buffer))  # unbuffered Python has no `raw` below
-
-
-def _over(outlet: _Outlet, stream: Any) -> TextIO:
-    """A text stream that writes as `stream` does, through the outlet."""
-    return io.TextIOWrapper(
-        io.BufferedWriter(outlet),
-        encoding=stream.encoding,
-        errors=stream.errors,
-        line_buffering=stream.line_buffering or stream.write_through,
-    )

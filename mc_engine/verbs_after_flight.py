@@ -45,8 +45,7 @@ def report(
 ) -> None:
     """Write the reports of runs, tunings or rare events anew."""
     advise(lambda: f"interrupted; `mc-engine report {' '.join(map(shell_word, folders))}` writes the reports")
-    from mc_engine.rare_event_folder import is_rare_event_directory
-    from mc_engine.tuning_folder import is_tuning_directory
+    from mc_engine.directory_kinds import RUN, kind_of
 
     if kind not in (None, *REPORT_FORMATS):
         leave(USAGE, f'--format "{kind}" is not known; {", ".join(REPORT_FORMATS)}')
@@ -57,8 +56,7 @@ def report(
         folder = run_at(named)
         if folder != Path(named):
             published[folder] = named
-        kept_apart = is_tuning_directory(folder) or is_rare_event_directory(folder)
-        paths.append(folder if kept_apart else existing_run(folder).path)
+        paths.append(existing_run(folder).path if kind_of(folder) in (RUN, None) else folder)
     more: dict[str, Any] = {} if template is None else {"template": template, "beside": paths}
     for path in paths:
         for written in write_reports(path, ("html", "pdf") if kind is None else (kind,), **more):
@@ -71,19 +69,20 @@ def report(
 @exit_status()
 def status(place: RunPlace) -> None:
     """How far a run is, and how its cases ended; of a tuning or a rare event, what was found."""
-    from mc_engine.rare_event_folder import is_rare_event_directory, open_rare_event
+    from mc_engine.directory_kinds import RARE_EVENT, TUNING, kind_of
+    from mc_engine.rare_event_folder import open_rare_event
     from mc_engine.rare_event_lines import outcome_lines as rare_lines
     from mc_engine.run_summary import case_line
-    from mc_engine.tuning_folder import is_tuning_directory, open_tuning, outcome_lines
+    from mc_engine.tuning_folder import open_tuning, outcome_lines
     from mc_engine.writer_lock import described, holder
 
     folder = run_at(place)
-    if is_tuning_directory(folder):
+    if kind_of(folder) == TUNING:
         record = open_tuning(folder)
         typer.echo(f"tuning       {place}\ncampaign     {record.manifest['campaign']['name']}")
         typer.echo("\n".join(outcome_lines(record)))
         return
-    if is_rare_event_directory(folder):
+    if kind_of(folder) == RARE_EVENT:
         estimate = open_rare_event(folder)
         typer.echo(f"rare event   {place}\ncampaign     {estimate.record['campaign']['name']}")
         typer.echo("\n".join(rare_lines(estimate.result)))
@@ -129,27 +128,17 @@ def summary(
 @app.command()
 @exit_status()
 def verify(place: RunPlace) -> None:
-    """Hold every byte of a run against its journal, or of a tuning or rare event against its manifest."""
-    from mc_engine.rare_event_folder import is_rare_event_directory, open_rare_event
-    from mc_engine.store import is_run_directory
-    from mc_engine.tuning_folder import is_tuning_directory, open_tuning
-    from mc_engine.verification import damages, remedies
+    """Verify all checksums of a run, a tuning or a rare event, with its reports and replays."""
+    from mc_engine.directory_kinds import kind_of
+    from mc_engine.verification import RESUME, damages, remedies
 
     folder = run_at(place)
-    if is_tuning_directory(folder):
-        open_tuning(folder)  # which reads every byte
-        typer.echo(f"{place}: every byte is as it was written")
-        return
-    if is_rare_event_directory(folder):
-        open_rare_event(folder)
-        typer.echo(f"{place}: every byte is as it was written")
-        return
-
-    if not is_run_directory(folder):
+    if kind_of(folder) is None:
         existing_run(folder)
-    problems = damages(folder)
-    for problem in problems:
-        typer.echo(f"{place}/{problem.what}", err=True)
+    found = damages(folder)
+    problems = [one for one in found if one.mended_by != RESUME]
+    for one in found:
+        typer.echo(f"{place}/{one.what}" + f"; {RESUME}" * (one.mended_by == RESUME), err=True)
     if problems:
         leave(DAMAGED, f"{place}: {counted(problems, 'problem')}; {'; '.join(remedies(place, problems))}")
     typer.echo(f"{place}: every byte is as it was written")

@@ -19,6 +19,7 @@ from mc_engine.command_line import (
     leave,
     new_file,
 )
+from mc_engine.numbers_in_text import LEAST_SHARE
 from mc_engine.shell_words import shell_word
 
 
@@ -62,7 +63,7 @@ def check(
     from mc_engine.model_contract import breaches, flight_faults
 
     campaign = load_campaign(file)
-    found = (breaches(campaign) or flight_faults(file)) if model else []
+    found = (breaches(campaign) or flight_faults(campaign, file)) if model else []
     if found:
         leave(
             USAGE,
@@ -83,7 +84,9 @@ def plan(
     ] = None,
     share: Annotated[float | None, typer.Option(help="Share of cases to be demonstrated, such as 0.9973.")] = None,
     confidence: Annotated[float | None, typer.Option(help="Confidence of the demonstration, such as 0.90.")] = None,
-    failures: Annotated[int | None, typer.Option(min=0, help="Only the row for this many failures.")] = None,
+    failures: Annotated[
+        int | None, typer.Option(min=0, max=1_000_000, help="Only the row for this many failures.")
+    ] = None,
     two_sided: Annotated[
         bool, typer.Option("--two-sided", help="Also the cases for an interval between order statistics (Wilks).")
     ] = False,
@@ -106,8 +109,8 @@ def plan(
 def _probability(name: str, value: float | None) -> float:
     if value is None:
         leave(USAGE, f"{name} is missing; give --share and --confidence, or a campaign file")
-    if not 0.0 < value < 1.0:  # also false for NaN
-        leave(USAGE, f"{name} is {value:g}; it must be above 0 and below 1, such as 0.9973")
+    if not LEAST_SHARE <= value <= 1.0 - LEAST_SHARE:
+        leave(USAGE, f"{name} is {value:g}; it must be above 0 and below 1 by {LEAST_SHARE:g}, such as 0.9973")
     return value
 
 

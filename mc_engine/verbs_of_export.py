@@ -12,12 +12,12 @@ from mc_engine.command_line import (
     beginning,
     existing_run,
     exit_status,
-    is_url,
     leave,
     new_file,
     run_at,
 )
 from mc_engine.suggestions import hint
+from mc_engine.urls import is_url, store_url
 
 if TYPE_CHECKING:
     from mc_engine.store import Store
@@ -54,7 +54,7 @@ def export(
     if kind not in FORMATS:
         leave(USAGE, f'--format "{kind}" is not known; {" or ".join(FORMATS)}')
     if out is None and is_url(place):
-        leave(USAGE, f"--out is missing: {place} is a URL; name a file here")
+        leave(USAGE, f"--out is missing: {store_url(place)} is a URL; name a file here")
     store = existing_run(run_at(place))
     path = out if out is not None else store.path / f"end_states.{kind}"
     if not path.parent.is_dir():

@@ -36,7 +36,8 @@ from mc_engine.command_line import (
 from mc_engine.interruption import advise, heed
 from mc_engine.next_step import after_flight, is_complete
 from mc_engine.shell_words import shell_word
-from mc_engine.verbs_of_object_stores import echo_publication, refuse_path
+from mc_engine.status import MOST_CASES
+from mc_engine.verbs_of_object_stores import echo_publication
 
 if TYPE_CHECKING:
     from mc_engine.backends import Backend
@@ -142,11 +143,10 @@ def _refuse_with_shard(shard: str | None, others: dict[str, Any]) -> None:
 
 
 def _refuse_publication(url: str | None) -> None:
-    """A URL that is none, or where nothing can be listed, is told before a long flight."""
+    """A URL where nothing can be listed is told before a long flight."""
     if url is not None:
         from mc_engine.object_store import refuse_unreachable
 
-        refuse_path(url)
         refuse_unreachable(url)
 
 
@@ -180,7 +180,7 @@ def _finish(
     campaign: str | None = None,
 ) -> None:
     """What every flight ends with: reports, a summary, and an exit status where one was asked for."""
-    from mc_engine.run_summary import case_line, failed_cases, judgement, look_line, verdict_line
+    from mc_engine.run_summary import case_line, failed_cases, first_not_finite, judgement, look_line, verdict_line
 
     if store.manifest.get("shard"):
         if url is not None:
@@ -203,6 +203,8 @@ def _finish(
     if failed == sum(store.status_counts().values()):
         named = shell_word(campaign or store.path / "campaign.toml")
         typer.echo(f"no case flew to its end; `mc-engine check {named}` looks for the reason in the model", err=True)
+    elif (case := first_not_finite(store)) is not None:
+        typer.echo(f"not finite   `mc-engine replay {shell_word(store.path)} {case}` names the line of the model")
     _judge_failures(failed, max_failed)
     if judge and any(verdict.outcome != "pass" for verdict in judged):
         leave(NOT_MET, "not every requirement is met")
@@ -336,7 +338,7 @@ def merge(
     ],
     no_report: NoReport = False,
     chunk: Annotated[
-        int | None, typer.Option(min=1, help="Cases of a part; as `run` would have it by default.")
+        int | None, typer.Option(min=1, max=MOST_CASES, help="Cases of a part; as `run` would have it by default.")
     ] = None,
     workers: Workers = None,
 ) -> None:
@@ -363,6 +365,8 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
     flight = runner.replay(folder, case)
     for path in write_replay(store, case, flight.history):
         typer.echo(str(path))
+    if flight.lost:
+        typer.echo(flight.lost)
     if not flight.equal:
         for difference in flight.differences:
             typer.echo(str(difference), err=True)

@@ -5,11 +5,11 @@ from typing import Annotated
 
 import typer
 
-from mc_engine.command_line import USAGE, RunFolder, app, counted, existing_run, exit_status, is_url, leave, new_file
+from mc_engine.command_line import RunFolder, app, counted, existing_run, exit_status, new_file, object_store
 from mc_engine.interruption import advise
 from mc_engine.shell_words import shell_word
 
-Url = Annotated[str, typer.Argument(metavar="URL", help="Such as s3://bucket/runs/deorbit.")]
+Url = Annotated[str, typer.Argument(metavar="URL", help="Such as s3://bucket/runs/deorbit.", parser=object_store)]
 
 
 @app.command()
@@ -25,15 +25,9 @@ def echo_publication(folder: Path, url: str) -> None:
     """Publish the run, and say what was sent."""
     from mc_engine.object_store import publish
 
-    refuse_path(url)
     done = publish(folder, url)
-    typer.echo(f"published    {url}: {counted(done.sent, 'file')}, {done.sent_bytes:,} bytes; {done.kept} were there")
-
-
-def refuse_path(url: str) -> None:
-    """A local path in place of a URL is a slip of the user's."""
-    if not is_url(url):
-        leave(USAGE, f"{url}: is no URL such as s3://bucket/runs/deorbit")
+    files = counted(done.sent, "file")
+    typer.echo(f"published    {done.url}: {files}, {done.sent_bytes:,} bytes; {done.kept} were there")
 
 
 @app.command()
@@ -44,5 +38,4 @@ def fetch(
     """Copy a run from an object store to a new directory; every part is held against its journal."""
     from mc_engine.object_store import fetch
 
-    refuse_path(url)
     typer.echo(f"run          {fetch(url, folder)}")

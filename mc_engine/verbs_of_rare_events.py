@@ -48,7 +48,9 @@ def rare(
     method: Annotated[
         str, typer.Option(help="subset or cross-entropy.", autocompletion=beginning(("subset", "cross-entropy")))
     ] = "subset",
-    cases_per_level: Annotated[int, typer.Option(min=1, help="Cases that each level stands on.")] = 10_000,
+    cases_per_level: Annotated[
+        int, typer.Option(min=1, max=10_000_000, help="Cases that each level stands on.")
+    ] = 10_000,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
     out: Annotated[
         Path | None,
@@ -62,7 +64,6 @@ def rare(
     from mc_engine.campaign import load_campaign
     from mc_engine.limit_state import chosen_requirement, refuse_unmappable
     from mc_engine.rare_event import METHODS, estimate_rare_event
-    from mc_engine.rare_event_folder import RECORD
     from mc_engine.rare_event_lines import outcome_lines
     from mc_engine.run_folder import default_folder
 
@@ -74,7 +75,7 @@ def rare(
     refuse_unmappable(campaign)
     path = out if out is not None else default_folder(f"{campaign.name}-rare")
     refuse_occupied_folder(path)
-    advise(lambda: after_search(path, RECORD, "the estimate is"))
+    advise(lambda: after_search(path, "rare.json", "the estimate is"))
     typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
     found = estimate_rare_event(
         campaign,

@@ -17,8 +17,12 @@ _REPEATS = 20
 @exit_status()
 def bench(
     file: CampaignFile,
-    cases: Annotated[int | None, typer.Option(min=1, help="Cases of a flight; what is short unless said.")] = None,
-    repeats: Annotated[int, typer.Option(min=1, help="Flights of each build; the fastest counts.")] = _REPEATS,
+    cases: Annotated[
+        int | None, typer.Option(min=1, max=10_000_000, help="Cases of a flight; what is short unless said.")
+    ] = None,
+    repeats: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Flights of each build; the fastest counts.")
+    ] = _REPEATS,
 ) -> None:
     """How fast a campaign flies on one thread, and how much faster its cases fly side by side than one at a time.
 

@@ -30,8 +30,12 @@ def tune(
         ),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")] = None,
-    generations: Annotated[int | None, typer.Option(min=1, help="Generations, in place of the file's.")] = None,
-    population: Annotated[int | None, typer.Option(min=4, help="Candidates in each, in place of the file's.")] = None,
+    generations: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Generations, in place of the file's.")
+    ] = None,
+    population: Annotated[
+        int | None, typer.Option(min=4, max=100_000, help="Candidates in each, in place of the file's.")
+    ] = None,
     no_report: NoReport = False,
     workers: Workers = None,
 ) -> None:
@@ -43,10 +47,10 @@ def tune(
     campaign = load_campaign(file)
     path = out if out is not None else default_folder(campaign.name)
     refuse_occupied_folder(path)
-    advise(lambda: after_search(path, MANIFEST, "the generations that were flown are"))
+    advise(lambda: after_search(path, "tuning.json", "the generations that were flown are"))
     from mc_engine.progress import Progress
     from mc_engine.tuning import tune
-    from mc_engine.tuning_folder import MANIFEST, outcome_lines
+    from mc_engine.tuning_folder import outcome_lines
 
     with Progress() as progress:
         record = tune(

@@ -1,6 +1,7 @@
 """Inside a worker process: the campaign of its run, the limits it keeps, and its end with the process that began it."""
 
 import os
+import re
 import signal
 import sys
 import threading
@@ -15,7 +16,7 @@ import numpy as np
 
 from mc_engine.campaign import Campaign
 from mc_engine.chunks import Order, carry_out, fly_nominal
-from mc_engine.durable_file import temporary_name
+from mc_engine.durable_file import leave, names_in, publish, remove_file, temporary_name
 from mc_engine.errors import StoreError
 from mc_engine.flown_campaign import campaign_of
 from mc_engine.interruption import SIGNALS
@@ -88,9 +89,9 @@ class Watch:
     def over(self, case_ids: np.ndarray) -> Iterator[None]:
         """The cases of a batch fly side by side, so that the batch takes as long as its longest case."""
         first, last = int(case_ids[0]), int(case_ids[-1])
-        note = _note(self._run, IN_FLIGHT, first, last)
-        note.touch()
-        timer = threading.Timer(self._seconds or 0.0, self._end, (note, _note(self._run, LATE, first, last)))
+        note = _note(IN_FLIGHT, first, last)
+        leave(self._run, note)
+        timer = threading.Timer(self._seconds or 0.0, self._end, (note, _note(LATE, first, last)))
         timer.daemon = True
         if self._seconds is not None:
             timer.start()
@@ -98,11 +99,11 @@ class Watch:
             yield
         finally:
             timer.cancel()
-        note.unlink(missing_ok=True)
+        remove_file(self._run, note)
 
-    def _end(self, in_flight: Path, late: Path) -> None:
+    def _end(self, in_flight: str, late: str) -> None:
         try:
-            in_flight.replace(late)
+            publish(self._run, in_flight, late)
         finally:
             os._exit(1)  # nothing else ends a thread that flies
 
@@ -110,8 +111,8 @@ class Watch:
 IN_FLIGHT, LATE = "in_flight", "late"
 
 
-def _note(run: Path, kind: str, first: int, last: int) -> Path:
-    return temporary_name(run / "cases" / f"{kind}-{first}-{last}")  # a name that the next writer sweeps away
+def _note(kind: str, first: int, last: int) -> str:
+    return temporary_name(f"cases/{kind}-{first}-{last}")  # a name that the next writer sweeps away
 
 
 def take_notes(run: Path, case_ids: np.ndarray) -> tuple[str, np.ndarray]:
@@ -125,11 +126,13 @@ def take_notes(run: Path, case_ids: np.ndarray) -> tuple[str, np.ndarray]:
 
 def _noted(run: Path, kind: str, case_ids: np.ndarray) -> np.ndarray:
     noted = np.zeros(case_ids.size, dtype=bool)
-    for path in (run / "cases").glob(temporary_name(Path(f"{kind}-*")).name):
-        _, first, last = path.stem.split("-")
-        these = (case_ids >= int(first)) & (case_ids <= int(last))
+    for name in names_in(run, "cases"):
+        found = re.fullmatch(rf"\.{kind}-([0-9]{{1,18}})-([0-9]{{1,18}})\.tmp", name)
+        if found is None:
+            continue
+        these = (case_ids >= int(found[1])) & (case_ids <= int(found[2]))
         if these.any():
-            path.unlink(missing_ok=True)
+            remove_file(run, f"cases/{name}")
             noted |= these
     return case_ids[noted]
 

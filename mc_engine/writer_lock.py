@@ -1,12 +1,13 @@
-"""One writer per run directory.
+"""One writer per directory of a run, a tuning or a rare event.
 
-The lock is the operating system's own on the file `.lock`, which holds the writer's process number, machine and
-start time for messages.  It falls with its process, so a lock left by a kill is stale at once; whoever takes it
-over learns whose it was.  The file stays, empty, when the writer leaves: removing it would let two processes hold
-a lock on two files of one name.
+The lock is the operating system's own, on the file `.lock` and, where there is one, on the journal: deleting `.lock`
+lets nobody in.  It falls with its process.  `.lock` holds the writer's record, for messages and for whoever takes over
+after a kill, and is empty when nobody writes.
 
-File systems without locks (some cluster mounts) are judged by the record alone: a process that lives here, or any
-on another machine, keeps its lock until the file is deleted by hand.
+On file systems without locks (some cluster mounts) that record is the lock.  Who makes the file `.lock.claim`, which
+the system lets one process do, may judge the record and put its own in place.  A writer whose process is over does not
+count; one that cannot be seen from here keeps its lock until a person deletes the file.  A writer looks before each
+step whether the lock is still its own.
 """
 
 import errno
@@ -14,98 +15,199 @@ import json
 import os
 import socket
 import time
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import naming, open_regular
+from mc_engine.directory_kinds import JOURNAL
+from mc_engine.durable_file import make_folder, naming, open_regular, read_short
 from mc_engine.errors import StoreError
 from mc_engine.journal import utc_now
 
-LOCK_NAME = ".lock"
+LOCK_NAME, CLAIM = ".lock", ".lock.claim"
+LOCK_FILES = frozenset({LOCK_NAME, CLAIM})
 PATIENCE_S = 0.25  # a reader asking `holder` has the lock for an instant; a writer has it for longer
 _UNSUPPORTED = {errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK, errno.ENOTSUP}
+_CONTESTED = {errno.EAGAIN, errno.EACCES, errno.EDEADLK}
+
+
+class _BusyError(Exception):
+    """Somebody else has the lock."""
 
 
 class WriterLock:
-    """The lock of one run directory; `acquire` and `release` come in pairs."""
+    """The lock of one directory; `acquire` and `release` come in pairs, or a `with` block does both."""
 
-    def __init__(self, folder: Path):
-        self.path = folder / LOCK_NAME
-        self._descriptor: int | None = None
+    def __init__(self, folder: Path, name: str = LOCK_NAME, journal: str = JOURNAL):
+        """name, journal : of the lock file, and of the journal that it is for, in `folder`."""
+        self.path = folder / name
+        self._names = _locked_files(name, journal)
+        self._locked: list[int] = []  # descriptors; none on a file system without locks
+        self._record = b""  # what `.lock` holds while this object has the lock
+        self._held = ExitStack()
+
+    def __enter__(self) -> dict[str, Any] | None:
+        return self.acquire()
+
+    def __exit__(self, *_: object) -> None:
+        self.release()
 
     @property
     def held(self) -> bool:
         """True while this object holds the lock."""
-        return self._descriptor is not None
+        return bool(self._record)
 
     def acquire(self) -> dict[str, Any] | None:
         """Take the lock; the record of its last holder if that one died with it, else None.
 
         Raises StoreError within a second, naming the path, if another writer is at work.
         """
-        with naming(self.path):
-            descriptor = open_regular(self.path, os.O_RDWR | os.O_CREAT)
+        deadline = time.monotonic() + PATIENCE_S
+        while True:
             try:
-                before = self._wait(descriptor)
-                record = {"pid": os.getpid(), "host": socket.gethostname(), "since": utc_now()}
-                _overwrite(descriptor, json.dumps(record).encode())
-            except BaseException:
-                os.close(descriptor)
-                raise
-        self._descriptor = descriptor
+                with naming(self.path):
+                    return self._take()
+            except _BusyError as error:
+                if time.monotonic() > deadline:
+                    raise StoreError(f"{self.path.parent}: {error}") from None
+            time.sleep(0.02)
+
+    def _take(self) -> dict[str, Any] | None:
+        with ExitStack() as held:
+            locked = _system_locks(self.path.parent, self._names, held, os.O_CREAT)
+            with nullcontext() if locked else _claimed(self.path.with_name(CLAIM)):
+                before = _read(self.path)
+                if _is_at_work(before, locked):
+                    way_out = f"this file system has no locks: if that process is over, delete {self.path}"
+                    raise _BusyError(f"{described(before)} is writing here; {way_out}")
+                record = {"pid": os.getpid(), **_here(), "since": utc_now(), "start": _start(os.getpid())}
+                content = json.dumps({**record, "locks": bool(locked)}).encode()
+                _overwrite(self.path, locked, content)
+            self._locked, self._record, self._held = locked, content, held.pop_all()
         return before
 
-    def _wait(self, descriptor: int) -> dict[str, Any] | None:
-        deadline = time.monotonic() + PATIENCE_S
-        while not _take(descriptor):
-            if time.monotonic() > deadline:
-                raise StoreError(f"{self.path.parent}: {described(_read(descriptor))} is writing here")
-            time.sleep(0.02)
-        return _read(descriptor)
+    def check(self) -> None:
+        """StoreError if this object took the lock, and the lock is no more that of the directory."""
+        with naming(self.path):
+            if not self.held or self._is_ours():
+                return
+        lost = f"was moved or removed, or its {self.path.name} was deleted or taken over"
+        raise StoreError(f"{self.path.parent}: {lost}, while this process was writing there; it has stopped")
+
+    def _is_ours(self) -> bool:
+        if self._locked:
+            return _is_at(self.path.with_name(self._names[len(self._locked) - 1]), self._locked[-1])
+        return self.path.exists() and read_short(self.path) == self._record
 
     def release(self) -> None:
-        """Give the lock back.  The lock falls even if the record cannot be emptied."""
-        if self._descriptor is None:
-            return
-        descriptor, self._descriptor = self._descriptor, None
+        """Give the lock back.  It falls even if the record cannot be emptied; that of a lock lost is left as it is."""
+        with self._held, suppress(OSError, StoreError):
+            if self.held and self._is_ours():
+                _overwrite(self.path, self._locked, b"")
+        self._record = b""
+
+
+@contextmanager
+def writer_of_new(folder: Path, refuse: Callable[[], None]) -> Iterator[WriterLock]:
+    """Be the one writer of the new directory `folder`, which is gone again if the block leaves nothing there.
+
+    refuse : raises StoreError where it is occupied.
+    """
+    refuse()
+    make_folder(folder)
+    with (lock := WriterLock(folder)):
+        refuse()  # again: two may have come this far
+        done = False
         try:
-            with suppress(OSError):
-                _overwrite(descriptor, b"")
-                _system_unlock(descriptor)
+            yield lock
+            done = True
         finally:
-            os.close(descriptor)
+            with suppress(OSError):
+                if done or os.listdir(folder) == [LOCK_NAME]:
+                    lock.path.unlink()
+                    folder.rmdir()  # where it is empty
 
 
-def holder(folder: Path) -> dict[str, Any] | None:
+def holder(folder: Path, name: str = LOCK_NAME, journal: str = JOURNAL) -> dict[str, Any] | None:
     """The record of the writer now at work in `folder`; None if there is none."""
+    with suppress(OSError, StoreError), ExitStack() as held:  # a directory we may only read: nobody to be told of
+        try:
+            locked = _system_locks(folder, _locked_files(name, journal), held)
+        except _BusyError:
+            return _read(folder / name) or {}
+        record = _read(folder / name)
+        return record if _is_at_work(record, locked) else None
+    return None
+
+
+def is_left_by_dead(folder: Path) -> bool:
+    """True if the last writer in `folder`, where none is at work now, was killed."""
+    with suppress(StoreError):
+        return _read(folder / LOCK_NAME) is not None
+    return False
+
+
+def _system_locks(folder: Path, names: tuple[str, ...], held: ExitStack, flags: int = 0) -> list[int]:
+    """Descriptors with the system's lock, of the lock file and the journal; none on a file system without locks.
+
+    flags : O_CREAT, to make the lock file where it is not there.  held : closed to let them go.
+    """
+    locked: list[int] = []
+    for name, more in ((name, flags * (name == names[0])) for name in names):
+        path = folder / name
+        if not more and not path.exists():
+            continue
+        with naming(path):
+            descriptor = open_regular(path, os.O_RDWR | more)
+        held.callback(_let_go, descriptor)
+        try:
+            _system_lock(descriptor)
+        except OSError as error:
+            if error.errno in _UNSUPPORTED:
+                return []
+            if error.errno not in _CONTESTED:
+                raise
+            raise _BusyError(f"{described(_read(folder / names[0]))} is writing here") from None
+        if not _is_at(path, descriptor):
+            raise _BusyError("another writer is writing here")  # it replaced the file before the lock was ours
+        locked.append(descriptor)
+    return locked
+
+
+@contextmanager
+def _claimed(path: Path) -> Iterator[None]:
+    """Have made the file `path`, which one process can."""
     try:
-        descriptor = open_regular(folder / LOCK_NAME, os.O_RDWR)
-    except (OSError, StoreError):
-        return None  # no lock file, or a directory we may only read: nobody to be told of
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
+    except FileExistsError:
+        way_out = f"if none is, one was killed at that moment: delete {path}"
+        raise _BusyError(f"another writer is about to begin here; {way_out}") from None
     try:
-        return None if _take(descriptor) else (_read(descriptor) or {})
-    except OSError:
-        return None
+        yield
     finally:
-        os.close(descriptor)
+        path.unlink(missing_ok=True)
 
 
-def _take(descriptor: int) -> bool:
-    """Try for the system's lock; True if it is ours."""
+def _is_at(path: Path, descriptor: int) -> bool:
+    """Whether the open file is the one that has this name now."""
     try:
-        _system_lock(descriptor)
-        return True
-    except OSError as error:
-        if error.errno in _UNSUPPORTED:
-            return not _seems_alive(_read(descriptor))
-        if error.errno in (errno.EAGAIN, errno.EACCES, errno.EDEADLK):
-            return False
-        raise
+        return os.path.samestat(os.stat(path, follow_symlinks=False), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False
+
+
+def _let_go(descriptor: int) -> None:
+    with suppress(OSError):
+        _system_unlock(descriptor)
+    os.close(descriptor)
 
 
 if os.name == "nt":
     import msvcrt
+
+    def _locked_files(name: str, journal: str) -> tuple[str, ...]:
+        return (name,)  # an open file can neither be deleted nor replaced here
 
     def _system_lock(descriptor: int) -> None:
         # Windows locks bytes against reading too: one far behind the record leaves the record readable.
@@ -118,6 +220,9 @@ if os.name == "nt":
 else:
     import fcntl
 
+    def _locked_files(name: str, journal: str) -> tuple[str, ...]:
+        return (name, journal)
+
     def _system_lock(descriptor: int) -> None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
@@ -126,37 +231,62 @@ else:
         fcntl.flock(descriptor, fcntl.LOCK_UN)
 
 
-def _seems_alive(record: dict[str, Any] | None) -> bool:
-    if record is None:
+def _is_at_work(record: dict[str, Any] | None, locked: list[int]) -> bool:
+    """Whether the writer of a record may be at work, as it cannot be if it had the system's locks that are ours now."""
+    if record is None or (locked and record.get("locks", True)):
         return False
-    if record.get("host") != socket.gethostname() or os.name == "nt":
+    elsewhere = any(record.get(key, value) != value for key, value in _here().items())
+    if elsewhere or os.name == "nt":  # where to ask for a process may end it
         return True
     try:
-        os.kill(int(record["pid"]), 0)
+        pid = int(record["pid"])
+        os.kill(pid, 0)
     except ProcessLookupError:
         return False
-    except (OSError, KeyError, ValueError, OverflowError):
+    except (OSError, KeyError, ValueError, TypeError, OverflowError):
         return True
-    return True
+    start = _start(pid)  # its number may have been given to another process since
+    return start is None or start == record.get("start", start)
 
 
-def _read(descriptor: int) -> dict[str, Any] | None:
-    os.lseek(descriptor, 0, os.SEEK_SET)
-    content = os.read(descriptor, 4096)
-    if not content.strip(b"\0 \n"):
-        return None
+def _here() -> dict[str, str]:
+    """Where a process number means what it does here: on this machine, and in its container."""
+    host = {"host": socket.gethostname()}
+    with suppress(OSError):
+        return {**host, "numbers": os.readlink("/proc/self/ns/pid")}
+    return host
+
+
+def _start(pid: int) -> int | None:
+    """When a process began, in ticks since its machine did; -1 if it is dead, None where the system does not say."""
     try:
-        record = json.loads(content)
+        fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()
+    except OSError:
+        return None
+    return -1 if fields[0] in (b"Z", b"X") else int(fields[19])
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    """The record in a lock file; {} if it holds anything else, None if nothing."""
+    content = read_short(path) if os.path.lexists(path) else b""
+    try:
+        record = json.loads(content) if content.strip(b"\0 \n") else None
     except (ValueError, RecursionError):
         return {}
-    return record if isinstance(record, dict) else {}
+    return record if record is None or isinstance(record, dict) else {}
 
 
-def _overwrite(descriptor: int, content: bytes) -> None:
-    os.ftruncate(descriptor, 0)
-    os.lseek(descriptor, 0, os.SEEK_SET)
-    if content:
-        os.write(descriptor, content)
+def _overwrite(path: Path, locked: list[int], content: bytes) -> None:
+    # Windows lets only the descriptor with the lock write.
+    descriptor = locked[0] if locked else open_regular(path, os.O_WRONLY)
+    try:
+        os.ftruncate(descriptor, 0)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        if content:
+            os.write(descriptor, content)
+    finally:
+        if not locked:
+            os.close(descriptor)
 
 
 def described(record: dict[str, Any] | None) -> str:

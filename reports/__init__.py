@@ -1,8 +1,23 @@
-"""Reports of a run: one self-contained HTML page and one typeset PDF with the same contents."""
+"""Reports of a run: one self-contained HTML page and one typeset PDF with the same contents.
 
-from reports.cli import report, write_reports
-from reports.contents import build
-from reports.html import render_html
-from reports.pdf import render_pdf
+The names load what they need when they are first used: the process that fills in a template needs next to nothing.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from reports.cli import report, write_reports
+    from reports.contents import build
+    from reports.html import render_html
+    from reports.pdf import render_pdf
+
+_HOME = {"build": "contents", "render_html": "html", "render_pdf": "pdf", "report": "cli", "write_reports": "cli"}
 
 __all__ = ["build", "render_html", "render_pdf", "report", "write_reports"]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

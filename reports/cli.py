@@ -1,17 +1,19 @@
 """What `mc-engine report RUN...` does: read the runs or tunings, build the contents, write the files."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mc_engine.durable_file import make_folder, temporary_name, write_durably
-from mc_engine.rare_event_folder import is_rare_event_directory, open_rare_event
+from mc_engine.derived_files import FIGURES, derived_files
+from mc_engine.directory_kinds import RARE_EVENT, TUNING, kind_of
+from mc_engine.rare_event_folder import open_rare_event
+from mc_engine.run_folder import readable
 from mc_engine.store import open_store
-from mc_engine.tuning_folder import is_tuning_directory, open_tuning
+from mc_engine.tuning_folder import open_tuning
 from reports.contents import build, titled
 from reports.document import Attachment, Document
 from reports.flown import Flown
 from reports.html import render_html
-from reports.markdown import FILE, FOLDER, figure_files, render_markdown
+from reports.markdown import FILE, figure_files, render_markdown
 from reports.pdf import render_pdf
 from reports.pictures import Pictures
 from reports.rare_events import build_rare_event
@@ -46,19 +48,21 @@ def write_reports(
 
     template : a file with sections of the user's own; it sees this run and those of `beside`, see `user_sections`.
     Returns the paths of the reports and of files that belong to them (a footprint's KML), not of a Markdown report's
-    figures.  The contents are built once.  Every file appears whole or not at all.
+    figures.  The contents are built once.  All files of a format appear together or not at all.
     """
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
         raise ValueError(f'"{unknown[0]}" is no format of a report; use {", ".join(FORMATS)}')
     path = Path(run_path)
     document = _document(path, Path(template) if template else None, [Path(other) for other in beside])
-    pictures, written = Pictures(), []
+    pictures, written, kept = Pictures(), [], derived_files(path)
     for name in dict.fromkeys(formats):
         files = FORMATS[name](document, pictures)
-        _remove_stale(path, _write_all(path, files[1:]))
-        written += _write_all(path, files[:1])
-    return written + _write_all(path, document.files)
+        kept.write({file.name: file.content for file in files}, alone_in=FIGURES if files[1:] else None)
+        written.append(path / files[0].name)
+    if document.files:
+        kept.write({file.name: file.content for file in document.files})
+    return written + [path / file.name for file in document.files]
 
 
 def report(run_path: str | Path, format: str | None = None) -> list[Path]:
@@ -67,14 +71,12 @@ def report(run_path: str | Path, format: str | None = None) -> list[Path]:
 
 
 def _document(path: Path, template: Path | None, beside: Sequence[Path]) -> Document:
-    name = path.resolve().name
-    if is_tuning_directory(path):
-        if template is not None:
-            raise TemplateError(f"{path}: is a tuning; a template speaks of runs")
+    name, kind = readable(path.resolve().name), kind_of(path)
+    if kind in (TUNING, RARE_EVENT) and template is not None:
+        raise TemplateError(f"{path}: is a {kind}; a template speaks of runs")
+    if kind == TUNING:
         return build_tuning(open_tuning(path), name)
-    if is_rare_event_directory(path):
-        if template is not None:
-            raise TemplateError(f"{path}: is a rare event; a template speaks of runs")
+    if kind == RARE_EVENT:
         return build_rare_event(open_rare_event(path), name)
     run = open_store(path)
     document = build(run, name)
@@ -87,29 +89,7 @@ def _document(path: Path, template: Path | None, beside: Sequence[Path]) -> Docu
 
 
 def _facts(path: Path) -> RunFacts:
-    if is_tuning_directory(path):
-        raise TemplateError(f"{path}: is a tuning; a template speaks of runs")
-    flown = Flown(open_store(path), path.name)
+    if (kind := kind_of(path)) in (TUNING, RARE_EVENT):
+        raise TemplateError(f"{path}: is a {kind}; a template speaks of runs")
+    flown = Flown(open_store(path), readable(path.name))
     return run_facts(flown, titled(flown))
-
-
-def _remove_stale(path: Path, figures: Sequence[Path]) -> None:
-    """Take away the figures of an earlier Markdown report that this one does not have."""
-    for file in (path / FOLDER).glob("figure-*.svg") if figures else ():
-        if file not in figures:
-            file.unlink()
-
-
-def _write_all(path: Path, files: Iterable[Attachment]) -> list[Path]:
-    return [_write(path / file.name, file.content) for file in files]
-
-
-def _write(path: Path, content: bytes) -> Path:
-    """Write one file, whole or not at all; DiskError or StoreError names it."""
-    make_folder(path.parent)
-    try:
-        write_durably(path, content)
-    except KeyboardInterrupt:
-        temporary_name(path).unlink(missing_ok=True)  # of a full disk it is gone already
-        raise
-    return path

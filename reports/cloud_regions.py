@@ -3,10 +3,11 @@
 Computed on the metrics in units of their standard deviations, so that the units of the axes do not matter.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from mc_engine.statistics.moments import in_units, near_one
 from mc_engine.statistics.regions import covariance_ellipses, density_regions
 from reports.figures.scatter import CloudRegion
 from reports.flown import CONFIDENCE, Flown
@@ -24,22 +25,26 @@ def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.nda
     distinct = (np.unique(values).size for values in (x, y))
     if not flown.random or not metrics.issuperset(names) or min(distinct) < FEWEST:
         return ()
-    points = np.column_stack([x, y])
+    points, exponent = near_one(np.column_stack([x, y]))
     centre, scale = points.mean(axis=0), points.std(axis=0)
     if not np.all(scale > 1e-12 * np.abs(points).max(axis=0)):
         return ()
-    return tuple(_regions((points - centre) / scale, centre, scale))
+
+    def placed(outline: np.ndarray) -> np.ndarray:
+        return in_units(centre + outline * scale, exponent)
+
+    return tuple(_regions((points - centre) / scale, placed))
 
 
-def _regions(points: np.ndarray, centre: np.ndarray, scale: np.ndarray) -> Iterator[CloudRegion]:
+def _regions(points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray]) -> Iterator[CloudRegion]:
     n = count(len(points))
     for one in covariance_ellipses(points, ELLIPSES, THINNEST):
         held = f"really holds {count(one.inside)} of {n}, {percent(one.inside / one.n, 1)}"
         text = f"ellipse of a normal cloud's {percent(one.content)} (χ²): {held}"
-        yield CloudRegion(True, text, (centre + one.outline() * scale,))
+        yield CloudRegion(True, text, (placed(one.outline()),))
     for region in density_regions(points, (REGION,), CONFIDENCE, THINNEST):
         text = (
             f"at least {percent(region.content)} of all flights, {percent(region.confidence)} confidence, any shape: "
             f"holds {count(region.inside)} of {n}"
         )
-        yield CloudRegion(False, text, tuple(centre + outline * scale for outline in region.outlines))
+        yield CloudRegion(False, text, tuple(map(placed, region.outlines)))

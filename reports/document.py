@@ -1,15 +1,17 @@
 """What a report says, as plain data: sections of texts, tables and figures, in reading order.
 
-Built once by `contents`, drawn twice by `html` and `pdf`.  All strings are plain text; escaping is the
-renderers' work.
+Built once by `contents`, drawn by `html`, `pdf` and `markdown`.  All strings are plain text; escaping is the
+renderers' work, and no renderer meets a character that steers, reorders or hides: a document is clean once it is made.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
 from matplotlib.figure import Figure
+
+from mc_engine.text import clean
 
 
 @dataclass(frozen=True)
@@ -181,6 +183,29 @@ class Document:
     question: str = "Will it work?"
     files: tuple[Attachment, ...] = ()
     cases: CaseData | None = None
+
+    def __post_init__(self) -> None:
+        for one in fields(self):
+            object.__setattr__(self, one.name, _cleaned(getattr(self, one.name)))
+
+
+def _cleaned(value: Any) -> Any:
+    """The value with all strings in it clean; the value itself where it holds none that is not."""
+    if isinstance(value, str):
+        return clean(value)
+    if isinstance(value, float | int):  # of which there may be a hundred thousand
+        return value
+    if isinstance(value, dict):
+        return {_cleaned(name): _cleaned(one) for name, one in value.items()}
+    if isinstance(value, tuple | list):
+        items = [_cleaned(one) for one in value]
+        same = all(new is old for new, old in zip(items, value, strict=True))
+        return value if same else type(value)(items)
+    if is_dataclass(value) and not isinstance(value, type):
+        held = {one.name: getattr(value, one.name) for one in fields(value)}
+        changed = {name: new for name, old in held.items() if (new := _cleaned(old)) is not old}
+        return replace(value, **changed) if changed else value
+    return value
 
 
 def numbered(document: Document) -> Document:

@@ -79,7 +79,7 @@ def geojson(places: Places) -> bytes:
     head = {"type": "FeatureCollection", "title": places.title, "description": places.note}
     features = ",\n".join(json.dumps(one, ensure_ascii=False, allow_nan=False) for one in _features(places))
     text = json.dumps(head, ensure_ascii=False)[:-1] + ', "features": [\n' + features + "\n]}\n"
-    return text.encode("utf-8")
+    return text.encode("utf-8", errors="backslashreplace")  # a lone surrogate, as JSON writes it
 
 
 def _features(places: Places) -> Iterator[dict[str, Any]]:
@@ -183,4 +183,4 @@ def _data(placemark: ElementTree.Element, facts: dict[str, Any]) -> None:
 
 def _text(parent: ElementTree.Element, tag: str, text: str) -> None:
     # XML 1.0, section 2.2: other control characters cannot be written, not even as references.
-    ElementTree.SubElement(parent, tag).text = re.sub("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]", "", text)
+    ElementTree.SubElement(parent, tag).text = re.sub("[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]", "", text)

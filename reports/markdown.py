@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator
 
+from mc_engine.derived_files import FIGURES
 from reports.document import (
     Attachment,
     Block,
@@ -17,16 +18,11 @@ from reports.document import (
     Text,
     blocks_of,
 )
+from reports.markdown_text import SPACE, escaped
 from reports.pictures import Pictures
 
 FILE = "report.md"
-FOLDER = "report-figures"
 MARKS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
-_SPACE = re.compile(r"[ \t\r\n\f\v\x85\u2028\u2029]+")  # not the narrow ones inside numbers
-_SPECIAL = re.compile(r"([\\`*\[\]<>#|~&$])")
-_UNDERSCORE = re.compile(r"(?<![^\W_])_|_(?![^\W_])")  # inside a word it emphasises nothing
-_ADDRESS = re.compile(r":(?=//)|(?<=www)\.|@", re.IGNORECASE)  # what some readers turn into links
-_LINE_START = re.compile(r"^(\s*)([-+](?=[-\s]|$)|=(?=[=\s]|$)|\d+[.)](?=\s|$))")
 
 
 def render_markdown(document: Document) -> bytes:
@@ -44,19 +40,12 @@ def figure_files(document: Document, pictures: Pictures) -> Iterator[Attachment]
     for block in blocks_of(document, FigureBlock):
         svg = pictures.svg(block)
         ground = re.sub(r"(<svg [^>]*>)", r'\1<rect width="100%" height="100%" fill="#ffffff"/>', svg, count=1)
-        yield Attachment(f"{FOLDER}/{_file(block)}", ground.encode("utf-8"))
-
-
-def escaped(text: str) -> str:
-    """Text that no reader of Markdown takes for anything else, on one line."""
-    line = _SPECIAL.sub(r"\\\1", _SPACE.sub(" ", text).strip())
-    line = _ADDRESS.sub(lambda found: "\\" + found[0], _UNDERSCORE.sub(r"\\_", line))
-    return _LINE_START.sub(lambda found: f"{found[1]}{found[2][:-1]}\\{found[2][-1]}", line)
+        yield Attachment(f"{FIGURES}/{_file(block)}", ground.encode("utf-8"))
 
 
 def code(text: str) -> str:
     """A code span; text with a backtick of its own stays plain."""
-    line = _SPACE.sub(" ", text).strip()
+    line = SPACE.sub(" ", text).strip()
     if not line:
         return ""
     return escaped(line) if "`" in line or "\\" in line else "`" + line.replace("|", "\\|") + "`"
@@ -90,7 +79,7 @@ def _contents(sections: Iterable[Section]) -> Iterator[str]:
 
 def _block(block: Block) -> list[str]:
     if isinstance(block, FigureBlock):
-        picture = f"![{escaped(block.drawing.alternative)}]({FOLDER}/{_file(block)})"
+        picture = f"![{escaped(block.drawing.alternative)}]({FIGURES}/{_file(block)})"
         return [picture, "", f"**Figure {block.number}.** {escaped(block.caption)}"]
     if isinstance(block, Table):
         return _table(block)

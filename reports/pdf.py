@@ -1,6 +1,7 @@
 """The report typeset on A4 by typst: the same contents, vector figures, the same bytes every time."""
 
 import json
+import time
 from dataclasses import asdict
 from datetime import datetime
 from importlib.resources import as_file, files
@@ -9,6 +10,7 @@ from typing import Any
 import matplotlib
 import typst
 
+from mc_engine.errors import EngineError
 from reports.document import Block, Document, FigureBlock, Table, Terms, Text
 from reports.pictures import Pictures
 
@@ -20,6 +22,8 @@ def render_pdf(document: Document, pictures: Pictures | None = None) -> bytes:
 
     All text reaches typst as JSON strings, which it never reads as markup.
     """
+    if time.time() < 0.0:  # typst asks for it, and panics
+        raise EngineError("the clock of this computer stands before 1970, with which no PDF is made; set it")
     content = json.dumps(_plain(document, pictures or Pictures()), ensure_ascii=False, allow_nan=False)
     with as_file(files("reports").joinpath("templates")) as templates:
         return typst.compile(

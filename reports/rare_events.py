@@ -159,7 +159,7 @@ def _failures(record: RareEventRecord) -> Iterator[Table | str | None]:
 
 
 def _input_table(result: dict[str, Any]) -> Table:
-    across = "across" in result["inputs"][0]
+    across = result["inputs"][0].get("across") is not None
     columns = [
         Column("Input", "name", 2.6),
         Column("Mean [σ]", "number", 1.0),

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from mc_engine.replay_files import read_replay, replayed_cases
 from reports.document import Block, CaseColumn, CaseData, FigureBlock, Section
 from reports.drawings import nominal_point, thinned_rows
 from reports.figures import ScatterDrawing, screen
@@ -163,7 +164,7 @@ def case_histories(flown: Flown) -> tuple[dict[int, dict[str, tuple[Any, Any]]],
 def _first_of_all(flown: Flown) -> Iterator[int]:
     for metric in flown.key_metrics:
         yield from (int(flown.case_ids[row]) for row in flown.worst(metric, WORST_RANKS))
-    yield from replayed_cases(flown)
+    yield from _replayed(flown)
     yield from (int(case) for case in flown.case_ids[~flown.ok])
 
 
@@ -176,19 +177,20 @@ def _curves(frame: pd.DataFrame, names: list[str]) -> dict[str, tuple[Any, Any]]
 def _all_histories(flown: Flown) -> pd.DataFrame:
     """The run's histories and those of cases that were replayed since."""
     kept = set(flown.histories["case_id"]) if len(flown.histories) else set()
-    replayed = [pd.read_parquet(path) for case, path in replayed_cases(flown).items() if case not in kept]
+    quantities = flown.manifest.get("quantities", [])
+    replayed = [read_replay(_folder(flown), case, quantities) for case in _replayed(flown) if case not in kept]
     tables = [table for table in (flown.histories, *replayed) if len(table)]
     return pd.concat(tables, ignore_index=True) if tables else flown.histories
 
 
-def replayed_cases(flown: Flown) -> dict[int, Path]:
-    """Files that `mc-engine replay` left in the run's folder, by case."""
-    folder = Path(getattr(flown.run, "path", "")) / "replay"
-    if not hasattr(flown.run, "path") or not folder.is_dir():
-        return {}
+def _replayed(flown: Flown) -> list[int]:
+    """Cases of the table that `mc-engine replay` left a history of in the run."""
     known = set(flown.case_ids.tolist())
-    found = {path.stem.removeprefix("case-"): path for path in folder.glob("case-*.parquet")}
-    return {int(case): found[case] for case in sorted(found) if case.isdigit() and int(case) in known}
+    return [case for case in replayed_cases(_folder(flown)) if case in known] if hasattr(flown.run, "path") else []
+
+
+def _folder(flown: Flown) -> Path:
+    return Path(getattr(flown.run, "path", ""))
 
 
 def _quantities(flown: Flown, histories: dict[int, dict[str, tuple[Any, Any]]]) -> list[str]:

@@ -12,31 +12,33 @@
 A template sees `run` and, in the order of the command, `runs` (`RunFacts`), and places any table or figure of the
 report with `table(NAME)` and `figure(NAME)`, a line of its own each; NAME is the anchor of its section, -2, -3, ...
 for the further ones.  Values of the run are written as text: they are never read as Markdown, nor as Jinja.  The
-template runs in Jinja's sandbox: no imports, no files, no private members.
+template runs in Jinja's sandbox, in a process with bounds: no imports, no files, no private members, 20 s, 512 MiB.
 """
 
+import json
+import os
 import re
+import subprocess
+import sys
+import threading
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-import jinja2
-from jinja2.sandbox import ImmutableSandboxedEnvironment
-
 from mc_engine.errors import EngineError
+from mc_engine.journal import plain
 from mc_engine.statistics import summarize
+from reports import template_process
 from reports.document import Block, Document, FigureBlock, Table, numbered
 from reports.flown import Flown
-from reports.markdown import escaped
 from reports.markdown_blocks import sections_of
-from reports.numbers import count, number, percent
+from reports.template_process import BEGIN, END
 
 ANCHOR = "own"
-_BEGIN, _END = "\ue000", "\ue001"  # private characters about the place of a table or figure
-_PLACE = re.compile(f"{_BEGIN}(\\d+){_END}")
-_FRAME = "<template>"
-_FAULTS = (jinja2.TemplateError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+LONGEST_S = 20.0  # that a template may take
+_PLACE = re.compile(f"{BEGIN}(\\d+){END}")
+_KINDS: dict[str, type] = {"table": Table, "figure": FigureBlock}
 
 
 class TemplateError(EngineError):
@@ -138,88 +140,69 @@ def with_own_sections(document: Document, template: Path, run: RunFacts, runs: S
 
     Raises TemplateError, one sentence with the line, for whatever is wrong with the template.
     """
-    placed = _Placed(document)
+    named = {word: _named(document, kind) for word, kind in _KINDS.items()}
     try:
         source = template.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "is not UTF-8 text"
         raise TemplateError(f"{template}: {reason}") from None
-    text = _filled_in(
-        template, source, {"run": run, "runs": list(runs), "table": placed.table, "figure": placed.figure}
-    )
+    filled = _filled_in(template, source, run, runs, {word: list(blocks) for word, blocks in named.items()})
+    chosen = [named[word][name] for word, name in filled["placed"]]
+
+    def placed(text: str) -> list[Block] | None:
+        found = _PLACE.findall(text)
+        return [chosen[int(index)] for index in found] if found else None
+
     try:
-        own = sections_of(text, placed.blocks, ANCHOR)
+        own = sections_of(filled["text"], placed, ANCHOR)
     except ValueError as error:
         raise TemplateError(f"{template}: {error}") from None
     return numbered(replace(document, sections=(*own, *document.sections)))
 
 
-def _filled_in(template: Path, source: str, names: Mapping[str, Any]) -> str:
-    environment = ImmutableSandboxedEnvironment(undefined=jinja2.StrictUndefined, finalize=_written)
-    environment.filters |= {"number": number, "percent": percent, "count": count}
-    try:
-        return environment.from_string(source).render(names)
-    except _FAULTS as error:
-        line = _line(error)
-        place = f"{template}, line {line}" if line else str(template)
-        raise TemplateError(f"{place}: {' '.join(str(error).split()) or type(error).__name__}") from None
+def _filled_in(
+    template: Path, source: str, run: RunFacts, runs: Sequence[RunFacts], known: Mapping[str, list[str]]
+) -> dict[str, Any]:
+    """The text that the template comes to, from a process that has bounds; see `template_process`."""
+    facts = [run, *runs]
+    request = {"source": source, "run": 0, "runs": [_plain(one) for one in facts], "known": known}
+    # Nothing is imported from the folder of the process, or of the program: -P, and the paths of this one.
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    command = [sys.executable, "-P", "-W", "ignore", template_process.__file__]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+                          encoding="utf-8", env=environment) as process:  # fmt: skip
+        assert process.stdin is not None
+        assert process.stdout is not None
+        timer = threading.Timer(LONGEST_S, process.kill)
+        timer.start()
+        try:
+            answer: dict[str, Any] = {"quantile": None}
+            words = json.dumps(request, default=plain)
+            while "quantile" in answer:
+                process.stdin.write(f"{words}\n")
+                process.stdin.flush()
+                answer = json.loads(process.stdout.readline())
+                if "quantile" in answer:
+                    index, metric, probability = answer["quantile"]
+                    found = facts[index].metrics[metric].quantile(probability)
+                    words = json.dumps([found.value, found.lower, found.upper])
+        except (OSError, ValueError):  # its end came before that of the template
+            answer = {"fault": f"takes more than {LONGEST_S:.0f} s, or than its memory", "line": None}
+        finally:
+            timer.cancel()
+            process.kill()
+    if "fault" in answer:
+        place = f"{template}, line {answer['line']}" if answer["line"] else str(template)
+        raise TemplateError(f"{place}: {answer['fault']}")
+    return answer
 
 
-def _line(error: Exception) -> int | None:
-    """The template's line that an error rose from."""
-    if isinstance(error, jinja2.TemplateSyntaxError):
-        return error.lineno
-    line, frame = None, error.__traceback__
-    while frame is not None:
-        line = frame.tb_lineno if frame.tb_frame.f_code.co_filename == _FRAME else line
-        frame = frame.tb_next
-    return line
-
-
-def _written(value: Any) -> Any:
-    """A value of the run as text that Markdown leaves alone."""
-    if isinstance(value, _Place | jinja2.Undefined):
-        return value
-    if isinstance(value, bool) or value is None:
-        return {True: "yes", False: "no", None: "–"}[value]
-    if isinstance(value, int):
-        return count(value)
-    if isinstance(value, float):
-        return number(value)
-    return escaped(str(value).replace(_BEGIN, "").replace(_END, ""))
-
-
-class _Place(str):
-    """Where a table or figure stands in the filled-in text."""
-
-
-class _Placed:
-    """The tables and figures of a document by name, and those that a template has placed."""
-
-    def __init__(self, document: Document):
-        kinds: tuple[type, ...] = (Table, FigureBlock)
-        self.named = {kind: _named(document, kind) for kind in kinds}
-        self.chosen: list[Block] = []
-
-    def table(self, name: str) -> _Place:
-        """A table of the report."""
-        return self._place(Table, "table", name)
-
-    def figure(self, name: str) -> _Place:
-        """A figure of the report."""
-        return self._place(FigureBlock, "figure", name)
-
-    def _place(self, kind: type, word: str, name: str) -> _Place:
-        known = self.named[kind]
-        if name not in known:
-            raise LookupError(f"there is no {word} “{name}”; this report has {', '.join(known) or 'none'}")
-        self.chosen.append(known[name])
-        return _Place(f"\n\n{_BEGIN}{len(self.chosen) - 1}{_END}\n\n")
-
-    def blocks(self, text: str) -> list[Block] | None:
-        """The blocks that a paragraph stands for; None for a paragraph of text."""
-        found = _PLACE.findall(text)
-        return [self.chosen[int(index)] for index in found] if found else None
+def _plain(run: RunFacts) -> dict[str, Any]:
+    """The facts as plain data; of a metric all but its values."""
+    facts = {one.name: getattr(run, one.name) for one in fields(run)}
+    metrics = {name: {key: value for key, value in vars(one).items() if key != "_values"}
+               for name, one in run.metrics.items()}  # fmt: skip
+    return {**facts, "metrics": metrics, "requirements": {name: asdict(one) for name, one in run.requirements.items()}}
 
 
 def _named(document: Document, kind: type) -> dict[str, Block]:

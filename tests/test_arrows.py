@@ -35,12 +35,18 @@ def test_reports_know_of_the_engine_only_what_a_store_and_its_statistics_are():
         "units",
         "figures",
         "errors",
+        "derived_files",
+        "directory_kinds",
         "durable_file",
+        "journal",
+        "run_folder",
+        "replay_files",
         "tuning_folder",
         "rare_event_folder",
         "comparison",
         "run_changes",
         "shell_words",
+        "text",
     }
     used = {name.split(".")[1] for _, name in imported("reports") if name.startswith("mc_engine.")}
     assert used <= known

@@ -15,6 +15,7 @@ STEERED = 0.15 * STANDARD_GRAVITY  # drag from which on a law commands: earlier 
 LAST_SPEED = 400.0  # m/s, below which the reference bank is held
 
 ROWS, COLUMNS = 512, 8
+LAST_PLACE = ROWS - 1.000001  # among the rows
 SPREAD = 60.0  # m/s
 # the header: speed of the first row [m/s]; rows per unit of the logarithm, of both tables; range of the whole
 # reference [m]; the same quantities as the clock tells them before the air is felt (see `clocked_range`)
@@ -32,12 +33,9 @@ Influence = namedtuple("Influence", "climb drag range by_drag by_climb by_lift u
 
 @physics
 def _row(tables, start, density, x):
-    """The eight columns at a speed lost x [m/s]; the first and the last row stand for what lies beyond.
-
-    maximum and minimum keep their second argument where the first is not a number, so that no row is outside.
-    """
+    """The eight columns at a speed lost x [m/s]; the first and the last row stand for what lies beyond."""
     place = log(1.0 + maximum(x, 0.0) * (1.0 / SPREAD)) * density
-    place = minimum(maximum(place, 0.0), ROWS - 1.000001)
+    place = minimum(maximum(place, 0.0), LAST_PLACE)
     row = floor(place)
     f, at = place - row, start + COLUMNS * row
     a0, b0 = look_up(tables, at), look_up(tables, at + 8.0)

@@ -32,7 +32,7 @@ def page() -> str:
 def _verb(name: str, command: Any) -> Iterator[str]:
     arguments = [_value(one) for one in command.params if one.param_type_name == "argument"]
     usage = " ".join(["mc-engine", name, *arguments, "[OPTIONS]"])
-    yield f"## {name}\n\n```text\n{usage}\n```\n\n{prose(command.help or '')}\n"
+    yield f"## {name}\n\n```text\n{usage}\n```\n\n{prose(command.help or '')}\n\n{prose(command.epilog or '')}\n"
     rows = [(code(_names(one)), escaped(one.help or ""), _default(one)) for one in command.params]
     yield (table(("Argument or option", "Meaning", "Unless said"), rows) + "\n") if rows else ""
 

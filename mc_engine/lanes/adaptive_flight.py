@@ -15,9 +15,12 @@ from mc_engine.lanes.adaptive_step import (
     LAST,
     PEAK,
     arrive,
+    best_time,
+    best_value,
     first_length,
     glance,
     ideal_factor,
+    is_lost,
     leap,
     next_length,
     sense,
@@ -58,7 +61,7 @@ _FEW = 3.0  # looks at an event with its width; then the width grows
 _CHORDS = 8.0  # then every other look halves the bracket, so that none stalls
 _CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
 _CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
-_NEVER, _NONE = 1e300, 1e-300
+_NEVER, _NONE, _NAN = 1e300, 1e-300, float("nan")
 
 
 @physics
@@ -110,20 +113,6 @@ def _turn(kind, sense0, rate0, sense1, rate1, direction, h):
     x = (sense1 - sense0 - rate1 * h) / where(turning, rate0 - rate1, 1.0)
     reaches = (sense0 + rate0 * x) * sense0 <= 0.0
     return where(turning & reaches & (x > 0.02 * h) & (x < 0.98 * h), x, h)
-
-
-@physics
-def _best(kind, best, value, mask):
-    """Largest value of a peak; the present one of anything else."""
-    return where(mask & ((value > best) | (kind == LAST) | (kind == EVENT)), value, best)
-
-
-@physics
-def _when(kind, when, best, value, fired, t, mask):
-    """Time of the best value of a peak, of the last moment above zero, of the last event."""
-    peak = (kind == PEAK) | (kind == CORNER)
-    news = where(peak, where(value > best, 1.0, 0.0), where(fired | ((kind == LAST) & (value > 0.0)), 1.0, 0.0))
-    return where(mask & (news > 0.5), t, when)
 
 
 @physics
@@ -309,9 +298,12 @@ def _fly(
         attempts = attempts + 1.0
         stepping, looking = flying & (not closing), flying & closing
         good = stepping & (error <= 1.0)
-        poor = stepping & (not good)
         hopes = map_fields(_arm, kinds, here.senses, here.values, there.senses, there.values, best, trial)
         over = any_field(map_fields(_fires, hopes, here.senses, there.senses, signs, good))
+        # whether such a step met an event cannot be told: it is tried shorter, as if its error were not a number
+        error = where(any_field(map_fields(is_lost, kinds, there.values)) & (not over), _NAN, error)
+        good = good & (error <= 1.0)
+        poor = stepping & (not good)
         turn = least(map_fields(_turn, kinds, here.senses, here.rates, there.senses, there.rates, signs, trial))
         dip = good & (not over) & (turn < trial)
         fits = good & (not over) & (not dip)
@@ -337,8 +329,8 @@ def _fly(
         now = select(closed, beyond, there)
         fired = map_fields(_fires, armed, here.senses, now.senses, signs, closed)
         stopped = closed & f.stops_of(fired)
-        when = map_fields(_when, kinds, when, best, now.values, fired, now.t, arrived)
-        best = map_fields(_best, kinds, best, now.values, arrived)
+        when = map_fields(best_time, kinds, when, best, now.values, fired, now.t, arrived)
+        best = map_fields(best_value, kinds, best, now.values, arrived)
         ended = arrived & (stopped | (now.t >= clock.until))
         stuck = stepping & (not ended) & (h <= 1e-14 * abs(here.t) + 1e-290)
         capped = flying & (not ended) & (attempts >= clock.attempts)
@@ -356,7 +348,7 @@ def _fly(
         if any_lane(sampling | switching):
             after = changed(f, key, case, sample, here, fired, switching, sampling, p, o, _REACH * h)
             here = select(sampling | switching, after, here)
-            best = map_fields(_best, kinds, best, here.values, sampling | switching)
+            best = map_fields(best_value, kinds, best, here.values, sampling | switching)
             sample = where(sampling, sample + 1.0, sample)
             last_ideal = where(sampling | switching, _NONE, last_ideal)
         done = ended | stuck | capped

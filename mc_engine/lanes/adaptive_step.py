@@ -111,7 +111,8 @@ def _first_length(f, t, s, k, m, p, o, atol, rtol, order, longest):
     steep = maximum(d1, d2)
     flat = steep <= 1e-15
     guess = exp(log(0.01 / where(flat, 1.0, steep)) / order)
-    return minimum(minimum(100.0 * h, where(flat, maximum(1e-6, 1e-3 * h), guess)), longest)
+    length = minimum(minimum(100.0 * h, where(flat, maximum(1e-6, 1e-3 * h), guess)), longest)
+    return where(length == length, length, longest)  # of a derivative that is not a number no length can be told
 
 
 first_length = compile_callable(_first_length)
@@ -132,6 +133,27 @@ def _rate(kind, value, ahead, behind, inverse):
 def _sense_of(kind, value, rate):
     """Rate of a peak, else the value; on zero, where an event has just ended a step, the side it is going to."""
     return where(kind == PEAK, rate, where(value == 0.0, 1e-30 * rate, value))
+
+
+@physics
+def best_value(kind, best, value, mask):
+    """Largest value of a peak, or not a number once a value was none; the present one of anything else."""
+    return where(mask & ((value > best) | (value != value) | (kind == LAST) | (kind == EVENT)), value, best)
+
+
+@physics
+def best_time(kind, when, best, value, fired, t, mask):
+    """Time of the best value of a peak, of the last moment above zero, of the last event."""
+    peak = (kind == PEAK) | (kind == CORNER)
+    news = where(peak, where(value > best, 1.0, 0.0), where(fired | ((kind == LAST) & (value > 0.0)), 1.0, 0.0))
+    lost = (kind != EVENT) & (value != value)
+    return where(mask & ((news > 0.5) | lost), where(lost, value, t), when)
+
+
+@physics
+def is_lost(kind, value):
+    """Mask: the function of an event is not a number."""
+    return (kind == EVENT) & (value != value)
 
 
 def _watch(f, t, s, m, p, o):

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 
+from mc_engine.errors import ModelError
 from mc_engine.lanes import lowering as _lowering  # registers the lane type and its functions
 from mc_engine.lanes import namespaces as _namespaces  # registers classes that hold constants
 from mc_engine.lanes.kernel_cache import keep_on_disk
@@ -22,6 +23,8 @@ _UNWRAPPED: dict[str, Any] = {
     "pipeline_class": LinkedCompiler,
 }
 
+if config.DISABLE_JIT:
+    raise ModelError("the environment has NUMBA_DISABLE_JIT, with which no kernel can be compiled; unset it")
 assert _lowering
 assert _namespaces
 

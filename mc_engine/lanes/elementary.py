@@ -6,7 +6,18 @@ slowly loses digits, and from 1e16 rad on the answer means nothing.  Not-a-numbe
 infinities as in C99, but sin and tan of -0.0 are 0.0.
 """
 
-from mc_engine.lanes.functions import copysign, exponent, fma, mantissa, maximum, minimum, rint, sqrt, two_to, where
+from mc_engine.lanes.functions import (
+    exponent,
+    fma,
+    mantissa,
+    maximum,
+    minimum,
+    rint,
+    sign_copied,
+    sqrt,
+    two_to,
+    where,
+)
 from mc_engine.lanes.physics_function import physics
 
 _INF = float("inf")
@@ -26,8 +37,7 @@ _LOG2_E = 1.4426950408889634
 @physics
 def _exp_of_sum(x, x_low):
     """e**(x + x_low) for |x_low| below an ulp of x: Cody-Waite reduction, Taylor terms by Estrin's scheme."""
-    # the variable stands second: minimum and maximum return their second argument where one is missing
-    x = minimum(710.0, maximum(-746.0, x))
+    x = minimum(maximum(x, -746.0), 710.0)
     n = rint(x * _LOG2_E)
     r = fma(n, -_LN2_LOW, fma(n, -_LN2, x)) + x_low
     r2 = r * r
@@ -137,10 +147,10 @@ def atan2(y, x):
     rest = rest + where(steep, t, 0.0)
     angle = where(steep, angle, t)
     angle, rest = where(swap, _HALF_PI - angle, angle), where(swap, _HALF_PI_2 - rest, rest)
-    left = copysign(1.0, x) < 0.0
+    left = sign_copied(1.0, x) < 0.0
     angle, rest = where(left, _PI - angle, angle), where(left, _PI_2 - rest, rest)
     missing = (x != x) | (y != y)
-    return where(missing, _NAN, copysign(angle + rest, y))
+    return where(missing, _NAN, sign_copied(angle + rest, y))
 
 
 @physics
@@ -226,7 +236,7 @@ def _log_pair(x):
 
 @physics
 def pow(x, y):
-    """x**y with the conventions of C99, as far as numbers go: NaN for x < 0 unless y is whole; x**0 is 1."""
+    """x**y with the conventions of C99 for numbers: NaN for x < 0 unless y is whole; x**0 is 1."""
     ax = abs(x)
     usable = (ax > 0.0) & (ax < _INF)
     high, low = _log_pair(where(usable, ax, 1.0))
@@ -238,8 +248,8 @@ def pow(x, y):
     size = where(ax == 0.0, where(y > 0.0, 0.0, _INF), where(ax == _INF, grows, size))
     whole = rint(y) == y
     odd = whole & (abs(y) < 9007199254740992.0) & (rint(0.5 * y) != 0.5 * y)
-    negative = copysign(1.0, x) < 0.0
+    negative = sign_copied(1.0, x) < 0.0
     value = where(negative & odd, -size, size)
     value = where((x < 0.0) & usable & (rint(y) != y), _NAN, value)
-    value = where((x != x) | (y != y), _NAN, value)
-    return where((y == 0.0) | (x == 1.0), 1.0, value)
+    value = where((y == 0.0) | (x == 1.0), 1.0, value)
+    return where((x != x) | (y != y), _NAN, value)

@@ -32,6 +32,20 @@ def crossed(before, after, direction):
 
 
 @physics
+def may_have_crossed(before, after, direction):
+    """Mask: `crossed`, or it cannot be told, because the function is not a number."""
+    rising = not ((before >= 0.0) | (after < 0.0) | (direction < 0.0))
+    falling = not ((before <= 0.0) | (after > 0.0) | (direction > 0.0))
+    return rising | falling
+
+
+@physics
+def _lost(before, after, direction):
+    """Mask: the function is not a number at the end, and may have crossed."""
+    return may_have_crossed(before, after, direction) & (after != after)
+
+
+@physics
 def _secant(before, after, direction, low, high, unused):
     """Length at which the chord of one event function meets zero; `high` where it does not cross."""
     return where(crossed(before, after, direction), low + (high - low) * (before / (before - after)), high)
@@ -81,7 +95,8 @@ def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying):
     """What becomes of a step [t, finish] of length h in which some flying lane meets events.
 
     s, end : states at both ends of the step as if there were no events; g_start, g_end : event values there.
-    Returns (state, memory, time, stopped, overrun): lanes that stop end at their event, the others at `finish`.
+    Returns (state, memory, time, stopped, overrun, lost): lanes that stop end at their event, the others at `finish`;
+    those are lost of which the values there do not tell whether they have met another.
     Event functions of time see `finish` itself at the end, not the sum t + h: the next step starts from the same
     number, so an event on the grid is met once, neither missed nor met twice by a rounding.
     """
@@ -106,7 +121,8 @@ def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying):
         end = select(on, rk4_shared(f.rhs, t, rest, s, m, p, o), end)
         g_end = select(on, spread(f.events(finish, end, m, p, o), t), g_end)
         pending = on & any_field(map_fields(crossed, g_start, g_end, signs))
-    return end, m, time, stopped, pending
+    lost = flying & (not stopped) & any_field(map_fields(_lost, g_start, g_end, signs))
+    return end, m, time, stopped, pending, lost
 
 
 follow = compile_inline(_follow)

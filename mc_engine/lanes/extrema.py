@@ -1,4 +1,7 @@
-"""Running extrema of quantities along a flight, finer than the grid on which they are seen."""
+"""Running extrema of quantities along a flight, finer than the grid on which they are seen.
+
+A quantity that is once not a number has no extreme value; it has a last time above zero if it is seen there later.
+"""
 
 from mc_engine.lanes.functions import where
 from mc_engine.lanes.physics_function import physics
@@ -6,8 +9,8 @@ from mc_engine.lanes.physics_function import physics
 
 @physics
 def crest(v0, v1, v2, best):
-    """Mask: the middle one of three neighbouring values tops both and may top the best so far."""
-    return (v1 >= v0) & (v1 >= v2) & (v1 + abs(v1 - v0) + abs(v1 - v2) > best)
+    """Mask: the middle one of three neighbouring values tops both and may top the best so far, or is not a number."""
+    return not ((v1 < v0) | (v1 < v2) | (v1 + abs(v1 - v0) + abs(v1 - v2) <= best))
 
 
 @physics
@@ -23,8 +26,9 @@ def _vertex(t0, t1, t2, v0, v1, v2):
 @physics
 def crest_time(when, best, v0, v1, v2, t0, t1, t2, smooth, mask):
     """Time of the best value, the crest of the last three values included where the mask holds."""
-    better = crest_value(best, best, v0, v1, v2, t0, t1, t2, smooth, mask) > best
-    return where(better, t1 + smooth * _vertex(t0, t1, t2, v0, v1, v2), when)
+    value = crest_value(best, best, v0, v1, v2, t0, t1, t2, smooth, mask)
+    when = where(value > best, t1 + smooth * _vertex(t0, t1, t2, v0, v1, v2), when)
+    return where(value == value, when, value)
 
 
 @physics
@@ -41,25 +45,25 @@ def crest_value(best, unused, v0, v1, v2, t0, t1, t2, smooth, mask):
     slope = ((v1 - v0) * b * b + (v2 - v1) * a * a) / scale
     bend = ((v2 - v1) * a - (v1 - v0) * b) / scale
     top = v1 + x * (slope + x * bend)
-    return where(usable & (top > best), top, best)
+    return where(mask & (v1 != v1), v1, where(usable & (top > best), top, best))
 
 
 @physics
 def end_value(best, value, mask):
     """Best value, an end point of the flight included where the mask holds."""
-    return where(mask & (value > best), value, best)
+    return where(mask & ((value > best) | (value != value)), value, best)
 
 
 @physics
 def end_time(when, best, value, t, mask, unused):
     """Time of the best value, an end point of the flight included where the mask holds."""
-    return where(mask & (value > best), t, when)
+    return where(mask & (value > best), t, where(mask & (value != value), value, when))
 
 
 @physics
 def above(when, v1, t1, mask):
     """Last time at which the value stood above zero, as far as the steps tell."""
-    return where(mask & (v1 > 0.0), t1, when)
+    return where(mask & (v1 > 0.0), t1, where(mask & (v1 != v1), v1, when))
 
 
 @physics

@@ -7,7 +7,7 @@ rejoins.  Lanes never look at each other: a lane that has ended or failed keeps 
 from mc_engine.lanes import extrema
 from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_callable, compile_inline
-from mc_engine.lanes.events import crossed, follow
+from mc_engine.lanes.events import follow, may_have_crossed
 from mc_engine.lanes.functions import any_lane, where
 from mc_engine.lanes.noise import Draws
 from mc_engine.lanes.runge_kutta import rk4
@@ -67,13 +67,13 @@ def _step(f, has_events, t, finish, h, s, m, p, o, flying):
     """
     end = rk4(f.rhs, t, h, s, m, p, o)
     now, stopped = finish, flying & (not flying)
-    overrun = stopped
+    overrun = lost = stopped
     if has_events:
         g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
-        if any_lane(flying & any_field(map_fields(crossed, g, g_end, f.signs_of(g)))):
-            end, m, now, stopped, overrun = follow(f, t, finish, h, s, end, m, p, o, g, g_end, flying)
+        if any_lane(flying & any_field(map_fields(may_have_crossed, g, g_end, f.signs_of(g)))):
+            end, m, now, stopped, overrun, lost = follow(f, t, finish, h, s, end, m, p, o, g, g_end, flying)
     size = total(end)
-    broken = flying & (not (size - size == 0.0))
+    broken = lost | (flying & (not (size - size == 0.0)))
     return end, m, now, stopped, overrun & (not broken), broken
 
 

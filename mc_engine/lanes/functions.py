@@ -11,42 +11,57 @@ from fractions import Fraction
 import numpy as np
 
 from mc_engine.errors import ModelError
+from mc_engine.lanes.number import Number, result_of, taking_numbers
 
 
+@taking_numbers
 def sqrt(x):
     """Square root; NaN below zero.  Correctly rounded."""
+    if isinstance(x, float):  # here and below: NumPy would take ten times as long
+        return math.sqrt(x) if x >= 0.0 else math.nan
     with np.errstate(invalid="ignore"):
         return _plain(np.sqrt(x))
 
 
+@taking_numbers
 def fma(x, y, z):
     """x y + z with one rounding."""
+    if isinstance(x, float) and isinstance(y, float) and isinstance(z, float):
+        return _FMA(x, y, z)
     with np.errstate(all="ignore"):
         return _plain(np.asarray(_exact_fma(x, y, z), dtype=np.float64))
 
 
+@taking_numbers
 def rint(x):
     """Nearest whole number, halves to even."""
     return _plain(np.rint(x))
 
 
+@taking_numbers
 def floor(x):
     """Largest whole number not above x."""
     return _plain(np.floor(x))
 
 
 def minimum(x, y):
-    """The smaller of x and y; y where either is not a number."""
-    return where(x < y, x, y)
+    """The smaller of x and y; y where they are equal, as 0.0 and -0.0 are.  Not a number where either is not one."""
+    return where((x < y) | (x != x), x, y)
 
 
 def maximum(x, y):
-    """The larger of x and y; y where either is not a number."""
-    return where(x > y, x, y)
+    """The larger of x and y; y where they are equal, as 0.0 and -0.0 are.  Not a number where either is not one."""
+    return where((x > y) | (x != x), x, y)
 
 
 def copysign(x, y):
-    """|x| with the sign of y."""
+    """|x| with the sign of y.  Not a number where either is not one: its sign means nothing."""
+    return where(y == y, sign_copied(x, y), y)
+
+
+@taking_numbers
+def sign_copied(x, y):
+    """|x| with the sign bit of y, whatever y is."""
     return _plain(np.copysign(x, y))
 
 
@@ -58,20 +73,26 @@ def where(mask, x, y):
     _refuse_number(mask, "where")
     if _is_condition(x) or _is_condition(y):
         raise ModelError("`where` chooses between numbers; between conditions, write (mask & x) | ((not mask) & y)")
+    if isinstance(mask, bool) and isinstance(x, float | int) and isinstance(y, float | int):
+        chosen = x if mask else y
+        return result_of("where", (chosen,), chosen) if Number in (type(x), type(y)) else float(chosen)
     return _plain(np.where(mask, x, y))
 
 
+@taking_numbers
 def two_to(n):
     """2**n for a whole number -1022 <= n <= 1023, given as a float."""
     n = np.asarray(n, dtype=np.float64)
     return _plain(np.where(np.isfinite(n), np.ldexp(1.0, np.nan_to_num(n).astype(np.int64)), np.nan))
 
 
+@taking_numbers
 def exponent(x):
     """floor(log2 |x|) as a float, for normal x: the number's own binary exponent."""
     return _plain(np.frexp(x)[1] - 1.0)
 
 
+@taking_numbers
 def mantissa(x):
     """|x| / 2**exponent(x), in [1, 2), for normal x."""
     return _plain(np.frexp(np.abs(x))[0] * 2.0)
@@ -80,16 +101,17 @@ def mantissa(x):
 TABLES = "tables"  # name of the settings' field that holds a model's tables
 
 
+@taking_numbers
 def look_up(tables, place):
-    """The number at `place` of the model's tables: a whole number as a float.
+    """The number at `place` of the model's tables: a whole number, as a float or as an integer of a loop.
 
-    Below the first place, and where the place is not a number, the first; above the last, the last: a flight that has
-    gone astray reads nothing foreign.
+    Below the first place, the first; above the last, the last.  Not a number where the place is not one.
     """
-    if isinstance(place, float):  # NumPy would take ten times as long, and designs look up hundreds of thousands
-        return float(tables[int(min(place, len(tables) - 1.0))]) if place > 0.0 else float(tables[0])
-    inside = np.clip(np.nan_to_num(np.asarray(place, dtype=np.float64)), 0.0, len(tables) - 1.0)
-    return _plain(tables[inside.astype(int)])
+    if isinstance(place, float | int):
+        return float(tables[int(min(max(place, 0.0), len(tables) - 1.0))]) if place == place else math.nan
+    place = np.asarray(place, dtype=np.float64)
+    inside = np.clip(np.nan_to_num(place), 0.0, len(tables) - 1.0)
+    return where(place == place, tables[inside.astype(int)], place)
 
 
 def any_lane(mask):
@@ -137,4 +159,5 @@ def _fma_of_the_library():
     return function
 
 
-_exact_fma = np.frompyfunc(_fma_of_the_library(), 3, 1)
+_FMA = _fma_of_the_library()
+_exact_fma = np.frompyfunc(_FMA, 3, 1)

@@ -1,25 +1,37 @@
 """Machine code of kernels on disk, which is a convenience: where it cannot be read or kept, kernels are compiled again.
 
-numba's own cache takes every failure of the disk for the program's; its files stand beside that of the kernel.
+A file holds one compiled kernel behind a digest of it, and nothing of it is used before the digest is checked: damaged
+machine code would crash, or fly other numbers.  The name of a file is made of all that it is compiled for, so that
+processes that compile the same write the same file, each at once and whole.
 """
 
 import logging
-from contextlib import suppress
+from hashlib import blake2b
+from pathlib import Path
 from typing import Any
 
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.serialize import dumps, loads
+
+_DIGEST_BYTES = 32
 
 
 class KernelCache(FunctionCache):
     """numba's cache of one function, whose failures end no flight."""
 
+    def __init__(self, function: Any):
+        super().__init__(function)
+        self._cache_file = _Files(self._cache_path, self._impl.filename_base, None)
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function; None, to be compiled, where a file of the cache is broken."""
+        """The compiled function; None, to be compiled, where there is none or its file is damaged."""
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # a file that was cut or overwritten ends in errors of almost any kind
-            self._forget()
-            return None
+        except _Damaged:
+            _warn(self.cache_path, "a compiled kernel is damaged there", "the model is compiled again")
+        except Exception as error:  # the disk's, or of what another machine compiled
+            _warn(self.cache_path, _reason(error), "a compiled kernel cannot be read there, and is compiled again")
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a compiled function; a warning with the folder where the disk refuses."""
@@ -28,9 +40,36 @@ class KernelCache(FunctionCache):
         except OSError as error:
             _refused(self.cache_path, error)
 
-    def _forget(self) -> None:
-        with suppress(OSError):  # then it is broken for the next one, too
-            self.flush()
+
+class _Damaged(Exception):
+    """A file is not what was written."""
+
+
+class _Files(IndexDataCacheFile):
+    """A file for each key, without an index, which processes that write at once would take from each other."""
+
+    def load(self, key: Any) -> Any:
+        try:
+            content = self._path(key).read_bytes()
+        except FileNotFoundError:
+            return None
+        digest, data = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+        if digest != _digest(key, data):
+            raise _Damaged
+        return loads(data)
+
+    def save(self, key: Any, data: Any) -> None:
+        content = dumps(data)
+        with self._open_for_write(str(self._path(key))) as file:
+            file.write(_digest(key, content) + content)
+
+    def _path(self, key: Any) -> Path:
+        name = self._data_name(0).removesuffix(".0.nbc")
+        return Path(self._cache_path) / f"{name}.{_digest(key, b'').hex()[:16]}.nbc"
+
+
+def _digest(key: Any, content: bytes) -> bytes:
+    return blake2b(repr(key).encode() + content, digest_size=_DIGEST_BYTES).digest()
 
 
 def keep_on_disk(dispatcher: Any) -> Any:
@@ -43,9 +82,13 @@ def keep_on_disk(dispatcher: Any) -> Any:
 
 
 def _refused(folder: str, error: Exception) -> None:
-    logging.getLogger("mc_engine").warning(
-        "%s: %s; compiled kernels cannot be kept there, and will be compiled again; make room, or name another folder "
-        "in MC_ENGINE_CACHE",
-        folder,
-        getattr(error, "strerror", None) or error,
-    )
+    what = "compiled kernels cannot be kept there, and will be compiled again; make room, or name another folder in "
+    _warn(folder, _reason(error), f"{what}MC_ENGINE_CACHE")
+
+
+def _reason(error: Exception) -> str:
+    return str(getattr(error, "strerror", None) or error)
+
+
+def _warn(folder: str, reason: str, what: str) -> None:
+    logging.getLogger("mc_engine").warning("%s: %s; %s", folder, reason, what)

@@ -17,6 +17,8 @@ from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, lower_cast, register_model
 
+from mc_engine.lanes.number import power_by_squaring
+
 F64, I64, I32, I1 = ir.DoubleType(), ir.IntType(64), ir.IntType(32), ir.IntType(1)
 _TYPED: list[Any] = []  # the operators that know lanes
 
@@ -69,7 +71,9 @@ def mask_type(width: int) -> Any:
 
 
 def splat(builder: Any, value: Any, width: int) -> Any:
-    """One LLVM scalar in every element of a vector."""
+    """One LLVM scalar in every element of a vector; of a constant, a constant."""
+    if isinstance(value, ir.Constant):
+        return ir.Constant(ir.VectorType(value.type, width), [value.constant] * width)
     undefined = ir.Constant(ir.VectorType(value.type, width), ir.Undefined)
     one = builder.insert_element(undefined, value, ir.Constant(I32, 0))
     return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(I32, width), [0] * width))
@@ -177,18 +181,6 @@ _unary(operator.neg, lambda b, x: b.fneg(x), "f")
 _unary(operator.pos, lambda b, x: x, "f")
 _unary(abs, _absolute, "f")
 _unary(operator.not_, lambda b, x: b.not_(x), "m")
-
-
-def power_by_squaring(multiply: Callable[[Any, Any], Any], base: Any, n: int) -> Any:
-    """base**n for n >= 1 with the multiplications in the order that numba uses for one float64."""
-    result = None
-    while n:
-        if n & 1:
-            result = base if result is None else multiply(result, base)
-        n >>= 1
-        if n:
-            base = multiply(base, base)
-    return result
 
 
 @infer_global(operator.pow)

@@ -23,6 +23,7 @@ from mc_engine.lanes.lane_type import (
     splat,
 )
 
+_NAN = float("nan")
 Emit = Callable[[Any, int, list[Any]], Any]
 
 
@@ -80,6 +81,36 @@ def _select(builder, width, args):
     return builder.select(mask, x, y)
 
 
+def _handed_on(builder, width, tested, value):
+    """The value, and NaN where what is tested is not a number."""
+    return builder.select(builder.fcmp_unordered("uno", tested, tested), constant(width, _NAN), value)
+
+
+def _is_written_out(value):
+    """Whether a value is a number of the source, the same in every lane."""
+    if isinstance(value, ir.Constant) and isinstance(value.type, ir.VectorType):
+        value = value.constant[0]
+    return isinstance(value, ir.Constant) and value.constant == value.constant
+
+
+def _extreme(sign: str) -> Emit:
+    """Compare and select, not minnum, which drops what is not a number: the second number where they are equal."""
+
+    def emit(builder, width, args):
+        x, y = args
+        if _is_written_out(y):  # only x can be none
+            return builder.select(builder.fcmp_unordered(sign, x, y), x, y)
+        # one instruction, which gives y where either is none
+        chosen = builder.select(builder.fcmp_ordered(sign, x, y), x, y)
+        return chosen if _is_written_out(x) else _handed_on(builder, width, x, chosen)
+
+    return emit
+
+
+def _copysign(builder, width, args):
+    return _handed_on(builder, width, args[1], _intrinsic("copysign")(builder, width, args))
+
+
 def _two_to(builder, width, args):
     # adding 1.5 * 2**52 leaves the whole number in the low bits; the exponent field is 52 bits up
     shifted = builder.fadd(args[0], constant(width, 6755399441055744.0 + 1023.0))
@@ -107,10 +138,10 @@ _register(functions.sqrt, 1, _intrinsic("sqrt"))
 _register(functions.rint, 1, _intrinsic("rint"))
 _register(functions.floor, 1, _intrinsic("floor"))
 _register(functions.fma, 3, fused)
-_register(functions.copysign, 2, _intrinsic("copysign"))
-# compare and select, not minnum: one instruction, and the same choice at every width for 0.0 and -0.0
-_register(functions.minimum, 2, lambda b, w, a: b.select(b.fcmp_ordered("<", a[0], a[1]), a[0], a[1]))
-_register(functions.maximum, 2, lambda b, w, a: b.select(b.fcmp_ordered(">", a[0], a[1]), a[0], a[1]))
+_register(functions.sign_copied, 2, _intrinsic("copysign"))
+_register(functions.copysign, 2, _copysign)
+_register(functions.minimum, 2, _extreme("<"))
+_register(functions.maximum, 2, _extreme(">"))
 _register(functions.where, 2, _select, mask_first=True)
 _register(functions.two_to, 1, _two_to)
 _register(functions.exponent, 1, _exponent)
@@ -124,18 +155,25 @@ class _LookUpTyping(AbstractTemplate):
     def generic(self, args, kws):
         if len(args) != 2 or not isinstance(args[0], types.CPointer) or not is_number(args[1]):
             return None
-        return signature(number_type(common_width(args[1])), args[0], number_type(common_width(args[1])))
+        place = types.int64 if isinstance(args[1], types.Integer) else number_type(common_width(args[1]))
+        return signature(number_type(common_width(args[1])), args[0], place)
 
 
 @lower_builtin(functions.look_up, types.CPointer, types.Any)
 def _look_up(context, builder, sig, args):
-    """One load a lane: the vector gather is no faster.  The last place stands before the first."""
+    """One load a lane: the vector gather is no faster.  The last place and, before it, NaN stand before the first."""
     width = common_width(sig.args[1])
     last = builder.load(builder.gep(args[0], [ir.Constant(I64, -1)]))
+    if sig.args[1] == types.int64:
+        place, last = args[1], builder.fptosi(last, I64)
+        place = builder.select(builder.icmp_signed("<", place, last), place, last)
+        place = builder.select(builder.icmp_signed(">", place, ir.Constant(I64, 0)), place, ir.Constant(I64, 0))
+        return builder.load(builder.gep(args[0], [place]))
     last = splat(builder, last, width) if width > 1 else last
-    least = constant(width, 0.0)
-    # what is not a number is not above the least, and so becomes it
-    place = builder.select(builder.fcmp_ordered(">", args[1], least), args[1], least)
+    least, missing = constant(width, 0.0), constant(width, -2.0)
+    place = builder.select(builder.fcmp_ordered("<", args[1], least), least, args[1])
+    # by now only what is not a number is not above the place of NaN
+    place = builder.select(builder.fcmp_ordered(">", place, missing), place, missing)
     place = builder.select(builder.fcmp_ordered("<", place, last), place, last)
     places = builder.fptosi(place, llvm_type(width, I64))
     if width == 1:

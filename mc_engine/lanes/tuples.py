@@ -14,7 +14,7 @@ from numba.np import arrayobj
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes.functions import TABLES
-from mc_engine.lanes.lane_type import I1, Lanes, common_width, convert, mask_type, number_type
+from mc_engine.lanes.lane_type import I1, Lanes, common_width, convert, number_type
 from mc_engine.lanes.lowering import constant, fused, llvm_type
 
 
@@ -60,13 +60,6 @@ def spread(typingctx, value, like):
         return _pack(context, builder, result, fields)
 
     return result(value, like), codegen
-
-
-@intrinsic
-def mask_like(typingctx, flag, like):
-    """A plain truth value in every lane of the width of `like`."""
-    result = mask_type(common_width(like))
-    return result(flag, like), lambda context, builder, sig, args: convert(context, builder, args[0], flag, result)
 
 
 @intrinsic
@@ -240,7 +233,7 @@ def scalars_like(typingctx, like, array):
 def load_scalars(typingctx, cls, array):
     """Named tuple of class `cls` with one plain float64 per field from a 1-D array.
 
-    A last field called `tables` becomes the address of what follows in the array after its last place.
+    A last field called `tables` becomes the address of what follows in the array after NaN and its last place.
     """
     names = cls.instance_class._fields
     count = len(names) - (names[-1] == TABLES)
@@ -248,7 +241,7 @@ def load_scalars(typingctx, cls, array):
     result = _tuple_type([types.float64] * count + extra, cls)
 
     def codegen(context, builder, sig, args):
-        places = [ir.Constant(ir.IntType(64), i + (i == count)) for i in range(len(names))]
+        places = [ir.Constant(ir.IntType(64), i + 2 * (i == count)) for i in range(len(names))]
         at = [_pointer(context, builder, array, args[1], None, place, 1) for place in places]
         return _pack(context, builder, result, [_read(builder, pointer) for pointer in at[:count]] + at[count:])
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mc_engine.lanes import floor, look_up, maximum, minimum, physics, sqrt, where
+from mc_engine.lanes import floor, look_up, maximum, physics, sqrt, where
 
 FADING = 0.01  # rad from the vertical
 STEPS_PER_MACH = 20.0  # rows of a table, close enough that every printed Mach number of two digits is one of them
@@ -25,9 +25,9 @@ def lift_direction(vx, vy, vz, ux, uy, uz, speed, cos_bank, sin_bank):
     """
     rx, ry, rz = vy * uz - vz * uy, vz * ux - vx * uz, vx * uy - vy * ux  # to the right, as long as the level speed
     level = maximum(sqrt(rx * rx + ry * ry + rz * rz), FADING * speed)
-    moving = speed > 0.0
-    side = sin_bank / where(moving, level, 1.0)
-    ahead = cos_bank / where(moving, level * speed, 1.0)
+    still = speed <= 0.0
+    side = sin_bank / where(still, 1.0, level)
+    ahead = cos_bank / where(still, 1.0, level * speed)
     return (
         ahead * (ry * vz - rz * vy) + side * rx,
         ahead * (rz * vx - rx * vz) + side * ry,
@@ -59,11 +59,14 @@ def mach_table(points: Sequence[tuple[float, float, float]]) -> np.ndarray:
 def over_mach(tables, first, mach):
     """The two columns at a Mach number, of the table that begins at place `first`.
 
-    The first and the last row stand for what lies beyond them, and for a Mach number that is not a number.
+    The first and the last row stand for what lies beyond them.
     """
     last = look_up(tables, first + 1.0)
-    place = minimum(maximum((mach - look_up(tables, first)) * STEPS_PER_MACH, 0.0), last)
-    row = minimum(floor(place), last - 1.0)
+    place = maximum(0.0, (mach - look_up(tables, first)) * STEPS_PER_MACH)
+    # one instruction in place of the three of `minimum`; a place that is not a number is handed on as well
+    place = where(place > last, last, place)
+    row = floor(place)
+    row = where(row > last - 1.0, last - 1.0, row)
     f, at = place - row, first + _HEADER + 2.0 * row
     a, b = look_up(tables, at), look_up(tables, at + 1.0)
     return a + f * (look_up(tables, at + 2.0) - a), b + f * (look_up(tables, at + 3.0) - b)

@@ -10,7 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from mc_engine.lanes import exp, log, physics, where
+from mc_engine.lanes import exp, log, minimum, physics, where
 
 # Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., Table 8-4:
 # base altitude [m], density there [kg/m^3], scale height [m].
@@ -135,7 +135,7 @@ def us76_logarithm(h):
     Mach number and nothing else.  The lowest layer goes on below the ground.
     """
     # both sides of 86 km are computed, so the altitude of each stays within its own
-    low = where(h < US76_TOP, h, US76_TOP)
+    low = minimum(h, US76_TOP)
     stretch = GEOPOTENTIAL_RADIUS / (GEOPOTENTIAL_RADIUS + low)
     x = stretch * low
     t0, lapse, a, b, c = _T0[0], _LAPSE[0], _A[0], _B[0], _C[0]

@@ -120,14 +120,14 @@ def harmonics(x, y, z, mu, radius, degree, order, tables, first):
     s2 = radius * radius * inverse2
     ax, ay, az = 0.0 * x, 0.0 * x, 0.0 * x
     v_sector, w_sector = radius * sqrt(r2) * inverse2, 0.0 * x
-    at, last = first, int(degree) + 2
+    at, last = int(first), int(degree) + 2  # integers: the processor reckons with them beside the lanes
     for j in range(int(order) + 2):
         v, w, v_before, w_before = v_sector, w_sector, 0.0 * x, 0.0 * x
         for _ in range(j, last):
-            ax = ax + (look_up(tables, at) * v + look_up(tables, at + 1.0) * w)
-            ay = ay + (look_up(tables, at + 2.0) * v + look_up(tables, at + 3.0) * w)
-            az = az + (look_up(tables, at + 4.0) * v + look_up(tables, at + 5.0) * w)
-            up, across = look_up(tables, at + 6.0) * sz, look_up(tables, at + 7.0) * s2
+            ax = ax + (look_up(tables, at) * v + look_up(tables, at + 1) * w)
+            ay = ay + (look_up(tables, at + 2) * v + look_up(tables, at + 3) * w)
+            az = az + (look_up(tables, at + 4) * v + look_up(tables, at + 5) * w)
+            up, across = look_up(tables, at + 6) * sz, look_up(tables, at + 7) * s2
             v, v_before = up * v - across * v_before, v
             w, w_before = up * w - across * w_before, w
             at = at + COLUMNS

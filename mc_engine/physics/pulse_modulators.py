@@ -14,6 +14,7 @@ M. J. Sidi, Spacecraft Dynamics and Control (1997), section 9.3.
 from collections import namedtuple
 
 from mc_engine.lanes import any_lane, copysign, exp, floor, log, maximum, minimum, physics, where
+from mc_engine.lanes.functions import sign_copied
 
 # filtered: the lag's output; output: -1.0, 0.0 or 1.0; age: time since it last changed [s];
 # pulses: how many have begun; shortest: the shortest that has ended [s], infinite before
@@ -81,17 +82,17 @@ def _switched(sample, command, m):
     """The sample after the next switch, where there is one."""
     pulses, turns = sample.pulses, sample.turns
     firing = abs(pulses.output) > 0.5
-    threshold = where(firing, pulses.output * m.off, copysign(m.on, sample.end))
+    threshold = where(firing, pulses.output * m.off, sign_copied(m.on, sample.end))
     spent, stretch = _approach(pulses.filtered, threshold, sample.drive, m.time_constant, turns)
-    spent = where(turns, minimum(spent, sample.left), 0.0)
+    spent = where(turns, where(spent < sample.left, spent, sample.left), 0.0)
     age, fired = pulses.age + spent, sample.fired + pulses.output * spent
     ends, begins = turns & firing, turns & (not firing)
     pulses = Pulses(
         where(turns, threshold, pulses.filtered),
-        where(ends, 0.0, where(begins, copysign(1.0, sample.end), pulses.output)),
+        where(ends, 0.0, where(begins, sign_copied(1.0, sample.end), pulses.output)),
         where(turns, 0.0, age),
         where(begins, pulses.pulses + 1.0, pulses.pulses),
-        where(ends, minimum(age, pulses.shortest), pulses.shortest),
+        where(ends & (age < pulses.shortest), age, pulses.shortest),
     )
     rest = where(turns, minimum(sample.rest * stretch, 1.0), sample.rest)
     return _headed(pulses, sample.left - spent, rest, fired, command, m)
@@ -112,18 +113,18 @@ def _without_cycles(sample, command, m):
     some = n > 0.0
     left = where(some, maximum(sample.left - n * (pulse + pause), 0.0), sample.left)
     rest = where(some, exp(-left / m.time_constant), sample.rest)
-    shortest = where(some, minimum(pulse, pulses.shortest), pulses.shortest)
+    shortest = where(some & (pulse < pulses.shortest), pulse, pulses.shortest)
     pulses = Pulses(pulses.filtered, pulses.output, pulses.age, pulses.pulses + n, shortest)
     return _headed(pulses, left, rest, sample.fired + copysign(n * pulse, command), command, m)
 
 
 @physics
 def _ended(sample, period):
-    """(pulses, mean) at the end of the sample."""
+    """(pulses, mean) at the end of the sample; no number where the command was none: it would leave the output on."""
     pulses, left = sample.pulses, sample.left
     fired = sample.fired + pulses.output * left
     after = Pulses(sample.end, pulses.output, pulses.age + left, pulses.pulses, pulses.shortest)
-    return after, fired * (1.0 / period)
+    return after, where(sample.end == sample.end, fired * (1.0 / period), sample.end)
 
 
 @physics

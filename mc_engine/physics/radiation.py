@@ -39,7 +39,8 @@ def sunlit(x, y, z, sx, sy, sz):
     y1 = sqrt(maximum(a * a - x1 * x1, 0.0))
     first = a * a * acos(minimum(maximum(x1 / a, -1.0), 1.0))
     second = b * b * acos(minimum(maximum((safe - x1) / b, -1.0), 1.0))
-    return where(partly, 1.0 - (first + second - safe * y1) / (PI * a * a), where(c >= a + b, 1.0, 0.0))
+    dark = 0.0 * (a + b + c)  # not a number where an angle is not one
+    return where(partly, 1.0 - (first + second - safe * y1) / (PI * a * a), where(c >= a + b, 1.0, dark))
 
 
 @physics

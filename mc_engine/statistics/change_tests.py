@@ -19,11 +19,13 @@ Brown & Forsythe, J. Am. Stat. Assoc. 69 (1974), 364-367; McNemar, Psychometrika
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from math import inf, isfinite, sqrt
 
 import numpy as np
 from scipy.stats import binomtest, fisher_exact, levene, norm, rankdata, wilcoxon
+
+from mc_engine.statistics.moments import in_units, near_one
 
 FEWEST = 10  # numbers in each run, or pairs, for a test of a metric
 _EXACT = 50  # pairs up to which the exact distribution of signed ranks is taken
@@ -111,7 +113,9 @@ def metric_change(
     if min(used) == 0:
         return MetricChange(metric, used, tried, 0 if paired else None, _of(np.mean, a, b), _of(np.std, a, b),
                             UNKNOWN, UNKNOWN, np.nan, np.nan)  # fmt: skip
-    scale = max(float(np.abs(a).max()), float(np.abs(b).max()))
+    both, exponent = near_one(np.concatenate([a, b]))
+    a, b = both[: a.size], both[a.size :]
+    scale = float(np.abs(both).max())
     unit = max(tolerance * float(a.std()), _ROUNDING * scale)
     differing = int(np.count_nonzero(np.abs(b - a) > unit)) if paired else None
     shift_p, spread_p = (_paired_p if paired else _unpaired_p)(a, b, unit)
@@ -120,9 +124,9 @@ def metric_change(
         used,
         tried,
         differing,
-        _of(np.mean, a, b),
-        _of(_deviation, a, b),
-        _shift(a, b, paired, confidence),
+        _of(lambda one: in_units(np.mean(one), exponent), a, b),
+        _of(lambda one: in_units(_deviation(one), exponent), a, b),
+        Estimate(*(float(in_units(one, exponent)) for one in astuple(_shift(a, b, paired, confidence)))),
         _ratio(a, b, paired, confidence, _ROUNDING * scale),
         shift_p,
         spread_p,

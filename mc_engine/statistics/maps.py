@@ -13,10 +13,12 @@ Points outside the hull of the cases, in a hole between them, or where the error
 extrapolation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
+
+from mc_engine.statistics.moments import in_units, near_one
 
 FEWEST = 24
 NEIGHBOURS = (24, 36, 54, 80, 120, 180, 270, 400, 600, 900)  # to choose from
@@ -58,7 +60,17 @@ def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -
 
     None when there are too few cases, or when they lie on a line, for a map to mean anything.
     """
-    x, y, z = (np.asarray(values, dtype=np.float64) for values in (x, y, z))
+    pairs = [near_one(np.asarray(values, dtype=np.float64)) for values in (x, y, z)]
+    found = _map(*(values for values, _ in pairs), points)
+    if found is None:
+        return None
+    x, y, value = (in_units(*one) for one in zip((found.x, found.y, found.value), (e for _, e in pairs), strict=True))
+    return replace(
+        found, x=x, y=y, value=value, error=None if found.error is None else in_units(found.error, pairs[2][1])
+    )
+
+
+def _map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap | None:
     grid = _full_grid(x, y, z)
     if grid is not None:
         return grid

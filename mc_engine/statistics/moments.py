@@ -17,6 +17,21 @@ def finite_values(values: np.ndarray) -> np.ndarray:
     return values[np.isfinite(values)] + 0.0
 
 
+def near_one(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`values` (float64[n] or [n, k]) in units of a power of two near the largest of each column; and its exponent.
+
+    It rounds nothing.  Squares and differences of what comes out neither overflow nor vanish.
+    """
+    exponent = np.frexp(np.abs(np.where(np.isfinite(values), values, 0.0)).max(axis=0, initial=0.0))[1]
+    return np.ldexp(values, -exponent), exponent
+
+
+def in_units(values: np.ndarray | float, exponent: np.ndarray) -> np.ndarray:
+    """What `near_one` has made small, in its own unit again; infinite, and no warning, beyond float64."""
+    with np.errstate(over="ignore"):
+        return np.ldexp(values, exponent)
+
+
 class Tally:
     """First pass.  n_used : finite values of n_tried."""
 

@@ -26,6 +26,7 @@ from scipy.stats import rankdata
 
 from mc_engine.statistics.first_order import first_order, standardised
 from mc_engine.statistics.input_columns import InputColumn, finite_rows, input_columns
+from mc_engine.statistics.moments import near_one
 from mc_engine.statistics.total_order import total_order
 
 FEWEST_CASES = 20
@@ -99,7 +100,7 @@ def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) ->
         for one in np.unique(pattern):
             where = np.flatnonzero(pattern == one)
             rows = np.flatnonzero(used[:, where[0]])
-            part = table[np.ix_(rows, where)]
+            part, _ = near_one(table[np.ix_(rows, where)])
             _fill(found, [column.at(rows) for column in columns], part, where, independent)
     return Sensitivity(tuple(inputs), names, n_used, int(tried), correlated=strongest, **found)
 

@@ -20,7 +20,8 @@ _ROUNDING = 1e-12  # of the size of two numbers: more than rounding adds up to o
 
 def nearly_equal(low: float, high: float) -> bool:
     """Whether two numbers are the same but for rounding."""
-    return bool(high == low or abs(high - low) <= _ROUNDING * max(abs(low), abs(high)))
+    low, high = float(low), float(high)  # whose difference may be infinite without a word
+    return high == low or abs(high - low) <= _ROUNDING * max(abs(low), abs(high))
 
 
 @dataclass(frozen=True)

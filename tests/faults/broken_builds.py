@@ -8,7 +8,7 @@ import os
 from contextlib import suppress
 from dataclasses import asdict, replace
 
-from mc_engine import dispatch, durable_file, part_contents, parts, store
+from mc_engine import dispatch, durable_file, parts, store
 from mc_engine.writer_lock import WriterLock
 
 
@@ -40,8 +40,8 @@ def suspects_given_up(patch):
 def disk_unheard(patch):
     """What the disk says when it cannot write is not heard."""
 
-    def write_synced(path, content, place=None):
-        with open(path, "wb", buffering=0) as file, suppress(OSError):
+    def write_synced(root, name, content, told=None):
+        with open(root / name, "wb", buffering=0) as file, suppress(OSError):
             durable_file.write_all(file.fileno(), content)
             os.fsync(file.fileno())
 
@@ -52,8 +52,8 @@ def disk_unheard(patch):
 def contents_unsynced(patch):
     """Files get their names before their bytes are on the disk."""
 
-    def write_synced(path, content, place=None):
-        with open(path, "wb", buffering=0) as file:
+    def write_synced(root, name, content, told=None):
+        with open(root / name, "wb", buffering=0) as file:
             file.write(content)
 
     patch(durable_file, "write_synced", write_synced)
@@ -62,13 +62,12 @@ def contents_unsynced(patch):
 
 def names_unsynced(patch):
     """A journal line is written before the name of its part is on the disk."""
-    patch(durable_file, "sync_folder", lambda path: None)
+    patch(durable_file, "_sync_names", lambda folder: None)
 
 
 def digests_unread(patch):
     """The bytes of a part are not held against the journal."""
     patch(parts, "content_problem", lambda content, part: "")
-    patch(part_contents, "content_problem", lambda content, part: "")
 
 
 def unlocked(patch):

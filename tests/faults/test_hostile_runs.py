@@ -115,7 +115,6 @@ NONSENSE = [
     ("part", {"file": "cases/part-0000000040-0000000079.parquet\0"}),
     ("part", {"status": {"ok": -5}}),
     ("part", {"status": []}),
-    ("part", {"status": {"fine": 40}}),
     ("part", {"sha256": "0"}),
     ("part", {"bytes": ...}),
     ("part", {"colour": "red"}),
@@ -154,11 +153,6 @@ def test_a_part_told_twice_does_not_count_twice(run):
     part = open_store(run).parts[1]
     number = added(run, "part", **vars(part))
     assert_a_sentence(call("summary", run), f"line {number}: damaged", f"its cases stand in {part.file} already")
-
-
-def test_a_status_count_that_is_not_that_of_the_file_is_named_and_mended(run, flown):
-    tampered(run, "part", status={"no-stop": CHUNK})
-    assert any("its cases did not end as the journal says" in problem for problem in damage(run))
 
 
 def test_deep_nesting_is_damage(run):

@@ -31,6 +31,7 @@ def check_kills(folder, kills, seed, broken=()):
             status, took = runs.fly(run, rng.uniform(0.0, seconds))
             if status == -signal.SIGKILL:
                 holder = _holder(run)
+                assert not holder or open_store(run).verify() == []  # what a kill leaves is no damage
                 lost.append(_chunks_lost(run, table))
                 store = completed(run, campaign, CHUNK)
                 assert_as_unbroken(run, whole)

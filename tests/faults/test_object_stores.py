@@ -16,6 +16,7 @@ from stones import stones
 
 from mc_engine import run as fly
 from mc_engine.cli import app
+from mc_engine.derived_files import derived_files
 from mc_engine.errors import StoreError
 from mc_engine.object_store import _Remote, fetch, publish
 from mc_engine.publisher import Publisher
@@ -56,30 +57,30 @@ def memory():
 def run(tmp_path):
     """A run of forty cases in four parts, with a report."""
     filled(created(tmp_path / "run"))
-    (tmp_path / "run" / "report.html").write_text("<p>forty cases</p>")
+    derived_files(tmp_path / "run").write({"report.html": b"<p>forty cases</p>"})
     return tmp_path / "run"
 
 
 def digests(folder):
-    paths = [path for path in folder.rglob("*") if path.is_file() and path.name != ".lock"]
+    paths = [path for path in folder.rglob("*") if path.is_file() and path.suffix != ".lock" and path.name != ".lock"]
     return {path.relative_to(folder).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
 
 
 def test_a_run_comes_back_from_s3_byte_by_byte(s3, run, tmp_path):
     sent = publish(run, f"{s3}/study/one").sent
     assert sent.index("journal.jsonl") > max(i for i, name in enumerate(sent) if name.startswith("cases/"))
-    assert sent[-1] == "report.html"
+    assert sent[-2:] == ("report.html", "derived.jsonl")
     back = fetch(f"{s3}/study/one", tmp_path / "back")
     assert digests(back) == digests(run)
     assert damage(back) == []
 
 
 def test_what_lies_on_s3_already_does_not_travel_again(s3, run):
-    assert len(publish(run, f"{s3}/again").sent) == 8
+    assert len(publish(run, f"{s3}/again").sent) == 9
     assert publish(run, f"{s3}/again").sent == ()
-    (run / "report.html").write_text("<p>anew</p>")
+    derived_files(run).write({"report.html": b"<p>anew</p>"})
     open_store(run).note("finished")
-    assert publish(run, f"{s3}/again").sent == ("journal.jsonl", "report.html")
+    assert publish(run, f"{s3}/again").sent == ("journal.jsonl", "report.html", "derived.jsonl")
 
 
 def test_the_verbs_take_a_run_to_s3_and_report_on_it_there(s3, run, tmp_path):
@@ -170,7 +171,7 @@ def test_a_server_that_cannot_be_reached_is_a_sentence(run, monkeypatch):
 
 def test_an_upload_that_breaks_off_anywhere_is_completed_and_never_loads_wrong(memory, run, tmp_path, monkeypatch):
     whole = digests(run)
-    whole_parts = sum(name != "journal.jsonl" and name != "report.html" for name in whole) - 1
+    whole_parts = sum(name not in ("journal.jsonl", "report.html", "derived.jsonl") for name in whole) - 1
     write = _Remote.write
     for stop in range(len(whole)):
         url = f"{memory}/{stop}"

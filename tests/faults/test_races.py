@@ -1,8 +1,12 @@
-"""Two processes on one run directory at the same moment: one flies, the other is refused within a second."""
+"""Several processes on one run directory at the same moment: one flies, the others are refused within a second."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
+import threading
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
@@ -13,6 +17,14 @@ from mc_engine import open_store, runner
 
 CASES, CHUNK = 400, 40
 LONG = 4000  # cases: no racer is done before the other has begun
+WITHOUT_LOCKS = """
+import errno, fcntl
+
+def refuse(*_):
+    raise OSError(errno.ENOLCK, "No locks available")
+
+fcntl.flock = fcntl.lockf = refuse
+"""
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the racers are forked, which Windows cannot")
 
@@ -43,9 +55,11 @@ for line in sys.stdin:
                 if verb == "run":
                     runner.run(campaign, Path(run), workers=2, chunk=chunk)
                 else:
-                    runner.resume(run, workers=2, chunk=chunk)
+                    runner.resume(run, workers=2, chunk=chunk, repair=verb == "repair")
             except EngineError as error:
                 said = str(error)
+            except BaseException as error:
+                said = repr(error)
             os.write(writing, json.dumps([said, time.monotonic() - begin]).encode())
             os._exit(0)
         os.close(writing)
@@ -59,10 +73,13 @@ for line in sys.stdin:
 
 
 class Races:
-    def __init__(self, folder, broken=()):
+    def __init__(self, folder, broken=(), locks=True):
+        """locks : False for a file system that has none, as the racers and all that they start see it."""
         command = [sys.executable, "-c", SERVER, str(folder), str(CHUNK), *broken]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-        self._server = subprocess.Popen(command, env=FORKING, **pipes)
+        (folder / "sitecustomize.py").write_text("" if locks else WITHOUT_LOCKS)
+        path = os.pathsep.join([str(folder), FORKING["PYTHONPATH"]])
+        self._server = subprocess.Popen(command, env={**FORKING, "PYTHONPATH": path}, **pipes)
         assert json.loads(self._server.stdout.readline()) == "ready"
 
     def __call__(self, verb, run, moments):
@@ -70,6 +87,12 @@ class Races:
         self._server.stdin.write(json.dumps([verb, str(run), moments]) + "\n")
         self._server.stdin.flush()
         return json.loads(self._server.stdout.readline())
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
 
     def close(self):
         self._server.stdin.close()
@@ -112,17 +135,107 @@ def test_a_hundred_races_corrupt_nothing(tmp_path, record_property):
     assert max(waited) < 1.0
 
 
-def test_two_that_resume_one_run_do_not_both_write(tmp_path):
-    campaign = stones(tmp_path / "campaign", LONG)
-    whole = runner.run(campaign, tmp_path / "whole", workers=2, chunk=CHUNK)
-    expected, races = results(whole.path), Races(tmp_path / "campaign")
-    try:
-        for part in list(whole.parts):
-            whole.withdraw(part)
-        outcomes = races("resume", whole.path, [0.0, 0.0])
-    finally:
-        races.close()
+@pytest.fixture(scope="module")
+def long_run(tmp_path_factory):
+    """The folder of a campaign, its unbroken run of a hundred parts, and the bytes of that."""
+    folder = tmp_path_factory.mktemp("long")
+    whole = runner.run(stones(folder / "campaign", LONG), folder / "whole", workers=2, chunk=CHUNK).path
+    return folder / "campaign", whole, results(whole)
+
+
+def test_two_that_resume_one_run_do_not_both_write(long_run, tmp_path):
+    campaign, whole, expected = long_run
+    run = interrupted(whole, tmp_path / "run")
+    with Races(campaign) as races:
+        outcomes = races("resume", run, [0.0, 0.0])
     refused = [said for said, _ in outcomes if said]
     assert len(refused) == 1, outcomes
     assert "is writing here" in refused[0]
-    assert_as_unbroken(whole.path, expected)
+    assert_as_unbroken(run, expected)
+
+
+def interrupted(whole, run, damaged=False):
+    """A copy of a run as a kill leaves it that came before the first part: the lock has the record of a dead process.
+
+    damaged : a bit of a line of the journal is flipped, too.
+    """
+    shutil.copytree(whole, run)
+    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    begun = next(number for number, line in enumerate(lines) if b'"event":"part"' in line)
+    content = bytearray(b"".join(lines[:begun]))
+    if damaged:
+        content[len(lines[0]) + 20] ^= 1
+    (run / "journal.jsonl").write_bytes(content)
+    for part in [*(run / "cases").iterdir(), *(run / "history").iterdir()]:
+        part.unlink()
+    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
+    (run / ".lock").write_text(json.dumps({"pid": int(gone.stdout), "host": os.uname().nodename, "since": "then"}))
+    return run
+
+
+def check_three_at_once(long_run, folder, count, locks, meanwhile=None):
+    """Three racers of each kind, so many times; what the refused ones were told.
+
+    meanwhile : what happens to the directory of a resumed run while they race.
+    """
+    (campaign, whole, expected), told = long_run, []
+    with Races(campaign, locks=locks) as races:
+        for number in range(count):
+            for verb in ("resume",) if meanwhile else ("run", "resume", "repair"):
+                run = folder / f"{verb}-{number}"
+                if verb != "run":
+                    interrupted(whole, run, damaged=verb == "repair")
+                with happening(meanwhile, run):
+                    outcomes = races(verb, run, [0.0, 0.25, 0.5] if meanwhile else [0.0, 0.0, 0.0])
+                refused = [said for said, _ in outcomes if said]
+                told += refused
+                assert len(refused) == 2, outcomes
+                assert all(str(run) in said for said in refused), refused
+                assert_as_unbroken(run, expected)
+                assert not (run / ".lock.claim").exists()
+                assert len(open_store(run).notes("finished")) == 1
+                shutil.rmtree(run)
+    return told
+
+
+@contextmanager
+def happening(what, run):
+    """Has something done to a run again and again, as long as the block lasts."""
+    done = threading.Event()
+    thread = threading.Thread(target=lambda: [what(run) for _ in iter(lambda: what and done.wait(0.01), True)])
+    if what:
+        thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        if what:
+            thread.join()
+
+
+def delete_lock(run):
+    (run / ".lock").unlink(missing_ok=True)
+
+
+def test_of_three_at_once_one_writes_without_locks_of_the_system(long_run, tmp_path, record_property):
+    told = check_three_at_once(long_run, tmp_path, 2, locks=False)
+    record_property("racers refused", len(told))
+    assert all("is writing here" in said or "holds a run already" in said for said in told), told
+
+
+@pytest.mark.slow
+def test_of_three_at_once_one_writes_without_locks_of_the_system_twenty_times(long_run, tmp_path, record_property):
+    record_property("racers refused", len(check_three_at_once(long_run, tmp_path, 20, locks=False)))
+
+
+def test_a_lock_deleted_in_flight_lets_nobody_in(long_run, tmp_path, record_property):
+    told = check_three_at_once(long_run, tmp_path, 2, locks=True, meanwhile=delete_lock)
+    record_property("racers refused", len(told))
+    assert all("is writing here" in said for said in told), told
+
+
+@pytest.mark.slow
+def test_a_lock_deleted_in_flight_lets_nobody_in_twenty_times(long_run, tmp_path, record_property):
+    record_property(
+        "racers refused", len(check_three_at_once(long_run, tmp_path, 20, locks=True, meanwhile=delete_lock))
+    )

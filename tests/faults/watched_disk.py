@@ -65,9 +65,12 @@ class _Watch:
         self._os = {name: getattr(os, name) for name in dir(os) if callable(getattr(os, name))}
         self._open_file = io.open
 
-    def _inside(self, path):
-        path = None if isinstance(path, int) else Path(os.fsdecode(path)).absolute()
-        return path if path is not None and path.is_relative_to(self._root) else None
+    def _inside(self, path, folder=None):
+        """The path below the root, or None.  folder : descriptor of the one that a name stands for a file in."""
+        if isinstance(path, int) or (folder is not None and folder not in self._paths):
+            return None
+        path = (self._paths[folder] / path) if folder is not None else Path(os.fsdecode(path)).absolute()
+        return path if path.is_relative_to(self._root) else None
 
     def _do(self, kind, path, call, facts=dict):
         with self._lock:
@@ -77,9 +80,14 @@ class _Watch:
             return result
 
     def open(self, path, flags, mode=0o777, **options):
-        inside = self._inside(path)
+        inside = self._inside(path, options.get("dir_fd"))
         if inside is None:
-            return self._os["open"](path, flags, mode, **options)
+            descriptor = self._os["open"](path, flags, mode, **options)
+            self._paths.pop(descriptor, None)
+            return descriptor
+        if flags & os.O_DIRECTORY:  # on the way to a file, whose own opening is told
+            self._paths[descriptor := self._os["open"](path, flags, mode, **options)] = inside
+            return descriptor
         fresh = bool(flags & os.O_CREAT) and not os.path.exists(inside)
         with self._lock:
             descriptor = self._do("open", inside, lambda: self._os["open"](path, flags, mode, **options),
@@ -123,19 +131,19 @@ class _Watch:
         return self._do("sync", path, lambda: self._os["fsync"](descriptor))
 
     def replace(self, source, target, **options):
-        path, to = self._inside(source), self._inside(target)
+        path, to = (self._inside(name, options.get("src_dir_fd")) for name in (source, target))
         if path is None:
             return self._os["replace"](source, target, **options)
         return self._do("rename", path, lambda: self._os["replace"](source, target, **options), lambda: {"to": to})
 
     def unlink(self, path, **options):
-        inside = self._inside(path)
+        inside = self._inside(path, options.get("dir_fd"))
         if inside is None:
             return self._os["unlink"](path, **options)
         return self._do("unlink", inside, lambda: self._os["unlink"](path, **options))
 
     def mkdir(self, path, mode=0o777, **options):
-        inside = self._inside(path)
+        inside = self._inside(path, options.get("dir_fd"))
         if inside is None:
             return self._os["mkdir"](path, mode, **options)
         return self._do("mkdir", inside, lambda: self._os["mkdir"](path, mode, **options))

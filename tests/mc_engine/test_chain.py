@@ -1,13 +1,20 @@
 """A chain: every case takes its inputs from the same case of another run, and keeps that case's columns."""
 
+import json
+import os
+import shutil
+from hashlib import sha256
+
 import numpy as np
 import pandas as pd
 import pytest
 from cart import call, fails_with
 
 from mc_engine.campaign import load_campaign
-from mc_engine.errors import CampaignError, StoreError
-from mc_engine.runner import extend, replay, resume, run
+from mc_engine.errors import CampaignError, EngineError, StoreError
+from mc_engine.journal import encode, scan
+from mc_engine.opened_run import open_run
+from mc_engine.runner import extend, replay, rerun, resume, run
 from mc_engine.store import open_store
 
 MODEL = '''
@@ -148,8 +155,6 @@ def test_a_case_that_failed_upstream_keeps_its_row_and_says_why(cases):
 
 def test_a_run_in_a_chain_stands_alone(folder, tmp_path):
     """Replay needs neither the campaign's folder nor the run upstream."""
-    import shutil
-
     shutil.copytree(folder / "runs" / "second", tmp_path / "moved")
     assert replay(tmp_path / "moved", 3).equal
     assert resume(tmp_path / "moved").n_cases == 40
@@ -158,8 +163,6 @@ def test_a_run_in_a_chain_stands_alone(folder, tmp_path):
 
 @pytest.mark.parametrize("damage", ["gone", "flipped"])
 def test_what_was_taken_is_verified_before_it_is_used(folder, tmp_path, damage):
-    import shutil
-
     shutil.copytree(folder / "runs" / "second", tmp_path / "run")
     copy = tmp_path / "run" / "upstream.parquet"
     content = bytearray(copy.read_bytes())
@@ -230,3 +233,71 @@ def test_what_does_not_fit_is_said_with_its_place(folder, change, message):
     with pytest.raises(CampaignError) as caught:
         load_campaign("second", text=text.replace(*change), directory=folder / "second")
     assert message in str(caught.value)
+
+
+# ---- where [inputs] may lead
+
+
+def with_files(folder, **contents):
+    """Change files of a run directory, for which its journal vouches afterwards."""
+    events = list(scan((folder / "journal.jsonl").read_bytes()).entries)
+    for name, content in contents.items():
+        (folder / name.replace("_", ".")).write_bytes(content)
+        events[0].facts[name.split("_")[0]] = sha256(content).hexdigest()
+    events[0].facts["companions"].pop("upstream.parquet", None)
+    lines = [encode(number, one.at, one.event, one.facts) for number, one in enumerate(events, start=1)]
+    (folder / "journal.jsonl").write_bytes(b"".join(lines))
+
+
+@pytest.fixture
+def theirs(folder, tmp_path):
+    """The second run of the chain, as somebody else might send it."""
+    return shutil.copytree(folder / "runs" / "second", tmp_path / "run")
+
+
+def trap(folder, mark):
+    """A campaign elsewhere, whose model leaves a mark."""
+    folder.mkdir()
+    (folder / "model.py").write_text(
+        f"import pathlib; pathlib.Path({str(mark)!r}).touch()\n"
+        + MODEL.replace("HEIGHT", "height").replace("RESULT", "top")
+    )
+    (folder / "campaign.toml").write_text(FIRST)
+    return folder
+
+
+USES = (resume, rerun, lambda folder: replay(folder, 3), lambda folder: open_run(folder).case(3).replay(),
+        lambda folder: load_campaign(folder / "campaign.toml"))  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["a run", "a campaign"])
+def test_the_campaign_file_of_a_run_leads_to_no_other_run_and_no_other_campaign(theirs, folder, tmp_path, kind):
+    mark = tmp_path / "marked"
+    outside = folder / "runs" / "first" if kind == "a run" else trap(tmp_path / "trap", mark)
+    text = (theirs / "campaign.toml").read_text().replace("../runs/first", str(outside))
+    manifest = json.loads((theirs / "manifest.json").read_bytes())
+    manifest["upstream"] = None
+    with_files(theirs, campaign_toml=text.encode(), manifest_json=json.dumps(manifest).encode())
+    (theirs / "upstream.parquet").unlink()
+    for use in USES:
+        with pytest.raises(EngineError, match=r"upstream\.parquet: No such file"):
+            use(theirs)
+    assert not mark.exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights")
+@pytest.mark.parametrize("target", ["run", "copy"])
+def test_a_link_in_place_of_the_copy_is_not_followed(theirs, folder, tmp_path, target):
+    shutil.copy(theirs / "upstream.parquet", tmp_path / "copy")
+    (theirs / "upstream.parquet").unlink()
+    (theirs / "upstream.parquet").symlink_to(tmp_path / "copy" if target == "copy" else folder / "runs" / "first")
+    with_files(theirs)
+    for use in USES:
+        with pytest.raises(EngineError, match=r"upstream\.parquet: "):
+            use(theirs)
+
+
+def test_the_campaign_file_of_a_run_is_read_with_the_copy_that_the_run_keeps(theirs):
+    """From wherever it lies: the run upstream is nowhere near."""
+    assert not (theirs.parent / "runs").exists()
+    assert load_campaign(theirs / "campaign.toml").upstream.rows.n_cases == 40

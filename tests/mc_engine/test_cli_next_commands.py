@@ -68,17 +68,17 @@ def test_a_run_that_is_complete_is_not_flown_again(here):
 
 
 def test_a_creation_that_the_disk_cut_short_is_begun_again_by_the_same_command(here, monkeypatch):
-    durably = store.write_durably
+    durably = store.disk.write_inside
 
-    def full(path, content):
-        if path.name == store.JOURNAL:
-            raise DiskError(f"{path}: No space left on device")
-        return durably(path, content)
+    def full(root, name, content):
+        if name == store.JOURNAL:
+            raise DiskError(f"{root / name}: No space left on device")
+        return durably(root, name, content)
 
     shutil.copytree(SHIPPED / "minimal", here / "mine")
     flight = ("run", "mine", "--cases", "8", "--no-report", "--out", "flown")
     with monkeypatch.context() as patch:
-        patch.setattr(store, "write_durably", full)
+        patch.setattr(store.disk, "write_inside", full)
         fails_with(4, call(*flight), "journal.jsonl: No space left on device")
     assert (here / "flown" / "model.py").exists()  # which its creation left, and only a run of this model expects
     (here / "flown" / "mine.txt").touch()

@@ -10,7 +10,7 @@ from small_run import ENVIRONMENT
 from mc_engine.campaign import SHIPPED, load_campaign
 from mc_engine.errors import CampaignError
 from mc_engine.flown_campaign import companions_of
-from mc_engine.kernel import model_sources, source_digest
+from mc_engine.kernel import source_digest
 from mc_engine.runner import extend, replay, run
 from mc_engine.store import open_store
 
@@ -88,10 +88,17 @@ def test_the_sources_of_an_installed_model_are_all_that_it_reaches_in_its_packag
     }
     campaign_in(tmp_path, files, "from ..phys.dyn import pull", model="pkg_beside/models/orbit.py")
     monkeypatch.syspath_prepend(tmp_path)
-    model = load_campaign(tmp_path / "campaign.toml").model
-    before = source_digest(model, None)
-    (tmp_path / "pkg_beside" / "constants.py").write_text("MU = 3.9e14\n")
-    assert source_digest(model, None) != before
+    digests = []
+    for constants in (MU, "MU = 3.9e14\n"):
+        (tmp_path / "pkg_beside" / "constants.py").write_text(constants)
+        for name in [name for name in sys.modules if name.startswith("pkg_beside")]:
+            del sys.modules[name]
+        model = load_campaign(tmp_path / "campaign.toml").model
+        assert model.rhs.function.__globals__["pull"].function.__globals__["MU"] == float(constants.split()[-1])
+        digests.append(source_digest(model, None))
+        (tmp_path / "pkg_beside" / "constants.py").write_text("MU = 1.0\n")
+        assert source_digest(model, None) == digests[-1]  # of what was imported
+    assert len(set(digests)) == 2
 
 
 def test_a_folder_of_an_installed_name_does_not_hide_it(tmp_path):
@@ -159,7 +166,7 @@ def test_what_another_model_of_the_folder_reads_is_no_source_of_this_one(tmp_pat
     read = {}
     for name in ("a", "b"):
         campaign = load_campaign(tmp_path / f"{name}.toml")
-        read[name] = [path.name for path in model_sources(campaign.model, tmp_path) if path.suffix == ".csv"]
+        read[name] = [path.name for path in campaign.model.sources.late]
     assert read == {"a": ["a.csv"], "b": ["b.csv"]}
 
 

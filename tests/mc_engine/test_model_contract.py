@@ -56,8 +56,8 @@ INTERPRETED = {
     ),
     "NaN derivative": (
         [(ACCELERATION, "g = -MU_EARTH / (r2 * sqrt(-r2))")],
-        "@physics\ndef rhs",
-        '`rhs` gives nan for the derivative of "vx" at the start of the nominal case',
+        "    g = -MU_EARTH",
+        '(t = 0 s); so `rhs` gives nan for the derivative of "vx" at the start of the nominal case',
     ),
     "if": (
         [(ACCELERATION, f"if r2 > 1.0:\n        {ACCELERATION}\n    else:\n        g = 0.0")],
@@ -206,12 +206,12 @@ def test_check_leaves_with_two_and_the_sentence(tmp_path):
 
 
 def test_a_model_that_kills_its_process_is_a_sentence_unless_only_the_file_is_read(tmp_path):
-    kill = "import os\n    if os.environ.get('KILL') and inputs.burn_dv.size > 3:\n        os._exit(9)"
+    kill = "import os\n    if inputs.burn_dv.size > 3:\n        os._exit(9)"
     campaign_with(tmp_path, *with_prepare(kill))
-    done = check(tmp_path, KILL="1")
+    done = check(tmp_path)
     assert done.returncode == 2
     assert "killed its process: exit status 9" in done.stderr
-    assert check(tmp_path, "--no-model", KILL="1").returncode == 0
+    assert check(tmp_path, "--no-model").returncode == 0
 
 
 @pytest.mark.parametrize("name", [one.name for one in list_campaigns()])

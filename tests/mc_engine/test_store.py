@@ -102,7 +102,7 @@ def test_duckdb_reads_the_cases(store):
 
 def test_a_part_written_half_is_seen_by_neither_pandas_nor_duckdb(store):
     run = filled(store).path
-    temporary_name(run / "cases" / parts.part_name(40, 10)).write_bytes(b"PAR1 and no more")
+    (run / temporary_name(f"cases/{parts.part_name(40, 10)}")).write_bytes(b"PAR1 and no more")
     assert len(pd.read_parquet(run / "cases")) == 40
     assert duckdb.sql(f"SELECT count(*) FROM '{run}/cases/*.parquet'").fetchall() == [(40,)]
 
@@ -278,10 +278,10 @@ def test_a_directory_with_someones_files_is_refused_and_untouched(run, name):
 def killed_at(n):
     calls = iter(range(1000))
 
-    def write(path, content):
+    def write(root, name, content):
         if next(calls) == n:
             raise KeyboardInterrupt
-        parts.write_durably(path, content)
+        parts.write_inside(root, name, content)
 
     return write
 
@@ -291,7 +291,7 @@ def test_a_creation_that_was_killed_anywhere_can_be_made_again(tmp_path, monkeyp
     while True:
         run = tmp_path / f"run-{reached}"
         with monkeypatch.context() as patch:
-            patch.setattr("mc_engine.store.write_durably", killed_at(reached))
+            patch.setattr("mc_engine.store.disk.write_inside", killed_at(reached))
             try:
                 created(run)
                 break

@@ -60,9 +60,9 @@ def test_a_part_is_synced_renamed_and_its_folder_synced_before_its_journal_line(
         done.append(("sync", os.fstat(descriptor).st_ino))
         fsync(descriptor)
 
-    def noted_replace(source, target):
-        done.append(("rename", os.stat(source).st_ino))
-        replace(source, target)
+    def noted_replace(source, target, **folders):
+        done.append(("rename", os.stat(source, dir_fd=folders["src_dir_fd"]).st_ino))
+        replace(source, target, **folders)
 
     with store.lock():
         monkeypatch.setattr(os, "fsync", noted_fsync)

@@ -11,12 +11,12 @@ import pytest
 from apogee_tuning import CHOICE, apogee_and_speed, apogee_campaign
 from cart import call, fails_with
 
-import mc_engine.tuning_folder
-from mc_engine import load_campaign, open_tuning, tune
+from mc_engine import counted_files, load_campaign, open_tuning, tune
 from mc_engine.campaign import SHIPPED
 from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
 from mc_engine.tuning import Generation, dominated_shares, is_stalled
 from mc_engine.tuning_folder import infeasibility
+from mc_engine.verification import damage
 
 UNREACHABLE = '\n[tuning.constraint.high]\nmetric = "apogee_altitude_km"\nat_least = 5000.0\n'
 
@@ -156,27 +156,36 @@ def test_a_killed_search_leaves_the_generations_that_were_flown(tmp_path):
     whole = tune(apogee_campaign(), tmp_path / "whole", seed=1, workers=1)
     pd.testing.assert_frame_equal(record.evaluations, whole.evaluations.iloc[:36])
     assert sorted(path.name for path in whole.path.iterdir()) == [
-        "evaluations.parquet", "front.parquet", "generations.parquet", "tuning.json", "tuning.toml"
+        ".lock", "evaluations.parquet", "front.parquet", "generations.parquet", "journal.jsonl", "tuning.json",
+        "tuning.toml",
     ]  # fmt: skip
 
 
 def test_a_search_killed_while_it_writes_still_has_the_generation_before(tmp_path, monkeypatch):
-    """Whichever of the files of the second generation is the last one to get to the disk."""
-    write, names = mc_engine.tuning_folder.write_durably, []
+    """Whichever step of its second generation is the last one: the old files count before its line, the new after."""
+    steps, done = ("write_synced", "append_synced", "publish"), []
 
-    def watched(path, content):
-        names.append(path.name)
-        if len(names) == stop:
-            raise KeyboardInterrupt
-        write(path, content)
+    def watched(name, genuine):
+        def call(*arguments):
+            done.append(name)
+            if len(done) == stop:
+                raise SystemExit  # which nothing tidies up behind, as after a kill
+            genuine(*arguments)
 
-    monkeypatch.setattr("mc_engine.tuning_folder.write_durably", watched)
-    for stop in range(6, 11):
-        names.clear()
-        with pytest.raises(KeyboardInterrupt):
+        return call
+
+    for name in steps:
+        monkeypatch.setattr(counted_files, name, watched(name, getattr(counted_files, name)))
+    found = {}
+    for stop in range(11, 22):  # the first generation takes five files and their names
+        done.clear()
+        with pytest.raises(SystemExit):
             tune(apogee_campaign(), tmp_path / str(stop), seed=1)
-        assert len(open_tuning(tmp_path / str(stop)).evaluations) == 12
-    assert names[-1] == "tuning.json"
+        record = open_tuning(tmp_path / str(stop))
+        found[stop] = (done[-1], len(record.evaluations), record.manifest["tuning"]["flown"])
+        assert damage(tmp_path / str(stop)) == []
+    before = [("write_synced", 12, 1)] * 5 + [("append_synced", 12, 1)]
+    assert list(found.values()) == before + [("publish", 24, 2)] * 5
 
 
 def test_a_search_in_which_nothing_flies_to_its_end_says_why(tmp_path):

@@ -1,3 +1,4 @@
+import errno
 import json
 import os
 import subprocess
@@ -8,8 +9,8 @@ import pytest
 from small_run import ENVIRONMENT, block
 
 from mc_engine.errors import StoreError
-from mc_engine.store import open_store
-from mc_engine.writer_lock import WriterLock, described, holder
+from mc_engine.store import open_store, refuse_occupied
+from mc_engine.writer_lock import WriterLock, described, holder, writer_of_new
 
 
 def test_a_second_writer_is_refused_within_a_second_and_told_who_is_first(store):
@@ -45,21 +46,117 @@ def test_a_writer_sees_what_another_committed_since_it_opened(store):
     assert open_store(store.path).committed() == [(0, 20)]
 
 
-def test_without_system_locks_a_living_holder_is_respected_and_a_dead_one_replaced(store, monkeypatch):
-    def unsupported(_):
-        raise OSError(38, "Function not implemented")
+@pytest.fixture
+def no_locks(monkeypatch):
+    """A file system without locks."""
 
-    monkeypatch.setattr("mc_engine.writer_lock._system_lock", unsupported)
+    def unsupported(*_):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", unsupported)
+
+
+def leave_record(store, **facts):
+    """The record of a process that is over, as its kill leaves it."""
+    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
+    record = {"pid": int(gone.stdout), "host": os.uname().nodename, "since": "then", **facts}
+    (store.path / ".lock").write_text(json.dumps(record))
+    return record
+
+
+@pytest.mark.usefixtures("no_locks")
+def test_without_system_locks_a_living_holder_is_respected_and_a_dead_one_replaced(store):
     with store.lock(), pytest.raises(StoreError, match="is writing here"):
         open_store(store.path).note("x")
-    gone = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"], capture_output=True, check=True)
-    record = json.loads(json.dumps({"pid": int(gone.stdout), "host": os.uname().nodename, "since": "then"}))
-    (store.path / ".lock").write_text(json.dumps(record))
+    record = leave_record(store)
     store.note("x")
     assert store.notes("lock-taken-over")[0].facts["from"] == record
-    (store.path / ".lock").write_text(json.dumps({**record, "host": "another"}))
-    with pytest.raises(StoreError, match=r"on another \(since then\)"):
+    leave_record(store, pid=os.getpid(), start=1)  # the number was given to another process since
+    store.note("x")
+    assert len(store.notes("lock-taken-over")) == 2
+
+
+@pytest.mark.usefixtures("no_locks")
+def test_without_system_locks_a_holder_out_of_sight_is_respected_until_its_file_is_deleted(store):
+    leave_record(store, host="another")
+    with pytest.raises(StoreError, match=rf"on another \(since then\) .* delete {store.path / '.lock'}"):
         store.note("x")
+    (store.path / ".lock").unlink()
+    store.note("x")
+
+
+@pytest.mark.usefixtures("no_locks")
+def test_without_system_locks_of_two_that_find_a_dead_holder_one_takes_over(store, monkeypatch):
+    leave_record(store)
+    kill, second = os.kill, WriterLock(store.path)
+
+    def late(pid, number):
+        monkeypatch.setattr(os, "kill", kill)
+        with pytest.raises(StoreError, match=r"delete .*\.lock\.claim"):
+            second.acquire()  # while the first has judged, and not yet written
+        kill(pid, number)
+
+    monkeypatch.setattr(os, "kill", late)
+    store.note("x")
+    assert not (store.path / ".lock.claim").exists()
+    assert second.acquire() is None
+
+
+def test_a_writer_without_system_locks_whose_lock_is_deleted_writes_nothing_more(store, no_locks):
+    other = open_store(store.path)
+    with store.lock():
+        store.append(0, 10, block(0, 10))
+        (store.path / ".lock").unlink()
+        with other.lock():
+            before = (store.path / "journal.jsonl").read_bytes()
+            for write in (lambda: store.append(10, 10, block(10, 10)), store.sweep, lambda: store.note("x")):
+                with pytest.raises(StoreError, match=r"its \.lock was deleted or taken over.*; it has stopped"):
+                    write()
+            assert (store.path / "journal.jsonl").read_bytes() == before
+            other.append(10, 10, block(10, 10))
+    assert open_store(store.path).verify() == []
+    assert open_store(store.path).committed() == [(0, 20)]
+
+
+def test_a_lock_file_deleted_or_made_anew_in_flight_lets_nobody_in(store):
+    with store.lock():
+        for make in (lambda: None, (store.path / ".lock").touch):
+            (store.path / ".lock").unlink(missing_ok=True)
+            make()
+            with pytest.raises(StoreError, match="another writer is writing here"):
+                open_store(store.path).note("x")
+            assert holder(store.path) == {}
+        store.append(0, 10, block(0, 10))
+    assert holder(store.path) is None
+    assert open_store(store.path).verify() == []
+
+
+def test_a_journal_that_grew_under_a_writer_is_left_as_it_is(store):
+    with store.lock():
+        store.note("x")
+        with open(store.path / "journal.jsonl", "ab") as file:
+            file.write(b"?")
+        with pytest.raises(StoreError, match="another process has written here"):
+            store.note("y")
+    assert (store.path / "journal.jsonl").read_bytes().endswith(b"}\n?")
+
+
+def test_a_new_directory_has_one_writer_and_is_gone_if_nothing_was_put_there(tmp_path):
+    def refuse():
+        refuse_occupied(tmp_path / "new")
+
+    def write(inside):
+        with writer_of_new(tmp_path / "new", refuse):
+            inside()
+
+    def second():
+        with pytest.raises(StoreError, match=rf"process {os.getpid()} on .* is writing here"):
+            write(lambda: pytest.fail("two writers"))
+        raise KeyError
+
+    with pytest.raises(KeyError):
+        write(second)
+    assert not (tmp_path / "new").exists()
 
 
 def test_a_lock_record_of_garbage_is_no_obstacle(store):

@@ -2,9 +2,11 @@
 
 import numpy as np
 
+from mc_engine.directory_kinds import TUNING
 from mc_engine.pareto import non_dominated
 from mc_engine.parts import Column
-from mc_engine.tuning_folder import TABLES, UNFINISHED, open_tuning, write_tuning
+from mc_engine.result_folder import write_result
+from mc_engine.tuning_folder import UNFINISHED, open_tuning
 
 MEASURES = ["cost", "error", "limited"]
 
@@ -49,8 +51,7 @@ def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False, end="all gen
         "generations": ([Column(name, "", "generation", name) for name in generations], generations),
         "front": (columns, {name: values[front] for name, values in arrays.items()}),
     }
-    assert set(tables) == set(TABLES)
-    write_tuning(path, "", manifest(objectives, limit, n, end), tables)
+    write_result(path, TUNING, "", manifest(objectives, limit, n, end), tables)
     return open_tuning(path)
 
 
@@ -59,7 +60,7 @@ def manifest(objectives, limit, n, end):
     measured = {"quantile": None}
     return {
         "created_utc": "2026-04-21T10:15:00Z",
-        "campaign": {"name": "test", "title": "A made-up search", "model": "m", "digest": "d", "seed": 1},
+        "campaign": {"name": "test", "title": "A made-up search", "model": "m", "digest": "d", "seed": 1, "cases": 1},
         "model": {"name": "m", "title": "M", "source": "nobody", "digest": "e"},
         "tuning": {
             "seed": 1, "population": 10, "generations": n // 10, "flown": n // 10, "patience": None,

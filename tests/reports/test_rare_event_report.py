@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import reports
+from mc_engine.directory_kinds import RARE_EVENT
 from mc_engine.parts import Column
-from mc_engine.rare_event_folder import open_rare_event, write_rare_event
+from mc_engine.rare_event_folder import open_rare_event
+from mc_engine.result_folder import write_result
 from reports.document import FigureBlock, Table, blocks_of
 from reports.figures.tails import Tail
 from reports.rare_events import build_rare_event
@@ -14,7 +16,7 @@ MANIFEST = {
     "created_utc": "2026-01-02T03:04:05.000Z",
     "engine": "0.1.0",
     "seed_contract": 1,
-    "campaign": {"name": "toy", "title": "Toy <b>", "model": "toy", "digest": "d", "seed": 7},
+    "campaign": {"name": "toy", "title": "Toy <b>", "model": "toy", "digest": "d", "seed": 7, "cases": 9},
     "model": {"title": "A toy", "source": "", "digest": "m"},
     "inputs": [
         {"name": "a_pct", "unit": "%", "description": "a", "distribution": "normal", "bounds": "", "source": ""}
@@ -45,7 +47,8 @@ def estimated(path, **changes):
     result.update(changes)
     columns = [Column("case_id", "", "case", "number", "integer"), Column("weight", "", "case", "weight")]
     arrays = {"case_id": np.arange(3), "weight": np.array([0.5, 0.5, 2e-5])}
-    write_rare_event(path, "[campaign]\n", {**MANIFEST, "rare_event": result}, columns, arrays)
+    record = {**MANIFEST, "rare_event": result}
+    write_result(path, RARE_EVENT, "[campaign]\n", record, {"cases": (columns, arrays)})
     return open_rare_event(path)
 
 

@@ -13,7 +13,8 @@ from mc_engine.store import Column, create_store
 PUBLIC = {"build", "render_html", "render_pdf", "report", "write_reports"}
 SHARED = {
     "store", "statistics", "status", "units", "figures", "tuning_folder", "rare_event_folder", "comparison",
-    "run_changes", "durable_file", "errors", "shell_words",
+    "derived_files", "replay_files", "directory_kinds", "run_changes", "durable_file", "errors", "shell_words", "text",
+    "journal", "run_folder",
 }  # fmt: skip
 
 

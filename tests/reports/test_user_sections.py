@@ -113,7 +113,7 @@ def test_values_of_a_run_are_neither_markdown_nor_templates(filled, run, payload
         ("# A\n{% if %}", r"own\.md, line 2: Expected an expression"),
         ("# A\n\n{{ run.metrics.propellant_kg.quantile(99.865) }}", r"line 3: quantile\(99\.865\): a probability lies"),
         ("# A\n{{ run.__class__.__mro__ }}", r"own\.md, line 2: access to attribute '__class__' .* is unsafe"),
-        ("# A\n{{ run.metrics.propellant_kg._values }}", r"line 2: access to attribute '_values' .* is unsafe"),
+        ("# A\n{{ run.metrics.propellant_kg._values }}", r"line 2: .* has no attribute '_values'"),
         ("# A\n{% include '/etc/passwd' %}", r"own\.md, line 2: "),
         ("# A\n{{ 1 / 0 }}", r"own\.md, line 2: division by zero"),
         ("text\n\n# A", r"own\.md: line 1: text stands before the first heading"),

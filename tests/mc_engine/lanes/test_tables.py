@@ -32,18 +32,20 @@ def test_one_case_alone_has_the_bits_of_the_same_among_others():
     same_bytes({name: column[3:4] for name, column in together.items()}, alone)
 
 
-@pytest.mark.parametrize("width", [1, 8])
-def test_a_place_outside_or_none_at_all_is_the_nearest_one_inside(width):
+@pytest.mark.parametrize("width", [1, 8, 16])
+def test_a_place_outside_is_the_nearest_one_inside_and_what_is_no_number_breaks_the_flight(width):
     columns = flown(SHELF, place=np.array([-5.0, 1e9, np.pi, -200.0, 1e300]), width=width)
     assert columns["end_x_m"].tolist() == pytest.approx([0.0, 2401.0, 9.0, 0.0, 2401.0])
+    assert columns["status"].tolist() == ["ok", "ok", "ok", "not-finite", "ok"]
 
 
 def test_interpreted_physics_reads_the_same_numbers():
     tables = settings_of(SHELF, np.array([2.0, 0.5])).tables
     assert look_up(tables, 7.0) == 98.0
-    assert [look_up(tables, place) for place in (-1.0, np.nan, np.inf)] == [0.0, 0.0, 4802.0]
+    assert [look_up(tables, place) for place in (-1.0, np.inf, -np.inf, 7)] == [0.0, 4802.0, 0.0, 98.0]
+    assert np.isnan(look_up(tables, np.nan))
     assert look_up(tables, np.array([0.0, 3.0])).tolist() == [0.0, 18.0]
-    assert look_up(tables, np.array([-1.0, np.nan, np.inf])).tolist() == [0.0, 0.0, 4802.0]
+    np.testing.assert_array_equal(look_up(tables, np.array([-1.0, np.nan, np.inf])), [0.0, np.nan, 4802.0])
 
 
 def test_tables_are_computed_once_for_the_same_settings():

@@ -1,0 +1,96 @@
+"""Where a number of a model stopped being finite, in a sentence: file, line, source, and the numbers that were there."""
+
+import ast
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine.compiler_faults import is_the_users
+from mc_engine.lanes.number import Origin, Place
+from mc_engine.model import Model
+from mc_engine.physics_scope import shortened
+from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
+from mc_engine.trial_faults import chain_at
+
+_FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the arc sine", "acos": "the arc cosine",
+              "tan": "the tangent", "exp": "the exponential"}  # fmt: skip
+PATIENCE_S = 60.0  # of a flight to find the line
+_LONG = 100  # characters of a statement that is shown whole
+
+
+def may_be_lost(model: Model, flight: Mapping[str, np.ndarray]) -> bool:
+    """Whether a flight of one case ended not-finite, or gave a metric that is not a number.  flight : its columns."""
+    if flight["status"][0] == STATUS_NAME[OK]:
+        return any(not one.sometimes and bool(np.isnan(flight[one.name][0])) for one in model.metrics)
+    return bool(flight["status"][0] == STATUS_NAME[NOT_FINITE])
+
+
+def first_lost(
+    model: Model, inputs: Mapping[str, Any], case_id: int, seed: int, who: str, seconds: float = PATIENCE_S
+) -> str:
+    """The sentence on the number that broke a flight, or made a metric not a number; "" for a flight without.
+
+    By an interpreted flight of the case, which takes some milliseconds a step; it is given up after so many seconds.
+    who : the case in words.
+    """
+    from mc_engine.flight import fly_interpreted  # which tries models by what stands here
+    from mc_engine.lanes.interpreted import OutOfTime
+
+    try:
+        (_, status, _, _), flight = fly_interpreted(model, inputs, case_id, seed, seconds)
+    except OutOfTime as late:
+        return (f"{who}: interpreted to find the line, the flight came to t = {late.t:.6g} s in {seconds:.0f} s, and was "
+                "finite until then; look at what its state and time at the end make of the physics")  # fmt: skip
+    if status[0] == NOT_FINITE:
+        return sentence(flight.origin, who) if flight.origin is not None else ""
+    for metric, value in zip(model.metrics, flight.metrics, strict=False):
+        if status[0] == OK and math.isnan(value) and not metric.sometimes and (origin := _origin_of(value)) is not None:
+            return f'"{metric.name}": {sentence(origin, who)}'
+    return ""
+
+
+def _origin_of(value: Any) -> Origin | None:
+    return getattr(value, "origin", None)
+
+
+def sentence(origin: Origin, who: str = "") -> str:
+    """What happened, where, and when.  who : the case in words."""
+    when = f"t = {origin.t:.6g} s" if math.isfinite(origin.t) else ""
+    happened = f"{_what(origin)} ({', '.join(one for one in (when, who) if one)})"
+    if not origin.places:
+        return happened
+    spot = next((one for one in origin.places if is_the_users(_file(one))), origin.places[-1])
+    if spot is not origin.places[0]:
+        happened = f"in {_named(origin.places[0])}, {happened}"
+    text = _text(spot)
+    return f"{_named(spot)}: {text}: {happened}" if text else f"{_named(spot)}: {happened}"
+
+
+def _what(origin: Origin) -> str:
+    if not origin.arguments:
+        return origin.operation
+    result = "not a number" if math.isnan(origin.result) else "infinite"
+    values = [f"{one:.6g}" for one in origin.arguments if isinstance(one, float | int)]
+    if origin.operation in _FUNCTIONS:
+        return f"{_FUNCTIONS[origin.operation]} of {values[0]} is {result}"
+    if origin.operation.isidentifier():
+        return f"{origin.operation}({', '.join(values)}) is {result}"
+    return f"{f' {origin.operation} '.join(values)} is {result}"
+
+
+def _file(place: Place) -> Path:
+    return Path(place.tb_frame.f_code.co_filename)
+
+
+def _named(place: Place) -> str:
+    return f"{_file(place).name}, line {place.tb_lineno}"
+
+
+def _text(place: Place) -> str:
+    """The statement at a place, or of a long one what is computed there."""
+    chain = chain_at(place)
+    whole = next((ast.unparse(node) for node in chain if isinstance(node, ast.stmt)), "")
+    return whole if len(whole) <= _LONG else shortened(ast.unparse(chain[0])) if chain else ""

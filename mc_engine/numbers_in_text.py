@@ -1,0 +1,29 @@
+"""Numbers as people write them in tables, messages and on the command line: ASCII digits, sign, point and exponent.
+
+Python's own reading also takes 1_0, digits of other scripts, nan and infinity, none of which anybody means there.
+"""
+
+import re
+
+LARGEST_WHOLE = 2**63 - 1
+LEAST_SHARE = 1e-12  # and 1 less it is the most: beyond, 1 - share has too few digits
+
+_WHOLE = re.compile(r"[+-]?[0-9]{1,30}")
+_REAL = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,9})?")
+
+
+def is_whole(text: str) -> bool:
+    """True for the text of a whole number that int64 holds."""
+    return _WHOLE.fullmatch(text) is not None and abs(int(text)) <= LARGEST_WHOLE
+
+
+def is_real(text: str) -> bool:
+    """True for the text of a number that float64 holds; it may be so large that it is read as infinite."""
+    return _REAL.fullmatch(text) is not None
+
+
+def real(text: str) -> float:
+    """The number that a text is; ValueError if it is none.  Infinite where float64 does not hold it."""
+    if not is_real(text):
+        raise ValueError(f"{text!r} is not a number")
+    return float(text)

@@ -1,0 +1,149 @@
+"""Symbolic links at every name of a directory: no writer follows one, nothing outside changes, `verify` names each."""
+
+import re
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+from counted_directories import PAGES, TEXTS, a_rare_event, a_run, a_tuning, copied
+from stones import call
+from trapped import ROOT
+
+from mc_engine import durable_file, open_store, runner
+from mc_engine.derived_files import derived_files
+from mc_engine.durable_file import make_way, names_in, publish, read_inside, remove_file, temporary_name, write_inside
+from mc_engine.errors import EngineError, StoreError
+from mc_engine.verification import damage
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links need rights")
+
+MADE = {"run": a_run, "tuning": a_tuning, "rare event": a_rare_event}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A directory of each kind."""
+    folder = tmp_path_factory.mktemp("whole")
+    return {kind: made(folder) for kind, made in MADE.items()}
+
+
+def contents(folder):
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
+def write_all_there_is(folder, kind):
+    """Every way in which the engine writes into a directory."""
+    for files in (PAGES, TEXTS, {"report-figures/figure-1.svg": b"another"}):
+        with suppress(EngineError):
+            derived_files(folder).write(files, alone_in="report-figures" if files is not PAGES else None)
+    if kind == "run":
+        for use in (use_store, lambda run: runner.resume(run, workers=1, repair=True)):
+            with suppress(EngineError):
+                use(folder)
+
+
+def use_store(run):
+    store = open_store(run)
+    with store.lock():
+        rows = store.cases().iloc[:20]
+        store.withdraw(store.parts[0])
+        store.append(0, 20, {name: rows[name].to_numpy() for name in rows})
+        store.write_nominal(store.nominal())
+        store.write_histories(store.histories())
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_no_writer_follows_a_link_at_any_name_and_verify_names_it(whole, tmp_path, kind):
+    names = sorted(path.relative_to(whole[kind]).as_posix() for path in whole[kind].rglob("*"))
+    inner = [name for name in names if not name.endswith(".lock")]
+    spare = [temporary_name(name) for name in inner] + [".lock", ".derived.lock", "cases/.receipt.tmp"]
+    for number, name in enumerate([*inner, *spare]):
+        folder, outside = copied(whole[kind], tmp_path / f"{number}"), tmp_path / f"{number}-outside"
+        place = folder / name
+        if place.exists() and name in inner:
+            place.rename(outside)
+        else:
+            place.unlink(missing_ok=True)
+            outside.write_bytes(b"mine")
+        if not place.parent.exists():
+            continue
+        place.symlink_to(outside)
+        before = contents(outside) if outside.is_dir() else outside.read_bytes()
+        if name in inner:
+            assert any(name in what for what in damage(folder)), name
+            assert call("verify", folder).exit_code == 5
+        write_all_there_is(folder, kind)
+        assert (contents(outside) if outside.is_dir() else outside.read_bytes()) == before, name
+
+
+def test_report_and_replay_refuse_a_folder_that_is_a_link_and_leave_what_lies_there(tmp_path):
+    run, theirs = a_run(tmp_path), tmp_path / "theirs"
+    theirs.mkdir()
+    for name in ("figure-99.svg", "case-3.parquet", "case-3.png"):
+        (theirs / name).write_bytes(b"mine")
+    for folder, verb in (("report-figures", ("report", "--format", "md")), ("replay", ("replay", "3"))):
+        (run / folder).rename(tmp_path / folder)
+        (run / folder).symlink_to(theirs)
+        said = call(verb[0], run, *verb[1:])
+        assert (said.exit_code, isinstance(said.exception, SystemExit)) == (5, True), said.output
+        assert f"{folder}: is a symbolic link" in said.stderr
+        assert f"{folder}: is a symbolic link" in " ".join(damage(run))
+        assert set(contents(theirs).values()) == {b"mine"}
+        assert len(contents(theirs)) == 3
+        (run / folder).unlink()
+        (tmp_path / folder).rename(run / folder)
+    (tmp_path / "alias").symlink_to(run)  # the way to the directory is the user's own
+    assert call("report", tmp_path / "alias", "--format", "md").exit_code == 0
+    assert call("verify", tmp_path / "alias").exit_code == 0
+
+
+@pytest.mark.parametrize("holds_folders", [True, False], ids=["by descriptor", "by path"])
+def test_names_lead_nowhere_but_into_the_directory(tmp_path, monkeypatch, holds_folders):
+    monkeypatch.setattr(durable_file, "_HOLDS_FOLDERS", holds_folders and durable_file._HOLDS_FOLDERS)
+    root, outside = tmp_path / "root", tmp_path / "outside"
+    for folder in (root / "in", outside):
+        folder.mkdir(parents=True)
+    (outside / "a").write_bytes(b"mine")
+    (root / "link").symlink_to(outside)
+    write_inside(root, "in/.a.tmp", b"new")
+    acts = (
+        lambda name: write_inside(root, name, b"theirs"),
+        lambda name: remove_file(root, name),
+        lambda name: publish(root, "in/.a.tmp", name),
+        lambda name: make_way(root, f"{name}/b"),
+        lambda name: read_inside(root, name),
+        lambda name: names_in(root, f"{name}/.."),
+    )
+    for act in acts:
+        for name in ("link/a", "../outside/a", "in/../../outside/a", f"{outside}/a", "", "in//a", "in/\0"):
+            with pytest.raises(StoreError):
+                act(name)
+    assert contents(outside) == {"a": b"mine"}
+    write_inside(root, "in/a", b"ours")
+    assert read_inside(root, "in/a") == b"ours"
+    assert names_in(root, "in") == ["a"]
+
+
+# What writes, replaces, removes or makes files and folders.
+WRITES = re.compile(
+    r"\.(?:write_bytes|write_text|unlink|touch|mkdir|rmdir|rename(?!\(columns)|symlink_to|hardlink_to)\("
+    r"|\bos\.(?:open|remove|replace|rename|rmdir|makedirs|truncate|link|symlink)\(|\bshutil\.|\btempfile\."
+    r"|\bopen\([^)\n]*[\"'](?:[wax]b?\+?|r?b?\+b?)[\"']"
+)
+ELSEWHERE = {
+    "mc_engine/durable_file.py": "the one place",
+    "mc_engine/kernel.py": "the cache of compiled kernels",
+    "mc_engine/object_store.py": "scratch folders beside a fetched copy",
+    "mc_engine/user_streams.py": "the null device",
+    "mc_engine/verbs_before_flight.py": "init makes a folder that the user named",
+    "mc_engine/documentation/website.py": "the site of the documentation",
+}
+
+
+def test_no_other_module_writes_files():
+    sources = [path for package in ("mc_engine", "reports") for path in sorted((ROOT / package).rglob("*.py"))]
+    assert len(sources) > 200
+    texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in sources}
+    assert {name for name, text in texts.items() if WRITES.search(text)} == {*ELSEWHERE}
+    assert Path(durable_file.__file__).name == "durable_file.py"

@@ -1,0 +1,63 @@
+"""What a writer leaves that was killed is told by `verify`, and is no damage."""
+
+import json
+
+import pytest
+from cart import call
+from small_run import block
+
+from mc_engine import parts
+from mc_engine.verification import RESUME
+
+STRAY = "cases/part-0000000010-0000000019.parquet"
+
+
+def leave(store, name):
+    """A file as the run's own writer makes it, without a line in the journal."""
+    if name == STRAY:
+        parts.write_part(store.path, store.columns, 10, 10, block(10, 10))
+    else:
+        (store.path / name).write_bytes(b"PAR1")
+
+
+@pytest.fixture
+def killed(store):
+    """A run with ten cases whose writer was killed."""
+    store.append(0, 10, block(0, 10))
+    (store.path / ".lock").write_text(json.dumps({"pid": 1, "host": "gone", "since": "then"}))
+    return store
+
+
+@pytest.mark.parametrize("name", [STRAY, "cases/.part-0000000010-0000000019.parquet.tmp", ".campaign.toml.tmp"])
+def test_what_a_kill_leaves_is_told_and_is_no_damage(killed, name):
+    leave(killed, name)
+    done = call("verify", killed.path)
+    assert done.exit_code == 0, done.output
+    assert f"{killed.path / name}: " in done.stderr
+    assert RESUME in done.stderr
+    assert done.stdout == f"{killed.path}: every byte is as it was written\n"
+    assert killed.verify() == []
+    with killed.lock():  # as `resume` does
+        assert not (killed.path / name).exists()
+    assert call("verify", killed.path).stderr == ""
+
+
+def test_a_part_without_a_line_is_damage_where_no_writer_was_killed(killed):
+    (killed.path / ".lock").write_bytes(b"")
+    leave(killed, STRAY)
+    assert killed.verify() == [f"{STRAY}: has no line in the journal and does not count"]
+    assert call("verify", killed.path).exit_code == 5
+
+
+def test_a_part_whose_line_is_damaged_is_damage_also_after_a_kill(killed):
+    killed_journal = killed.path / "journal.jsonl"
+    (killed.path / ".lock").write_bytes(b"")
+    killed.append(10, 10, block(10, 10))
+    killed.append(20, 10, block(20, 10))
+    (killed.path / ".lock").write_text(json.dumps({"pid": 1, "host": "gone", "since": "then"}))
+    lines = killed_journal.read_bytes().splitlines(keepends=True)
+    killed_journal.write_bytes(b"".join([*lines[:-2], lines[-2].replace(b"part", b"part "), lines[-1]]))
+    done = call("verify", killed.path)
+    assert done.exit_code == 5
+    assert f"journal.jsonl, line {len(lines) - 1}: damaged" in done.stderr
+    assert f"{STRAY}: has no line in the journal and does not count" in done.stderr
