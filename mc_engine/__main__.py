@@ -19,6 +19,8 @@ def main() -> None:
     from mc_engine.user_streams import user_streams
 
     listen()  # to Ctrl-C also while the rest is loaded
+    for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(library, "1")  # its threads wait for each other longer than the small matrices here take
     catch_all()
     refuse_small_memory()
     with user_streams():

@@ -23,7 +23,7 @@ from mc_engine.campaign_parts import (
     check_metric,
     check_requirements,
     check_retention,
-    check_room_for_correlations,
+    check_size,
     nominal_values,
     refusal,
 )
@@ -33,13 +33,13 @@ from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.case_table_file import read_case_table, table_dispersions
 from mc_engine.chain import chained_count, check_taken, take_inputs
 from mc_engine.covariances import spread_covariances
-from mc_engine.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, block_problem, level_count
+from mc_engine.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, level_count
 from mc_engine.dispersions import Dispersion, build_dispersion
 from mc_engine.distributions import Scalar
 from mc_engine.errors import CampaignError, ModelError, Problem
 from mc_engine.input_values import inputs_of
 from mc_engine.model import AdaptiveStep, Model, load_model
-from mc_engine.sobol import MAX_DIMENSIONS
+from mc_engine.sensitivity_design import SensitivityDesign, check_sensitivity
 from mc_engine.status import MOST_CASES
 from mc_engine.suggestions import hint
 from mc_engine.tuning_parts import Tuning, check_tuning
@@ -64,7 +64,6 @@ __all__ = [
 ]
 
 _LARGEST_FILE = 250_000  # bytes; more of them could take the reader of TOML longer than a second
-_LARGEST_HYPERCUBE = 10_000_000  # cases; a Latin hypercube is held in memory as a whole
 
 
 @dataclass(frozen=True)
@@ -77,6 +76,7 @@ class Campaign:
     table : the columns of the design "table", else empty.  tuning : what [tuning] says, if it is there.
     looks : numbers of cases at which a run that ends with its verdicts is judged; empty where all cases fly.
     messages : orbit messages beside the file that covariances were read from.
+    sensitivity : what [sensitivity] says, if it is there.
     digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
         cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
     """
@@ -104,6 +104,7 @@ class Campaign:
     first: "Campaign | None" = field(default=None, compare=False, repr=False)
     looks: tuple[int, ...] = ()
     messages: tuple[str, ...] = ()
+    sensitivity: SensitivityDesign | None = None
 
 
 def load_campaign(
@@ -193,7 +194,7 @@ def _assemble(
         rows = 0 if upstream is None else (first.cases if first is not None else upstream.rows.n_cases)
         count = chained_count(section, rows, inside) if rows else _case_count(section, dispersions, table, inside)
     if count is not None:
-        _check_size(count, design or "", dispersions, correlations, inside)
+        check_size(count, design or "", dispersions, correlations, inside)
     retention = Retention()
     if sections.retention is not None:
         retention = check_retention(sections.retention, model, count, shortened, found.under("retention"))
@@ -201,6 +202,10 @@ def _assemble(
     if sections.tuning is not None:
         names = [one.name for one in dispersions]
         tuning = check_tuning(sections.tuning, model, names, design, found.under("tuning"))
+    flown_before = None if upstream is None else upstream.name
+    sensitivity = check_sensitivity(
+        sections.sensitivity, model, dispersions, correlations, design, flown_before, found.under("sensitivity")
+    )
     if section is None or count is None or found.problems:
         return None
     return Campaign(
@@ -226,6 +231,7 @@ def _assemble(
         upstream=upstream,
         first=first,
         messages=messages,
+        sensitivity=sensitivity,
     )
 
 
@@ -356,22 +362,6 @@ def _case_count(
     if section.cases not in (None, count):
         found.add("cases", f'{section.cases} is not allowed; the design "{section.design}" has {count} cases by itself')
     return count
-
-
-def _check_size(
-    count: int, design: str, dispersions: tuple[Dispersion, ...], correlations: tuple[Correlation, ...], found: Findings
-) -> None:
-    if design == "lhs":
-        check_room_for_correlations(count, correlations, found)
-        if count > _LARGEST_HYPERCUBE:
-            found.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
-    most = {"sobol": MAX_DIMENSIONS, "saltelli": MAX_DIMENSIONS // 2}.get(design, len(dispersions))
-    if len(dispersions) > most:
-        found.add("design", f'"{design}" has at most {most} dispersions, here are {len(dispersions)}; use "mc"')
-    if design in IN_BLOCKS and not dispersions:
-        found.add("design", f'"{design}" needs a dispersion to find the effect of')
-    if sentence := block_problem(design, len(dispersions), count):
-        found.add("cases", sentence)
 
 
 def _digest(

@@ -42,6 +42,12 @@ def _not_tiny(value: float) -> float:
     return value
 
 
+def _not_an_end(share: float) -> float:
+    if not LEAST_SHARE <= share <= 1.0 - LEAST_SHARE:
+        raise PydanticCustomError("nearly_an_end", "nearly 0 or 1", {"least": LEAST_SHARE})
+    return share
+
+
 def _printable(value: str) -> str:
     """Text that is shown as it is written: nothing in it steers a terminal or hides from the eye."""
     if not value.replace("\n", "").replace("\t", "").isprintable():
@@ -62,7 +68,7 @@ Value = Annotated[
 ]
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Positive = Annotated[float, Field(gt=0.0, le=LARGEST), AfterValidator(_not_tiny)]
-Share = Annotated[float, Field(ge=LEAST_SHARE, le=1.0 - LEAST_SHARE)]
+Share = Annotated[float, Field(gt=0.0, lt=1.0), AfterValidator(_not_an_end)]
 
 
 class Section(BaseModel):
@@ -248,7 +254,10 @@ class RequirementSection(Section):
 class WorstSection(Section):
     metric: str = Field(description="a metric of the model")
     count: int = Field(default=5, ge=1, le=1000)
-    side: Literal["largest", "smallest"] = "largest"
+    side: Literal["largest", "smallest"] | None = Field(
+        default=None,
+        description="by default those with the smallest margin to a limit; without a requirement, the largest",
+    )
 
 
 def _one_or_many(value: Any) -> str:
@@ -267,7 +276,7 @@ class HistoriesSection(Section):
     first: int = Field(default=0, ge=0, le=100_000, description="the first cases")
     cases: list[Annotated[int, Field(ge=0)]] = Field(default_factory=list, description="these cases")
     rows: int = Field(default=1500, ge=10, le=1_000_000, description="about how many instants each history has")
-    worst: Worst | None = Field(default=None, description="the cases with the largest (or smallest) values of a metric")
+    worst: Worst | None = Field(default=None, description="the worst cases of a metric")
 
 
 class RetentionSection(Section):
@@ -355,14 +364,19 @@ AnyDispersion = (
 class InputsSection(Section):
     """[inputs]: parameters that every case takes from the same case of another run, flown before."""
 
-    source: str = Field(
-        alias="from", min_length=1, description='a run directory, or the campaign to be flown first, such as "deorbit"'
-    )
+    source: str = Field(alias="from", min_length=1, description='a run, or the campaign to be flown first: "deorbit"')
     columns: dict[str, str] = Field(
         default_factory=dict,
         description="parameter = column of that run; results that have a parameter's name need no line here",
     )
     note: Note = ""
+
+
+class SensitivitySection(Section):
+    """[sensitivity]: flights beside the cases, from which the contributions of inputs to each metric are computed."""
+
+    cases: int = Field(ge=32, le=10_000_000, description="base cases; each is flown twice, and once for each group")
+    group: dict[str, list[str]] = Field(default_factory=dict, description="dispersions computed together, by group")
 
 
 class CampaignFile(Section):
@@ -376,6 +390,7 @@ class CampaignFile(Section):
     inputs: InputsSection | None = Field(default=None, description="what is taken from another run, case by case")
     requirement: dict[str, RequirementSection] = Field(default_factory=dict)
     retention: RetentionSection = Field(default_factory=RetentionSection)
+    sensitivity: SensitivitySection | None = Field(default=None, description="contributions of the inputs")
     tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from mc_engine.campaign_file import CorrelationSection, RequirementSection, RetentionSection, WorstSection
 from mc_engine.campaign_problems import Findings
 from mc_engine.correlation import group_matrix, is_positive_definite
-from mc_engine.designs import IN_BLOCKS, RANDOM
+from mc_engine.designs import IN_BLOCKS, RANDOM, block_problem
 from mc_engine.dispersions import Dispersion
 from mc_engine.distributions import Scalar
 from mc_engine.errors import MOST_SHOWN
@@ -18,8 +18,10 @@ from mc_engine.input_values import accepted_range, check_value, inputs_of, numbe
 from mc_engine.model import Model, Parameter, Refusals, Setting
 from mc_engine.model_faults import naming_faults
 from mc_engine.preparation import call_prepare
+from mc_engine.sobol import MAX_DIMENSIONS
 from mc_engine.suggestions import hint, listed
 
+_LARGEST_HYPERCUBE = 10_000_000  # cases; a Latin hypercube is held in memory as a whole
 _CASES_PER_CORRELATED = 10  # a Latin hypercube with fewer may not have room for the correlations asked for
 
 
@@ -47,11 +49,11 @@ class Requirement:
 
 
 class Worst(NamedTuple):
-    """The `n_cases` cases with the "largest" or "smallest" values of a metric."""
+    """The `n_cases` worst cases of a metric: its "largest" or "smallest" values; of None, as its requirement says."""
 
     metric: str
     n_cases: int
-    side: str
+    side: str | None
 
 
 @dataclass(frozen=True)
@@ -151,6 +153,23 @@ def _check_correlated(name: str, by_name: Mapping[str, Dispersion], model: Model
 def rank_pairs(correlations: Sequence[Correlation]) -> tuple[tuple[str, str, float], ...]:
     """The correlations as plain tuples."""
     return tuple((one.first, one.second, one.rank) for one in correlations)
+
+
+def check_size(
+    count: int, design: str, dispersions: tuple[Dispersion, ...], correlations: tuple[Correlation, ...], found: Findings
+) -> None:
+    """Note a number of cases, or of dispersions, that the design cannot have."""
+    if design == "lhs":
+        check_room_for_correlations(count, correlations, found)
+        if count > _LARGEST_HYPERCUBE:
+            found.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
+    most = {"sobol": MAX_DIMENSIONS, "saltelli": MAX_DIMENSIONS // 2}.get(design, len(dispersions))
+    if len(dispersions) > most:
+        found.add("design", f'"{design}" has at most {most} dispersions, here are {len(dispersions)}; use "mc"')
+    if design in IN_BLOCKS and not dispersions:
+        found.add("design", f'"{design}" needs a dispersion to find the effect of')
+    if sentence := block_problem(design, len(dispersions), count):
+        found.add("cases", sentence)
 
 
 def check_room_for_correlations(cases: int, correlations: tuple[Correlation, ...], found: Findings) -> None:

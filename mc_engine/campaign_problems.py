@@ -26,6 +26,7 @@ from mc_engine.campaign_file import (
     RequirementSection,
     RetentionSection,
     Section,
+    SensitivitySection,
     TunedSection,
     TuningSection,
     Value,
@@ -57,6 +58,7 @@ _MESSAGES = {
     "greater_than_equal": "{shown} is not allowed; it must be at least {ge}",
     "less_than": "{shown} is not allowed; it must be below {lt}",
     "less_than_equal": "{shown} is not allowed; it must be at most {le}",
+    "nearly_an_end": "{shown} is not allowed; it must be away from 0 and 1 by {least} at least",
     "too_short": "{actual_length} given; at least {min_length} needed",
     "too_long": "{actual_length} given; at most {max_length} allowed",
     "string_too_short": "{shown} is empty",
@@ -100,6 +102,7 @@ class Sections:
     retention: RetentionSection | None
     tuning: "TuningSections | None"
     inputs: InputsSection | None
+    sensitivity: SensitivitySection | None
 
 
 @dataclass(frozen=True)
@@ -147,8 +150,14 @@ def read_sections(document: dict[str, Any], found: Findings) -> Sections:
         requirements=_read_each(_requirement, _freely_named(document, "requirement", found)),
         retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
         tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
-        inputs=read(InputsSection, document["inputs"], inside["inputs"]) if "inputs" in document else None,
+        inputs=_optional(InputsSection, document, inside),
+        sensitivity=_optional(SensitivitySection, document, inside),
     )
+
+
+def _optional(section: type[_AnySection], document: dict[str, Any], inside: dict[str, Findings]) -> _AnySection | None:
+    name = section.__name__.removesuffix("Section").lower()
+    return read(section, document[name], inside[name]) if name in document else None
 
 
 def read(section: type[_AnySection], raw: Any, found: Findings) -> _AnySection | None:

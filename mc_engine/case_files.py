@@ -9,24 +9,23 @@ import io
 import json
 import math
 import os
-import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mc_engine.campaign_file import LARGEST
 from mc_engine.durable_file import open_regular
 from mc_engine.errors import StoreError
-from mc_engine.numbers_in_text import is_real, real
+from mc_engine.numbers_in_text import is_real
 
 if TYPE_CHECKING:
     import pandas as pd
 
-MOST_CSV_BYTES, MOST_CSV_CELLS, MOST_OF_LINE = 2**28, 20_000_000, 2**20
+MOST_CSV_BYTES, MOST_CSV_CELLS = 2**28, 20_000_000
 MOST_PARQUET_BYTES, MOST_PARQUET_CELLS = 2**32, 2**28
 MOST_COLUMNS = 10_000
 _MOST_LINES = 5  # named in one sentence
@@ -34,6 +33,7 @@ _LONGEST_NAME = 60  # written out in one
 
 
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet calculates a cell that begins so
+_NUMBERS = (int, float, np.number, Decimal)  # of a table that has types
 _GUARD = "'"  # which makes it text
 
 
@@ -88,7 +88,7 @@ def _read_parquet(path: Path) -> dict[str, np.ndarray]:
 def open_beside(path: Path, most: int) -> Iterator[Any]:
     """The file, to be read as bytes; FileFault where it has more than `most`, or the system refuses."""
     try:
-        with os.fdopen(open_regular(path, os.O_RDONLY), "rb") as file:
+        with os.fdopen(open_regular(path.resolve(), os.O_RDONLY), "rb") as file:  # a link in one's own folder counts
             size = os.fstat(file.fileno()).st_size
             if size > most:
                 raise FileFault(f'"{path.name}" has {size:,} bytes; at most {most:,} are read of such a file')
@@ -101,17 +101,9 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
     with open_beside(path, MOST_CSV_BYTES) as binary:
         lines = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
         try:
-            return _columns(path, csv.reader(_short(path, lines), strict=True))
+            return _columns(path, csv.reader(lines, strict=True))
         except (UnicodeDecodeError, csv.Error) as error:
             raise FileFault(f'"{path.name}" is not CSV text in UTF-8: {error}') from None
-
-
-def _short(path: Path, lines: TextIO) -> Iterator[str]:
-    """The lines, none of which fills the memory."""
-    while line := lines.readline(MOST_OF_LINE):
-        if len(line) == MOST_OF_LINE:
-            raise FileFault(f'"{path.name}" has a line of more than {MOST_OF_LINE:,} letters')
-        yield line
 
 
 def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
@@ -129,7 +121,7 @@ def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
         elif len(columns[0]) == most:
             raise FileFault(f'"{path.name}" has more than {MOST_CSV_CELLS:,} cells; a Parquet file may have more')
         for column, cell in zip(columns, row, strict=False):
-            column.append(sys.intern(_as_meant(cell)))  # most tables repeat themselves
+            column.append(_as_meant(cell))
         if len(ragged) > _MOST_LINES:
             break
     if ragged:
@@ -190,11 +182,8 @@ def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
 
 def _number(cell: Any) -> float:
     """A cell as a number; NaN for one that is none."""
-    if isinstance(cell, str):
-        return real(cell) if is_real(cell) else math.nan
-    return (
-        float(cell) if isinstance(cell, float | np.floating | Decimal) else math.nan
-    )  # others are arrays of their own
+    known = is_real(cell) if isinstance(cell, str) else type(cell) is not bool and isinstance(cell, _NUMBERS)
+    return float(cell) if known else math.nan
 
 
 def words(path: Path, name: str, cells: np.ndarray, choices: Sequence[str]) -> np.ndarray:

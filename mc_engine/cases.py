@@ -12,6 +12,8 @@ from mc_engine.dispersions import Dispersion
 from mc_engine.distributions import Scalar, column, quantiles
 from mc_engine.errors import CampaignError, Problem
 from mc_engine.input_values import number
+from mc_engine.sensitivity_design import DESIGN as PICK_FREEZE
+from mc_engine.sensitivity_design import companion_table, upstream_ids
 from mc_engine.units import convert
 
 _UNITLESS_KEYS = ("log_sigma", "alpha", "beta")
@@ -27,7 +29,8 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
     """
     ids = _checked(campaign, case_ids)
     if campaign.upstream is not None:
-        taken = {name: values[ids] for name, values in campaign.upstream.table.items()}
+        rows = upstream_ids(campaign, ids)
+        taken = {name: values[rows] for name, values in campaign.upstream.table.items()}
         return taken if campaign.design == "table" else {**taken, **_random_table(campaign, ids)}
     if campaign.design == "table":
         return {name: values[ids] for name, values in campaign.table.items()}
@@ -60,6 +63,8 @@ def _checked(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
 
 
 def _random_table(campaign: Campaign, ids: np.ndarray) -> dict[str, np.ndarray]:
+    if campaign.design == PICK_FREEZE:
+        return companion_table(campaign, ids)
     names = [one.name for one in campaign.dispersions]
     pairs = rank_pairs(campaign.correlations)
     cube = unit_cube(campaign.design, campaign.seed, names, ids, campaign.cases, pairs)

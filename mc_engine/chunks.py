@@ -17,6 +17,7 @@ from mc_engine.flight import fly
 from mc_engine.kernel import usual_width
 from mc_engine.model_faults import naming_faults
 from mc_engine.parts import CASE_COLUMNS, Column, Part, Written, read_part, revised_name, write_aside
+from mc_engine.sensitivity_design import noise_ids, upstream_ids
 from mc_engine.status import OK, STATUS_NAME
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
@@ -123,7 +124,8 @@ def fly_cases(campaign: Campaign, case_ids: np.ndarray, batch: int | None = None
             piece = slice(begin, begin + batch)
             inputs = full_inputs(campaign, {name: column[piece] for name, column in table.items()})
             with guard(case_ids[piece]):
-                flights.append(fly(campaign.model, inputs, case_ids[piece], campaign.seed, folder=campaign.directory))
+                noise = noise_ids(campaign, case_ids[piece])
+                flights.append(fly(campaign.model, inputs, noise, campaign.seed, folder=campaign.directory))
     flight = flights[0] if len(flights) == 1 else _stacked(flights)
     name_upstream(campaign, case_ids, flight)
     return {**table, **flight}
@@ -136,7 +138,7 @@ def _stacked(tables: Sequence[Mapping[str, np.ndarray]]) -> Columns:
 def name_upstream(campaign: Campaign, case_ids: np.ndarray, flight: Columns) -> None:
     """Say of cases that have nothing to start from what became of theirs upstream."""
     if campaign.upstream is not None:
-        reasons = campaign.upstream.refusals(case_ids)
+        reasons = campaign.upstream.refusals(upstream_ids(campaign, case_ids))
         flight["reason"] = np.where(reasons != "", reasons, flight["reason"])
 
 

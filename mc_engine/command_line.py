@@ -41,7 +41,7 @@ class _Commands(TyperGroup):
         for param in command.params if command is not None else ():
             kind = copy(param.type)
             if kind.name.startswith(("int", "float")):
-                kind.convert = partial(_converted, param.type)
+                kind.convert = partial(_converted, param.type)  # type: ignore[method-assign]
                 param.type = kind
         return command
 

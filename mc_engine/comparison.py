@@ -1,12 +1,12 @@
-"""Two runs held against each other: which metrics, shares and requirements changed beyond chance, and what was changed.
+"""Comparison of two runs: which metrics, requirements and fractions of cases changed beyond chance.
 
 Cases are compared in pairs where both runs flew the same inputs under the same number, which takes what the inputs
 have in common out of the difference; else as two independent samples.  All tests of a comparison (shift and spread of
-each metric, the share of cases flown to their end, the share inside each requirement) hold together at `alpha`
+each metric, the fraction of cases completed, the fraction inside each requirement) hold together at `alpha`
 (Holm): if nothing changed, the chance of even one false alarm is at most alpha.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -16,13 +16,22 @@ import pandas as pd
 from mc_engine.errors import EngineError
 from mc_engine.run_changes import Difference, campaign_diff, campaign_differences, code_differences
 from mc_engine.statistics.change_tests import MetricChange, ShareChange, holm, metric_change, share_change
-from mc_engine.statistics.requirements import FAIL, NOT_DEMONSTRABLE, PASS, SAMPLING_DESIGNS, inside_limits, judge
+from mc_engine.statistics.requirements import (
+    FAIL,
+    NOT_DEMONSTRABLE,
+    PASS,
+    SAMPLING_DESIGNS,
+    Verdict,
+    inside_all,
+    judge_all,
+    was_looked_at,
+)
 from mc_engine.status import OK, STATUS_NAME
 
 ALPHA = 0.003  # one false alarm in some 300 comparisons; 0.3 sigma is still found with 1000 cases and dozens of metrics
 TOLERANCE = 1e-6  # standard deviations: smaller differences of a pair are rounding
 CONFIDENCE = 0.95
-FLOWN = "flown to its end"
+FLOWN = "completed"
 _RANK = {PASS: 0, NOT_DEMONSTRABLE: 1, FAIL: 2}
 
 
@@ -47,15 +56,34 @@ class Pairing:
 
 @dataclass(frozen=True)
 class VerdictChange:
-    """A requirement's verdict in each run, by that run's own limits; None where a run has no such requirement."""
+    """A requirement's verdict in each run, by that run's own limits; None where a run has no such requirement.
+
+    inside : by run, how many of its cases are inside the limits, of all.
+    """
 
     name: str
     before: str | None
     after: str | None
+    inside: tuple[tuple[int, int] | None, tuple[int, int] | None] = (None, None)
+
+    @property
+    def words(self) -> str:
+        """Such as "fail → pass", or "pass in both runs"."""
+        ends = [one or "not required" for one in (self.before, self.after)]
+        return " → ".join(ends) if ends[0] != ends[1] else f"{ends[0]} in both runs"
+
+    def inside_words(self, counted: Callable[[int], str]) -> str:
+        """Such as "877 → 10,000 of 10,000 cases inside"; counted : how a number of cases is written."""
+        a, b = self.inside
+        if a is None or b is None:
+            return ""
+        (passed, tried), (now, of) = a, b
+        before = counted(passed) if tried == of else f"{counted(passed)} of {counted(tried)}"
+        return f"{before} → {counted(now)} of {counted(of)} cases inside"
 
     @property
     def worse(self) -> bool:
-        """Whether it stands worse than before: passed, not demonstrable, failed."""
+        """Whether the verdict is worse than before, in the order pass, not demonstrable, fail."""
         return self.before is not None and self.after is not None and _RANK[self.after] > _RANK[self.before]
 
 
@@ -102,12 +130,12 @@ class Comparison:
 
     @property
     def worse_verdicts(self) -> tuple[VerdictChange, ...]:
-        """Requirements that stand worse on the same cases; on other cases chance alone may turn a verdict."""
+        """Requirements with a worse verdict on the same cases; on other cases chance alone may change a verdict."""
         return tuple(one for one in self.verdicts if one.worse) if self.pairing.paired else ()
 
     @property
     def changed(self) -> bool:
-        """Whether anything changed beyond chance, or a requirement stands worse on the same cases."""
+        """Whether anything changed beyond chance, or a requirement has a worse verdict on the same cases."""
         return bool(self.shifted or self.spread or self.moved_shares or self.worse_verdicts)
 
 
@@ -136,7 +164,7 @@ def compare_runs(
                       confidence=CONFIDENCE, tolerance=tolerance)
         for name in metrics
     ]  # fmt: skip
-    counted = {FLOWN: ok, **_inside(manifests[1], values)}
+    counted = {FLOWN: ok, **_inside(manifests[1], values, ok)}
     shares = [
         share_change(name, one[first], other[second], paired=pairing.paired, confidence=CONFIDENCE)
         for name, (one, other) in counted.items()
@@ -210,11 +238,11 @@ def _shared_metrics(
     return [name for name in shared if units[name][0] == units[name][1]], tuple(left_out)
 
 
-def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]]) -> dict[str, Any]:
+def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok: Any) -> dict[str, Any]:
     """bool[n] of both runs for each requirement of B: inside its limits."""
     return {
         str(record["name"]): tuple(
-            inside_limits(one[record["metric"]], record.get("at_most"), record.get("at_least")) for one in values
+            inside_all([record], one.__getitem__, flown) for one, flown in zip(values, ok, strict=True)
         )
         for record in manifest.get("requirements", [])
         if record["metric"] in values[0]
@@ -222,18 +250,23 @@ def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]]) ->
 
 
 def _verdicts(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
-    found: list[dict[str, str]] = []
+    found: list[dict[str, Verdict]] = []
     for manifest, table, flown in zip(manifests, tables, ok, strict=True):
         design = str(manifest["campaign"].get("design", "mc"))
-        records = [one for one in manifest.get("requirements", []) if design in SAMPLING_DESIGNS]
-        found.append(
-            {
-                str(one["name"]): judge(one, table[one["metric"]].to_numpy(dtype=np.float64), flown, design).outcome
-                for one in records
-            }
-        )
-    names = dict.fromkeys([*found[0], *found[1]])
-    return tuple(VerdictChange(name, found[0].get(name), found[1].get(name)) for name in names)
+        records = manifest.get("requirements", []) if design in SAMPLING_DESIGNS else []
+        looked = was_looked_at(manifest, len(table))
+        columns = {one["metric"]: table[one["metric"]].to_numpy(dtype=np.float64) for one in records}
+        judged, joint = judge_all(records, columns.__getitem__, flown, design, looked)
+        found.append({verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]})
+    changes = []
+    for name in dict.fromkeys([*found[0], *found[1]]):
+        a, b = (_told(one.get(name)) for one in found)
+        changes.append(VerdictChange(name, a[0], b[0], (a[1], b[1])))
+    return tuple(changes)
+
+
+def _told(verdict: Verdict | None) -> tuple[str | None, tuple[int, int] | None]:
+    return (None, None) if verdict is None else (verdict.outcome, (verdict.passed, verdict.tried))
 
 
 def _p_values(metrics: Any, shares: Any) -> list[float]:

@@ -6,23 +6,24 @@ import numpy as np
 
 from mc_engine.comparison import Comparison
 from mc_engine.run_changes import changed_lines
-from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange
+from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite
 
+_LEAST_P = 1e-12  # a smaller p-value means no more
 _HEADINGS = ("metric", "shift", "in sigma of A", "adjusted p", "spread B/A", "adjusted p", "used A, B")
 
 
 def comparison_lines(found: Comparison) -> Iterator[str]:
     """All that a reader needs to act on, the answer last."""
     for letter, name, cases, ok in zip("AB", found.names, found.cases, found.ok, strict=True):
-        yield f"{letter}  {name}: {cases:,} cases, {ok:,} flown to their end"
+        yield f"{letter}  {name}: {cases:,} cases, {ok:,} completed"
     yield found.pairing.reason
+    for one in found.verdicts:
+        inside = one.inside_words("{:,}".format)
+        yield f"requirement {one.name}: {one.words}{', ' if inside else ''}{inside}"
     yield from _changes(found)
     yield from _table(found)
     yield from (f"not compared: {sentence}" for sentence in found.left_out)
     yield from (_share_line(one, found.alpha) for one in found.shares)
-    for verdict in found.verdicts:
-        if verdict.before != verdict.after:
-            yield f"requirement {verdict.name}: {verdict.before or 'not there'} -> {verdict.after or 'not there'}"
     yield answer(found)
 
 
@@ -34,7 +35,7 @@ def answer(found: Comparison) -> str:
     parts = [
         _named("shift of", [one.metric for one in found.shifted]),
         _named("spread of", [one.metric for one in found.spread]),
-        _named("share", [one.name for one in found.moved_shares]),
+        _named("fraction", [one.name for one in found.moved_shares]),
         _named("requirement worse:", [one.name for one in found.worse_verdicts]),
     ]
     return f"changed: {'; '.join(part for part in parts if part)} ({held})"
@@ -45,10 +46,10 @@ def _named(what: str, names: list[str]) -> str:
 
 
 def _changes(found: Comparison) -> Iterator[str]:
-    yield f"code: {'as it was' if not found.code else ''}".rstrip()
+    yield f"code: {'unchanged' if not found.code else ''}".rstrip()
     yield from (f"  {line}" for line in changed_lines(found.code))
     same = not found.campaign and not found.diff
-    yield f"campaign: {'as it was' if same else ''}".rstrip()
+    yield f"campaign: {'unchanged' if same else ''}".rstrip()
     yield from (f"  {line}" for line in changed_lines(found.campaign))
     if found.diff and not found.campaign:
         yield from (f"  {line}" for line in found.diff)
@@ -56,13 +57,17 @@ def _changes(found: Comparison) -> Iterator[str]:
 
 def _table(found: Comparison) -> Iterator[str]:
     same = [one.metric for one in found.metrics if one.same]
-    rows = [_HEADINGS, *(_row(one, found) for one in found.metrics if not one.same)]
+    moved = sorted((one for one in found.metrics if not one.same and finite(one.shift)), key=lambda one: -one.effect)
+    rows = [_HEADINGS, *(_row(one, found) for one in moved)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADINGS))]
     for row in rows if len(rows) > 1 else []:
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         yield "  ".join(cells).rstrip()
     if same:
         yield f"the same in both runs: {', '.join(same)}"
+    absent = [one.metric for one in found.metrics if not one.same and not finite(one.shift)]
+    if absent:
+        yield f"without a number in one of the runs: {', '.join(absent)}"
 
 
 def _row(one: MetricChange, found: Comparison) -> tuple[str, ...]:
@@ -98,4 +103,4 @@ def _p(value: float, alpha: float) -> str:
     """The p-value, a star where it is significant."""
     if not np.isfinite(value):
         return "no test"
-    return f"{value:.2g}{' *' if value <= alpha else ''}"
+    return f"{f'{value:.2g}' if value >= _LEAST_P else '<1e-12'}{' *' if value <= alpha else ''}"

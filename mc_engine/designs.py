@@ -49,11 +49,12 @@ def _column(design: str, seed: int, name: str, dimension: int, case_ids: np.ndar
     if design == "mc":
         return uniforms(seed, name, case_ids)
     if design == "sobol":
-        return scrambled_sobol(_key(f"{seed}/{name}/sobol"), dimension, case_ids)
+        return scrambled_sobol(sobol_key(f"{seed}/{name}/sobol"), dimension, case_ids)
     return scrambled_halton(seed, name, dimension, case_ids)
 
 
-def _key(words: str) -> int:
+def sobol_key(words: str) -> int:
+    """The key that scrambles a Sobol' sequence, from its address."""
     return int.from_bytes(sha256(words.encode()).digest()[:8], "little")
 
 
@@ -94,7 +95,7 @@ def _saltelli(seed: int, names: Sequence[str], block: np.ndarray, row: np.ndarra
     for k, name in enumerate(names):
         a, b = (
             # Each with a key of its own: under one key the first points of all dimensions are the same.
-            scrambled_sobol(_key(f"{seed}/{name}/saltelli {which}"), 2 * k + place, block)
+            scrambled_sobol(sobol_key(f"{seed}/{name}/saltelli {which}"), 2 * k + place, block)
             for place, which in enumerate("ab")
         )
         columns.append(np.where((row == len(names) + 1) | (row == k + 1), b, a))

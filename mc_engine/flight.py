@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mc_engine.lanes.interpreted import InterpretedFlight
 
 Inputs = Mapping[str, Any]
+_NO_TABLES = np.empty(0)
 _MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
@@ -160,9 +161,14 @@ def _number(item: float | str | Callable[[Any], float], settings: Any) -> float:
     return float(getattr(settings, item) if isinstance(item, str) else item)
 
 
-def settings_of(model: Model, codes: np.ndarray) -> Any:
-    """The settings of one kernel call by symbol, codes and SI numbers, with the model's tables if it has any."""
-    return _settings_of(model, tuple(float(code) for code in codes))
+def settings_of(model: Model, codes: np.ndarray, tables: np.ndarray = _NO_TABLES) -> Any:
+    """The settings of one kernel call by symbol, codes and SI numbers, with the model's tables if it has any.
+
+    tables : of the cases, behind those of the model.
+    """
+    shared = _settings_of(model, tuple(float(code) for code in codes))
+    own = tables.size and model.tables is not None
+    return shared._replace(tables=np.concatenate([shared.tables, tables])) if own else shared
 
 
 @lru_cache(maxsize=64)
@@ -173,15 +179,11 @@ def _settings_of(model: Model, codes: tuple[float, ...]) -> Any:
     return chosen(*codes, np.ascontiguousarray(model.tables(chosen(*codes, np.empty(0))), dtype=np.float64))
 
 
-def _kernel_settings(model: Model, codes: np.ndarray, tables: np.ndarray) -> np.ndarray:
-    """The same as one array, as kernels take it: codes, then NaN, the last place of the tables, and the tables.
-
-    tables : of the cases, behind those of the model.
-    """
+def _kernel_settings(model: Model, codes: np.ndarray, chosen: Any) -> np.ndarray:
+    """The same as one array, as kernels take it: codes, then NaN, the last place of the tables, and the tables."""
     if model.tables is None:
         return codes
-    shared = settings_of(model, codes).tables
-    return np.concatenate([codes, [np.nan, shared.size + tables.size - 1.0], shared, tables])
+    return np.concatenate([codes, [np.nan, chosen.tables.size - 1.0], chosen.tables])
 
 
 def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
@@ -255,12 +257,12 @@ def _bound_kernel(
     kernel : in place of the model's own
     """
     parameters, settings, tables = inputs
-    refuse_unfit(model, parameters, settings_of(model, settings))
+    chosen = settings_of(model, settings, tables)
+    refuse_unfit(model, parameters, chosen)
     kernel = kernel or build_kernel(model, folder, width)
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
-    kernel_settings = _kernel_settings(model, settings, tables)
+    kernel_settings = _kernel_settings(model, settings, chosen)
     shared = np.ascontiguousarray(parameters), kernel_settings, np.uint64(noise_key(seed)), cases
-    chosen = settings_of(model, settings)
     if isinstance(clock, AdaptiveStep):
         return partial(kernel, *shared, *adaptive_arguments(model, clock, chosen), *out, history, float(pace))
     return partial(kernel, *shared, *grid_of(clock, chosen), *out, history, int(pace))
@@ -291,7 +293,8 @@ def fly_interpreted(
 ) -> tuple[tuple[np.ndarray, ...], "InterpretedFlight"]:
     """((time, status, states, metrics) of one case in SI, what its flight knows of numbers that are not finite).
 
-    By Python, some thousand times as long as by a kernel.  OutOfTime after so many seconds.  The case must be able to start.
+    By Python, which takes some thousand times as long as a kernel; OutOfTime after so many seconds.  The case must be
+    able to start.
     """
     from mc_engine.lanes.interpreted import InterpretedFlight  # which loads the compiler
 

@@ -13,11 +13,12 @@ from mc_engine.manifest import columns_of, sampling_digest
 from mc_engine.model import sources_of
 from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS
 from mc_engine.run_folder import readable
-from mc_engine.store import Store
+from mc_engine.sensitivity_design import companion
+from mc_engine.store import SENSITIVITY, Store
 from mc_engine.streams import SEED_CONTRACT
 from mc_engine.upstream import COMPANION
 
-_OWN = (*PART_FOLDERS, FIGURES, REPLAYS)  # folders of a run directory
+_OWN = (*PART_FOLDERS, SENSITIVITY, FIGURES, REPLAYS)  # folders of a run directory
 
 
 def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
@@ -31,7 +32,9 @@ def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
     flown_by = model.get("digest"), model.get("sampling_digest"), contract
     if None in (*flown_by, recorded.get("digest"), recorded.get("design"), recorded.get("seed")):
         raise StoreError(f"{store.path}: its manifest does not say how the campaign was flown; run the campaign anew")
-    cases = store.n_cases if recorded["design"] in ("lhs", *EXTENSIBLE) else None
+    beside = store.manifest.get("sensitivity")
+    drawn = beside if beside is not None else {"design": recorded["design"], "cases": store.n_cases}
+    cases = drawn["cases"] if drawn["design"] in ("lhs", *EXTENSIBLE) else None
     campaign = load_campaign(
         recorded["name"],
         cases=cases,
@@ -40,6 +43,8 @@ def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
         directory=directory or store.path,
         upstream=store.path / COMPANION,  # also where the manifest has none: a run leads nowhere else
     )
+    if beside is not None and campaign.sensitivity is not None:
+        campaign = companion(campaign)
     if campaign.digest != recorded["digest"]:
         raise StoreError(f"{store.path}: a file of the campaign was edited; run the campaign anew")
     ours = source_digest(campaign.model, campaign.directory), sampling_digest(), SEED_CONTRACT

@@ -68,7 +68,7 @@ def parts_of(model: Model, watching: bool) -> Parts:
 
 
 def functions_of(model: Model, makers: Any = None) -> Functions:
-    """The physics of a model and the picks of its fields.  makers : of the latter, `mc_engine.lanes.tuples` unless said"""
+    """The physics of a model, and picks of its fields as `makers` makes them: intrinsics unless said."""
     from mc_engine.lanes import tuples
 
     return Functions(

@@ -1,4 +1,4 @@
-"""Where a number of a model stopped being finite, in a sentence: file, line, source, and the numbers that were there."""
+"""Where a number of a model stopped being finite, in a sentence: file, line, source, and the numbers there."""
 
 import ast
 import math
@@ -11,6 +11,7 @@ import numpy as np
 from mc_engine.compiler_faults import is_the_users
 from mc_engine.lanes.number import Origin, Place
 from mc_engine.model import Model
+from mc_engine.model_faults import place_in_model
 from mc_engine.physics_scope import shortened
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 from mc_engine.trial_faults import chain_at
@@ -42,18 +43,16 @@ def first_lost(
     try:
         (_, status, _, _), flight = fly_interpreted(model, inputs, case_id, seed, seconds)
     except OutOfTime as late:
-        return (f"{who}: interpreted to find the line, the flight came to t = {late.t:.6g} s in {seconds:.0f} s, and was "
-                "finite until then; look at what its state and time at the end make of the physics")  # fmt: skip
+        return (f"{who}: the flight that looks for the line was given up after {seconds:.0f} s, at t = {late.t:.6g} s; "
+                "it was finite until then")  # fmt: skip
+    except ArithmeticError as error:  # of two numbers outside of the physics: kernels go on with an infinity
+        return f"{who}: the flight that looks for the line cannot go on from {place_in_model(error)}: {error}"
     if status[0] == NOT_FINITE:
         return sentence(flight.origin, who) if flight.origin is not None else ""
     for metric, value in zip(model.metrics, flight.metrics, strict=False):
-        if status[0] == OK and math.isnan(value) and not metric.sometimes and (origin := _origin_of(value)) is not None:
-            return f'"{metric.name}": {sentence(origin, who)}'
+        if status[0] == OK and math.isnan(value) and not metric.sometimes and value.origin is not None:
+            return f'"{metric.name}": {sentence(value.origin, who)}'
     return ""
-
-
-def _origin_of(value: Any) -> Origin | None:
-    return getattr(value, "origin", None)
 
 
 def sentence(origin: Origin, who: str = "") -> str:
@@ -62,11 +61,12 @@ def sentence(origin: Origin, who: str = "") -> str:
     happened = f"{_what(origin)} ({', '.join(one for one in (when, who) if one)})"
     if not origin.places:
         return happened
-    spot = next((one for one in origin.places if is_the_users(_file(one))), origin.places[-1])
-    if spot is not origin.places[0]:
+    ours = [one for one in origin.places if is_the_users(_file(one))] or [origin.places[-1]]
+    if ours[0] is not origin.places[0]:
         happened = f"in {_named(origin.places[0])}, {happened}"
-    text = _text(spot)
-    return f"{_named(spot)}: {text}: {happened}" if text else f"{_named(spot)}: {happened}"
+    if len(ours) > 1:
+        happened += f", called by {_named(ours[-1])}"
+    return ": ".join(filter(None, (_named(ours[0]), _text(ours[0]), happened)))
 
 
 def _what(origin: Origin) -> str:

@@ -2,6 +2,7 @@
 
 from dataclasses import asdict
 from hashlib import sha256
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from mc_engine.figures import to_record
 from mc_engine.input_values import inputs_of
 from mc_engine.journal import utc_now
 from mc_engine.kernel import source_digest
-from mc_engine.model import Field, Setting
+from mc_engine.model import Model, Named, Setting
 from mc_engine.parts import Column
 from mc_engine.provenance import engine_version, environment
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
@@ -27,8 +28,9 @@ _SAMPLING = (
     "distributions",
     "flight",
     "halton",
+    "sensitivity_design",
+    "block_layout",
     "sobol",
-    "sobol_numbers",
     "streams",
     "upstream",
 )
@@ -37,8 +39,8 @@ _SAMPLING = (
 def sampling_digest() -> str:
     """SHA-256 over the sources that draw the inputs of a case and hand them to its kernel."""
     digest = sha256()
-    for name in _SAMPLING:
-        digest.update(f"{name}\n".encode() + Path(__file__).with_name(f"{name}.py").read_bytes())
+    for name in (*(f"{name}.py" for name in _SAMPLING), "sobol_numbers.txt"):
+        digest.update(f"{name}\n".encode() + Path(__file__).with_name(name).read_bytes())
     return digest.hexdigest()
 
 
@@ -75,6 +77,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
         "inputs": [*_taken_inputs(campaign), *dispersion_records(campaign)],
         **_shared_inputs(campaign),
         "quantities": [_record(one) for one in model.quantities],
+        "ranges": _ranges(campaign.model),
         "requirements": [asdict(one) for one in campaign.requirements],
         "looks": list(campaign.looks),
         "figures": [*(to_record(figure) for figure in model.figures), *_taken_figures(campaign)],
@@ -114,8 +117,15 @@ def _taken_figures(campaign: Campaign) -> list[dict[str, Any]]:
     return [record for record in drawn if {record["x"], record["y"], record.get("metric", record["x"])} <= here]
 
 
-def _record(item: Field) -> dict[str, str]:
+def _record(item: Named) -> dict[str, str]:
     return {"name": item.name, "unit": item.unit, "description": item.description}
+
+
+def _ranges(model: Model) -> dict[str, list[float | None]]:
+    """Ends of the physical range of the metrics and quantities that have one; None for an open end."""
+    fields = [*model.quantities, *model.metrics]
+    ends = {one.name: [end if isfinite(end) else None for end in (one.low, one.high)] for one in fields}
+    return {name: pair for name, pair in ends.items() if pair != [None, None]}
 
 
 def _shared_inputs(campaign: Campaign) -> dict[str, list[dict[str, Any]]]:

@@ -3,6 +3,7 @@
 What is in it when the engine writes it, `mc_engine.manifest` says.
 """
 
+import json
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -13,6 +14,7 @@ from mc_engine.campaign_file import Share
 from mc_engine.errors import ModelError
 from mc_engine.figure_rules import refuse_kinds
 from mc_engine.figures import KINDS, from_record
+from mc_engine.journal import plain
 from mc_engine.parts import CASE_COLUMNS, Column
 from mc_engine.receipts import first_mistake
 from mc_engine.status import MOST_CASES
@@ -64,26 +66,22 @@ class _Shard(Record):
         return self
 
 
-class Described(_Named):
+class _Described(_Named):
+    """An input, parameter, setting or history quantity."""
+
     unit: str = ""
     description: str = ""
-
-
-class _Input(Described):
     nominal: Value = ""
+    value: Value = ""
+    overridden: bool = False
+    choices: list[Value] = []
     distribution: str = ""
     bounds: str = ""
     source: str = ""
     note: str = ""
 
 
-class _Shared(Described):
-    value: Value = ""
-    overridden: bool = False
-    choices: list[Value] = []
-
-
-class ColumnRecord(Described):
+class _Column(_Named):
     unit: str
     role: str
     description: str
@@ -147,16 +145,11 @@ class _Git(Record):
 
 
 class _Provenance(Record):
-    python: str = ""
-    platform: str = ""
-    cpu: str = ""
-    numba: str = ""
-    llvm: str = ""
     packages: dict[str, str] = {}
     git: _Git | None = None
 
 
-def _each_once(columns: list[ColumnRecord]) -> list[ColumnRecord]:
+def _each_once(columns: list[_Column]) -> list[_Column]:
     names = [column.name for column in columns]
     if names[: len(CASE_COLUMNS)] != [column.name for column in CASE_COLUMNS] or len({*names}) < len(names):
         raise ValueError("its columns are not those of a case table")
@@ -172,10 +165,10 @@ class Head(Record):
     seed_contract: int = 0
     campaign: _Campaign
     model: _Model = _Model()
-    inputs: list[_Input] = []
-    parameters: list[_Shared] = []
-    settings: list[_Shared] = []
-    quantities: list[Described] = []
+    inputs: list[_Described] = []
+    parameters: list[_Described] = []
+    settings: list[_Described] = []
+    quantities: list[_Described] = []
     requirements: list[_Requirement] = []
     looks: list[CaseNumber] = []
     figures: list[_Figure] = []
@@ -187,7 +180,7 @@ class Head(Record):
 
 class _Manifest(Head):
     shard: _Shard | None = None
-    columns: Annotated[list[ColumnRecord], AfterValidator(_each_once)]
+    columns: Annotated[list[_Column], AfterValidator(_each_once)]
 
     @model_validator(mode="after")
     def _requires_of_its_columns(self) -> "_Manifest":
@@ -201,10 +194,10 @@ class _UpstreamFacts(_Campaign):
     """What a copy of the run upstream says of itself; a case, also the nominal one, may have NaN for a metric."""
 
     cases: CaseNumber = 0
-    columns: Annotated[list[ColumnRecord], AfterValidator(_each_once)]
+    columns: Annotated[list[_Column], AfterValidator(_each_once)]
     nominal: dict[str, Annotated[float, Field(allow_inf_nan=True)] | int | str | bool]
     figures: list[_Figure] = []
-    inputs: list[_Input] = []
+    inputs: list[_Described] = []
     design: str
     seed: Seed
 
@@ -212,6 +205,16 @@ class _UpstreamFacts(_Campaign):
 def parse_manifest(content: bytes | str) -> dict[str, Any]:
     """What the bytes of a manifest say; ValueError with a sentence if no engine can have written them."""
     return checked_record(content, _Manifest, FORMAT)[0]
+
+
+def manifest_bytes(record: Mapping[str, Any]) -> bytes:
+    """The bytes of a manifest; ModelError where no engine would read it, for what the model says of itself."""
+    try:
+        content = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False, default=plain).encode()
+        _checked(_Manifest, from_json(content))
+    except ValueError as error:
+        raise ModelError(f"what the model says of itself fits into no manifest: {error}") from error
+    return content
 
 
 def parse_upstream(content: bytes | str) -> dict[str, Any]:

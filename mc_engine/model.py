@@ -33,13 +33,8 @@ DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}  # of events, and t
 
 
 @dataclass(frozen=True)
-class Field:
-    """A named number: column name ending in its unit, the unit, a one-line meaning.
-
-    Axes of figures say the name in words: `sun_angle_deg` is "sun angle [deg]"; of an input that is a symbol, such as
-    `ve_pct`, the meaning up to a comma or semicolon too.
-    sometimes : a metric that exists, or differs, only with some settings; `check` does not miss it.
-    """
+class Named:
+    """A named number: column name ending in its unit, the unit, a one-line meaning."""
 
     name: str
     unit: str
@@ -59,16 +54,34 @@ class Field:
 
 
 @dataclass(frozen=True)
-class Parameter(Field):
-    """An input that may differ from case to case.  Values outside [low, high] are refused."""
+class Field(Named):
+    """A named number: column name ending in its unit, the unit, a one-line meaning.
+
+    Axes of figures say the name in words: `sun_angle_deg` is "sun angle [deg]"; of an input that is a symbol, such as
+    `ve_pct`, the meaning up to a comma or semicolon too.
+    sometimes : a metric that exists, or differs, only with some settings; `check` does not miss it.
+    low, high : the physical range, such as low=0.0 of an eccentricity; reports show no normal ellipse that leaves it.
+    """
+
+    low: float = field(default=-np.inf, kw_only=True)
+    high: float = field(default=np.inf, kw_only=True)
+
+
+@dataclass(frozen=True)
+class Parameter(Named):
+    """An input that may differ from case to case.  Values outside [low, high] are refused.
+
+    random_draw : its value only names a random draw, as a seed does; its contribution is that of the random draws.
+    """
 
     default: float
     low: float = -np.inf
     high: float = np.inf
+    random_draw: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)
-class Setting(Field):
+class Setting(Named):
     """An input shared by all cases of one kernel call: a choice of words, a switch, a date, or a number.
 
     In kernels a choice is the index of the word in `choices`, a switch is 0.0 or 1.0, a date is a modified Julian date

@@ -74,7 +74,7 @@ def nominal_inputs(campaign: Campaign) -> tuple[Any, Any]:
         doing = "prepare"
         ready = prepare(model, campaign.nominal, FEW)
         doing = "tables"
-        settings = settings_of(model, ready.settings[0])
+        settings = settings_of(model, ready.settings[0], ready.tables)
     except EngineError:
         raise
     except SystemExit:

@@ -10,7 +10,18 @@ import numpy as np
 
 from mc_engine.errors import ModelError
 from mc_engine.figure_rules import refuse_false_figures
-from mc_engine.model import DIRECTIONS, AdaptiveStep, Event, Extremum, Field, FixedStep, Model, Parameter, Setting
+from mc_engine.model import (
+    DIRECTIONS,
+    AdaptiveStep,
+    Event,
+    Extremum,
+    Field,
+    FixedStep,
+    Model,
+    Named,
+    Parameter,
+    Setting,
+)
 from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_hint, unit_suffix
 
@@ -29,7 +40,7 @@ def refuse_contradictions(model: Model) -> None:
             raise ModelError(f"the model's `{word}` is {getattr(model, word)!r}; it must be a text")
     _refuse_other_records(model)
     _refuse_half_letters(model)
-    inputs: tuple[Field, ...] = (*model.parameters, *model.settings)
+    inputs: tuple[Named, ...] = (*model.parameters, *model.settings)
     for one in (*inputs, *model.states, *model.quantities, *model.metrics):
         _refuse_name(one)
     outputs: tuple[Field, ...] = (*model.metrics, *(Field(f"end_{one.name}", "", "") for one in model.states))
@@ -41,7 +52,9 @@ def refuse_contradictions(model: Model) -> None:
     _refuse_twice("extremum", [one.name for one in model.extrema])
     _refuse_twice("event", [one.name for one in model.event_list])
     for parameter in model.parameters:
-        _refuse_range(parameter)
+        _refuse_numbers(f'parameter "{parameter.name}"', parameter.default, parameter.low, parameter.high)
+    for one in (*model.states, *model.quantities, *model.metrics):
+        _refuse_numbers(f'"{one.name}"', one.low, one.high)
     for setting in model.settings:
         _refuse_choice(setting)
     for extremum in model.extrema:
@@ -85,7 +98,7 @@ def _refuse_half_letters(model: Model) -> None:
         raise ModelError(f'a text has {letter!a} after "{before}", which is no character; leave it out') from None
 
 
-def _refuse_name(one: Field) -> None:
+def _refuse_name(one: Named) -> None:
     for word, value in (("name", one.name), ("unit", one.unit), ("description", one.description)):
         if not isinstance(value, str):
             raise ModelError(f'"{one.name}" has {value!r} as its {word}; it must be a text')
@@ -98,10 +111,10 @@ def _refuse_name(one: Field) -> None:
     _refuse_word("name", one.symbol)
 
 
-def _refuse_range(parameter: Parameter) -> None:
-    for value in (parameter.default, parameter.low, parameter.high):
+def _refuse_numbers(what: str, *values: Any) -> None:
+    for value in values:
         if not isinstance(value, int | float | np.number) or isinstance(value, bool) or isnan(value):
-            raise ModelError(f'parameter "{parameter.name}" has {value!r} where a number is wanted, without quotes')
+            raise ModelError(f"{what} has {value!r} where a number is wanted, without quotes")
 
 
 def _refuse_choice(setting: Setting) -> None:

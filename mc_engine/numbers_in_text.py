@@ -20,10 +20,3 @@ def is_whole(text: str) -> bool:
 def is_real(text: str) -> bool:
     """True for the text of a number that float64 holds; it may be so large that it is read as infinite."""
     return _REAL.fullmatch(text) is not None
-
-
-def real(text: str) -> float:
-    """The number that a text is; ValueError if it is none.  Infinite where float64 does not hold it."""
-    if not is_real(text):
-        raise ValueError(f"{text!r} is not a number")
-    return float(text)

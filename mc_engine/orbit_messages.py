@@ -13,7 +13,7 @@ from datetime import datetime
 
 import numpy as np
 
-from mc_engine.numbers_in_text import real
+from mc_engine.numbers_in_text import is_real
 
 AXES = ("X", "Y", "Z", "X_DOT", "Y_DOT", "Z_DOT")
 LOCAL = ("RTN", "TNW")
@@ -146,11 +146,7 @@ def _plain_frame(name: str) -> str:
 
 
 def _number(line: int, text: str) -> float:
-    try:
-        value = real(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
+    if not (is_real(text) and np.isfinite(value := float(text))):
         raise MessageFault(f'line {line}: "{text}" is not a finite number')
     return value
 

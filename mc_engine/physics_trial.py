@@ -269,5 +269,5 @@ def _refuse_infinite(
             bad = np.ravel(value)[~np.isfinite(np.ravel(value))][0]
             lost = getattr(calling(name, function, *(_first(one) for one in arguments)), field)
             first = sentence(lost.origin) if getattr(lost, "origin", None) else f"{place_of(function)}: out of range"
-            raise Breach(f'{first}; so `{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal case; '
-                         "keep square roots, logarithms and divisions in range")  # fmt: skip
+            raise Breach(f'{first}; so `{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal '
+                         "case; keep square roots, logarithms and divisions in range")  # fmt: skip

@@ -11,6 +11,7 @@ from mc_engine.cases import case_table, full_inputs, nominal_row
 from mc_engine.chunks import NOMINAL_NOISE
 from mc_engine.flight import fly_history
 from mc_engine.parts import problem_of
+from mc_engine.statistics.worst import limits_on, worst_cases
 from mc_engine.status import OK, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
 from mc_engine.store import Store
 
@@ -65,11 +66,12 @@ def retained_cases(store: Store, campaign: Campaign) -> list[int]:
     wanted = campaign.retention
     chosen = [*range(min(wanted.first, store.n_cases)), *(case for case in wanted.cases if case < store.n_cases)]
     for worst in wanted.worst:
-        table = store.cases(["case_id", "status", worst.metric])
-        values = table.loc[table["status"] == STATUS_NAME[OK]].set_index("case_id")[worst.metric].dropna()
-        # a stable sort: equal values go by their case, whatever the order of the chunks
-        ranked = values.sort_index().sort_values(ascending=worst.side == "smallest", kind="stable")
-        chosen += [int(case) for case in ranked.index[: worst.n_cases]]
+        table = store.cases(["case_id", "status", worst.metric])  # by case, so that equal ones go by their number
+        limits = limits_on(worst.metric, [vars(one) for one in campaign.requirements]) if worst.side is None else None
+        rows = worst_cases(
+            table[worst.metric], table["status"] == STATUS_NAME[OK], worst.n_cases, worst.side != "smallest", limits
+        )
+        chosen += [int(case) for case in table["case_id"].to_numpy()[rows]]
     dangerous = _dangerous_cases(store)
     return [case for case in dict.fromkeys(chosen) if case not in dangerous]
 

@@ -28,6 +28,7 @@ from mc_engine.progress import ProgressCall
 from mc_engine.repair import mend_journal
 from mc_engine.retained_histories import history_frame
 from mc_engine.run_folder import default_folder
+from mc_engine.sensitivity_design import noise_ids
 from mc_engine.sessions import Session, complete, fly_failed, session_of
 from mc_engine.shards import Shard, merge_shards
 from mc_engine.store import JOURNAL, Store, create_store, open_store
@@ -194,7 +195,7 @@ def replay(path: str | Path, case_id: int) -> Replay:
     campaign = campaign_of(store)
     table = case_table(campaign, np.array([case_id]))
     inputs = full_inputs(campaign, _scalars(table))
-    flown = campaign.model, inputs, case_id, campaign.seed
+    flown = campaign.model, inputs, int(noise_ids(campaign, np.array([case_id]))[0]), campaign.seed
     flight, history = fly_history(*flown, folder=campaign.directory, width=1)
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from mc_engine.backends import Backend
 from mc_engine.campaign import Campaign
@@ -17,15 +17,19 @@ from mc_engine.crews import crew_of
 from mc_engine.dispatch import Dispatch
 from mc_engine.durable_file import remove_file
 from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
+from mc_engine.flown_campaign import companions_of
 from mc_engine.interruption import stop_signal
+from mc_engine.manifest import columns_of, manifest_of
 from mc_engine.part_bounds import Stretch, part_bounds, stretches
 from mc_engine.parts import Written, problem_of
 from mc_engine.progress import ProgressCall
-from mc_engine.repair import withdraw_damaged
+from mc_engine.repair import mend_journal, withdraw_damaged
 from mc_engine.retained_histories import write_histories
+from mc_engine.sensitivity_design import DESIGN as PICK_FREEZE
+from mc_engine.sensitivity_design import companion, sensitivity_record
 from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
-from mc_engine.store import JOURNAL, Store
+from mc_engine.store import JOURNAL, SENSITIVITY, Store, create_store, is_run_directory, open_store
 
 Settle = Callable[[Order, Written], None]
 
@@ -49,23 +53,32 @@ def session_of(
 
 
 def complete(store: Store, campaign: Campaign, session: Session, repair: bool = False) -> Store:
-    """Fly what is missing, then the histories.  repair : parts that are damaged are missing, too."""
+    """Fly what is missing, then the histories and the companion.  repair : parts that are damaged are missing, too."""
     with _resumable(store, "resume --repair" if repair else "resume", session) as stop:
-        if repair:
-            withdraw_damaged(store)
-        orders, size = _orders(store, session)
-        wanted = sum(order.stop - order.first for order in orders)
-        store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=wanted)
-        begin = time.perf_counter()
-        _keep_nominal(store, campaign, bool(orders))
-        compiled = time.perf_counter()
-        _fly(store, campaign, session, orders, lambda order, written: store.publish(written), stop.is_set)
-        if store.missing():
-            raise _interrupted(store)
-        flown = time.perf_counter()
-        _keep_histories(store, campaign, session, stop.is_set)
-        store.note("finished", prepare_s=round(compiled - begin, 3), fly_s=round(flown - compiled, 3))
+        _complete(store, campaign, session, repair, stop)
     return store
+
+
+def _complete(store: Store, campaign: Campaign, session: Session, repair: bool, stop: threading.Event) -> None:
+    """The same, for the writer of the run.  stop : is set where it is to end."""
+    if repair:
+        withdraw_damaged(store)
+    orders, size = _orders(store, session)
+    wanted = sum(order.stop - order.first for order in orders)
+    store.note("started", backend=session.backend.name, workers=session.workers, chunk=size, missing=wanted)
+    begin = time.perf_counter()
+    _keep_nominal(store, campaign, bool(orders))
+    compiled = time.perf_counter()
+    _fly(store, campaign, session, orders, lambda order, written: store.publish(written), stop.is_set)
+    if store.missing():
+        raise _interrupted(store)
+    flown = time.perf_counter()
+    _keep_histories(store, campaign, session, stop.is_set)
+    if campaign.sensitivity is not None and campaign.design != PICK_FREEZE and len(store.wanted) == store.n_cases:
+        _keep_companion(store, campaign, session, repair, stop)
+        if not store.notes("companion"):
+            store.note("companion")
+    store.note("finished", prepare_s=round(compiled - begin, 3), fly_s=round(flown - compiled, 3))
 
 
 @contextmanager
@@ -167,6 +180,29 @@ def _keep_histories(store: Store, campaign: Campaign, session: Session, stopped:
     whole = len(store.wanted) == store.n_cases
     if whole and not write_histories(store, campaign, session.workers, stopped):
         raise _interrupted(store)
+
+
+def _keep_companion(store: Store, campaign: Campaign, session: Session, repair: bool, stop: threading.Event) -> None:
+    """Fly or complete the flights beside the run, a run directory inside it."""
+    beside, path = companion(campaign), store.path / SENSITIVITY
+    if path.is_symlink():
+        raise StoreError(f"{path}: is a symbolic link; remove it, and `resume` flies into a folder of the run's own")
+    if not is_run_directory(path):
+        manifest = {**manifest_of(beside), "sensitivity": sensitivity_record(campaign)}
+        create_store(path, manifest, beside.text, columns_of(beside), companions_of(beside))
+    elif repair:
+        mend_journal(path)
+    done, flown = store.status_counts(), session.progress
+
+    def tell(cases: int, total: int, failed: int) -> None:
+        if flown is not None:
+            flown(sum(done.values()) + cases, sum(done.values()) + total, _failed(done) + failed)
+
+    inner = open_store(path)
+    if inner.manifest["campaign"]["digest"] != beside.digest:
+        raise StoreError(f"{path}: holds flights of another campaign; remove it, and `resume` flies them anew")
+    with inner.lock():
+        _complete(inner, beside, replace(session, progress=tell, chunk=None), repair, stop)
 
 
 def _keep_nominal(store: Store, campaign: Campaign, flying: bool) -> None:

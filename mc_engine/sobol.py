@@ -5,17 +5,24 @@ Good to 128 dimensions and 2**32 points; beyond, use the design "mc".
 """
 
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 
-from mc_engine.sobol_numbers import STARTING_NUMBERS
-
-MAX_DIMENSIONS = len(STARTING_NUMBERS) + 1
+MAX_DIMENSIONS = 128  # of the table in sobol_numbers.txt
 
 _BITS = 32
 _BLOCK = 8192  # points worked on at a time, so that they stay in cache
 _GROUP = 4  # digits scrambled with one hash: their 15 inner nodes take one bit each
 _ONE = np.uint64(1)
+
+
+@cache
+def _starting_numbers() -> list[tuple[int, list[int]]]:
+    """(primitive polynomial, m_1 ... m_s) of the dimensions from 2 on; the first has every m = 1 and needs none."""
+    lines = Path(__file__).with_name("sobol_numbers.txt").read_text(encoding="ascii").splitlines()
+    numbers = [[int(word) for word in line.split()] for line in lines if not line.startswith("#")]
+    return [(polynomial, start) for polynomial, *start in numbers]
 
 
 @cache
@@ -26,7 +33,7 @@ def direction_numbers(dimension: int) -> tuple[int, ...]:
     """
     if dimension == 0:
         return tuple(1 << (_BITS - k) for k in range(1, _BITS + 1))
-    polynomial, start = STARTING_NUMBERS[dimension - 1]
+    polynomial, start = _starting_numbers()[dimension - 1]
     degree = len(start)
     m = list(start)
     for k in range(degree, _BITS):

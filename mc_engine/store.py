@@ -8,7 +8,6 @@ its rows are right, but not yet counted.)  Manifest and campaign are never chang
 journal.  A `Store` is for one thread; one process at a time may write.
 """
 
-import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
@@ -24,11 +23,11 @@ from mc_engine import durable_file as disk
 from mc_engine import parts
 from mc_engine.companions import edited_files
 from mc_engine.directory_kinds import JOURNAL, MANIFEST, RUN, kind_of
-from mc_engine.errors import ModelError, StoreError
+from mc_engine.errors import StoreError
 from mc_engine.finished_parts import count_finished, leave_receipt
 from mc_engine.history_tables import history_columns, history_table, read_histories
-from mc_engine.journal import Entry, Journal, damaged_line, encode, plain, utc_now
-from mc_engine.manifest_file import cases_in, columns_in, parse_manifest
+from mc_engine.journal import Entry, Journal, damaged_line, encode, utc_now
+from mc_engine.manifest_file import cases_in, columns_in, manifest_bytes, parse_manifest
 from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
 from mc_engine.receipts import Range, Receipts, receipts_of
 from mc_engine.shell_words import shell_word
@@ -37,6 +36,7 @@ from mc_engine.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock, writer_of_n
 __all__ = ["JOURNAL", "Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
 
 CAMPAIGN, NOMINAL = "campaign.toml", "nominal.parquet"
+SENSITIVITY = "sensitivity"  # the run directory, inside a run, of the flights for contributions
 NO_FOLDER = "the folder is gone"
 _EDITED = "damaged or edited, it is not the one this run began with; put the original back"
 _OURS_BEFORE_THE_JOURNAL = {*LOCK_FILES, CAMPAIGN, MANIFEST, *PART_FOLDERS}
@@ -61,11 +61,7 @@ def create_store(
         names = {column.name for column in CASE_COLUMNS}
         columns = [*CASE_COLUMNS, *(column for column in columns if column.name not in names)]
         record = {**manifest, "columns": [asdict(column) for column in columns]}
-        content = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False, default=plain).encode()
-        try:
-            parse_manifest(content)  # what this engine would not read, it does not write
-        except ValueError as error:
-            raise ModelError(f"what the model says of itself fits into no manifest: {error}") from error
+        content = manifest_bytes(record)
         text = campaign_text.encode()
         for name, companion in companions.items():
             disk.make_way(path, name)

@@ -53,7 +53,7 @@ def _written(text: str) -> str:
 
 def catch_all() -> None:
     """From here on warnings, and errors of threads, are a sentence each on standard error, and no Python source."""
-    warnings.showwarning = _tell_warning
+    warnings.showwarning = _tell_warning  # type: ignore[assignment]
     threading.excepthook = lambda facts: _tell_error(facts.exc_value)
     sys.unraisablehook = lambda facts: _tell_error(facts.exc_value)
 

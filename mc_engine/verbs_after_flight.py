@@ -23,7 +23,7 @@ from mc_engine.interruption import advise
 from mc_engine.shell_words import shell_word
 from mc_engine.verbs_of_object_stores import echo_publication
 
-REPORT_FORMATS = ("html", "pdf", "md")
+REPORT_FORMATS = ("html", "pdf", "md", "json")
 
 
 @app.command()
@@ -35,7 +35,9 @@ def report(
     kind: Annotated[
         str | None,
         typer.Option(
-            "--format", help="html, pdf or md; html and pdf by default.", autocompletion=beginning(REPORT_FORMATS)
+            "--format",
+            help="html, pdf, md or json; by default html and pdf, with the data as json.",
+            autocompletion=beginning(REPORT_FORMATS),
         ),
     ] = None,
     template: Annotated[

@@ -1,4 +1,4 @@
-"""The verb that holds two runs against each other: compare."""
+"""The command that compares two runs: compare."""
 
 import importlib
 from pathlib import Path
@@ -31,7 +31,8 @@ def compare(
 ) -> None:
     """What changed from run A to run B beyond chance.
 
-    Exit status 0: no significant change; 1: a metric or share changed, or a requirement stands worse on the same cases.
+    Exit status 0: no significant change; 1: a metric or a fraction of cases changed, or a requirement has a
+    worse verdict on the same cases.
     """
     wrong = [path for path in report or [] if path.suffix not in (".html", ".pdf")]
     if wrong:
@@ -46,8 +47,8 @@ def compare(
     for line in comparison_lines(found):
         typer.echo(line)
     for path in report or []:
-        # As for the reports of a run: looked for only where they are asked for.
-        importlib.import_module("reports.compare").write_comparison(found, path)
+        # As for the reports of a run: imported only where they are asked for.
+        importlib.import_module("reports.compare").write_comparison(found, path, (a, b))
         typer.echo(str(path))
     if found.changed:
         raise typer.Exit(CHANGED)

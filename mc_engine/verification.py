@@ -22,7 +22,7 @@ from mc_engine.parts import PART_FOLDERS, Part, is_part_file, problem_of, read_p
 from mc_engine.receipts import Receipts, receipts_of, without_lost
 from mc_engine.result_folder import VERBS, read_result, result_files
 from mc_engine.shell_words import shell_word
-from mc_engine.store import CAMPAIGN, CUT_SHORT, JOURNAL, MANIFEST, NO_FOLDER, NOMINAL
+from mc_engine.store import CAMPAIGN, CUT_SHORT, JOURNAL, MANIFEST, NO_FOLDER, NOMINAL, SENSITIVITY
 from mc_engine.writer_lock import LOCK_NAME, holder, is_left_by_dead
 
 # What mends a damage, with the directory in braces, and its file.
@@ -124,9 +124,20 @@ def _run_damages(run: Path) -> tuple[list[Damage], Collection[str]]:
     if not busy:
         problems += _uncounted(run, lying, counted, remedy)
         problems += _unfinished(journal, counted, manifest, remedy)
+        problems += _beside(run, journal)
     if killed:
         problems += _half_written(run)
     return problems, begun
+
+
+def _beside(run: Path, journal: Scan) -> Iterator[Damage]:
+    """What is wrong with the flights beside the run, which its last session made or completed."""
+    flown = any(entry.event == "companion" for entry in journal.entries)
+    if flown and not _is_folder(run / SENSITIVITY):
+        yield Damage(f"{SENSITIVITY}: {NO_FOLDER}", REPAIR)
+    elif _is_folder(run / SENSITIVITY):
+        for one in damages(run / SENSITIVITY) if kind_of(run / SENSITIVITY) == RUN else ():
+            yield Damage(f"{SENSITIVITY}/{one.what}", one.mended_by)
 
 
 def _cases(manifest: dict[str, Any] | None) -> int | None:

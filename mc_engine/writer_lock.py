@@ -162,7 +162,7 @@ def _system_locks(folder: Path, names: tuple[str, ...], held: ExitStack, flags: 
             descriptor = open_regular(path, os.O_RDWR | more)
         held.callback(_let_go, descriptor)
         try:
-            _system_lock(descriptor)
+            _system_lock(descriptor, take=True)
         except OSError as error:
             if error.errno in _UNSUPPORTED:
                 return []
@@ -198,8 +198,8 @@ def _is_at(path: Path, descriptor: int) -> bool:
 
 
 def _let_go(descriptor: int) -> None:
-    with suppress(OSError):
-        _system_unlock(descriptor)
+    with suppress(OSError):  # closing alone would leave the lock with a forked child that still has the descriptor
+        _system_lock(descriptor, take=False)
     os.close(descriptor)
 
 
@@ -209,26 +209,18 @@ if os.name == "nt":
     def _locked_files(name: str, journal: str) -> tuple[str, ...]:
         return (name,)  # an open file can neither be deleted nor replaced here
 
-    def _system_lock(descriptor: int) -> None:
+    def _system_lock(descriptor: int, take: bool) -> None:
         # Windows locks bytes against reading too: one far behind the record leaves the record readable.
         os.lseek(descriptor, 1 << 20, os.SEEK_SET)
-        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
-
-    def _system_unlock(descriptor: int) -> None:
-        os.lseek(descriptor, 1 << 20, os.SEEK_SET)
-        msvcrt.locking(descriptor, msvcrt.LK_UNLCK, 1)  # type: ignore[attr-defined, unused-ignore]
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK if take else msvcrt.LK_UNLCK, 1)  # type: ignore[attr-defined, unused-ignore]
 else:
     import fcntl
 
     def _locked_files(name: str, journal: str) -> tuple[str, ...]:
         return (name, journal)
 
-    def _system_lock(descriptor: int) -> None:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-    def _system_unlock(descriptor: int) -> None:
-        # Closing alone would leave the lock with a forked child that still has the descriptor.
-        fcntl.flock(descriptor, fcntl.LOCK_UN)
+    def _system_lock(descriptor: int, take: bool) -> None:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB if take else fcntl.LOCK_UN)
 
 
 def _is_at_work(record: dict[str, Any] | None, locked: list[int]) -> bool:
@@ -268,7 +260,12 @@ def _start(pid: int) -> int | None:
 
 def _read(path: Path) -> dict[str, Any] | None:
     """The record in a lock file; {} if it holds anything else, None if nothing."""
-    content = read_short(path) if os.path.lexists(path) else b""
+    try:
+        content = read_short(path) if os.path.lexists(path) else b""
+    except StoreError:
+        if os.path.lexists(path):
+            raise
+        content = b""  # somebody deleted it meanwhile
     try:
         record = json.loads(content) if content.strip(b"\0 \n") else None
     except (ValueError, RecursionError):

@@ -1,14 +1,17 @@
 """Single cases: the worst, the failed, and all of them when there are only a few; each can be repeated alone."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from mc_engine.shell_words import shell_word
+from mc_engine.statistics.contributors import Contributor, contributors
+from mc_engine.statistics.worst import Limits
 from reports.document import Cell, Column, Table
 from reports.flown import ColumnFacts, Flown
-from reports.numbers import axis_label, count, exact, number, with_unit
+from reports.numbers import axis_label, column_texts, count, exact, number, with_unit
+from reports.outcomes import inside
 
 WORST = 5
 WORST_METRICS = 4
@@ -30,17 +33,14 @@ def case_table(flown: Flown) -> Table | None:
         *(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.5) for fact in metrics),
         Column("Status", "code", 1.2),
     )
-    values = [flown.values(fact.name) for fact in metrics]
-    rows = tuple(
-        (
-            Cell(str(case), int(case), case=int(case)),
-            *(_input_cell(flown.cases[fact.name].iloc[row]) for fact in inputs),
-            *(Cell(number(column[row]), _sortable(column[row])) for column in values),
-            Cell(str(flown.cases["status"].iloc[row])),
-        )
-        for row, case in enumerate(flown.case_ids)
-    )
-    return Table("Case by case", columns, rows, "Inputs that are the same in all cases stand under Inputs.")
+    cells = [
+        [Cell(str(case), int(case), case=int(case)) for case in flown.case_ids],
+        *(_input_cells(flown.cases[fact.name]) for fact in inputs),
+        *(_number_cells(flown.values(fact.name)) for fact in metrics),
+        [Cell(str(word)) for word in flown.cases["status"]],
+    ]
+    rows = tuple(zip(*cells, strict=True))
+    return Table("Case by case", columns, rows, "Inputs that are the same in all cases are listed under Inputs.")
 
 
 def _sortable(value: float) -> float | None:
@@ -56,7 +56,7 @@ def input_words(flown: Flown, row: int) -> str:
     """What sets a case apart, for the key of a figure: its first two inputs that vary."""
     parts = []
     for fact in varying_inputs(flown)[:2]:
-        value = with_unit(_input_cell(flown.cases[fact.name].iloc[row]).text, fact.unit)
+        value = with_unit(_input_cells(flown.cases[fact.name])[row].text, fact.unit)
         parts.append(f"{flown.words(fact.name)} {value}")
     return ", ".join(parts)
 
@@ -66,46 +66,65 @@ def worst_tables(flown: Flown) -> Iterator[Table]:
     for metric in flown.key_metrics[:WORST_METRICS]:
         rows = flown.worst(metric, WORST)
         if rows.size and not flown.summaries[metric].constant:
-            which = "largest" if flown.large_is_bad(metric) else "smallest"
-            yield _case_table(flown, f"Cases with the {which} {flown.words(metric)}", metric, rows)
+            yield _case_table(flown, _worst_words(flown, metric), metric, rows)
     failed = np.flatnonzero(~flown.ok)
     if failed.size:
         title = f"Failed cases: the first {min(FAILED_SHOWN, failed.size)} of {count(failed.size)}"
         yield _case_table(flown, title, None, failed[:FAILED_SHOWN])
 
 
+def _worst_words(flown: Flown, metric: str) -> str:
+    limits = flown.limits(metric)
+    if not limits.two_sided:
+        return f"Cases with the {'smallest' if limits.at_least is not None else 'largest'} {flown.words(metric)}"
+    ends = [with_unit(number(end), flown.unit(metric)) for end in (limits.at_least, limits.at_most)]
+    return f"Cases with the smallest margin of {flown.words(metric)} to its limits, {ends[0]} and {ends[1]}"
+
+
 def _case_table(flown: Flown, caption: str, metric: str | None, rows: np.ndarray) -> Table:
-    inputs = flown.with_role("dispersion")
-    shown = inputs[:INPUTS_SHOWN]
-    result = (
-        Column(axis_label(flown.words(metric), flown.unit(metric)), "number", 1.6)
-        if metric
-        else Column("Status", "code", 1.4)
-    )
-    columns = (
-        Column("Case", "number", 0.9),
-        result,
-        *(Column(axis_label(fact.name, fact.unit), "number", 1.3) for fact in shown),
-        Column("Repeat it alone", "code", 3.6),
-    )
-    values = flown.values(metric) if metric else None
-    cells = []
-    for row in rows:
-        case = int(flown.case_ids[row])
-        outcome = (
-            Cell(str(flown.cases["status"].iloc[row]))
-            if values is None
-            else Cell(number(values[row]), float(values[row]))
-        )
-        drawn = (_input_cell(flown.cases[fact.name].iloc[row]) for fact in shown)
-        replay = Cell(f"mc-engine replay {shell_word(flown.name)} {case}")
-        cells.append((Cell(count(case), case, case=case), outcome, *drawn, replay))
-    hidden = len(inputs) - len(shown)
-    note = f"{hidden} more dispersed inputs stand in the case table." if hidden > 0 else ""
-    return Table(caption, columns, tuple(cells), note)
+    """Cases with their status, or a metric and its margin, the inputs that contribute most, and the command to replay.
+
+    Without a metric the inputs are those that contribute most to being inside all limits.
+    """
+    inside_of = inside(flown).astype(np.float64)
+    found = flown.contributors(metric) if metric else contributors(flown.inputs, inside_of)
+    found = found or [Contributor(name, np.nan) for name in flown.inputs]
+    shown = [flown.columns[one.name] for one in found[:INPUTS_SHOWN]]
+    columns = [Column("Case", "number", 0.9)]
+    cells = [[Cell(count(int(case)), int(case), case=int(case)) for case in flown.case_ids[rows]]]
+    if metric is None:
+        columns.append(Column("Status", "code", 1.4))
+        cells.append([Cell(str(word)) for word in flown.cases["status"].iloc[rows]])
+    else:
+        values, limits = flown.values(metric)[rows], flown.limits(metric)
+        columns.append(Column(axis_label(flown.words(metric), flown.unit(metric)), "number", 1.6))
+        cells.append(_number_cells(values))
+        if limits != Limits():
+            columns.append(Column("Margin", "number", 1.3))
+            cells.append(_number_cells(limits.margins(values) * limits.width))
+    for fact in shown:
+        columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.3))
+        cells.append(_input_cells(flown.cases[fact.name].iloc[rows]))
+    columns.append(Column("Command to replay", "code", 3.6))
+    cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in flown.case_ids[rows]])
+    return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, found, len(shown)))
 
 
-def _input_cell(value: Any) -> Cell:
-    if isinstance(value, str | bool | np.bool_):
-        return Cell(exact(bool(value) if isinstance(value, np.bool_) else value))
-    return Cell(number(float(value), 4), _sortable(float(value)))
+def _inputs_said(flown: Flown, found: list[Contributor], shown: int) -> str:
+    """Which inputs the columns are of."""
+    hidden = len(flown.with_role("dispersion")) - shown
+    if hidden <= 0:
+        return ""
+    which = "the strongest contributors" if np.isfinite(found[0].share) else "the first"
+    return f"Inputs: {which}; the case table holds {count(hidden)} more."
+
+
+def _input_cells(column: pd.Series) -> list[Cell]:
+    if pd.api.types.is_bool_dtype(column) or not pd.api.types.is_numeric_dtype(column):
+        return [Cell(exact(value if isinstance(value, str) else bool(value))) for value in column]
+    return _number_cells(column.to_numpy(dtype=np.float64))
+
+
+def _number_cells(values: np.ndarray) -> list[Cell]:
+    texts = column_texts(values.tolist())
+    return [Cell(text, _sortable(value)) for text, value in zip(texts, values.tolist(), strict=True)]

@@ -10,31 +10,41 @@ from mc_engine.run_folder import readable
 from mc_engine.store import open_store
 from mc_engine.tuning_folder import open_tuning
 from reports.contents import build, titled
+from reports.data import FILE as JSON
+from reports.data import render_json
 from reports.document import Attachment, Document
 from reports.flown import Flown
 from reports.html import render_html
 from reports.markdown import FILE, figure_files, render_markdown
 from reports.pdf import render_pdf
-from reports.pictures import Pictures
 from reports.rare_events import build_rare_event
 from reports.tuning import build_tuning
 from reports.user_sections import RunFacts, TemplateError, run_facts, with_own_sections
 
 
-def _html(document: Document, pictures: Pictures) -> list[Attachment]:
+def _html(document: Document) -> list[Attachment]:
     return [Attachment("report.html", render_html(document))]
 
 
-def _pdf(document: Document, pictures: Pictures) -> list[Attachment]:
-    return [Attachment("report.pdf", render_pdf(document, pictures))]
+def _pdf(document: Document) -> list[Attachment]:
+    return [Attachment("report.pdf", render_pdf(document))]
 
 
-def _markdown(document: Document, pictures: Pictures) -> list[Attachment]:
-    return [Attachment(FILE, render_markdown(document)), *figure_files(document, pictures)]
+def _json(document: Document) -> list[Attachment]:
+    return [Attachment(JSON, render_json(document))]
+
+
+def _markdown(document: Document) -> list[Attachment]:
+    return [Attachment(FILE, render_markdown(document)), *figure_files(document)]
 
 
 # The first file of each is the report, the others belong to it.
-FORMATS: dict[str, Callable[[Document, Pictures], list[Attachment]]] = {"html": _html, "pdf": _pdf, "md": _markdown}
+FORMATS: dict[str, Callable[[Document], list[Attachment]]] = {
+    "html": _html,
+    "pdf": _pdf,
+    "md": _markdown,
+    "json": _json,
+}
 USUAL = ("html", "pdf")
 
 
@@ -44,7 +54,7 @@ def write_reports(
     template: str | Path | None = None,
     beside: Sequence[str | Path] = (),
 ) -> list[Path]:
-    """Write report.html, report.pdf and report.md (those asked for) into the directory of a run or tuning.
+    """Write the reports asked for, and report.json, into the directory of a run, a tuning or a rare event.
 
     template : a file with sections of the user's own; it sees this run and those of `beside`, see `user_sections`.
     Returns the paths of the reports and of files that belong to them (a footprint's KML), not of a Markdown report's
@@ -55,11 +65,13 @@ def write_reports(
         raise ValueError(f'"{unknown[0]}" is no format of a report; use {", ".join(FORMATS)}')
     path = Path(run_path)
     document = _document(path, Path(template) if template else None, [Path(other) for other in beside])
-    pictures, written, kept = Pictures(), [], derived_files(path)
+    written, kept = [], derived_files(path)
     for name in dict.fromkeys(formats):
-        files = FORMATS[name](document, pictures)
+        files = FORMATS[name](document)
         kept.write({file.name: file.content for file in files}, alone_in=FIGURES if files[1:] else None)
         written.append(path / files[0].name)
+    if "json" not in formats:
+        kept.write({JSON: render_json(document)})
     if document.files:
         kept.write({file.name: file.content for file in document.files})
     return written + [path / file.name for file in document.files]

@@ -33,18 +33,26 @@ def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.nda
     def placed(outline: np.ndarray) -> np.ndarray:
         return in_units(centre + outline * scale, exponent)
 
-    return tuple(_regions((points - centre) / scale, placed))
+    ranges = np.transpose([flown.range(name) for name in names])
+    return tuple(_regions((points - centre) / scale, placed, ranges))
 
 
-def _regions(points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray]) -> Iterator[CloudRegion]:
+def _regions(
+    points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray], ranges: np.ndarray
+) -> Iterator[CloudRegion]:
+    """Regions of standardised points.  ranges : float64[2, 2], lowest and highest possible x and y.
+
+    A normal distribution whose ellipse reaches what is impossible is not that of these metrics: no ellipse then.
+    """
     n = count(len(points))
-    for one in covariance_ellipses(points, ELLIPSES, THINNEST):
-        held = f"really holds {count(one.inside)} of {n}, {percent(one.inside / one.n, 1)}"
-        text = f"ellipse of a normal cloud's {percent(one.content)} (χ²): {held}"
-        yield CloudRegion(True, text, (placed(one.outline()),))
+    ellipses = [(one, placed(one.outline())) for one in covariance_ellipses(points, ELLIPSES, THINNEST)]
+    if all((ranges[0] <= outline).all() and (outline <= ranges[1]).all() for _, outline in ellipses):
+        for one, outline in ellipses:
+            held = f"holds {count(one.inside)} of {n} cases, {percent(one.inside / one.n, 1)}"
+            yield CloudRegion(True, f"{percent(one.content)} ellipse of a normal distribution: {held}", (outline,))
     for region in density_regions(points, (REGION,), CONFIDENCE, THINNEST):
         text = (
-            f"at least {percent(region.content)} of all flights, {percent(region.confidence)} confidence, any shape: "
-            f"holds {count(region.inside)} of {n}"
+            f"distribution-free region, at least {percent(region.content)} with {percent(region.confidence)} "
+            f"confidence: holds {count(region.inside)} of {n} cases"
         )
-        yield CloudRegion(False, text, tuple(map(placed, region.outlines)))
+        yield CloudRegion(False, text, tuple(np.clip(placed(outline), *ranges) for outline in region.outlines))

@@ -8,15 +8,19 @@ import numpy as np
 from mc_engine.comparison import CONFIDENCE, Comparison, VerdictChange
 from mc_engine.durable_file import write_durably
 from mc_engine.run_changes import Difference
-from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite
+from mc_engine.statistics.change_tests import UNKNOWN, Estimate, MetricChange, ShareChange, finite
+from reports.comparison_overlays import overlay_blocks
 from reports.contents import blocks
-from reports.document import Card, Cell, Column, Document, FigureBlock, Section, Table, Terms, numbered
+from reports.document import Block, Card, Cell, Column, Document, FigureBlock, Section, Table, Terms, numbered
 from reports.figures.changes import ChangeDrawing, ChangePanel
+from reports.flown import Flown, Run
 from reports.html import render_html
 from reports.numbers import count, number, percent, with_unit, words
 from reports.pdf import render_pdf
 
 MOST_ROWS = 40  # of the figure
+LEAST_P = 1e-12  # a smaller p-value means no more
+WIDEST, FEW_SIGMA = 20.0, 5.0  # the axis of shifts: so many medians, or so many σ at least
 GLOSSARY = Terms(
     (
         (
@@ -29,41 +33,53 @@ GLOSSARY = Terms(
             "The same case, with the same inputs, in both runs: what the inputs do is taken out of the difference. "
             "Otherwise the runs are two independent samples.",
         ),
-        ("shift", "Mean of run B less that of run A, also in standard deviations σ of run A."),
-        ("spread", "Standard deviation of run B over that of run A."),
+        (
+            "shift",
+            "The shift from run A to run B that the test does not distinguish from none: the Hodges–Lehmann "
+            "estimate, in standard deviations σ of run A. Means of both runs are in columns of their own.",
+        ),
+        ("spread", "The ratio, run B over run A, of the distances from each run’s own median, estimated likewise."),
         (
             "tests",
             "Paired: Wilcoxon’s signed ranks of the differences, and of the distances to each run’s own median; "
-            "McNemar’s exact test of a share. Unpaired: normal scores, Brown and Forsythe’s test, Fisher’s exact "
-            "test. They hold for any shape of distribution; the sizes beside them are of means and standard "
-            "deviations, so that with long tails the two may speak of different things.",
+            "McNemar’s exact test of a fraction. Unpaired: normal scores, Brown and Forsythe’s test, Fisher’s exact "
+            "test. They are distribution-free. Each size and interval of a metric is of the quantity that its test is "
+            "of: the interval excludes no change exactly where the test, by itself, finds one.",
         ),
         ("intervals", f"They hold with {percent(CONFIDENCE)} each, one by one; they are not widened for their number."),
     )
 )
 
 
-def write_comparison(found: Comparison, path: Path) -> Path:
-    """Write the comparison to `path`, a page if it ends in .html, else a PDF; the file appears whole or not at all."""
-    document = build_comparison(found)
+def write_comparison(found: Comparison, path: Path, runs: tuple[Run, Run] | None = None) -> Path:
+    """Write the comparison to `path`, a page if it ends in .html, else a PDF; the file appears whole or not at all.
+
+    runs : A and B, whose distributions, histories and footprints are laid over one another.
+    """
+    document = build_comparison(found, runs)
     content = render_html(document) if path.suffix == ".html" else render_pdf(document)
     write_durably(path, content)
     return path
 
 
-def build_comparison(found: Comparison) -> Document:
-    """The comparison as a document: what changed in the results, then what was changed in code and campaign."""
+def build_comparison(found: Comparison, runs: tuple[Run, Run] | None = None) -> Document:
+    """The comparison as a document: requirements first, then metrics, then what was edited in code and campaign."""
+    overlays: tuple[Block, ...] = ()
+    if runs is not None:
+        pair = Flown(runs[0], found.names[0]), Flown(runs[1], found.names[1])
+        overlays = blocks(overlay_blocks(pair, [one.metric for one in _ranked(found)]))
     sections = (
+        Section("requirements", "Requirements", blocks([_verdict_table(found), _share_table(found)])),
         Section("metrics", "Metrics", blocks(_metric_blocks(found))),
-        Section("shares", "Shares and requirements", blocks([_share_table(found), _verdict_table(found)])),
-        Section("code", "What changed in the code", blocks([_difference_block("Code", found.code)])),
-        Section("campaign", "What changed in the campaign", blocks(_campaign_blocks(found))),
-        Section("reading", "How to read this report", (GLOSSARY,)),
+        Section("overlays", "Both runs over one another", overlays),
+        Section("code", "Changes in the code", blocks([_difference_block("Code", found.code)])),
+        Section("campaign", "Changes in the campaign", blocks(_campaign_blocks(found))),
+        Section("reading", "Glossary", (GLOSSARY,)),
     )
     return numbered(
         Document(
             kind="Comparison of two runs",
-            question="What changed?",
+            question="Changes",
             title=found.titles[1] if found.titles[0] == found.titles[1] else " and ".join(found.titles),
             subtitle=_sentence(found),
             created=found.created[1],
@@ -81,42 +97,49 @@ def build_comparison(found: Comparison) -> Document:
 
 def _sentence(found: Comparison) -> str:
     chance = f"{count(found.n_tests)} tests; at most {percent(found.alpha)} chance of any false alarm"
-    what = "Something changed from run A to run B" if found.changed else "No significant change from run A to run B"
-    return f"{what} ({chance})."
+    what = "Significant changes from run A to run B" if found.changed else "No significant change from run A to run B"
+    turned = [f"{one.name}: {one.words}" for one in found.verdicts if one.before != one.after]
+    verdicts = f"Requirements: {'; '.join(turned)}. " if turned else ""
+    return f"{verdicts}{what} ({chance})."
 
 
 def _facts(found: Comparison) -> tuple[tuple[str, str], ...]:
     reason = found.pairing.reason
     facts = []
     for letter, name, cases, ok, created in zip("AB", found.names, found.cases, found.ok, found.created, strict=True):
-        flown = f"{count(cases)} cases, {count(ok)} to their end"
+        flown = f"{count(cases)} cases, {count(ok)} completed"
         facts.append((f"Run {letter}", f"{name}: {flown}, {created[:16].replace('T', ' ')}".rstrip(", ")))
     return (*facts, ("Cases", f"{reason[:1].upper()}{reason[1:]}"))
 
 
 def _cards(found: Comparison) -> Iterator[Card]:
+    for verdict in found.verdicts:
+        if verdict.before != verdict.after:
+            yield Card(verdict.name, verdict.words, verdict.inside_words(count), _tone(verdict) or "open")
+    same = [one for one in found.verdicts if one.before == one.after]
+    if same:
+        detail = "; ".join(f"{one.name}: {one.words}, {one.inside_words(count)}".rstrip(", ") for one in same)
+        yield Card("Other requirements" if len(same) < len(found.verdicts) else "Requirements", "same verdicts", detail)
     total = len(found.metrics)
     for label, moved, what in (("Shift", found.shifted, "mean"), ("Spread", found.spread, "spread")):
-        names = ", ".join(words(one.metric, found.units[one.metric]) for one in moved[:4])
+        ranked = sorted(moved, key=lambda one: -one.effect)
+        names = ", ".join(words(one.metric, found.units[one.metric]) for one in ranked[:4])
         more = f" and {len(moved) - 4} more" if len(moved) > 4 else ""
         detail = (
             f"of {count(total)} metrics: {names}{more}" if moved else f"the {what} of none of {count(total)} metrics"
         )
         yield Card(label, f"{count(len(moved))} changed" if moved else "no change", detail, "bad" if moved else "good")
     shares = found.moved_shares
-    detail = ", ".join(one.name for one in shares) or f"none of {count(len(found.shares))} shares of cases"
-    yield Card("Shares", f"{len(shares)} changed" if shares else "no change", detail, "bad" if shares else "good")
-    worse = [one.name for one in found.verdicts if one.worse]
-    if found.verdicts:
-        tone = ("bad" if found.pairing.paired else "open") if worse else "good"
-        detail = ", ".join(worse) or f"none of {count(len(found.verdicts))}"
-        yield Card("Requirements", f"{len(worse)} worse" if worse else "none worse", detail, tone)
+    detail = ", ".join(one.name for one in shares) or f"none of {count(len(found.shares))} fractions of cases"
+    yield Card(
+        "Fractions of cases", f"{len(shares)} changed" if shares else "no change", detail, "bad" if shares else "good"
+    )
 
 
 def _warnings(found: Comparison) -> tuple[str, ...]:
     sentences = [f"Not compared: {sentence}." for sentence in found.left_out]
     if not found.pairing.paired and any(one.worse for one in found.verdicts):
-        sentences.append("The runs flew other cases: chance alone may have turned the verdict of a requirement.")
+        sentences.append("The runs flew other cases: chance alone may have changed the verdict of a requirement.")
     return tuple(sentences)
 
 
@@ -125,9 +148,9 @@ def _warnings(found: Comparison) -> tuple[str, ...]:
 
 def _metric_blocks(found: Comparison) -> Iterator[FigureBlock | Table | str]:
     if not found.metrics:
-        yield "The runs share no metric."
+        yield "The runs have no metric in common."
         return
-    moved = [one for one in found.metrics if not one.same]
+    moved = _ranked(found)
     drawn = [one for one in moved if finite(one.shift_in_sigma) or finite(one.ratio)]
     if drawn:
         yield _figure(found, drawn)
@@ -136,13 +159,22 @@ def _metric_blocks(found: Comparison) -> Iterator[FigureBlock | Table | str]:
     same = [one.metric for one in found.metrics if one.same]
     if same:
         yield f"The same in both runs: {', '.join(same)}."
+    absent = [one.metric for one in found.metrics if not one.same and not finite(one.shift)]
+    if absent:
+        yield f"Without a number in one of the runs: {', '.join(absent)}."
+
+
+def _ranked(found: Comparison) -> list[MetricChange]:
+    """The metrics that differ, the largest effect first."""
+    return sorted((one for one in found.metrics if not one.same and finite(one.shift)), key=lambda one: -one.effect)
 
 
 def _figure(found: Comparison, moved: list[MetricChange]) -> FigureBlock:
-    evidence = [min(p for p in (one.shift_adjusted, one.spread_adjusted, np.inf) if p == p) for one in moved]
-    shown = [moved[k] for k in sorted(np.argsort(evidence, kind="stable")[:MOST_ROWS])]
+    shown = moved[:MOST_ROWS]
+    reach = _reach([abs(one.shift_in_sigma.value) for one in shown])
+    far = [one for one in shown if abs(one.shift_in_sigma.value) > reach]
     panels = (
-        _panel("Shift [σ of run A]", [one.shift_in_sigma for one in shown],
+        _panel("Shift [σ of run A]", [UNKNOWN if one in far else one.shift_in_sigma for one in shown],
                [one.shift_adjusted <= found.alpha for one in shown], 0.0),
         _panel("Spread, run B over run A", [one.ratio for one in shown],
                [one.spread_adjusted <= found.alpha for one in shown], 1.0),
@@ -150,8 +182,19 @@ def _figure(found: Comparison, moved: list[MetricChange]) -> FigureBlock:
     names = tuple(words(one.metric, found.units[one.metric]) for one in shown)
     caption = "How far each metric moved and how much its spread changed from run A to run B"
     if len(shown) < len(moved):
-        caption += f"; the {len(shown)} of {len(moved)} metrics with the strongest evidence"
+        caption += f"; the {len(shown)} of {len(moved)} metrics with the largest changes"
+    if far:
+        values = (
+            f"{words(one.metric, found.units[one.metric])} {number(one.shift_in_sigma.value, 3)} σ" for one in far
+        )
+        caption += f". Shifts beyond the axis, not drawn: {', '.join(values)}"
     return FigureBlock(f"{caption}.", ChangeDrawing(names, panels, percent(CONFIDENCE)), "half")
+
+
+def _reach(shifts: list[float]) -> float:
+    """The largest shift that the axis holds: of those that are far beyond most others, none would be read off."""
+    known = np.sort([one for one in shifts if np.isfinite(one)])
+    return max(WIDEST * float(np.quantile(known, 0.5, method="lower")), FEW_SIGMA) if known.size else FEW_SIGMA
 
 
 def _panel(title: str, estimates: list[Estimate], significant: list[bool], none: float) -> ChangePanel:
@@ -171,7 +214,10 @@ def _metric_table(found: Comparison, moved: list[MetricChange]) -> Table:
         Column("Spread B/A", "number", 1.6),
         Column("Adjusted p", "number", 1.3),
     )
-    note = f"Small: the {percent(CONFIDENCE)} interval; used of tried cases. σ: standard deviation of run A."
+    note = (
+        f"The largest change first. Small: the {percent(CONFIDENCE)} interval of the quantity that the test is of; "
+        "cases used of cases flown. σ: standard deviation of run A."
+    )
     return Table("Metrics of both runs", columns, tuple(_metric_row(found, one) for one in moved), note)
 
 
@@ -206,7 +252,8 @@ def _estimate(one: Estimate) -> Cell:
 def _p(value: float, alpha: float) -> Cell:
     if not np.isfinite(value):
         return Cell("no test")
-    return Cell(number(value, 2), value, tone="bad" if value <= alpha else "")
+    text = number(value, 2) if value >= LEAST_P else f"< {number(LEAST_P, 2)}"
+    return Cell(text, value, tone="bad" if value <= alpha else "")
 
 
 # ---- shares and requirements
@@ -217,12 +264,15 @@ def _share_table(found: Comparison) -> Table:
         Column("Cases", "text", 2.0),
         Column("Run A", "number", 1.5),
         Column("Run B", "number", 1.5),
-        Column("Difference of shares", "number", 2.2),
+        Column("Difference", "number", 2.2),
         Column("Adjusted p", "number", 1.2),
     )
     note = "Requirements are counted by the limits of run B in both runs; a case without a number is outside."
     return Table(
-        "Shares of the cases in both runs", columns, tuple(_share_row(one, found.alpha) for one in found.shares), note
+        "Fractions of the cases in both runs",
+        columns,
+        tuple(_share_row(one, found.alpha) for one in found.shares),
+        note,
     )
 
 
@@ -238,10 +288,15 @@ def _share_row(one: ShareChange, alpha: float) -> tuple[Cell, ...]:
 def _verdict_table(found: Comparison) -> Table | None:
     if not found.verdicts:
         return None
-    columns = (Column("Requirement", "text", 2.0), Column("Verdict of run A", "text", 2.0),
-               Column("Verdict of run B", "text", 2.0))  # fmt: skip
+    columns = (Column("Requirement", "text", 2.0), Column("Run A", "text", 1.6), Column("Run B", "text", 1.6),
+               Column("Change", "text", 3.4))  # fmt: skip
     rows = tuple(
-        (Cell(one.name), Cell(one.before or "not there"), Cell(one.after or "not there", tone=_tone(one)))
+        (
+            Cell(one.name),
+            Cell(one.before or "not required"),
+            Cell(one.after or "not required", tone=_tone(one)),
+            Cell(one.words, small=one.inside_words(count)),
+        )
         for one in found.verdicts
     )
     return Table("Verdicts, each by its own run’s requirement", columns, rows)
@@ -269,5 +324,5 @@ def _campaign_blocks(found: Comparison) -> Iterator[Table | str]:
     if found.diff:
         rows = tuple((Cell(line[:1]), Cell(line[1:])) for line in found.diff if not line.startswith("@@"))
         columns = (Column("", "code", 0.3), Column("Line of campaign.toml", "code", 6.0))
-        note = "−: a line of run A alone; +: a line of run B alone; others stand in both."
+        note = "−: a line of run A alone; +: a line of run B alone; others are in both."
         yield Table("The two campaign files", columns, rows, note)

@@ -1,10 +1,11 @@
-"""The contents of a report, in reading order: first the verdicts, last what is needed to make the numbers again."""
+"""The contents of a report, in reading order: first the verdicts, last what is needed to reproduce the numbers."""
 
 from collections.abc import Iterable, Iterator
 
 from reports.case_tables import case_table, worst_tables
 from reports.convergence import convergence_blocks
 from reports.corridors import corridor_blocks
+from reports.data import run_data
 from reports.document import Block, Document, Section, Table, Text, numbered
 from reports.drawings import distribution_blocks, history_blocks, map_blocks, scatter_blocks
 from reports.flown import Flown, Run
@@ -46,6 +47,7 @@ def build(run: Run, name: str) -> Document:
             sections=sections,
             files=tuple(landing.files),
             cases=case_data(flown, sections),
+            data=run_data(flown),
         )
     )
 
@@ -59,21 +61,23 @@ def _sections(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
     yield Section("requirements", "Requirements", _requirements(flown))
     yield Section("corridor", "Corridor", blocks(corridor_blocks(flown)))
     yield Section("footprint", "Footprint", blocks(landing.blocks))
-    yield Section("levels", "Choices compared", blocks(level_blocks(flown)))
-    yield Section("drivers", "What drives it", blocks(sensitivity_blocks(flown)))
+    yield Section("levels", "Comparison of options", blocks(level_blocks(flown)))
+    yield Section("drivers", "Contributors", blocks(sensitivity_blocks(flown)))
     yield Section("maps", "Maps", blocks(map_blocks(flown)))
     yield Section("distributions", "Distributions", blocks(distribution_blocks(flown)))
-    yield Section("metrics", "Metrics in numbers", _metrics(flown))
+    yield Section("metrics", "All metrics", _metrics(flown))
     yield Section("convergence", "Convergence", blocks(convergence_blocks(flown)))
     yield Section("histories", "Time histories", blocks([*profile_blocks(flown), *history_blocks(flown)]))
-    yield Section("scatter", "One against another", blocks(scatter_blocks(flown)))
+    yield Section("scatter", "Scatter plots", blocks(scatter_blocks(flown)))
     yield Section(CASES, "Cases by outcome", blocks(case_blocks(flown)))
     yield Section("worst", "Worst and failed cases", blocks(worst_tables(flown)))
-    yield Section("status", "How the cases ended", (status_table(flown),))
-    yield Section("published", "Published and ours", blocks([*statistics_tables(flown), published_table(flown)]))
+    yield Section("status", "Completion of the cases", (status_table(flown),))
+    yield Section(
+        "published", "Validation against published results", blocks([*statistics_tables(flown), published_table(flown)])
+    )
     yield Section("inputs", "Inputs", blocks(_inputs(flown)))
     yield Section("provenance", "Provenance", (provenance_table(flown),))
-    yield Section("reading", "How to read this report", (GLOSSARY,))
+    yield Section("reading", "Glossary", (GLOSSARY,))
 
 
 def blocks(found: Iterable[Block | str | None]) -> tuple[Block, ...]:
@@ -95,5 +99,5 @@ def _metrics(flown: Flown) -> tuple[Block, ...]:
 
 def _inputs(flown: Flown) -> Iterator[Table | str | None]:
     yield input_table(flown) or "No input is dispersed: all cases are the nominal one."
-    yield fixed_table(flown, "parameters", "Parameters that all cases share")
+    yield fixed_table(flown, "parameters", "Parameters common to all cases")
     yield fixed_table(flown, "settings", "Settings of the run")

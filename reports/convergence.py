@@ -15,7 +15,7 @@ from reports.document import Cell, Column, FigureBlock, Table
 from reports.figures import RunningDrawing, RunningPanel
 from reports.flown import CONFIDENCE, Flown
 from reports.headline import HIGH, LOW
-from reports.numbers import count, interval, number, percent
+from reports.numbers import count, interval, number, percent, percentile
 from reports.tables import metric_cell
 
 MOST_METRICS = 8
@@ -31,13 +31,13 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     if told:
         drawn = list(told)[:MOST_DRAWN]
         panels = tuple(RunningPanel(_what(run), flown.axis(name), run) for name in drawn for run in told[name])
-        caption = "Mean and outer quantile of the metrics that matter against the number of cases"
+        caption = "Mean and outer percentile of the key metrics against the number of cases"
         yield FigureBlock(caption, RunningDrawing(panels, CONFIDENCE), "half")
         yield _table(flown, told)
     silent = [name for name in runs if name not in told]
     if silent:
         yield (
-            f"Nothing is said on the convergence of {', '.join(silent)}: fewer than {FEWEST} cases have a number, "
+            f"Convergence not assessed for {', '.join(silent)}: fewer than {FEWEST} cases have a number, "
             "or it is the same in all of them."
         )
 
@@ -46,13 +46,13 @@ def _runs(flown: Flown, name: str) -> tuple[RunningEstimate, ...]:
     if flown.summaries[name].constant:
         return ()
     values = flown.values(name)
-    outer = HIGH if flown.large_is_bad(name) else LOW
+    outer = HIGH if flown.largest_is_worst(name) else LOW
     found = running_mean(values, CONFIDENCE), running_quantile(values, outer, CONFIDENCE)
     return tuple(run for run in found if run is not None)
 
 
 def _what(run: RunningEstimate) -> str:
-    return "mean" if run.probability is None else f"{percent(run.probability, 3)} quantile"
+    return "mean" if run.probability is None else percentile(run.probability)
 
 
 def _table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
@@ -63,18 +63,19 @@ def _table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
         Column("From all", "number", 1.9),
         Column("Interval reaches", "number", 1.3),
         Column("Halves differ by chance", "number", 1.3),
-        Column("Settled", "text", 1.5),
+        Column("Converged", "text", 1.5),
     )
     rows = tuple(_row(flown, name, run) for name, pair in told.items() for run in pair)
     note = (
-        f"Settled: the {percent(CONFIDENCE)} interval of the estimate reaches no farther from it than "
-        f"{number(CLOSE_MEAN)} standard deviations of the metric for a mean, {number(CLOSE_QUANTILE)} for a quantile "
+        f"Converged: the {percent(CONFIDENCE)} interval of the estimate reaches no farther from it than "
+        f"{number(CLOSE_MEAN)} standard deviations of the metric for a mean, {number(CLOSE_QUANTILE)} for a percentile "
         "(column “interval reaches”), and the first and second half of the cases do not differ beyond chance "
         f"(probability at least {percent(DRIFT)}; Welch’s test of the means, Fisher’s of the cases beyond the "
-        "quantile). Intervals are those of independent draws: Student’s for the mean, order statistics for quantiles. "
-        "A metric that has not settled may well have a sure verdict: that rests on its requirement alone."
+        "percentile). Intervals are those of independent draws: Student’s for the mean, order statistics for "
+        "percentiles. "
+        "A metric that has not converged may have a certain verdict: that depends on its requirement alone."
     )
-    return Table("Have the estimates settled?", columns, rows, note)
+    return Table("Convergence of the estimates", columns, rows, note)
 
 
 def _row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, ...]:
@@ -99,10 +100,10 @@ def _row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, ...]:
 
 def _verdict(run: RunningEstimate) -> Cell:
     if run.settled:
-        return Cell("settled", tone="good")
+        return Cell("converged", tone="good")
     if run.reach is not None and run.reach <= run.close:
-        return Cell("wanders", small="the halves differ", tone="bad")
-    wanted = f"takes about {count(_rounded(run.cases_wanted))} cases" if run.cases_wanted else "needs more cases"
+        return Cell("no", small="the halves differ", tone="bad")
+    wanted = f"needs about {count(_rounded(run.cases_wanted))} cases" if run.cases_wanted else "needs more cases"
     return Cell("not yet", small=wanted, tone="open")
 
 

@@ -8,12 +8,12 @@ import numpy as np
 
 from mc_engine.figures import CorridorFigure
 from mc_engine.statistics import SurfaceMap, Verdict, clopper_pearson, map_metric
-from mc_engine.statistics.requirements import inside_limits
 from reports.document import Cell, Column, FigureBlock, Table
 from reports.drawings import nominal_point, thinned_rows
 from reports.figures import CorridorDrawing, LimitLine
 from reports.flown import Flown
 from reports.numbers import count, number, percent, with_unit
+from reports.outcomes import inside, inside_words
 from reports.tables import limit_text
 
 CONFIDENCE = 0.95
@@ -28,14 +28,9 @@ def corridor_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         if isinstance(figure, CorridorFigure) and not (figure.upstream and flown.absence(figure.x, figure.y)):
             verdicts = [verdict for verdict in flown.verdicts if verdict.metric in figure.metrics]
             if verdicts:
-                violated = np.array([_violated(flown, verdict) for verdict in verdicts])
+                violated = np.array([~inside(flown, [verdict]) for verdict in verdicts])
                 yield _corridor(flown, figure, verdicts, violated)
                 yield _violation_table(flown, verdicts, violated)
-
-
-def _violated(flown: Flown, verdict: Verdict) -> np.ndarray:
-    """bool[n_tried]: not inside the limit; a case without a number is not inside."""
-    return ~inside_limits(flown.values(verdict.metric), verdict.at_most, verdict.at_least)
 
 
 def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray) -> FigureBlock | str:
@@ -45,7 +40,7 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     if not used.size:
         lacking = f"none of {count(flown.n_tried)} cases has both {figure.x} and {figure.y}"
         return f"{figure.title}: not drawn; {flown.absence(figure.x, figure.y) or lacking}."
-    words, member = _classes([verdict.name for verdict in verdicts], violated)
+    words, member = _classes([verdict.name for verdict in verdicts], violated, inside_words(flown, verdicts))
     # every violation stays in the picture, as far as there is room
     rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
     drawing = CorridorDrawing(
@@ -60,21 +55,22 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
         n_used=int(used.size),
         n_tried=flown.n_tried,
         nominal=nominal_point(flown, figure.x, figure.y),
+        columns=(figure.x, figure.y),
     )
     missing = flown.n_tried - used.size
-    lost = f" {count(missing)} of {count(flown.n_tried)} cases have no place in it." if missing else ""
-    return FigureBlock(f"{figure.title}.{_limits_said(drawing.limits, verdicts)}{lost}", drawing, "wide")
+    lost = f" {count(missing)} of {count(flown.n_tried)} cases have no values to draw." if missing else ""
+    return FigureBlock(f"{figure.title}.{_limits_said(flown, drawing.limits, verdicts)}{lost}", drawing, "wide")
 
 
-def _limits_said(limits: tuple[LimitLine, ...], verdicts: list[Verdict]) -> str:
+def _limits_said(flown: Flown, limits: tuple[LimitLine, ...], verdicts: list[Verdict]) -> str:
     if limits:
         return ""
     if all(verdict.passed == verdict.tried for verdict in verdicts):
-        return " All cases are inside all limits."
+        return f" All cases are {inside_words(flown, verdicts)}."
     return " No limit is drawn: none of them is decided by the two columns alone."
 
 
-def _classes(names: list[str], violated: np.ndarray) -> tuple[list[str], np.ndarray]:
+def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[list[str], np.ndarray]:
     """Words of the classes, and the class of each case: inside, then the sets of limits violated, most frequent first.
 
     violated : bool[n_requirements, n_tried].  What is too rare for a colour of its own shares the last one.
@@ -83,7 +79,7 @@ def _classes(names: list[str], violated: np.ndarray) -> tuple[list[str], np.ndar
     found, cases = np.unique(code[code > 0], return_counts=True)
     ordered = found[np.lexsort((found, -cases))].tolist()
     own = ordered if len(ordered) < MOST_CLASSES else ordered[: MOST_CLASSES - 2]
-    words = ["inside all limits"]
+    words = [inside_all]
     member = np.zeros(code.size, dtype=np.int64)
     for k, one in enumerate(own, start=1):
         words.append(f"beyond {' and '.join(compress(names, [one >> bit & 1 for bit in range(len(names))]))}")
@@ -148,7 +144,7 @@ def _violation_table(flown: Flown, verdicts: list[Verdict], violated: np.ndarray
     columns = (
         Column("Limit", "text", 2.6),
         Column("Violated / tried", "number", 1.5),
-        Column("Share" if not flown.random else "Probability", "number", 1.5),
+        Column("Fraction" if not flown.random else "Probability", "number", 1.5),
         Column(f"{percent(CONFIDENCE)} interval", "number", 1.8),
         Column("Without a number", "number", 1.3),
     )
@@ -162,9 +158,11 @@ def _violation_table(flown: Flown, verdicts: list[Verdict], violated: np.ndarray
         rows.append(row)
     note = "A failed case, or one without a number, counts as a violation."
     if flown.random:
-        note += " Intervals: Clopper–Pearson, two-sided; with no violation the upper limit alone says something."
+        note += " Intervals: Clopper–Pearson, two-sided; with no violation only the upper limit is informative."
     else:
-        note += " Shares of the cases flown; they were chosen, not drawn, so they are no probabilities."
+        note += (
+            " Fractions of the cases flown; these were chosen, not drawn at random, so they estimate no probabilities."
+        )
     return Table("How often the limits are violated", columns, tuple(rows), note)
 
 

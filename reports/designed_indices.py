@@ -1,4 +1,4 @@
-"""What drives the metrics of a run that was designed to tell: Sobol' indices of Saltelli's blocks, Morris's effects."""
+"""Contributors in a run designed for sensitivity: Sobol' indices of Saltelli's blocks, Morris's effects."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -10,10 +10,10 @@ from reports.document import Cell, Column, FigureBlock, Table
 from reports.figures import IndexMap
 from reports.flown import Flown
 from reports.numbers import axis_label, count, number, percent
+from reports.outcomes import ALL_LIMITS, inside, inside_words
 
 MOST_METRICS = 8
 MOST_INPUTS = 12  # in the figure, and a metric in the table
-INSIDE = "inside all limits"
 BLOCKS = {"saltelli": "blocks", "morris": "trajectories"}
 _TITLES = {
     "first_order": "First-order index",
@@ -24,15 +24,13 @@ _TITLES = {
 }
 
 
-def designed_blocks(
-    flown: Flown, inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]
-) -> Iterator[FigureBlock | Table | str]:
+def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureBlock | Table | str]:
     """Indices of the metrics that matter and, if cases failed, of passing; a sentence for metrics without any."""
     metrics = {name: flown.values(name) for name in flown.key_metrics[:MOST_METRICS]}
     names = {name: flown.words(name) for name in metrics}
-    if failed:
-        names[INSIDE] = INSIDE
-        metrics[INSIDE] = (~np.any(list(failed.values()), axis=0)).astype(np.float64)
+    if flown.verdicts or not flown.ok.all():
+        names[ALL_LIMITS] = inside_words(flown)
+        metrics[ALL_LIMITS] = inside(flown).astype(np.float64)
     found = designed_indices(flown.design, flown.case_ids, inputs, metrics)
     main = "total" if flown.design == "saltelli" else "mu_star"
     shown = np.flatnonzero(np.isfinite(found.values[main]).any(axis=0))
@@ -46,7 +44,7 @@ def designed_blocks(
             f"No indices for {', '.join(silent)}: the same in all cases that have it, or fewer than {FEWEST_BLOCKS} "
             f"whole {BLOCKS[flown.design]} with a number."
         )
-    yield "Shares of cases of this design estimate no probabilities: its cases belong together and are no random draws."
+    yield "Fractions of the cases of this design estimate no probabilities: its cases are not independent random draws."
 
 
 def _figure(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:
@@ -59,11 +57,11 @@ def _figure(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapp
         n_used=(int(found.n_used[shown].min()), int(found.n_used[shown].max())),
         n_tried=found.n_tried,
         index="total index",
-        none="the input does nothing, alone or with others",
-        all="nothing happens without it",
+        none="the input contributes nothing",
+        all="all of the variance involves it",
         counted="blocks",
     )
-    return FigureBlock("Share of each metric’s variance that stays when all other inputs are known.", drawing, "wide")
+    return FigureBlock("Total Sobol’ index of each input and metric.", drawing, "wide")
 
 
 def _table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str], main: str) -> Table:
@@ -94,10 +92,10 @@ def _cell(value: float, reach: float) -> Cell:
 
 def _saltelli_note(found: DesignedIndices) -> str:
     return (
-        f"± half the {percent(CONFIDENCE)} interval (bootstrap over blocks; analysis by SALib). First-order: the share "
-        "of the variance that goes when this input alone becomes known; total: the share that stays when all others "
-        f"are. A block is {len(found.inputs) + 2} cases; one with a case that has no number is left out whole. Noise "
-        "in flight counts into every total index."
+        f"± half the {percent(CONFIDENCE)} interval (bootstrap over blocks; analysis by SALib). First-order index: "
+        "fraction of the variance due to this input alone; total index: fraction due to it and its interactions. A "
+        f"block is {len(found.inputs) + 2} cases; one with a case that has no number is left out whole. Random draws "
+        "in flight count into every total index."
     )
 
 
@@ -106,6 +104,6 @@ def _morris_note() -> str:
         f"± half the {percent(CONFIDENCE)} interval (bootstrap; analysis by SALib). An effect is the metric’s change "
         "as one input steps between the middles of quarters of its distribution that lie two apart, divided by 2/3. "
         "μ*: mean size; μ: mean; σ: standard deviation, large where the effect bends or depends on other inputs. It "
-        "ranks inputs; shares of variance need design saltelli. A trajectory with a case that has no number is left "
+        "ranks inputs; Sobol’ indices need the design saltelli. A trajectory with a case that has no number is left "
         "out whole."
     )

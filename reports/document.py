@@ -4,49 +4,14 @@ Built once by `contents`, drawn by `html`, `pdf` and `markdown`.  All strings ar
 renderers' work, and no renderer meets a character that steers, reorders or hides: a document is clean once it is made.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
-from matplotlib.figure import Figure
+import numpy as np
 
 from mc_engine.text import clean
-
-
-@dataclass(frozen=True)
-class Key:
-    """One entry of a figure's key.  mark: "line", "dash", "dot", "band", "bar", "field", "point" or "ring".
-
-    sign : the shape of a point, as plotly names it.
-    """
-
-    mark: str
-    colour: str
-    text: str
-    sign: str = "circle"
-
-
-class Drawing(ABC):
-    """A figure's data, with what it takes to draw it on a screen and on paper."""
-
-    @property
-    @abstractmethod
-    def key(self) -> tuple[Key, ...]:
-        """What the marks mean."""
-
-    @property
-    @abstractmethod
-    def alternative(self) -> str:
-        """The figure in words, for those who do not see it."""
-
-    @abstractmethod
-    def interactive(self) -> list[dict[str, Any]]:
-        """One plotly specification ("data", "layout") per panel; colours may be "@ink" and other page colours."""
-
-    @abstractmethod
-    def printed(self) -> Figure:
-        """The figure for the page, all panels."""
+from reports.figures.marks import Drawing
 
 
 @dataclass(frozen=True)
@@ -132,25 +97,28 @@ class Card:
 
 @dataclass(frozen=True)
 class CaseColumn:
-    """One column of `CaseData`: a number or None per case, or a word."""
+    """One column of `CaseData`: a number per case, NaN for none, or a word.
+
+    role : "dispersion", "metric", or "place" for one that only figures show.
+    """
 
     name: str
     label: str
     role: str
-    values: tuple[float | str | None, ...]
+    values: np.ndarray | tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class CaseData:
-    """Single cases that an interactive page can look up: those drawn, the worst, and those that did not pass.
+    """Cases that an interactive page can look up: all, or those drawn, the worst, and those that did not pass.
 
     outcome : per case an index into `outcomes`.  axes : names of the two columns that the figure of cases starts with.
     histories : by case, then quantity, its times [s] and values; quantities : label by name; the nominal is case -1.
     """
 
     n_tried: int
-    ids: tuple[int, ...]
-    outcome: tuple[int, ...]
+    ids: np.ndarray
+    outcome: np.ndarray
     outcomes: tuple[str, ...]
     columns: tuple[CaseColumn, ...]
     axes: tuple[str, str] | None
@@ -169,7 +137,10 @@ class Attachment:
 
 @dataclass(frozen=True)
 class Document:
-    """The whole report.  created: ISO date and time, UTC, of the run (not of the report); kind: what stands above."""
+    """The whole report.  created: ISO date and time, UTC, of the run (not of the report); kind: what stands above.
+
+    data : the numbers of a run's report for programs, by the fields of `data.ReportRecord`.
+    """
 
     title: str
     subtitle: str
@@ -180,9 +151,10 @@ class Document:
     warnings: tuple[str, ...]
     sections: tuple[Section, ...] = field(default=())
     kind: str = "Monte Carlo dispersion report"
-    question: str = "Will it work?"
+    question: str = "Verdict"
     files: tuple[Attachment, ...] = ()
     cases: CaseData | None = None
+    data: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for one in fields(self):

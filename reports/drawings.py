@@ -1,12 +1,13 @@
 """The figures of a run: picks the data, bounds how much of it is drawn, and says what was left out."""
 
 from collections.abc import Iterator
+from itertools import combinations
 
 import numpy as np
 
 from mc_engine.figures import HistoryFigure, MapFigure, ScatterFigure
 from mc_engine.statistics import map_metric
-from mc_engine.statistics.maps import FEWEST
+from mc_engine.statistics.maps import FEWEST, LEAST_EXPLAINED, explained_share
 from mc_engine.statistics.summary import nearly_equal
 from reports.case_tables import FEW_CASES, input_words
 from reports.cloud_regions import cloud_regions
@@ -14,12 +15,14 @@ from reports.document import FigureBlock
 from reports.figures import DistributionPanel, Distributions, Histories, HistoryLine, MapDrawing, ScatterDrawing
 from reports.flown import Flown
 from reports.history_bands import fair_cases, history_bands
-from reports.numbers import axis_label, count, number, words
-from reports.outcomes import INSIDE, case_outcomes, outcome_names
+from reports.numbers import axis_label, count, number, percent, words
+from reports.outcomes import case_outcomes, outcome_names
 from reports.published import published_law
 
 POINTS_SHOWN = 2000
+FEWEST_SHOWN = 50  # of an outcome, as far as there are so many
 PANELS_IN_A_FIGURE = 12
+STRONGEST_INPUTS = 4  # among whose pairs the one is looked for that explains most
 COLOURED_CASES = 8
 COLOURED_OVER_BANDS = 2  # more would hide the band
 WORST_RANKS = 10
@@ -35,6 +38,18 @@ def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN)
     even = rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
     place = np.minimum(np.searchsorted(rows, always), rows.size - 1)
     return np.union1d(even, always[rows[place] == always])
+
+
+def thinned_by_outcome(rows: np.ndarray, outcome: np.ndarray, most: int = POINTS_SHOWN) -> np.ndarray:
+    """At most about `most` of the ascending row numbers, the same share of every outcome, evenly through the table.
+
+    An outcome of up to FEWEST_SHOWN cases is drawn whole.
+    """
+    share = min(1.0, most / max(rows.size, 1))
+    groups = [rows[outcome[rows] == one] for one in np.unique(outcome[rows])]
+    kept = [max(round(share * group.size), min(FEWEST_SHOWN, group.size)) for group in groups]
+    chosen = [group[np.linspace(0, group.size - 1, n).astype(np.int64)] for group, n in zip(groups, kept, strict=True)]
+    return np.sort(np.concatenate(chosen)) if chosen else rows
 
 
 def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
@@ -57,6 +72,8 @@ def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
     if reason:
         return f"{figure.title}: not drawn; {reason}."
     surface = map_metric(x, y, z)
+    if surface is not None and surface.explained < LEAST_EXPLAINED:
+        return f"{figure.title}: not drawn; {_too_little_explained(flown, figure, surface.explained)}."
     if surface is None or not np.isfinite(surface.value).any():
         few = f"the run has too few cases over {figure.x} and {figure.y} for a map"
         unsure = (f"nowhere is its surface over {figure.x} and {figure.y} sure enough: other inputs scatter it, the "
@@ -74,9 +91,28 @@ def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
         point_values=z[rows],
         n_points=int(used.size),
         nominal=nominal_point(flown, figure.x, figure.y),
+        columns=(figure.x, figure.y, figure.metric),
     )
     caption = figure.title if surface.exact else f"{figure.title}. Blank where the cases do not support a surface."
     return FigureBlock(caption, drawing, "wide")
+
+
+def _too_little_explained(flown: Flown, figure: MapFigure, share: float) -> str:
+    """How little the two inputs explain, and which two explain most."""
+    x, y = flown.words(figure.x), flown.words(figure.y)
+    said = f"{x} and {y} together explain {percent(max(share, 0.0), 0)} of the variance of {flown.words(figure.metric)}"
+    names = [one.name for one in flown.contributors(figure.metric) if np.isfinite(flown.values(one.name)).any()]
+    values = flown.values(figure.metric)
+    pairs = {
+        (a, b): explained_share(flown.values(a), flown.values(b), values)
+        for a, b in combinations(names[:STRONGEST_INPUTS], 2)
+        if {a, b} != {figure.x, figure.y}
+    }
+    best = max(pairs, key=lambda pair: np.nan_to_num(pairs[pair], nan=-1.0), default=None)
+    if best is None or not pairs[best] > share:
+        return f"{said}, and no two inputs more"
+    a, b = (flown.words(name) for name in best)
+    return f"{said}; the two inputs that explain most are {a} and {b}, {percent(max(pairs[best], 0.0), 0)}"
 
 
 def _no_map(figure: MapFigure, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> str:
@@ -109,7 +145,8 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
         return f"{figure.title}: not drawn; {reason}."
     ends = [int(used[pick(values[used])]) for values in (x, y) for pick in (np.argmin, np.argmax)]
     outcome = case_outcomes(flown)
-    rows = thinned_rows(used, np.union1d(ends, np.flatnonzero(outcome != INSIDE)[:POINTS_SHOWN]))
+    rows = np.union1d(thinned_by_outcome(used, outcome), ends)
+    regions = cloud_regions(flown, (figure.x, figure.y), x[used], y[used])
     drawing = ScatterDrawing(
         x=x[rows],
         y=y[rows],
@@ -121,9 +158,12 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
         nominal=nominal_point(flown, figure.x, figure.y),
         outcome=outcome[rows],
         outcomes=tuple(zip(outcome_names(flown), np.bincount(outcome[used], minlength=3).tolist(), strict=True)),
-        regions=cloud_regions(flown, (figure.x, figure.y), x[used], y[used]),
+        columns=(figure.x, figure.y),
+        regions=regions,
     )
-    return FigureBlock(figure.title, drawing, "wide")
+    impossible = bool(regions) and not any(one.elliptic for one in regions)
+    said = ". No normal ellipse is shown: it would leave the physical range of these metrics" if impossible else ""
+    return FigureBlock(f"{figure.title}{said}.", drawing, "wide")
 
 
 def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
@@ -132,7 +172,7 @@ def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     others = [name for name in drawable if name not in flown.key_metrics]
     key = [name for name in flown.key_metrics if name in drawable]
     if key:
-        title = "Distributions of the metrics that matter" if others else "Distributions of the metrics"
+        title = "Distributions of the key metrics" if others else "Distributions of the metrics"
         yield from _distribution_figures(flown, key, title)
     if others:
         yield from _distribution_figures(flown, others, "Distributions of the other metrics")
@@ -182,7 +222,7 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     if not wanted:
         return
     if not len(flown.histories):
-        yield "No histories were retained in this run; [retention] in the campaign file asks for them."
+        yield "No time histories were saved in this run; [retention] in the campaign file selects cases."
         return
     cases = history_cases(flown)
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
@@ -202,7 +242,7 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
             labels = {name: axis_label(words(name, flown.unit(name)), flown.unit(name)) for name in names}
             yield FigureBlock(figure.title, Histories(lines, labels, bands), "half")
     if constant:
-        yield f"Not drawn, the same all through in every retained case: {', '.join(constant)}."
+        yield f"Not drawn, constant in every saved case: {', '.join(constant)}."
     if missing:
         yield f"Not drawn, the histories have no such quantity: {', '.join(dict.fromkeys(missing))}."
 
@@ -235,7 +275,8 @@ def _worst_reasons(flown: Flown) -> dict[int, tuple[int, str]]:
         return {int(case): (row, input_words(flown, row)) for row, case in enumerate(flown.case_ids)}
     reasons: dict[int, tuple[int, str]] = {}
     for order, metric in enumerate(name for name in flown.key_metrics if not flown.summaries[name].constant):
-        which = "largest" if flown.large_is_bad(metric) else "smallest"
+        one_sided = "largest" if flown.largest_is_worst(metric) else "smallest"
+        which = "worst" if flown.limits(metric).two_sided else one_sided
         for place, row in enumerate(flown.worst(metric, WORST_RANKS), start=1):
             text = f"{which} {flown.words(metric)}" + (f", no. {place}" if place > 1 else "")
             reasons.setdefault(int(flown.case_ids[row]), (place + WORST_RANKS * order, text))

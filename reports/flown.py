@@ -3,17 +3,23 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pandas as pd
 
 from mc_engine.figures import KINDS, MapFigure, ScatterFigure, from_record
 from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
+from mc_engine.statistics.contributors import Contributor, contributors
+from mc_engine.statistics.worst import Limits, limits_on
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 from reports.numbers import axis_label, named, words
 
 CONFIDENCE = 0.90
+
+
+if TYPE_CHECKING:
+    from reports.contributions import Contributions
 
 
 class Run(Protocol):
@@ -49,6 +55,7 @@ class Flown:
         self.nominal = run.nominal()
         self.histories = run.histories()
         self.n_wanted = int(run.n_cases)
+        self._contributors: dict[str, list[Contributor]] = {}
 
     # ---- what the manifest says
 
@@ -78,6 +85,11 @@ class Flown:
     def with_role(self, role: str) -> list[ColumnFacts]:
         """Columns of one role that the table holds, in order."""
         return [fact for fact in self.columns.values() if fact.role == role and fact.name in self.cases.columns]
+
+    def range(self, name: str) -> tuple[float, float]:
+        """The physical range that the model gives a column; infinite where it gives none."""
+        low, high = self.manifest.get("ranges", {}).get(name, (None, None))
+        return -np.inf if low is None else float(low), np.inf if high is None else float(high)
 
     def unit(self, name: str) -> str:
         return self.columns[name].unit if name in self.columns else ""
@@ -114,7 +126,7 @@ class Flown:
 
     @cached_property
     def ok(self) -> np.ndarray:
-        """bool[n_tried]: flown to its end."""
+        """bool[n_tried]: completed."""
         return np.asarray(self.cases["status"] == STATUS_NAME[OK], dtype=bool)
 
     @cached_property
@@ -171,14 +183,47 @@ class Flown:
         metrics = [fact.name for fact in self.with_role("metric")]
         return [name for name in dict.fromkeys(wanted) if name in metrics] or metrics
 
-    def large_is_bad(self, metric: str) -> bool:
-        """False for a metric that is only required to be at least something."""
-        limits = [verdict for verdict in self.verdicts if verdict.metric == metric]
-        return not limits or any(verdict.at_most is not None for verdict in limits)
+    def limits(self, metric: str) -> Limits:
+        """The tightest limits that the requirements set on a metric."""
+        return limits_on(metric, self.manifest.get("requirements", []))
+
+    def largest_is_worst(self, metric: str) -> bool:
+        """Whether the bad end of a metric is the upper one; with two limits, that with the smaller margin."""
+        return self.limits(metric).largest_is_worst(self.values(metric))
 
     def worst(self, metric: str, count: int) -> np.ndarray:
-        """Rows of the worst cases of a metric."""
-        return worst_cases(self.values(metric), self.ok, count, self.large_is_bad(metric))
+        """Rows of the worst cases of a metric: those with the smallest margin to a limit."""
+        return worst_cases(self.values(metric), self.ok, count, limits=self.limits(metric))
+
+    @property
+    def inputs(self) -> dict[str, np.ndarray]:
+        """The columns of the dispersed inputs by name."""
+        return {fact.name: self.cases[fact.name].to_numpy() for fact in self.with_role("dispersion")}
+
+    def contributors(self, metric: str) -> list[Contributor]:
+        """The dispersed inputs that vary, the one that contributes most to the metric first."""
+        if metric not in self._contributors:
+            self._contributors[metric] = self._flown_contributors(metric) or contributors(
+                self.inputs, self.values(metric)
+            )
+        return self._contributors[metric]
+
+    def _flown_contributors(self, metric: str) -> list[Contributor]:
+        """The same from the flights beside the run, by total effect; empty without them."""
+        from reports.contributions import members_of  # which reads what is flown
+
+        found, members = self.contributions, members_of(self)
+        if found is None or not found.flights:
+            return []
+        rows = found.by_metric.get(metric, ())
+        return [Contributor(name, one.size) for one in rows for name in members[one.input] if name in self.inputs]
+
+    @cached_property
+    def contributions(self) -> "Contributions | None":
+        """Shares of the variance of the metrics that matter, by input and random draws."""
+        from reports.contributions import contributions
+
+        return contributions(self)
 
     def status_text(self, status: str) -> str:
         """The sentence behind a status word: the run's own, or this engine's."""

@@ -15,7 +15,7 @@ from reports.drawings import thinned_rows
 from reports.figures import FootprintCurve, FootprintDrawing
 from reports.flown import CONFIDENCE, Flown
 from reports.map_files import Mark, Outline, Places, geojson, kml
-from reports.numbers import count, interval, number, percent, with_unit
+from reports.numbers import count, counted, interval, number, percent, with_unit
 
 DRAWN_REGION = 0.9  # content of the one region in the figure; more would hide the ellipses
 DISTANCES = (0.5, 0.9, 0.99)
@@ -85,20 +85,30 @@ def _landing(flown: Flown, figure: FootprintFigure) -> _Landing | str:
     if absent:
         return f"{figure.title}: not drawn; {absent}."
     latitude, longitude = flown.values(figure.latitude), flown.values(figure.longitude)
-    placed = np.isfinite(latitude) & np.isfinite(longitude) & (np.abs(latitude) <= 90.0)
-    down = placed & _down(flown, figure)
-    rows = np.flatnonzero(down)
+    placed = _placed(flown, figure)
+    rows = np.flatnonzero(placed & _down(flown, figure))
     above = int(placed.sum() - rows.size)
     if not rows.size:
         high = f"; {count(above)} ended above {_limit(flown, figure)}" if above else ""
-        return f"{figure.title}: not drawn; none of {count(flown.n_tried)} cases has a place on the ground{high}."
-    ellipsoid = ELLIPSOIDS.get(_planet(flown, figure), WGS84)
+        return f"{figure.title}: not drawn; none of {count(flown.n_tried)} cases has an impact point{high}."
+    ellipsoid = ELLIPSOIDS.get(planet_of(flown, figure), WGS84)
     found = footprint(latitude[rows], longitude[rows], ellipsoid, flown.random)
     if found is None:
-        return f"{figure.title}: not drawn; the {count(rows.size)} places lie too far apart for one picture."
+        return f"{figure.title}: not drawn; the {count(rows.size)} impact points lie too far apart for one figure."
     if found.reach < 1.0 and rows.size > 1:
-        return f"{figure.title}: not drawn; all {count(rows.size)} cases that have a place end within one metre."
+        return f"{figure.title}: not drawn; all {count(rows.size)} impact points lie within one metre."
     return _Landing(figure, latitude, longitude, rows, above, found, _aim(flown, figure))
+
+
+def landed(flown: Flown, figure: FootprintFigure) -> tuple[np.ndarray, np.ndarray]:
+    """Latitude and longitude, float64[k] degrees, of the cases that came down."""
+    rows = _placed(flown, figure) & _down(flown, figure)
+    return flown.values(figure.latitude)[rows], flown.values(figure.longitude)[rows]
+
+
+def _placed(flown: Flown, figure: FootprintFigure) -> np.ndarray:
+    latitude, longitude = flown.values(figure.latitude), flown.values(figure.longitude)
+    return np.isfinite(latitude) & np.isfinite(longitude) & (np.abs(latitude) <= 90.0)
 
 
 def _down(flown: Flown, figure: FootprintFigure) -> np.ndarray:
@@ -114,13 +124,13 @@ def _limit(flown: Flown, figure: FootprintFigure) -> str:
     return with_unit(number(limit), flown.unit(column))
 
 
-def _planet(flown: Flown, figure: FootprintFigure) -> str:
+def planet_of(flown: Flown, figure: FootprintFigure) -> str:
     settings = {record["name"]: record.get("value") for record in flown.manifest.get("settings", [])}
     return str(settings.get(figure.planet, "earth")).lower()
 
 
 def _on_earth(flown: Flown, figure: FootprintFigure) -> bool:
-    return _planet(flown, figure) not in ELLIPSOIDS or _planet(flown, figure) == "earth"
+    return planet_of(flown, figure) not in ELLIPSOIDS or planet_of(flown, figure) == "earth"
 
 
 def _aim(flown: Flown, figure: FootprintFigure) -> Mark | None:
@@ -156,8 +166,9 @@ def _blocks(flown: Flown, landing: _Landing, stem: str) -> Iterator[FigureBlock 
         shown = min(landing.rows.size, PLACES_IN_A_FILE)
         which = "all" if shown == landing.rows.size else f"{count(shown)} of"
         yield (
-            f"{stem}.kml and {stem}.geojson beside this report hold {which} {count(landing.rows.size)} places with "
-            "case number and status, and the outlines of all regions, for a globe or a map."
+            f"{stem}.kml and {stem}.geojson beside this report hold {which} "
+            f"{counted(landing.rows.size, 'impact point')} with case number and "
+            "status, and the outlines of all regions, for a globe or a map."
         )
 
 
@@ -166,7 +177,7 @@ def _caption(flown: Flown, landing: _Landing) -> str:
     above = f" {count(landing.above)} cases ended above {_limit(flown, landing.figure)} and are left out." * bool(
         landing.above
     )
-    return f"{landing.figure.title}. Mean place {_place_words(plane.latitude, plane.longitude)}.{above}"
+    return f"{landing.figure.title}. Mean impact point {_place_words(plane.latitude, plane.longitude)}.{above}"
 
 
 def _place_words(latitude: float, longitude: float) -> str:
@@ -195,6 +206,9 @@ def _drawing(flown: Flown, landing: _Landing) -> FootprintDrawing:
         n_tried=flown.n_tried,
         aim=(aim.name, (float(here[0]), float(here[1]))) if aim is not None and here is not None else None,
         long_axis=_long_axis(landing.found),
+        case_ids=flown.case_ids[rows],
+        everywhere=points / 1000.0,
+        every_case=flown.case_ids[landing.rows],
     )
 
 
@@ -212,11 +226,13 @@ def _half_turn(longitude: np.ndarray) -> np.ndarray:
 
 def _curves(found: Footprint) -> Iterator[FootprintCurve]:
     for ellipse in found.ellipses:
-        text = f"{_name(ellipse)}, really holds {percent(ellipse.inside / ellipse.n, 1)}"
+        text = f"{_name(ellipse)}, holds {percent(ellipse.inside / ellipse.n, 1)} of the cases"
         yield FootprintCurve("ellipse", text, (ellipse.outline() / 1000.0,))
     for region in found.regions:
         if region.content == DRAWN_REGION:
-            yield FootprintCurve("region", f"{_name(region)}, any shape", tuple(o / 1000.0 for o in region.outlines))
+            yield FootprintCurve(
+                "region", f"{_name(region)}, distribution-free", tuple(o / 1000.0 for o in region.outlines)
+            )
 
 
 def _name(region: Ellipse | DensityRegion) -> str:
@@ -229,9 +245,9 @@ def _region_table(flown: Flown, landing: _Landing) -> Table:
     found = landing.found
     columns = (
         Column("Region", "text", 2.0),
-        Column("Content stated", "number", 1.7),
+        Column("Stated content", "number", 1.7),
         Column("Cases inside", "number", 1.4),
-        Column("Share inside", "number", 1.7),
+        Column("Fraction inside", "number", 1.7),
         Column("Semi-axes [km]", "number", 1.6),
         Column("Long axis [° from north]", "number", 1.2),
     )
@@ -239,13 +255,13 @@ def _region_table(flown: Flown, landing: _Landing) -> Table:
     n = found.ellipses[0].n
     bigger = f"; the next case lies with 99 % in one of k = {next_case_scale(0.99, n):.3f}" if n > 3 else ""
     note = (
-        "Ellipses: covariance of the cases in the plane about the mean place, scaled by k = √(−2 ln(1 − P)), χ² with "
-        f"two degrees of freedom: P of a normal cloud of known covariance{bigger}. Share inside: counted, with its "
-        f"{percent(CONFIDENCE_INSIDE)} Clopper–Pearson interval; where that interval leaves the content stated, the "
-        "cloud is not normal. Regions of any shape assume nothing about the cloud but independent draws: a level of a "
-        "smoothed density of every second case, set by the ranks of the others. Lengths are geodesics through the mean "
-        f"place, the farthest case {number(found.reach / 1000.0, 3)} km from it; across that direction the plane "
-        f"stretches them by at most {percent(found.plane.stretch(found.reach), 3)}."
+        "Ellipses: covariance of the cases in the plane about the mean impact point, scaled by k = √(−2 ln(1 − P)), "
+        f"χ² with two degrees of freedom: P of a normal distribution of known covariance{bigger}. Fraction inside: "
+        f"counted, with its {percent(CONFIDENCE_INSIDE)} Clopper–Pearson interval; where that interval excludes the "
+        "stated content, the distribution is not normal. Distribution-free regions assume nothing but independent "
+        "draws: a level of a smoothed density of every second case, set by the ranks of the others. Lengths are "
+        f"geodesics through the mean impact point, the farthest case {number(found.reach / 1000.0, 3)} km from it; "
+        f"across that direction the plane stretches them by at most {percent(found.plane.stretch(found.reach), 3)}."
     )
     return Table(
         f"Regions of the {count(landing.rows.size)} of {count(flown.n_tried)} cases that came down", columns, rows, note
@@ -261,7 +277,13 @@ def _region_row(region: Ellipse | DensityRegion) -> tuple[Cell, ...]:
     )
     if isinstance(region, DensityRegion):
         stated = Cell(percent(region.content), region.content, f"with {percent(region.confidence)} confidence")
-        return (Cell("region of any shape", small=_parts(len(region.outlines))), stated, *inside, Cell("–"), Cell("–"))
+        return (
+            Cell("distribution-free region", small=_parts(len(region.outlines))),
+            stated,
+            *inside,
+            Cell("–"),
+            Cell("–"),
+        )
     a, b = (axis / 1000.0 for axis in region.semi_axes)
     north = float(np.degrees(0.5 * np.pi - region.direction)) % 180.0
     return (
@@ -281,8 +303,8 @@ def _no_ellipses(flown: Flown, landing: _Landing) -> str:
     if not flown.random:
         return f"No regions: the cases of the design “{flown.design}” are chosen, not drawn."
     if landing.rows.size < 3:
-        return f"No regions: they need three places, and there are {count(landing.rows.size)}."
-    return f"No ellipses: the {count(landing.rows.size)} places lie on a line."
+        return f"No regions: they need three impact points, and there are {count(landing.rows.size)}."
+    return f"No ellipses: the {count(landing.rows.size)} impact points lie on a line."
 
 
 def _distance_table(flown: Flown, landing: _Landing) -> Table | None:
@@ -312,7 +334,7 @@ def _distance_table(flown: Flown, landing: _Landing) -> Table | None:
         f"CEP, circular error probable: half of the cases end within this distance. In brackets: distribution-free "
         f"limits, each holding with {each}."
         if flown.random
-        else "Levels of the flown cases, not of a population."
+        else "Percentiles of the flown cases, not of a population."
     )
     return Table("Distances along the ground", columns, ((where, used, *cells, largest),), note)
 
@@ -328,7 +350,7 @@ def _places(flown: Flown, landing: _Landing) -> Places:
     note = f"{landing.figure.title}; {count(rows.size)} of {count(flown.n_tried)} cases"
     status = [str(word) for word in flown.cases["status"].iloc[rows]]
     plane = landing.found.plane
-    marks = [Mark("mean place", plane.latitude, plane.longitude)]
+    marks = [Mark("mean impact point", plane.latitude, plane.longitude)]
     marks += [landing.aim] if landing.aim else []
     return Places(
         title=title,

@@ -19,39 +19,40 @@ GLOSSARY = Terms(
         ),
         (
             "requirement",
-            "A limit on a metric, a share of cases that must lie inside it, and the confidence with which "
-            "the flown cases must show that share.",
+            "A limit on a metric, the probability with which a case must lie inside it, and the confidence with which "
+            "the flown cases must demonstrate that probability.",
         ),
         (
             "pass",
-            "The lower confidence bound on the share, at the confidence required, reaches that share. The bound is "
-            "Clopper and Pearson’s where the number of cases was fixed in advance; where it was decided on the way, "
-            "one that holds at every number of cases at once.",
+            "The lower confidence bound on the probability, at the confidence required, reaches the one required. The "
+            "bound is Clopper and Pearson’s where the number of cases was fixed in advance; with interim analyses it "
+            "is one that holds at every number of cases at once.",
         ),
-        ("fail", "Even the upper bound, at the same confidence, stays below the share required."),
+        ("fail", "Even the upper bound, at the same confidence, stays below the probability required."),
         (
             "not demonstrable",
             "The cases decide neither way: more of them are needed, or the design gives no probabilities.",
         ),
         (
-            "limit shown",
-            "The value that the wanted share of cases lies inside, with the wanted confidence: an order "
-            "statistic (Wilks), whatever the distribution; two of them where a requirement has two limits. Cases "
-            "without a number take the worst ranks.",
+            "demonstrated bound",
+            "Tolerance limit: the required fraction of cases lies inside it with the required confidence. An order "
+            "statistic (Wilks), distribution-free; two of them where a requirement has two limits. Cases without a "
+            "number take the worst ranks.",
         ),
         (
             "consumer’s risk",
-            "The probability that the cases pass a system that just misses the share required. The producer’s risk is "
-            "the reverse: that they do not pass one that fails only half as often as it may. More cases lower it.",
+            "The probability that the cases pass a system that just misses the probability required. The producer’s "
+            "risk is the reverse: that they do not pass one that fails only half as often as it may. More cases "
+            "lower it.",
         ),
         (
-            "quantile",
-            "The value below which the stated share of cases lies. 0.135, 2.275, 50, 97.725 and 99.865 % are "
+            "percentile",
+            "The value below which the stated percentage of cases lies. 0.135, 2.275, 50, 97.725 and 99.865 % are "
             "a normal distribution’s −3, −2, 0, +2 and +3 standard deviations; no normality is assumed here.",
         ),
         (
-            "interval of a quantile",
-            "Two order statistics, each on its side of the true quantile with 95 % for a 90 % "
+            "interval of a percentile",
+            "Two order statistics, each on its side of the true percentile with 95 % for a 90 % "
             "interval. A dash: the cases are too few for that limit.",
         ),
         (
@@ -63,34 +64,35 @@ GLOSSARY = Terms(
         ),
         (
             "ellipse",
-            "The covariance ellipse of the cases, scaled so that it would hold the stated share of a normal cloud. "
-            "What it really holds is counted beside it.",
+            "The covariance ellipse of the cases, scaled so that it would hold the stated fraction of a normal "
+            "distribution. The fraction that it holds is counted. It is left out where it would leave the physical "
+            "range of a metric.",
         ),
         (
-            "region of any shape",
-            "Holds at least the stated share of all possible cases, with the stated confidence, whatever their "
+            "distribution-free region",
+            "Holds at least the stated fraction of all possible cases, with the stated confidence, whatever their "
             "distribution: half of the cases draw it, the other half set its size.",
         ),
         (
-            "choices compared",
-            "Cases that differ in one word and share all other inputs are pairs; differences within pairs do not hold "
-            "the scatter of the draws.",
+            "comparison of options",
+            "Cases that differ in one option and have all other inputs in common are pairs; differences within pairs "
+            "are free of the scatter of the draws.",
         ),
         (
             "first-order index",
-            "The share of a metric’s variance that would go if the input were known: from bins of the flown cases, of "
-            "any shape of the dependence. SRC, PRCC and Spearman see trends only, and tell their direction.",
+            "First-order Sobol’ index: the fraction of a metric’s variance that is due to the input alone, estimated "
+            "from bins of the flown cases. SRC, PRCC and Spearman measure trends only, and give their direction.",
         ),
         (
-            "driver",
-            "An input, or a pair of them, whose values differ between failed and passed cases by more than chance "
-            "among all that were looked at. A difference, not a proof of a cause.",
+            "contributor to failures",
+            "An input, or a pair of inputs, whose values differ between failed and passed cases by more than chance "
+            "among all that were tested. A difference, not a proof of a cause.",
         ),
         (
             "map",
             "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by a local "
-            "quadratic regression. Its error, which holds the true surface in about 95 % of the places within twice "
-            "its size, adds the scatter of the cases and the bias where the surface bends. Blank outside the cases.",
+            "quadratic regression. Its error, within twice which the true surface lies at about 95 % of the points, "
+            "adds the scatter of the cases and the bias where the surface bends. Blank outside the cases.",
         ),
     )
 )

@@ -1,13 +1,14 @@
-"""The headline box: will it work, how surely, and what does it cost."""
+"""The headline box: which requirements are met, with what confidence, and the key results."""
 
 from collections.abc import Iterator
 
 from mc_engine.figures import MapFigure
 from mc_engine.shell_words import shell_word
-from mc_engine.statistics import Verdict
+from mc_engine.statistics import Summary, Verdict
+from mc_engine.statistics.worst import Limits
 from reports.document import Card
 from reports.flown import CONFIDENCE, Flown
-from reports.numbers import count, number, percent, with_unit
+from reports.numbers import count, number, percent, percentile, with_unit
 from reports.tables import TONES, limit_text
 
 MOST_COSTS = 4
@@ -23,7 +24,7 @@ def verdict_cards(flown: Flown) -> tuple[Card, ...]:
 
 
 def _verdict_card(flown: Flown, verdict: Verdict) -> Card:
-    asked = "every limit kept"
+    asked = "inside every limit"
     if verdict.metric:
         asked = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
     wanted = f"{percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
@@ -40,18 +41,20 @@ def _because(flown: Flown, verdict: Verdict) -> str:
     """What the counts show, as the end of a sentence."""
     lost = f", {count(verdict.no_number)} of the others without a number" if verdict.no_number else ""
     if verdict.lower is None or verdict.upper is None:
-        return f"{lost}; " + ("no case was flown" if not verdict.tried else "cases of this design are no random sample")
+        return f"{lost}; " + (
+            "no case was flown" if not verdict.tried else "the cases of this design are not a random sample"
+        )
     if verdict.outcome == "fail" and verdict.upper >= verdict.share:  # the joint one, for another's failing
         failing = [one.name for one in flown.verdicts if one.shared_outcome == "fail"]
         return f"{lost}; {' and '.join(failing)} {'fails' if len(failing) == 1 else 'fail'} with confidence shared"
     if verdict.outcome == "fail":
-        return f"{lost}; the true share is at most {percent(verdict.upper)}"
-    more = f", {count(verdict.needed)} cases would be needed without a further failure" if verdict.needed else ""
-    return f"{lost}; the true share is at least {percent(verdict.lower)}{more}"
+        return f"{lost}; the true probability is at most {percent(verdict.upper)}"
+    more = f", {count(verdict.needed)} cases without a further failure would demonstrate it" if verdict.needed else ""
+    return f"{lost}; the true probability is at least {percent(verdict.lower)}{more}"
 
 
 def cost_cards(flown: Flown) -> tuple[Card, ...]:
-    """What the metrics that the model maps (or those that matter) come to."""
+    """The key results: the metrics that the model maps, or those that matter."""
     mapped = [figure.metric for figure in flown.figures if isinstance(figure, MapFigure)]
     names = [name for name in dict.fromkeys([*mapped, *flown.key_metrics]) if name in flown.summaries]
     names.sort(key=lambda name: flown.summaries[name].n_used == 0)  # what no case has comes last
@@ -68,23 +71,45 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         if summary.constant and summary.n_used > 1:
             yield Card(flown.words(name), *_same(flown, name, used))
             continue
-        large, spread = flown.large_is_bad(name), summary.spread
-        end = summary.maximum if large else summary.minimum
-        tail = summary.at(HIGH if large else LOW)
-        limit = None if tail is None else (tail.upper if large else tail.lower)
-        side = "at most" if large else "at least"
-        median = summary.at(0.5)
-        middle = f"median {number(median.value, 4, spread) if median else '–'}"
-        nominal = flown.nominal_value(name)
-        rest = [middle, f"{'largest' if large else 'smallest'} {number(end, 4, spread)}", f"from {used}"]
-        rest[:0] = [f"nominal {number(nominal, 4, spread)}"] if nominal is not None else []
-        if flown.random and limit is not None and tail is not None:
-            each = percent(0.5 * (1.0 + CONFIDENCE))
-            rest.insert(0, f"quantile {number(tail.value, 4, spread)}, this limit of it holds with {each}")
-            answer = f"{side} {with_unit(number(limit, 4, spread), unit)} in {percent(HIGH, 3)} of cases"
-        else:
-            answer = f"{side} {with_unit(number(end, 4, spread), unit)} in the cases flown"
-        yield Card(flown.words(name), answer, f"{'; '.join(rest)}.")
+        spread, limits = summary.spread, flown.limits(name)
+        median, nominal = summary.at(0.5), flown.nominal_value(name)
+        rest = [f"nominal {number(nominal, 4, spread)}"] if nominal is not None else []
+        rest.append(f"median {number(median.value, 4, spread) if median else '–'}")
+        if limits == Limits() or limits.two_sided:
+            rest += _tails(flown, summary, (LOW, HIGH))
+            low, high = (number(end, 4, spread) for end in (summary.minimum, summary.maximum))
+            answer = f"{low} to {with_unit(high, unit)}{_of_limits(limits, unit)}"
+            yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
+            continue
+        large = limits.at_most is not None
+        end, tail = (summary.maximum, summary.at(HIGH)) if large else (summary.minimum, summary.at(LOW))
+        bound = None if tail is None or not flown.random else (tail.upper if large else tail.lower)
+        rest.append(f"{'largest' if large else 'smallest'} {number(end, 4, spread)}")
+        rest += _tails(flown, summary, (HIGH,) if large else (LOW,))
+        shown, where = (end, "in the cases flown") if bound is None else (bound, f"in {percent(HIGH, 3)} of cases")
+        answer = f"at {'most' if large else 'least'} {with_unit(number(shown, 4, spread), unit)} {where}"
+        yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
+
+
+def _tails(flown: Flown, summary: Summary, probabilities: tuple[float, ...]) -> Iterator[str]:
+    """Outer percentiles with their confidence bounds, those that the cases are enough for."""
+    each = percent(0.5 * (1.0 + CONFIDENCE))
+    for probability in probabilities if flown.random else ():
+        found, upper = summary.at(probability), probability > 0.5
+        bound = None if found is None else (found.upper if upper else found.lower)
+        if found is not None and bound is not None:
+            value, limit = (number(one, 4, summary.spread) for one in (found.value, bound))
+            side = "upper" if upper else "lower"
+            yield f"{percentile(probability)} {value}, {each} {side} confidence bound {limit}"
+
+
+def _of_limits(limits: Limits, unit: str) -> str:
+    """The two limits behind a range: of ±5 s, or of 24 to 55 m."""
+    if limits.at_most is None or limits.at_least is None:
+        return ""
+    if limits.at_least == -limits.at_most:
+        return f" of ±{with_unit(number(limits.at_most), unit)}"
+    return f" of {number(limits.at_least)} to {with_unit(number(limits.at_most), unit)}"
 
 
 def _same(flown: Flown, name: str, used: str) -> tuple[str, str]:
@@ -96,7 +121,7 @@ def _same(flown: Flown, name: str, used: str) -> tuple[str, str]:
 
 
 def warnings(flown: Flown) -> tuple[str, ...]:
-    """What a reader must know before believing any number below."""
+    """What a reader must know before using any number below."""
     found = []
     missing = flown.n_wanted - flown.n_tried
     if missing > 0:
@@ -115,26 +140,29 @@ def warnings(flown: Flown) -> tuple[str, ...]:
         found.append("No case was flown.")
     if not flown.random:
         found.append(
-            f"The design is “{flown.design}”: its cases are chosen, not drawn, so shares and quantiles below "
-            "describe these cases and are no probabilities."
+            f"The design is “{flown.design}”: its cases are chosen, not drawn at random. Fractions and percentiles "
+            "below describe these cases and do not estimate probabilities."
         )
     return tuple(found)
 
 
 def _how_looked_at(flown: Flown) -> str:
-    """Why the bounds are wider than those of a number of cases that was fixed in advance."""
+    """Interim analyses: why the bounds are wider than those of a number of cases that was fixed in advance."""
     looks = [int(look) for look in flown.manifest.get("looks", [])]
     flown_so_far = count(flown.n_wanted)
     if looks:
         steps = ", ".join(count(look) for look in looks)
-        story = f"Flying was to end once every requirement passes or fails, looked at after {steps} cases; "
-        story += f"it went on to {flown_so_far}."
+        story = (
+            f"The run was to end once every requirement passes or fails, with interim analyses after {steps} cases; "
+        )
+        story += f"it ended after {flown_so_far}."
     else:
         begun = count(int(flown.campaign.get("cases", 0)))
-        story = f"The run was begun with {begun} cases and extended to {flown_so_far} when those could be seen."
+        story = f"The run began with {begun} cases and was extended to {flown_so_far} after their results were known."
     return (
-        f"{story} The bounds on shares hold at every number of cases at once (Robbins’ mixture, Ville’s inequality) "
-        "and are wider for it; quantiles and other intervals are those of a number fixed in advance."
+        f"{story} The bounds on probabilities hold at every number of cases at once (sequential testing: Robbins’ "
+        "mixture, Ville’s inequality) and are wider for it; percentiles and other intervals are those of a number "
+        "fixed in advance."
     )
 
 
@@ -142,7 +170,7 @@ def summary_sentence(flown: Flown) -> str:
     """All verdicts in one sentence."""
     outcomes = [verdict.outcome for verdict in flown.verdicts]
     if not outcomes:
-        return "The campaign sets no requirement; below is what the cases cost."
+        return "The campaign sets no requirement; the key results follow."
     total = len(outcomes)
     if all(outcome == "pass" for outcome in outcomes):
         met = "The requirement is met" if total == 1 else f"All {total} requirements are met"

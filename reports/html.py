@@ -6,20 +6,21 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.document import CaseData, Document, FigureBlock, blocks_of
-from reports.figures import screen
-from reports.figures.scatter import screen_cloud
+from reports.figures import Histories, screen
+from reports.figures.marks import Band, Limit
 
 SCRIPTS = ("tables.js", "figures.js", "cases.js", "histories.js")
 
 
 @cache
-def plotly_script() -> str:
-    """plotly.js as the plotly package ships it (the wheel holds the full bundle only)."""
-    return files("plotly").joinpath("package_data/plotly.min.js").read_text(encoding="utf-8")
+def plotly_script() -> Markup:
+    """plotly.js, its "basic" bundle: scatters and bars.  Its licence and notice stand at its head."""
+    return _own_file("plotly-basic.min.js")
 
 
 @cache
@@ -53,45 +54,85 @@ def _own_file(name: str) -> Markup:
 
 def render_html(document: Document) -> bytes:
     """The page, UTF-8."""
+    cases = document.cases
     figures = [
-        {"id": f"figure-{block.number}-{index}", "number": block.number, **panel}
+        {"id": f"figure-{block.number}-{index}", "number": block.number, **_by_row(panel, cases)}
         for block in blocks_of(document, FigureBlock)
-        for index, panel in enumerate(block.drawing.interactive())
+        for index, panel in enumerate(screen.specifications(block.drawing))
     ]
     page = _environment().get_template("report.html.j2")
     text = page.render(
         document=document,
         figures=figures,
-        panels=Counter(figure["number"] for figure in figures),
-        cases=case_record(document.cases),
-        held=frozenset(document.cases.histories if document.cases else ()),
+        heights=_heights(figures),
+        cases=case_record(document),
+        held=frozenset(cases.histories if cases else ()),
+        found=Counter(cases.outcome.tolist() if cases else ()),
         style=_own_file("report.css"),
         scripts=[_own_file(name) for name in SCRIPTS],
-        plotly=Markup(plotly_script() if figures else ""),
+        plotly=plotly_script() if figures else "",
     )
     return text.encode("utf-8")
 
 
-def case_record(cases: CaseData | None) -> dict[str, Any] | None:
+def _heights(figures: list[dict[str, Any]]) -> dict[int, list[int]]:
+    """Pixels of every panel, by the number of its figure: its place is kept until it is drawn."""
+    heights: dict[int, list[int]] = {}
+    for figure in figures:
+        heights.setdefault(figure["number"], []).append(figure["layout"]["height"])
+    return heights
+
+
+def _by_row(panel: dict[str, Any], cases: CaseData | None) -> dict[str, Any]:
+    """The panel, its clouds of cases over columns that the page holds without their numbers: `rows` say which cases."""
+    names = {column.name for column in cases.columns if isinstance(column.values, np.ndarray)} if cases else set()
+    for trace in panel["data"]:
+        if trace.get("meta") == screen.CASES and cases is not None:
+            row = np.searchsorted(cases.ids, trace["customdata"])
+            held = row < cases.ids.size
+            known = bool(held.all() and (cases.ids[row] == trace["customdata"]).all())
+            if known and trace["columns"] is not None and names.issuperset(trace["columns"]):
+                for member in ("x", "y", "customdata", *["text"] * (len(trace["columns"]) > 2)):
+                    del trace[member]
+                trace["rows"] = screen.typed(row, "u4")
+    return panel
+
+
+def case_record(document: Document) -> dict[str, Any] | None:
     """What the page's scripts look single cases up in, as plain data."""
+    cases = document.cases
     if cases is None:
         return None
-    time_axis = screen.axis("time [s]", zeroline=False)
+    clouds, panel = screen.outcome_clouds(cases.outcomes), screen.history_panel()
     return {
         "tried": cases.n_tried,
-        "ids": cases.ids,
-        "outcome": cases.outcome,
+        "ids": screen.typed(cases.ids, "f8") if (np.diff(cases.ids) > 1).any() else [int(cases.ids[0]), cases.ids.size],
+        "outcome": screen.typed(cases.outcome, "u1"),
         "outcomes": cases.outcomes,
-        "columns": [
-            {"name": column.name, "label": column.label, "role": column.role, "values": column.values}
-            for column in cases.columns
-        ],
+        "columns": [{"name": column.name, "label": column.label, "role": column.role, "values": _values(column.values)}
+                    for column in cases.columns],
         "axes": cases.axes,
-        "clouds": [screen_cloud(k, name) for k, name in enumerate(cases.outcomes)],
+        "clouds": clouds,
         "quantities": [{"name": name, "label": label} for name, label in cases.quantities.items()],
         "histories": {
-            str(case): {name: [screen.rounded(t), screen.rounded(y)] for name, (t, y) in curves.items()}
+            str(case): {name: [screen.packed(t), screen.packed(y)] for name, (t, y) in curves.items()}
             for case, curves in cases.histories.items()
         },
-        "panel": screen.layout(time_axis, screen.axis("", nticks=6), 240, " ", hovermode="closest"),
-    }
+        "behind": _behind(document),
+        "panel": panel,
+    }  # fmt: skip
+
+
+def _values(values: np.ndarray | tuple[str, ...]) -> Any:
+    return screen.column(values) if isinstance(values, np.ndarray) else values
+
+
+def _behind(document: Document) -> dict[str, list[dict[str, Any]]]:
+    """Envelopes and limits of history quantities, which a single case's curve is drawn over."""
+    found: dict[str, list[dict[str, Any]]] = {}
+    for block in blocks_of(document, FigureBlock):
+        if isinstance(block.drawing, Histories):
+            for name, plot in zip(block.drawing.labels, block.drawing.plots, strict=True):
+                marks = [mark for mark in plot.marks if isinstance(mark, Band | Limit)]
+                found.setdefault(name, [trace for mark in marks for trace in screen.traced(mark, plot)])
+    return found

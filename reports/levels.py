@@ -1,4 +1,4 @@
-"""Choices compared: the metrics by the level of a dispersed word, on the same cases wherever the run has them."""
+"""Comparison of options: the metrics by the level of a dispersed word, on the same cases wherever the run has them."""
 
 from collections.abc import Iterator
 
@@ -67,7 +67,7 @@ def _varies(flown: Flown, metric: str) -> bool:
 
 def _pairs_said(flown: Flown, matched: np.ndarray) -> str:
     if not len(matched):
-        return "Its levels were flown on different cases, so that differences between them hold the cases’ scatter too."
+        return "Its levels were flown on different cases: differences between them include the scatter of the cases."
     share = len(matched) * matched.shape[1]
     return (
         f"{count(len(matched))} sets of cases differ in it alone, one case a level: the same draws for all "
@@ -155,5 +155,5 @@ def _note(flown: Flown, first: str, paired: bool) -> str:
     share = percent(CONFIDENCE)
     return note + (
         f"In brackets: {share} distribution-free interval of the median (sign test) and Clopper–Pearson interval of "
-        "the share of pairs, for pairs that were drawn independently."
+        "the fraction of pairs, for pairs that were drawn independently."
     )

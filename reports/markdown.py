@@ -18,8 +18,8 @@ from reports.document import (
     Text,
     blocks_of,
 )
+from reports.figures import paper
 from reports.markdown_text import SPACE, escaped
-from reports.pictures import Pictures
 
 FILE = "report.md"
 MARKS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
@@ -35,10 +35,10 @@ def render_markdown(document: Document) -> bytes:
     return ("\n".join(lines).rstrip() + "\n").encode("utf-8")
 
 
-def figure_files(document: Document, pictures: Pictures) -> Iterator[Attachment]:
+def figure_files(document: Document) -> Iterator[Attachment]:
     """The figures on white, since a reader in dark mode would not see black lines."""
     for block in blocks_of(document, FigureBlock):
-        svg = pictures.svg(block)
+        svg = paper.svg(block.drawing)
         ground = re.sub(r"(<svg [^>]*>)", r'\1<rect width="100%" height="100%" fill="#ffffff"/>', svg, count=1)
         yield Attachment(f"{FIGURES}/{_file(block)}", ground.encode("utf-8"))
 
@@ -59,7 +59,7 @@ def _head(document: Document) -> Iterator[str]:
     for warning in document.warnings:
         yield from (f"> {escaped(warning)}", "")
     yield from _cards(document.question, document.verdicts)
-    yield from _cards("What does it cost?", document.costs)
+    yield from _cards("Key results", document.costs)
 
 
 def _cards(title: str, cards: Iterable[Card]) -> Iterator[str]:

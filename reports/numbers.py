@@ -1,6 +1,9 @@
 """Numbers and names as a reader wants them: sensible digits, a true minus sign, units beside every name."""
 
 import re
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from itertools import pairwise
 from math import floor, isfinite, log10
 
 from mc_engine.units import UNITS, unit_suffix
@@ -9,12 +12,18 @@ SPACE = "\u202f"  # narrow, no-break: groups digits and stands before a unit
 MOST_DIGITS = 8  # of one number in a table
 LONGEST_SYMBOL = 3  # letters
 LONGEST_LABEL = 44  # letters of an axis label, without its unit
+_ROUNDING = 1e-12  # of the size of two numbers: closer ones count as equal
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
 def count(number: int) -> str:
     """A whole number with its digits in groups of three: 10 000."""
     return f"{number:,}".replace(",", SPACE).replace("-", "−")
+
+
+def counted(number: int, noun: str) -> str:
+    """A whole number with its noun: 1 case, 2 cases."""
+    return f"{count(number)} {noun}{'' if number == 1 else 's'}"
 
 
 def number(value: float | None, digits: int = 5, scale: float | None = None) -> str:
@@ -42,6 +51,30 @@ def number(value: float | None, digits: int = 5, scale: float | None = None) -> 
     return "0" if float(text.replace(",", "")) == 0.0 else text.replace(",", SPACE).replace("-", "−")
 
 
+def column_texts(values: Sequence[float | None]) -> list[str]:
+    """The numbers of one column of a table: digits follow their spread, and values that differ never print alike."""
+    numbers = [value for value in values if value is not None and isfinite(value)]
+    distinct = sorted(set(numbers))
+    apart = [b for a, b in pairwise(distinct) if b - a > _ROUNDING * max(abs(a), abs(b))]
+    if not apart:
+        return [number(value, 4) for value in values]
+    if max(map(abs, numbers)) < 1e7 and distinct[-1] - distinct[0] >= 1e-5:
+        decimals = range(min(max(2 - floor(log10(distinct[-1] - distinct[0])), 0), MOST_DIGITS), 16)
+        styles: Iterable[Callable[[float], str]] = (partial(_fixed, decimals=digits) for digits in decimals)
+    else:
+        styles = (partial(number, digits=digits) for digits in range(4, 18))
+    for style in styles:
+        texts = [number(value) if value is None or not isfinite(value) else style(value) for value in values]
+        if len({style(value) for value in numbers}) > len(apart):
+            break
+    return texts
+
+
+def _fixed(value: float, decimals: int) -> str:
+    text = f"{value:,.{decimals}f}" if abs(value) >= 1e4 else f"{value:.{decimals}f}"
+    return text.removeprefix("-" if float(text.replace(",", "")) == 0.0 else " ").replace(",", SPACE).replace("-", "−")
+
+
 def _trim(text: str) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
@@ -61,6 +94,13 @@ def percent(share: float | None, digits: int = 2) -> str:
         digits += 1
     scaled = floor(share * 10 ** (digits + 2) + 1e-6) / 10**digits
     return f"{_trim(f'{scaled:.{digits}f}')}{SPACE}%"
+
+
+def percentile(probability: float) -> str:
+    """A percentile by its name: 99.865th percentile."""
+    text = percent(probability, 3).removesuffix(f"{SPACE}%")
+    ending = {"1": "st", "2": "nd", "3": "rd"}.get(text[-1], "th") if text[-2:-1] != "1" else "th"
+    return f"{text}{ending} percentile"
 
 
 def exact(value: float | str | bool) -> str:

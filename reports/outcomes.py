@@ -1,28 +1,51 @@
-"""How each case came out: inside all limits, outside one of them, or failed; what figures and tables of cases share."""
+"""How each case came out: inside all limits, outside one of them, or failed.
+
+Every count of cases in a report comes from `inside`, and its words from `inside_words`: a figure or table over some of
+the requirements never says "all limits".
+"""
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from mc_engine.statistics.requirements import inside_limits
+from mc_engine.statistics import Verdict
+from mc_engine.statistics.requirements import inside_all
 from reports.flown import Flown
 from reports.numbers import count
 
 INSIDE, OUTSIDE, FAILED = 0, 1, 2
+ALL_LIMITS, COMPLETED = "inside all limits", "completed"
+
+
+def inside(flown: Flown, verdicts: Sequence[Verdict] | None = None) -> np.ndarray:
+    """bool[n_tried]: completed, and inside the limits of these requirements, of all without any named."""
+    asked = flown.verdicts if verdicts is None else verdicts
+    return inside_all([vars(verdict) for verdict in asked if verdict.metric], flown.values, flown.ok)
+
+
+def inside_words(flown: Flown, verdicts: Sequence[Verdict] | None = None) -> str:
+    """What cases that are `inside` are called; without a requirement they are only completed."""
+    if not flown.verdicts:
+        return COMPLETED
+    if verdicts is None or len(verdicts) == len(flown.verdicts):
+        return ALL_LIMITS
+    return f"inside the limit{'s' if len(verdicts) > 1 else ''} of {', '.join(one.name for one in verdicts)}"
+
+
+def failures(flown: Flown) -> Mapping[str, np.ndarray]:
+    """bool[n_tried] by requirement: not inside it; and, if cases failed, not completed."""
+    found = {verdict.name: ~inside(flown, [verdict]) for verdict in flown.verdicts}
+    return found if flown.ok.all() else {**found, COMPLETED: ~flown.ok}
 
 
 def case_outcomes(flown: Flown) -> np.ndarray:
     """int8[n_tried]: INSIDE, OUTSIDE or FAILED; a metric that is not a number is outside its limit."""
-    found = np.where(flown.ok, INSIDE, FAILED).astype(np.int8)
-    for verdict in flown.verdicts:
-        if not verdict.metric:  # all requirements jointly
-            continue
-        inside = inside_limits(flown.values(verdict.metric), verdict.at_most, verdict.at_least)
-        found[flown.ok & ~inside] = OUTSIDE
-    return found
+    return np.where(flown.ok, np.where(inside(flown), INSIDE, OUTSIDE), FAILED).astype(np.int8)
 
 
 def outcome_names(flown: Flown) -> tuple[str, str, str]:
     """The words for the three outcomes; without a requirement, nothing can be outside."""
-    return ("inside all limits" if flown.verdicts else "flown to its end", "outside a limit", "failed")
+    return inside_words(flown), "outside a limit", "failed"
 
 
 def outcome_sentence(flown: Flown) -> str:

@@ -2,41 +2,58 @@
 
 import json
 import time
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from datetime import datetime
 from importlib.resources import as_file, files
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
-import matplotlib
 import typst
 
 from mc_engine.errors import EngineError
+from reports.columns import widths
 from reports.document import Block, Document, FigureBlock, Table, Terms, Text
-from reports.pictures import Pictures
+from reports.figures import paper
 
 KINDS = {Text: "text", Terms: "terms", Table: "table", FigureBlock: "figure"}
 
 
-def render_pdf(document: Document, pictures: Pictures | None = None) -> bytes:
+def render_pdf(document: Document) -> bytes:
     """The PDF.  Its creation date is that of the run.
 
     All text reaches typst as JSON strings, which it never reads as markup.
     """
     if time.time() < 0.0:  # typst asks for it, and panics
         raise EngineError("the clock of this computer stands before 1970, with which no PDF is made; set it")
-    content = json.dumps(_plain(document, pictures or Pictures()), ensure_ascii=False, allow_nan=False)
+    content = json.dumps(_plain(document), ensure_ascii=False, allow_nan=False)
     with as_file(files("reports").joinpath("templates")) as templates:
         return typst.compile(
             str(templates / "report.typ"),
             root=str(templates),
-            font_paths=[matplotlib.get_data_path() + "/fonts/ttf"],
+            font_paths=[fonts()],
             ignore_system_fonts=True,  # the machine's fonts must not change the pages
             sys_inputs={"report": content},
             format="pdf",
         )
 
 
-def _plain(document: Document, pictures: Pictures) -> dict[str, Any]:
+def render_picture(svg: str, kind: Any) -> bytes:
+    """One figure as PDF or PNG, on white."""
+    page: Any = b'#set page(width: auto, height: auto, margin: 4pt)\n#image(bytes(sys.inputs.svg), format: "svg")'
+    return typst.compile(
+        page, font_paths=[fonts()], ignore_system_fonts=True, sys_inputs={"svg": svg}, format=kind, ppi=200.0
+    )
+
+
+def fonts() -> str:
+    """The folder of the DejaVu typefaces, which come with matplotlib; found without importing it."""
+    found = find_spec("matplotlib")
+    return str(Path(str(found and found.origin)).parent / "mpl-data" / "fonts" / "ttf")
+
+
+def _plain(document: Document) -> dict[str, Any]:
     """The document as plain data, figures as SVG."""
     return {
         "kind": document.kind,
@@ -52,24 +69,39 @@ def _plain(document: Document, pictures: Pictures) -> dict[str, Any]:
             {
                 "title": section.title,
                 "anchor": section.anchor,
-                "blocks": [_block(block, pictures) for block in section.blocks],
+                "blocks": list(_blocks(section.blocks)),
             }
             for section in document.sections
         ],
     }
 
 
-def _block(block: Block, pictures: Pictures) -> dict[str, Any]:
+def _blocks(blocks: Sequence[Block]) -> Iterator[dict[str, Any]]:
+    """The blocks as plain data; two figures of one panel come side by side."""
+    rest = list(blocks)
+    while rest:
+        block = rest.pop(0)
+        if _lone(block) and rest and _lone(rest[0]):
+            half = 0.5 * (paper.WIDTH - paper.GAP)
+            yield {"kind": "pair", "figures": [_block(block, half), _block(rest.pop(0), half)]}
+        else:
+            yield _block(block)
+
+
+def _lone(block: Block) -> bool:
+    return isinstance(block, FigureBlock) and len(block.drawing.plots) == 1 and not block.drawing.plots[0].x.ticks
+
+
+def _block(block: Block, width: float = paper.WIDTH) -> dict[str, Any]:
     if isinstance(block, FigureBlock):
         drawing = block.drawing
-        body: dict[str, Any] = {
-            "caption": block.caption,
-            "alternative": drawing.alternative,
-            "svg": pictures.svg(block),
-        }
+        strips = paper.strips(drawing, width)
+        body: dict[str, Any] = {"caption": block.caption, "alternative": drawing.alternative, "strips": strips}
     else:
         body = asdict(block)
         body["style"] = body.pop("kind", "")  # of a text; "kind" says which block it is
+        if isinstance(block, Table):
+            body["widths"] = widths(block)
     return {"kind": KINDS[type(block)], **body}
 
 

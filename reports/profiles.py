@@ -13,6 +13,9 @@ from reports.flown import Flown
 from reports.history_bands import FEWEST_CASES, PROBABILITIES, fair_cases
 
 LEVELS = 200
+LEAST_LEG = 0.05  # of the range of y: a smaller rise or fall is no change of direction
+MOST_LEGS = 3
+CLOSED = 0.1  # of both ranges: a curve that ends nearer to its beginning is closed
 
 
 def profile_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
@@ -30,46 +33,90 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
     if not np.isfinite(flown.histories[names].to_numpy(dtype=np.float64)).all(axis=1).any():
         return f"{figure.title}: not drawn; no retained case has both {figure.x} and {figure.y}."
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
-    band = profile_band(flown.histories, fair, figure.x, figure.y)
+    found = profile_bands(flown.histories, fair, figure.x, figure.y)
+    bands = found if isinstance(found, tuple) else ()
     lines = tuple(
         history_line(flown, case, label, rank, names)
         for case, (label, rank) in history_cases(flown).items()
-        if band is None or (rank is not None and rank <= COLOURED_OVER_BANDS)
+        if not bands or (rank is not None and rank <= COLOURED_OVER_BANDS)
     )
-    drawing = ProfileDrawing(lines, figure.x, figure.y, flown.axis(figure.x), flown.axis(figure.y), band)
-    return FigureBlock(f"{figure.title}.{_band_words(flown, figure, band)}", drawing, "wide")
+    drawing = ProfileDrawing(lines, figure.x, figure.y, flown.axis(figure.x), flown.axis(figure.y), *bands[:2])
+    said = (
+        _band_words(flown, figure, found)
+        if isinstance(found, tuple)
+        else f" {found.replace(figure.y, flown.words(figure.y))}."
+        if flown.random
+        else ""
+    )
+    return FigureBlock(f"{figure.title}.{said}", drawing, "wide")
 
 
-def _band_words(flown: Flown, figure: ProfileFigure, band: ProfileBand | None) -> str:
-    if band is None:
-        return f" Bands need {FEWEST_CASES} retained cases 0, 1, 2, …" if flown.random else ""
+def _band_words(flown: Flown, figure: ProfileFigure, bands: tuple[ProfileBand, ...]) -> str:
     x, y = flown.words(figure.x), flown.words(figure.y)
+    ways = " and ".join("up" if band.rising else "down" for band in bands)
+    again = "climbs" if not bands[0].rising else "descends"
     return (
-        f" The bands are of {x} at equal {y}, over the first {band.n_cases} cases. Of a flight that climbs again, the "
-        f"first way down to a level counts; a level that fewer than {FEWEST_CASES} flights reach has no band."
+        f" The bands are percentiles of {x} at equal {y} on the way {ways}, over the first {bands[0].n_cases} cases. "
+        f"Of a flight that {again} again, the first way {'up' if bands[0].rising else 'down'} to a level counts; "
+        f"a level that fewer than {FEWEST_CASES} flights reach has no band."
     )
 
 
-def profile_band(histories: pd.DataFrame, case_ids: Sequence[int], x: str, y: str) -> ProfileBand | None:
-    """Quantiles of x where each flight first comes down to a level of y; None for too few cases or one level.
+def profile_bands(histories: pd.DataFrame, case_ids: Sequence[int], x: str, y: str) -> tuple[ProfileBand, ...] | str:
+    """Quantiles of x where each flight first comes to a level of y; or the sentence that says why there are none.
 
-    Between its own rows a flight is a straight line.  Climbs are left out: a level has one x per flight.
+    Flights that begin by descending have a band over the way down; those that climb first one over the way up, and one
+    over the way down from their highest point if that is all that follows.  Between its own rows a flight is a
+    straight line.  Closed and oscillating curves have no band: they are at a level more often than once.
     """
     if len(case_ids) < FEWEST_CASES:
-        return None
+        return f"Bands need {FEWEST_CASES} retained cases, numbered from 0 on"
     chosen = histories[histories["case_id"].isin(case_ids)].sort_values(["case_id", "t_s"], kind="stable")
-    flights = [flight[[x, y]].to_numpy(dtype=np.float64) for _, flight in chosen.groupby("case_id")]
-    values = chosen[y].to_numpy(dtype=np.float64)
-    values = values[np.isfinite(values)]
-    if not values.size or values.min() == values.max():
-        return None
-    levels = np.linspace(values.min(), values.max(), LEVELS)
-    table = np.array([first_descent(flight[:, 0], flight[:, 1], levels) for flight in flights])
+    table = chosen[["case_id", x, y]].to_numpy(dtype=np.float64)
+    table = table[np.isfinite(table).all(axis=1)]
+    flights = np.split(table[:, 1:], np.flatnonzero(np.diff(table[:, 0])) + 1)
+    ends = table[:, 1:].min(axis=0), table[:, 1:].max(axis=0)
+    if not len(table) or ends[0][1] == ends[1][1]:
+        return f"No bands: {y} is the same in all of these cases"
+    legs = [_legs(flight[:, 1], LEAST_LEG * (ends[1][1] - ends[0][1])) for flight in flights]
+    closed = [np.abs(one[-1] - one[0]) < CLOSED * (ends[1] - ends[0]) for one in flights]
+    n_legs = float(np.median([len(one) for one in legs]))
+    if n_legs > MOST_LEGS or (n_legs > 1 and np.mean([one.all() for one in closed]) > 0.5):
+        return f"No bands: {y} does not run one way along these curves, they are closed or oscillate"
+    rising = sum(one[0] > 0 for one in legs if one) > 0.5 * len(legs)
+    levels = np.linspace(ends[0][1], ends[1][1], LEVELS)
+    found = [_band(flights, levels, rising)]
+    if rising and n_legs == 2:
+        found.append(_band([one[int(np.argmax(one[:, 1])) :] for one in flights], levels, False))
+    bands = tuple(band for band in found if band is not None)
+    return bands or f"No bands: no level of {y} is reached by {FEWEST_CASES} of these cases"
+
+
+def _legs(y: np.ndarray, least: float) -> list[int]:
+    """Directions, +1 or -1, of the stretches that rise or fall by `least` or more, in the order of time."""
+    legs: list[int] = []
+    low = high = float(y[0])
+    for value in y.tolist():
+        low, high = min(low, value), max(high, value)
+        if value - low >= least and legs[-1:] != [1]:
+            legs.append(1)
+            high = value
+        elif high - value >= least and legs[-1:] != [-1]:
+            legs.append(-1)
+            low = value
+    return legs
+
+
+def _band(flights: list[np.ndarray], levels: np.ndarray, rising: bool) -> ProfileBand | None:
+    """Quantiles of x at the levels of y on the first way up, or down, to each; None for too few flights."""
+    way = -1.0 if rising else 1.0
+    asked = np.sort(way * levels)
+    table = np.array([first_descent(flight[:, 0], way * flight[:, 1], asked) for flight in flights])[:, :: int(way)]
     used = np.count_nonzero(np.isfinite(table), axis=0) >= FEWEST_CASES
     if np.count_nonzero(used) < 2:
         return None
     curves = {p: np.nanquantile(table[:, used], p, axis=0) for p in PROBABILITIES}
-    return ProfileBand(levels[used], curves, len(flights))
+    return ProfileBand(levels[used], curves, len(flights), rising)
 
 
 def first_descent(x: np.ndarray, y: np.ndarray, levels: np.ndarray) -> np.ndarray:

@@ -31,7 +31,7 @@ def _facts(flown: Flown) -> Iterator[tuple[str, str]]:
     yield "design", flown.design
     yield "seed", str(campaign.get("seed", ""))
     yield "seed contract", str(manifest.get("seed_contract", ""))
-    yield "cases flown / wanted", f"{count(flown.n_tried)} / {count(flown.n_wanted)}"
+    yield "cases flown / required", f"{count(flown.n_tried)} / {count(flown.n_wanted)}"
     yield "git", git_text(made.get("git"))
     for key in ("python", "platform", "cpu", "numba", "llvm"):
         yield key, str(made.get(key, ""))
@@ -74,7 +74,7 @@ def campaign_facts(flown: Flown) -> tuple[tuple[str, str], ...]:
         ("Model", str(flown.manifest.get("model", {}).get("title", ""))),
         (
             "Cases",
-            f"{count(flown.n_tried)} flown of {count(flown.n_wanted)}, {count(int(flown.ok.sum()))} to their end",
+            f"{count(flown.n_tried)} flown of {count(flown.n_wanted)}, {count(int(flown.ok.sum()))} completed",
         ),
         ("Design", f"{flown.design}, seed {exact(str(campaign.get('seed', '–')))}"),
         ("Run", str(flown.manifest.get("created_utc", ""))[:16].replace("T", " ") + " UTC"),

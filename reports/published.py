@@ -41,15 +41,16 @@ def published_table(flown: Flown) -> Table | None:
     columns = (
         Column("Quantity", "text", 2.4),
         Column("Published", "number", 1.6),
-        Column("Ours", "number", 2.0),
+        Column("Computed", "number", 2.0),
         Column("Difference", "number", 1.7),
         Column("Remark", "text", 2.5),
     )
     note = (
-        "Ours is the nominal case of this run unless a case is named; “fixed” is a number that the campaign’s tests "
-        "hold. Difference: ours less published, marked as inside or outside the printed digits where those say how far."
+        "Computed: by the nominal case of this run, or by the case named; “fixed” is a number that the campaign’s "
+        "tests check. Difference: computed less published, marked as inside or outside the tolerance where there is "
+        "one."
     )
-    return Table("Published values and ours", columns, tuple(_row(flown, record) for record in records), note)
+    return Table("Published and computed values", columns, tuple(_row(flown, record) for record in records), note)
 
 
 def _row(flown: Flown, record: Mapping[str, Any]) -> tuple[Cell, ...]:

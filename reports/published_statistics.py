@@ -26,7 +26,7 @@ def _table(flown: Flown, place: str, rows: Mapping[str, Mapping[str, Mapping[str
     used = [name for name in STATISTICS if any(name in row for row in rows.values())]
     columns = [Column("Quantity", "name", 2.0)]
     for name in used:
-        columns += [Column(f"{_TITLES[name]}, published", "number", 1.4), Column("ours", "number", 1.4)]
+        columns += [Column(f"{_TITLES[name]}, published", "number", 1.4), Column("computed", "number", 1.4)]
     body = []
     for of, row in rows.items():
         cells = [Cell(axis_label(of, flown.unit(of)))]
@@ -34,10 +34,10 @@ def _table(flown: Flown, place: str, rows: Mapping[str, Mapping[str, Mapping[str
             cells += _pair(flown, row[name]) if name in row else [Cell("–"), Cell("–")]
         body.append(tuple(cells))
     note = (
-        f"Ours: {count(int(flown.ok.sum()))} cases of this run, with its own law of dispersion; for the farthest as "
-        "many as the source has. Marked where the record says how far a number may lie from the printed one."
+        f"Computed: {count(int(flown.ok.sum()))} cases of this run, with its own dispersions; for the farthest as many "
+        "as the source has. Marked where the record gives a tolerance."
     )
-    return Table(f"{place} beside this run", tuple(columns), tuple(body), note)
+    return Table(f"{place} compared with this run", tuple(columns), tuple(body), note)
 
 
 def _pair(flown: Flown, record: Mapping[str, Any]) -> list[Cell]:

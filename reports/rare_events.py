@@ -22,13 +22,13 @@ GLOSSARY = Terms(
         (
             "margin",
             "How far the metric is inside its limit, in its own unit; the nearer one of two limits. A case that did "
-            "not fly to its end, or has no number, has failed.",
+            "not complete, or has no number, has failed.",
         ),
         (
             "subset simulation",
             "Cases are led to the failures in levels. The tenth that is nearest to the limit starts chains of cases "
-            "that may step anywhere but back; the probability is the product of the shares. Several runs are made "
-            "side by side, and the interval comes from their scatter. Au & Beck (2001); Papaioannou and others (2015).",
+            "that may step anywhere but back; the probability is the product of the fractions. Several runs are made "
+            "in parallel, and the interval comes from their scatter. Au & Beck (2001); Papaioannou and others (2015).",
         ),
         (
             "cross entropy",
@@ -62,11 +62,11 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
     """The report of an estimate; `name` is its directory's name."""
     campaign, result = record.record["campaign"], record.result
     sections = (
-        Section("failures", "What the failures look like", blocks(_failures(record))),
+        Section("failures", "Failures", blocks(_failures(record))),
         Section("levels", "How it was reached", _levels(result)),
         Section("inputs", "Dispersed inputs", (_inputs(record.record["inputs"]),)),
         Section("provenance", "Provenance", (_provenance(record, name),)),
-        Section("reading", "How to read this report", (GLOSSARY,)),
+        Section("reading", "Glossary", (GLOSSARY,)),
     )
     return numbered(
         Document(
@@ -122,8 +122,8 @@ def _verdict(result: dict[str, Any]) -> Card:
     return Card(
         label=result["requirement"]["name"],
         answer=answer,
-        detail=f"Not met with a probability of {number(result['probability'], 4)}, {interval}; {number(allowed, 4)} is "
-        f"allowed.{source}",
+        detail=f"Probability of failure {number(result['probability'], 4)}, {interval}; allowed: "
+        f"{number(allowed, 4)}.{source}",
         tone=tone,
     )
 
@@ -142,7 +142,7 @@ def _costs(result: dict[str, Any]) -> Iterator[Card]:
         yield Card(
             label="cases",
             answer=count(result["cases"]),
-            detail=f"{number(plain, 3)} plain cases would tell it with the same error: "
+            detail=f"{number(plain, 3)} independent cases would give the same standard error: "
             f"{number(plain / result['cases'], 3)} times as many.",
         )
 
@@ -198,11 +198,11 @@ def _level_words(chains: bool) -> str:
     if chains:
         return (
             "Level 0 holds plain cases. Each further level explores what lies at or below its margin with chains; "
-            "accepted is the share of their steps that did not lead back."
+            "accepted is the fraction of their steps that did not lead back."
         )
     return (
         "Each level is drawn from the density fitted to the level before. Its margin is the median of the cases that "
-        "the next density is fitted to; accepted is the effective share of these. The last level is the fresh cases "
+        "the next density is fitted to; accepted is the effective fraction of these. The last level is the fresh cases "
         "that the estimate rests on."
     )
 
@@ -251,7 +251,7 @@ def _provenance(record: RareEventRecord, name: str) -> Table:
         ("directory", name),
         ("started (UTC)", manifest.get("created_utc", "")),
         ("engine", manifest.get("engine", "")),
-        ("asked for", f"{asked['method']}, {asked['cases_per_level']} cases per level"),
+        ("configured", f"{asked['method']}, {asked['cases_per_level']} cases per level"),
         ("campaign", campaign["name"]),
         ("campaign digest", campaign["digest"]),
         ("model", campaign["model"]),

@@ -14,24 +14,25 @@ def requirement_table(flown: Flown) -> Table:
         Column("Limit", "text", 1.9),
         Column("Required", "number", 1.3),
         Column("Inside / tried", "number", 1.5),
-        Column("Share shown", "number", 1.8),
-        Column("Limit shown", "text", 1.8),
+        Column("Demonstrated probability", "number", 1.8),
+        Column("Demonstrated bound", "text", 1.8),
         Column("Verdict", "text", 2.0),
     )
     records = flown.manifest.get("requirements", [])
     sources = [str(record.get("source") or "") for record in records]
     rows = [_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True)]
     note = (
-        f"Share shown: observed share, below it {_bounds_named(flown)}. "
-        "Limit shown: the limit that these cases demonstrate with the share and confidence required (Wilks), below it "
-        "its distance inside the required one. A failed case, or one whose metric is not a number, counts as outside."
+        f"Demonstrated probability: observed fraction of the cases, below it {_bounds_named(flown)}. Demonstrated "
+        "bound: the tolerance limit that these cases demonstrate with the probability and confidence required "
+        "(Wilks), below it its margin to the limit. A failed case, or one whose metric is not a number, counts as "
+        "outside."
     )
     if flown.joint is not None:
         rows.append(_requirement_row(flown, flown.joint, ""))
         note += (
-            " All at once: cases inside every limit; required is 100 % less what each requirement may miss. It passes "
-            "where that is shown and every requirement passes, and fails where one of them fails with confidence "
-            "shared (next table)."
+            " All at once: cases inside every limit; required is 100 % less what each requirement may miss. It "
+            "passes where that is demonstrated and every requirement passes, and fails where one of them fails with "
+            "confidence shared (next table)."
         )
     return Table("Requirements and their verdicts", columns, tuple(rows), note)
 
@@ -41,7 +42,7 @@ def _bounds_named(flown: Flown) -> str:
         return "the Clopper–Pearson bounds, each holding with the confidence required"
     return (
         "bounds that hold, each with the confidence required, at every number of cases at once (Robbins’ mixture): "
-        "how many to fly was decided while looking at them"
+        "the number of cases was decided by interim analyses"
     )
 
 
@@ -53,7 +54,7 @@ def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell,
     needed = f"needs {count(verdict.needed)} cases" if verdict.needed else ""
     return (
         Cell(verdict.name, small=verdict.metric),
-        Cell(limit_text(verdict, unit), small=source) if verdict.metric else Cell("every limit"),
+        Cell(limit_text(verdict, unit), small=source) if verdict.metric else Cell("all limits"),
         Cell(percent(verdict.share, 3), verdict.share, f"with {percent(verdict.confidence)} confidence"),
         Cell(f"{count(verdict.passed)} / {count(verdict.tried)}", verdict.passed, lost),
         Cell(percent(verdict.estimate), verdict.estimate, bounds),
@@ -86,13 +87,13 @@ def risk_table(flown: Flown) -> Table | None:
     rows = tuple(_risk_row(verdict, len(judged)) for verdict in judged)
     note = (
         f"Allowed outside: the most of these {count(flown.n_tried)} cases with which the requirement still passes. "
-        "Consumer’s risk: the probability that so many cases pass a system that just misses the share required. "
+        "Consumer’s risk: the probability that so many cases pass a system that just misses the probability required. "
         "Producer’s risk: the probability that they do not pass one that fails half as often as it may. "
     )
     if flown.looked:
         note += (
-            "The number of cases was decided on the way: the consumer’s risk is then below the figure given, whatever "
-            "the rule by which flying ended, and the producer’s has no figure. "
+            "The number of cases was decided by interim analyses: the consumer’s risk is then below the figure given, "
+            "whatever the stopping rule, and the producer’s risk has no figure. "
         )
     if len(flown.verdicts) > 1:
         note += (
@@ -108,7 +109,7 @@ def risk_table(flown: Flown) -> Table | None:
 def _risk_row(verdict: Verdict, among: int) -> tuple[Cell, ...]:
     outside = verdict.tried - verdict.passed
     allowed = (
-        Cell("none would do", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
+        Cell("none suffices", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
     )
     if verdict.looked:
         consumer = Cell(f"below {percent(1.0 - verdict.confidence)}", 1.0 - verdict.confidence)

@@ -1,4 +1,4 @@
-"""What drives it: the inputs behind the spread of each metric, and those that tell failed cases from passed ones."""
+"""Contributors: the inputs behind the spread of each metric, and those that separate failed from passed cases."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 
 from mc_engine.statistics.drivers import FALSE_DISCOVERIES, FEWEST, Driver, failure_drivers, success_along
-from mc_engine.statistics.requirements import inside_limits
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_chance, sensitivity
+from reports.companion_section import companion_blocks
 from reports.designed_indices import designed_blocks
 from reports.document import Cell, Column, FigureBlock, Table
 from reports.figures import IndexMap, SuccessDrawing, SuccessPanel
 from reports.flown import Flown
-from reports.numbers import count, number, percent
+from reports.numbers import count, counted, number, percent
+from reports.outcomes import ALL_LIMITS, failures, inside, inside_words
 
 CONFIDENCE = 0.95
 MOST_METRICS = 8
@@ -22,50 +23,39 @@ SURELY = 2.0  # standard errors
 MOST_DRIVERS = 12
 MOST_PANELS = 6
 MOST_CASES = 20_000  # above, the indices rest on cases picked evenly
-ALL_LIMITS = "inside all limits"
-FLOWN = "flown to its end"
 
 
 def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     """Indices of the metrics that matter, then the drivers of the failures; nothing without a dispersed input."""
-    inputs = {fact.name: flown.cases[fact.name].to_numpy() for fact in flown.with_role("dispersion")}
+    inputs = flown.inputs
     if not inputs or not flown.n_tried:
         return
     if flown.design in ("saltelli", "morris"):
-        yield from designed_blocks(flown, inputs, _failed(flown))
+        yield from designed_blocks(flown, inputs)
         return
     if not flown.random:
         yield (
-            f"The cases of this design ({flown.design}) were chosen, not drawn: shares of variance and drivers of "
-            "failures would speak of that choice. A design mc, lhs, sobol or halton shows them."
+            f"The cases of this design ({flown.design}) were chosen, not drawn at random: Sobol’ indices and "
+            "contributors to failures would describe that choice. The designs mc, lhs, sobol and halton give them."
         )
         return
-    failed = _failed(flown)
-    yield from _index_blocks(flown, inputs, failed)
+    failed = failures(flown)
+    found = flown.contributions
+    yield from (companion_blocks(flown, found) if found is not None and found.flights else _index_blocks(flown, inputs))
     if failed:
         yield from _driver_blocks(flown, inputs, failed)
-
-
-def _failed(flown: Flown) -> dict[str, np.ndarray]:
-    """bool[n_tried] by requirement: not inside it; and, if cases failed, not flown to their end."""
-    failed = {}
-    for verdict in flown.verdicts:
-        failed[verdict.name] = ~inside_limits(flown.values(verdict.metric), verdict.at_most, verdict.at_least)
-    return failed if flown.ok.all() else {**failed, FLOWN: ~flown.ok}
 
 
 # ---- indices
 
 
-def _index_blocks(
-    flown: Flown, inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]
-) -> Iterator[FigureBlock | Table | str]:
+def _index_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureBlock | Table | str]:
     rows = np.arange(flown.n_tried)[:: -(-flown.n_tried // MOST_CASES)]
     metrics = {name: flown.values(name)[rows] for name in flown.key_metrics[:MOST_METRICS]}
     names = {name: flown.words(name) for name in metrics}
-    if failed:
-        names[ALL_LIMITS] = ALL_LIMITS if flown.verdicts else FLOWN
-        metrics[ALL_LIMITS] = (~np.any(list(failed.values()), axis=0))[rows].astype(np.float64)
+    if flown.verdicts or not flown.ok.all():
+        names[ALL_LIMITS] = inside_words(flown)
+        metrics[ALL_LIMITS] = inside(flown)[rows].astype(np.float64)
     found = sensitivity({name: values[rows] for name, values in inputs.items()}, metrics)
     shown = np.flatnonzero(np.isfinite(found.first_order).any(axis=0))
     silent = [names[name] for k, name in enumerate(found.metrics) if k not in shown]
@@ -92,11 +82,11 @@ def _index_figure(
         n_used=(int(used.min()), int(used.max())),
         n_tried=n_rows,
     )
-    caption = "Share of each metric’s variance that goes when one input becomes known"
+    caption = "First-order Sobol’ index of each input and metric"
     left_out = len(found.inputs) - order.size
     if left_out:
         rest = float(max(np.delete(largest, order).max(), 0.0))
-        caption += f"; {count(left_out)} inputs are not shown, none of them above {number(rest, 2)}"
+        caption += f"; not shown: {counted(left_out, 'input')}, at most {number(rest, 2)}"
     if n_rows < flown.n_tried:
         caption += f". From {count(n_rows)} cases picked evenly out of {count(flown.n_tried)}"
     return FigureBlock(f"{caption}.", drawing, "wide")
@@ -117,8 +107,6 @@ def _index_table(flown: Flown, found: Sensitivity, shown: np.ndarray, names: Map
         small = f"{count(int(found.n_used[k]))} / {count(found.n_tried)}"
         if np.isfinite(found.r_squared[k]):
             small += f", R² {found.r_squared[k]:.2f}"
-        if found.unexplained[k] >= 0.005:
-            small += f", {percent(float(found.unexplained[k]), 0)} unexplained"
         for row in _strongest(found, k):
             cells = [
                 _with_error(getattr(found, index)[row, k], getattr(found, f"{index}_error")[row, k])
@@ -126,8 +114,12 @@ def _index_table(flown: Flown, found: Sensitivity, shown: np.ndarray, names: Map
             ]
             metric = Cell(names[found.metrics[k]], small=small)
             rows.append((metric, Cell(flown.words(found.inputs[row])), *cells))
+        if found.unexplained[k] >= 0.005:
+            left = Cell(percent(float(found.unexplained[k]), 0), float(found.unexplained[k]))
+            rest = (Cell("unexplained by the inputs"), Cell("–"), left, Cell("–"), Cell("–"), Cell("–"))
+            rows.append((Cell(names[found.metrics[k]], small=small), *rest))
     return Table(
-        f"What the metrics depend on: the strongest inputs of each, at most {STRONGEST}",
+        f"Contributors to each metric, at most {STRONGEST}",
         columns,
         tuple(rows),
         _index_note(flown, found),
@@ -155,19 +147,19 @@ def _with_error(value: float, error: float) -> Cell:
 
 def _index_note(flown: Flown, found: Sensitivity) -> str:
     note = (
-        "± one standard error, for independent draws; further inputs are within two of them of 0, or weaker. R²: the "
-        "share of the variance that the linear regression behind SRC explains. First-order: the share that goes when "
-        "this input alone becomes known. Total: the share that stays when all others are known; what it has more than "
-        "first-order is due to inputs acting together. Unexplained: the share that the surrogate behind the total "
-        "indices gives to no input (noise in flight, sharp edges); a total index may be larger by up to it."
+        "± one standard error, for independent draws; further inputs are within two standard errors of 0, or weaker. "
+        "R²: fraction of the variance that the linear regression behind SRC explains. First-order index: fraction of "
+        "the variance due to this input alone. Total index: fraction due to this input and its interactions with "
+        "others. Unexplained: fraction that the surrogate model behind the total indices attributes to no input "
+        "(random draws in flight, discontinuities); a total index may be larger by up to it."
     )
     if found.correlated is not None:
         first, second, rho = found.correlated
         if beyond_chance(rho, found.n_tried):
             note += (
                 f" Inputs are correlated, most of all {flown.words(first)} and {flown.words(second)} "
-                f"(rank correlation {number(rho, 2)}): first-order and Spearman hold what an input owes to its "
-                "partner, and total indices, which are for independent inputs, are left out."
+                f"(rank correlation {number(rho, 2)}): first-order and Spearman include what an input owes to its "
+                "correlation; total indices require independent inputs and are left out."
             )
     return note
 
@@ -190,7 +182,7 @@ def _driver_blocks(
         )
     if found.undecided:
         yield (
-            f"Drivers were not looked for, fewer than {FEWEST} cases failed or fewer than {FEWEST} passed: "
+            f"Not tested for contributors to failures, fewer than {FEWEST} cases failed or fewer than {FEWEST} passed: "
             f"{', '.join(found.undecided)}."
         )
     if found.singles:
@@ -207,7 +199,7 @@ def _driver_table(
 ) -> Table:
     columns = (
         Column("Requirement", "text", 1.7),
-        Column("Driver", "text", 2.3),
+        Column("Contributor", "text", 2.3),
         Column("Cases fail where it is", "text", 2.1),
         Column("Separation", "number", 1.2),
         Column("Adjusted p", "number", 1.3),
@@ -217,10 +209,10 @@ def _driver_table(
     rows = tuple(_driver_row(flown, one, failed) for one in told)
     left_out = len(singles) + len(pairs) - len(told)
     note = (
-        f"{count(singles_tested)} tests of single inputs and {count(pairs_tested)} of pairs; on average at most "
-        f"{percent(FALSE_DISCOVERIES)} of what is found of each kind is chance (Benjamini–Hochberg). Separation: "
-        "Cliff’s delta, 1 if all failed cases are told from all passed ones, 0 if none. A pair is found if the two "
-        "tell more than each alone; its cell is made of outer thirds. What is correlated with a driver is found too."
+        f"{count(singles_tested)} tests of single inputs and {count(pairs_tested)} of pairs; false-discovery rate of "
+        f"each kind at most {percent(FALSE_DISCOVERIES)} (Benjamini–Hochberg). Separation: Cliff’s delta, 1 if all "
+        "failed cases are separated from all passed ones, 0 if none. A pair is listed if it separates better than "
+        "each of its inputs; its cell is made of outer thirds. Inputs correlated with a contributor are listed too."
     )
     if left_out:
         note += f" {count(left_out)} weaker ones are not shown."

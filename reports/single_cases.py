@@ -1,7 +1,7 @@
 """Single cases: the figure of all by their outcome, and what an interactive page needs to look any of them up.
 
-A page cannot hold a million cases.  It holds those that its figures draw, the worst ones and those that did not pass,
-up to a budget; what is left out is counted.
+A page holds all cases as far as a budget of numbers reaches, so that what is chosen in a figure is counted in full.  Of
+more cases, it holds those that its figures draw, the worst ones and those that did not pass, and says how many.
 """
 
 from collections.abc import Iterable, Iterator
@@ -13,8 +13,8 @@ import pandas as pd
 
 from mc_engine.replay_files import read_replay, replayed_cases
 from reports.document import Block, CaseColumn, CaseData, FigureBlock, Section
-from reports.drawings import nominal_point, thinned_rows
-from reports.figures import ScatterDrawing, screen
+from reports.drawings import nominal_point, thinned_by_outcome, thinned_rows
+from reports.figures import ScatterDrawing
 from reports.figures.histories import thinned
 from reports.flown import ColumnFacts, Flown
 from reports.numbers import axis_label, words
@@ -23,8 +23,8 @@ from reports.outcomes import INSIDE, case_outcomes, outcome_names, outcome_sente
 ANCHOR = "cases"
 NOMINAL = -1
 BINS = 10
-MOST_CASES = 6000
-MOST_NUMBERS = 300_000  # of the cases
+MOST_CASES = 6000  # drawn, and held where a page cannot hold all
+MOST_NUMBERS = 160_000  # of the cases, 4 bytes each
 MOST_METRICS = 24
 WORST_RANKS = 10
 SAMPLES = 160  # of a curve
@@ -45,7 +45,7 @@ def case_blocks(flown: Flown) -> Iterator[Block | str]:
 def _outcome_figure(flown: Flown, x_name: str, y_name: str) -> FigureBlock:
     x, y, outcome = flown.values(x_name), flown.values(y_name), case_outcomes(flown)
     used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
-    rows = thinned_rows(used, np.flatnonzero(outcome != INSIDE)[:MOST_CASES])
+    rows = thinned_by_outcome(used, outcome)
     drawing = ScatterDrawing(
         x=x[rows],
         y=y[rows],
@@ -57,8 +57,9 @@ def _outcome_figure(flown: Flown, x_name: str, y_name: str) -> FigureBlock:
         nominal=nominal_point(flown, x_name, y_name),
         outcome=outcome[rows],
         outcomes=tuple(zip(outcome_names(flown), np.bincount(outcome[used], minlength=3).tolist(), strict=True)),
+        columns=(x_name, y_name),
     )
-    return FigureBlock(f"Cases by how they came out: {outcome_sentence(flown)}.", drawing, "wide")
+    return FigureBlock(f"Cases by outcome: {outcome_sentence(flown)}.", drawing, "wide")
 
 
 def case_axes(flown: Flown) -> tuple[str, str] | None:
@@ -88,19 +89,24 @@ def _told(values: np.ndarray, lost: np.ndarray) -> float:
 
 
 def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
-    """Inputs, metrics and histories of the cases that the page holds; None without a case."""
+    """Inputs, metrics and histories of the cases that the page holds; None without a case.
+
+    It holds all cases where it can, with as many metrics as there is room for, those that matter first.
+    """
     if not flown.n_tried:
         return None
-    facts = [*flown.with_role("dispersion"), *_metrics(flown)]
+    key = [*flown.with_role("dispersion"), *(flown.columns[name] for name in flown.key_metrics[:MOST_METRICS])]
+    most = MOST_NUMBERS // flown.n_tried
+    everything = most >= len(key)
+    facts = _facts(flown, min(most, len(key) + MOST_METRICS) if everything else len(key))
     histories, left_out = case_histories(flown)
-    rows = _rows(flown, sections, histories, max(1, len(facts)))
-    outcome = case_outcomes(flown)
+    rows = np.arange(flown.n_tried) if everything else _rows(flown, sections, histories, max(1, len(facts)))
     return CaseData(
         n_tried=flown.n_tried,
-        ids=tuple(int(case) for case in flown.case_ids[rows]),
-        outcome=tuple(int(k) for k in outcome[rows]),
+        ids=flown.case_ids[rows],
+        outcome=case_outcomes(flown)[rows],
         outcomes=outcome_names(flown),
-        columns=tuple(_column(flown, fact, rows) for fact in facts),
+        columns=tuple(_column(flown, fact, rows) for fact in facts) + tuple(_places(flown, sections, rows)),
         axes=case_axes(flown),
         quantities={name: _quantity_label(flown, name) for name in _quantities(flown, histories)},
         histories=histories,
@@ -108,9 +114,17 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
     )
 
 
-def _metrics(flown: Flown) -> list[ColumnFacts]:
-    names = dict.fromkeys([*flown.key_metrics, *(fact.name for fact in flown.with_role("metric"))])
-    return [flown.columns[name] for name in list(names)[:MOST_METRICS]]
+def _facts(flown: Flown, most: int) -> list[ColumnFacts]:
+    """All inputs, then the metrics, those that matter first, together at most so many."""
+    inputs = [fact.name for fact in flown.with_role("dispersion")]
+    metrics = [fact.name for fact in flown.with_role("metric")]
+    drawn = [
+        name
+        for figure in flown.figures
+        for name in (getattr(figure, "x", ""), getattr(figure, "y", ""))
+        if name in metrics
+    ]
+    return [flown.columns[name] for name in list(dict.fromkeys([*inputs, *flown.key_metrics, *drawn, *metrics]))[:most]]
 
 
 def _column(flown: Flown, fact: ColumnFacts, rows: np.ndarray) -> CaseColumn:
@@ -118,11 +132,22 @@ def _column(flown: Flown, fact: ColumnFacts, rows: np.ndarray) -> CaseColumn:
     label = axis_label(fact.name, fact.unit)
     if pd.api.types.is_bool_dtype(values) or not pd.api.types.is_numeric_dtype(values):
         return CaseColumn(fact.name, label, fact.role, tuple(values.astype(str)))
-    return CaseColumn(fact.name, label, fact.role, tuple(screen.rounded(flown.values(fact.name)[rows])))
+    return CaseColumn(fact.name, label, fact.role, flown.values(fact.name)[rows])
+
+
+def _places(flown: Flown, sections: Iterable[Section], rows: np.ndarray) -> Iterator[CaseColumn]:
+    """Numbers that figures alone have of the cases, such as where they came down on a map."""
+    for section in sections:
+        for block in section.blocks:
+            for name, (label, cases, values) in (
+                block.drawing.places if isinstance(block, FigureBlock) else {}
+            ).items():
+                row = pd.Index(cases).get_indexer(flown.case_ids[rows])
+                yield CaseColumn(name, label, "place", np.where(row >= 0, values[row], np.nan))
 
 
 def _rows(flown: Flown, sections: Iterable[Section], histories: Iterable[int], columns: int) -> np.ndarray:
-    """Row numbers of the cases that the page holds, in the order of the table."""
+    """Row numbers of the cases that a page holds that cannot hold all, in the order of the table."""
     most = min(MOST_CASES, max(MOST_NUMBERS // columns, 1))
     place = pd.Index(flown.case_ids)
     worst = [flown.worst(metric, WORST_RANKS) for metric in flown.key_metrics]

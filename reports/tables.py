@@ -49,7 +49,7 @@ def summary_table(flown: Flown) -> Table:
         "Used / tried: cases with a number, of all cases flown. Shape: skewness and excess kurtosis, both 0 for a "
         "normal distribution; “not normal” where they and the D’Agostino–Pearson test agree."
     )
-    return Table("Metrics: how many, where, how wide", columns, tuple(rows), note)
+    return Table("Statistics of the metrics", columns, tuple(rows), note)
 
 
 def metric_cell(flown: Flown, name: str) -> Cell:
@@ -97,34 +97,32 @@ def quantile_table(flown: Flown) -> Table | None:
         else ""
     )
     note += (
-        "a dash where the cases are too few for one."
-        if flown.random
-        else "Levels of the flown cases, not of a population."
+        "a dash: too few cases for a limit." if flown.random else "Percentiles of the flown cases, not of a population."
     )
-    return Table("Quantiles of the metrics", columns, tuple(rows), note)
+    return Table("Percentiles of the metrics", columns, tuple(rows), note)
 
 
 def _for_fixed(flown: Flown) -> str:
     """What is to be said of such limits where the number of cases was decided on the way."""
     if not flown.looked:
         return ""
-    return " for a number of cases fixed in advance (it was decided on the way here, so they hold somewhat less often)"
+    return " for a number of cases fixed in advance (with interim analyses they hold somewhat less often)"
 
 
 def status_table(flown: Flown) -> Table:
-    """How the cases ended, each status with its meaning; reasons of refused and failed cases below it."""
+    """Completion of the cases: each status with its meaning; reasons of refused and failed cases below it."""
     columns = (
         Column("Status", "code", 1.2),
         Column("Cases", "number", 1.0),
-        Column("Share", "number", 1.0),
+        Column("Fraction", "number", 1.0),
         Column("Meaning", "text", 6.0),
     )
     counts = flown.cases["status"].astype(str).value_counts(sort=False)
     words = sorted(counts.index, key=lambda word: (word != "ok", -counts[word], word))
     rows = [_status_row(word, int(counts[word]), flown.n_tried, flown.status_text(word)) for word in words]
     rows += [_status_row("", cases, flown.n_tried, reason) for reason, cases in _reasons(flown)]
-    rows.append(_status_row("all", flown.n_tried, flown.n_tried, f"flown of {count(flown.n_wanted)} wanted"))
-    return Table("How the cases ended", columns, tuple(rows))
+    rows.append(_status_row("all", flown.n_tried, flown.n_tried, f"flown of {count(flown.n_wanted)} required"))
+    return Table("Completion of the cases", columns, tuple(rows))
 
 
 def _reasons(flown: Flown) -> list[tuple[str, int]]:

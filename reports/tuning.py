@@ -32,14 +32,14 @@ GLOSSARY = Terms(
             "Of all feasible candidates that were flown, those that no other one equals or beats in every objective "
             "and beats in one. Which of them is best is a choice between the objectives.",
         ),
-        ("violation", "How far a candidate is beyond its limits, in shares of each limit, added up."),
+        ("violation", "How far a candidate is beyond its limits, as fractions of each limit, added up."),
         (
             "quantile",
             "The order statistic of the candidate’s dispersed cases; a case that failed takes the worst rank. All "
             "candidates fly the same cases with the same noise, so they differ by their choice alone.",
         ),
         (
-            "share of the box",
+            "fraction of the box",
             "Of the box that holds the fronts of all generations: what the front so far dominates. It levels off when "
             "the search brings nothing new; it does not show that nothing better exists.",
         ),
@@ -53,12 +53,12 @@ def build_tuning(record: TuningRecord, name: str) -> Document:
     campaign = tuned.manifest["campaign"]
     sections = (
         Section("front", "The front", blocks(_front(tuned))),
-        Section("published", "Published and ours", blocks([published_table(tuned)])),
-        Section("convergence", "How the search went", _convergence(tuned)),
-        Section("question", "What was asked", (parameter_table(tuned), measure_table(tuned))),
+        Section("published", "Validation against published results", blocks([published_table(tuned)])),
+        Section("convergence", "Convergence of the search", _convergence(tuned)),
+        Section("question", "Problem", (parameter_table(tuned), measure_table(tuned))),
         Section("inputs", "Other inputs", blocks(input_tables(tuned))),
         Section("provenance", "Provenance", (provenance_table(tuned),)),
-        Section("reading", "How to read this report", (GLOSSARY,)),
+        Section("reading", "Glossary", (GLOSSARY,)),
     )
     return numbered(
         Document(
@@ -194,7 +194,7 @@ def _convergence(tuned: Tuned) -> tuple[Block, ...]:
     shares = frame["dominated_share"].to_numpy()
     curves = {}
     if tuned.record.feasible and np.isfinite(shares).all():
-        curves["share of the box that the front dominates"] = shares
+        curves["fraction of the box that the front dominates"] = shares
     if tuned.constraints:
         least = frame["least_violation"].to_numpy()
         if least[0] > 0.0:

@@ -79,8 +79,8 @@ def published_table(tuned: Tuned) -> Table | None:
     columns = (
         Column("Point", "text", 1.6),
         *(Column(tuned.label(name), "number", 1.2) for name in tuned.objectives),
-        *(Column(f"ours, {tuned.label(name)}", "number", 1.2) for name in tuned.objectives),
-        Column("Ours is", "text", 1.6),
+        *(Column(f"computed, {tuned.label(name)}", "number", 1.2) for name in tuned.objectives),
+        Column("Computed is", "text", 1.6),
         Column("Source", "text", 2.6),
     )
     best = tuned.best[tuned.objectives].to_numpy()
@@ -96,8 +96,8 @@ def published_table(tuned: Tuned) -> Table | None:
         cells = [Cell(number(value, 5), float(value)) for value in (*point, *ours)]
         verdict = Cell(words_, small=limits, tone="good" if good and not limits else "open")
         rows.append((Cell(one["name"]), *cells, verdict, Cell(one["source"])))
-    note = "Ours: the candidate of the front that falls least short of the point in its worst objective."
-    return Table("Published points beside the front", columns, tuple(rows), note)
+    note = "Computed: the candidate of the front that falls least short of the point in its worst objective."
+    return Table("Published points compared with the front", columns, tuple(rows), note)
 
 
 def parameter_table(tuned: Tuned) -> Table:
@@ -170,7 +170,7 @@ def input_tables(tuned: Tuned) -> Iterator[Table | str | None]:
         (Cell(one["name"]), Cell(with_unit(exact(one["value"]), one["unit"])), Cell(one["description"]))
         for one in fixed
     )
-    yield Table("Settings and parameters that all candidates share", columns, rows) if rows else None
+    yield Table("Settings and parameters common to all candidates", columns, rows) if rows else None
 
 
 def provenance_table(tuned: Tuned) -> Table:

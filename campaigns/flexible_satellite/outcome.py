@@ -33,24 +33,31 @@ EXTREMA = (
 )
 METRICS = (
     *QUANTITIES[:11],
-    Field("peak_rate_rad_s", "rad/s", "largest inertial body rate"),
-    Field("peak_modal_displacement", "", f"largest displacement of any mode, {_MODAL}"),
-    Field("settling_time_s", "s", "last time with 1 - q0 above 1e-3; the length of the flight where it never settles"),
-    Field("damping_time_s", "s", "last time with the displacement of any mode above 0.005; as settling_time_s"),
-    Field("control_effort_n_m_s", "N m s", "impulse of all actuators: integral of |u1| + |u2| + |u3|"),
-    Field("attitude_effort_s", "s", "integral of |q1| + |q2| + |q3|"),
-    Field("scalar_effort_s", "s", "integral of |1 - q0|"),
-    Field("q_vector_norm", "", "size of the vector part at the end"),
-    Field("attitude_error_deg", "deg", "angle between body and orbital frame at the end"),
-    Field("eta_norm", "", f"root of the sum of squares of the modal displacements at the end, {_MODAL}"),
-    Field("pulse_count", "", "pulses of all modulators"),
-    Field("min_pulse_s", "s", "shortest pulse of any modulator; none for an ideal actuator", sometimes=True),
+    Field("peak_rate_rad_s", "rad/s", "largest inertial body rate", low=0.0),
+    Field("peak_modal_displacement", "", f"largest displacement of any mode, {_MODAL}", low=0.0),
+    Field(
+        "settling_time_s",
+        "s",
+        "last time with 1 - q0 above 1e-3; the length of the flight where it never settles",
+        low=0.0,
+    ),
+    Field(
+        "damping_time_s", "s", "last time with the displacement of any mode above 0.005; as settling_time_s", low=0.0
+    ),
+    Field("control_effort_n_m_s", "N m s", "impulse of all actuators: integral of |u1| + |u2| + |u3|", low=0.0),
+    Field("attitude_effort_s", "s", "integral of |q1| + |q2| + |q3|", low=0.0),
+    Field("scalar_effort_s", "s", "integral of |1 - q0|", low=0.0),
+    Field("q_vector_norm", "", "size of the vector part at the end", low=0.0, high=1.0),
+    Field("attitude_error_deg", "deg", "angle between body and orbital frame at the end", low=0.0),
+    Field("eta_norm", "", f"root of the sum of squares of the modal displacements at the end, {_MODAL}", low=0.0),
+    Field("pulse_count", "", "pulses of all modulators", low=0.0),
+    Field("min_pulse_s", "s", "shortest pulse of any modulator; none for an ideal actuator", sometimes=True, low=0.0),
     *(Field(f"pulse_count_{axis}", "", f"pulses about {axis}") for axis in "xyz"),
     *(Field(f"min_pulse_{axis}_s", "s", f"shortest pulse about {axis}", sometimes=True) for axis in "xyz"),
     *(Field(f"on_time_{axis}_s", "s", f"time that the {axis} thrusters fired") for axis in "xyz"),
     *(Field(f"impulse_{axis}_n_m_s", "N m s", f"impulse of the {axis} actuator, without sign") for axis in "xyz"),
     *(Field(f"propellant_{axis}_kg", "kg", f"propellant for the impulse of the {axis} actuator") for axis in "xyz"),
-    Field("propellant_kg", "kg", "propellant for the impulse of all actuators"),
+    Field("propellant_kg", "kg", "propellant for the impulse of all actuators", low=0.0),
 )
 Quantities = namedtuple("Quantities", [field.symbol for field in QUANTITIES])  # type: ignore[misc]
 Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]

@@ -40,9 +40,9 @@ EXTREMA = (
 )
 
 
-def _some(name: str, unit: str, description: str) -> Field:
+def _some(name: str, unit: str, description: str, **bounds: float) -> Field:
     """A metric that not every phase has."""
-    return Field(name, unit, description, sometimes=True)
+    return Field(name, unit, description, sometimes=True, **bounds)
 
 
 METRICS = (
@@ -65,21 +65,23 @@ METRICS = (
         "osculating period less the sidereal day at the end of the transfer, or of a flight without",
     ),
     _some("actual_period_error_s", "s", "the same by the actual drift"),
-    _some("eccentricity", "", "osculating eccentricity at the end of the transfer, or of a flight without"),
-    Field("peak_eccentricity", "", "largest osculating eccentricity of the flight"),
-    _some("inclination_deg", "deg", "osculating inclination at the end of the transfer, or of a flight without"),
-    Field("delta_v_m_s", "m/s", "characteristic velocity"),
-    _some("transfer_time_s", "s", "end of the last burn of the phasing"),
-    Field("corrections", "", "burns"),
+    _some("eccentricity", "", "osculating eccentricity at the end of the transfer, or of a flight without", low=0.0),
+    Field("peak_eccentricity", "", "largest osculating eccentricity of the flight", low=0.0),
+    _some(
+        "inclination_deg", "deg", "osculating inclination at the end of the transfer, or of a flight without", low=0.0
+    ),
+    Field("delta_v_m_s", "m/s", "characteristic velocity", low=0.0),
+    _some("transfer_time_s", "s", "end of the last burn of the phasing", low=0.0),
+    Field("corrections", "", "burns", low=0.0),
     Field("final_longitude_deviation_deg", "deg", "longitude less the required one at the end of the flight"),
-    Field("final_eccentricity", "", "osculating eccentricity at the end of the flight"),
-    _some("min_range_m", "m", "smallest range"),
-    _some("max_range_m", "m", "largest range"),
-    _some("settled_min_range_m", "m", "smallest range after settle_time_days"),
-    _some("settled_max_range_m", "m", "largest range after settle_time_days"),
-    _some("relative_eccentricity", "", "length of the difference of the eccentricity vectors at the end"),
+    Field("final_eccentricity", "", "osculating eccentricity at the end of the flight", low=0.0),
+    _some("min_range_m", "m", "smallest range", low=0.0),
+    _some("max_range_m", "m", "largest range", low=0.0),
+    _some("settled_min_range_m", "m", "smallest range after settle_time_days", low=0.0),
+    _some("settled_max_range_m", "m", "largest range after settle_time_days", low=0.0),
+    _some("relative_eccentricity", "", "length of the difference of the eccentricity vectors at the end", low=0.0),
     _some("relative_drift_m", "m", "drift of the module past the target in a revolution, at the end"),
-    _some("steady", "", "1 if the settled range stayed within range_low_m and range_high_m"),
+    _some("steady", "", "1 if the settled range stayed within range_low_m and range_high_m", low=0.0, high=1.0),
 )
 Quantities = namedtuple("Quantities", [field.symbol for field in QUANTITIES])  # type: ignore[misc]
 Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]

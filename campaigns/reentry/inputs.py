@@ -40,7 +40,13 @@ PARAMETERS = (
     Parameter("density_factor", "", "true over standard density, at all altitudes", 1.0, low=0.0),
     Parameter("density_deviation", "", "slow density error, in sigmas of its profile over altitude", 0.0, -10.0, 10.0),
     Parameter(
-        "weather_draw", "", "names the air of the day: another number, another air; 0 is the mean one", 0.0, 0.0, 1.0
+        "weather_draw",
+        "",
+        "names the air of the day: another number, another air; 0 is the mean one",
+        default=0.0,
+        low=0.0,
+        high=1.0,
+        random_draw=True,
     ),
     Parameter("density_random_size", "", "size of the random density, in multiples of weather.py", 1.0, low=0.0),
     Parameter("wind_random_size", "", "size of the random winds, in multiples of weather.py", 1.0, low=0.0),

@@ -1,9 +1,11 @@
 """The air of one day: random density and winds over altitude, frozen for a case.
 
 Each case has its own profile, a function of altitude alone: a vehicle that comes back to an altitude, as in a skip,
-meets the same air again.  The profile stands in nodes two kilometres apart, drawn before the flight; between them it
-goes over smoothly, so that the density keeps a slope.  A profile is named by one number, `weather_draw`: the same
-number is the same air, whatever the vehicle, the law or the other errors, and 0 is air without a random part.
+meets the same air again.  The profile is drawn before the flight at nodes two kilometres apart and is interpolated
+smoothly between them, so that the density keeps a slope.  The lowest node of each case lies at a random depth below
+the ground, up to one spacing: extremes of the air lie at nodes, and nodes at the same altitudes in all cases would
+show in every distribution of an altitude as a comb.  A profile is named by one number, `weather_draw`: the same number
+is the same air, whatever the vehicle, the law or the other errors, and 0 is air without a random part.
 
 Magnitudes are engineering defaults of the class of the Global Reference Atmosphere Models (F. W. Leslie, C. G. Justus,
 NASA/TM-2011-216467) and of J. W. Campbell, NASA TM X-3529 (1977).
@@ -12,13 +14,13 @@ NASA/TM-2011-216467) and of J. W. Campbell, NASA TM X-3529 (1977).
 from collections import namedtuple
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from mc_engine.lanes import floor, look_up, maximum, minimum, physics
 
-SPACING, NODES, FIELDS = 2e3, 66, 3  # m; up to 130 km; density, wind to the east and to the north
-LENGTH = NODES * FIELDS
-ALTITUDES = SPACING * np.arange(NODES)
+SPACING, NODES, FIELDS = 2e3, 66, 3  # m; up to 128 km; density, wind to the east and to the north
+DEPTH = NODES * FIELDS  # index of the depth of the lowest node, in spacings, behind the nodes of a case
+LENGTH = DEPTH + 1
 # altitude [km] against 1-sigma of the logarithm of the density, of each wind component [m/s], and the mean wind to
 # the east [m/s]
 _PROFILE = np.array(
@@ -40,9 +42,14 @@ BLOCK = 1024  # cases drawn at once: their deviates stay in the processor's cach
 Weather = namedtuple("Weather", "density density_slope east east_slope north north_slope")
 
 
-def standard_profile(column: int) -> np.ndarray:
-    """One column of the magnitudes at the nodes; constant above 100 km."""
-    return np.interp(ALTITUDES, 1e3 * _PROFILE[:, 0], _PROFILE[:, column])
+def node_altitudes(depth: np.ndarray) -> np.ndarray:
+    """float64[n, NODES] [m] for the depths of the lowest nodes, float64[n] in [0, 1) spacings."""
+    return SPACING * (np.arange(NODES) - depth[:, None])
+
+
+def standard_profile(column: int, altitudes: np.ndarray) -> np.ndarray:
+    """One column of the magnitudes at altitudes [m]; constant above 100 km and below the ground."""
+    return np.interp(altitudes, 1e3 * _PROFILE[:, 0], _PROFILE[:, column])
 
 
 def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:
@@ -69,26 +76,30 @@ def gauss_markov(deviates: np.ndarray, length: float) -> np.ndarray:
 
 
 def weather_nodes(draw: np.ndarray, density_size, wind_size, mean_size) -> np.ndarray:
-    """float64[n, LENGTH]: the profiles of n cases, node after node, its three fields side by side.
+    """float64[n, LENGTH]: the profiles of n cases, node after node, its three fields side by side, then the depth.
 
     draw : in [0, 1), 0 for no random part;  density_size, wind_size, mean_size : multiples of the magnitudes above
     """
     sizes = np.where(draw > 0.0, 1.0, 0.0) * np.array([density_size, wind_size, wind_size])
-    out = np.empty((draw.size, NODES, FIELDS))
+    out = np.empty((draw.size, LENGTH))
     for first in range(0, draw.size, BLOCK):
         block = slice(first, first + BLOCK)
-        out[block] = _random_part(draw[block], sizes[:, block])
-    out[:, :, 1] += np.asarray(mean_size)[:, None] * standard_profile(3)
-    return out.reshape(draw.size, LENGTH)
+        deviates = normal_deviates(draw[block], 2 * DEPTH + 1)
+        depth = np.where(draw[block] > 0.0, ndtr(deviates[:, -1]), 0.0)
+        altitudes = node_altitudes(depth)
+        nodes = _random_part(deviates[:, :-1], sizes[:, block], altitudes)
+        nodes[:, :, 1] += np.asarray(mean_size)[block, None] * standard_profile(3, altitudes)
+        out[block, :DEPTH], out[block, DEPTH] = nodes.reshape(-1, DEPTH), depth
+    return out
 
 
-def _random_part(draw: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def _random_part(deviates: np.ndarray, sizes: np.ndarray, altitudes: np.ndarray) -> np.ndarray:
     """float64[n, NODES, FIELDS] for sizes [FIELDS, n]: the sum of the two scales, half of the variance each."""
-    deviates = normal_deviates(draw, 2 * LENGTH).reshape(-1, FIELDS, 2, NODES)
-    out = np.empty((draw.size, NODES, FIELDS))
+    deviates = deviates.reshape(-1, FIELDS, 2, NODES)
+    out = np.empty((len(deviates), NODES, FIELDS))
     for field, column in enumerate((1, 2, 2)):
         both = gauss_markov(deviates[:, field, 0], SMALL_SCALE) + gauss_markov(deviates[:, field, 1], LARGE_SCALE)
-        out[:, :, field] = np.sqrt(0.5) * sizes[field][:, None] * both * standard_profile(column)
+        out[:, :, field] = np.sqrt(0.5) * sizes[field][:, None] * both * standard_profile(column, altitudes)
     return out
 
 
@@ -103,9 +114,9 @@ def _between(tables, at, x):
 def weather_at(h, first, tables):
     """The `Weather` at altitude h [m] of the case whose nodes begin at place `first` of the tables.
 
-    Below the ground and above the nodes the air is that of the first and the last of them.
+    Below and above its nodes the air is that of the first and the last of them.
     """
-    place = minimum(maximum(h * (1.0 / SPACING), 0.0), NODES - 1.000001)
+    place = minimum(maximum(h * (1.0 / SPACING) + look_up(tables, first + DEPTH), 0.0), NODES - 1.000001)
     node = floor(place)
     x, at = place - node, first + FIELDS * node
     density, density_slope = _between(tables, at, x)

@@ -9,7 +9,7 @@ import numpy as np
 
 from mc_engine.campaign import SHIPPED, ShippedCampaign, list_campaigns
 from mc_engine.documentation.markdown_text import code, escaped, table
-from mc_engine.model import AdaptiveStep, Field, Model, Parameter, Setting, load_model
+from mc_engine.model import AdaptiveStep, Model, Named, Parameter, Setting, load_model
 from mc_engine.published_table import campaign_table
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
 
@@ -101,7 +101,7 @@ _INTRODUCTION = {
 }
 
 
-def _meaning(one: Field, at_the_end: bool = False) -> tuple[str, str, str]:
+def _meaning(one: Named, at_the_end: bool = False) -> tuple[str, str, str]:
     return code(f"end_{one.name}" if at_the_end else one.name), escaped(one.unit) or "–", escaped(one.description)
 
 

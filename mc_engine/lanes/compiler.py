@@ -23,7 +23,7 @@ _UNWRAPPED: dict[str, Any] = {
     "pipeline_class": LinkedCompiler,
 }
 
-if config.DISABLE_JIT:
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise ModelError("the environment has NUMBA_DISABLE_JIT, with which no kernel can be compiled; unset it")
 assert _lowering
 assert _namespaces

@@ -40,7 +40,7 @@ def may_have_crossed(before, after, direction):
 
 
 @physics
-def _lost(before, after, direction):
+def is_lost(before, after, direction):
     """Mask: the function is not a number at the end, and may have crossed."""
     return may_have_crossed(before, after, direction) & (after != after)
 
@@ -121,7 +121,7 @@ def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying):
         end = select(on, rk4_shared(f.rhs, t, rest, s, m, p, o), end)
         g_end = select(on, spread(f.events(finish, end, m, p, o), t), g_end)
         pending = on & any_field(map_fields(crossed, g_start, g_end, signs))
-    lost = flying & (not stopped) & any_field(map_fields(_lost, g_start, g_end, signs))
+    lost = flying & (not stopped) & any_field(map_fields(is_lost, g_start, g_end, signs))
     return end, m, time, stopped, pending, lost
 
 

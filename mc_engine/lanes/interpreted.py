@@ -1,10 +1,12 @@
 """The engine's own loops run by Python on the Numbers of one case: the same flight, which knows what broke it.
 
-The loops are those that kernels are compiled of.  Only their intrinsics, which exist inside kernels alone, have a second
-meaning here, under the same names.
+The loops are those that kernels are compiled of.  Only their intrinsics, which exist inside kernels alone, have a
+second meaning here, under the same names.
 """
 
+import functools
 import math
+import operator
 import time
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -79,19 +81,26 @@ class InterpretedFlight:
                     names[name] = FunctionType(value.py_func.__code__, self._interpreted(home))
                 elif name in _INTRINSICS:
                     names[name] = _INTRINSICS[name]
-            names["total"] = self.total
+            names |= {"total": self.total, "map_fields": self.map_fields}
         return self._names[module]
 
     def total(self, fields: Sequence[Number]) -> Number:
         """Sum of the fields; the flight's `origin` is theirs, where it is not finite."""
         if time.monotonic() > self._end:
             raise OutOfTime(self._t)
-        value = fields[0]
-        for one in fields[1:]:
-            value = value + one
-        if not math.isfinite(value) and type(value) is Number:
+        value: Any = functools.reduce(operator.add, fields)
+        if not math.isfinite(value):
             self.origin = value.origin
         return value
+
+    def map_fields(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """function(a_i, b_i, ...) for every field i; the flight's `origin` is that of an event which is lost."""
+        first = next(one for one in arguments if isinstance(one, tuple))
+        rows = list(zip(*(one if isinstance(one, tuple) else [one] * len(first) for one in arguments), strict=True))
+        results = [function(*row) for row in rows]
+        if getattr(function, "__name__", "") == "is_lost":
+            self.origin = next((row[1].origin for row, lost in zip(rows, results, strict=True) if lost), self.origin)
+        return _record(type(first), results)
 
     def counted(self, what: str, count: int) -> Callable[[Any], Any]:
         def hand_on(fields: Any) -> Any:
@@ -122,19 +131,6 @@ def _spread(value: Any, like: Any) -> Any:
     return _record(type(value), [number(one) for one in value]) if isinstance(value, tuple) else number(value)
 
 
-def _map_fields(function: Callable[..., Any], *arguments: Any) -> Any:
-    first = next(one for one in arguments if isinstance(one, tuple))
-    rows = zip(*(one if isinstance(one, tuple) else [one] * len(first) for one in arguments), strict=True)
-    return _record(type(first), [function(*row) for row in rows])
-
-
-def _least(fields: Sequence[Any]) -> Any:
-    value = fields[0]
-    for one in fields[1:]:
-        value = value if value < one else one
-    return value
-
-
 def _load_scalars(cls: Any, array: np.ndarray) -> Any:
     n = len(cls._fields) - (cls._fields[-1] == TABLES)
     return cls(*map(Number, array[:n]), *([array[n + 2 :]] if n < len(cls._fields) else []))
@@ -157,8 +153,7 @@ def _stage_sum(memory: list[Any], like: Any, first: int, last: int, columns: np.
 
 _INTRINSICS: dict[str, Callable[..., Any]] = {
     "spread": _spread,
-    "map_fields": _map_fields,
-    "least": _least,
+    "least": functools.partial(functools.reduce, lambda x, y: x if x < y else y),
     "any_field": any,
     "select": lambda mask, chosen, other: chosen if mask else other,
     "add_scaled": lambda y, h, k: _record(type(y), [fma(number(h), one, to) for one, to in zip(k, y, strict=True)]),

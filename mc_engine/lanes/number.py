@@ -1,11 +1,12 @@
 """A float for interpreted flights: it computes as kernels do, and knows where it stopped being finite.
 
-1/0 is infinite, as in kernels.  A result that is infinite or not a number has an `Origin`: the operation that made it of
-finite numbers, and where.  All that is computed of it later has the same one, so that the number which breaks a flight
-tells of the first mistake.
+1/0 is infinite, as in kernels.  A result that is infinite or not a number has an `Origin`: the operation that made it
+of finite numbers, and where.  All that is computed of it later has the same one, so that the number which breaks a
+flight tells of the first mistake.
 """
 
 import functools
+import inspect
 import math
 import operator
 import sys
@@ -66,7 +67,7 @@ def number(value: Any, origin: Origin | None = None) -> Number:
 
 
 def numbers(value: Any) -> Any:
-    """A record with Numbers in place of its numbers, also in records within; a number as a Number; all else as it is."""
+    """A number as a Number, a record with Numbers in place of its numbers; all else as it is."""
     if isinstance(value, tuple):
         fields = [numbers(one) for one in value]
         return type(value)(*fields) if hasattr(value, "_fields") else tuple(fields)
@@ -85,8 +86,12 @@ def result_of(operation: str, arguments: tuple[Any, ...], value: float) -> Numbe
 def taking_numbers(function: Callable[..., Any]) -> Callable[..., Any]:
     """A function of floats that gives a Number where it is handed one."""
 
+    signature = inspect.signature(function)
+
     @functools.wraps(function)
-    def call(*arguments: Any) -> Any:
+    def call(*arguments: Any, **named: Any) -> Any:
+        if named:  # as a kernel takes them, too
+            arguments = signature.bind(*arguments, **named).args
         if Number not in map(type, arguments):
             return function(*arguments)
         plain = [float(one) if type(one) is Number else one for one in arguments]

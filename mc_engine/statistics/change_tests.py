@@ -10,25 +10,29 @@ Unpaired
     share    Fisher's exact test
 
 All of them hold for any shape of distribution; what they assume is that the cases are independent of each other, so
-for `lhs`, `sobol` and `halton` they are on the safe side.  Sizes: difference of the means, ratio of the standard
-deviations, difference of the shares, each with an interval of its own (not widened for the number of intervals).
+for `lhs`, `sobol` and `halton` they are on the safe side.  The size of a change is of the same quantity as its test:
+the shift, or the ratio of the spreads, that the test does not tell from none at all, and as its interval all those
+that it does not reject (Hodges & Lehmann, Ann. Math. Stat. 34 (1963), 598-611); a difference of shares has an
+interval of its own.  Intervals are not widened for their number.  Of pairs, tests and sizes are of those that differ.
+Of more than `MOST_CASES` numbers so many are tested, picked evenly.
 
 Wilcoxon, Biometrics Bull. 1 (1945), 80-83; Grambsch, Biometrika 81 (1994), 527-534 (spread of pairs by distances);
 van der Waerden, Indag. Math. 14 (1952), 453-458; Chernoff & Savage, Ann. Math. Stat. 29 (1958), 972-994 (its power);
 Brown & Forsythe, J. Am. Stat. Assoc. 69 (1974), 364-367; McNemar, Psychometrika 12 (1947), 153-157.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
-from math import inf, isfinite, sqrt
+from math import inf, isfinite, log, sqrt
 
 import numpy as np
-from scipy.stats import binomtest, fisher_exact, levene, norm, rankdata, wilcoxon
+from scipy.optimize import brentq
+from scipy.stats import binomtest, fisher_exact, norm, rankdata, t
 
 from mc_engine.statistics.moments import in_units, near_one
 
 FEWEST = 10  # numbers in each run, or pairs, for a test of a metric
-_EXACT = 50  # pairs up to which the exact distribution of signed ranks is taken
+MOST_CASES = 200_000
 _ROUNDING = 1e-12  # of the largest number: spread below it is rounding
 
 
@@ -49,8 +53,8 @@ class MetricChange:
     """One metric in two runs.  n_used of n_tried cases have a number, by run; of a paired one, in both runs.
 
     differing : of a pair's two numbers, how many pairs differ by more than the tolerance; None if unpaired.
-    mean, deviation : by run.  shift : mean of B less that of A, in the metric's unit.  ratio : standard deviation of
-    B over that of A.  shift_p, spread_p : p-values, NaN where there is nothing to test; adjusted ones by Holm.
+    mean, deviation : by run.  shift : from A to B, in the metric's unit.  ratio : spread of B over that of A, both as
+    tested.  shift_p, spread_p : p-values, NaN where there is nothing to test; adjusted ones by Holm.
     """
 
     metric: str
@@ -72,6 +76,13 @@ class MetricChange:
         if min(self.n_used) == 0 or self.differing == 0:
             return min(self.n_used) > 0
         return not isfinite(self.shift_p) and abs(self.shift.value) <= _ROUNDING * abs(self.mean[0])
+
+    @property
+    def effect(self) -> float:
+        """How large the change is: of the shift in sigma and the logarithm of the ratio the larger one."""
+        unscaled = inf if abs(self.shift.value) > 0.0 else 0.0  # run A has no spread
+        shift = abs(self.shift_in_sigma.value) if finite(self.shift_in_sigma) else unscaled
+        return max(shift, abs(log(self.ratio.value)) if self.ratio.value > 0.0 else 0.0)
 
     @property
     def shift_in_sigma(self) -> Estimate:
@@ -118,19 +129,26 @@ def metric_change(
     scale = float(np.abs(both).max())
     unit = max(tolerance * float(a.std()), _ROUNDING * scale)
     differing = int(np.count_nonzero(np.abs(b - a) > unit)) if paired else None
-    shift_p, spread_p = (_paired_p if paired else _unpaired_p)(a, b, unit)
-    return MetricChange(
-        metric,
-        used,
-        tried,
-        differing,
-        _of(lambda one: in_units(np.mean(one), exponent), a, b),
-        _of(lambda one: in_units(_deviation(one), exponent), a, b),
-        Estimate(*(float(in_units(one, exponent)) for one in astuple(_shift(a, b, paired, confidence)))),
-        _ratio(a, b, paired, confidence, _ROUNDING * scale),
-        shift_p,
-        spread_p,
-    )
+
+    def back(pair: Sequence[float]) -> tuple[float, float]:
+        return float(in_units(float(pair[0]), exponent)), float(in_units(float(pair[1]), exponent))
+
+    mean, deviation = _of(np.mean, a, b), _of(_deviation, a, b)
+    told = metric, used, tried, differing, back(mean), back(deviation)
+    if min(used) < FEWEST:
+        return MetricChange(*told, Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf), UNKNOWN, np.nan,
+                            np.nan)  # fmt: skip
+    a, b = (one[:: -(-one.size // MOST_CASES)] for one in (a, b))
+    z = float(norm.ppf(0.5 + 0.5 * confidence))
+    if max(np.ptp(a), np.ptp(b), abs(a[0] - b[0])) <= unit:  # the same constant
+        same = float(in_units(float(np.median(b) - np.median(a)), exponent))
+        return MetricChange(*told, Estimate(same, same, same), UNKNOWN, np.nan, np.nan)
+    shift, shift_p = _shift(a, b, paired, unit, z)
+    ratio, spread_p = _ratio(a, b, paired, unit, z)
+    if min(deviation) <= _ROUNDING * scale:
+        ratio = UNKNOWN
+    shift = Estimate(*(float(in_units(one, exponent)) for one in astuple(shift)))
+    return MetricChange(*told, shift, ratio, shift_p, spread_p)
 
 
 def share_change(name: str, a: np.ndarray, b: np.ndarray, *, paired: bool, confidence: float = 0.95) -> ShareChange:
@@ -169,68 +187,86 @@ def _deviation(values: np.ndarray) -> float:
     return float(values.std(ddof=1)) if values.size > 1 else 0.0
 
 
-def _distances(values: np.ndarray) -> np.ndarray:
-    return np.abs(values - np.median(values))
-
-
-def _paired_p(a: np.ndarray, b: np.ndarray, unit: float) -> tuple[float, float]:
-    """p-values of shift and spread of pairs; what differs by no more than `unit` counts as equal."""
-    if a.size < FEWEST or max(np.ptp(a), np.ptp(b), abs(a[0] - b[0])) <= unit:
-        return np.nan, np.nan  # too few, or the same constant
-    return _signed_ranks(b - a, unit), _signed_ranks(_distances(b) - _distances(a), unit)
-
-
-def _signed_ranks(differences: np.ndarray, unit: float) -> float:
-    moved = differences[np.abs(differences) > unit]
+def _shift(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) -> tuple[Estimate, float]:
+    """The shift with its interval, and the p-value of none."""
+    if not paired:
+        start, step = float(np.median(b) - np.median(a)), float(a.std() + b.std()) / sqrt(min(a.size, b.size)) + unit
+        return _inverted(lambda shift: _normal_scores(a, b - shift), start, step, z)
+    moved = (b - a)[np.abs(b - a) > unit]
     if not moved.size:
-        return 1.0
-    magnitudes = np.abs(moved)
-    untied = moved.size <= _EXACT and np.unique(magnitudes).size == moved.size
-    if untied:
-        return float(wilcoxon(moved, method="exact").pvalue)
-    # The normal limit with the variance that ties leave; written out, since ties may be all of the differences.
-    ranks = rankdata(magnitudes)
-    z = float((np.sign(moved) * ranks).sum()) / sqrt(float((ranks**2).sum()))
-    return float(2.0 * norm.sf(abs(z)))
+        return Estimate(0.0, 0.0, 0.0), 1.0
+    step = float(moved.std()) / sqrt(moved.size) + unit
+    return _inverted(lambda shift: _signed_ranks(moved - shift), float(np.median(moved)), step, z)
 
 
-def _unpaired_p(a: np.ndarray, b: np.ndarray, unit: float) -> tuple[float, float]:
-    if min(a.size, b.size) < FEWEST:
-        return np.nan, np.nan
-    if max(np.ptp(a), np.ptp(b), abs(a[0] - b[0])) <= unit:
-        return np.nan, np.nan  # the same constant
-    shift = _normal_scores(a, b)
-    if max(np.ptp(_distances(a)), np.ptp(_distances(b))) <= unit:
-        return shift, np.nan if np.ptp(a) > unit else 1.0
-    return shift, float(levene(a, b, center="median").pvalue)
+def _ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) -> tuple[Estimate, float]:
+    """The ratio of the distances to each run's own median with its interval, and the p-value of 1."""
+    one, other = (np.abs(values - np.median(values)) for values in (a, b))
+    if max(np.ptp(one), np.ptp(other)) <= unit:
+        return UNKNOWN, np.nan if np.ptp(a) > unit else 1.0
+    if paired:
+        moved = np.abs(other - one) > unit
+        if not moved.any():
+            return Estimate(1.0, 1.0, 1.0), 1.0
+        one, other = one[moved], other[moved]
+    if min(one.mean(), other.mean()) <= unit:
+        return UNKNOWN, _p_value(_mean_score(one, other))
+    score = _log_ratio_score(one, other, paired)
+    start = float(np.log(other.mean() / one.mean()))
+    found, p_value = _inverted(score, start, 1.0 / sqrt(min(one.size, other.size)), z)
+    return Estimate(*(float(np.exp(end)) for end in (found.value, found.lower, found.upper))), p_value
+
+
+def _log_ratio_score(one: np.ndarray, other: np.ndarray, paired: bool) -> Callable[[float], float]:
+    if paired:
+        return lambda ratio: _signed_ranks(other * np.exp(-ratio) - one)
+    return lambda ratio: _mean_score(one, other * np.exp(-ratio))
+
+
+def _inverted(score: Callable[[float], float], start: float, step: float, z: float) -> tuple[Estimate, float]:
+    """Where a score that falls with the change is 0, z and -z, and the p-value of no change, at 0."""
+    value, lower, upper = (_root(score, level, start, step) for level in (0.0, z, -z))
+    return Estimate(value, min(lower, value), max(upper, value)), _p_value(score(0.0))
+
+
+def _root(score: Callable[[float], float], level: float, start: float, step: float) -> float:
+    """The change at which a falling score passes a level; infinite for a level that it never comes to."""
+    way = 1.0 if score(start) > level else -1.0
+    near = far = start
+    for _ in range(60):
+        near, far, step = far, far + way * step, 2.0 * step
+        if way * (score(far) - level) <= 0.0:
+            return float(brentq(lambda at: score(at) - level, near, far, xtol=1e-7 * abs(far - near), rtol=1e-12))
+    return way * inf
+
+
+def _p_value(score: float) -> float:
+    return float(2.0 * norm.sf(abs(score)))
+
+
+def _signed_ranks(differences: np.ndarray) -> float:
+    """Wilcoxon's statistic over its standard deviation, with the variance that ties leave."""
+    ranks = rankdata(np.abs(differences))
+    return float((np.sign(differences) * ranks).sum()) / sqrt(float((ranks**2).sum()))
 
 
 def _normal_scores(a: np.ndarray, b: np.ndarray) -> float:
-    """p-value of a difference of place, by the permutation variance of the scores, which ties are part of."""
+    """van der Waerden's statistic of b over its standard deviation, by the permutation variance, with its ties."""
     n = a.size + b.size
     scores = norm.ppf(rankdata(np.concatenate([a, b])) / (n + 1.0))
     scores -= scores.mean()
     variance = a.size * b.size / (n * (n - 1.0)) * float((scores**2).sum())
-    return float(2.0 * norm.sf(abs(float(scores[: a.size].sum())) / sqrt(variance))) if variance > 0.0 else 1.0
+    return float(scores[a.size :].sum()) / sqrt(variance) if variance > 0.0 else 0.0
 
 
-def _shift(a: np.ndarray, b: np.ndarray, paired: bool, confidence: float) -> Estimate:
-    value = float(b.mean() - a.mean())
-    variance = _deviation(b - a) ** 2 / a.size if paired else _deviation(a) ** 2 / a.size + _deviation(b) ** 2 / b.size
-    return _about(value, sqrt(variance), confidence) if min(a.size, b.size) > 1 else Estimate(value, -inf, inf)
-
-
-def _ratio(a: np.ndarray, b: np.ndarray, paired: bool, confidence: float, rounding: float) -> Estimate:
-    """Ratio of the standard deviations, its interval from the influence function of its logarithm.
-
-    The deviation's influence is (z**2 - 1)/2 in standardised values z, whatever the distribution.
-    """
-    if min(a.size, b.size) < FEWEST or min(a.std(), b.std()) <= rounding:
-        return UNKNOWN
-    za, zb = (0.5 * ((one - one.mean()) / one.std()) ** 2 for one in (a, b))
-    variance = (zb - za).var() / a.size if paired else za.var() / a.size + zb.var() / b.size
-    log = _about(float(np.log(_deviation(b) / _deviation(a))), sqrt(variance), confidence)
-    return Estimate(*(float(np.exp(one)) for one in (log.value, log.lower, log.upper)))
+def _mean_score(a: np.ndarray, b: np.ndarray) -> float:
+    """The normal deviate of Student's t between the means of b and a: Brown and Forsythe's, of distances."""
+    freedom = a.size + b.size - 2
+    pooled = (a.var() * a.size + b.var() * b.size) / freedom * (1.0 / a.size + 1.0 / b.size)
+    if pooled <= 0.0:
+        return float(np.sign(b.mean() - a.mean())) * 40.0
+    statistic = float(b.mean() - a.mean()) / sqrt(pooled)
+    return float(np.sign(statistic) * norm.isf(max(t.sf(abs(statistic), freedom), 1e-300)))
 
 
 def _about(value: float, error: float, confidence: float) -> Estimate:

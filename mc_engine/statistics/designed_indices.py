@@ -15,6 +15,7 @@ import numpy as np
 
 from mc_engine.designs import MORRIS_LEVELS, block_size
 from mc_engine.statistics.input_columns import input_columns
+from mc_engine.statistics.pick_freeze import whole_blocks
 
 FEWEST_BLOCKS = 10
 CONFIDENCE = 0.95
@@ -46,7 +47,7 @@ def designed_indices(
 ) -> DesignedIndices:
     """Indices of a run of design "saltelli" or "morris".  case_ids : int64[n]; metrics : float64[n], NaN where none."""
     size = block_size(design, len(inputs))
-    rows = _whole_blocks(np.asarray(case_ids, dtype=np.int64), size)
+    rows = whole_blocks(np.asarray(case_ids, dtype=np.int64), size)
     names = ("first_order", "total") if design == "saltelli" else ("mu_star", "mu", "sigma")
     shape = (len(inputs), len(metrics))
     values = {name: np.full(shape, np.nan) for name in names}
@@ -64,14 +65,6 @@ def designed_indices(
         for name, (value, half) in found.items():
             values[name][:, k], reach[name][:, k] = value, half
     return DesignedIndices(design, tuple(inputs), tuple(metrics), values, reach, n_used, len(rows))
-
-
-def _whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
-    """int64[n_blocks, size]: rows of the cases of each block that is there as a whole."""
-    order = np.argsort(case_ids, kind="stable")
-    block = case_ids[order] // size
-    whole = np.bincount(block, minlength=1)[block] == size if block.size else np.zeros(0, dtype=bool)
-    return order[whole].reshape(-1, size)
 
 
 def _problem(names: tuple[str, ...]) -> dict[str, Any]:

@@ -10,7 +10,8 @@ the surface, among it all that the other inputs do.  The other is the bias of a 
 neighbourhood, for which the step to a cubic surface through the same cases stands (the correction of Calonico,
 Cattaneo & Farrell, J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).
 Points outside the hull of the cases, in a hole between them, or where the error is large, are NaN: a map is no
-extrapolation.
+extrapolation.  Where the two inputs explain less than `LEAST_EXPLAINED` of the metric's variance, in cross-validation
+by the same cases left out one at a time, no point has a value: contours would be those of noise.
 """
 
 from dataclasses import dataclass, replace
@@ -29,6 +30,7 @@ MOSTLY = 0.95  # of them must have a surface through their neighbours
 AS_GOOD = 1.01  # of the smallest squared error: the fewest neighbours that reach it bend the surface least
 WIDEST_HOLE = 0.6  # of the reach of the neighbourhood: where the nearest case is farther away, there is a hole
 MOST_CASES = 50_000  # smoothed; of more, so many are picked evenly
+LEAST_EXPLAINED = 0.2  # share of the variance of the metric
 MOST_ERROR = 0.05  # of the range of the metric; above it a point is left blank
 TERMS = 6  # of a quadratic in two variables; a cubic has four more
 POINTS_AT_ONCE = 256
@@ -40,7 +42,8 @@ class SurfaceMap:
 
     exact : the nodes are cases themselves.  cases_per_node : 1 for an exact grid; more when other inputs vary
     between cases of one node, and value is then their mean; 0 for scattered cases.  n_smoothed : of the n_used
-    cases with numbers, those that a smoothed surface is made of.
+    cases with numbers, those that a smoothed surface is made of.  explained : share of the metric's variance that the
+    surface predicts of cases left out; 1 for an exact grid.
     """
 
     x: np.ndarray
@@ -53,6 +56,7 @@ class SurfaceMap:
     n_used: int
     n_tried: int
     n_smoothed: int = 0
+    explained: float = 1.0
 
 
 def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -> SurfaceMap | None:
@@ -61,7 +65,7 @@ def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -
     None when there are too few cases, or when they lie on a line, for a map to mean anything.
     """
     pairs = [near_one(np.asarray(values, dtype=np.float64)) for values in (x, y, z)]
-    found = _map(*(values for values, _ in pairs), points)
+    found = _map(pairs[0][0], pairs[1][0], pairs[2][0], points)
     if found is None:
         return None
     x, y, value = (in_units(*one) for one in zip((found.x, found.y, found.value), (e for _, e in pairs), strict=True))
@@ -78,6 +82,12 @@ def _map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap
     if used.sum() < FEWEST or not _spread(x[used]) or not _spread(y[used]):
         return None
     return _smoothed(x[used], y[used], z[used], points, x.size)
+
+
+def explained_share(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
+    """The share of the variance of z that a smooth surface over x and y predicts of cases left out; NaN for too few."""
+    found = map_metric(x, y, z, points=2)
+    return np.nan if found is None else found.explained
 
 
 def _spread(values: np.ndarray) -> bool:
@@ -99,6 +109,7 @@ def _full_grid(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> SurfaceMap | None
         return None
     used = np.isfinite(z)
     value, error = _node_means(node[used], z[used], nodes)
+    within = np.nansum((z[used] - value[node[used]]) ** 2) / max(int(used.sum()) - nodes, 1)
     shape = (y_levels.size, x_levels.size)
     each = int(tried[0])
     return SurfaceMap(
@@ -111,6 +122,7 @@ def _full_grid(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> SurfaceMap | None
         neighbours=0,
         n_used=int(used.sum()),
         n_tried=int(x.size),
+        explained=1.0 - within / variance if (variance := float(np.var(z[used]))) > 0.0 and each > 1 else 1.0,
     )
 
 
@@ -136,7 +148,11 @@ def _smoothed(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int, tried: i
     if hull is None:
         return None
     tree = cKDTree(cloud)
-    neighbours = _chosen_neighbours(tree, cloud, z)
+    neighbours, explained = _chosen_neighbours(tree, cloud, z)
+    if explained < LEAST_EXPLAINED:
+        x_axis, y_axis = (np.array(ends) for ends in zip(low, high, strict=True))
+        blank = np.full((2, 2), np.nan)
+        return SurfaceMap(x_axis, y_axis, blank, blank, False, 0, neighbours, n_used, tried, rows.size, explained)
     points = points if neighbours < MANY_NEIGHBOURS else points // COARSER + 1
     x_axis, y_axis = (np.linspace(*ends, points) for ends in zip(low, high, strict=True))
     at = (np.stack(np.meshgrid(x_axis, y_axis), axis=-1).reshape(-1, 2) - centre) / scale
@@ -144,14 +160,11 @@ def _smoothed(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int, tried: i
     fit, deviation = _surface(tree, cloud, z, at[inside], neighbours)
     blank = ~(deviation <= MOST_ERROR)
     fit[blank] = deviation[blank] = np.nan
-    if blank.all():
-        return None
     value, error = np.full(at.shape[0], np.nan), np.full(at.shape[0], np.nan)
     value[inside], error[inside] = middle + spread * fit, spread * deviation
     shape = (points, points)
-    return SurfaceMap(
-        x_axis, y_axis, value.reshape(shape), error.reshape(shape), False, 0, neighbours, n_used, tried, rows.size
-    )
+    value, error = value.reshape(shape), error.reshape(shape)
+    return SurfaceMap(x_axis, y_axis, value, error, False, 0, neighbours, n_used, tried, rows.size, explained)
 
 
 def _hull(cloud: np.ndarray) -> np.ndarray | None:
@@ -161,12 +174,13 @@ def _hull(cloud: np.ndarray) -> np.ndarray | None:
     return ConvexHull(cloud).equations if widths[0] > 1e-6 * widths[1] else None
 
 
-def _chosen_neighbours(tree: cKDTree, cloud: np.ndarray, z: np.ndarray) -> int:
-    """The number of neighbours that foretells cases best from the others, or a smaller one that is as good."""
+def _chosen_neighbours(tree: cKDTree, cloud: np.ndarray, z: np.ndarray) -> tuple[int, float]:
+    """The number of neighbours that predicts left-out cases best, or a smaller one that is as good; and the share of
+    the variance of z that it predicts."""
     rows = np.unique(np.linspace(0, len(cloud) - 1, min(len(cloud), LEFT_OUT)).astype(np.int64))
     choices = [number for number in NEIGHBOURS if number < len(cloud)]
     if len(choices) < 2:
-        return min(NEIGHBOURS[0], len(cloud))
+        return min(NEIGHBOURS[0], len(cloud)), 1.0  # too few cases to leave any out
     distance, near = tree.query(cloud[rows], k=choices[-1] + 1)
     distance, near = distance[:, 1:], near[:, 1:]  # without the case itself
     scores = []
@@ -175,7 +189,9 @@ def _chosen_neighbours(tree: cKDTree, cloud: np.ndarray, z: np.ndarray) -> int:
         misses = (fit.value(z) - z[rows]) ** 2
         # Cases on a few levels of an input: near ones fix no surface before a second and third level are among them.
         scores.append(float(np.mean(misses[fit.fixed])) if fit.fixed.mean() >= MOSTLY else np.inf)
-    return next(number for number, score in zip(choices, scores, strict=True) if score <= AS_GOOD * min(scores))
+    least = min(scores)
+    chosen = next(number for number, score in zip(choices, scores, strict=True) if score <= AS_GOOD * least)
+    return chosen, 1.0 - least / max(float(np.var(z[rows])), 1e-300) if least < np.inf else 1.0
 
 
 def _surface(

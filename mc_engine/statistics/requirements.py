@@ -17,7 +17,7 @@ allowed, 1 - confidence, divided by their number (Bonferroni); `shared_outcome` 
 those hold all at once.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
@@ -124,11 +124,9 @@ def judge_all(
     verdicts = [judge(one, column(one["metric"]), ok, design, looked, among) for one in requirements]
     if share is None:
         return verdicts, None
-    inside, usable = ok.copy(), ok.copy()
+    inside, usable = inside_all(requirements, column, ok), ok.copy()
     for verdict in verdicts:
-        values = np.asarray(column(verdict.metric), dtype=np.float64)
-        inside &= inside_limits(values, verdict.at_most, verdict.at_least)
-        usable &= np.isfinite(values)
+        usable &= np.isfinite(np.asarray(column(verdict.metric), dtype=np.float64))
     confidence = min(verdict.confidence for verdict in verdicts)
     asked = {"name": JOINT, "metric": "", "share": share, "confidence": confidence}
     alone = _verdict(asked, None, inside, usable, design, looked, among)
@@ -165,12 +163,12 @@ def judge(
 ) -> Verdict:
     """Verdict on one requirement record ("name", "metric", "at_most", "at_least", "share", "confidence").
 
-    values : float64[n_tried], the metric; ok : bool[n_tried], whether the case was flown to its end.
+    values : float64[n_tried], the metric; ok : bool[n_tried], whether the case was completed.
     looked : whether the number of cases was decided by looking at them.  among : how many requirements there are.
     """
     values = np.asarray(values, dtype=np.float64)
     usable = np.asarray(ok, dtype=bool) & np.isfinite(values)
-    inside = usable & inside_limits(values, _limit(requirement, "at_most"), _limit(requirement, "at_least"))
+    inside = inside_all([requirement], lambda _: values, ok)
     return _verdict(requirement, values, inside, usable, design, looked, among)
 
 
@@ -264,6 +262,20 @@ def was_looked_at(manifest: Mapping[str, Any], n_cases: int) -> bool:
 def _limit(requirement: Mapping[str, Any], key: str) -> float | None:
     value = requirement.get(key)
     return None if value is None else float(value)
+
+
+def inside_all(
+    requirements: Iterable[Mapping[str, Any]], column: Callable[[str], np.ndarray], ok: np.ndarray
+) -> np.ndarray:
+    """bool[n]: completed, and inside the limits of all these requirement records; whoever counts cases asks here.
+
+    column : metric to float64[n].  ok : bool[n].  Without a requirement every completed case is inside.
+    """
+    inside = np.array(ok, dtype=bool)
+    for one in requirements:
+        values = np.asarray(column(str(one["metric"])), dtype=np.float64)
+        inside &= inside_limits(values, _limit(one, "at_most"), _limit(one, "at_least"))
+    return inside
 
 
 def inside_limits(values: np.ndarray, at_most: float | None, at_least: float | None) -> np.ndarray:

@@ -1,16 +1,67 @@
-"""The worst cases of a metric among those that have a number; failed cases have none and are listed apart."""
+"""The worst cases of a metric: those with the smallest margin to the nearest limit that a requirement sets.
+
+A metric without a requirement has no bad side of its own: its worst cases are then those with the largest values, or
+with the smallest where somebody asks for them.  Failed cases have no number and are listed apart.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 
-def worst_cases(values: np.ndarray, ok: np.ndarray, count: int, largest: bool = True) -> np.ndarray:
+class Limits(NamedTuple):
+    """The tightest limits that requirements set on one metric; None where they set none."""
+
+    at_most: float | None = None
+    at_least: float | None = None
+
+    @property
+    def two_sided(self) -> bool:
+        """Whether there are both."""
+        return self.at_most is not None and self.at_least is not None
+
+    @property
+    def width(self) -> float:
+        """The unit of margins: the distance between two limits, the size of a single one, 1 for a limit of 0."""
+        ends = [end for end in self if end is not None]
+        return abs(ends[0] - ends[-1] if len(ends) > 1 else ends[0]) or 1.0 if ends else 1.0
+
+    def margins(self, values: np.ndarray) -> np.ndarray:
+        """float64[n]: distance inside the nearest limit over the width, negative outside; infinite without a limit."""
+        above = np.inf if self.at_most is None else self.at_most - values
+        below = np.inf if self.at_least is None else values - self.at_least
+        return np.minimum(above, below) / self.width + 0.0 * values
+
+    def largest_is_worst(self, values: np.ndarray) -> bool:
+        """Whether large values are the bad ones; with two limits, whether the value nearest to one is at the upper."""
+        if self.at_most is None or self.at_least is None:
+            return self.at_least is None
+        finite = values[np.isfinite(values)]
+        return not finite.size or self.at_most - finite.max() <= finite.min() - self.at_least
+
+
+def limits_on(metric: str, requirements: Iterable[Mapping[str, Any]]) -> Limits:
+    """The tightest limits that these records ("metric", "at_most", "at_least") set on a metric."""
+    records = [one for one in requirements if one["metric"] == metric]
+    upper = [float(one["at_most"]) for one in records if one.get("at_most") is not None]
+    lower = [float(one["at_least"]) for one in records if one.get("at_least") is not None]
+    return Limits(min(upper, default=None), max(lower, default=None))
+
+
+def worst_cases(
+    values: np.ndarray, ok: np.ndarray, count: int, largest: bool = True, limits: Limits | None = None
+) -> np.ndarray:
     """Row numbers (int64[<= count]), worst first, ties in row order.
 
-    values : float64[n], ok : bool[n].  largest : whether large values are the bad ones.
+    values : float64[n], ok : bool[n].  limits : the worst have the smallest margin to the nearest of them; without
+    any, the largest values are the worst, or the smallest.
     """
     values = np.asarray(values, dtype=np.float64)
     rows = np.flatnonzero(np.asarray(ok, dtype=bool) & np.isfinite(values))
     goodness = -values[rows] if largest else values[rows]
+    if limits is not None and limits != Limits():
+        goodness = limits.margins(values[rows])
     if 0 < count < rows.size:  # sort none but those that can be among them: a table may have a million rows
         among = np.flatnonzero(goodness <= np.partition(goodness, count - 1)[count - 1])
         rows, goodness = rows[among], goodness[among]

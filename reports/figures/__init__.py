@@ -1,4 +1,4 @@
-"""The kinds of figures: data in, one drawing for the screen and one for paper out."""
+"""The kinds of figures: data in, panels of marks out; `screen` and `paper` draw them."""
 
 from reports.figures.convergence import Convergence
 from reports.figures.corridors import CorridorDrawing, LimitLine

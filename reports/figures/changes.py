@@ -1,15 +1,11 @@
 """Changes from one run to another: a row a metric, how far its mean moved and how much its spread grew or shrank."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from reports.document import Drawing, Key
-from reports.figures import paper, screen
-from reports.figures.palette import BLUE, INK, VERMILION, on_paper
+from reports.figures.marks import Axis, Drawing, Limit, Plot, Points
+from reports.figures.palette import BLUE, INK, VERMILION
 from reports.numbers import number
 
 MARKS = ((BLUE, "circle"), (VERMILION, "diamond"))  # by whether the change is significant
@@ -51,15 +47,6 @@ class ChangeDrawing(Drawing):
     content: str
 
     @property
-    def key(self) -> tuple[Key, ...]:
-        (plain, sign), (changed, other) = MARKS
-        return (
-            Key("point", changed, f"significant, with its {self.content} interval", other),
-            Key("point", plain, "not significant", sign),
-            Key("dash", INK, "no change"),
-        )
-
-    @property
     def alternative(self) -> str:
         parts = []
         for panel in self.panels:
@@ -71,70 +58,33 @@ class ChangeDrawing(Drawing):
             parts.append(f"{panel.title}: {', '.join(moved) if moved else 'no metric changed significantly'}")
         return f"{'; '.join(parts)}."
 
-    def interactive(self) -> list[dict[str, Any]]:
-        return [self._screen_panel(panel) for panel in self.panels]
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        return tuple(self._panel(panel) for panel in self.panels)
 
-    def _screen_panel(self, panel: ChangePanel) -> dict[str, Any]:
-        data: list[dict[str, Any]] = []
+    def _panel(self, panel: ChangePanel) -> Plot:
+        marks: list[Limit | Points] = [Limit(panel.none, "x", INK, "no change", "dash", 1.0, key="no change")]
+        keys = "not significant", f"significant, with its {self.content} interval"
         for sure, (colour, sign) in enumerate(MARKS):
             rows = np.flatnonzero(np.isfinite(panel.value) & (panel.significant == bool(sure)))
-            data.append(
-                {
-                    "type": "scatter",
-                    "mode": "markers",
-                    "x": screen.rounded(panel.value[rows]),
-                    "y": rows.tolist(),
-                    "error_x": {
-                        "type": "data",
-                        "symmetric": False,
-                        "array": screen.rounded((panel.upper - panel.value)[rows]),
-                        "arrayminus": screen.rounded((panel.value - panel.lower)[rows]),
-                        "color": colour,
-                        "thickness": 1.5,
-                        "width": 0,
-                    },
-                    "marker": {"size": 9, "color": colour, "symbol": sign},
-                    "text": [screen.plain(self._words(panel, int(row))) for row in rows],
-                    "hovertemplate": "%{text}<extra></extra>",
-                }
+            ends = panel.lower[rows], panel.upper[rows]
+            texts = tuple(self._words(panel, int(row)) for row in rows)
+            marks.append(
+                Points(panel.value[rows], rows, colour, sign=sign, size=8.0, texts=texts, x_ends=ends, key=keys[sure])
             )
-        line = {"type": "line", "x0": panel.none, "x1": panel.none, "yref": "paper", "y0": 0, "y1": 1}
-        shapes = [{**line, "line": {"color": INK, "width": 1, "dash": "dash"}}]
-        ends = np.log10(panel.span).tolist() if panel.none else list(panel.span)
-        kind = {"type": "log", "tickvals": ratio_ticks(panel.span)} if panel.none else {"nticks": 7}
-        x = screen.axis("", zeroline=False, range=ends, **kind)
-        ticks = {"tickvals": list(range(len(self.metrics))), "ticktext": [screen.plain(name) for name in self.metrics]}
-        y = screen.axis("", range=[len(self.metrics) - 0.5, -0.5], zeroline=False, **ticks)
-        height = 90 + 24 * len(self.metrics)
-        return {"data": data, "layout": screen.layout(x, y, height, panel.title, shapes=shapes, hovermode="closest")}
+        ticks = tuple((tick, number(tick, 3)) for tick in ratio_ticks(panel.span)) if panel.none else None
+        names = tuple(enumerate(self.metrics))
+        return Plot(
+            tuple(marks),
+            Axis(reach=panel.span, log=bool(panel.none), ticks=ticks),
+            Axis(reach=(len(self.metrics) - 0.5, -0.5), ticks=names),
+            panel.title,
+            70.0 + 24.0 * len(self.metrics),
+        )
 
     def _words(self, panel: ChangePanel, row: int) -> str:
         ends = f"{number(float(panel.lower[row]), 3)} to {number(float(panel.upper[row]), 3)}"
         return f"{self.metrics[row]}: {number(float(panel.value[row]), 3)}, {ends}"
-
-    def printed(self) -> Figure:
-        figure, axes = paper.new_figure(0.7 + 0.17 * len(self.metrics), 1, len(self.panels))
-        for axis, panel in zip(axes, self.panels, strict=True):
-            self._print_panel(axis, panel)
-        axes[0].set_yticks(range(len(self.metrics)), [paper.literal(name) for name in self.metrics])
-        for axis in axes[1:]:
-            axis.set_yticks(range(len(self.metrics)), [])
-        paper.add_key(figure, self.key)
-        return figure
-
-    def _print_panel(self, axis: Axes, panel: ChangePanel) -> None:
-        if panel.none:
-            axis.set_xscale("log")
-            axis.set_xticks(ratio_ticks(panel.span), [number(tick, 3) for tick in ratio_ticks(panel.span)])
-            axis.minorticks_off()
-        for sure, (colour, sign) in enumerate(MARKS):
-            rows = np.flatnonzero(np.isfinite(panel.value) & (panel.significant == bool(sure)))
-            axis.hlines(rows, panel.lower[rows], panel.upper[rows], on_paper(colour), linewidth=1.2)
-            axis.plot(panel.value[rows], rows, paper.SIGNS[sign], color=on_paper(colour), markersize=4)
-        axis.axvline(panel.none, color=on_paper(INK), linestyle="--", linewidth=0.7)
-        axis.set_xlim(panel.span)
-        axis.set_ylim(len(self.metrics) - 0.5, -0.5)
-        axis.set_title(paper.literal(panel.title), fontsize=7.5)
 
 
 def ratio_ticks(span: tuple[float, float]) -> list[float]:

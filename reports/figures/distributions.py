@@ -4,16 +4,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from textwrap import fill
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from mc_engine.statistics import Quantile, Summary
-from reports.document import Drawing, Key
-from reports.figures import paper, screen
-from reports.figures.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION, on_paper
+from reports.figures.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
+from reports.figures.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
 from reports.numbers import count, interval, number, percent
 
 FEWEST_BINS, MOST_BINS = 8, 48
@@ -21,8 +18,7 @@ CENTRAL = (0.005, 0.995)  # what a histogram must show well
 SPOILT = 3.0  # times the width of the central part: a wider range is cut
 FAR = 10.0  # times the width of all bins: a nominal or limit farther away is told, not drawn
 LAW_REACH, LAW_POINTS = 4.0, 81  # standard deviations on either side, places of the curve
-PANELS_IN_A_ROW = 3
-SCREEN_LINE = 28  # characters above a panel on the screen
+TITLE_WIDTH = 28  # characters above a narrow panel
 
 
 @dataclass(frozen=True)
@@ -116,21 +112,7 @@ class Distributions(Drawing):
     panels: tuple[DistributionPanel, ...]
     outer: tuple[float, ...]
     with_intervals: bool
-
-    @property
-    def key(self) -> tuple[Key, ...]:
-        outer = " and ".join(percent(p, 3) for p in self.outer)
-        entries = [Key("bar", SKY, "cases"), Key("line", ORANGE, "median"), Key("dash", BLUE, f"{outer} quantiles")]
-        if self.with_intervals:
-            confidence = percent(self.panels[0].summary.confidence)
-            entries.append(Key("band", BLUE, f"{confidence} interval of a quantile, free of distribution"))
-        if any(panel.nominal is not None and panel.near(panel.nominal) for panel in self.panels):
-            entries.append(Key("dot", INK, "nominal"))
-        if any(panel.near(limit) for panel in self.panels for limit in panel.limits):
-            entries.append(Key("line", VERMILION, "required limit"))
-        if any(panel.law for panel in self.panels):
-            entries.append(Key("line", GREEN, "normal law that the source prints"))
-        return tuple(entries)
+    across: ClassVar[int] = 4
 
     @property
     def alternative(self) -> str:
@@ -146,50 +128,33 @@ class Distributions(Drawing):
             )
         return f"Histograms. {'; '.join(parts)}."
 
-    def interactive(self) -> list[dict[str, Any]]:
-        return [self._screen_panel(panel) for panel in self.panels]
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        return tuple(self._plot(panel) for panel in self.panels)
 
-    def _screen_panel(self, panel: DistributionPanel) -> dict[str, Any]:
+    def _plot(self, panel: DistributionPanel) -> Plot:
         edges, counts = panel.edges, panel.counts
         x_law, y_law = law_curve(panel, edges)
         top = 1.06 * max([float(counts.max()), *y_law])
-        bars = {
-            "type": "bar",
-            "x": screen.rounded(0.5 * (edges[1:] + edges[:-1]), 9),
-            "y": counts.tolist(),
-            "width": float(edges[1] - edges[0]),
-            "marker": {"color": SKY, "opacity": 0.6, "line": {"width": 0}},
-            "customdata": [[number(a), number(b)] for a, b in pairwise(edges)],
-            "hovertemplate": "%{customdata[0]} to %{customdata[1]}: %{y} cases<extra></extra>",
-        }
-        data = [bars, *(_screen_line(*line, top) for line in self._lines(panel))]
-        if panel.law:
-            data.append(_screen_law(x_law, y_law, panel.law))
-        shapes = [
-            {"type": "rect", "xref": "x", "yref": "paper", "x0": low, "x1": high, "y0": 0, "y1": 1,
-             "fillcolor": BLUE, "opacity": 0.25, "line": {"width": 0}, "layer": "below"}
-            for low, high in self._bands(panel)
-        ]  # fmt: skip
-        title = "\n".join(filter(None, (panel.title, fill(panel.beyond, SCREEN_LINE))))
-        x, y = (
-            screen.axis(panel.label, nticks=_tick_count(edges), range=self._reach(panel, edges)),
-            screen.axis("cases", range=[0, top], nticks=5),
+        told = tuple(
+            f"{number(a)} to {number(b)}: {count(int(n))} cases"
+            for (a, b), n in zip(pairwise(edges), counts, strict=True)
         )
-        return {
-            "data": data,
-            "layout": screen.layout(x, y, 250 + screen.TITLE_LINE * title.count("\n"), title, bargap=0, shapes=shapes),
-        }
-
-    def _reach(self, panel: DistributionPanel, edges: np.ndarray) -> list[float]:
-        """The range of an axis that shows every bar, line and band."""
-        places = [
-            *edges[[0, -1]],
-            *law_curve(panel, edges)[0],
-            *(line[0] for line in self._lines(panel)),
-            *sum(self._bands(panel), ()),
-        ]
-        margin = 0.03 * (max(places) - min(places))
-        return [float(min(places) - margin), float(max(places) + margin)]
+        marks: list[Mark] = [self._box(panel, low, high, top) for low, high in self._bands(panel)]
+        marks.append(Bar(edges[:-1], edges[1:], np.zeros(counts.size), counts, SKY, texts=told, key="cases"))
+        marks += [Limit(at, "x", colour, what, dash, key=key) for at, colour, dash, what, key in self._lines(panel)]
+        if panel.law:
+            what = f"printed normal law, {number(panel.law[0])} ± {number(panel.law[1])} (1 σ)"
+            marks.append(Line(x_law, y_law, GREEN, width=2.0, text=what, key="normal law that the source prints"))
+        title = "\n".join(filter(None, (panel.title, fill(panel.beyond, TITLE_WIDTH))))
+        whole = bool(edges[1] - edges[0] == 1.0)
+        return Plot(
+            tuple(marks),
+            Axis(panel.label, most=5, whole=whole, grid=False, margin=0.03),
+            Axis("cases", reach=(0.0, top), most=4, whole=True),
+            title,
+            240.0,
+        )
 
     def _bands(self, panel: DistributionPanel) -> list[tuple[float, float]]:
         if not self.with_intervals:
@@ -205,74 +170,22 @@ class Distributions(Drawing):
             one for one in found if all(end is None or low <= end <= high for end in (one.value, one.lower, one.upper))
         ]
 
-    def _lines(self, panel: DistributionPanel) -> list[tuple[float, str, str, str]]:
-        """(place, colour, dash, what) of every upright line of a panel."""
+    def _lines(self, panel: DistributionPanel) -> list[tuple[float, str, str, str, str]]:
+        """(place, colour, dash, what, key) of every upright line of a panel."""
         lines = []
         for found in self._quantiles(panel):
             colour, dash = (ORANGE, "solid") if found.probability == 0.5 else (BLUE, "dash")
             bounds = f" {interval(found.lower, found.upper)}" if self.with_intervals else ""
             what = f"{percent(found.probability, 3)} quantile {number(found.value)}{bounds}"
-            lines.append((found.value, colour, dash, what))
+            outer = f"{' and '.join(percent(p, 3) for p in self.outer)} quantiles"
+            lines.append((found.value, colour, dash, what, "median" if found.probability == 0.5 else outer))
         if panel.nominal is not None and panel.near(panel.nominal):
-            lines.append((panel.nominal, INK, "dot", f"nominal {number(panel.nominal)}"))
+            lines.append((panel.nominal, INK, "dot", f"nominal {number(panel.nominal)}", "nominal"))
         near = [limit for limit in panel.limits if panel.near(limit)]
-        lines += [(limit, VERMILION, "solid", f"required limit {number(limit)}") for limit in near]
+        lines += [(limit, VERMILION, "solid", f"required limit {number(limit)}", "required limit") for limit in near]
         return lines
 
-    def printed(self) -> Figure:
-        columns = 2 if len(self.panels) in (2, 4) else min(PANELS_IN_A_ROW, len(self.panels))
-        rows = -(-len(self.panels) // columns)
-        figure, axes = paper.new_figure(0.45 + 1.65 * rows, rows, columns)
-        for axis, panel in zip(axes, self.panels, strict=False):
-            self._print_panel(axis, panel, columns)
-        for axis in axes[len(self.panels) :]:
-            axis.set_axis_off()
-        paper.add_key(figure, self.key)
-        return figure
-
-    def _print_panel(self, axis: Axes, panel: DistributionPanel, columns: int) -> None:
-        edges = panel.edges
-        axis.stairs(panel.counts, edges, fill=True, color=SKY, alpha=0.6, linewidth=0)
-        for low, high in self._bands(panel):
-            axis.axvspan(low, high, color=BLUE, alpha=0.3, linewidth=0)
-        styles = {"solid": "-", "dash": "--", "dot": ":"}
-        for place, colour, dash, _ in self._lines(panel):
-            axis.axvline(place, color=on_paper(colour), linestyle=styles[dash], linewidth=1.0)
-        axis.plot(*law_curve(panel, edges), color=GREEN, linewidth=1.2)
-        axis.set_xlim(*self._reach(panel, edges))
-        beyond = fill(panel.beyond, 96 // min(columns, 2) - 12 * (columns > 2))
-        axis.set_title(paper.literal("\n".join(filter(None, (panel.title, beyond)))), fontsize=7.5)
-        axis.set_xlabel(paper.literal(panel.label), fontsize=7.0)
-        axis.set_ylabel("cases", fontsize=7.0)
-        axis.grid(axis="x", visible=False)
-        paper.few_ticks(axis, 3 if len(self.panels) > 4 else 5, whole=edges[1] - edges[0] == 1.0)
-        paper.label_below_power(axis)
-
-
-def _tick_count(edges: np.ndarray) -> int:
-    """Fewer ticks where their numbers are long."""
-    return 4 if max(abs(edges[0]), abs(edges[-1])) > 500.0 * (edges[-1] - edges[0]) else 6
-
-
-def _screen_law(x: np.ndarray, y: np.ndarray, law: tuple[float, float]) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": screen.rounded(x, 9),
-        "y": screen.rounded(y, 6),
-        "line": {"color": GREEN, "width": 2.0},
-        "text": screen.plain(f"printed normal law, {number(law[0])} ± {number(law[1])} (1 σ)"),
-        "hovertemplate": "%{text}<extra></extra>",
-    }
-
-
-def _screen_line(place: float, colour: str, dash: str, what: str, top: float) -> dict[str, Any]:
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "x": [place] * 2,
-        "y": [0, top],
-        "line": {"color": colour, "dash": dash, "width": 1.8},
-        "text": screen.plain(what),
-        "hovertemplate": "%{text}<extra></extra>",
-    }
+    def _box(self, panel: DistributionPanel, low: float, high: float, top: float) -> Bar:
+        """An interval of a quantile, as high as the panel."""
+        key = f"{percent(panel.summary.confidence)} interval of a quantile, distribution-free"
+        return Bar(np.array([low]), np.array([high]), np.zeros(1), np.array([top]), BLUE, 0.3, key=key)

@@ -1,19 +1,14 @@
 """A footprint: the ends of the flights about their mean place, with the regions that hold them."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from reports.document import Drawing, Key
-from reports.figures import paper, screen
-from reports.figures.palette import BLUE, GREEN, INK, VERMILION, on_paper
-from reports.numbers import count, number
+from reports.figures.marks import Axis, Drawing, Line, Plot, Points, nominal_ring, region
+from reports.figures.palette import BLUE, DASHES, GREEN, INK, VERMILION
+from reports.numbers import count
 
-DASHES = ("solid", "dash", "dot")
-MARKS = {"solid": "line", "dash": "dash", "dot": "dot"}
-PRINT_DASH = {"solid": "-", "dash": "--", "dot": ":"}
 EAST, NORTH = "east of the mean place [km]", "north of the mean place [km]"
 ALONG, ACROSS = "along the long axis [km]", "across it, to the left [km]"
 
@@ -33,6 +28,7 @@ class FootprintDrawing(Drawing):
 
     n_used of n_tried have a place; aim : words and point of the place that distances count from, if there is one.
     long_axis : direction of a cloud much longer than wide [rad, from east to north].
+    case_ids : of the points;  everywhere, every_case : the same of all n_used cases, those not shown among them.
     """
 
     points: np.ndarray
@@ -42,6 +38,11 @@ class FootprintDrawing(Drawing):
     n_tried: int
     aim: tuple[str, tuple[float, float]] | None
     long_axis: float | None = None
+    case_ids: np.ndarray | None = None
+    everywhere: np.ndarray | None = None
+    every_case: np.ndarray | None = None
+    across: ClassVar[int] = 1
+    form: ClassVar[str] = "Ends of flights about their mean place"
 
     @property
     def styled(self) -> list[tuple[FootprintCurve, str, str]]:
@@ -55,51 +56,42 @@ class FootprintDrawing(Drawing):
         return found
 
     @property
-    def key(self) -> tuple[Key, ...]:
-        shown = "all shown" if len(self.points) == self.n_used else f"{count(len(self.points))} shown"
-        cases = Key("point", BLUE, f"{count(self.n_used)} of {count(self.n_tried)} cases, {shown}")
-        curves = [Key(MARKS[dash], colour, curve.text) for curve, colour, dash in self.styled]
-        aim = [Key("ring", INK, self.aim[0])] if self.aim else []
-        return (cases, *curves, *aim)
+    def plots(self) -> tuple[Plot, ...]:
+        return tuple(self._plot(view) for view in self.views)
 
-    @property
-    def alternative(self) -> str:
-        low, high = self.points.min(axis=0), self.points.max(axis=0)
-        spans = (
-            f"from {number(float(low[k]), 3)} to {number(float(high[k]), 3)} km {way}"
-            for k, way in enumerate(("east", "north"))
-        )
-        regions = "; ".join(curve.text for curve in self.curves)
-        return (
-            f"Ends of {count(self.n_used)} of {count(self.n_tried)} flights about their mean place, {', '.join(spans)}."
-            f"{f' Regions: {regions}.' if regions else ''}"
-        )
-
-    def interactive(self) -> list[dict[str, Any]]:
-        return [self._screen_panel(view) for view in self.views]
-
-    def _screen_panel(self, view: "View") -> dict[str, Any]:
+    def _plot(self, view: "View") -> Plot:
         points = view.turned(self.points)
-        cloud = {
-            "type": "scatter",
-            "mode": "markers",
-            "x": screen.rounded(points[:, 0]),
-            "y": screen.rounded(points[:, 1]),
-            "customdata": [screen.plain(name) for name in self.names],
-            "marker": {"size": 4, "color": BLUE, "opacity": 0.5},
-            "hovertemplate": "%{customdata}<extra></extra>",
-        }
-        data: list[dict[str, Any]] = [cloud]
+        shown = "all shown" if len(points) == self.n_used else f"{count(len(points))} shown"
+        marks: list[Line | Points] = [
+            Points(
+                points[:, 0],
+                points[:, 1],
+                BLUE,
+                opacity=0.5,
+                texts=self.names,
+                cases=self.case_ids,
+                columns=view.columns if self.everywhere is not None else None,
+                key=f"{count(self.n_used)} of {count(self.n_tried)} cases, {shown}",
+            )
+        ]
         for curve, colour, dash in self.styled:
-            data.append(screen.outline(view.turned(joined(curve.outlines)), colour, dash, curve.text))
+            marks.append(region([view.turned(one) for one in curve.outlines], colour, dash, curve.text))
         if self.aim:
             x, y = view.turned(np.array([self.aim[1]]))[0].tolist()
-            data.append(screen.ring((x, y), INK, self.aim[0]))
-        equal = {"scaleanchor": "x", "scaleratio": 1} if view.equal else {}
-        x_axis = screen.axis(view.x_label, zeroline=False)
-        y_axis = screen.axis(view.y_label, zeroline=False, **equal)
-        height = int(90 + 720 * self._flatness()) if view.equal else 380
-        return {"data": data, "layout": screen.layout(x_axis, y_axis, height, hovermode="closest")}
+            marks.append(nominal_ring((x, y), INK, self.aim[0]))
+        height = 60.0 + 720.0 * self._flatness() if view.equal else 380.0
+        return Plot(tuple(marks), Axis(view.x_label), Axis(view.y_label), height=height, equal=view.equal)
+
+    @property
+    def places(self) -> dict[str, tuple[str, np.ndarray, np.ndarray]]:
+        """Where all cases lie on the axes: by column, its label, cases and numbers."""
+        if self.everywhere is None or self.every_case is None:
+            return {}
+        return {
+            column: (label, self.every_case, view.turned(self.everywhere)[:, k])
+            for view in self.views
+            for k, (column, label) in enumerate(zip(view.columns, (view.x_label, view.y_label), strict=True))
+        }
 
     @property
     def views(self) -> tuple["View", ...]:
@@ -115,24 +107,6 @@ class FootprintDrawing(Drawing):
         spans = np.ptp(np.concatenate([self.points, *outlines]), axis=0)
         return float(np.clip(spans[1] / max(spans[0], 1e-9), 0.25, 0.75))
 
-    def printed(self) -> Figure:
-        heights = [0.5 + 6.0 * self._flatness() if view.equal else 2.7 for view in self.views]
-        figure, axes = paper.new_figure(0.5 + sum(heights), len(heights), heights=heights)
-        for axis, view in zip(axes, self.views, strict=True):
-            points = view.turned(self.points)
-            axis.scatter(points[:, 0], points[:, 1], s=3.0, color=BLUE, alpha=0.5, linewidths=0)
-            for curve, colour, dash in self.styled:
-                line = view.turned(joined(curve.outlines))
-                axis.plot(line[:, 0], line[:, 1], color=colour, linestyle=PRINT_DASH[dash], linewidth=1.1)
-            if self.aim:
-                x, y = view.turned(np.array([self.aim[1]]))[0]
-                axis.plot(x, y, "o", ms=6, mfc="none", color=on_paper(INK), markeredgewidth=1.6)
-            axis.set(xlabel=view.x_label, ylabel=view.y_label)
-            if view.equal:
-                axis.set_aspect("equal", adjustable="datalim")
-        paper.add_key(figure, self.key, columns=2)
-        return figure
-
 
 @dataclass(frozen=True)
 class View:
@@ -143,15 +117,14 @@ class View:
     angle: float
     equal: bool
 
+    @property
+    def columns(self) -> tuple[str, str]:
+        """Names of the places on its axes, as columns of the cases."""
+        return (f"place: {self.x_label}", f"place: {self.y_label}")
+
     def turned(self, points: np.ndarray) -> np.ndarray:
         """Points float64[k, 2] in these axes."""
         if self.angle == 0.0:
             return points
         c, s = np.cos(self.angle), np.sin(self.angle)
         return np.column_stack([c * points[:, 0] + s * points[:, 1], c * points[:, 1] - s * points[:, 0]])
-
-
-def joined(outlines: tuple[np.ndarray, ...]) -> np.ndarray:
-    """The curves behind each other, a not-a-number between two, at which the pen is lifted."""
-    parts = [part for outline in outlines for part in (outline, np.full((1, 2), np.nan))]
-    return np.concatenate(parts[:-1])

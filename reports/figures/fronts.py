@@ -1,17 +1,12 @@
 """Objectives of a tuning against each other: every candidate, the front, and what is published."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from reports.document import Drawing, Key
-from reports.figures import paper, screen
-from reports.figures.palette import BLUE, INK, MUTED, ORANGE, SKY, VERMILION, on_paper
+from reports.figures.marks import Axis, Drawing, Line, Plot, Points, nominal_ring
+from reports.figures.palette import BLUE, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
 from reports.numbers import count, number
 
 MOST_PANELS = 6
@@ -37,19 +32,6 @@ class FrontDrawing(Drawing):
     n_infeasible: int
     first_small: bool = True
     published: tuple[tuple[str, tuple[float, ...]], ...] = ()
-
-    @property
-    def key(self) -> tuple[Key, ...]:
-        entries = []
-        if len(self.front):
-            what = "best if the constraints are left out" if self.relaxed else "front"
-            entries.append(Key("line", self._front_colour, f"{what}: {count(len(self.front))} candidates"))
-        if self.n_feasible:
-            entries.append(Key("point", SKY, f"{count(self.n_feasible)} feasible candidates"))
-        if self.n_infeasible:
-            entries.append(Key("point", MUTED, f"{count(self.n_infeasible)} candidates outside a constraint"))
-        entries += [Key("ring", self._published_colour(k), name) for k, (name, _) in enumerate(self.published)]
-        return tuple(entries)
 
     @property
     def _front_colour(self) -> str:
@@ -94,63 +76,26 @@ class FrontDrawing(Drawing):
             inside &= (cloud[:, objective] >= low) & (cloud[:, objective] <= high)
         return int(np.count_nonzero(~inside))
 
-    def interactive(self) -> list[dict[str, Any]]:
-        return [self._screen_panel(*pair) for pair in self.pairs]
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        return tuple(self._plot(*pair) for pair in self.pairs)
 
-    def _screen_panel(self, i: int, j: int) -> dict[str, Any]:
-        data = []
-        for points, colour, name in ((self.infeasible, MUTED, "infeasible"), (self.feasible, SKY, "feasible")):
-            marker = {"size": 4, "color": colour, "opacity": 0.45}
-            data.append(_trace(points[:, i], points[:, j], "markers", name, marker=marker))
-        mode = "lines+markers" if len(self.labels) == 2 else "markers"
-        steps = {"shape": "hv" if self.first_small else "vh", "color": self._front_colour, "width": 1.6}
-        marker = {"size": 6, "color": self._front_colour}
-        data.append(_trace(self.front[:, i], self.front[:, j], mode, "front", marker=marker, line=steps))
-        for k, (name, values) in enumerate(self.published):
-            marker = {"size": 12, "color": "#ffffff", "line": {"width": 3, "color": self._published_colour(k)}}
-            data.append(_trace([values[i]], [values[j]], "markers", name, marker=marker))
-        x = screen.axis(self.labels[i], zeroline=False, range=list(self.reach(i)))
-        y = screen.axis(self.labels[j], zeroline=False, range=list(self.reach(j)))
-        return {"data": data, "layout": screen.layout(x, y, 440, hovermode="closest")}
-
-    def printed(self) -> Figure:
-        columns = min(2, len(self.pairs))
-        rows = -(-len(self.pairs) // columns)
-        figure, axes = paper.new_figure(0.5 + (3.4 if columns == 1 else 2.6) * rows, rows, columns)
-        for axis, pair in zip(axes, self.pairs, strict=False):
-            self._print_panel(axis, *pair)
-        for axis in axes[len(self.pairs) :]:
-            axis.set_axis_off()
-        paper.add_key(figure, self.key)
-        return figure
-
-    def _print_panel(self, axis: Axes, i: int, j: int) -> None:
-        for points, colour in ((self.infeasible, MUTED), (self.feasible, SKY)):
-            axis.scatter(points[:, i], points[:, j], s=3.0, color=on_paper(colour), alpha=0.5, linewidths=0)
-        front = self.front
+    def _plot(self, i: int, j: int) -> Plot:
+        clouds = (
+            (self.infeasible, MUTED, "candidates outside a constraint", self.n_infeasible),
+            (self.feasible, SKY, "feasible candidates", self.n_feasible),
+        )
+        marks: list[Points | Line] = [
+            Points(points[:, i], points[:, j], colour, name, opacity=0.45, key=f"{count(n)} {name}" if n else "")
+            for points, colour, name, n in clouds
+        ]
+        name = "best if the constraints are left out" if self.relaxed else "front"
+        x, y = self.front[:, i], self.front[:, j]
         if len(self.labels) == 2:
-            axis.step(
-                front[:, i],
-                front[:, j],
-                where="post" if self.first_small else "pre",
-                color=self._front_colour,
-                linewidth=1.2,
-            )
-        axis.scatter(front[:, i], front[:, j], s=12.0, color=self._front_colour, linewidths=0, zorder=3)
-        for k, (_, values) in enumerate(self.published):
-            colour = on_paper(self._published_colour(k))
-            axis.plot(values[i], values[j], "o", markersize=7, markerfacecolor="white", color=colour, zorder=4)
-        axis.set(xlim=self.reach(i), ylim=self.reach(j))
-        axis.set(xlabel=paper.literal(self.labels[i]), ylabel=paper.literal(self.labels[j]))
-
-
-def _trace(x: Sequence[float] | np.ndarray, y: Sequence[float] | np.ndarray, mode: str, name: str, **more: Any) -> Any:
-    return {
-        "type": "scatter",
-        "mode": mode,
-        "x": screen.rounded(x),
-        "y": screen.rounded(y),
-        "name": screen.plain(name),
-        "hovertemplate": "(%{x}, %{y})<extra>%{fullData.name}</extra>",
-        **more,
-    }
+            marks.append(Line(x, y, self._front_colour, "front", width=1.6, step="hv" if self.first_small else "vh"))
+        key = f"{name}: {count(len(x))} candidates" if len(x) else ""
+        marks.append(Points(x, y, self._front_colour, name, size=6.0, key=key))
+        for k, (name, values) in enumerate(self.published):
+            marks.append(nominal_ring((values[i], values[j]), self._published_colour(k), name, PAPER))
+        x_axis, y_axis = (Axis(self.labels[k], reach=self.reach(k)) for k in (i, j))
+        return Plot(tuple(marks), x_axis, y_axis, height=440.0 if len(self.pairs) == 1 else 340.0)

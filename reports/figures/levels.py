@@ -1,20 +1,20 @@
 """Metrics by the level of a choice: where half and nine tenths of the cases lie, a row a level, a panel a metric."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
-from reports.document import Drawing, Key
-from reports.figures import paper, screen
-from reports.figures.palette import BLUE, MUTED, ORANGE, SKY, on_paper
+from reports.figures.marks import Axis, Drawing, Line, Plot, Points
+from reports.figures.palette import BLUE, MUTED, ORANGE, PAPER, SKY
 from reports.numbers import count, number
 
 SPREAD = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # probabilities of what is drawn
 LOGARITHMIC = 30.0  # medians this far apart are drawn on a logarithmic axis
-PANELS_IN_A_ROW = 2
+SPANS = (  # of SPREAD, with colour, width and words
+    (0, 6, MUTED, 1.2, "all cases"),
+    (1, 5, SKY, 7.0, "5 % to 95 %"),
+    (2, 4, BLUE, 11.0, "middle half of the cases"),
+)
 
 
 @dataclass(frozen=True)
@@ -45,15 +45,6 @@ class LevelsDrawing(Drawing):
     panels: tuple[LevelPanel, ...]
 
     @property
-    def key(self) -> tuple[Key, ...]:
-        return (
-            Key("point", ORANGE, "median"),
-            Key("bar", BLUE, "middle half of the cases"),
-            Key("bar", SKY, "5 % to 95 %"),
-            Key("line", MUTED, "all cases"),
-        )
-
-    @property
     def alternative(self) -> str:
         parts = []
         for panel in self.panels:
@@ -62,63 +53,24 @@ class LevelsDrawing(Drawing):
                 for level, row, used in zip(self.levels, panel.quantiles, panel.used, strict=True)
             )
             parts.append(f"{panel.label}: {medians}")
-        return f"Medians by {self.what}. {'; '.join(parts)}."
+        return f"Medians by {self.form}. {'; '.join(parts)}."
 
-    def interactive(self) -> list[dict[str, Any]]:
-        return [self._screen_panel(panel) for panel in self.panels]
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        return tuple(self._plot(panel) for panel in self.panels)
 
-    def _screen_panel(self, panel: LevelPanel) -> dict[str, Any]:
-        data: list[dict[str, Any]] = []
+    def _plot(self, panel: LevelPanel) -> Plot:
+        marks: list[Line | Points] = []
         # Places are numbers, not words: plotly would read a level such as "2" as a number or a date.
         for place, (level, row, used) in enumerate(zip(self.levels, panel.quantiles, panel.used, strict=True)):
-            text = f"{level}, {count(used)} cases"
-            for low, high, colour, width in ((0, 6, MUTED, 1.2), (1, 5, SKY, 7), (2, 4, BLUE, 11)):
-                trace = {
-                    "type": "scatter",
-                    "mode": "lines",
-                    "x": screen.rounded(row[[low, high]]),
-                    "y": [place, place],
-                    "line": {"color": colour, "width": width},
-                    "text": screen.plain(text),
-                    "hovertemplate": "%{text}: %{x:.5g}<extra></extra>",
-                }
-                data.append(trace)
-        middle = {
-            "type": "scatter",
-            "mode": "markers",
-            "x": screen.rounded(panel.quantiles[:, 3]),
-            "y": list(range(len(self.levels))),
-            "marker": {"size": 8, "color": ORANGE, "line": {"width": 1, "color": "#ffffff"}},
-            "text": [screen.plain(level) for level in self.levels],
-            "hovertemplate": "%{text}: median %{x:.5g}<extra></extra>",
-        }
-        data.append(middle)
-        kind = {"type": "log"} if panel.logarithmic else {}
-        x = screen.axis("", zeroline=False, nticks=6, **kind)
-        ticks = {"tickvals": list(range(len(self.levels))), "ticktext": [screen.plain(level) for level in self.levels]}
-        y = screen.axis("", range=[len(self.levels) - 0.5, -0.5], showgrid=False, zeroline=False, **ticks)
-        height = 90 + 26 * len(self.levels)
-        return {"data": data, "layout": screen.layout(x, y, height, panel.title, hovermode="closest")}
-
-    def printed(self) -> Figure:
-        columns = min(PANELS_IN_A_ROW, len(self.panels))
-        rows = -(-len(self.panels) // columns)
-        figure, axes = paper.new_figure(0.4 + rows * (0.65 + 0.17 * len(self.levels)), rows, columns)
-        for axis, panel in zip(axes, self.panels, strict=False):
-            self._print_panel(axis, panel)
-        for axis in axes[len(self.panels) :]:
-            axis.set_axis_off()
-        paper.add_key(figure, self.key, columns=4)
-        return figure
-
-    def _print_panel(self, axis: Axes, panel: LevelPanel) -> None:
-        places = np.arange(len(self.levels))
-        for low, high, colour, width in ((0, 6, MUTED, 0.8), (1, 5, SKY, 4.0), (2, 4, BLUE, 7.0)):
-            axis.hlines(places, panel.quantiles[:, low], panel.quantiles[:, high], on_paper(colour), linewidth=width)
-        axis.plot(panel.quantiles[:, 3], places, "o", color=ORANGE, markersize=4, markeredgecolor="white")
-        if panel.logarithmic:
-            axis.set_xscale("log")
-        axis.set_yticks(places, [paper.literal(level) for level in self.levels])
-        axis.set_ylim(len(self.levels) - 0.5, -0.5)
-        axis.set_title(paper.literal(panel.title), fontsize=7.5)
-        axis.grid(axis="y", visible=False)
+            for low, high, colour, width, key in SPANS:
+                text = f"{level}, {count(used)} cases: {number(float(row[low]), 4)} to {number(float(row[high]), 4)}"
+                marks.append(Line(row[[low, high]], np.full(2, place), colour, width=width, text=text, key=key))
+        median = panel.quantiles[:, 3]
+        texts = tuple(
+            f"{level}: median {number(float(one), 4)}" for level, one in zip(self.levels, median, strict=True)
+        )
+        marks.append(Points(median, np.arange(median.size), ORANGE, size=8.0, edge=PAPER, texts=texts, key="median"))
+        ticks = tuple(enumerate(self.levels))
+        y = Axis(reach=(len(self.levels) - 0.5, -0.5), ticks=ticks, grid=False)
+        return Plot(tuple(marks), Axis(log=panel.logarithmic), y, panel.title, 40.0 + 26.0 * len(self.levels))

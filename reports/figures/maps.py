@@ -1,16 +1,13 @@
 """A metric over two inputs: filled contours with the flown cases and the nominal on them."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
 
 from mc_engine.statistics import SurfaceMap
-from reports.document import Drawing, Key
-from reports.figures import paper, screen
-from reports.figures.palette import FIELD, INK, VERMILION, field_scale
+from reports.figures.marks import Axis, Drawing, Field, Plot, Points, nominal_ring
+from reports.figures.palette import VERMILION
+from reports.figures.ticks import covering
 from reports.numbers import count, number, with_unit
 
 LEVELS = 12
@@ -31,6 +28,7 @@ class MapDrawing(Drawing):
     point_values: np.ndarray
     n_points: int
     nominal: tuple[float, float] | None
+    columns: tuple[str, str, str] | None = None
 
     @property
     def method(self) -> str:
@@ -51,12 +49,6 @@ class MapDrawing(Drawing):
         )
 
     @property
-    def key(self) -> tuple[Key, ...]:
-        shown = "all" if len(self.points) == self.n_points else f"{count(len(self.points))} of {count(self.n_points)}"
-        entries = [Key("field", "#7C7B78", f"surface: {self.method}"), Key("point", DOT, f"flown cases, {shown} shown")]
-        return (*entries, Key("ring", VERMILION, "nominal")) if self.nominal else tuple(entries)
-
-    @property
     def alternative(self) -> str:
         surface = self.surface
         row, column = np.unravel_index(int(np.nanargmax(surface.value)), surface.value.shape)
@@ -74,70 +66,22 @@ class MapDrawing(Drawing):
         if high - low <= 1e-9 * max(abs(low), abs(high)):
             half = max(abs(low), 1.0) * 1e-6
             return np.array([low - half, low + half])
-        return np.asarray(MaxNLocator(LEVELS, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
+        return np.array(covering(low, high, LEVELS))
 
-    def interactive(self) -> list[dict[str, Any]]:
-        levels, surface = self.levels(), self.surface
-        field = {
-            "type": "contour",
-            "x": screen.rounded(surface.x),
-            "y": screen.rounded(surface.y),
-            "z": screen.rounded(surface.value, 5),
-            "colorscale": field_scale(),
-            "zmin": float(levels[0]),
-            "zmax": float(levels[-1]),
-            "contours": {"start": float(levels[0]), "end": float(levels[-1]), "size": float(levels[1] - levels[0])},
-            "line": {"width": 0.6, "color": "rgba(255,255,255,0.55)"},
-            "colorbar": {"title": {"text": screen.plain(self.metric_label), "side": "right"}, "thickness": 14,
-                         "outlinewidth": 0, "tickcolor": INK},
-            "hovertemplate": "%{x:.3f}, %{y:.3f}: %{z:.4g}<extra>surface</extra>",
-        }  # fmt: skip
-        dots = {
-            "type": "scatter",
-            "mode": "markers",
-            "x": screen.rounded(self.points[:, 0]),
-            "y": screen.rounded(self.points[:, 1]),
-            "meta": screen.CASES,
-            "customdata": [
-                [int(case), number(value)] for case, value in zip(self.case_ids, self.point_values, strict=True)
-            ],
-            "marker": {
-                "size": 3.5,
-                "color": DOT,
-                "line": {"width": 0.4, "color": "rgba(255,255,255,0.7)"},
-            },
-            "hovertemplate": "case %{customdata[0]}: (%{x:.3f}, %{y:.3f}), %{customdata[1]}<extra></extra>",
-        }
-        data = [field, dots]
-        if self.nominal:
-            data.append(
-                {
-                    "type": "scatter",
-                    "mode": "markers",
-                    "x": [self.nominal[0]],
-                    "y": [self.nominal[1]],
-                    "marker": {"size": 12, "color": "#ffffff", "line": {"width": 3, "color": VERMILION}},
-                    "hovertemplate": "nominal (%{x:.3f}, %{y:.3f})<extra></extra>",
-                }
-            )
-        x, y = (screen.axis(label, showgrid=False, zeroline=False) for label in (self.x_label, self.y_label))
-        return [{"data": data, "layout": screen.layout(x, y, 520, hovermode="closest", dragmode="select")}]
-
-    def printed(self) -> Figure:
-        figure, (axis,) = paper.new_figure(4.3)
-        surface, levels = self.surface, self.levels()
-        value = np.ma.masked_invalid(surface.value)
-        field = axis.contourf(surface.x, surface.y, value, levels, cmap=FIELD)
-        lines = axis.contour(surface.x, surface.y, value, levels, colors="white", linewidths=0.4, alpha=0.6)
-        axis.clabel(lines, levels[::2], fontsize=6, fmt=lambda level: number(level, 3))
-        axis.scatter(self.points[:, 0], self.points[:, 1], s=4.5, color=DOT, edgecolors="white", linewidths=0.25)
-        if self.nominal:
-            axis.plot(*self.nominal, "o", markersize=6, markerfacecolor="white", color=VERMILION, markeredgewidth=1.6)
-        axis.set(xlabel=paper.literal(self.x_label), ylabel=paper.literal(self.y_label))
-        axis.grid(visible=False)
-        bar = figure.colorbar(
-            field, ax=axis, label=paper.literal(self.metric_label), pad=0.02, aspect=32, format=paper.PlainNumbers()
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        surface = self.surface
+        texts = tuple(f"{self.metric_label}: {number(float(value))}" for value in self.point_values)
+        marks: list[Field | Points] = [
+            Field(surface.x, surface.y, surface.value, self.levels(), self.metric_label, f"surface: {self.method}")
+        ]
+        x, y = self.points.T
+        shown = "all" if len(x) == self.n_points else f"{count(len(x))} of {count(self.n_points)}"
+        key = f"cases, {shown} shown"
+        marks.append(
+            Points(x, y, DOT, size=3.5, edge="#ffffff", texts=texts, cases=self.case_ids, columns=self.columns, key=key)
         )
-        bar.ax.spines["outline"].set_visible(False)
-        paper.add_key(figure, self.key, columns=1)
-        return figure
+        if self.nominal:
+            marks.append(nominal_ring(self.nominal, VERMILION, edge="#ffffff"))
+        axes = (Axis(self.x_label, grid=False, margin=0.0), Axis(self.y_label, grid=False, margin=0.0))
+        return (Plot(tuple(marks), *axes, height=500.0),)

@@ -8,11 +8,13 @@ ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE = "#E69F00", "#56B4E9", "#009E73", "
 INK, MUTED, GRID, PAPER = "@ink", "@muted", "@grid", "@paper"
 
 # What the page colours are on paper.
-ON_PAPER = {INK: "#1b1b1b", MUTED: "#7a7a7a", GRID: "#dddddd", PAPER: "#ffffff"}
+ON_PAPER = {INK: "#1b1f23", MUTED: "#6c757d", GRID: "#dfe3e6", PAPER: "#ffffff"}
 
 LINES = (VERMILION, BLUE, GREEN, ORANGE, PURPLE, SKY)
 DASHES = ("solid", "dash", "dot")
-FIELD = "cividis"
+KEY_MARK = {"solid": "line", "dash": "dash", "dot": "dot"}  # of a line in a figure's key, by its dash
+CIVIDIS = ("#00224e", "#003170", "#2a3f6d", "#434e6c", "#575d6d", "#6a6c71", "#7d7c78", "#918b78", "#a59c74",
+           "#bcae6c", "#d2c060", "#e9d34e", "#fee838")  # fmt: skip
 
 
 def on_paper(colour: str) -> str:
@@ -20,10 +22,9 @@ def on_paper(colour: str) -> str:
     return ON_PAPER.get(colour, colour)
 
 
-def field_scale(steps: int = 16) -> list[list[object]]:
-    """The field's colour scale as plotly wants it."""
-    from matplotlib import colormaps
-
-    ramp = colormaps[FIELD].resampled(steps)
-    return [[index / (steps - 1), "rgb({:.0f},{:.0f},{:.0f})".format(*(255 * c for c in ramp(index)[:3]))]
-            for index in range(steps)]  # fmt: skip
+def field_colour(part: float) -> str:
+    """The field's colour from 0, dark, to 1, bright."""
+    place = min(max(part, 0.0), 1.0) * (len(CIVIDIS) - 1)
+    low = min(int(place), len(CIVIDIS) - 2)
+    ends = [[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in CIVIDIS[low : low + 2]]
+    return "#" + "".join(f"{round(a + (place - low) * (b - a)):02x}" for a, b in zip(*ends, strict=True))

@@ -1,20 +1,17 @@
 """One column against another, a point a case, marked by how the case came out."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from reports.document import Drawing, Key
-from reports.figures import paper, screen
-from reports.figures.footprints import DASHES, PRINT_DASH, joined
-from reports.figures.footprints import MARKS as LINE_MARKS
-from reports.figures.palette import BLUE, GREEN, INK, PURPLE, VERMILION, on_paper
-from reports.numbers import count, number
+from reports.figures.marks import Axis, Drawing, Line, Plot, Points, nominal_ring, region
+from reports.figures.palette import BLUE, DASHES, GREEN, INK, PAPER, PURPLE, VERMILION
+from reports.numbers import count
 
-# Colour, shape and size of what is inside, outside and failed: apart in grey and for the colour-blind, too.
-MARKS = ((BLUE, "circle", 4.0, 0.5), (VERMILION, "diamond", 7.0, 0.9), (INK, "triangle-up", 8.0, 0.9))
+# Colour and shape of what is inside, outside and failed: apart in grey and for the colour-blind, too.
+MARKS = ((BLUE, "circle"), (VERMILION, "diamond"), (INK, "triangle-up"))
+MOST, FEWER = (4.0, 0.5), (7.0, 0.9)  # size and opacity of the largest outcome, beneath, and of the others, above it
 
 
 @dataclass(frozen=True)
@@ -34,6 +31,7 @@ class ScatterDrawing(Drawing):
     """x, y : float64[k] of the cases shown (finite), with case_ids int64[k]; n_used of n_tried have both numbers.
 
     outcome : int[k], an index into `outcomes`, pairs of words and of how many of the n_used cases came out so.
+    columns : the names of x and y in the table of cases.
     """
 
     x: np.ndarray
@@ -47,6 +45,8 @@ class ScatterDrawing(Drawing):
     outcome: np.ndarray
     outcomes: tuple[tuple[str, int], ...]
     regions: tuple[CloudRegion, ...] = ()
+    columns: tuple[str, str] | None = None
+    form: ClassVar[str] = "Scatter of cases"
 
     @property
     def styled(self) -> list[tuple[CloudRegion, str, str]]:
@@ -60,87 +60,30 @@ class ScatterDrawing(Drawing):
         ]
 
     @property
-    def key(self) -> tuple[Key, ...]:
-        entries = []
-        for k, (words, cases) in enumerate(self.outcomes):
-            if cases:
-                shown = int((self.outcome == k).sum())
-                thinned = "" if shown == cases else f" ({count(shown)} shown)"
-                text = f"{words}: {count(cases)} of {count(self.n_tried)} cases{thinned}"
-                entries.append(Key("point", MARKS[k][0], text, MARKS[k][1]))
-        if self.nominal:
-            entries.append(Key("ring", VERMILION, "nominal"))
-        return (*entries, *(Key(LINE_MARKS[dash], colour, one.text) for one, colour, dash in self.styled))
+    def drawn(self) -> list[tuple[int, float, float]]:
+        """The outcomes that have cases, the largest first, as they are drawn one above the other: size and opacity."""
+        order = sorted((k for k, (_, cases) in enumerate(self.outcomes) if cases), key=lambda k: -self.outcomes[k][1])
+        return [(k, *(MOST if place == 0 else FEWER)) for place, k in enumerate(order)]
 
     @property
-    def alternative(self) -> str:
-        parts = ", ".join(f"{words}: {count(cases)}" for words, cases in self.outcomes if cases)
-        regions = "; ".join(one.text for one in self.regions)
-        return (
-            f"Scatter of {self.y_label}, {number(float(self.y.min()), 4)} to {number(float(self.y.max()), 4)}, against "
-            f"{self.x_label}, {number(float(self.x.min()), 4)} to {number(float(self.x.max()), 4)}; "
-            f"{count(self.n_used)} of {count(self.n_tried)} cases; {parts}."
-            f"{f' Regions: {regions}.' if regions else ''}"
-        )
-
-    def interactive(self) -> list[dict[str, Any]]:
-        data = [self._screen_cloud(k) for k, (_, cases) in enumerate(self.outcomes) if cases]
-        for region, colour, dash in self.styled:
-            data.append(screen.outline(joined(region.outlines), colour, dash, region.text))
+    def plots(self) -> tuple[Plot, ...]:
+        marks: list[Points | Line] = [self._cloud(*one) for one in self.drawn]
+        marks += [region(one.outlines, colour, dash, one.text) for one, colour, dash in self.styled]
         if self.nominal:
-            nominal = {
-                "type": "scatter",
-                "mode": "markers",
-                "x": [self.nominal[0]],
-                "y": [self.nominal[1]],
-                "marker": {"size": 11, "color": "#ffffff", "line": {"width": 3, "color": VERMILION}},
-                "hovertemplate": "nominal (%{x}, %{y})<extra></extra>",
-            }
-            data.append(nominal)
-        x, y = screen.axis(self.x_label, zeroline=False), screen.axis(self.y_label, zeroline=False)
-        return [{"data": data, "layout": screen.layout(x, y, 420, hovermode="closest", dragmode="select")}]
+            marks.append(nominal_ring(self.nominal, VERMILION, edge=PAPER))
+        return (Plot(tuple(marks), Axis(self.x_label), Axis(self.y_label), height=400.0),)
 
-    def _screen_cloud(self, k: int) -> dict[str, Any]:
-        rows = self.outcome == k
-        return {
-            **screen_cloud(k, self.outcomes[k][0]),
-            "x": screen.rounded(self.x[rows], 8),
-            "y": screen.rounded(self.y[rows], 8),
-            "customdata": [int(case) for case in self.case_ids[rows]],
-        }
-
-    def printed(self) -> Figure:
-        figure, (axis,) = paper.new_figure(3.4)
-        for k, (colour, sign, size, _) in enumerate(MARKS):
-            rows = self.outcome == k
-            area, opacity = ((size - 0.5) ** 2 / 4.0, 0.5) if k == 0 else (size * size / 4.0, 0.9)
-            axis.scatter(
-                self.x[rows],
-                self.y[rows],
-                s=area,
-                color=on_paper(colour),
-                marker=paper.SIGNS[sign],
-                alpha=opacity,
-                linewidths=0,
-            )
-        for region, colour, dash in self.styled:
-            line = joined(region.outlines)
-            axis.plot(line[:, 0], line[:, 1], color=colour, linestyle=PRINT_DASH[dash], linewidth=1.1)
-        if self.nominal:
-            axis.plot(*self.nominal, "o", markersize=6, markerfacecolor="white", color=VERMILION, markeredgewidth=1.6)
-        axis.set(xlabel=paper.literal(self.x_label), ylabel=paper.literal(self.y_label))
-        paper.add_key(figure, self.key, columns=1 if self.regions else 3)
-        return figure
+    def _cloud(self, k: int, size: float, opacity: float) -> Points:
+        rows, (words, cases) = self.outcome == k, self.outcomes[k]
+        shown = int(rows.sum())
+        thinned = "" if shown == cases else f" ({count(shown)} shown)"
+        key = f"{words}: {count(cases)} of {count(self.n_tried)} cases{thinned}"
+        found = outcome_cloud(k, words, self.x[rows], self.y[rows], self.case_ids[rows])
+        return replace(found, size=size, opacity=opacity, columns=self.columns, key=key)
 
 
-def screen_cloud(outcome: int, words: str) -> dict[str, Any]:
-    """The cloud of one outcome for the screen, still without its points."""
-    colour, sign, size, opacity = MARKS[outcome]
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "meta": screen.CASES,
-        "name": screen.plain(words),
-        "marker": {"size": size, "symbol": sign, "color": colour, "opacity": opacity},
-        "hovertemplate": "case %{customdata}: (%{x}, %{y})<extra>%{fullData.name}</extra>",
-    }
+def outcome_cloud(k: int, words: str, x: np.ndarray, y: np.ndarray, cases: np.ndarray) -> Points:
+    """The cases of one outcome, in its colour and shape."""
+    colour, sign = MARKS[k]
+    size, opacity = FEWER if k else MOST
+    return Points(x, y, colour, words, sign, size, opacity, cases=cases)

@@ -1,4 +1,4 @@
-"""Figures from a table of cases: a DataFrame in, a matplotlib `Figure` out.
+"""Figures from a table of cases: a DataFrame in, a `Picture` out, which a notebook shows and `savefig` writes.
 
     from reports.figures.table_figures import fuel_map, histogram, scatter
 
@@ -9,19 +9,19 @@ They draw what the reports draw, in the same style.  A table from `open_run` bri
 the names stand alone.  Where there is a column `status`, cases that are not ok have no metrics.
 """
 
-from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from mc_engine.errors import EngineError
 from mc_engine.statistics import map_metric, summarize
 from mc_engine.status import OK, STATUS_NAME
+from reports.figures import paper
 from reports.figures.distributions import DistributionPanel, Distributions
 from reports.figures.maps import MapDrawing
-from reports.figures.paper import STYLE
+from reports.figures.marks import Drawing
 from reports.figures.scatter import ScatterDrawing
 from reports.numbers import axis_label, count, words
 
@@ -29,7 +29,33 @@ OUTER = (0.00135, 0.99865)  # quantiles drawn beside the median
 POINTS_ON_MAP = 2000
 
 
-def histogram(table: pd.DataFrame, column: str) -> Figure:
+@dataclass(frozen=True)
+class Picture:
+    """A figure in the style of the reports.  svg : of the width of a page."""
+
+    drawing: Drawing
+
+    @property
+    def svg(self) -> str:
+        return paper.svg(self.drawing)
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+    def savefig(self, file: str | Path) -> None:
+        """Write it as SVG, PDF or PNG, as the file's ending says; EngineError for another."""
+        from reports.pdf import render_picture
+
+        kind = Path(file).suffix.removeprefix(".").lower()
+        if kind == "svg":
+            Path(file).write_bytes(self.svg.encode())
+        elif kind in ("pdf", "png"):
+            Path(file).write_bytes(render_picture(self.svg, kind))
+        else:
+            raise EngineError(f"{file}: a figure is written as .svg, .pdf or .png")
+
+
+def histogram(table: pd.DataFrame, column: str) -> Picture:
     """Cases over the values of a column, with its median and outer quantiles.
 
     EngineError if there is no such column of numbers, or fewer than two cases have one.
@@ -39,10 +65,10 @@ def histogram(table: pd.DataFrame, column: str) -> Figure:
     _refuse_few(finite.size, 2, column)
     used = f"{count(finite.size)} of {count(values.size)} cases"
     panel = DistributionPanel(used, _label(table, column), finite, summarize(values), None, ())
-    return _styled(Distributions((panel,), OUTER, False).printed)
+    return Picture(Distributions((panel,), OUTER, False))
 
 
-def scatter(table: pd.DataFrame, x: str, y: str) -> Figure:
+def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
     """One column against another, a point a case.  EngineError as for `histogram`."""
     a, b = _values(table, x), _values(table, y)
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b))
@@ -59,10 +85,10 @@ def scatter(table: pd.DataFrame, x: str, y: str) -> Figure:
         outcome=np.zeros(used.size, dtype=np.int8),
         outcomes=(("cases with both numbers", int(used.size)),),
     )
-    return _styled(drawing.printed)
+    return Picture(drawing)
 
 
-def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Figure:
+def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:
     """Filled contours of any metric over two columns: exact on a grid, smoothed from scattered cases.
 
     Blank where the cases do not support a surface; see `mc_engine.statistics.map_metric`.  EngineError where the cases
@@ -86,7 +112,7 @@ def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Figure:
         n_points=int(used.size),
         nominal=None,
     )
-    return _styled(drawing.printed)
+    return Picture(drawing)
 
 
 def _values(table: pd.DataFrame, column: str) -> np.ndarray:
@@ -116,8 +142,3 @@ def _label(table: pd.DataFrame, column: str) -> str:
 
 def _case_ids(table: pd.DataFrame) -> np.ndarray:
     return (table["case_id"] if "case_id" in table else table.index).to_numpy()
-
-
-def _styled(draw: Callable[[], Figure]) -> Figure:
-    with mpl.rc_context({**mpl.rcParamsDefault, **STYLE, "backend": "agg"}):
-        return draw()

@@ -3,21 +3,30 @@
 const reportCases = (function () {
   const data = JSON.parse(document.getElementById("case-data").textContent);
   if (!data) return null;
-  const MOST_ROWS = 300;
-  const place = new Map(data.ids.map((id, row) => [id, row]));
-  const clouds = reportFigures.figures.filter((figure) => figure.data.some((trace) => trace.meta === "cases"));
+  const MOST_ROWS = 300, MOST_DRAWN = 6000;
+  const [first, many] = Array.isArray(data.ids) ? data.ids : [0, 0];
+  data.ids = many ? Float64Array.from({ length: many }, (_, k) => first + k) : reportFigures.numbers(data.ids);
+  data.outcome = reportFigures.numbers(data.outcome);
+  for (const column of data.columns) {
+    column.words = Array.isArray(column.values) && column.values.some((value) => typeof value === "string");
+    if (!column.words) column.values = reportFigures.numbers(column.values);
+  }
+  const columns = new Map(data.columns.map((column) => [column.name, column]));
+  const listed = data.columns.filter((column) => column.role !== "place"); // the others are for figures alone
+  const place = new Map(Array.from(data.ids, (id, row) => [id, row]));
+  const all = Array.from(data.ids.keys());
+  const clouds = reportFigures.figures.filter(reportFigures.hasCases);
   const selection = document.getElementById("selection");
   const explorer = document.getElementById("explorer");
   let choices = 0;
   let chosen = null;
 
-  const caseOf = (item) => (Array.isArray(item) ? item[0] : item);
-  const isNumber = (value) => typeof value === "number";
+  const isNumber = (value) => typeof value === "number" && !Number.isNaN(value);
   const grouped = (value) => String(value).replace(/\B(?=(\d{3})+$)/g, "\u202f");
 
   function shown(value) {
-    if (value === null) return "–";
-    if (!isNumber(value)) return value;
+    if (typeof value === "string") return value;
+    if (!isNumber(value)) return "–";
     return String(Number(value.toPrecision(5))).replace("-", "−");
   }
 
@@ -37,7 +46,7 @@ const reportCases = (function () {
   }
 
   function valueCell(value) {
-    const cell = element("td", shown(value), isNumber(value) || value === null ? "number" : "text");
+    const cell = element("td", shown(value), typeof value === "string" ? "text" : "number");
     if (isNumber(value)) cell.dataset.value = value;
     return cell;
   }
@@ -47,7 +56,7 @@ const reportCases = (function () {
     first.dataset.value = id;
     first.append(caseLabel(id));
     line.append(first, element("td", data.outcomes[data.outcome[at]], "text"));
-    for (const column of data.columns) line.append(valueCell(column.values[at]));
+    for (const column of listed) line.append(valueCell(column.values[at]));
     return line;
   }
 
@@ -62,7 +71,7 @@ const reportCases = (function () {
     heading.colSpan = 2;
     heading.scope = "row";
     line.append(heading);
-    for (const column of data.columns) {
+    for (const column of listed) {
       const value = median(rows.map((at) => column.values[at]));
       line.append(element("td", value === null ? "" : shown(value), "number"));
     }
@@ -71,7 +80,7 @@ const reportCases = (function () {
 
   function heading() {
     const line = element("tr");
-    for (const label of ["Case", "Outcome", ...data.columns.map((column) => column.label)]) {
+    for (const label of ["Case", "Outcome", ...listed.map((column) => column.label)]) {
       const cell = element("th"), button = element("button", label);
       cell.scope = "col";
       button.type = "button";
@@ -87,13 +96,26 @@ const reportCases = (function () {
     head.append(heading());
     body.append(...known.slice(0, MOST_ROWS).map(row));
     foot.append(medians("median of these", known.map((id) => place.get(id))));
-    foot.append(medians("median of all in this page", data.ids.map((_, at) => at)));
+    foot.append(medians(data.ids.length < data.tried ? "median of all in this page" : "median of all", all));
     document.getElementById("selection-table").replaceChildren(head, body, foot);
-    let text = `${grouped(ids.length)} cases chosen, of ${grouped(data.ids.length)} in this page and ${grouped(data.tried)} flown`;
+    let text = `${grouped(ids.length)} ${ids.length === 1 ? "case" : "cases"} chosen of ${grouped(data.tried)}`;
+    if (data.ids.length < data.tried) text += `; this page holds ${grouped(data.ids.length)} of them, and counts no others`;
     if (ids.length > known.length) text += `; ${grouped(ids.length - known.length)} are drawn without their numbers`;
     if (known.length > MOST_ROWS) text += `; the first ${MOST_ROWS} are listed`;
     document.getElementById("selection-count").textContent = text;
     selection.hidden = false;
+  }
+
+  // Clouds over columns that the page holds come without their numbers.
+  for (const figure of clouds) {
+    for (const trace of figure.data) {
+      if (!trace.rows) continue;
+      const rows = reportFigures.numbers(trace.rows), [x, y, told] = trace.columns.map((name) => columns.get(name).values);
+      if (told) trace.text = Array.from(rows, (row) => `${reportFigures.plain(columns.get(trace.columns[2]).label)}: ${shown(told[row])}`);
+      trace.x = Array.from(rows, (row) => x[row]);
+      trace.y = Array.from(rows, (row) => y[row]);
+      trace.customdata = Array.from(rows, (row) => data.ids[row]);
+    }
   }
 
   function lift(ids) {
@@ -103,13 +125,13 @@ const reportCases = (function () {
         if (trace.meta !== "cases") continue;
         delete trace.selectedpoints;
         if (!ids) continue;
-        trace.selectedpoints = trace.customdata.flatMap((item, index) => (ids.has(caseOf(item)) ? [index] : []));
+        trace.selectedpoints = Array.from(trace.customdata).flatMap((id, index) => (ids.has(id) ? [index] : []));
         trace.selected = { marker: { opacity: 1 } };
         trace.unselected = { marker: { opacity: 0.08 } };
       }
       figure.layout.selections = []; // the outline of a box goes: other figures and axes show the same choice
       figure.layout.selectionrevision = choices;
-      reportFigures.draw(figure);
+      reportFigures.update(figure);
     }
   }
 
@@ -122,28 +144,72 @@ const reportCases = (function () {
     document.body.classList.toggle("choosing", Boolean(chosen));
   }
 
+  // Whether a point lies in a box or lasso of plotly's, in the units of the axes.
+  function inside(event) {
+    if (event.range) {
+      const [x, y] = [event.range.x, event.range.y].map((ends) => [Math.min(...ends), Math.max(...ends)]);
+      return (a, b) => a >= x[0] && a <= x[1] && b >= y[0] && b <= y[1];
+    }
+    const { x, y } = event.lassoPoints;
+    return (a, b) => {
+      let odd = false;
+      for (let k = 0, before = x.length - 1; k < x.length; before = k++) {
+        if (y[k] > b !== y[before] > b && a < ((x[before] - x[k]) * (b - y[k])) / (y[before] - y[k]) + x[k]) odd = !odd;
+      }
+      return odd;
+    };
+  }
+
+  // All cases of the page in the box or lasso, those among them that the figure does not draw.
+  function caught(figure, event) {
+    const within = inside(event), found = new Set();
+    for (const trace of figure.data) {
+      if (trace.meta !== "cases") continue;
+      if (trace.columns && trace.columns.every((name) => columns.has(name))) {
+        const [x, y] = trace.columns.map((name) => columns.get(name).values);
+        for (const row of all) if (within(x[row], y[row])) found.add(data.ids[row]);
+      } else {
+        trace.customdata.forEach((id, k) => within(trace.x[k], trace.y[k]) && found.add(id));
+      }
+    }
+    return found;
+  }
+
   for (const figure of clouds) {
-    const panel = document.getElementById(figure.id);
-    panel.on("plotly_selected", (event) => {
-      if (!event || !(event.range || event.lassoPoints)) return; // a mere click, or our own drawing
-      choose(event.points.filter((point) => point.data.meta === "cases").map((point) => caseOf(point.customdata)));
-    });
-    panel.on("plotly_deselect", () => choose(null));
+    figure.onDrawn = (panel) => {
+      panel.on("plotly_selected", (event) => {
+        if (!event || !(event.range || event.lassoPoints)) return; // a mere click, or our own drawing
+        choose(caught(figure, event));
+      });
+      panel.on("plotly_deselect", () => choose(null));
+    };
   }
 
   // ---- the figure of cases: other axes, and choosing without a mouse
 
   function columnOf(id) {
-    return data.columns[Number(document.getElementById(id).value)];
+    return listed[Number(document.getElementById(id).value)];
+  }
+
+  function evenly(rows) {
+    const step = Math.max(1, rows.length / MOST_DRAWN);
+    return Array.from({ length: Math.min(rows.length, MOST_DRAWN) }, (_, k) => rows[Math.floor(k * step)]);
   }
 
   function redraw() {
     const x = columnOf("explorer-x"), y = columnOf("explorer-y");
     const figure = reportFigures.figures.find((one) => one.id === explorer.dataset.figure);
+    const there = (column, at) => column.words || isNumber(column.values[at]);
     figure.data = data.clouds.map((cloud, k) => {
-      const rows = data.ids.map((_, at) => at).filter((at) => data.outcome[at] === k && x.values[at] !== null && y.values[at] !== null);
-      return { ...cloud, x: rows.map((at) => x.values[at]), y: rows.map((at) => y.values[at]), customdata: rows.map((at) => data.ids[at]) };
+      const rows = evenly(all.filter((at) => data.outcome[at] === k && there(x, at) && there(y, at)));
+      const take = (column) => rows.map((at) => column.values[at]);
+      const names = [x, y].map((column) => reportFigures.plain(column.label));
+      return { ...cloud, columns: [x.name, y.name], x: take(x), y: take(y), customdata: rows.map((at) => data.ids[at]),
+        hovertemplate: `case %{customdata}<br>${names[0]}: %{x}<br>${names[1]}: %{y}<extra>%{fullData.name}</extra>` };
     });
+    for (const axis of ["xaxis", "yaxis"]) {
+      for (const member of ["range", "type", "autorange"]) delete figure.layout[axis][member];
+    }
     for (const [axis, column] of [["xaxis", x], ["yaxis", y]]) {
       figure.layout[axis].title.text = reportFigures.plain(column.label);
     }
@@ -156,16 +222,16 @@ const reportCases = (function () {
     explorer.addEventListener("click", (event) => {
       const wanted = event.target.dataset.outcome;
       if (wanted === undefined) return;
-      choose(wanted === "none" ? null : data.ids.filter((_, at) => data.outcome[at] === Number(wanted)));
+      choose(wanted === "none" ? null : all.filter((at) => data.outcome[at] === Number(wanted)).map((at) => data.ids[at]));
     });
     explorer.addEventListener("submit", (event) => {
       event.preventDefault();
       const column = columnOf("explorer-column");
       const bound = (id, open) => { const text = document.getElementById(id).value; return text === "" ? open : Number(text); };
       const low = bound("explorer-low", -Infinity), high = bound("explorer-high", Infinity);
-      choose(data.ids.filter((_, at) => isNumber(column.values[at]) && column.values[at] >= low && column.values[at] <= high));
+      choose(all.filter((at) => isNumber(column.values[at]) && column.values[at] >= low && column.values[at] <= high).map((at) => data.ids[at]));
     });
   }
   document.getElementById("selection-close").addEventListener("click", () => choose(null));
-  return { data, place, shown, element };
+  return { data, listed, place, shown, element };
 })();

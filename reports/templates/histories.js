@@ -2,19 +2,19 @@
 // The time history of one case, over the nominal one: opened by a link "#case-17", from tables or from elsewhere.
 (function () {
   if (!reportCases) return;
-  const { data, place, shown } = reportCases;
+  const { data, listed, place, shown } = reportCases;
   const dialog = document.getElementById("history"), panels = document.getElementById("history-panels");
   const held = Object.keys(data.histories).map(Number).sort((a, b) => a - b);
   let open = null;
 
-  function curve(id, name) {
-    const found = (data.histories[id] || {})[name];
+  function curve(id, quantity) {
+    const found = (data.histories[id] || {})[quantity.name];
     if (!found) return [];
     const nominal = id === -1;
     return [{
       type: "scatter", mode: "lines", x: found[0], y: found[1], name: nominal ? "nominal" : "case " + id,
       line: { color: nominal ? "@ink" : "#D55E00", dash: nominal ? "dot" : "solid", width: nominal ? 1.4 : 2 },
-      hovertemplate: "%{x:.4g} s: %{y:.5g}<extra>%{fullData.name}</extra>",
+      hovertemplate: `time [s]: %{x:.5g}<br>${reportFigures.plain(quantity.label)}: %{y:.5g}<extra>%{fullData.name}</extra>`,
     }];
   }
 
@@ -22,14 +22,15 @@
     const layout = structuredClone(data.panel);
     layout.title.text = reportFigures.plain(quantity.label);
     const cases = open === -1 ? [-1] : [-1, open];
-    return { id: "history-" + index, data: cases.flatMap((id) => curve(id, quantity.name)), layout };
+    const found = cases.flatMap((id) => curve(id, quantity));
+    return { id: "history-" + index, data: [...(data.behind[quantity.name] || []), ...found], layout };
   }
 
   function inputs(id) {
     const at = place.get(id);
     if (at === undefined) return "Every input at its nominal value.";
-    const parts = data.columns.filter((column) => column.role === "dispersion").map((column) => `${column.label} ${shown(column.values[at])}`);
-    return `${data.outcomes[data.outcome[at]]}; ${parts.join(", ")}. Dotted: the nominal case.`;
+    const parts = listed.filter((column) => column.role === "dispersion").map((column) => `${column.label} ${shown(column.values[at])}`);
+    return `${data.outcomes[data.outcome[at]]}; ${parts.join(", ")}. Dotted: the nominal case; shaded, where the report has them: the envelopes of the cases.`;
   }
 
   function draw() {

@@ -33,5 +33,26 @@
     const heading = button.parentNode;
     sort(heading.closest("table"), heading.cellIndex, heading);
   });
+  // Longer tables can be searched: a row stays that has every word of the search.
+  const LONG = 8;
+  for (const figure of document.querySelectorAll("figure.table")) {
+    const rows = Array.from(figure.querySelectorAll("tbody tr")), title = figure.querySelector("figcaption b").textContent;
+    if (rows.length <= LONG) continue;
+    const bar = document.createElement("p"), field = document.createElement("input"), status = document.createElement("span");
+    bar.className = "search";
+    field.type = "search";
+    field.placeholder = "Search this table";
+    field.setAttribute("aria-label", "Search " + title.replace(/\.$/, ""));
+    status.setAttribute("role", "status");
+    bar.append(field, " ", status);
+    figure.querySelector(".scroll").before(bar);
+    const texts = rows.map((row) => row.textContent.toLowerCase());
+    field.addEventListener("input", () => {
+      const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+      rows.forEach((row, k) => { row.hidden = !words.every((word) => texts[k].includes(word)); });
+      const left = rows.filter((row) => !row.hidden).length;
+      status.textContent = words.length ? `${left} of ${rows.length} rows` : "";
+    });
+  }
   if (window.innerWidth <= 1000) document.querySelector("nav details").open = false;
 })();

@@ -37,9 +37,9 @@ def refused(text, folder):
 @pytest.mark.parametrize(
     ("body", "words"),
     [
-        (FUEL + "confidence = 1e-17", "at least 1e-12"),
-        (FUEL + "confidence = 1e-300", "at least 1e-12"),
-        (FUEL + "share = 0.9999999999999999", "at most 1"),
+        (FUEL + "confidence = 1e-17", "by 1e-12 at least"),
+        (FUEL + "confidence = 1e-300", "by 1e-12 at least"),
+        (FUEL + "share = 0.9999999999999999", "by 1e-12 at least"),
         ('[dispersion.ve_pct]\ndist = "discrete"\nvalues = [1.0, 2.0]\nweights = [1e308, 1e308]', "at most 1e+50"),
         ('[dispersion.ve_pct]\ndist = "discrete"\nvalues = [1.0, 2.0]\nweights = [nan, 1]', "finite"),
     ],
@@ -97,11 +97,10 @@ def test_a_pipe_is_no_table(tmp_path):
 
 def test_rows_columns_and_lines_of_a_table_have_bounds(tmp_path, monkeypatch):
     monkeypatch.setattr(case_files, "MOST_CSV_CELLS", 1000)
-    monkeypatch.setattr(case_files, "MOST_OF_LINE", 5000)
     path = tmp_path / "x.csv"
     for text, words in [
         ("a,b\n" + "1,2\n" * 501, "more than 1,000 cells"),
-        ("a,b\n1," + "2" * 6000, "a line of more than 5,000 letters"),
+        ("a,b\n1," + "2" * 200_000, "field larger than field limit"),
         (",".join(f"c{k}" for k in range(900)) + "\n" + "1\n" * 9, "900 columns are named"),
     ]:
         path.write_text(text)
@@ -204,12 +203,7 @@ def minimal():
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="names of files are text elsewhere")
 def test_a_folder_whose_name_is_no_text_is_refused(tmp_path, minimal, chain):
     odd = os.fsdecode(os.path.join(os.fsencode(tmp_path), b"\xff\xfe"))
-    for command in (
-        ("check", "--no-model", odd),
-        ("run", odd),
-        ("run", "minimal", "--out", f"{odd}x"),
-        ("report", odd),
-    ):
+    for command in (("check", "--no-model", odd), ("run", odd), ("run", "minimal", "--out", f"{odd}x")):
         if command[0] == "check":
             shutil.copytree(minimal, odd)
         assert_answered(done := call(*command), 2)

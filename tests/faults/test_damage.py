@@ -224,8 +224,9 @@ def test_an_extension_that_was_broken_off_keeps_what_it_flew_and_can_be_asked_fo
     (run / "journal.jsonl").write_bytes(b"".join(kept))
     stops = [entry.facts["first"] + entry.facts["rows"] for entry in entries[: len(kept)] if entry.event == "part"]
     assert runner.resume(run, workers=2, repair=True).n_cases == max(stops) >= 290
-    store = runner.extend(run, 350, workers=2, chunk=30)
-    assert store.verify() == []
+    if max(stops) < 350:
+        runner.extend(run, 350, workers=2, chunk=30)
+    assert damage(run) == []
     assert results(run) == results(grown.path)
 
 

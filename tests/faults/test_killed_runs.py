@@ -50,6 +50,8 @@ def _holder(run):
     """Whose lock a resumed run takes over: the record of the killed process, where it was writing cases."""
     if not (run / "journal.jsonl").exists():
         return []
+    if not (run / ".lock").exists():
+        return []
     record = (run / ".lock").read_text()
     return [json.loads(record)] if record else []
 

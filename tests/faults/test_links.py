@@ -138,6 +138,9 @@ ELSEWHERE = {
     "mc_engine/user_streams.py": "the null device",
     "mc_engine/verbs_before_flight.py": "init makes a folder that the user named",
     "mc_engine/documentation/website.py": "the site of the documentation",
+    "mc_engine/unforeseen.py": "the log of an error, in the folder of temporary files",
+    "mc_engine/writer_lock.py": "the lock of a directory",
+    "reports/figures/table_figures.py": "a picture, to the place that the user names",
 }
 
 

@@ -50,6 +50,7 @@ def asked(verb, run, flown):
     return done
 
 
+@pytest.mark.filterwarnings("ignore:Glyph:UserWarning")  # a letter that no font has, in a label of a figure
 @pytest.mark.parametrize("count", [120, pytest.param(3000, marks=pytest.mark.slow)])
 def test_mutated_manifests_are_answered_with_a_sentence(run, flown, count, record_property):
     rng = np.random.default_rng(count)

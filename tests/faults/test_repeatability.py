@@ -14,7 +14,7 @@ def checked(folder, *words):
     ("factor", "sentence"),
     [
         ("hash('gravity') % 1000 / 1000.0", f"`FACTOR` in model.py {SAME}"),
-        ("__import__('time').time()", f"`FACTOR` in model.py {SAME}"),
+        pytest.param("__import__('time').time()", f"`FACTOR` in model.py {SAME}", marks=pytest.mark.slow),
         ("float(__import__('os').environ.get('FACTOR', 1.0))", 'model.py, line 6 reads the environment variable "FACT'),
     ],
 )

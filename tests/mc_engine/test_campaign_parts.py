@@ -125,10 +125,10 @@ def test_retention_names_first_worst_and_single_cases():
         histories = { nominal = false, first = 3, cases = [17, 5], worst = [
             { metric = "propellant_kg", count = 2 }, { metric = "range_m", side = "smallest" }] }
     """)
-    worst = (Worst("propellant_kg", 2, "largest"), Worst("range_m", 5, "smallest"))
+    worst = (Worst("propellant_kg", 2, None), Worst("range_m", 5, "smallest"))
     assert campaign.retention == Retention(False, 3, worst, (17, 5))
     metric, n_cases, side = campaign.retention.worst[0]
-    assert (metric, n_cases, side) == ("propellant_kg", 2, "largest")
+    assert (metric, n_cases, side) == ("propellant_kg", 2, None)
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,9 @@ def calls(monkeypatch):
 
     def replay(path, case_id):
         history = pd.DataFrame({"case_id": [case_id] * 2, "t_s": [0.0, 1.0], "force_n": [1.0, 2.0]})
-        return SimpleNamespace(equal=seen.equal, differences=["propellant_kg: 1 is not 2"], history=history, row={})
+        return SimpleNamespace(
+            equal=seen.equal, differences=["propellant_kg: 1 is not 2"], history=history, row={}, lost=""
+        )
 
     def write_reports(path, formats=("html", "pdf")):
         seen.reports.append(formats)

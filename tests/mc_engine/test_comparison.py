@@ -66,7 +66,7 @@ def test_pairs_need_half_of_the_smaller_run(tmp_path):
 
 def test_failed_cases_are_a_share_that_changed(tmp_path):
     found = compared(run(tmp_path / "a"), run(tmp_path / "b", failed=40))
-    assert [one.name for one in found.moved_shares] == ["flown to its end", "fuel"]
+    assert [one.name for one in found.moved_shares] == ["completed", "fuel"]
     assert (found.shares[0].lost, found.shares[0].gained) == (40, 0)
     assert found.metrics[0].n_used == (360, 360)
 

@@ -1,11 +1,10 @@
-import re
-
 import numpy as np
 import pytest
 
 import mc_engine
 from mc_engine import load_campaign, open_run, runner
 from mc_engine.errors import EngineError, StoreError
+from reports.figures.marks import Bar
 from reports.figures.table_figures import fuel_map, histogram, scatter
 
 
@@ -87,22 +86,32 @@ def test_text_of_a_run_is_never_read_as_html(run):
 
 def test_figures_of_a_table_draw_its_cases_with_its_units(run):
     table = run.cases
-    bars = histogram(table, "apogee_altitude_km").axes[0]
-    assert bars.patches[0].get_data().values.sum() == 150
-    assert bars.get_xlabel() == "apogee altitude [km]"
-    cloud = scatter(table, "magnitude_error_pct", "apogee_altitude_km").axes[0]
-    drawn = cloud.collections[0].get_offsets()
-    assert np.array_equal(drawn, table[["magnitude_error_pct", "apogee_altitude_km"]].to_numpy())
-    surface = fuel_map(table, "magnitude_error_pct", "pitch_error_deg", "apogee_altitude_km")
-    assert [axis.get_ylabel() for axis in surface.axes] == ["pitch error [deg]", "apogee altitude [km]"]
+    (bars,) = histogram(table, "apogee_altitude_km").drawing.plots
+    assert sum(mark.top.sum() for mark in bars.marks if isinstance(mark, Bar)) == 150
+    assert bars.x.label == "apogee altitude [km]"
+    (cloud,) = scatter(table, "magnitude_error_pct", "apogee_altitude_km").drawing.plots
+    assert np.array_equal(cloud.marks[0].x, table["magnitude_error_pct"])
+    assert np.array_equal(cloud.marks[0].y, table["apogee_altitude_km"])
+    (surface,) = fuel_map(table, "magnitude_error_pct", "pitch_error_deg", "apogee_altitude_km").drawing.plots
+    assert [surface.y.label, surface.field.label] == ["pitch error [deg]", "apogee altitude [km]"]
+
+
+def test_a_figure_of_a_table_is_shown_by_a_notebook_and_written_as_a_file(run, tmp_path):
+    picture = histogram(run.cases, "apogee_altitude_km")
+    assert "apogee altitude [km]</text>" in picture._repr_svg_()
+    for ending, begin in ((".svg", b"<svg"), (".png", b"\x89PNG"), (".pdf", b"%PDF")):
+        picture.savefig(tmp_path / f"bars{ending}")
+        assert (tmp_path / f"bars{ending}").read_bytes().startswith(begin)
+    with pytest.raises(EngineError, match=r"bars\.jpg: a figure is written as .svg, .pdf or .png"):
+        picture.savefig(tmp_path / "bars.jpg")
 
 
 def test_failed_cases_are_left_out_and_counted(run):
     table = run.cases.copy()
     table.loc[:9, "status"] = "no-stop"
-    axis = histogram(table, "apogee_altitude_km").axes[0]
-    assert axis.patches[0].get_data().values.sum() == 140
-    assert re.search("140 of 150 cases", axis.get_title(loc="left"))
+    (bars,) = histogram(table, "apogee_altitude_km").drawing.plots
+    assert sum(mark.top.sum() for mark in bars.marks if isinstance(mark, Bar)) == 140
+    assert "140 of 150 cases" in bars.title
 
 
 def test_a_figure_of_nothing_is_refused_with_a_sentence(run):

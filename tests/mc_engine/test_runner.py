@@ -147,6 +147,21 @@ def test_the_worst_cases_keep_their_histories(tmp_path):
     assert list(dict.fromkeys(store.histories()["case_id"])) == list(lowest)
 
 
+def test_the_worst_cases_of_a_requirement_with_two_limits_have_the_smallest_margin(tmp_path):
+    """As measured from the nearer limit, whichever end that is."""
+    small = load_campaign("minimal")
+    text = small.text.replace(
+        "histories = { nominal = true, first = 3 }",
+        'histories = { nominal = false, worst = { metric = "apogee_altitude_km", count = 4 } }',
+    )
+    text += '[requirement.band]\nmetric = "apogee_altitude_km"\nat_least = 780.0\nat_most = 9000.0\n'
+    store = runner.run(load_campaign("small", text=text, directory=small.directory, cases=300), tmp_path / "run")
+    altitude = store.cases().set_index("case_id")["apogee_altitude_km"]
+    margin = np.minimum(9000.0 - altitude, altitude - 780.0)
+    assert list(dict.fromkeys(store.histories()["case_id"])) == list(margin.nsmallest(4).index)
+    assert margin.nsmallest(4).index[0] == altitude.idxmin()
+
+
 def test_a_failed_case_keeps_its_row_and_its_inputs_and_the_others_are_untouched(flown, tmp_path):
     """A burn that leaves the Earth for good never meets an apogee: no-stop, and NaN metrics, in that row alone."""
     (tmp_path / "cases.csv").write_text("magnitude_error_pct,pitch_error_deg\n0,0\n4000,0\n1,0.5\n")

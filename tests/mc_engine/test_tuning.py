@@ -156,7 +156,7 @@ def test_a_killed_search_leaves_the_generations_that_were_flown(tmp_path):
     whole = tune(apogee_campaign(), tmp_path / "whole", seed=1, workers=1)
     pd.testing.assert_frame_equal(record.evaluations, whole.evaluations.iloc[:36])
     assert sorted(path.name for path in whole.path.iterdir()) == [
-        ".lock", "evaluations.parquet", "front.parquet", "generations.parquet", "journal.jsonl", "tuning.json",
+        "evaluations.parquet", "front.parquet", "generations.parquet", "journal.jsonl", "tuning.json",
         "tuning.toml",
     ]  # fmt: skip
 

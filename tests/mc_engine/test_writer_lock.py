@@ -6,10 +6,14 @@ import sys
 import time
 
 import pytest
+from apogee_tuning import apogee_campaign
 from small_run import ENVIRONMENT, block
 
+from mc_engine import load_campaign
 from mc_engine.errors import StoreError
+from mc_engine.rare_event import estimate_rare_event
 from mc_engine.store import open_store, refuse_occupied
+from mc_engine.tuning import tune
 from mc_engine.writer_lock import WriterLock, described, holder, writer_of_new
 
 
@@ -141,6 +145,17 @@ def test_a_journal_that_grew_under_a_writer_is_left_as_it_is(store):
     assert (store.path / "journal.jsonl").read_bytes().endswith(b"}\n?")
 
 
+def test_a_tuning_and_a_rare_event_have_one_writer(tmp_path):
+    searches = [
+        lambda: tune(apogee_campaign(), tmp_path, generations=1, workers=1),
+        lambda: estimate_rare_event(load_campaign("minimal"), out=tmp_path, cases_per_level=100, workers=1),
+    ]
+    with writer_of_new(tmp_path, lambda: None):
+        for search in searches:
+            with pytest.raises(StoreError, match="is writing here"):
+                search()
+
+
 def test_a_new_directory_has_one_writer_and_is_gone_if_nothing_was_put_there(tmp_path):
     def refuse():
         refuse_occupied(tmp_path / "new")
@@ -168,7 +183,9 @@ def test_a_lock_record_of_garbage_is_no_obstacle(store):
 RACE = """
 import os
 from small_run import ENVIRONMENT, block, created
+from mc_engine import load_campaign
 from mc_engine.errors import StoreError
+from mc_engine.rare_event import estimate_rare_event
 print("ready", flush=True)
 while not os.path.exists({go!r}):
     pass

@@ -203,7 +203,7 @@ def manifest(**changes: Any) -> dict[str, Any]:
                 "note": "",
             },
         ],
-        "status_texts": {"ok": "flown to its end"},
+        "status_texts": {"ok": "completed"},
         "provenance": {
             "python": "3.11.7",
             "platform": "Linux x86_64",

@@ -16,7 +16,6 @@ from reports import build, render_html, render_pdf
 from reports.document import Document, Section, Text
 from reports.html import plotly_script
 from reports.markdown import figure_files, render_markdown
-from reports.pictures import Pictures
 from reports.user_sections import run_facts, with_own_sections
 
 REFUSED = STEERING | HIDDEN | {LONE}
@@ -34,11 +33,6 @@ def document():
     return build(run, f"run{PAYLOAD}{LONE}")
 
 
-@pytest.fixture(scope="module")
-def pictures():
-    return Pictures()
-
-
 def test_the_page_has_no_such_character(document):
     text = render_html(document).decode()
     text = text.replace(plotly_script(), "")
@@ -49,18 +43,18 @@ def test_the_page_has_no_such_character(document):
     assert not any(f"\\u{ord(one):04x}" in record.replace("\\\\", "") for one in REFUSED)
 
 
-def test_the_pdf_is_typeset_and_has_no_such_character(document, pictures):
-    reader = pypdf.PdfReader(io.BytesIO(render_pdf(document, pictures)))
+def test_the_pdf_is_typeset_and_has_no_such_character(document):
+    reader = pypdf.PdfReader(io.BytesIO(render_pdf(document)))
     text = "".join(page.extract_text() for page in reader.pages)
     assert not (REFUSED - {"\u200b"}) & set(text)  # which the template itself puts where a name may break
     assert "evil" in text
 
 
-def test_markdown_and_its_pictures_have_no_such_character(document, pictures):
+def test_markdown_and_its_pictures_have_no_such_character(document):
     text = render_markdown(document).decode()
     assert not REFUSED & set(text)
     assert text.count("\\\\u202eevil") > 20  # a backslash of the escape is escaped once more
-    for file in figure_files(document, pictures):
+    for file in figure_files(document):
         assert not REFUSED & set(file.content.decode())
 
 

@@ -33,14 +33,64 @@ def tables(document):
 def test_the_headline_says_what_changed_and_the_table_by_how_much():
     found = compared(shift=8.0, seed=2)
     document = build_comparison(found)
-    assert document.subtitle.startswith("Something changed from run A to run B")
-    assert [(card.label, card.tone) for card in document.verdicts][:2] == [("Shift", "bad"), ("Spread", "good")]
+    assert document.subtitle.endswith("chance of any false alarm).")
+    assert [(card.label, card.tone) for card in document.verdicts][:2] == [("Requirements", ""), ("Shift", "bad")]
     (row,) = [row for row in tables(document)["Metrics of both runs"].rows if row[0].text.startswith("peak force")]
     assert row[4].tone == "bad"
     change = next(one for one in found.metrics if one.metric == "peak_force_n")
     assert row[3].value == pytest.approx(change.shift.value / change.deviation[0])
     (figure,) = blocks_of(document, FigureBlock)
     assert "peak force" in figure.drawing.alternative
+
+
+def two_runs(tmp_shift):
+    """Runs that fly the same cases; in B all are inside the limit on force, and a metric without spread has moved."""
+    runs = []
+    for limit, moved in ((20.0, 0.0), (1e3, tmp_shift)):
+        made = synthetic_run(1200, failed=0)
+        made.manifest["requirements"][1]["at_most"] = limit
+        made.table["entry_speed_m_s"] = 7800.0 + 1e-6 * made.table["ve_pct"] + 1e-3 * moved
+        made.table["settling_time_s"] += moved
+        made.campaign_text = "[campaign]"
+        runs.append(made)
+    return runs
+
+
+def test_requirements_come_first_and_in_words():
+    a, b = two_runs(1.0)
+    found = compare_runs(a, b, ("before", "after"))
+    document = build_comparison(found, (a, b))
+    assert document.sections[0].anchor == "requirements"
+    passed = [int((run.table["peak_force_n"] <= limit).sum()) for run, limit in ((a, 20.0), (b, 1e3))]
+    card = document.verdicts[0]
+    assert (card.label, card.answer, card.tone) == ("force", "fail → pass", "good")
+    assert card.detail == f"{passed[0]:,} → {passed[1]:,} of {len(a.table):,} cases inside".replace(",", "\u202f")
+    assert "force: fail → pass" in document.subtitle
+
+
+def test_a_shift_far_beyond_the_others_is_said_and_the_axis_shows_the_others():
+    a, b = two_runs(1.0)
+    document = build_comparison(compare_runs(a, b, ("before", "after")))
+    (figure,) = blocks_of(document, FigureBlock)
+    low, high = figure.drawing.panels[0].span
+    assert -10.0 < low < high < 10.0
+    assert "beyond the axis, not drawn: entry speed" in figure.caption
+    rows = tables(document)["Metrics of both runs"].rows
+    assert [row[0].text.split(" [")[0].split("\u202f")[0] for row in rows] == ["entry speed", "settling time"]
+
+
+def test_both_runs_are_laid_over_one_another_with_the_counts_of_the_table():
+    a, b = two_runs(1.0)
+    document = build_comparison(compare_runs(a, b, ("before", "after")), (a, b))
+    section = next(one for one in document.sections if one.anchor == "overlays")
+    distribution = section.blocks[0].drawing.panels[1]
+    assert distribution.x_label == "settling time [s]"
+    for mark, run in zip(distribution.marks, (a, b), strict=True):
+        values, edges = run.table["settling_time_s"], np.unique(mark.x)
+        assert mark.y[1:-1:2] == pytest.approx(np.histogram(values, edges)[0] / 1200)
+    assert {mark.run for panel in section.blocks[1].drawing.panels for mark in panel.marks} == {0, 1}
+    page = render_html(document).decode()
+    assert "run B: fraction of the cases" in page
 
 
 def test_the_same_run_twice_has_no_figure_and_says_so():

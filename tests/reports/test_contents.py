@@ -65,12 +65,12 @@ def test_the_cost_comes_with_its_limit_and_the_cases_it_rests_on(document):
 
 
 def test_every_metric_says_how_many_cases_it_used_of_how_many_tried(document):
-    for row in cells(tables(document)["Metrics: how many, where, how wide"]):
+    for row in cells(tables(document)["Statistics of the metrics"]):
         assert row[1] == "9\u202f988 / 10\u202f000"
 
 
 def test_failed_cases_are_listed_with_their_status_and_its_meaning(document):
-    ended = cells(tables(document)["How the cases ended"])
+    ended = cells(tables(document)["Completion of the cases"])
     assert ended[0][:2] == ["ok", "9\u202f988"]
     assert ended[1][:2] == ["not-finite", "12"]
     assert "infinite" in ended[1][3]
@@ -109,7 +109,7 @@ def test_a_metric_that_differs_by_rounding_is_one_short_number_that_is_the_same_
     assert (card.answer, card.detail) == (
         "1.5\u202fkg in all cases with a number", "nominal 1.5; the same in 195 of 200 cases.",
     )  # fmt: skip
-    row = next(row for row in cells(tables(document)["Metrics: how many, where, how wide"]) if "propellant" in row[0])
+    row = next(row for row in cells(tables(document)["Statistics of the metrics"]) if "propellant" in row[0])
     assert row[2:] == ["1.5", "1.5", "0", "1.5", "1.5", "constant"]
     assert "Cases with the largest propellant" not in tables(document)
 
@@ -125,7 +125,10 @@ def test_a_metric_that_differs_by_rounding_is_one_short_number_that_is_the_same_
             "T: not drawn; pulse_count is the same in all cases.",
         ),
         (MapFigure("settling_time_s", "ve_pct", "oe_pct", "T"), "no case has a number for settling_time_s, ve_pct and"),
-        (MapFigure("entry_speed_m_s", "ve_pct", "oe_pct", "T"), "nowhere is its surface over ve_pct and oe_pct sure"),
+        (
+            MapFigure("entry_speed_m_s", "ve_pct", "oe_pct", "T"),
+            "% of the variance of entry speed, and no two inputs more",
+        ),
         (ScatterFigure("isp_s", "ve_pct", "T"), "T: not drawn; the run does not disperse isp_s."),
         (CorridorFigure("ve", "oe_pct", ("propellant_kg",), "T"), "T: not drawn; the run has no column ve."),
         (HistoryFigure(("force_n", "force"), "T"), "Not drawn, the histories have no such quantity: force."),
@@ -185,9 +188,9 @@ def test_cases_of_a_grid_are_not_sold_as_probabilities():
     run.manifest["campaign"]["design"] = "grid"
     document = build(run, RUN)
     assert {card.answer for card in document.verdicts} == {"not demonstrable"}
-    assert "no probabilities" in " ".join(document.warnings)
+    assert "do not estimate probabilities" in " ".join(document.warnings)
     assert "in the cases flown" in document.costs[0].answer
-    assert not any("[" in cell.small for row in tables(document)["Quantiles of the metrics"].rows for cell in row)
+    assert not any("[" in cell.small for row in tables(document)["Percentiles of the metrics"].rows for cell in row)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2])
@@ -245,7 +248,7 @@ def test_sources_of_requirements_and_notes_of_inputs_are_kept():
 def test_infinite_metrics_are_not_used():
     run = synthetic_run(200, failed=0)
     run.table.loc[7, "propellant_kg"] = float("inf")
-    row = cells(tables(build(run, RUN))["Metrics: how many, where, how wide"])[1]
+    row = cells(tables(build(run, RUN))["Statistics of the metrics"])[1]
     assert row[1] == "199 / 200"
 
 

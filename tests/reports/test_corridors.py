@@ -9,7 +9,7 @@ from landing_run import landing_run
 from mc_engine.statistics import clopper_pearson
 from reports.contents import build
 from reports.document import FigureBlock, Table
-from reports.figures import CorridorDrawing, paper
+from reports.figures import CorridorDrawing, paper, screen
 
 
 def corridor(document):
@@ -76,7 +76,7 @@ def test_chosen_cases_have_shares_and_no_probabilities():
     run = landing_run(500)
     run.manifest["campaign"]["design"] = "grid"
     _, table = corridor(build(run, "run"))
-    assert [column.title for column in table.columns][2] == "Share"
+    assert [column.title for column in table.columns][2] == "Fraction"
     assert {row[3].text for row in table.rows} == {"–"}
 
 
@@ -89,8 +89,8 @@ def test_few_failed_and_equal_cases_are_drawn_or_said(cases):
         for section in document.sections:
             for block in section.blocks:
                 if isinstance(block, FigureBlock):
-                    json.dumps(block.drawing.interactive(), allow_nan=False)
-                    assert "<svg" in paper.svg(block.drawing.printed)
+                    json.dumps(screen.specifications(block.drawing), allow_nan=False)
+                    assert "<svg" in paper.svg(block.drawing)
 
 
 def test_without_a_requirement_there_is_no_corridor():

@@ -11,6 +11,7 @@ from reports.document import FigureBlock, blocks_of
 from reports.figures import MapDrawing, paper, screen
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
+from reports.figures.marks import Points
 
 
 @pytest.fixture(scope="module")
@@ -45,30 +46,31 @@ def test_thinning_a_history_keeps_its_shortest_pulse():
 
 def test_at_most_two_thousand_points_and_the_extremes_are_drawn(drawings):
     for drawing in drawings:
-        for panel in drawing.interactive():
-            for trace in panel["data"]:
-                if trace["type"] == "scatter" and trace["mode"] == "markers":
-                    assert len(trace["x"]) <= 2020
+        for plot in drawing.plots:
+            for mark in plot.marks:
+                if isinstance(mark, Points):
+                    assert mark.x.size <= 2020
 
 
 def test_the_interactive_figures_are_json_without_nan(drawings):
     for drawing in drawings:
-        json.dumps(drawing.interactive(), allow_nan=False)
+        json.dumps(screen.specifications(drawing), allow_nan=False)
 
 
 def test_the_printed_figures_are_the_same_bytes_twice_and_hold_no_date(drawings):
     for drawing in drawings:
-        first = paper.svg(drawing.printed)
-        assert first == paper.svg(drawing.printed)
+        first = paper.svg(drawing)
+        assert first == paper.svg(drawing)
         assert "<metadata>" not in first
         assert "<path" in first
+        assert "<text" in first
 
 
 def test_numbers_that_differ_by_little_stay_different_on_the_screen():
-    values = -2.0 + 1e-5 * np.array([[0.0, 0.5, np.nan], [1.0, 0.25, 0.75]])
+    values = -2.0 + 1e-5 * np.array([0.0, 0.5, np.nan, 1.0, 0.25, 0.75])
     shown = np.array(screen.rounded(values, 5), dtype=float)
     assert np.nanmax(np.abs(shown - values)) < 1e-9
-    assert np.isnan(shown[0, 2])
+    assert np.isnan(shown[2])
     assert screen.rounded([1.0, 1.0 + 2**-52], 5)[1] == 1.0 + 2**-52
     assert screen.rounded([-0.123456789, 2.0], 5) == [-0.12346, 2.0]
     assert screen.rounded([1 / 3, 1 / 3], 5) == [0.33333, 0.33333]
@@ -80,7 +82,7 @@ def test_dollar_signs_in_names_are_no_mathematics():
     labelled = [one for one in drawn if isinstance(one, MapDrawing) and "$x$" in one.x_label]
     assert labelled
     for one in labelled:
-        assert "<svg" in paper.svg(one.printed)
+        assert "<svg" in paper.svg(one)
 
 
 def _with_name(name):

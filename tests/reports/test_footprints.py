@@ -11,7 +11,7 @@ from landing_run import FOOTPRINT, landing_run
 from reports import render_html, render_pdf
 from reports.contents import build
 from reports.document import FigureBlock, Table, Text
-from reports.figures import FootprintDrawing
+from reports.figures import FootprintDrawing, screen
 from reports.map_files import cut_at_date_line
 
 KML = "{http://www.opengis.net/kml/2.2}"
@@ -48,7 +48,7 @@ def test_the_drawing_counts_the_cases_that_came_down(document):
 def test_a_footprint_across_the_date_line_is_one_cloud(document):
     drawing = blocks(document, FigureBlock)[0].drawing
     assert np.abs(drawing.points).max() < 250.0  # km
-    for panel in drawing.interactive():
+    for panel in screen.specifications(drawing):
         json.dumps(panel, allow_nan=False)
 
 
@@ -142,13 +142,13 @@ def test_chosen_cases_have_points_and_no_regions():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda table: table.assign(status="not-finite"), "none of 50 cases has a place on the ground."),
-        (lambda table: table.assign(latitude_deg=np.nan), "none of 50 cases has a place on the ground."),
-        (lambda table: table.assign(end_altitude_km=99.0), "on the ground; 49 ended above 30\u202fkm."),
-        (lambda table: table.assign(latitude_deg=1.0, longitude_deg=2.0), "that have a place end within one metre"),
-        (lambda table: table.head(1), "No regions: they need three places, and there are 1."),
-        (lambda table: table.head(2), "No regions: they need three places, and there are 2."),
-        (lambda table: table.assign(latitude_deg=0.0), "places lie on a line."),
+        (lambda table: table.assign(status="not-finite"), "none of 50 cases has an impact point."),
+        (lambda table: table.assign(latitude_deg=np.nan), "none of 50 cases has an impact point."),
+        (lambda table: table.assign(end_altitude_km=99.0), "an impact point; 49 ended above 30\u202fkm."),
+        (lambda table: table.assign(latitude_deg=1.0, longitude_deg=2.0), "impact points lie within one metre"),
+        (lambda table: table.head(1), "No regions: they need three impact points, and there are 1."),
+        (lambda table: table.head(2), "No regions: they need three impact points, and there are 2."),
+        (lambda table: table.assign(latitude_deg=0.0), "impact points lie on a line."),
         (lambda table: table.assign(latitude_deg=0.0, longitude_deg=7.2 * table["case_id"]), "too far apart"),
         (lambda table: table.drop(columns="latitude_deg"), "not drawn; the run has no column latitude_deg."),
     ],

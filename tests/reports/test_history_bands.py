@@ -7,7 +7,7 @@ from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document import FigureBlock, blocks_of
-from reports.figures import Histories, paper
+from reports.figures import Histories, paper, screen
 from reports.history_bands import fair_cases, history_bands
 
 TIMES = np.linspace(0.0, 10.0, 101)
@@ -84,11 +84,11 @@ def test_a_report_draws_bands_with_the_nominal_and_the_two_worst(drawing):
     texts = [entry.text for entry in histories_drawing.key]
     assert "5\u202f% to 95\u202f% of 60 cases" in texts
     assert "25\u202f% to 75\u202f% of 60 cases" in texts
-    filled = [trace for trace in histories_drawing.interactive()[0]["data"] if trace.get("fill") == "tonexty"]
+    filled = [trace for trace in screen.specifications(histories_drawing)[0]["data"] if trace.get("fill") == "toself"]
     assert len(filled) == 2
-    assert paper.svg(histories_drawing.printed) == paper.svg(histories_drawing.printed)
+    assert paper.svg(histories_drawing) == paper.svg(histories_drawing)
 
 
 def test_a_quantity_that_never_changes_is_named_instead_of_drawn(drawing):
     document, _ = drawing
-    assert "Not drawn, the same all through in every retained case: position_error_m." in repr(document)
+    assert "Not drawn, constant in every saved case: position_error_m." in repr(document)

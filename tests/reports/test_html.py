@@ -34,8 +34,8 @@ def figures(page):
     return json.loads(re.search(r'id="figures">(.*?)</script>', page, re.DOTALL)[1])
 
 
-def test_the_page_of_ten_thousand_cases_is_below_eight_megabytes(page):
-    assert len(page.encode()) < 8 * MEGABYTE
+def test_the_page_of_ten_thousand_cases_is_below_three_and_a_half_megabytes(page):
+    assert len(page.encode()) < 3.5 * MEGABYTE
 
 
 def test_nothing_is_loaded_from_anywhere(page):

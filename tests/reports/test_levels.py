@@ -8,7 +8,7 @@ from landing_run import landing_run
 
 from reports.contents import build
 from reports.document import FigureBlock, Table
-from reports.figures import LevelPanel, LevelsDrawing, paper
+from reports.figures import LevelPanel, LevelsDrawing, paper, screen
 
 LAWS = ("none", "one", "two")
 
@@ -47,8 +47,8 @@ def test_the_figure_holds_the_quantiles_of_each_level():
     panel = next(one for one in drawing.panels if one.label == "peak load [g]")
     expected = run.table[run.table["law"] == "two"]["peak_load_g"].quantile([0.05, 0.5, 0.95])
     assert panel.quantiles[2, [1, 3, 5]] == pytest.approx(expected.to_numpy(), rel=1e-12)
-    json.dumps(drawing.interactive(), allow_nan=False)
-    assert "<svg" in paper.svg(drawing.printed)
+    json.dumps(screen.specifications(drawing), allow_nan=False)
+    assert "<svg" in paper.svg(drawing)
 
 
 def test_chosen_cases_have_ranges_in_place_of_intervals():
@@ -75,8 +75,8 @@ def test_a_level_whose_cases_all_failed_is_said_and_drawn_empty():
     figure, tables = choices(build(run, "run"))
     row = tables["Peak load [g] by law"].rows[2]
     assert (row[1].text, row[2].text, row[5].small) == ("0 / 200", "–", "0 of 200 pairs")
-    json.dumps(figure.drawing.interactive(), allow_nan=False)
-    assert "<svg" in paper.svg(figure.drawing.printed)
+    json.dumps(screen.specifications(figure.drawing), allow_nan=False)
+    assert "<svg" in paper.svg(figure.drawing)
 
 
 def test_all_failed_is_a_sentence():

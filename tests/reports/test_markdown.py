@@ -10,7 +10,6 @@ from synthetic_run import synthetic_run
 from reports import build
 from reports.document import FigureBlock, Table, blocks_of
 from reports.markdown import code, escaped, figure_files, render_markdown
-from reports.pictures import Pictures
 
 
 def tokens(text):
@@ -50,7 +49,7 @@ def test_every_table_figure_and_section_is_there(document):
 
 def test_every_picture_is_a_file_with_its_alternative_text(document):
     text = render_markdown(document).decode()
-    files = {file.name: file.content for file in figure_files(document, Pictures())}
+    files = {file.name: file.content for file in figure_files(document)}
     shown = {token.attrs["src"]: token.content for token in tokens(text) if token.type == "image"}
     assert set(shown) == set(files)
     assert all(len(alternative) > 40 for alternative in shown.values())

@@ -1,10 +1,13 @@
 """The typeset report."""
 
+import ctypes
 import io
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 
+import numpy as np
 import pypdf
 import pypdfium2
 import pytest
@@ -12,6 +15,7 @@ from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_pdf
+from reports.document import Cell, Column, Section, Table
 
 MARKUP = [
     '#panic("x")',
@@ -95,7 +99,7 @@ def test_the_creation_date_is_that_of_the_run(pdf):
 def test_numbered_tables_figures_and_pages_are_there(pdf, tmp_path):
     text = text_of(pdf, tmp_path)
     assert "Table 1. Requirements and their verdicts" in text
-    assert "Figure 1. Share of each metric" in text
+    assert "Figure 1. First-order Sobol’ index" in text
     assert "Figure 3. Correction fuel" in text
     assert re.search(r"\b2 ?/ ?\d", text)
     assert re.search(r"Provenance\W+\d", text)
@@ -117,3 +121,45 @@ def test_hardly_any_cases_and_all_failed_are_still_typeset(n, failed):
 
 def test_a_date_that_cannot_be_read_is_left_out():
     assert render_pdf(build(synthetic_run(5, failed=0, created_utc="yesterday"), "run")).startswith(b"%PDF")
+
+
+def test_every_page_but_the_last_is_at_least_half_full(pdf):
+    pages = [page.render(scale=0.5, grayscale=True).to_numpy() for page in pypdfium2.PdfDocument(pdf)]
+    for grey in pages[1:-1]:
+        body = grey[: int(0.93 * len(grey))]  # without the foot
+        assert np.flatnonzero((body < 200).any(axis=1)).max() > 0.5 * len(grey)
+
+
+def test_no_type_is_smaller_than_seven_and_a_half_points(pdf):
+    sizes = {}
+    for page in pypdfium2.PdfDocument(pdf):
+        for item in page.get_objects(filter=[pypdfium2.raw.FPDF_PAGEOBJ_TEXT], max_depth=8):
+            height = ctypes.c_float()
+            assert pypdfium2.raw.FPDFTextObj_GetFontSize(item.raw, height)
+            _, _, c, d, _, _ = item.get_matrix().get()
+            sizes[round(height.value * (c * c + d * d) ** 0.5, 2)] = item
+    assert len(sizes) >= 3
+    assert min(sizes) >= 7.45
+
+
+def test_text_of_figures_is_found_and_set_in_the_typefaces_of_the_page(pdf, tmp_path):
+    text = text_of(pdf, tmp_path)
+    for label in ("peak force [N]", "time [s]", "required limit"):
+        assert label in text
+    fonts = [item["/FontName"].split("+")[1] for item in _dictionaries(pypdf.PdfReader(io.BytesIO(pdf)))
+             if item.get("/Type") == "/FontDescriptor"]  # fmt: skip
+    assert set(fonts) == {"DejaVuSans", "DejaVuSans-Bold", "DejaVuSansMono"}
+
+
+def test_a_table_leaves_no_row_alone_on_a_page():
+    blocks = []
+    for n in range(2, 60, 3):
+        rows = tuple((Cell(f"first of {n}" if k == 0 else f"last of {n}" if k == n - 1 else f"{k}"),) for k in range(n))
+        blocks.append(Table("rows", (Column("head"),), rows, number=n))
+    document = replace(build(synthetic_run(5, failed=0), "run"), sections=(Section("t", "Tables", tuple(blocks)),))
+    for page in pypdf.PdfReader(io.BytesIO(render_pdf(document))).pages[1:]:
+        lines = [line for line in page.extract_text().splitlines() if line.strip()]
+        for k, line in enumerate(lines):
+            before, after = (lines[k + step] if 0 <= k + step < len(lines) else "" for step in (-1, 1))
+            assert not (line.startswith("last of") and before == "head"), line
+            assert not (line.startswith("first of") and not re.match(r"\d|last", after)), line

@@ -9,6 +9,7 @@ from mc_engine.parts import Column
 from mc_engine.rare_event_folder import open_rare_event
 from mc_engine.result_folder import write_result
 from reports.document import FigureBlock, Table, blocks_of
+from reports.figures import screen
 from reports.figures.tails import Tail
 from reports.rare_events import build_rare_event
 
@@ -62,8 +63,8 @@ def test_the_headline_is_the_probability_against_what_is_allowed(tmp_path):
     assert document.subtitle == "The limit fuel_kg at most 2.5\u202fkg is not met with a probability of 2·10⁻⁵."
     (card,) = document.verdicts
     assert (card.answer, card.tone) == ("met", "good")
-    assert "1.5·10⁻⁵ to 2.7·10⁻⁵; 0.0027 is allowed. Source: tank." in card.detail
-    assert document.costs[1].detail.startswith("2 960 000 plain cases".replace(" ", "\u202f", 2))
+    assert "1.5·10⁻⁵ to 2.7·10⁻⁵; allowed: 0.0027. Source: tank." in card.detail
+    assert document.costs[1].detail.startswith("2 960 000 independent cases".replace(" ", "\u202f", 2))
 
 
 @pytest.mark.parametrize(
@@ -81,7 +82,7 @@ def test_levels_and_failed_inputs_are_listed_and_drawn(tmp_path):
     (figure,) = blocks_of(document, FigureBlock)
     assert isinstance(figure.drawing, Tail)
     np.testing.assert_array_equal(figure.drawing.probability, [0.1, 1e-2, 1e-3, 1e-4])
-    point = figure.drawing.interactive()[0]["data"][1]
+    point = screen.specifications(figure.drawing)[0]["data"][-1]
     assert point["y"][0] - point["error_y"]["arrayminus"][0] == pytest.approx(1.5e-5)
     assert "interval 1.5·10⁻⁵ to 2.7·10⁻⁵" in figure.drawing.alternative
 

@@ -30,7 +30,7 @@ def mc(cases=1000):
 
 def test_the_last_row_is_all_at_once_with_the_joint_share_asked_for():
     row = texts(requirement_table(flown(campaign=mc())))[-1]
-    assert row[:4] == ["all at once", "every limit", "99.46 % with 90 % confidence", "1 000 / 1 000"]
+    assert row[:4] == ["all at once", "all limits", "99.46 % with 90 % confidence", "1 000 / 1 000"]
     assert row[-1] == "pass"
 
 
@@ -56,7 +56,7 @@ def test_a_run_by_looks_says_its_schedule_and_which_bounds_these_are():
     assert "fixed in advance" in quantile_table(looked).note
     assert "fixed in advance" not in quantile_table(flown(campaign=mc())).note
     warned = " ".join(warnings(looked)).replace("\u202f", " ")
-    assert "looked at after 100, 500, 1 000, 2 000 cases; it went on to 1 000" in warned
+    assert "with interim analyses after 100, 500, 1 000, 2 000 cases; it ended after 1 000" in warned
     fuel = texts(risk_table(looked))[0]
     assert fuel[3:5] == ["below 10 %", "–"]
     assert texts(requirement_table(looked))[0][-1] == "not demonstrable needs 1 104 cases"
@@ -64,7 +64,7 @@ def test_a_run_by_looks_says_its_schedule_and_which_bounds_these_are():
 
 def test_a_run_extended_by_hand_says_so():
     warned = " ".join(warnings(flown(campaign=mc(500)))).replace("\u202f", " ")
-    assert "begun with 500 cases and extended to 1 000" in warned
+    assert "began with 500 cases and was extended to 1 000" in warned
     assert "extended" not in " ".join(warnings(flown(campaign=mc())))
 
 

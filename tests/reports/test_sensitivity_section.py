@@ -8,7 +8,7 @@ from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document import FigureBlock, Table, Text
-from reports.figures import IndexMap, SuccessDrawing, paper
+from reports.figures import IndexMap, SuccessDrawing, paper, screen
 
 
 def section(run):
@@ -38,7 +38,7 @@ def test_the_settling_time_is_shared_as_its_closed_form_says(drawn):
 
 
 def test_the_table_says_how_many_cases_each_index_rests_on(drawn):
-    rows = block(drawn, Table, "What the metrics depend on").rows
+    rows = block(drawn, Table, "Contributors to each metric").rows
     by_metric = {row[0].text: row[0].small for row in rows}
     assert by_metric["propellant"].startswith("3\u202f988 / 4\u202f000, R² 0.0")
     assert by_metric["settling time"] == "3\u202f988 / 4\u202f000, R² 1.00"
@@ -86,8 +86,8 @@ def drawable(found):
         if isinstance(one, FigureBlock):
             assert one.drawing.key
             assert len(one.drawing.alternative) > 40
-            json.dumps(one.drawing.interactive(), allow_nan=False)
-            assert "<svg" in paper.svg(one.drawing.printed)
+            json.dumps(screen.specifications(one.drawing), allow_nan=False)
+            assert "<svg" in paper.svg(one.drawing)
 
 
 def test_both_drawings_hold_what_the_table_says(drawn):
@@ -109,7 +109,7 @@ def test_few_failed_and_equal_cases_are_drawn_or_said(cases):
         drawable(found)
         if change == lost or cases < 20:
             assert "No indices for propellant" in said(found)
-            assert "Drivers were not looked for" in said(found)
+            assert "Not tested for contributors to failures" in said(found)
 
 
 def test_without_a_driver_the_report_says_how_many_tests_found_none():
@@ -128,5 +128,5 @@ def test_names_with_markup_stay_text():
     for column in run.manifest["columns"]:
         if column["name"] == "ve_pct":
             column["description"] = "<b>$x$</b>"
-    panel = block(section(run), FigureBlock, "Success probability").drawing.interactive()[0]
+    panel = screen.specifications(block(section(run), FigureBlock, "Success probability").drawing)[0]
     assert "<b>" not in json.dumps(panel)

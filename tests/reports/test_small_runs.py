@@ -6,7 +6,6 @@ from synthetic_run import synthetic_run
 
 from reports import build, render_html, render_pdf
 from reports.markdown import figure_files, render_markdown
-from reports.pictures import Pictures
 
 
 def constant(run):
@@ -35,11 +34,10 @@ SMALL = {
 def test_the_report_says_so_in_every_format(case):
     run, said = SMALL[case]
     document = build(run, "run")
-    pictures = Pictures()
     page = render_html(document).decode()
     text = render_markdown(document).decode()
     assert said in page
     assert said in text
     assert "nan" not in text.split()
-    assert render_pdf(document, pictures).startswith(b"%PDF")
-    assert len(list(figure_files(document, pictures))) == page.count('<figure class="drawing"')
+    assert render_pdf(document).startswith(b"%PDF")
+    assert len(list(figure_files(document))) == page.count('<figure class="drawing"')

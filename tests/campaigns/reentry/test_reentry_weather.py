@@ -9,12 +9,13 @@ from reentry_twin import standard_density
 from scipy.integrate import solve_ivp
 
 from campaigns.reentry.weather import (
-    ALTITUDES,
+    DEPTH,
     LARGE_SCALE,
     LENGTH,
     NODES,
     SMALL_SCALE,
     SPACING,
+    node_altitudes,
     normal_deviates,
     standard_profile,
     weather_at,
@@ -29,7 +30,14 @@ draws = st.floats(1e-9, 1.0 - 1e-9)
 def nodes():
     """float64[N, NODES, 3] of full size, without a mean wind."""
     one = np.ones(N)
-    return weather_nodes(np.random.default_rng(76).uniform(size=N), one, one, 0.0 * one).reshape(N, NODES, 3)
+    return weather_nodes(np.random.default_rng(76).uniform(size=N), one, one, 0.0 * one)[:, :DEPTH].reshape(N, NODES, 3)
+
+
+@pytest.fixture(scope="module")
+def depths():
+    """float64[N] of the same cases."""
+    one = np.ones(N)
+    return weather_nodes(np.random.default_rng(76).uniform(size=N), one, one, 0.0 * one)[:, DEPTH]
 
 
 def test_deviates_are_standard_normal_and_independent():
@@ -46,9 +54,23 @@ def test_neighbouring_numbers_name_unrelated_airs():
 
 
 @pytest.mark.parametrize(("field", "column"), [(0, 1), (1, 2), (2, 2)])
-def test_each_altitude_has_the_size_of_its_profile(nodes, field, column):
-    assert nodes[:, :, field].std(axis=0) == pytest.approx(standard_profile(column), rel=0.05)
-    assert np.abs(nodes[:, :, field].mean(axis=0)).max() < 5.0 * standard_profile(column).max() / np.sqrt(N)
+def test_each_altitude_has_the_size_of_its_profile(nodes, depths, field, column):
+    sizes = standard_profile(column, node_altitudes(depths))
+    assert (nodes[:, :, field] / sizes).std(axis=0) == pytest.approx(np.ones(NODES), rel=0.05)
+    assert np.abs((nodes[:, :, field] / sizes).mean(axis=0)).max() < 5.0 / np.sqrt(N)
+
+
+def test_no_altitude_is_favoured_by_the_nodes(depths):
+    """Extremes of the air lie at nodes; they are spread evenly over altitude from case to case."""
+    one = np.ones(600)
+    table = weather_nodes(np.random.default_rng(5).uniform(size=600), one, one, one)
+    above = np.arange(40e3, 48e3, 50.0)
+    profiles = np.array([[weather_at(h, 0.0, row).density for h in above] for row in table])
+    peak = profiles.argmax(axis=1)
+    highest = above[peak[(peak > 0) & (peak < above.size - 1)]]
+    counted = np.histogram((highest / SPACING) % 1.0, 4, (0.0, 1.0))[0]
+    assert counted.max() < 2.0 * counted.min()
+    assert np.histogram(depths, 10, (0.0, 1.0))[0] == pytest.approx(N / 10, rel=0.15)
 
 
 def test_the_correlation_over_altitude_is_the_mean_of_the_two_scales(nodes):
@@ -66,9 +88,11 @@ def test_density_and_winds_are_independent(nodes):
 
 def test_zero_names_the_mean_air():
     one = np.ones(2)
-    found = weather_nodes(np.array([0.0, 0.5]), one, one, one).reshape(2, NODES, 3)
+    table = weather_nodes(np.array([0.0, 0.5]), one, one, one)
+    found = table[:, :DEPTH].reshape(2, NODES, 3)
+    assert table[0, DEPTH] == 0.0
     assert np.abs(found[0, :, [0, 2]]).max() == 0.0
-    assert found[0, :, 1].tolist() == standard_profile(3).tolist()
+    assert found[0, :, 1].tolist() == standard_profile(3, node_altitudes(np.zeros(1))[0]).tolist()
     assert np.abs(found[1, :, 0]).max() > 0.0
 
 
@@ -76,11 +100,12 @@ def test_zero_names_the_mean_air():
 def test_values_meet_the_nodes_and_slopes_are_derivatives(draw, h):
     one = np.ones(1)
     table = weather_nodes(np.array([draw]), one, one, one)[0]
-    k = int(np.clip(h / SPACING, 0, NODES - 2))
-    at_node = weather_at(float(ALTITUDES[k]), 0.0, table)
-    assert (at_node.density, at_node.east, at_node.north) == pytest.approx(table[3 * k : 3 * k + 3], abs=1e-12)
+    altitudes = node_altitudes(table[DEPTH:])[0]
+    k = int(np.clip(h / SPACING + table[DEPTH], 0, NODES - 2))
+    at_node = weather_at(float(altitudes[k]), 0.0, table)
+    assert (at_node.density, at_node.east, at_node.north) == pytest.approx(table[3 * k : 3 * k + 3], abs=1e-9)
     low, here, high = (weather_at(h + step, 0.0, table) for step in (-0.5, 0.0, 0.5))
-    if 1.0 < h < ALTITUDES[-1] - 1.0:
+    if altitudes[0] + 1.0 < h < altitudes[-1] - 1.0:
         assert here.density_slope == pytest.approx(high.density - low.density, abs=1e-7)
         assert here.east_slope == pytest.approx(high.east - low.east, abs=1e-4)
         assert here.north_slope == pytest.approx(high.north - low.north, abs=1e-4)

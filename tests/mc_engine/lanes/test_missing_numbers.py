@@ -1,4 +1,4 @@
-"""What is not a number is handed on: by every function of the lanes and of the physics, by tables, extrema and events."""
+"""What is not a number is handed on: by the functions of lanes and physics, by tables, extrema and events."""
 
 import math
 

@@ -68,17 +68,27 @@ def test_the_same_numbers_are_no_change_and_rounding_is_none():
     assert metric_change("y", a, a + 1e-3, paired=True).shift_p < 1e-6
 
 
-def test_intervals_hold_the_true_shift_and_ratio_as_often_as_they_say():
-    for paired in (False, True):
-        held = []
-        for seed in range(200):
-            a = np.exp(normal("a", seed, 300))
-            b = 2.0 * (a if paired else np.exp(normal("b", seed, 300))) + normal("c", seed, 300) + 1.0
-            found = metric_change("y", a, b, paired=paired)
-            mean = 1.0 + np.exp(0.5)
-            held.append(found.shift.lower <= mean <= found.shift.upper)
-        # of lognormal clouds the normal limit holds a little less often than it says
-        assert np.mean(held) >= 0.95 - 0.04
+@pytest.mark.parametrize("paired", [False, True])
+def test_intervals_hold_the_true_shift_as_often_as_they_say(paired):
+    held = []
+    for seed in range(200):
+        a = np.exp(normal("a", seed, 300))
+        b = a + 0.5 * normal("c", seed, 300) + 1.0 if paired else np.exp(normal("b", seed, 300)) + 1.0
+        found = metric_change("y", a, b, paired=paired)
+        held.append(found.shift.lower <= 1.0 <= found.shift.upper)
+    assert 0.92 <= np.mean(held) <= 0.98
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_an_interval_spans_no_change_exactly_where_the_test_of_the_same_quantity_finds_none(paired):
+    """Long tails: a few huge numbers hide a clear shift from the means, not from the ranks that the test is of."""
+    for seed in range(40):
+        a, noise = normal("a", seed, 400), normal("b", seed, 400)
+        tails = np.where(np.arange(400) % 40 == 0, 1e4 * normal("c", seed, 400), 0.0)
+        b = (a if paired else noise) + tails + (seed % 4) * 0.06 + 0.3 * normal("d", seed, 400)
+        found = metric_change("y", a, b, paired=paired)
+        for estimate, p_value, none in ((found.shift, found.shift_p, 0.0), (found.ratio, found.spread_p, 1.0)):
+            assert (estimate.lower <= none <= estimate.upper) == (p_value >= 0.05), (seed, estimate, p_value)
 
 
 def test_pairs_without_a_number_in_one_run_are_left_out_and_counted():
@@ -86,7 +96,7 @@ def test_pairs_without_a_number_in_one_run_are_left_out_and_counted():
     holes = np.where(np.arange(50) < 4, np.nan, b)
     found = metric_change("y", a, holes, paired=True)
     assert (found.n_used, found.n_tried) == ((46, 46), (50, 50))
-    assert found.shift.value == pytest.approx((b - a)[4:].mean())
+    assert found.shift.value == pytest.approx(np.median((b - a)[4:]), abs=0.2)
     assert metric_change("y", a, holes, paired=False).n_used == (50, 46)
 
 

@@ -1,0 +1,47 @@
+"""How the cases of a pick-freeze design lie in blocks (`statistics.pick_freeze`); loads nothing but NumPy."""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+RANDOM_DRAWS = "random draws"  # the group of the noise made in flight and of the parameters that name a draw
+A, B, C = 0, 1, 2  # the independent points of a block
+
+
+@dataclass(frozen=True)
+class BlockLayout:
+    """The rows of a block: A; A_B(g) for each group; B; and A_C(g) for the groups in `repeated`.
+
+    C is a third point.  A, A_B(g) and A_C(g) are three pairs in place of one for the total index of a repeated group:
+    worth it for the random draws, which a whole metric may depend on, so that nothing else steadies its indices.
+    """
+
+    groups: tuple[str, ...]
+    repeated: tuple[str, ...] = ()
+
+    @property
+    def size(self) -> int:
+        """Rows of a block."""
+        return len(self.groups) + 2 + len(self.repeated)
+
+    def points(self, group: str) -> np.ndarray:
+        """int64[size]: the point, A, B or C, that each row takes the group from."""
+        found = np.full(self.size, A)
+        found[[self.groups.index(group) + 1, len(self.groups) + 1]] = B
+        if group in self.repeated:
+            found[self._repetition(group)] = C
+        return found
+
+    def _repetition(self, group: str) -> int:
+        return len(self.groups) + 2 + self.repeated.index(group)
+
+    def in_common(self, group: str) -> list[tuple[int, int]]:
+        """Pairs of rows that have the group alone in common."""
+        return [(len(self.groups) + 1, self.groups.index(group) + 1)]
+
+    def differing(self, group: str) -> list[tuple[int, int]]:
+        """Pairs of rows that differ in the group alone."""
+        rows = [0, self.groups.index(group) + 1]
+        rows += [self._repetition(group)] if group in self.repeated else []
+        return list(combinations(rows, 2))

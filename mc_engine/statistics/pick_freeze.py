@@ -1,0 +1,101 @@
+"""First-order and total Sobol' indices of groups of inputs, from cases that were flown in pairs for this purpose.
+
+The cases of a block share a point A, with its random draws, and an independent point B.  A_B(g) is A with group g taken
+from B.  What A_B(g) and B have in common is group g alone, so that their correlation is the first-order index of g;
+A_B(g) and A differ in group g alone, and 1 less their correlation is its total index.  The draws made in flight are a
+group like any other.  Inputs that are correlated with one another have to be in one group.
+
+Janon, Klein, Lagnoux, Nodet & Prieur, ESAIM: Probab. Stat. 18 (2014), 342-364, eq. (6) (first order, pooled mean and
+variance) and section 2.3 (its asymptotic variance, by the delta method); Jansen, Comput. Phys. Commun. 117 (1999),
+35-43 (total: half the mean square of the difference, over the variance).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mc_engine.block_layout import BlockLayout
+
+FEWEST_BLOCKS = 20
+
+
+def layout_of(record: Mapping[str, Any]) -> BlockLayout:
+    """The layout that the manifest of the flights, under "sensitivity", tells of."""
+    return BlockLayout(tuple(group["name"] for group in record["groups"]), tuple(record["repeated"]))
+
+
+@dataclass(frozen=True)
+class PickFreeze:
+    """Indices float64[n_groups, n_metrics] with their standard errors; NaN for a metric that does not vary.
+
+    n_used : int64[n_metrics], blocks in which every case has a number, of n_tried.
+    """
+
+    groups: tuple[str, ...]
+    metrics: tuple[str, ...]
+    first: np.ndarray
+    first_error: np.ndarray
+    total: np.ndarray
+    total_error: np.ndarray
+    n_used: np.ndarray
+    n_tried: int
+
+
+def pick_freeze(layout: BlockLayout, case_ids: np.ndarray, metrics: Mapping[str, np.ndarray]) -> PickFreeze:
+    """Indices of every group and metric.
+
+    case_ids : int64[n]; case `block * layout.size + row` is that row of that block.
+    metrics : float64[n], NaN where a case has no number: its block is then left out as a whole.
+    """
+    rows = whole_blocks(np.asarray(case_ids, dtype=np.int64), layout.size)
+    shape = (len(layout.groups), len(metrics))
+    first, first_error, total, total_error = (np.full(shape, np.nan) for _ in range(4))
+    n_used = np.zeros(len(metrics), dtype=np.int64)
+    for k, values in enumerate(metrics.values()):
+        y = np.asarray(values, dtype=np.float64)[rows]
+        y = y[np.isfinite(y).all(axis=1)]
+        n_used[k] = len(y)
+        scaled = _scaled(y)
+        if len(y) < FEWEST_BLOCKS or scaled is None:
+            continue
+        for g, group in enumerate(layout.groups):
+            first[g, k], first_error[g, k] = _correlation(scaled, layout.in_common(group))
+            left, total_error[g, k] = _correlation(scaled, layout.differing(group))
+            total[g, k] = 1.0 - left
+    return PickFreeze(layout.groups, tuple(metrics), first, first_error, total, total_error, n_used, len(rows))
+
+
+def whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
+    """int64[n_blocks, size]: places of the cases of each block that is there as a whole."""
+    order = np.argsort(case_ids, kind="stable")
+    block = case_ids[order] // size
+    whole = np.bincount(block, minlength=1)[block] == size if block.size else np.zeros(0, dtype=bool)
+    return order[whole].reshape(-1, size)
+
+
+def _scaled(y: np.ndarray) -> np.ndarray | None:
+    """About zero and of order one, so that squares neither overflow nor lose digits; None without a spread."""
+    if not y.size:
+        return None
+    largest = float(np.abs(y).max())
+    if largest == 0.0:
+        return None
+    y = y / largest
+    y = y - y.mean()
+    spread = float(y.std())
+    return None if spread < 1e-13 else y / spread
+
+
+def _correlation(y: np.ndarray, pairs: Sequence[tuple[int, int]]) -> tuple[float, float]:
+    """Correlation of pairs of rows with pooled mean and variance, and its standard error over the blocks."""
+    a, b = y[:, [pair[0] for pair in pairs]], y[:, [pair[1] for pair in pairs]]
+    product, square, middle = (a * b).mean(axis=1), (0.5 * (a * a + b * b)).mean(axis=1), (0.5 * (a + b)).mean(axis=1)
+    mean = middle.mean()
+    variance = square.mean() - mean * mean
+    if variance <= 0.0:
+        return np.nan, np.nan
+    value = (product.mean() - mean * mean) / variance
+    influence = product - 2.0 * mean * middle - value * (square - 2.0 * mean * middle)
+    return float(value), float(influence.std() / (variance * np.sqrt(len(y))))

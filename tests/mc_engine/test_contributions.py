@@ -1,0 +1,128 @@
+"""The flights beside a run: indices against closed forms, resumed to the same bytes, and never among the cases."""
+
+import shutil
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mc_engine import load_campaign, open_store, runner
+from mc_engine.errors import CampaignError, RunInterrupted
+from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
+
+MODEL = Path(__file__).parent / "contributions" / "model.py"
+HEAD = '[campaign]\nmodel = "model.py"\ncases = 100\ndesign = "mc"\nseed = 3\n'
+INPUTS = "".join(
+    f'[dispersion.{name}]\ndist = "uniform"\nlower = 0.0\nupper = 1.0\n' for name in ("x1", "x2", "x3", "x4", "ticket")
+)
+
+
+def campaign(folder, more="", head=HEAD):
+    shutil.copy(MODEL, folder)
+    (folder / "campaign.toml").write_text(head + INPUTS + more)
+    return load_campaign(folder / "campaign.toml")
+
+
+def indices(run):
+    store = open_store(run / "sensitivity")
+    layout = layout_of(store.manifest["sensitivity"])
+    cases = store.cases()
+    metrics = {column.name: cases[column.name].to_numpy() for column in store.columns if column.role == "metric"}
+    found = pick_freeze(layout, cases["case_id"].to_numpy(), metrics)
+    return {
+        metric: {group: (found.first[g, k], found.total[g, k]) for g, group in enumerate(found.groups)}
+        for k, metric in enumerate(found.metrics)
+    }
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("contributions")
+    runner.run(campaign(folder, "[sensitivity]\ncases = 8192\n"), folder / "run")
+    return folder / "run"
+
+
+def test_indices_of_ishigami_and_of_sobols_g_lie_within_a_hundredth(flown):
+    found = indices(flown)
+    # Ishigami & Homma (1990), a = 7, b = 0.1: Saltelli et al., Global Sensitivity Analysis: The Primer, p. 196
+    for name, first, total in (("x1", 0.3139, 0.5576), ("x2", 0.4424, 0.4424), ("x3", 0.0, 0.2437), ("x4", 0.0, 0.0)):
+        assert found["ishigami"][name] == pytest.approx((first, total), abs=0.01), name
+    # Sobol', Math. Comput. Simul. 55 (2001), 271-280: V_i = 1/(3 (1 + a_i)^2), a = 0, 1, 4.5, 9
+    partial = 1.0 / (3.0 * (1.0 + np.array([0.0, 1.0, 4.5, 9.0])) ** 2)
+    whole = np.prod(1.0 + partial)
+    for name, own in zip(("x1", "x2", "x3", "x4"), partial, strict=True):
+        exact = own / (whole - 1.0), own * whole / (1.0 + own) / (whole - 1.0)
+        assert found["sobol_g"][name] == pytest.approx(exact, abs=0.01), name
+
+
+def test_noise_in_flight_and_parameters_that_name_a_draw_are_one_group_of_their_own(flown):
+    found = indices(flown)
+    assert list(found["noise"]) == ["x1", "x2", "x3", "x4", "random draws"]
+    for metric in ("noise", "raffle"):
+        assert found[metric]["random draws"][1] == pytest.approx(1.0, abs=0.02)
+        assert [found[metric][name][1] for name in ("x1", "x2", "x3", "x4")] == pytest.approx([0.0] * 4, abs=0.02)
+    # variances 1/12, 1/12, 4/12 and 1
+    exact = {"x1": 1.0 / 18.0, "x2": 1.0 / 18.0, "x3": 4.0 / 18.0, "x4": 0.0, "random draws": 12.0 / 18.0}
+    assert {name: total for name, (_, total) in found["line"].items()} == pytest.approx(exact, abs=0.02)
+
+
+def test_inputs_that_are_correlated_have_one_contribution(tmp_path):
+    pair = '[[correlation]]\nbetween = ["x1", "x2"]\nrank = 0.5\n[sensitivity]\ncases = 4096\n'
+    runner.run(campaign(tmp_path, pair), tmp_path / "run")
+    found = indices(tmp_path / "run")["line"]
+    own = (2.0 + 2.0 * 0.5) / 12.0  # of x1 + x2: a rank correlation of uniform numbers is their correlation
+    assert list(found) == ["x1, x2", "x3", "x4", "random draws"]
+    assert found["x1, x2"] == pytest.approx((own / (own + 4.0 / 12.0 + 1.0),) * 2, abs=0.03)
+
+
+def test_the_cases_are_the_same_with_and_without_them(flown, tmp_path):
+    runner.run(campaign(tmp_path), tmp_path / "run")
+    assert not (tmp_path / "run" / "sensitivity").exists()
+    assert open_store(tmp_path / "run").cases().equals(open_store(flown).cases())
+
+
+def test_flights_broken_off_are_resumed_to_the_same_bytes(tmp_path):
+    asked = campaign(tmp_path, "[sensitivity]\ncases = 512\n[sensitivity.group]\nodd = ['x1', 'x3']\n")
+    runner.run(asked, tmp_path / "whole", chunk=64)
+
+    sent = []
+
+    def stop(done, total, failed):
+        if done > 1000 and not sent:
+            sent.append(done)
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(RunInterrupted, match="resume"):
+        runner.run(asked, tmp_path / "run", progress=stop)
+    assert open_store(tmp_path / "run" / "sensitivity").missing()
+    runner.resume(tmp_path / "run")
+    ours, theirs = (open_store(tmp_path / name / "sensitivity").cases() for name in ("run", "whole"))
+    assert len(ours) == 512 * (4 + 3)  # groups: odd, x2, x4 and the random draws, which have a row more
+    assert ours.equals(theirs)
+    assert runner.replay(tmp_path / "run" / "sensitivity", 1001).equal
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ("[sensitivity]\ncases = 1\n", "sensitivity.cases: 1 is not allowed"),
+        ("[sensitivity]\ncases = 64\n[sensitivity.group]\na = ['x9']\n", '"x9" is not dispersed; known are "x1"'),
+        ("[sensitivity]\ncases = 64\n[sensitivity.group]\na = ['ticket']\n", "names a random draw"),
+        ("[sensitivity]\ncases = 64\n[sensitivity.group]\na = ['x1']\nb = ['x1']\n", 'is in the group "a" already'),
+        ("[sensitivity]\ncases = 10000000\n", None),
+    ],
+)
+def test_what_cannot_be_computed_is_told_with_its_place(tmp_path, more, sentence):
+    if sentence is None:
+        assert campaign(tmp_path, more).sensitivity.flights == 80_000_000
+        return
+    with pytest.raises(CampaignError, match="sensitivity") as error:
+        campaign(tmp_path, more)
+    assert sentence in str(error.value)
+
+
+def test_a_design_that_draws_nothing_has_no_contributions(tmp_path):
+    head = HEAD.replace('"mc"', '"saltelli"').replace("100", "7")
+    with pytest.raises(CampaignError, match="draws nothing from distributions"):
+        campaign(tmp_path, "[sensitivity]\ncases = 64\n", head)
