@@ -48,13 +48,14 @@ class Contributions:
     """By metric, the strongest contributor first; the unexplained share last.
 
     flights : of the companion, 0 where all comes from the table of cases.  n_used, n_tried : by metric, the blocks or
-    cases that the indices rest on.
+    cases that the indices rest on.  members : the inputs in each group of the flights; empty without them.
     """
 
     by_metric: dict[str, tuple[Contributor, ...]]
     flights: int
     n_used: dict[str, int]
     n_tried: int
+    members: dict[str, list[str]]
 
     def rows(self) -> Iterator[Contributor]:
         """All contributors, metric by metric."""
@@ -79,13 +80,6 @@ def companion_of(flown: Flown) -> Store | None:
     return None if store.missing() else store
 
 
-def members_of(flown: Flown) -> dict[str, list[str]]:
-    """The inputs in each group of the flights beside the run; of a table each input alone."""
-    store = companion_of(flown)
-    groups = store.manifest["sensitivity"]["groups"] if store is not None else ()
-    return {group["name"]: list(group["members"]) for group in groups}
-
-
 def _of_companion(store: Store, metrics: list[str]) -> Contributions:
     record = store.manifest["sensitivity"]
     layout = layout_of(record)
@@ -108,7 +102,8 @@ def _of_companion(store: Store, metrics: list[str]) -> Contributions:
         ]
         by_metric[metric] = tuple(sorted(rows, key=lambda one: -one.size))
     used = {metric: int(n) for metric, n in zip(metrics, found.n_used, strict=True)}
-    return Contributions(by_metric, len(cases), used, found.n_tried)
+    members = {group["name"]: list(group["members"]) for group in record["groups"]}
+    return Contributions(by_metric, len(cases), used, found.n_tried, members)
 
 
 def _of_table(flown: Flown, metrics: list[str]) -> Contributions | None:
@@ -121,7 +116,7 @@ def _of_table(flown: Flown, metrics: list[str]) -> Contributions | None:
     )
     by_metric = {metric: tuple(_table_rows(found, k)) for k, metric in enumerate(metrics)}
     used = {metric: int(n) for metric, n in zip(metrics, found.n_used, strict=True)}
-    return Contributions(by_metric, 0, used, found.n_tried)
+    return Contributions(by_metric, 0, used, found.n_tried, {})
 
 
 def _table_rows(found: Sensitivity, k: int) -> Iterator[Contributor]:

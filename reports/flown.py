@@ -210,13 +210,11 @@ class Flown:
 
     def _flown_contributors(self, metric: str) -> list[Contributor]:
         """The same from the flights beside the run, by total effect; empty without them."""
-        from reports.contributions import members_of  # which reads what is flown
-
-        found, members = self.contributions, members_of(self)
+        found = self.contributions
         if found is None or not found.flights:
             return []
-        rows = found.by_metric.get(metric, ())
-        return [Contributor(name, one.size) for one in rows for name in members[one.input] if name in self.inputs]
+        rows, inputs = found.by_metric.get(metric, ()), self.inputs
+        return [Contributor(name, one.size) for one in rows for name in found.members[one.input] if name in inputs]
 
     @cached_property
     def contributions(self) -> "Contributions | None":
