@@ -16,7 +16,7 @@ from stones import assert_as_unbroken, results, stones
 from mc_engine import open_store, runner
 
 CASES, CHUNK = 400, 40
-LONG = 4000  # cases: no racer is done before the other has begun
+LONG = 4000
 WITHOUT_LOCKS = """
 import errno, fcntl
 
@@ -28,9 +28,10 @@ fcntl.flock = fcntl.lockf = refuse
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the racers are forked, which Windows cannot")
 
-# Each racer is a fork that waits for its moment; it says what became of it, and how long that took.
+# Each racer is a fork that waits for its moment; it says what became of it, and how long that took.  Who writes does
+# not finish before the others have come, however fast it flies: at its first chunk it waits for what becomes of them.
 SERVER = """
-import json, os, sys, time
+import json, mmap, os, sys, time
 from pathlib import Path
 import broken_builds
 from mc_engine import load_campaign, runner
@@ -44,8 +45,14 @@ fly_nominal(campaign)
 print(json.dumps("ready"), flush=True)
 for line in sys.stdin:
     verb, run, moments = json.loads(line)
-    start, racers = time.monotonic() + 0.05, []
-    for moment in moments:
+    start, racers, ended = time.monotonic() + 0.05, [], mmap.mmap(-1, len(moments))
+
+    def wait_for_the_others(*_):
+        late = time.monotonic() + 10.0
+        while sum(ended[:]) < len(moments) - 1 and time.monotonic() < late:
+            time.sleep(0.005)
+
+    for number, moment in enumerate(moments):
         reading, writing = os.pipe()
         if os.fork() == 0:
             while time.monotonic() < start + moment:
@@ -53,13 +60,15 @@ for line in sys.stdin:
             begin, said = time.monotonic(), ""
             try:
                 if verb == "run":
-                    runner.run(campaign, Path(run), workers=2, chunk=chunk)
+                    runner.run(campaign, Path(run), workers=2, chunk=chunk, progress=wait_for_the_others)
                 else:
-                    runner.resume(run, workers=2, chunk=chunk, repair=verb == "repair")
+                    repair = verb == "repair"
+                    runner.resume(run, workers=2, chunk=chunk, progress=wait_for_the_others, repair=repair)
             except EngineError as error:
                 said = str(error)
             except BaseException as error:
                 said = repr(error)
+            ended[number] = 1
             os.write(writing, json.dumps([said, time.monotonic() - begin]).encode())
             os._exit(0)
         os.close(writing)
