@@ -11,7 +11,7 @@ import sysconfig
 from pathlib import Path
 
 from mc_engine import lanes
-from mc_engine.lanes import noise
+from mc_engine.lanes import philox
 from mc_engine.physics_scope import shortened
 
 _ENGINE = Path(__file__).resolve().parent
@@ -98,7 +98,7 @@ def _meaning(text: str, source: str) -> str:
         return _wrong_operands(sign, _types(asked[2]))
     if "NRT required" in text:
         return _MADE
-    if asked and (known := getattr(lanes, asked[1], getattr(noise, asked[1], None))):
+    if asked and (known := getattr(lanes, asked[1], getattr(philox, asked[1], None))):
         wanted = ", ".join(inspect.signature(known).parameters)
         return f"`{asked[1]}` takes ({wanted}), by their places; here it is given {_listed(_types(asked[2]))}"
     if match := re.search(r"function Function\(<(?:built-in function|ufunc|class) '?(\w+)'?>\)", cause):

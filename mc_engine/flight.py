@@ -14,7 +14,7 @@ from mc_engine.errors import ModelError
 from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.kernel_parts import settings_class
 from mc_engine.lanes.functions import TABLES
-from mc_engine.lanes.noise import noise_key
+from mc_engine.lanes.philox import noise_key
 from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model import AdaptiveStep, FixedStep, Model, Refusals
 from mc_engine.physics_source import place_of

@@ -16,8 +16,8 @@ import numpy as np
 from mc_engine.errors import ModelError
 from mc_engine.kernel_parts import NoMemory
 from mc_engine.lanes.functions import TABLES
-from mc_engine.lanes.noise import Draws, noise_key
 from mc_engine.lanes.number import calling
+from mc_engine.lanes.philox import Draws, noise_key
 from mc_engine.lost_numbers import sentence
 from mc_engine.model import Model
 from mc_engine.model_faults import MORE

@@ -1,13 +1,21 @@
-"""How many cases a campaign needs to demonstrate a share of success with a given confidence.
+"""How many cases demonstrate a required probability: tables for one, and for the requirements of a campaign."""
 
-k of N: with at most k failures among N cases the share is shown (Clopper & Pearson, Biometrika 26 (1934), 404-413).
-The same numbers are those of distribution-free tolerance limits (Wilks, Ann. Math. Statist. 12 (1941), 91-96):
-the (k + 1)-th largest of N values is an upper limit to the share, and the interval between two order statistics
-that leaves r values out at each end, those two among them, takes as many cases as 2 r - 1 failures.
-"""
-
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import NamedTuple
+
+from mc_engine.campaign import Campaign
+from mc_engine.campaign_parts import Requirement
+from mc_engine.statistics.binomial import (
+    acceptance_number,
+    half_rate_share,
+    lower_bound,
+    pass_chance,
+    smallest_interval_sample,
+    smallest_sample,
+)
+from mc_engine.statistics.requirements import JOINT, SAMPLING_DESIGNS, joint_share
+from mc_engine.statistics.time_uniform import smallest_sample as smallest_at_any_time
 
 ROWS = 6  # failures 0 to 5
 
@@ -24,87 +32,11 @@ class PlanRow(NamedTuple):
     half_rate: float
 
 
-def demonstrated_share(cases: int, failures: int, confidence: float) -> float:
-    """Lower confidence bound of the share of success after `failures` in `cases`; 0 if all failed.
-
-    Clopper & Pearson, Biometrika 26 (1934), 404-413.
-    """
-    from scipy.special import betaincinv
-
-    if failures >= cases:
-        return 0.0
-    return float(betaincinv(cases - failures, failures + 1, 1.0 - confidence))
-
-
-def smallest_sample(share: float, confidence: float, failures: int = 0) -> int:
-    """Smallest number of cases in which `failures` failures still demonstrate `share` with `confidence`.
-
-    share, confidence : in (0, 1), else ValueError.  failures : not negative.
-    """
-    for name, value in (("share", share), ("confidence", confidence)):
-        if not 0.0 < value < 1.0:
-            raise ValueError(f"{name} is {value}; it must lie between 0 and 1")
-    if failures < 0:
-        raise ValueError(f"failures is {failures}; it must not be negative")
-    return fewest_cases(lambda cases: _demonstrates(cases, share, confidence, failures), failures)
-
-
-def smallest_interval_sample(share: float, confidence: float, left_out: int = 1) -> int:
-    """Smallest number of cases whose `left_out`-th smallest and largest values enclose `share` of all cases.
-
-    left_out : from 1, the rank of the two limits, counted from either end.  With 1, smallest and largest value.
-    Wilks, Ann. Math. Statist. 12 (1941), 91-96: 93 for 95 % with 95 % confidence.
-    """
-    if left_out < 1:
-        raise ValueError(f"left_out is {left_out}; the first rank is 1")
-    return smallest_sample(share, confidence, 2 * left_out - 1)
-
-
-def acceptance_number(tried: int, share: float, confidence: float) -> int | None:
-    """The most failures among `tried` cases that still show `share`; None if even none at all would not do."""
-    return most_failures(lambda failures: _demonstrates(tried, share, confidence, failures), tried)
-
-
-def fewest_cases(demonstrates: Callable[[int], bool], failures: int) -> int:
-    """The smallest number of cases above `failures` that demonstrates, and all larger ones with it; bisection."""
-    too_few, enough = failures, failures + 1
-    while not demonstrates(enough):
-        too_few, enough = enough, 2 * enough
-    while enough - too_few > 1:
-        middle = (too_few + enough) // 2
-        too_few, enough = (too_few, middle) if demonstrates(middle) else (middle, enough)
-    return enough
-
-
-def most_failures(demonstrates: Callable[[int], bool], tried: int) -> int | None:
-    """The largest number of failures below `tried` that demonstrates, and all smaller ones with it; None if none."""
-    most, too_many = -1, tried
-    while too_many - most > 1:
-        middle = (most + too_many) // 2
-        most, too_many = (middle, too_many) if demonstrates(middle) else (most, middle)
-    return None if most < 0 else most
-
-
-def _demonstrates(cases: int, share: float, confidence: float, failures: int) -> bool:
-    """True if so few failures would be too lucky, had the share of success been just below `share`."""
-    from scipy.special import betainc
-
-    # betainc(n - k, k + 1, p) is the binomial chance of at most k failures when each case succeeds with p.
-    return bool(betainc(cases - failures, failures + 1, share) <= 1.0 - confidence)
-
-
-def half_rate_share(share: float) -> float:
-    """The share of success of a system that fails half as often as `share` allows."""
-    return 0.5 * (1.0 + share)
-
-
 def plan_row(share: float, confidence: float, failures: int) -> PlanRow:
     """The smallest sample for so many failures, and what it comes to."""
-    from scipy.special import bdtr
-
     cases = smallest_sample(share, confidence, failures)
-    passes = float(bdtr(failures, cases, 1.0 - half_rate_share(share)))
-    return PlanRow(failures, cases, demonstrated_share(cases, failures, confidence), passes)
+    passes = pass_chance(cases, failures, half_rate_share(share))
+    return PlanRow(failures, cases, lower_bound(cases - failures, cases, confidence), passes)
 
 
 def plan_table(share: float, confidence: float, rows: int = ROWS) -> list[PlanRow]:
@@ -114,8 +46,6 @@ def plan_table(share: float, confidence: float, rows: int = ROWS) -> list[PlanRo
 
 def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Iterator[str]:
     """A line per row, under a heading; with the cases that `run --until verdict` takes for as many failures."""
-    from mc_engine.statistics.time_uniform import smallest_sample as smallest_at_any_time
-
     heading = f"{'failures':>8}  {'cases':>9}  {'until verdict':>13}  {'demonstrated share':>18}"
     yield f"{heading}  passes at half the failures"
     for row in rows:
@@ -133,3 +63,63 @@ def interval_lines(share: float, confidence: float, rows: int = 3) -> Iterator[s
 
 def _ordinal(rank: int) -> str:
     return f"{rank}{({2: 'nd', 3: 'rd'}).get(rank, 'th')}"
+
+
+def plan_lines(campaign: Campaign, failures: Sequence[int] = range(ROWS), two_sided: bool = False) -> Iterator[str]:
+    """The plan of a campaign with requirements, line by line.
+
+    failures : a row for each number of failed cases.  two_sided : also the cases for intervals by order statistics.
+    """
+    yield f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}"
+    if campaign.design not in SAMPLING_DESIGNS:
+        yield f'shares of cases of design "{campaign.design}" are no probabilities: what follows is for "mc"'
+    asked = sorted(campaign.requirements, key=_wanted, reverse=True)
+    for (share, confidence), group in groupby(asked, key=_wanted):
+        yield from _block(", ".join(one.name for one in group), share, confidence, failures, campaign.cases, two_sided)
+    if len(asked) > 1:
+        yield from _together(campaign, failures)
+
+
+def _wanted(requirement: Requirement) -> tuple[float, float]:
+    return requirement.share, requirement.confidence
+
+
+def _block(
+    names: str, share: float, confidence: float, failures: Sequence[int], cases: int, two_sided: bool
+) -> Iterator[str]:
+    yield ""
+    yield f"{names}: share {share:.10g} with confidence {confidence:.10g}"
+    yield from table_lines([plan_row(share, confidence, one) for one in failures], share, confidence)
+    yield _allowance(cases, share, confidence)
+    if two_sided:
+        yield from ["", *interval_lines(share, confidence)]
+
+
+def _allowance(cases: int, share: float, confidence: float) -> str:
+    """What the file's own number of cases comes to."""
+    accepted = acceptance_number(cases, share, confidence)
+    if accepted is None:
+        needed = plan_row(share, confidence, 0).cases
+        return f"  {cases:,} in the file are too few, even if none fails: {needed:,} are needed"
+    just, half = (pass_chance(cases, accepted, one) for one in (share, half_rate_share(share)))
+    return (
+        f"  {cases:,} cases allow {accepted:,} failures; they pass a system that just misses the share with "
+        f"{100.0 * just:.1f} %, one that fails half as often as it may with {100.0 * half:.1f} %"
+    )
+
+
+def _together(campaign: Campaign, failures: Sequence[int]) -> Iterator[str]:
+    """All requirements: the cases that show each, the joint share, and each with the confidence shared."""
+    asked = campaign.requirements
+    confidence = min(one.confidence for one in asked)
+    share = joint_share([one.share for one in asked])
+    among = len(asked) + (share is not None)  # as the joint verdict shares it
+    yield ""
+    yield f"every requirement: if each passes, all are met with confidence {confidence:.10g} (Berger 1982)"
+    yield f"{'failures':>8}  {'cases':>9}  cases with the confidence shared among {among} (Bonferroni)"
+    for number in failures:
+        each = max(plan_row(one.share, one.confidence, number).cases for one in asked)
+        shared = max(plan_row(one.share, 1.0 - (1.0 - one.confidence) / among, number).cases for one in asked)
+        yield f"{number:>8}  {each:>9}  {shared}"
+    if share is not None:
+        yield from _block(JOINT, share, confidence, failures, campaign.cases, two_sided=False)

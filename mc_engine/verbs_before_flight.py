@@ -116,7 +116,7 @@ def _probability(name: str, value: float | None) -> float:
 
 def _plan_campaign(file: str, failures: Sequence[int], two_sided: bool) -> None:
     from mc_engine.campaign import load_campaign
-    from mc_engine.campaign_plan import plan_lines
+    from mc_engine.plan import plan_lines
 
     campaign = load_campaign(file)
     if not campaign.requirements:

@@ -31,7 +31,7 @@ from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import crossed
 from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, where
 from mc_engine.lanes.lane_access import lane_holds, store_lane, with_column, with_lane
-from mc_engine.lanes.noise import Draws
+from mc_engine.lanes.philox import Draws
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.tuples import (
     any_field,

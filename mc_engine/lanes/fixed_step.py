@@ -9,7 +9,7 @@ from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import follow, may_have_crossed
 from mc_engine.lanes.functions import any_lane, where
-from mc_engine.lanes.noise import Draws
+from mc_engine.lanes.philox import Draws
 from mc_engine.lanes.runge_kutta import rk4
 from mc_engine.lanes.tuples import (
     any_field,

@@ -9,7 +9,7 @@ from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
-from mc_engine.lanes import functions, noise
+from mc_engine.lanes import functions, philox
 from mc_engine.lanes.lane_type import (
     F64,
     I64,
@@ -203,9 +203,9 @@ def _any_lane(context, builder, sig, args):
     return builder.icmp_unsigned("!=", word, ir.Constant(ir.IntType(width), 0))
 
 
-@infer_global(noise.uniform_pair)
+@infer_global(philox.uniform_pair)
 class _UniformPairTyping(AbstractTemplate):
-    key = noise.uniform_pair
+    key = philox.uniform_pair
 
     def generic(self, args, kws):
         if len(args) != 2 or not isinstance(args[0], types.BaseNamedTuple) or not isinstance(args[1], types.Integer):
@@ -213,7 +213,7 @@ class _UniformPairTyping(AbstractTemplate):
         return signature(types.UniTuple(number_type(common_width(*args[0])), 2), args[0], types.int64)
 
 
-@lower_builtin(noise.uniform_pair, types.BaseNamedTuple, types.Integer)
+@lower_builtin(philox.uniform_pair, types.BaseNamedTuple, types.Integer)
 def _uniform_pair(context, builder, sig, args):
     draws, width = sig.args[0], common_width(*sig.args[0])
 
@@ -236,11 +236,11 @@ def _uniform_pair(context, builder, sig, args):
     key = widen(context.cast(builder, builder.extract_value(args[0], 0), draws[0], types.uint64))
     k0, k1, case = low(key), high(key), counter(1)
     c0, c1, c2, c3 = low(case), high(case), low(counter(2)), low(widen(args[1]))
-    for _ in range(noise.ROUNDS):
-        p0, p1 = builder.mul(c0, whole(noise.MULTIPLIERS[0])), builder.mul(c2, whole(noise.MULTIPLIERS[1]))
+    for _ in range(philox.ROUNDS):
+        p0, p1 = builder.mul(c0, whole(philox.MULTIPLIERS[0])), builder.mul(c2, whole(philox.MULTIPLIERS[1]))
         c0, c2 = builder.xor(builder.xor(high(p1), c1), k0), builder.xor(builder.xor(high(p0), c3), k1)
         c1, c3 = low(p1), low(p0)
-        k0, k1 = low(builder.add(k0, whole(noise.WEYL[0]))), low(builder.add(k1, whole(noise.WEYL[1])))
+        k0, k1 = low(builder.add(k0, whole(philox.WEYL[0]))), low(builder.add(k1, whole(philox.WEYL[1])))
 
     def fraction(upper, lower):
         # 52 bits behind the point of a number in [1, 2), then less one: no conversion, no rounding

@@ -5,22 +5,17 @@ spread of a share is smaller than binomial, so the limits are then on the safe s
 `one_at_a_time` a share of cases is no probability and none of this applies.  Where the number of cases was decided
 by looking at them, `time_uniform` has the limits that hold.
 
+k of N: with at most k failures among N cases a share is demonstrated.  The same numbers are those of distribution-free
+tolerance limits (Wilks, Ann. Math. Statist. 12 (1941), 91-96): the (k + 1)-th largest of N values is an upper limit to
+the share, and the interval between two order statistics that leaves r values out at each end, those two among them,
+takes as many cases as 2 r - 1 failures.
+
 Clopper & Pearson, Biometrika 26 (1934), 404-413.
 """
 
-from scipy.special import bdtr, betaincinv
+from collections.abc import Callable
 
-from mc_engine.plan import acceptance_number, smallest_sample
-
-__all__ = [
-    "acceptance_number",
-    "check_counts",
-    "clopper_pearson",
-    "lower_bound",
-    "pass_chance",
-    "smallest_sample",
-    "upper_bound",
-]
+from scipy.special import bdtr, betainc, betaincinv
 
 
 def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
@@ -49,6 +44,66 @@ def pass_chance(tried: int, accepted: int | None, true_share: float) -> float:
     Hanson & Beard, NASA/TP-2010-216447, section 4.
     """
     return 0.0 if accepted is None else float(bdtr(accepted, tried, 1.0 - true_share))
+
+
+def smallest_sample(share: float, confidence: float, failures: int = 0) -> int:
+    """Smallest number of cases in which `failures` failures still demonstrate `share` with `confidence`.
+
+    share, confidence : in (0, 1), else ValueError.  failures : not negative.
+    """
+    for name, value in (("share", share), ("confidence", confidence)):
+        if not 0.0 < value < 1.0:
+            raise ValueError(f"{name} is {value}; it must lie between 0 and 1")
+    if failures < 0:
+        raise ValueError(f"failures is {failures}; it must not be negative")
+    return fewest_cases(lambda cases: _demonstrates(cases, share, confidence, failures), failures)
+
+
+def smallest_interval_sample(share: float, confidence: float, left_out: int = 1) -> int:
+    """Smallest number of cases whose `left_out`-th smallest and largest values enclose `share` of all cases.
+
+    left_out : from 1, the rank of the two limits, counted from either end.  With 1, smallest and largest value.
+    Wilks, Ann. Math. Statist. 12 (1941), 91-96: 93 for 95 % with 95 % confidence.
+    """
+    if left_out < 1:
+        raise ValueError(f"left_out is {left_out}; the first rank is 1")
+    return smallest_sample(share, confidence, 2 * left_out - 1)
+
+
+def acceptance_number(tried: int, share: float, confidence: float) -> int | None:
+    """The most failures among `tried` cases that still show `share`; None if even none at all would not do."""
+    return most_failures(lambda failures: _demonstrates(tried, share, confidence, failures), tried)
+
+
+def fewest_cases(demonstrates: Callable[[int], bool], failures: int) -> int:
+    """The smallest number of cases above `failures` that demonstrates, and all larger ones with it; bisection."""
+    too_few, enough = failures, failures + 1
+    while not demonstrates(enough):
+        too_few, enough = enough, 2 * enough
+    while enough - too_few > 1:
+        middle = (too_few + enough) // 2
+        too_few, enough = (too_few, middle) if demonstrates(middle) else (middle, enough)
+    return enough
+
+
+def most_failures(demonstrates: Callable[[int], bool], tried: int) -> int | None:
+    """The largest number of failures below `tried` that demonstrates, and all smaller ones with it; None if none."""
+    most, too_many = -1, tried
+    while too_many - most > 1:
+        middle = (most + too_many) // 2
+        most, too_many = (middle, too_many) if demonstrates(middle) else (most, middle)
+    return None if most < 0 else most
+
+
+def _demonstrates(cases: int, share: float, confidence: float, failures: int) -> bool:
+    """True if so few failures would be too lucky, had the share of success been just below `share`."""
+    # betainc(n - k, k + 1, p) is the binomial chance of at most k failures when each case succeeds with p.
+    return bool(betainc(cases - failures, failures + 1, share) <= 1.0 - confidence)
+
+
+def half_rate_share(share: float) -> float:
+    """The share of success of a system that fails half as often as `share` allows."""
+    return 0.5 * (1.0 + share)
 
 
 def check_counts(passed: int, tried: int, confidence: float) -> None:

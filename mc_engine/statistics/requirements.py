@@ -23,7 +23,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from mc_engine.plan import half_rate_share
 from mc_engine.statistics import binomial, time_uniform, tolerance
 
 PASS = "pass"
@@ -211,7 +210,7 @@ def _verdict(
         else None,
         accepted=accepted,
         consumer_risk=binomial.pass_chance(tried, accepted, share) if exact else None,
-        producer_risk=1.0 - binomial.pass_chance(tried, accepted, half_rate_share(share)) if exact else None,
+        producer_risk=1.0 - binomial.pass_chance(tried, accepted, binomial.half_rate_share(share)) if exact else None,
         shared_outcome=shared,
         random=random,
         looked=looked,
@@ -245,7 +244,7 @@ def _with_limits_shown(verdict: Verdict, usable: np.ndarray, limits: ShareLimits
     # Blocks of values are exchangeable at one number of cases only; at all of them each end stands for itself,
     # with half of what may lie outside and half of the error.
     half = limits.acceptance_number(
-        verdict.tried, half_rate_share(verdict.share), 1.0 - 0.5 * (1.0 - verdict.confidence)
+        verdict.tried, binomial.half_rate_share(verdict.share), 1.0 - 0.5 * (1.0 - verdict.confidence)
     )
     low, high = tolerance.lower_limit(usable, half, lost), tolerance.upper_limit(usable, half, lost)
     return replace(verdict, enclosed=None if low is None or high is None else (low, high))

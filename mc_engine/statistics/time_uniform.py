@@ -22,8 +22,7 @@ from math import log
 import numpy as np
 from scipy.special import betainc, betaincc, betaln
 
-from mc_engine.plan import fewest_cases, most_failures
-from mc_engine.statistics.binomial import check_counts
+from mc_engine.statistics.binomial import check_counts, fewest_cases, most_failures
 
 _POWER = 0.5  # weights q^(_POWER - 1): much weight on rare failures, some on frequent ones
 _HALVINGS = 100  # of a bracket inside (0, 1): more than doubles can tell apart

@@ -3,7 +3,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from mc_engine.plan import acceptance_number, demonstrated_share, interval_lines, plan_table, smallest_sample
+from mc_engine.plan import interval_lines, plan_table
+from mc_engine.statistics.binomial import acceptance_number, lower_bound, smallest_sample
 
 # share, confidence: smallest samples for 0, 1, 2, ... failures.
 # 59, 93, 124 and 299, 473: Wilks, Ann. Math. Stat. 12 (1941), one-sided tolerance limits; the others by scipy.
@@ -30,15 +31,15 @@ def test_one_case_fewer_would_not_demonstrate_the_share(share, confidence, failu
 
 @pytest.mark.parametrize("row", plan_table(0.9973, 0.90, 4))
 def test_a_row_says_what_share_it_demonstrates(row):
-    assert row.shown >= 0.9973 > demonstrated_share(row.cases - 1, row.failures, 0.90)
+    assert row.shown >= 0.9973 > lower_bound(row.cases - 1 - row.failures, row.cases - 1, 0.90)
 
 
 def test_without_a_failure_the_bound_has_its_closed_form():
-    assert demonstrated_share(852, 0, 0.90) == pytest.approx(0.1 ** (1 / 852), rel=1e-13)
+    assert lower_bound(852, 852, 0.90) == pytest.approx(0.1 ** (1 / 852), rel=1e-13)
 
 
 def test_all_cases_failed_demonstrates_nothing():
-    assert demonstrated_share(5, 5, 0.9) == 0.0
+    assert lower_bound(0, 5, 0.9) == 0.0
 
 
 @pytest.mark.parametrize(("share", "confidence"), [(0.0, 0.9), (1.0, 0.9), (0.9, 0.0), (0.9, 1.0), (float("nan"), 0.9)])

@@ -7,7 +7,7 @@ from flexible_twin import fly_twin
 
 from mc_engine.flight import fly, fly_history, prepare
 from mc_engine.kernel_parts import settings_class
-from mc_engine.lanes.noise import Draws, noise_key
+from mc_engine.lanes.philox import Draws, noise_key
 
 # both fly the same samples; what is left is that of Runge-Kutta steps of 10 ms, and trapezoids of |q| at their corners
 TOLERANCE = {"q": 5e-11, "omega": 2e-10, "eta": 3e-9, "end_momentum": 5e-9, "impulse": 5e-9, "control_effort": 1e-8}

@@ -6,7 +6,7 @@ from flown_models import FOLDER, OSCILLATOR, flown, same_bytes
 
 from mc_engine.flight import fly_history
 from mc_engine.lanes.functions import fma
-from mc_engine.lanes.noise import Draws, noise_key
+from mc_engine.lanes.philox import Draws, noise_key
 
 RANDOM = np.random.default_rng(3)
 MIXED = {

@@ -6,7 +6,8 @@ from compiled_physics import WIDTHS, apply, bits, by_every_width
 from scipy import stats
 
 from mc_engine.lanes import physics
-from mc_engine.lanes.noise import Draws, noise_key, normal_pair, philox_words, uniform_pair
+from mc_engine.lanes.noise import normal_pair
+from mc_engine.lanes.philox import Draws, noise_key, philox_words, uniform_pair
 
 KEY = 0x299F31D0A4093822
 # Random123 1.14, file tests/kat_vectors, lines "philox4x32 10": counter, key, answer

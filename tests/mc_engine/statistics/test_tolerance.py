@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mc_engine.plan import smallest_interval_sample, smallest_sample
-from mc_engine.statistics.binomial import acceptance_number
+from mc_engine.statistics.binomial import acceptance_number, smallest_interval_sample, smallest_sample
 from mc_engine.statistics.tolerance import interval, lower_limit, upper_limit
 
 VALUES = np.array([3.0, 1.0, 5.0, 2.0, 4.0])
