@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mc_engine.campaign_file import CampaignSection, schema
+from mc_engine.campaign_file import CampaignSection, ReportSection, schema
 from mc_engine.campaign_parts import (
     Correlation,
     Requirement,
@@ -76,7 +76,7 @@ class Campaign:
     table : the columns of the design "table", else empty.  tuning : what [tuning] says, if it is there.
     looks : numbers of cases at which a run that ends with its verdicts is judged; empty where all cases fly.
     messages : orbit messages beside the file that covariances were read from.
-    sensitivity : what [sensitivity] says, if it is there.
+    sensitivity : what [sensitivity] says, if it is there.  report : probability and confidence of its statistics.
     digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
         cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
     """
@@ -105,6 +105,7 @@ class Campaign:
     looks: tuple[int, ...] = ()
     messages: tuple[str, ...] = ()
     sensitivity: SensitivityDesign | None = None
+    report: ReportSection = field(default_factory=ReportSection)
 
 
 def load_campaign(
@@ -232,6 +233,7 @@ def _assemble(
         first=first,
         messages=messages,
         sensitivity=sensitivity,
+        report=sections.report or ReportSection(),
     )
 
 
@@ -375,6 +377,7 @@ def _digest(
     content = json.loads(json.dumps(document, default=str))  # TOML has dates, JSON has none
     if section.design != "lhs":
         content["campaign"].pop("cases", None)
+    content.pop("report", None)  # how a run is told, not what it is
     content["campaign"]["seed"] = section.seed or 0  # a grid may do without one, and is resumed with 0
     order = [one.name for one in dispersions]
     digest = sha256(json.dumps([content, order], sort_keys=True).encode())

@@ -19,7 +19,7 @@ MOST_STEPS = 10**12
 LONGEST_LINE, LONGEST_NOTE = 300, 5000  # letters
 LARGEST = 1e50  # beyond it, squares and quotients of numbers leave the range of float64
 
-DesignName = Literal["mc", "lhs", "sobol", "halton", "saltelli", "morris", "grid", "one_at_a_time", "table"]
+DesignName = Literal["mc", "lhs", "sobol", "saltelli", "morris", "grid", "one_at_a_time", "table"]
 
 
 def _scalar(value: Any) -> Scalar:
@@ -82,7 +82,7 @@ class CampaignSection(Section):
 
     model: str = Field(min_length=1, description='a module such as "campaigns.deorbit", or "model.py" beside this file')
     cases: int | None = Field(default=None, ge=1, le=MOST_CASES, description="number of cases; random designs only")
-    design: DesignName = Field(description="how the cases are laid out: mc, lhs, sobol, halton, saltelli, grid, ...")
+    design: DesignName = Field(description="how the cases are laid out: mc, lhs, sobol, saltelli, grid, ...")
     seed: int | None = Field(
         default=None, ge=0, le=2**63 - 1, description="any whole number from 0 on; random designs only"
     )
@@ -348,17 +348,9 @@ class TuningSection(Section):
 
 
 AnyDispersion = (
-    LevelsDispersion
-    | NormalDispersion
-    | UniformDispersion
-    | TriangularDispersion
-    | LognormalDispersion
-    | BetaDispersion
-    | ExponentialDispersion
-    | DiscreteDispersion
-    | EmpiricalDispersion
-    | ConstantDispersion
-)
+    LevelsDispersion | NormalDispersion | UniformDispersion | TriangularDispersion | LognormalDispersion
+    | BetaDispersion | ExponentialDispersion | DiscreteDispersion | EmpiricalDispersion | ConstantDispersion
+)  # fmt: skip
 
 
 class InputsSection(Section):
@@ -379,6 +371,13 @@ class SensitivitySection(Section):
     group: dict[str, list[str]] = Field(default_factory=dict, description="dispersions computed together, by group")
 
 
+class ReportSection(Section):
+    """[report]: the probability and the confidence of all statistics of a report, beside its requirements' own."""
+
+    probability: Share = Field(default=0.9973, ge=0.5, description="of tolerance limits and percentiles")
+    confidence: Share = Field(default=0.90, ge=0.5, description="with which each bound holds")
+
+
 class CampaignFile(Section):
     """A campaign of mc-engine: a model, the spread of its inputs, and what the results must meet."""
 
@@ -391,6 +390,7 @@ class CampaignFile(Section):
     requirement: dict[str, RequirementSection] = Field(default_factory=dict)
     retention: RetentionSection = Field(default_factory=RetentionSection)
     sensitivity: SensitivitySection | None = Field(default=None, description="contributions of the inputs")
+    report: ReportSection = Field(default=ReportSection(), description="probability and confidence of the report")
     tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")
 
 

@@ -23,6 +23,7 @@ from mc_engine.campaign_file import (
     LevelsDispersion,
     ObjectiveSection,
     PublishedPointSection,
+    ReportSection,
     RequirementSection,
     RetentionSection,
     Section,
@@ -103,6 +104,7 @@ class Sections:
     tuning: "TuningSections | None"
     inputs: InputsSection | None
     sensitivity: SensitivitySection | None
+    report: ReportSection | None
 
 
 @dataclass(frozen=True)
@@ -152,6 +154,7 @@ def read_sections(document: dict[str, Any], found: Findings) -> Sections:
         tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
         inputs=_optional(InputsSection, document, inside),
         sensitivity=_optional(SensitivitySection, document, inside),
+        report=read(ReportSection, document.get("report", {}), inside["report"]),
     )
 
 
@@ -311,6 +314,8 @@ def _sentence(section: type[Section] | None, details: ErrorDetails) -> str:
         return f"is missing: {_keys(_class_at(section, location))[str(location[-1])].description}"
     if kind == "extra_forbidden" and section is not None:
         return f"is not a known key{hint(str(location[-1]), _keys(_class_at(section, location)))}"
+    if kind == "literal_error" and location[-1:] == ("design",) and value == "halton":
+        return '"halton" is no longer offered; use "sobol"'
     if kind == "literal_error":
         allowed = re.findall(r"'([^']*)'", context["expected"])
         if isinstance(value, str):

@@ -7,16 +7,13 @@ engine.  Every candidate flies the same cases with the same noise, so that two c
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from mc_engine.campaign import Campaign
-from mc_engine.cases import case_table, full_inputs
-from mc_engine.chunks import NOMINAL_NOISE
+from mc_engine.cases import case_table
+from mc_engine.chunks import NOMINAL_NOISE, fly_in_threads
 from mc_engine.distributions import column
-from mc_engine.flight import fly
-from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.model_faults import naming_faults
 from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
 from mc_engine.tuning_parts import Constraint, Tuning
@@ -64,7 +61,7 @@ def fly_candidates(campaign: Campaign, tuning: Tuning, candidates: np.ndarray, w
     inputs |= {one.name: np.repeat(candidates[:, k], per) for k, one in enumerate(tuning.parameters)}
     names = list(dict.fromkeys(one.metric for one in tuning.measures))
     with naming_faults(campaign.model_reference, "a candidate"):
-        flown = _fly(campaign, inputs, np.tile(ids, n), ["status", "reason", *names], workers)
+        flown = fly_in_threads(campaign, inputs, np.tile(ids, n), ["status", "reason", *names], workers)
     ok = (flown["status"] == STATUS_NAME[OK]).reshape(n, per)
     metrics = {name: np.where(ok, flown[name].reshape(n, per), np.nan) for name in names}
     measured = [
@@ -106,27 +103,6 @@ def _shared_cases(campaign: Campaign, tuning: Tuning) -> tuple[np.ndarray, dict[
     if not tuning.nominal:
         return ids, table
     return np.append(NOMINAL_NOISE, ids), {name: np.append(nominal[name], table[name]) for name in table}
-
-
-def _fly(
-    campaign: Campaign, inputs: dict[str, np.ndarray], ids: np.ndarray, wanted: list[str], workers: int
-) -> dict[str, np.ndarray]:
-    """The wanted columns of all cases, flown by some threads in pieces of whole blocks."""
-    from joblib import Parallel, delayed
-
-    def task(rows: slice) -> dict[str, Any]:
-        piece = full_inputs(campaign, {name: values[rows] for name, values in inputs.items()})
-        flown = fly(campaign.model, piece, ids[rows], campaign.seed, folder=campaign.directory)
-        return {name: flown[name] for name in wanted}
-
-    width = usual_width(campaign.model)
-    build_kernel(campaign.model, campaign.directory, width)  # once, before several threads ask for it together
-    size = width * -(-len(ids) // (width * workers))
-    pieces = [slice(first, first + size) for first in range(0, len(ids), size)]
-    if len(pieces) == 1:
-        return task(pieces[0])
-    landed: Any = Parallel(n_jobs=workers, backend="threading")(delayed(task)(piece) for piece in pieces)
-    return {name: np.concatenate([columns[name] for columns in landed]) for name in wanted}
 
 
 def _measured(values: np.ndarray, quantile: float | None, large_is_bad: bool, nominal_first: bool) -> np.ndarray:

@@ -41,10 +41,11 @@ class FileFault(Exception):
     """What is wrong with the file, as one sentence; the reader of the campaign file adds the place."""
 
 
-def resolve_beside(directory: Path, reference: str) -> Path:
+def resolve_beside(directory: Path, reference: str, owner: str = "the campaign file") -> Path:
     """The file `reference`, which must stand in `directory` or below it, and be named from there.
 
-    A run directory holds a copy of it under the same name, which must lead to the copy; so a link keeps its own name.
+    owner : whose directory it is.  A run directory holds a copy of the file under the same name, which must lead to the
+    copy; so a link keeps its own name.
     """
     home = directory.resolve()
     name = json.dumps(reference if len(reference) <= _LONGEST_NAME else f"{reference[:57]}...", ensure_ascii=False)
@@ -54,12 +55,12 @@ def resolve_beside(directory: Path, reference: str) -> Path:
     except (OSError, ValueError, RuntimeError):  # too long, with a zero byte, links that go round
         raise FileFault(f"{name} is no name that a file can have") from None
     if not path.is_relative_to(home):
-        raise FileFault(f"{name} lies outside the folder of the campaign file; put it beside that file")
+        raise FileFault(f"{name} lies outside the folder of {owner}; put it beside {owner}")
     if os.path.isabs(reference) or os.path.normpath(reference).startswith(".."):
         here = json.dumps(path.relative_to(home).as_posix(), ensure_ascii=False)
-        raise FileFault(f"{name} leads through other folders than that of the campaign file; write {here}")
+        raise FileFault(f"{name} leads through other folders than that of {owner}; write {here}")
     if not is_file:
-        raise FileFault(f"there is no file {name} beside the campaign file")
+        raise FileFault(f"there is no file {name} beside {owner}")
     return home / os.path.normpath(reference)
 
 

@@ -24,7 +24,7 @@ _SIGMA_DIGITS = 5
 def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray]:
     """Column per dispersion, in file order and declared units: float64[n], bool[n], or object[n] of words.
 
-    case_ids : int64[n], in any order.  For "mc", "sobol" and "halton" they may go beyond the campaign's
+    case_ids : int64[n], in any order.  For "mc" and "sobol" they may go beyond the campaign's
     number of cases: these are the cases it would have if it were longer.
     """
     ids = _checked(campaign, case_ids)

@@ -6,6 +6,7 @@ What a case comes to depends on (campaign, sources, seed, case_id): chunks and w
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 from mc_engine.campaign import Campaign
 from mc_engine.cases import case_table, full_inputs, nominal_row
 from mc_engine.flight import fly
-from mc_engine.kernel import usual_width
+from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.model_faults import naming_faults
 from mc_engine.parts import CASE_COLUMNS, Column, Part, Written, read_part, revised_name, write_aside
 from mc_engine.sensitivity_design import noise_ids, upstream_ids
@@ -54,9 +55,8 @@ class Order:
 
     lost : cases that are not flown; their rows hold their inputs and the reason.
     base : a part in which only the cases that failed are flown anew.  failed : these cases.
-    probe : only these cases are flown, and nothing is written: do they kill the worker?
-    batch : how many cases are flown at a time, if not all.
     suspected : a worker has died of it; it is flown in small batches, with a note of each.
+    alone : cases that are flown first, one by one: one of them may be what the worker died of.
     """
 
     first: int
@@ -64,47 +64,38 @@ class Order:
     lost: tuple[Lost, ...] = ()
     base: Part | None = None
     failed: tuple[int, ...] = ()
-    probe: tuple[int, ...] = ()
-    batch: int | None = None
     suspected: bool = False
+    alone: tuple[int, ...] = ()
 
     def flown(self) -> np.ndarray:
-        """int64[n], the cases that are to be flown."""
-        if self.probe:
-            return np.array(self.probe, dtype=np.int64)
+        """int64[n], the cases that are to be flown, in the order in which they are."""
         cases = np.array(self.failed, dtype=np.int64) if self.base else np.arange(self.first, self.stop, dtype=np.int64)
-        return cases[~np.isin(cases, [lost.case_id for lost in self.lost])]
+        cases = cases[~np.isin(cases, [lost.case_id for lost in self.lost])]
+        return cases[np.argsort(~np.isin(cases, self.alone), kind="stable")]
 
-    def probing(self, cases: np.ndarray) -> "Order":
-        """The order to fly some of these cases on trial."""
-        return Order(self.first, self.stop, probe=tuple(int(case) for case in cases), suspected=True)
+    def suspecting(self, cases: np.ndarray) -> "Order":
+        """The same order, in which these cases fly alone, too."""
+        alone = {*self.alone, *cases.tolist()} - {lost.case_id for lost in self.lost}
+        return replace(self, suspected=True, alone=tuple(sorted(alone)))
 
-    def without(self, lost: Sequence[Lost], batch: int | None) -> "Order":
-        """The same order, in which these cases are not flown."""
-        return replace(self, lost=(*self.lost, *lost), batch=batch)
-
-    def once_more(self) -> "Order":
-        """The same order, under suspicion."""
-        return replace(self, suspected=True)
+    def without(self, lost: Lost) -> "Order":
+        """The same order, in which this case is not flown."""
+        return replace(self, lost=(*self.lost, lost))
 
 
 def carry_out(
     campaign: Campaign, columns: Sequence[Column], run: Path, order: Order, guard: Guard | None = None
-) -> Written | None:
-    """Fly an order and write its part aside in `run`; a probe leaves nothing.
+) -> Written:
+    """Fly an order and write its part aside in `run`.
 
     guard : entered with the cases of each batch; batches are then no larger than the kernel is wide.
     """
     flown = order.flown()
-    batch = order.batch
-    if guard is not None:
-        batch = min(usual_width(campaign.model), batch or flown.size)
-    flights = [fly_cases(campaign, flown, batch, guard or _unguarded)] if flown.size else []
-    if order.probe:
-        return None
+    batch = None if guard is None else usual_width(campaign.model)
+    flights = [fly_cases(campaign, flown, batch, guard or _unguarded, len(order.alone))] if flown.size else []
     names = [column.name for column in columns]
     arrays: Mapping[str, Any] = {**flights[0], "case_id": flown} if flights else {}
-    if order.lost or order.base is not None:
+    if order.lost or order.alone or order.base is not None:
         arrays = _gathered(names, [arrays, _lost_rows(campaign, order.lost, names), _base_rows(run, order, flown)])
     file = revised_name(order.base.file) if order.base else None
     return write_aside(run, columns, order.first, order.stop - order.first, arrays, file)
@@ -114,14 +105,18 @@ def _unguarded(cases: np.ndarray) -> AbstractContextManager[None]:
     return nullcontext()
 
 
-def fly_cases(campaign: Campaign, case_ids: np.ndarray, batch: int | None = None, guard: Guard = _unguarded) -> Columns:
-    """All columns but case_id of some cases.  case_ids : int64[n], n > 0.  batch : cases at a time."""
+def fly_cases(
+    campaign: Campaign, case_ids: np.ndarray, batch: int | None = None, guard: Guard = _unguarded, alone: int = 0
+) -> Columns:
+    """All columns but case_id of some cases.  case_ids : int64[n], n > 0.
+
+    batch : cases at a time, if not all.  alone : how many of the first ones fly one by one.
+    """
     table = case_table(campaign, case_ids)
-    batch = min(batch or case_ids.size, case_ids.size)
+    edges = [*range(alone), *range(alone, case_ids.size, batch or case_ids.size), case_ids.size]
     flights = []
-    with naming_faults(campaign.model_reference, f"cases {case_ids[0]} to {case_ids[-1]}"):
-        for begin in range(0, case_ids.size, batch):
-            piece = slice(begin, begin + batch)
+    with naming_faults(campaign.model_reference, f"cases {case_ids.min()} to {case_ids.max()}"):
+        for piece in (slice(*edge) for edge in pairwise(edges)):
             inputs = full_inputs(campaign, {name: column[piece] for name, column in table.items()})
             with guard(case_ids[piece]):
                 noise = noise_ids(campaign, case_ids[piece])
@@ -133,6 +128,30 @@ def fly_cases(campaign: Campaign, case_ids: np.ndarray, batch: int | None = None
 
 def _stacked(tables: Sequence[Mapping[str, np.ndarray]]) -> Columns:
     return {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+
+
+def fly_in_threads(
+    campaign: Campaign, inputs: Columns, noise: np.ndarray, wanted: Sequence[str], workers: int
+) -> Columns:
+    """The wanted columns of cases that are not the campaign's own, flown by some threads in pieces of whole blocks.
+
+    inputs : the dispersed columns.  noise : int64[n], what addresses the noise of each case.
+    """
+    from joblib import Parallel, delayed
+
+    def task(rows: slice) -> Columns:
+        piece = full_inputs(campaign, {name: values[rows] for name, values in inputs.items()})
+        flown = fly(campaign.model, piece, noise[rows], campaign.seed, folder=campaign.directory)
+        return {name: flown[name] for name in wanted}
+
+    width = usual_width(campaign.model)
+    build_kernel(campaign.model, campaign.directory, width)  # once, before several threads ask for it together
+    size = width * -(-len(noise) // (width * workers))
+    pieces = [slice(first, first + size) for first in range(0, len(noise), size)]
+    if len(pieces) == 1:
+        return task(pieces[0])
+    landed: Any = Parallel(n_jobs=workers, backend="threading")(delayed(task)(piece) for piece in pieces)
+    return {name: np.concatenate([columns[name] for columns in landed]) for name in wanted}
 
 
 def name_upstream(campaign: Campaign, case_ids: np.ndarray, flight: Columns) -> None:

@@ -261,3 +261,8 @@ def write_reports(path: Path, formats: tuple[str, ...], **more: Any) -> list[Pat
     except DiskError as error:
         report = f"`mc-engine report {shell_word(path)}`"
         raise DiskError(f"{error}; what was flown is safe, {report} writes the reports") from error
+
+
+def replay_picture(store: Any, case: int, history: Any) -> bytes:
+    """The case's history over nominal, envelopes and limits, in the style of the reports."""
+    return bytes(importlib.import_module("reports").replay_picture(store, case, history))

@@ -166,8 +166,6 @@ class CountedFiles:
             for name in self._lying():
                 if not is_temporary(name.rpartition("/")[2]) and name not in state.receipts:
                     yield name, f"does not count, {self.journal} does not name it"
-            if os.path.lexists(lock := self.root / self._lock) and (lock.is_symlink() or not lock.is_file()):
-                yield self._lock, "is no regular file"
         except StoreError as error:  # a folder that is a symbolic link
             yield self._parted(error)
 

@@ -11,7 +11,7 @@ from mc_engine.parts import Written
 
 @dataclass(frozen=True)
 class Landing:
-    """What became of an order: its receipt, which a probe has not, or the error that ended it.
+    """What became of an order: its receipt, or the error that ended it.
 
     died : the worker is gone, or had not the memory; nothing is wrong with the order as far as is known.
     """

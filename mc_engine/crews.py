@@ -49,7 +49,7 @@ def crew_of(backend: Backend, store: Store, campaign: Campaign, workers: int) ->
 class ThreadCrew(Crew):
     """Threads of this process; kernels hold no interpreter lock."""
 
-    def __init__(self, perform: Callable[[Order], Written | None], workers: int):
+    def __init__(self, perform: Callable[[Order], Written], workers: int):
         from multiprocessing.pool import ThreadPool
 
         super().__init__()

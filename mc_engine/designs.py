@@ -5,24 +5,24 @@ dimension.  Designs in blocks do so too, but their cases belong together: Saltel
 trajectories for elementary effects.  Designs by levels give, per dispersion, the level that each case takes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from hashlib import sha256
 from math import prod
+from typing import Any
 
 import numpy as np
 
 from mc_engine import correlation
-from mc_engine.halton import scrambled_halton
 from mc_engine.sobol import scrambled_sobol
 from mc_engine.status import MOST_CASES
 from mc_engine.streams import uniforms
 
-RANDOM = ("mc", "lhs", "sobol", "halton")
+RANDOM = ("mc", "lhs", "sobol")
 IN_BLOCKS = ("saltelli", "morris")
 BY_LEVELS = ("grid", "one_at_a_time")
 DESIGNS = (*RANDOM, *IN_BLOCKS, *BY_LEVELS, "table")
-EXTENSIBLE = ("mc", "sobol", "halton", *IN_BLOCKS)  # the first 1000 cases of 2000 are the 1000 flown before
+EXTENSIBLE = ("mc", "sobol", *IN_BLOCKS)  # the first 1000 cases of 2000 are the 1000 flown before
 MORRIS_LEVELS = 4
 
 Pairs = tuple[tuple[str, str, float], ...]
@@ -48,9 +48,7 @@ def unit_cube(
 def _column(design: str, seed: int, name: str, dimension: int, case_ids: np.ndarray) -> np.ndarray:
     if design == "mc":
         return uniforms(seed, name, case_ids)
-    if design == "sobol":
-        return scrambled_sobol(sobol_key(f"{seed}/{name}/sobol"), dimension, case_ids)
-    return scrambled_halton(seed, name, dimension, case_ids)
+    return scrambled_sobol(sobol_key(f"{seed}/{name}/sobol"), dimension, case_ids)
 
 
 def sobol_key(words: str) -> int:
@@ -83,6 +81,18 @@ def block_problem(design: str, n_dispersions: int, n_cases: int) -> str:
     return (
         f'{n_cases} is not allowed; "{design}" with {n_dispersions} dispersions has blocks of {size} cases: {nearest}'
     )
+
+
+def extension_problem(manifest: Mapping[str, Any], has: int, cases: int) -> str:
+    """Why a run of `has` cases cannot get so many, as far as its manifest says; empty if it can."""
+    design = manifest["campaign"]["design"]
+    if manifest.get("upstream") is not None:
+        return "takes its inputs from another run; extend that one, and fly this campaign anew"
+    if manifest.get("shard") is not None:
+        return "is a shard; merge the shards, and extend the whole"
+    if design not in EXTENSIBLE:
+        return f'the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can'
+    return "" if cases > has else f"has {has} cases; give the number it is to have in all"
 
 
 def _saltelli(seed: int, names: Sequence[str], block: np.ndarray, row: np.ndarray) -> list[np.ndarray]:

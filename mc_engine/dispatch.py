@@ -1,17 +1,13 @@
 """From chunks to receipts: keeps a crew busy, and finds the cases that kill their workers.
 
 A chunk whose worker died is flown again, in small batches, with a note of each.  If that worker dies too, the cases
-of the last note, or all where there is none, are flown on trial, by halves and at last one by one, until those are
-found that kill their worker even alone, twice.  The chunk is then flown without them, and their rows say so.  So a
-part holds the same cases whatever happened on the way.
+of its last note are flown first, one by one.  A case whose worker dies of it alone, twice, is lost: the chunk is flown
+without it, and its row says so.  So a part holds the same cases whatever happened on the way.
 """
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
 from pathlib import Path
-
-import numpy as np
 
 from mc_engine.chunks import Lost, Order
 from mc_engine.crew import Crew, Landing
@@ -20,22 +16,12 @@ from mc_engine.parts import Written
 from mc_engine.status import STATUS_NAME, TIME_LIMIT, WORKER_DIED
 from mc_engine.worker_process import LATE, take_notes
 
-FEW = 16  # cases that are flown one by one rather than by halves: to begin a new worker takes longer
 LOOK_EVERY_S = 0.2  # at whether to stop
 DRAIN_S = 10.0  # without a worker, then what is under way is under way no more
-UNNOTED = 3  # deaths in which an order was not in flight as far as is known
-MOST_DEATHS = 30  # before any order has come through: it is not the cases then
+MOST_DEATHS = 30  # before any case has come through: it is not the cases then
+MOST_UNNOTED = 10  # deaths of one order of which nobody knows what was in flight
 DIED = "the process flying this case died"
 NO_MEMORY = "needed more memory than its worker may have"
-
-
-@dataclass
-class Search:
-    """The search of one chunk for the cases that kill their worker."""
-
-    order: Order
-    open_probes: int = 0
-    found: list[Lost] = field(default_factory=list)
 
 
 class Dispatch:
@@ -48,11 +34,10 @@ class Dispatch:
         self._crew, self._run, self._case_seconds = crew, run, case_seconds
         self._waiting: deque[Order] = deque()
         self._under_way = 0
-        self._twice: set[Order] = set()  # probes of a single case that are flown again
-        self._alone: Order | None = None  # one of them that is under way, and nothing beside it
-        self._unnoted: Counter[Order] = Counter()  # deaths with no note of what was in flight
-        self._searches: dict[Order, Search] = {}  # by their probes
-        self._landed = self._lost = 0
+        self._apart = False  # an order is under way, and nothing may be beside it
+        self._deaths: Counter[int] = Counter()  # of a case that flew alone
+        self._unnoted: Counter[int] = Counter()  # of an order, by its first case
+        self._lost, self._came_through = 0, False
 
     def receipts(self, orders: Iterable[Order], stopped: Callable[[], bool]) -> Iterator[tuple[Order, Written]]:
         """What the workers wrote, as it lands.
@@ -69,81 +54,59 @@ class Dispatch:
                     return
                 continue
             self._under_way -= 1
-            if landing.order is self._alone:
-                self._alone = None
+            self._apart = self._apart and self._under_way > 0
             if landing.died:
-                self._mourn(landing)
-            elif landing.error is not None:
-                raise landing.error
+                self._on_worker_death(landing)
+            elif landing.written is None:
+                raise landing.error or AssertionError(landing)
             else:
-                self._landed += 1
-                if landing.written is None:
-                    self._close_probe(landing.order)
-                else:
-                    self._fill(stopped)  # no worker waits until the receipt is dealt with
-                    yield landing.order, landing.written
+                self._came_through = True
+                self._fill(stopped)  # no worker waits until the receipt is dealt with
+                yield landing.order, landing.written
 
     def _fill(self, stopped: Callable[[], bool]) -> None:
         while self._waiting and not stopped() and self._may_begin(self._waiting[0]):
             order = self._waiting.popleft()
             self._crew.begin(order)
             self._under_way += 1
-            if self._crew.shared and order in self._twice:
-                self._alone = order
+            self._apart = self._flies_apart(order)
 
     def _may_begin(self, order: Order) -> bool:
-        """True where there is room; a last trial waits until nothing else flies that its worker could die of."""
-        if self._crew.shared and order in self._twice:
+        if self._apart or self._flies_apart(order):
             return self._under_way == 0
-        return self._alone is None and self._under_way < self._crew.room()
+        return self._under_way < self._crew.room()
 
-    def _mourn(self, landing: Landing) -> None:
-        """A worker died of an order, or with it: fly it again, or look for the case that it dies of."""
+    def _flies_apart(self, order: Order) -> bool:
+        """Whether nothing may fly beside an order, so that its worker dies of nothing else."""
+        return self._crew.shared and bool(order.alone)
+
+    def _on_worker_death(self, landing: Landing) -> None:
+        """Fly the order of a dead worker again, without the case that killed it if that is known by now.
+
+        The worker of an innocent case may be killed from outside, but hardly twice.
+        """
         order, flown = landing.order, landing.order.flown()
-        self._lost += 1
-        if self._lost >= MOST_DEATHS and not self._landed:
-            raise WorkersLost(f"the workers die whatever they fly; the last one said: {landing.error}")
         kind, noted = take_notes(self._run, flown)
+        self._lost += 1
+        self._came_through = self._came_through or (noted.size > 0 and noted[0] != flown[0])
+        if self._lost >= MOST_DEATHS and not self._came_through:
+            raise WorkersLost(f"the workers die whatever they fly; the last one said: {landing.error}")
+        if noted.size != 1:
+            if order.suspected and not noted.size:
+                self._count_unnoted(order)
+            self._waiting.append(order.suspecting(noted))
+            return
+        case = int(noted[0])
+        self._deaths[case] += case in order.alone
         if kind == LATE:
-            fate = Lost(-1, STATUS_NAME[TIME_LIMIT], f"took longer than {self._case_seconds:g} s")
-            self._suspect(order, noted, fate)
-        elif not order.suspected:
-            self._waiting.append(order.once_more())
-        elif not noted.size and self._unnoted[order] < UNNOTED:
-            self._unnoted[order] += 1  # it waited for a worker that died of another order, or was being set up
-            self._waiting.append(order)
-        elif order.probe and flown.size == 1 and order not in self._twice:
-            self._twice.add(order)  # the worker of an innocent case may be killed from outside, but hardly twice
-            self._waiting.append(order)
-        else:
+            order = order.without(Lost(case, STATUS_NAME[TIME_LIMIT], f"took longer than {self._case_seconds:g} s"))
+        elif self._deaths[case] > 1:
             reason = NO_MEMORY if isinstance(landing.error, MemoryError) else DIED
-            self._suspect(order, noted if noted.size else flown, Lost(-1, STATUS_NAME[WORKER_DIED], reason))
+            order = order.without(Lost(case, STATUS_NAME[WORKER_DIED], reason))
+        self._waiting.append(order.suspecting(noted))
 
-    def _suspect(self, order: Order, cases: np.ndarray, fate: Lost) -> None:
-        """One of these cases of the order is to blame: fly them by halves, and a few one by one."""
-        search = self._searches.get(order) or Search(order)
-        if order.probe and cases.size == 1:
-            search.found.append(replace(fate, case_id=int(cases[0])))
-            self._close_probe(order)
-            return
-        pieces = cases.size if cases.size <= FEW else 2
-        for piece in np.array_split(cases, pieces):
-            probe = order.probing(piece)
-            self._searches[probe] = search
-            self._waiting.append(probe)
-        search.open_probes += pieces
-        if order.probe:
-            self._close_probe(order)
-
-    def _close_probe(self, probe: Order) -> None:
-        search = self._searches.pop(probe)
-        search.open_probes -= 1
-        if search.open_probes:
-            return
-        batch = search.order.batch
-        if not search.found:  # they die in company only, as for want of memory: fly fewer at a time
-            if batch == 1:
-                cases = f"cases {search.order.first} to {search.order.stop - 1}"
-                raise WorkersLost(f"{cases}: their workers die, though each case comes through alone")
-            batch = (batch or FEW) // 2
-        self._waiting.append(search.order.without(search.found, batch))
+    def _count_unnoted(self, order: Order) -> None:
+        """It waited for a worker that died of another order, or was being set up; but not always."""
+        self._unnoted[order.first] += 1
+        if self._unnoted[order.first] > MOST_UNNOTED:
+            raise WorkersLost(f"cases {order.first} to {order.stop - 1}: their workers die before any of them flies")

@@ -1,12 +1,10 @@
-"""What the figures of a model must keep before it flies: fields of the right kind, names of what the model has."""
+"""What the figures of a model must keep before it flies: types of fields, names of what the model has."""
 
 from collections.abc import Iterator
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mc_engine.errors import ModelError
 from mc_engine.figures import (
-    KINDS,
     CorridorFigure,
     Figure,
     FootprintFigure,
@@ -15,24 +13,18 @@ from mc_engine.figures import (
     ProfileFigure,
     ScatterFigure,
 )
+from mc_engine.record_types import refuse_other_types
 from mc_engine.suggestions import hint, nearest
 
 if TYPE_CHECKING:
     from mc_engine.model import Model
 
 _OF_EVERY_CASE = ("case_id", "end_time_s")
-_LISTS = ("quantities", "metrics")  # fields that hold any number of names
 
 
 def refuse_false_figures(model: "Model") -> None:
-    """ModelError if a figure of the model has a field of the wrong kind, or names what the model does not have."""
-    if not isinstance(model.figures, tuple):
-        raise ModelError("`figures` must be a tuple of figures of mc_engine.figures; one alone needs its comma, "
-                         "(MapFigure(...),)")  # fmt: skip
+    """ModelError if a figure of the model has a field of another type, or names what the model does not have."""
     for figure in model.figures:
-        if not isinstance(figure, Figure):
-            kinds = ", ".join(kind.__name__ for kind in KINDS.values())
-            raise ModelError(f"`figures` holds {figure!r}; it must be a tuple of figures of mc_engine.figures: {kinds}")
         spot = f'the {type(figure).__name__} "{figure.title}"'
         refuse_kinds(figure, spot)
         for word, name, known in _names(figure, model):
@@ -42,34 +34,11 @@ def refuse_false_figures(model: "Model") -> None:
 
 
 def refuse_kinds(figure: Figure, spot: str) -> None:
-    """ModelError, which begins with `spot`, if a field of the figure is of the wrong kind."""
-    for one in fields(figure):
-        value = getattr(figure, one.name)
-        wanted = "" if value is None and one.default is None else _wanted(one.name, value)
-        if wanted:
-            raise ModelError(f"{spot} has {value!r} as its `{one.name}`; it must be {wanted}")
-
-
-def _wanted(name: str, value: Any) -> str:
-    """What a field must hold, if it holds anything else; else empty."""
-    if name in _LISTS:
-        return "" if _is_tuple_of(value, str) and value else 'a tuple of names; one alone needs its comma, ("name",)'
-    if name == "target":
-        return "" if _is_tuple_of(value, str, str) else 'two names, ("latitude", "longitude")'
-    if name == "ends_below":
-        pair = _is_tuple_of(value, str, (int, float)) and not isinstance(value[1], bool)
-        return "" if pair else 'a name and a number, ("altitude_km", 35.0)'
-    if name == "upstream":
-        return "" if isinstance(value, bool) else "True or False"
-    return "" if isinstance(value, str) else "a text"
-
-
-def _is_tuple_of(value: Any, *kinds: Any) -> bool:
-    """Whether it is a tuple with one item of each kind, or any number of items of the only one."""
-    if not isinstance(value, tuple):
-        return False
-    wanted = kinds if len(kinds) > 1 else kinds * len(value)
-    return len(value) == len(wanted) and all(isinstance(one, kind) for one, kind in zip(value, wanted, strict=True))
+    """ModelError, which begins with `spot`, if a field of the figure is of another type, or names nothing to draw."""
+    refuse_other_types(figure, spot)
+    for name, value in vars(figure).items():
+        if value == ():
+            raise ModelError(f"{spot} has () as its `{name}`; it must name one at least")
 
 
 def _names(figure: Figure, model: "Model") -> Iterator[tuple[str, str, list[str]]]:

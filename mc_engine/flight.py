@@ -11,6 +11,7 @@ import numpy as np
 
 from mc_engine.case_columns import END_TIME
 from mc_engine.errors import ModelError
+from mc_engine.interruption import in_another_thread
 from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.kernel_parts import settings_class
 from mc_engine.lanes.functions import TABLES
@@ -225,7 +226,7 @@ def _fly_group(
     out = _outputs(model, padded)
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
     cases = ready.parameters[:, index], settings, ready.tables
-    _bound_kernel(model, clock, folder, width, cases, seed, case_ids[index], out, _NO_HISTORY, 1.0)()
+    in_another_thread(_bound_kernel(model, clock, folder, width, cases, seed, case_ids[index], out, _NO_HISTORY, 1.0))
     time, status, states, metrics = out
     return time[:n], status[:n], states[:, :n], metrics[:, :n]
 
@@ -334,7 +335,8 @@ def fly_history(
     history = np.empty((n_rows, len(names)))
     ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
     cases = parameters, settings, ready.tables
-    n = _bound_kernel(model, model.clock, folder, width, cases, seed, ids, _outputs(model, width), history, pace)()
+    out = _outputs(model, width)
+    n = in_another_thread(_bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, history, pace))
     factors = [1.0, *(quantity.si_factor for quantity in model.quantities)]
     return columns, {name: history[:n, i] / factors[i] for i, name in enumerate(names)}
 

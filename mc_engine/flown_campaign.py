@@ -1,16 +1,19 @@
 """The campaign of a run directory, as it was flown: what resumes, replays and workers begin with."""
 
 import os
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from mc_engine.campaign import Campaign, load_campaign
 from mc_engine.derived_files import FIGURES, REPLAYS
 from mc_engine.designs import EXTENSIBLE
-from mc_engine.errors import CampaignError, Problem, StoreError
-from mc_engine.files_read import data_read
+from mc_engine.durable_file import make_way, write_inside
+from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError
 from mc_engine.kernel import source_digest
 from mc_engine.manifest import columns_of, sampling_digest
-from mc_engine.model import sources_of
+from mc_engine.model import load_model, sources_of
+from mc_engine.model_contract import nominal_inputs
 from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS
 from mc_engine.run_folder import readable
 from mc_engine.sensitivity_design import companion
@@ -60,13 +63,8 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
     paths = {base / file for file in files}
     if campaign.table_path is not None:
         paths.add(campaign.table_path)
-    known: dict[Path, bytes] = {}
-    if campaign.model_reference.endswith(".py"):
-        sources = sources_of(campaign.model)
-        known = {**sources.files, **sources.late}
-        paths.update([*known, *data_read(sources.home)])
-    contents = {_name_in(base, path): known[path] if path in known else path.read_bytes() for path in sorted(paths)}
-    for name in contents:
+    contents = {**{_name_in(base, path): path.read_bytes() for path in paths}, **_files_of_model(campaign)}
+    for name in sorted(contents):
         if name != readable(name):
             sentence = f"reads {name!a}, whose name is no text in UTF-8; give it another"
             raise CampaignError(campaign.name, [Problem("campaign.model", sentence)])
@@ -76,6 +74,34 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
             )
             raise CampaignError(campaign.name, [Problem("campaign.model", sentence)])
     return contents if campaign.upstream is None else {**contents, COMPANION: campaign.upstream.rows.content}
+
+
+def _files_of_model(campaign: Campaign) -> dict[str, bytes]:
+    """Sources and data of a model that is a file, as they were read; nothing of an installed one."""
+    if not campaign.model_reference.endswith(".py"):
+        return {}
+    sources, base = sources_of(campaign.model), campaign.directory.resolve()
+    return {_name_in(base, path): content for path, content in sorted({**sources.files, **sources.data}.items())}
+
+
+def refuse_undeclared_data(campaign: Campaign) -> None:
+    """ModelError if the model, which is sound, cannot begin from the copies of its files that a run keeps.
+
+    A file that it opens by a path outside its own folder is not found out.
+    """
+    if not (files := _files_of_model(campaign)):
+        return
+    with TemporaryDirectory(prefix="mc-engine-") as name:
+        folder = Path(name).resolve()
+        for file, content in files.items():
+            make_way(folder, file)
+            write_inside(folder, file, content)
+        try:
+            nominal_inputs(replace(campaign, model=load_model(campaign.model_reference, folder)))
+        except EngineError as error:
+            why = str(error).replace(f"{folder}{os.sep}", "")
+            kept = "a run keeps copies of the model's sources and of the files in Model(data=...), and of no others"
+            raise ModelError(f"{why}; {kept}") from None
 
 
 def _name_in(folder: Path, path: Path) -> str:

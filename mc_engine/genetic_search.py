@@ -75,3 +75,28 @@ def _pymoo() -> dict[str, Any]:
         raise EngineError(f"tuning needs pymoo, which is not installed; {how_to_install('tune')}") from None
     names = (NSGA2, Evaluator, Problem, SBX, PM, LHS, StaticProblem)
     return {one.__name__: one for one in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}
+
+
+def non_dominated(values: np.ndarray) -> np.ndarray:
+    """bool[n], true where no other row is as small in every column and smaller in one; of equal rows the first.
+
+    values : float64[n, n_objectives].  Rows that are not finite are never true.
+    """
+    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+    best = np.zeros(len(values), dtype=bool)
+    usable = np.flatnonzero(np.isfinite(values).all(axis=1))
+    rows = usable[np.unique(values[usable], axis=0, return_index=True)[1]]
+    if rows.size:
+        best[rows[NonDominatedSorting().do(values[rows], only_non_dominated_front=True)]] = True
+    return best
+
+
+def hypervolume(values: np.ndarray, reference: np.ndarray) -> float:
+    """Volume between `reference` and the rows that are below it in every column; 0 where there are none.
+
+    values : float64[n, n_objectives];  reference : float64[n_objectives].
+    """
+    from pymoo.indicators.hv import HV
+
+    return float(HV(ref_point=reference)(values))

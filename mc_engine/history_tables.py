@@ -47,15 +47,9 @@ def read_histories(run: Path, part: Part, quantities: Sequence[Mapping[str, str]
 
 def history_problem(table: pa.Table, quantities: Sequence[Mapping[str, str]]) -> str:
     """What is wrong with the columns of a table of histories; empty if they are case_id, t_s and quantities."""
-    names = table.column_names
-    for name in ("case_id", "t_s"):
-        if name not in names:
-            return f'its columns are not those of histories, "{name}" is missing'
-    known = {"case_id", "t_s", *(quantity["name"] for quantity in quantities)}
-    strange = [name for name in names if name not in known] if quantities else []
-    if strange:
-        return f'its columns are not those of histories, "{strange[0]}" is no quantity of the model'
+    names, known = table.column_names, {"case_id", "t_s", *(quantity["name"] for quantity in quantities)}
+    strange = {*names} - known if quantities else {}
     wanted = parts.arrow_schema(history_columns(names, quantities))
-    if len({*names}) < len(names) or not table.schema.equals(wanted, check_metadata=True):
+    if strange or not {"case_id", "t_s"} <= {*names} or not table.schema.equals(wanted, check_metadata=True):
         return "its columns are not those of histories"
     return ""

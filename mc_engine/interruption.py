@@ -5,9 +5,8 @@ line the first one ends what it is at, the second one the process, whatever it d
 INTERRUPTED, and the last words are the command that goes on.  This module loads next to nothing: the command line
 listens before it loads the rest of itself.
 
-Python hands signals to its main thread, between two steps of its own; a kernel that flies there holds them off for as
-long as it flies.  So a thread of the command line hears them too: it says at once that the first one was heard, and
-ends the process where the main thread does not heed the second.
+Python hands signals to its main thread, between two steps of its own.  Kernels and the compiler hold them off for as
+long as they work, so the main thread of the command line calls them by `in_another_thread`, and waits.
 """
 
 import atexit
@@ -20,19 +19,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from types import FrameType
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from mc_engine.text import clean
 
+if TYPE_CHECKING:
+    from concurrent.futures import Future
+
+T = TypeVar("T")
 INTERRUPTED = 4  # the exit status
 _MODEL_FAULT = 2  # the exit status of all that is wrong with a model
 NOTHING_BEGUN = "interrupted; nothing was begun, and the same command begins it"
 ONCE_MORE = "interrupted; the same command does it all once more"
 LANDING = "interrupted; what flies lands first, a second signal ends it at once"
-BUSY = "interrupted; what is being worked out ends first, a second signal ends it at once"
 
-_PROMPT_S = 0.5  # what the main thread may take to heed a signal
-_LEAVING_S = 5.0  # and to end its workers after the second one
+_LOOK_EVERY_S = 0.2
 _ONE_SIGNAL_S = 0.05  # what comes so soon after another was sent along with it: to the process, and to its group
 
 # Windows has Ctrl-Break beside Ctrl-C, and SIGTERM in name only.
@@ -55,23 +56,32 @@ _leave = os._exit
 class _CommandLine:
     """What the signals of this process find: there is one set of handlers in a process, and so one of these.
 
-    process : that listens.  heard : how many the main thread has heeded.  noticed : how many came, as the watch
-    counts them.
-    under_way : a verb is at work, which an exception may unwind.  landing : what flies is let land before.
-    done : the verb has ended.
+    process : that listens.  heard : how many signals came since then.  last_s : when the last one came.
+    under_way : a verb is at work, which an exception may unwind.  done : the verb has ended.
+    abandoned : a kernel or the compiler is still at work, for nobody.
     """
 
     listening: bool = False
     process: int = 0
     heard: int = 0
-    noticed: int = 0
+    last_s: float = -_ONE_SIGNAL_S
     under_way: bool = False
-    landing: bool = False
     done: bool = False
+    abandoned: bool = False
     advice: Advice = lambda: NOTHING_BEGUN
 
+    def count(self) -> bool:
+        """Count one more signal; false for one that was sent along with the last."""
+        last, self.last_s = self.last_s, time.monotonic()
+        if self.last_s - last < _ONE_SIGNAL_S:
+            return False
+        if self.listening:
+            self.heard += 1
+        return True
+
     def hear(self, number: int, frame: FrameType | None) -> None:
-        self.heard += 1
+        if not self.count():
+            return
         if self.heard > 1:
             self.leave_at_once()
         if self.done:
@@ -84,38 +94,12 @@ class _CommandLine:
         _tell(last_words())
         _leave(INTERRUPTED)
 
-    def notice(self) -> None:
-        """What the watch does about a signal; the main thread may be free to hear it, or not."""
-        self.noticed += 1
-        if self.noticed == 1 and self.landing:
-            _tell(LANDING)
-        elif self.noticed == 1:
-            _later(_PROMPT_S, self._tell_unless_heeded)
-        elif self.noticed == 2:
-            _later(_PROMPT_S, self._leave_unless_heeded)
-
-    def _tell_unless_heeded(self) -> None:
-        if not self.heard and not self.done:
-            _tell(BUSY)
-
-    def _leave_unless_heeded(self) -> None:
-        if self.heard > 1:
-            time.sleep(_LEAVING_S)
-        if not self.done:
-            self.leave_at_once()
-
 
 def _tell(words: str) -> None:
     """A line on standard error; not through sys.stderr, in the middle of whose writing a signal may have come."""
     with suppress(OSError):
         begin = "\n" if os.isatty(2) else ""  # behind ^C and a bar of progress
         os.write(2, f"{begin}{clean(words)}\n".encode())
-
-
-def _later(seconds: float, act: Callable[[], None]) -> None:
-    timer = threading.Timer(seconds, act)
-    timer.daemon = True
-    timer.start()
 
 
 _COMMAND_LINE = _CommandLine()
@@ -127,8 +111,7 @@ def listen() -> None:
     for number in SIGNALS:
         signal.signal(number, _COMMAND_LINE.hear)
     os._exit = _exit_with_a_word
-    _begin_watch()
-    atexit.register(_be_deaf)  # the first one registered is the last one called
+    atexit.register(_end)  # the first one registered is the last one called
 
 
 def _exit_with_a_word(status: int) -> NoReturn:
@@ -141,36 +124,39 @@ def _exit_with_a_word(status: int) -> NoReturn:
     _leave(status)
 
 
-def _begin_watch() -> None:
-    """Begin the thread that hears the signals whatever the main thread is at; without one where the system refuses."""
-    reading, writing = os.pipe()
-    try:
-        if os.name == "posix":
-            os.set_blocking(writing, False)  # as Python asks for; on Windows pipes have no such thing
-        signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
-    except (OSError, ValueError):
-        return
-    threading.Thread(target=_watch, args=(reading,), name="signals", daemon=True).start()
-
-
-def _watch(reading: int) -> None:
-    """Notice every signal whose number Python writes into the pipe the moment it comes."""
-    if hasattr(signal, "pthread_sigmask"):  # they are for the main thread, whose waiting they end
-        signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
-    last = -_ONE_SIGNAL_S
-    while numbers := os.read(reading, 64):
-        if not set(numbers) & set(SIGNALS):
-            continue
-        now = time.monotonic()
-        if now - last >= _ONE_SIGNAL_S:
-            _COMMAND_LINE.notice()
-        last = now
-
-
-def _be_deaf() -> None:
+def _end() -> None:
     """What comes while the interpreter is taken down must not turn the exit status of work that is done."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
+    if _COMMAND_LINE.abandoned:  # and what is still at work must not lose the interpreter under it
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                stream.flush()
+        _leave(INTERRUPTED)
+
+
+def in_another_thread(work: Callable[[], T]) -> T:
+    """What `work` returns or raises.  The main thread of the command line hears signals meanwhile, and may leave it."""
+    if not _COMMAND_LINE.listening or threading.current_thread() is not threading.main_thread():
+        return work()
+    from concurrent.futures import Future, wait
+
+    outcome: Future[T] = Future()
+    threading.Thread(target=_settle, args=(work, outcome), daemon=True).start()
+    try:
+        while not wait([outcome], _LOOK_EVERY_S).done:  # Windows hears nothing in a wait without an end
+            pass
+    except BaseException:
+        _COMMAND_LINE.abandoned = True
+        raise
+    return outcome.result()
+
+
+def _settle(work: Callable[[], T], outcome: "Future[T]") -> None:
+    try:
+        outcome.set_result(work())
+    except BaseException as error:
+        outcome.set_exception(error)
 
 
 @contextmanager
@@ -216,20 +202,20 @@ def stop_signal() -> Iterator[threading.Event]:
         return
 
     def ask(number: int, frame: FrameType | None) -> None:
-        if _COMMAND_LINE.listening:
-            _COMMAND_LINE.heard += 1
+        if not _COMMAND_LINE.count():
+            return
         if stop.is_set():
             raise Interrupted
         stop.set()
+        if _COMMAND_LINE.listening:
+            _tell(LANDING)
 
     before: dict[int, Any] = {number: signal.signal(number, ask) for number in SIGNALS}
-    _COMMAND_LINE.landing = True
     if _COMMAND_LINE.heard:  # before there was this event to set
         stop.set()
     try:
         yield stop
     finally:
-        _COMMAND_LINE.landing = False
         for number, handler in before.items():
             signal.signal(number, handler)
 

@@ -9,7 +9,6 @@ import json
 import os
 import re
 import zlib
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -127,17 +126,12 @@ class Journal:
         self.certain = True  # False from an append that failed on: the file may hold a line that is not in `entries`
         self._length, self._size = found.length, len(content)  # up to the last good line, and in all
 
-    def append(self, event: str, facts: dict[str, Any], judge: Callable[[Entry], None] | None = None) -> Entry:
-        """Write and sync one line.  After an error the line does not count and `append` may be tried again.
-
-        judge : called with the line's entry before it is written, to raise where it must not be.
-        """
+    def append(self, event: str, facts: dict[str, Any]) -> Entry:
+        """Write and sync one line.  After an error the line does not count and `append` may be tried again."""
         number = len(self.entries) + 1
         line = encode(number, utc_now(), event, facts)
         entry = decode(line[:-1], number)
         assert entry is not None  # just encoded
-        if judge is not None:
-            judge(entry)
         if self.certain and os.path.getsize(self.path) != self._size:
             raise StoreError(f"{self.path}: another process has written here; this one stops, and adds nothing")
         self.certain = False

@@ -16,13 +16,11 @@ from scipy.special import ndtr, ndtri
 
 from mc_engine.campaign import Campaign
 from mc_engine.campaign_parts import Requirement, rank_pairs
-from mc_engine.cases import full_inputs
+from mc_engine.chunks import fly_in_threads
 from mc_engine.correlation import gaussian_copula, group_matrix
 from mc_engine.designs import RANDOM
 from mc_engine.distributions import Constant, Discrete, Empirical, quantiles
 from mc_engine.errors import CampaignError, Problem
-from mc_engine.flight import fly
-from mc_engine.kernel import build_kernel, usual_width
 from mc_engine.model_faults import naming_faults
 from mc_engine.statistics.requirements import inside_limits
 from mc_engine.status import OK, STATUS_NAME
@@ -58,8 +56,10 @@ class LimitState:
         """float64[n]: distance inside the nearer limit, in the metric's unit; -inf for a case without a number."""
         if self._watch is not None:
             self._watch(self._n, self._failed)
-        status, metric = self._flown(u, noise)
-        one = self.requirement
+        one, ids = self.requirement, FIRST_NOISE + noise
+        with naming_faults(self.campaign.model_reference, "a case"):
+            flown = fly_in_threads(self.campaign, self.inputs(u), ids, ["status", one.metric], self._workers)
+        status, metric = flown["status"], flown[one.metric]
         able = (status == STATUS_NAME[OK]) & np.isfinite(metric)
         with np.errstate(invalid="ignore"):
             sides = [
@@ -97,26 +97,6 @@ class LimitState:
             assert one.distribution is not None  # a loaded campaign has one for every random design
             table[one.name] = quantiles(one.distribution, shares.get(one.name, np.full(len(u), 0.5)))
         return table
-
-    def _flown(self, u: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(status, metric) of some cases, flown by threads in pieces of whole blocks."""
-        from joblib import Parallel, delayed
-
-        campaign, table, ids = self.campaign, self.inputs(u), FIRST_NOISE + noise
-
-        def task(rows: slice) -> tuple[np.ndarray, np.ndarray]:
-            piece = full_inputs(campaign, {name: values[rows] for name, values in table.items()})
-            flown = fly(campaign.model, piece, ids[rows], campaign.seed, folder=campaign.directory)
-            return flown["status"], flown[self.requirement.metric]
-
-        width = usual_width(campaign.model)
-        size = width * -(-len(ids) // (width * self._workers))
-        with naming_faults(campaign.model_reference, "a case"):
-            build_kernel(campaign.model, campaign.directory, width)  # once, before several threads ask for it
-            pieces = [slice(first, first + size) for first in range(0, len(ids), size)]
-            landed = Parallel(n_jobs=self._workers, backend="threading")(delayed(task)(piece) for piece in pieces)
-        status, metric = (np.concatenate(parts) for parts in zip(*landed, strict=True))
-        return status, metric
 
 
 def _below(upper: np.ndarray | float | None, lower: np.ndarray | float | None) -> np.ndarray | None:

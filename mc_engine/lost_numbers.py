@@ -1,6 +1,5 @@
 """Where a number of a model stopped being finite, in a sentence: file, line, source, and the numbers there."""
 
-import ast
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,18 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.compiler_faults import is_the_users
-from mc_engine.lanes.number import Origin, Place
+from mc_engine.lanes.number import Origin
 from mc_engine.model import Model
-from mc_engine.model_faults import place_in_model
-from mc_engine.physics_scope import shortened
+from mc_engine.model_faults import is_the_users, place_in_model, source_place
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
-from mc_engine.trial_faults import chain_at
 
 _FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the arc sine", "acos": "the arc cosine",
               "tan": "the tangent", "exp": "the exponential"}  # fmt: skip
 PATIENCE_S = 60.0  # of a flight to find the line
-_LONG = 100  # characters of a statement that is shown whole
 
 
 def may_be_lost(model: Model, flight: Mapping[str, np.ndarray]) -> bool:
@@ -61,12 +56,12 @@ def sentence(origin: Origin, who: str = "") -> str:
     happened = f"{_what(origin)} ({', '.join(one for one in (when, who) if one)})"
     if not origin.places:
         return happened
-    ours = [one for one in origin.places if is_the_users(_file(one))] or [origin.places[-1]]
+    ours = [place for place in origin.places if is_the_users(Path(place.file))] or [origin.places[-1]]
     if ours[0] is not origin.places[0]:
-        happened = f"in {_named(origin.places[0])}, {happened}"
+        happened = f"in {origin.places[0]}, {happened}"
     if len(ours) > 1:
-        happened += f", called by {_named(ours[-1])}"
-    return ": ".join(filter(None, (_named(ours[0]), _text(ours[0]), happened)))
+        happened += f", called by {ours[-1]}"
+    return f"{source_place(*ours[0])}: {happened}"
 
 
 def _what(origin: Origin) -> str:
@@ -79,18 +74,3 @@ def _what(origin: Origin) -> str:
     if origin.operation.isidentifier():
         return f"{origin.operation}({', '.join(values)}) is {result}"
     return f"{f' {origin.operation} '.join(values)} is {result}"
-
-
-def _file(place: Place) -> Path:
-    return Path(place.tb_frame.f_code.co_filename)
-
-
-def _named(place: Place) -> str:
-    return f"{_file(place).name}, line {place.tb_lineno}"
-
-
-def _text(place: Place) -> str:
-    """The statement at a place, or of a long one what is computed there."""
-    chain = chain_at(place)
-    whole = next((ast.unparse(node) for node in chain if isinstance(node, ast.stmt)), "")
-    return whole if len(whole) <= _LONG else shortened(ast.unparse(chain[0])) if chain else ""

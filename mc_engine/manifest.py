@@ -27,7 +27,6 @@ _SAMPLING = (
     "distribution_keys",
     "distributions",
     "flight",
-    "halton",
     "sensitivity_design",
     "block_layout",
     "sobol",
@@ -79,6 +78,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
         "quantities": [_record(one) for one in model.quantities],
         "ranges": _ranges(campaign.model),
         "requirements": [asdict(one) for one in campaign.requirements],
+        "report": campaign.report.model_dump(),
         "looks": list(campaign.looks),
         "figures": [*(to_record(figure) for figure in model.figures), *_taken_figures(campaign)],
         "published": [dict(record) for record in model.published],
@@ -135,9 +135,9 @@ def _shared_inputs(campaign: Campaign) -> dict[str, list[dict[str, Any]]]:
     for name, item in inputs_of(campaign.model).items():
         if name in dispersed:
             continue
-        record = {**_record(item), "value": campaign.nominal[name]}
+        record = {**_record(item), "value": campaign.nominal[name], "overridden": name in campaign.parameters}
         if isinstance(item, Setting):
             settings.append({**record, "choices": list(item.choices)})
         else:
-            parameters.append({**record, "overridden": name in campaign.parameters})
+            parameters.append(record)
     return {"parameters": parameters, "settings": settings}

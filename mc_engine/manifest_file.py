@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import from_json
 
-from mc_engine.campaign_file import Share
+from mc_engine.campaign_file import ReportSection, Share
 from mc_engine.errors import ModelError
 from mc_engine.figure_rules import refuse_kinds
 from mc_engine.figures import KINDS, from_record
@@ -118,7 +118,6 @@ class _Published(Record):
     status: str = ""
     note: str = ""
     column: str | None = None
-    computed_column: str | None = None
     ours: Value | None = None
     at: dict[str, Value] | None = None
     tolerance: float | None = None
@@ -170,6 +169,7 @@ class Head(Record):
     settings: list[_Described] = []
     quantities: list[_Described] = []
     requirements: list[_Requirement] = []
+    report: ReportSection = ReportSection()
     looks: list[CaseNumber] = []
     figures: list[_Figure] = []
     published: list[_Published] = []

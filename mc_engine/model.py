@@ -22,6 +22,7 @@ import numpy as np
 from mc_engine.case_files import FileFault, resolve_beside
 from mc_engine.dates import modified_julian_date
 from mc_engine.errors import ModelError
+from mc_engine.figures import Figure
 from mc_engine.model_faults import place_in_model, relative_import, wrong_record
 from mc_engine.model_imports import find_unimported
 from mc_engine.model_sources import Sources, sources_of_file, sources_of_module
@@ -197,6 +198,8 @@ class Model:
         each Extremum
     tables(o) -> float64[n], NumPy: numbers that all cases of the same settings share, such as a reference path;
         physics reads them with look_up(o.tables, place)
+    data : files that the model reads while it is imported, such as ("aero.csv", "tables/wind.csv"), named from the
+        model's own folder and inside it.  They count as its source and a run directory keeps copies of them.
     """
 
     name: str
@@ -221,7 +224,8 @@ class Model:
     event_list: tuple[Event, ...] = ()
     extrema: tuple[Extremum, ...] = ()
     tables: Callable[..., np.ndarray] | None = None
-    figures: tuple[Any, ...] = ()
+    figures: tuple[Figure, ...] = ()
+    data: tuple[str, ...] = ()
     watching: bool = False  # see mc_engine.event_watch
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
@@ -270,6 +274,10 @@ def load_model(reference: str, beside: Path | None = None) -> Model:
     model = getattr(sources.module, "MODEL", None)
     if not isinstance(model, Model):
         raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
+    try:
+        sources = sources.with_data(model.data)
+    except ModelError as error:
+        raise ModelError(f'"{reference}": {error}') from None
     object.__setattr__(model, "reference", reference)
     object.__setattr__(model, "sources", sources)
     return model
@@ -303,7 +311,7 @@ def _from_module(reference: str) -> Sources:
     if not _defines_model(spec):
         raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
     try:
-        return sources_of_module(reference)
+        return sources_of_module(reference, Path(spec.origin or "").parent)
     except ModuleNotFoundError as error:
         raise ModelError(f'"{reference}" needs the package "{error.name}", which is not installed') from None
     except (Exception, SystemExit) as error:
@@ -333,8 +341,9 @@ def _fault(reference: str, error: BaseException) -> str:
         return f"{place}: ends the program; a model only defines MODEL"
     if isinstance(error, ModelError):
         return f"{place}: {error}"
-    if word := re.fullmatch(r"Type names and field names cannot be a keyword: '(\w+)'", str(error)):
-        return f'{place}: the name "{word[1]}" is a word of Python; take another'
+    if isinstance(error, FileNotFoundError):
+        name = Path(error.filename or str(error).removesuffix(" not found.")).name
+        return f'{place}: there is no file "{name}"; a model\'s data stand beside it and in Model(data=("{name}",))'
     if words := wrong_record(error) or relative_import(error):
         return f"{place}: {words}"
     text = error.msg if isinstance(error, SyntaxError) else str(error)

@@ -17,9 +17,9 @@ from mc_engine.campaign import Campaign
 from mc_engine.errors import EngineError, ModelError
 from mc_engine.flight import grid_of, prepare, settings_of
 from mc_engine.model import FixedStep
-from mc_engine.model_faults import MORE
+from mc_engine.model_faults import MORE, fault_of
 from mc_engine.physics_source import is_shipped, source_faults
-from mc_engine.physics_trial import FEW, Breach, fault_sentence, run_through
+from mc_engine.physics_trial import FEW, Breach, run_through
 from mc_engine.safe_path import SAFE_PATH
 
 _PATIENCE = 600.0  # s, for all flights and compilation; one case has a limit of its own
@@ -80,7 +80,7 @@ def nominal_inputs(campaign: Campaign) -> tuple[Any, Any]:
     except SystemExit:
         raise Breach(f"`{doing}` ends the process; a model only computes") from None
     except Exception as error:
-        raise Breach(fault_sentence(doing, error)) from None
+        raise Breach(f"`{doing}`: {fault_of(error, 'the model')}") from None
     if ready.refusals.mask[0]:
         raise Breach(f"the nominal case is refused: {ready.refusals.reason[0]}")
     for name, row in zip(model.kernel_parameters._fields, ready.parameters, strict=True):  # type: ignore[attr-defined]

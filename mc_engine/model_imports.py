@@ -6,7 +6,7 @@ are neither read nor written: Python would take one for a source's own by its si
 
 import linecache
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader, SourcelessFileLoader
@@ -15,9 +15,7 @@ from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any
 
-from mc_engine.files_read import USER
-
-Read = Callable[[Path], bytes | None]  # the content of a file, read once; None where there is no such file
+USER = "mc_engine_user_"  # begins the name of every module from a campaign's folder
 _ENGINE = "mc_engine"
 
 
@@ -59,13 +57,13 @@ def new_module(name: str, path: Path, content: bytes, **names: Any) -> ModuleTyp
 
 
 @contextmanager
-def importable(folder: Path, mark: str, read: Read) -> Iterator[None]:
+def importable(folder: Path, mark: str, contents: Mapping[Path, bytes]) -> Iterator[None]:
     """Let the sources in `folder` be imported, and forget their names again: another campaign's may have the same.
 
-    mark : of their contents.  A module goes on under a name with it, so that a cached kernel finds the functions that
-    it was made of again, and no others.
+    contents : of the sources, by file.  mark : of their contents.  A module goes on under a name with it, so that a
+    cached kernel finds the functions that it was made of again, and no others.
     """
-    finder = _Beside(folder, mark, read)
+    finder = _Beside(folder, mark, contents)
     # what a program has imported from there by itself may come from a bytecode file
     before = {name: module for name, module in sys.modules.items() if _is_imported_from(folder, name, module)}
     for name in before:
@@ -91,8 +89,8 @@ class _Beside(MetaPathFinder):
     roots : names of what was found in the folder.
     """
 
-    def __init__(self, folder: Path, mark: str, read: Read):
-        self._folder, self._mark, self._read = folder, mark, read
+    def __init__(self, folder: Path, mark: str, contents: Mapping[Path, bytes]):
+        self._folder, self._mark, self._contents = folder, mark, contents
         self.roots: set[str] = set()
 
     def find_spec(self, fullname: str, path: Any = None, target: ModuleType | None = None) -> ModuleSpec | None:
@@ -114,7 +112,7 @@ class _Beside(MetaPathFinder):
     def _source(self, fullname: str, place: Path) -> ModuleSpec | None:
         name = f"{USER}{fullname.replace('.', '_')}_{self._mark}"
         for file, inside in ((place / "__init__.py", [str(place)]), (place.with_name(f"{place.name}.py"), None)):
-            if (content := self._read(file)) is not None:
+            if (content := self._contents.get(file)) is not None:
                 loader = CapturedLoader(name, file, content)
                 return spec_from_file_location(fullname, file, loader=loader, submodule_search_locations=inside)
         return None

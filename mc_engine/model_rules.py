@@ -3,10 +3,8 @@
 import json
 from collections.abc import Iterable
 from keyword import iskeyword
-from math import inf, isnan
+from math import inf
 from typing import Any
-
-import numpy as np
 
 from mc_engine.errors import ModelError
 from mc_engine.figure_rules import refuse_false_figures
@@ -19,9 +17,9 @@ from mc_engine.model import (
     FixedStep,
     Model,
     Named,
-    Parameter,
     Setting,
 )
+from mc_engine.record_types import refuse_other_types
 from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_hint, unit_suffix
 
@@ -35,10 +33,16 @@ _METHODS = {"FixedStep": ("rk4",), "AdaptiveStep": ("dop853", "dp54")}
 
 def refuse_contradictions(model: Model) -> None:
     """ModelError with one sentence if the model contradicts itself or names what there is not."""
-    for word in ("name", "title", "source"):
-        if not isinstance(getattr(model, word), str):
-            raise ModelError(f"the model's `{word}` is {getattr(model, word)!r}; it must be a text")
-    _refuse_other_records(model)
+    refuse_other_types(model, "the model")
+    named: tuple[Any, ...] = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
+    for record in (*named, *model.event_list, *model.extrema):
+        refuse_other_types(record, f'{type(record).__name__} "{record.name}"')
+    refuse_other_types(model.clock, "the clock")
+    for name in ("states", "quantities", "metrics"):
+        if not getattr(model, name):
+            raise ModelError(f"`{name}` is empty; a model has one at least")
+    if not hasattr(model.kernel_parameters, "_fields"):
+        raise ModelError("kernel_parameters must be a named tuple, whose fields are the parameters' names without unit")
     _refuse_half_letters(model)
     inputs: tuple[Named, ...] = (*model.parameters, *model.settings)
     for one in (*inputs, *model.states, *model.quantities, *model.metrics):
@@ -51,10 +55,6 @@ def refuse_contradictions(model: Model) -> None:
     _refuse_twice("quantity", [one.name for one in model.quantities])
     _refuse_twice("extremum", [one.name for one in model.extrema])
     _refuse_twice("event", [one.name for one in model.event_list])
-    for parameter in model.parameters:
-        _refuse_numbers(f'parameter "{parameter.name}"', parameter.default, parameter.low, parameter.high)
-    for one in (*model.states, *model.quantities, *model.metrics):
-        _refuse_numbers(f'"{one.name}"', one.low, one.high)
     for setting in model.settings:
         _refuse_choice(setting)
     for extremum in model.extrema:
@@ -70,22 +70,6 @@ def refuse_contradictions(model: Model) -> None:
     _refuse_clock(model.clock, [one.symbol for one in model.settings], len(model.states))
 
 
-def _refuse_other_records(model: Model) -> None:
-    """ModelError unless each list of the model is a tuple of its own kind of record, and none is empty that must not
-    be."""
-    kinds = {"parameters": Parameter, "settings": Setting, "states": Field, "quantities": Field, "metrics": Field,
-             "event_list": Event, "extrema": Extremum}  # fmt: skip
-    for name, kind in kinds.items():
-        items = getattr(model, name)
-        if not isinstance(items, tuple) or not all(isinstance(one, kind) for one in items):
-            raise ModelError(f"`{name}` must be a tuple of {kind.__name__}; one alone needs its comma, "
-                             f"({kind.__name__}(...),)")  # fmt: skip
-        if not items and name in ("states", "quantities", "metrics"):
-            raise ModelError(f"`{name}` is empty; a model has one at least")
-    if not hasattr(model.kernel_parameters, "_fields"):
-        raise ModelError("kernel_parameters must be a named tuple, whose fields are the parameters' names without unit")
-
-
 def _refuse_half_letters(model: Model) -> None:
     """ModelError for text that no file can hold: half of a pair of UTF-16."""
     records = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
@@ -99,9 +83,6 @@ def _refuse_half_letters(model: Model) -> None:
 
 
 def _refuse_name(one: Named) -> None:
-    for word, value in (("name", one.name), ("unit", one.unit), ("description", one.description)):
-        if not isinstance(value, str):
-            raise ModelError(f'"{one.name}" has {value!r} as its {word}; it must be a text')
     if one.unit not in UNITS:
         raise ModelError(f'"{one.name}" has the unit "{one.unit}"{unit_hint(one.unit)}')
     suffix = unit_suffix(one.unit)
@@ -111,17 +92,8 @@ def _refuse_name(one: Named) -> None:
     _refuse_word("name", one.symbol)
 
 
-def _refuse_numbers(what: str, *values: Any) -> None:
-    for value in values:
-        if not isinstance(value, int | float | np.number) or isinstance(value, bool) or isnan(value):
-            raise ModelError(f"{what} has {value!r} where a number is wanted, without quotes")
-
-
 def _refuse_choice(setting: Setting) -> None:
     """ModelError for a setting whose own value is none of its words."""
-    if not isinstance(setting.choices, tuple) or not all(isinstance(word, str) for word in setting.choices):
-        raise ModelError(f'setting "{setting.name}" has the choices {setting.choices!r}; they must be a tuple of '
-                         'words, ("one", "other")')  # fmt: skip
     if setting.choices and str(setting.default) not in setting.choices:
         raise ModelError(f'setting "{setting.name}" has the default {setting.default!r}'
                          f"{hint(str(setting.default), setting.choices)}")  # fmt: skip
@@ -166,8 +138,6 @@ def _refuse_unknown(what: str, word: Any, known: Iterable[str]) -> None:
 def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], n_states: int) -> None:
     """ModelError for numbers by which nothing can fly.  settings : symbols that a clock may name."""
     kind = type(clock).__name__
-    if kind not in _METHODS:
-        raise ModelError("`clock` must be a FixedStep(...) or an AdaptiveStep(...)")
     _refuse_unknown("the clock has the method", clock.method, _METHODS[kind])
     _refuse_time("until", clock.until, settings)
     if isinstance(clock, FixedStep):
@@ -199,8 +169,7 @@ def _refuse_time(name: str, value: Any, settings: list[str], least: float | None
         return
     allowed = "above 0" if least is None else f"at least {least:g}"
     allowed += f", and {most:,.0f} at most" if most <= _MOST_ATTEMPTS else ""
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not number or not (0.0 < value <= most if least is None else least <= value <= most):
+    if not (0.0 < value <= most if least is None else least <= value <= most):
         raise ModelError(f"the clock's `{name}` is {value!r}; it must be a number {allowed}")
 
 

@@ -5,17 +5,19 @@ is read once: its content is what runs, what the digest is of, and what a run di
 """
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from mc_engine.files_read import USER, data_within
+from mc_engine.case_files import FileFault, resolve_beside
+from mc_engine.errors import ModelError
 from mc_engine.lanes.physics_function import PhysicsFunction
-from mc_engine.model_imports import PACKAGES, CapturedLoader, importable, new_module
-from mc_engine.syntax_tree import imported_names
+from mc_engine.model_imports import PACKAGES, USER, CapturedLoader, importable, new_module
+from mc_engine.syntax_tree import data_names, imported_names
 
 _ENGINE = "mc_engine"  # its own sources are counted apart
 
@@ -24,54 +26,71 @@ _ENGINE = "mc_engine"  # its own sources are counted apart
 class Sources:
     """A model's module and the files that it was made of, as they were read.
 
-    home : folder that the names of the files begin in.  late : those that only the import of the model has asked for,
-    such as its data.
+    home : folder that the names of the files begin in.  folder : the model's own.  data : contents of the files that
+    Model(data=...) names, as they were before the import.
     """
 
     module: ModuleType
     home: Path
+    folder: Path
     files: Mapping[Path, bytes]
-    late: Mapping[Path, bytes]
+    data: Mapping[Path, bytes]
 
     def named(self) -> Iterator[tuple[str, bytes]]:
         """Names, such as "lib/guidance.py", and contents in a fixed order."""
-        contents = {**self.files, **self.late}
+        contents = {**self.files, **self.data}
         for path in sorted(contents):
             name = path.relative_to(self.home).as_posix() if path.is_relative_to(self.home) else path.name
             yield name, contents[path]
 
-    def data_has_changed(self) -> bool:
-        """Whether a file that only the import has asked for has other contents now."""
-        return any(_content(path) != content for path, content in self.late.items())
+    def with_data(self, names: Sequence[str]) -> "Sources":
+        """The same with the data of the model itself; ModelError for a name that is wrong.
+
+        The model opens its data itself while it is imported.  What lay there before the import and lies there after it
+        is what the model has read.
+        """
+        try:
+            paths = {resolve_beside(self.folder, name, "the model"): name for name in names}
+        except FileFault as fault:
+            raise ModelError(f"data: {fault}") from None
+        for path, name in paths.items():
+            if path not in self.data:
+                raise ModelError(f'data: write "{name}" into the call itself, as in Model(..., data=("{name}",))')
+            if _content(path) != self.data[path]:
+                raise ModelError(f'data: "{name}" was changed while the model was loaded; begin again')
+        return replace(self, data={path: self.data[path] for path in paths})
 
 
 _OF_FILES: dict[str, Sources] = {}  # by the name of the module
 
 
 def sources_of_file(path: Path) -> Sources:
-    """Import a user's file under a name that depends on its text, so that an edited file is a new module.
+    """Import a user's file under a name that depends on its text and data, so that an edited file is a new module.
 
     The files and packages beside it can be imported, and count as its text.
     """
-    files, late = sources_beside(path), dict[Path, bytes]()
-    texts = (f"{file}\n{len(text)}\n".encode() + text for file, text in files.items())
+    files = sources_beside(path)
+    data = _data_in(path.parent, files.values())
+    texts = (f"{file}\n{len(text)}\n".encode() + text for file, text in {**files, **data}.items())
     mark = sha256(str(path).encode() + b"".join(texts)).hexdigest()[:12]
     name = f"{USER}{path.stem}_{mark}"
-    known = _OF_FILES.get(name)
-    if known is not None and not known.data_has_changed():
-        return known
-
-    def read(file: Path) -> bytes | None:
-        content = files.get(file, late.get(file))
-        if content is None and (content := _content(file)) is not None:
-            late[file] = content
-        return content
-
-    with importable(path.parent, mark, read), data_within(path.parent, late):
-        module = new_module(name, path, files[path])
-    remaining = {file: content for file, content in late.items() if file.is_file()}
-    _OF_FILES[name] = Sources(module, path.parent, files, remaining)
+    if name not in _OF_FILES:
+        with importable(path.parent, mark, files):
+            module = new_module(name, path, files[path])
+        _OF_FILES[name] = Sources(module, path.parent, path.parent, files, data)
     return _OF_FILES[name]
+
+
+def _data_in(folder: Path, sources: Iterable[bytes]) -> dict[Path, bytes]:
+    """Contents of the files that calls of `Model` in these sources name as their data; those that cannot be read are
+    left out."""
+    found = {}
+    for name in sorted({name for source in sources for name in data_names(source)}):
+        with suppress(FileFault):
+            path = resolve_beside(folder, name)
+            if (content := _content(path)) is not None:
+                found[path] = content
+    return found
 
 
 def sources_beside(file: Path) -> dict[Path, bytes]:
@@ -99,12 +118,13 @@ def _content(path: Path) -> bytes | None:
         return None
 
 
-def sources_of_module(name: str) -> Sources:
+def sources_of_module(name: str, folder: Path) -> Sources:
     """Import a module with its model: its folder, and what it reaches of its package or of other physics.
 
     What a program has imported before, by itself, counts as what its files say now.
     """
     root = name.partition(".")[0]
+    data = _data_in(folder, _contents(folder.glob("*.py")).values())
     with PACKAGES.loading(root):
         module = import_module(name)
     assert module.__file__ is not None  # a model's module always comes from a file
@@ -120,7 +140,7 @@ def sources_of_module(name: str) -> Sources:
                 waiting.append(reached)
                 found[Path(str(sys.modules[reached].__file__))] = _source(reached)
     base = home.parents[name.count(".") + (home.name == "__init__.py")]
-    return Sources(module, base, found, {})
+    return Sources(module, base, folder, found, data)
 
 
 def _imports(name: str) -> list[str]:

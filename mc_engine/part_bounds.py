@@ -20,15 +20,15 @@ class Stretch:
     chunk: int | None
 
 
-def stretches(entries: Iterable[Entry], stop: int) -> list[Stretch]:
-    """What a run began with, up to the case `stop`, and each extension, as its journal tells."""
+def stretches(entries: Iterable[Entry], stop: int, end: int) -> list[Stretch]:
+    """What a run began with, up to the case `stop`, and each extension up to `end`, as its journal tells."""
     found = [Stretch(stop, None)]
     for entry in entries:
         if entry.event == "extended":
             found.append(Stretch(entry.facts["cases"], None))
         elif entry.event in ("started", "merged") and found[-1].chunk is None:
             found[-1] = Stretch(found[-1].stop, entry.facts.get("chunk"))
-    return found
+    return [*found[:-1], Stretch(end, found[-1].chunk)]  # where the line of the last extension is lost, it ends before
 
 
 def part_bounds(missing: Sequence[Range], entries: Sequence[Entry], along: Sequence[Stretch], size: int) -> list[Range]:

@@ -239,8 +239,8 @@ def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) ->
         table = parquet_table(content, None if columns is None else [column.name for column in columns])
     except ValueError as error:
         raise StoreError(f"{path}: {error}{more}") from None
-    if problem := table_problem(table, part, columns):
-        raise StoreError(f"{path}: {problem}{more}")
+    if table.num_rows != part.rows or not (columns is None or table.schema.equals(arrow_schema(columns))):
+        raise StoreError(f"{path}: is no part of this run, it has other rows or columns{more}")
     return table
 
 
@@ -274,22 +274,6 @@ def _refuse_size(metadata: Any, most: int) -> None:
     sizes = [metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups)]
     if max(metadata.num_rows * metadata.num_columns, *sizes, sum(sizes) // 16, 0) > most:
         raise ValueError(f"it has more than the {most:,} cells that are read at once")
-
-
-def table_problem(table: pa.Table, part: Part, columns: Sequence[Column] | None) -> str:
-    """What is wrong with a table by the receipt of its part, and by its columns where they are known; else empty."""
-    if table.num_rows != part.rows:
-        return f"{table.num_rows} rows where the journal says {part.rows}"
-    names, wanted = table.column_names, None if columns is None else arrow_schema(columns)
-    if wanted is not None and not table.schema.equals(wanted):
-        missing = [name for name in wanted.names if name not in names]
-        told = f', "{missing[0]}" is missing' if missing else ""
-        return f"its columns are not those of the manifest{told}"
-    if "case_id" not in names or cases_in_name(part.file) is None:
-        return ""
-    if names.count("case_id") > 1 or not np.array_equal(table["case_id"].to_numpy(), np.arange(part.first, part.stop)):
-        return f"its case_id does not count from {part.first} to {part.stop - 1}"
-    return ""
 
 
 def content_problem(content: bytes, part: Part) -> str:

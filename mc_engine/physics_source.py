@@ -1,22 +1,26 @@
-"""What the source of a model's physics shows to be wrong, read without running it: each fault a sentence.
+"""What physics may contain, and what else a model's physics contains, read without running it: each breach a sentence.
 
-Read are the model's functions and all the physics that they call, down to the engine's own.  What the reader cannot
-follow is left to the trial and to the compiler.
+Read are the model's functions and all the physics that they call, down to the engine's own.  `_SYNTAX`, `_VALUES` and
+`_BUILTINS` are the list; the trial finds by running what the source alone does not show.
 """
 
 import ast
 import builtins
 import inspect
+import random
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
+from enum import Enum
 from pathlib import Path
-from types import CodeType, FunctionType
+from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
+
+import numpy as np
 
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model import Model
-from mc_engine.physics_loops import MOST_TIMES, counts, times
-from mc_engine.physics_scope import Scope, code_of, definition_of, running, shortened
+from mc_engine.model_faults import PHYSICS, source_place
+from mc_engine.syntax_tree import tree_of_file
 
 # The arguments that the engine hands to each function of a model.
 ARGUMENTS = {
@@ -32,26 +36,54 @@ ARGUMENTS = {
     "tables": "o",
 }
 INTERPRETED = ("prepare", "tables")  # NumPy, a whole chunk at a time
+
+# The syntax of physics.
+_SYNTAX = (
+    ast.FunctionDef, ast.Lambda, ast.arguments, ast.arg, ast.Return, ast.Expr, ast.Pass, ast.Assert, ast.Raise,
+    ast.Assign, ast.AugAssign, ast.AnnAssign, ast.NamedExpr,
+    ast.If, ast.IfExp, ast.For, ast.While, ast.Break, ast.Continue, ast.Try, ast.ExceptHandler,
+    ast.Match, ast.match_case, ast.pattern,
+    ast.Constant, ast.Name, ast.Attribute, ast.Subscript, ast.Slice, ast.Tuple, ast.Starred, ast.Call, ast.keyword,
+    ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare,
+    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.LShift, ast.RShift,
+    ast.BitAnd, ast.BitOr, ast.BitXor, ast.UAdd, ast.USub, ast.Not, ast.boolop, ast.cmpop, ast.expr_context,
+)  # fmt: skip
+# What physics reads from outside of a function.  Functions are judged by `_wrong_function`.
+_VALUES = (bool, int, float, str, tuple, np.ndarray, np.generic, Enum, type(None), ModuleType, SimpleNamespace, type,
+           PhysicsFunction)  # fmt: skip
+_BUILTINS = {abs, bool, divmod, enumerate, float, int, len, max, min, pow, range, round, sum, tuple, zip}
+
+_TUPLES = "keep numbers in tuples and named tuples"
+_KEEP = "what changes is kept in the state or in the memory, and a record is made anew, State(...) with every field"
+_OWN = "a case depends on its inputs and case_id alone: noise comes from the `draws` of `control`"
+_RETURN = "physics computes and returns; write def and `return`"
+# The usual fix of what is not on the list; without one, the list itself.
+_FIXES = (
+    ((ast.List, ast.Dict, ast.Set), f"a list, dictionary or set is not for physics; {_TUPLES}"),
+    ((ast.ListComp, ast.DictComp, ast.SetComp, ast.GeneratorExp),
+     f"a comprehension or generator is not for physics; write its terms out, or loop with `for`; {_TUPLES}"),
+    ((ast.Yield, ast.YieldFrom, ast.Await, ast.AsyncFor, ast.AsyncWith, ast.AsyncFunctionDef),
+     f"`async`, `await` and `yield` are not for physics; {_RETURN}"),
+    ((ast.Global, ast.Nonlocal), f"physics assigns to its own names; {_KEEP}"),
+    ((ast.Import, ast.ImportFrom), "an import is not for physics; move it to the top of the file"),
+    ((ast.With,), "`with` is not for physics, which only computes; leave it out"),
+    ((ast.MatMult,), "`@` is not for physics; write the products and their sum out"),
+    ((ast.Invert,), "`~` is not for physics; write `not mask`"),
+)  # fmt: skip
+
 _ENGINE = Path(__file__).resolve().parent
-_ALLOCATING = {"array", "arange", "empty", "zeros", "ones", "full", "linspace", "stack", "concatenate", "list", "dict"}
-_MADE = ast.List | ast.ListComp | ast.Dict | ast.DictComp | ast.Set | ast.SetComp
-_BUILTINS = {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range",
-             "round", "sum", "tuple", "zip"}  # fmt: skip
-_RECORD = {"_replace": "write State(...) with every field", "_asdict": "name the fields one by one",
-           "_make": "write State(...) with every field"}  # fmt: skip
-_FOREIGN = {"numpy", "numba", *sys.stdlib_module_names}
-_OWN = "a case must depend on its inputs and case_id alone"
-_KEEP = "what changes is kept in the state or in the memory"
+_AT_DEFINITION = {"annotation", "returns", "defaults", "kw_defaults", "decorator_list"}  # run once, by Python alone
+# What the attributes of may be read: nothing of it runs code of the user's.
+_FOLLOWED = (ModuleType, SimpleNamespace, np.random.Generator, np.random.RandomState, random.Random)
 
 
 def source_faults(model: Model) -> list[str]:
-    """Sentences on functions without decorator or with other arguments, and on what physics cannot do."""
-    found = list(_wrong_functions(model))
-    reader = _Reader({one.symbol: one.choices for one in model.settings})
+    """Sentences on functions without decorator or with other arguments, and on what physics may not contain."""
+    reader = _Reader(frozenset(setting.symbol for setting in model.settings))
     for name, function in _functions(model):
         if name not in INTERPRETED and isinstance(function, PhysicsFunction):
             reader.read(function, name, ())
-    return list(dict.fromkeys([*found, *reader.found]))
+    return [*_wrong_functions(model), *reader.breaches]
 
 
 def is_shipped(model: Model) -> bool:
@@ -64,6 +96,11 @@ def place_of(function: Callable[..., Any]) -> str:
     """Such as "model.py, line 12"."""
     code = code_of(function)
     return f"{Path(code.co_filename).name}, line {code.co_firstlineno}" if code else "the model"
+
+
+def code_of(function: Callable[..., Any]) -> CodeType | None:
+    """The code that a function, marked or not, was written as; None where it is something else."""
+    return getattr(inspect.unwrap(getattr(function, "function", function)), "__code__", None)
 
 
 def _functions(model: Model) -> Iterator[tuple[str, Callable[..., Any]]]:
@@ -90,16 +127,16 @@ def _wrong_functions(model: Model) -> Iterator[str]:
 
 
 class _Reader:
-    """Reads functions, each once, and gathers the faults.  settings : their choices by symbol."""
+    """Reads functions, each once, and gathers the breaches.  settings : their symbols."""
 
-    def __init__(self, settings: Mapping[str, tuple[str, ...]]) -> None:
-        self.found: list[str] = []
+    def __init__(self, settings: frozenset[str]) -> None:
+        self.breaches: list[str] = []
         self._settings = settings
         self._read: set[PhysicsFunction] = set()
-        self._said: set[tuple[CodeType, str]] = set()
+        self._named: set[tuple[CodeType, int | str]] = set()
 
     def read(self, physics: PhysicsFunction, name: str, callers: tuple[PhysicsFunction, ...]) -> None:
-        """Faults of a function and of the physics that it calls.  callers : the functions that it is called from.
+        """Breaches of a function and of the physics that it calls.  callers : the functions that it is called from.
 
         Functions are told apart by themselves, not by their code, which all that one factory makes share.
         """
@@ -109,170 +146,157 @@ class _Reader:
         if physics in callers:
             self._add(code, code.co_firstlineno, f"`{name}` calls itself; physics has no recursion, unroll it")
             return
-        tree = None if physics in self._read else definition_of(code)
+        tree = None if physics in self._read else _definition(code)
         self._read.add(physics)
         if tree is None:
             return
-        if isinstance(tree, ast.AsyncFunctionDef):
-            self._add(code, code.co_firstlineno, f"`{name}` is an async def; write def, physics waits for nothing")
-            return
-        if isinstance(tree, ast.FunctionDef) and tree.args.kwonlyargs:
-            self._add(code, code.co_firstlineno, _behind_a_star(name, tree.args))
-        nodes = list(running(tree))
-        scope = Scope(inspect.unwrap(physics.function), nodes, self._settings)
-        for node in nodes:
-            for sentence in _faults(node, name, scope):
-                self._add(code, getattr(node, "lineno", code.co_firstlineno), sentence)
+        nodes = [(tree, code.co_firstlineno), *_running(tree, code.co_firstlineno)]
+        scope = _Scope(inspect.unwrap(physics.function), [node for node, _ in nodes[1:]], self._settings)
+        for node, line in nodes:
+            if words := _breach(node, scope):
+                self._add(code, line, words)
             called = scope.value(node)
             if isinstance(called, PhysicsFunction):
                 self.read(called, called.function.__name__, (*callers, physics))
-            elif isinstance(node, ast.Call) and _is_unmarked(scope.value(node.func)):
-                helper = scope.value(node.func)
-                sentence = f"`{helper.__name__}` is not marked, and `{name}` calls it; write @physics on the line above"
-                self.found.append(f"{place_of(helper)}: {sentence}")
 
-    def _add(self, code: CodeType, line: int, sentence: str) -> None:
-        if (code, sentence) not in self._said:  # a name that is used twice is one mistake
-            self._said.add((code, sentence))
-            self.found.append(f"{Path(code.co_filename).name}, line {line}: {sentence}")
+    def _add(self, code: CodeType, line: int, words: str) -> None:
+        """One sentence a line, and one for a mistake that is made on several."""
+        if not {(code, line), (code, words)} & self._named:
+            self._named |= {(code, line), (code, words)}
+            self.breaches.append(f"{source_place(code.co_filename, line)}: {words}")
 
 
-def _faults(node: ast.AST, name: str, scope: Scope) -> Iterator[str]:
-    """Sentences on one node of the function `name`."""
-    if isinstance(node, _MADE):
-        yield f"a list, dictionary or set is made in every step of `{name}`; keep numbers in named tuples instead"
-    elif isinstance(node, ast.While) and not counts(node, scope):
-        yield f"`while` in `{name}` may never end for some case; write for k in range(most) and where(condition, a, b)"
-    elif isinstance(node, ast.Global | ast.Nonlocal):
-        yield f"`{ast.unparse(node)}` in `{name}`: {_OWN}; {_KEEP}"
-    elif isinstance(node, ast.Name | ast.Attribute) and isinstance(scope.value(node), list | dict | set):
-        kind = type(scope.value(node)).__name__
-        yield f"`{ast.unparse(node)}` in `{name}` is a {kind} outside of it; physics reads numbers and tuples, {_KEEP}"
-    elif isinstance(node, ast.Call):
-        if times(node, scope) > MOST_TIMES:  # minutes of a step, or more
-            yield f"`{ast.unparse(node)}` in `{name}` goes round more than {MOST_TIMES:,} times a step; shorten it"
-        constant = all(scope.is_constant(one) for one in [*node.args, *(one.value for one in node.keywords)])
-        if not scope.is_own(node.func):
-            yield from _wrong_call(ast.unparse(node.func), scope.value(node.func), name, constant)
-            yield from _left_to_a_default(node, scope.value(node.func), name)
-    elif isinstance(node, ast.FunctionDef | ast.Lambda) and node.args.kwonlyargs:
-        yield _behind_a_star(getattr(node, "name", "a lambda"), node.args)
-    elif isinstance(node, ast.Import | ast.ImportFrom):
-        yield f"`{ast.unparse(node)}` in `{name}`; move the import to the top of the file"
-    elif isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load):
-        if not isinstance(scope.value(node.value), list | dict | set):  # which is a mistake of its own
-            yield f"`{ast.unparse(node)}` is written in `{name}`, where arrays and tuples are only read; {_KEEP}"
-    elif isinstance(node, ast.Compare):
-        yield from _compared_with_a_text(node, name, scope)
-        yield from _compared_by_identity(node, name, scope)
-    else:
-        yield from _beyond_physics(node, name, scope)
+class _Scope:
+    """What the names of one function stand for, as far as they come from outside.  nodes : what runs in it."""
+
+    def __init__(self, function: Any, nodes: list[ast.AST], settings: frozenset[str]):
+        self.settings = settings
+        cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+        self._outside = vars(builtins) | function.__globals__ | {name: cell.cell_contents for name, cell in cells}
+        own = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+        own |= {node.arg for node in nodes if isinstance(node, ast.arg)}
+        own |= {node.name for node in nodes if isinstance(node, ast.FunctionDef)}
+        self._own = own - {name for node in nodes if isinstance(node, ast.Global) for name in node.names}
+
+    def value(self, node: ast.AST) -> Any:
+        """The object that a name, or an attribute of a module or class, stands for; None where that is not known."""
+        if isinstance(node, ast.Name):
+            return None if node.id in self._own else self._outside.get(node.id)
+        if not isinstance(node, ast.Attribute):
+            return None
+        owner = self.value(node.value)
+        if isinstance(owner, type):  # no descriptor and no metaclass runs
+            held = inspect.getattr_static(owner, node.attr, None)
+            return held.__func__ if isinstance(held, staticmethod) else held
+        return getattr(owner, node.attr, None) if isinstance(owner, _FOLLOWED) else None
+
+    def is_constant(self, node: ast.AST) -> bool:
+        """Whether an expression is the same in every case and step: it names nothing but what is outside."""
+        return all(self.value(part) is not None for part in ast.walk(node) if isinstance(part, ast.Name))
+
+    def is_text(self, node: ast.AST) -> bool:
+        """Whether it is a text, or a tuple of them, that is written or named."""
+        if isinstance(node, ast.Tuple):
+            return any(map(self.is_text, node.elts))
+        return isinstance(node.value if isinstance(node, ast.Constant) else self.value(node), str)
 
 
-def _behind_a_star(name: str, arguments: ast.arguments) -> str:
-    words = ", ".join(f"`{one.arg}`" for one in arguments.kwonlyargs)
-    return f"`{name}` has {words} behind a `*`, and kernels hand arguments over by their places; leave the star out"
+def _running(node: ast.AST, line: int) -> Iterator[tuple[ast.AST, int]]:
+    """The nodes under a function that are run when it is called, with their lines, in the order of the text."""
+    for field, value in ast.iter_fields(node):
+        if field in _AT_DEFINITION:
+            continue
+        for child in value if isinstance(value, list) else [value]:
+            if isinstance(child, ast.AST):
+                own = getattr(child, "lineno", line)
+                yield child, own
+                yield from _running(child, own)
 
 
-def _left_to_a_default(node: ast.Call, called: Any, name: str) -> Iterator[str]:
-    """One sentence on a named tuple made without some of its fields, whose defaults the compiler does not know."""
-    given = len(node.args) + len(node.keywords)
-    starred = any(isinstance(one, ast.Starred) for one in node.args) or any(one.arg is None for one in node.keywords)
-    if isinstance(called, type) and getattr(called, "_field_defaults", None) and not starred:
-        if given < len(getattr(called, "_fields", ())):
-            yield f"`{shortened(ast.unparse(node))}` in `{name}` leaves a field to its default; write every field"
+def _definition(code: CodeType) -> ast.AST | None:
+    """The syntax tree of a function; None where there is no source, as in an interactive session."""
+    try:
+        tree = tree_of_file(code.co_filename)
+    except (SyntaxError, ValueError):
+        return None
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and node.name == code.co_name:
+            if min([node.lineno, *(mark.lineno for mark in node.decorator_list)]) == code.co_firstlineno:
+                return node
+    return None
 
 
-def _beyond_physics(node: ast.AST, name: str, scope: Scope) -> Iterator[str]:
-    """One sentence on what Python can do and a kernel cannot."""
-    text = shortened(ast.unparse(node)) if isinstance(node, ast.expr) else ""
-    if isinstance(node, ast.GeneratorExp):
-        yield f"`{text}` in `{name}` is a generator, which kernels cannot run; write its terms out, or loop with `for`"
-    elif isinstance(node, ast.Yield | ast.YieldFrom | ast.Await):
-        yield f"`{text}` in `{name}`: physics gives its result once, and at its end; write `return`"
-    elif isinstance(node, ast.Starred) and isinstance(node.ctx, ast.Store):
-        yield f"`{text}` in `{name}` takes the rest of a tuple; name each part, or cut it out, as s[2:]"
-    elif isinstance(node, ast.Attribute) and not isinstance(node.ctx, ast.Load):
-        yield f"`{text}` is set in `{name}`, where records are only read; make another, State(...) with every field"
-    elif isinstance(node, ast.With | ast.AsyncWith):
-        context = ", ".join(ast.unparse(item.context_expr) for item in node.items)
-        if not any(isinstance(item.context_expr, ast.Call) and ast.unparse(item.context_expr.func) == "open"
-                   for item in node.items):  # fmt: skip
-            yield f"`with {shortened(context)}` in `{name}` is not for physics, which only computes; leave it out"
-    elif isinstance(node, ast.Try | ast.TryStar) and not _is_plain(node, scope):
-        yield (f"`try` in `{name}`: physics raises nothing, it goes on with an infinity or with what is not a number; "
-               "keep arguments in range with where(condition, a, b)")  # fmt: skip
+def _breach(node: ast.AST, scope: _Scope) -> str:
+    """What is wrong with one node, and the usual fix; "" for what physics may contain."""
+    if not isinstance(node, _SYNTAX):
+        return next((fix for kinds, fix in _FIXES if isinstance(node, kinds)), PHYSICS)
+    if isinstance(getattr(node, "ctx", None), ast.Store) and not isinstance(node, ast.Name | ast.Tuple):
+        return f"physics assigns to its own names, each by itself; {_KEEP}"
+    if isinstance(node, ast.arguments) and node.kwonlyargs:
+        return "arguments behind a `*` are not for physics, whose arguments are told by their places; leave it out"
+    if isinstance(node, ast.Constant) and isinstance(node.value, complex | bytes):
+        return "complex numbers and bytes are not for physics; keep two parts as two numbers"
+    if isinstance(node, ast.While) and not _steps(node):
+        return "`while` may never end for some case; write for k in range(most) and where(condition, a, b)"
+    if isinstance(node, ast.ExceptHandler) and node.type and scope.value(node.type) is not Exception:
+        return "physics raises nothing, numbers become infinite or NaN; keep them in range with where(condition, a, b)"
+    if isinstance(node, ast.Compare):
+        return _wrong_comparison(node, scope)
+    return _wrong_call(node, scope) if isinstance(node, ast.Call) else _wrong_value(scope.value(node))
 
 
-def _is_plain(node: ast.Try | ast.TryStar, scope: Scope) -> bool:
-    """Whether it is a `try` that kernels have: one that asks for no error by its kind."""
-    kinds = [scope.value(one.type) for one in node.handlers if one.type is not None]
-    return isinstance(node, ast.Try) and all(kind is Exception for kind in kinds)
+def _steps(loop: ast.While) -> bool:
+    """Whether a loop compares something that it steps; the trial counts its rounds."""
+    compared = {node.id for node in ast.walk(loop.test) if isinstance(node, ast.Name)}
+    assigned = [node for line in loop.body if isinstance(line, ast.Assign | ast.AugAssign) for node in ast.walk(line)]
+    stepped = {node.id for node in assigned if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    return isinstance(loop.test, ast.Compare) and bool(compared & stepped)
 
 
-def _compared_by_identity(node: ast.Compare, name: str, scope: Scope) -> Iterator[str]:
-    """One sentence on `is` between values of a case, which are never one object: it holds in none."""
+def _wrong_comparison(node: ast.Compare, scope: _Scope) -> str:
+    """On a setting compared with a text, for which kernels have a number, and on `is`, which holds in no case."""
     sides = [node.left, *node.comparators]
-    if not any(isinstance(one, ast.Is | ast.IsNot) for one in node.ops) or all(map(scope.is_constant, sides)):
-        return
+    chosen = any(isinstance(side, ast.Attribute) and side.attr in scope.settings for side in sides)
+    if chosen and any(map(scope.is_text, sides)) and not scope.is_constant(node):
+        return "in physics a setting is a number, not a text: the index in its `choices`, such as 0.0 for the first"
+    if not any(isinstance(sign, ast.Is | ast.IsNot) for sign in node.ops) or all(map(scope.is_constant, sides)):
+        return ""
     if any(isinstance(side, ast.Constant) and side.value is None for side in sides):
-        return  # of an argument that may be left out
-    fix = "a condition stands alone, or behind `not`; numbers are compared with == or !="
-    yield f"`{shortened(ast.unparse(node))}` in `{name}` compares objects, not values; {fix}"
+        return ""  # of an argument that may be left out
+    return "`is` compares objects, not values; a condition stands alone or behind `not`, numbers have == and !="
 
 
-def _compared_with_a_text(node: ast.Compare, name: str, scope: Scope) -> Iterator[str]:
-    """One sentence if a setting is compared with a word, for which kernels have a number."""
-    for one, other in zip([node.left, *node.comparators], [*node.comparators, node.left], strict=True):
-        for setting, word in ((one, other), (other, one)):
-            texts = [scope.text(part) for part in getattr(word, "elts", [word])]
-            if not isinstance(setting, ast.Attribute) or setting.attr not in scope.settings or None in texts:
-                continue
-            if texts and scope.value(_root(setting)) is None:
-                choices, text = scope.settings[setting.attr], texts[0]
-                place = f"; {text!r} is {choices.index(text)}.0, its place in `choices`" if text in choices else ""
-                yield f"`{ast.unparse(node)}` in `{name}` compares with a text; in physics a setting is a number{place}"
-                return
+def _wrong_call(node: ast.Call, scope: _Scope) -> str:
+    """On a call of what is neither physics nor a named tuple, and on arguments that kernels do not take."""
+    called, arguments = scope.value(node.func), [*node.args, *(named.value for named in node.keywords)]
+    if called is None and isinstance(node.func, ast.Attribute) and not scope.is_constant(node.func):
+        known = node.func.attr.startswith("_") or hasattr(np.ndarray, node.func.attr)
+        return f"methods are not for physics: functions are those of mc_engine.lanes; {_KEEP}" if known else ""
+    if isinstance(called, np.ufunc) and not all(map(scope.is_constant, arguments)):
+        return "NumPy is for arrays; physics uses the functions of mc_engine.lanes"
+    if not isinstance(called, type) or called in _BUILTINS or issubclass(called, np.generic | BaseException | Enum):
+        return ""
+    if not hasattr(called, "_fields"):
+        return f"physics makes no objects of the class `{called.__name__}`; make it a namedtuple, and {_TUPLES}"
+    starred = any(isinstance(value, ast.Starred) for value in node.args) or any(not name.arg for name in node.keywords)
+    short = len(arguments) < len(getattr(called, "_fields", ())) and getattr(called, "_field_defaults", None)
+    return "a field of the named tuple is left to its default; write every field" if short and not starred else ""
 
 
-def _root(node: ast.expr) -> ast.expr:
-    """What an attribute, or an attribute of one, is of."""
-    while isinstance(node, ast.Attribute):
-        node = node.value
-    return node
-
-
-def _wrong_call(text: str, called: Any, name: str, constant: bool) -> Iterator[str]:
-    """constant : whether all that it is called with is the same in every case."""
-    last, home = text.split(".")[-1], _home(called)
-    if last in _ALLOCATING and (called is None or home[0] in ("numpy", "builtins")):
-        yield f"`{text}` makes an array or list in every step of `{name}`; keep numbers in named tuples instead"
-    elif last in _RECORD and "." in text:
-        yield f"`{text}` in `{name}`: compiled physics makes a named tuple anew; {_RECORD[last]}"
-    elif called is None or isinstance(called, PhysicsFunction) or hasattr(called, "_fields"):
-        return
-    elif called is print:
-        yield f"`print` in `{name}` runs in every step of every case; let `observe` give what histories are to show"
-    elif called is getattr(builtins, last, None) and last not in _BUILTINS and not isinstance(called, type):
-        yield f"`{text}` is not for physics, and `{name}` calls it; physics reads parameters, settings and `tables`"
-    elif home[:2] == ("numpy", "random") or (
-        home[0] in sys.stdlib_module_names and home[0] not in ("builtins", "math")
-    ):
-        yield f"`{text}` in `{name}`: {_OWN}; noise comes from the `draws` of `control`"
-    elif home[0] == "numpy" and not isinstance(called, type) and not constant:
-        yield f"`{text}` in `{name}` is for arrays; physics uses the functions of mc_engine.lanes"
-
-
-def _home(called: Any) -> tuple[str, ...]:
-    """The module, part by part, that a function comes from; of a method, that of its object."""
-    module = getattr(called, "__module__", None) or type(getattr(called, "__self__", None)).__module__
-    return tuple(str(module).split(".")) if called is not None else ("",)
-
-
-def _is_unmarked(called: Any) -> bool:
-    """Whether a function of the user's own lacks its decorator."""
-    return isinstance(called, FunctionType) and not _ours(called) and _home(called)[0] not in _FOREIGN
-
-
-def _ours(called: FunctionType) -> bool:
-    return _ENGINE in Path(called.__code__.co_filename).parents
+def _wrong_value(value: Any) -> str:
+    """On a value from outside the function that physics cannot read, or must not."""
+    home = (getattr(value, "__module__", None) or type(getattr(value, "__self__", None)).__module__ or "").split(".")
+    if isinstance(value, list | dict | set):
+        return f"a {type(value).__name__} outside of physics changes; physics reads numbers and tuples, {_KEEP}"
+    if isinstance(value, _VALUES) or hasattr(type(value), "_numba_type_") or home[:2] == ["mc_engine", "lanes"]:
+        return ""
+    if isinstance(value, np.random.Generator | np.random.RandomState | random.Random) or "random" in home:
+        return f"random numbers are not for physics; {_OWN}"
+    if value is print:
+        return "`print` would run in every step of every case; let `observe` give what histories are to show"
+    if isinstance(value, np.ufunc) or (callable(value) and (value in _BUILTINS or home == ["math"])):
+        return ""
+    if isinstance(value, FunctionType) and home[0] not in ("numpy", *sys.stdlib_module_names):
+        return f"`{value.__name__}` is not marked; write @physics on the line above it"
+    name = getattr(value, "__name__", type(value).__name__)
+    return f"`{name}` is not for physics, which has no clocks, files, arrays and objects; {PHYSICS}"

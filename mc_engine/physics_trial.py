@@ -6,9 +6,12 @@ trusts the counts that the model declares: nothing is flown that has not passed.
 """
 
 import dis
+import sys
 from collections import namedtuple
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -20,16 +23,17 @@ from mc_engine.lanes.number import calling
 from mc_engine.lanes.philox import Draws, noise_key
 from mc_engine.lost_numbers import sentence
 from mc_engine.model import Model
-from mc_engine.model_faults import MORE
+from mc_engine.model_faults import MORE, fault_of_trial, source_place
 from mc_engine.physics_source import is_shipped, place_of, source_faults
 from mc_engine.suggestions import listed
-from mc_engine.trial_faults import fault_sentence, shape_of
 
 FEW = 3  # cases on arrays
+_MOST_ROUNDS = 1_000_000  # of the loops of one call, which a flight makes in every step
 # what the fields of each function's result are declared by
 _FIELDS = {"initial": "states", "rhs": "states", "observe": "quantities", "events": "event_list", "evaluate": "metrics"}
 _MANY = 128  # values of everything that `evaluate` is handed
 _DECADES = (-9.0, 15.0)  # powers of ten that they reach over: from nanometres to light years, in SI
+_ENGINE = str(Path(__file__).parent)
 _passed: set[Model] = set()
 
 
@@ -79,13 +83,13 @@ def _run_through(model: Model, p: Any, o: Any, seed: int, finite: bool) -> None:
     m = NoMemory(0.0) if model.start is None else _call(model, "start", p, o)
     if model.control is not None:
         sampled = _call(model, "control", t, s, m, p, o, Draws(noise_key(seed), 0.0, 0.0))
-        _same_record(model.control, "control", sampled, "start", m, "memory")
+        _same_record(model.control, "control", sampled, "start", m)
         m = sampled
     if finite:
         _refuse_infinite("initial", model.initial, (p, o), s, "the state")
     with suppress(_ByZero):
         derivative = _call(model, "rhs", t, s, m, p, o)
-        _same_record(model.rhs, "rhs", derivative, "initial", s, "named tuple")
+        _same_record(model.rhs, "rhs", derivative, "initial", s)
         if finite:
             _refuse_infinite("rhs", model.rhs, (t, s, m, p, o), derivative, "the derivative")
     with suppress(_ByZero):
@@ -141,55 +145,84 @@ def _try_events(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any) -> None:
     if model.switch is None:
         return
     arguments = (t, s, m, p, o, type(values)(*(np.zeros(FEW) for _ in values)))
-    result = _run(model.switch, "switch", arguments)
+    result = _run(model.switch, arguments)
     if not isinstance(result, tuple) or len(result) != 2 or hasattr(result, "_fields"):
-        raise Breach(
-            f"{place_of(model.switch)}: `switch` gives {shape_of(result)}; it must give state and memory, (s, m)"
-        )
+        raise _breach(model.switch, "switch", _shape_of(result), "state and memory, (s, m)")
     for given, wanted, source in zip(result, (s, m), ("initial", "start"), strict=True):
-        _same_record(model.switch, "switch", given, source, wanted, "named tuple")
+        _same_record(model.switch, "switch", given, source, wanted)
         _refuse_other_than_numbers(model.switch, "switch", given)
 
 
-def _same_record(function: Callable[..., Any], name: str, given: Any, source: str, wanted: Any, what: str) -> None:
+def _same_record(function: Callable[..., Any], name: str, given: Any, source: str, wanted: Any) -> None:
     if getattr(given, "_fields", None) != wanted._fields:
-        raise Breach(f"{place_of(function)}: `{name}` gives {shape_of(given)}, `{source}` {shape_of(wanted)}; both "
-                     f"must give the same {what}")  # fmt: skip
+        raise _breach(function, name, _shape_of(given), f"the named tuple of `{source}`, {_shape_of(wanted)}")
 
 
 def _call(model: Model, name: str, *arguments: Any) -> Any:
     """The result of one function of the model, a named tuple with a field for each that the model declares."""
     function = getattr(model, name)
-    result = _run(function, name, arguments)
+    result = _run(function, arguments)
     if not hasattr(result, "_fields"):
-        kind = "nothing" if result is None else type(result).__name__
-        raise Breach(f"{place_of(function)}: `{name}` gives {kind}; it must return a named tuple")
-    declared = _FIELDS.get(name)
-    if declared is not None:
-        _compare(
-            function,
-            name,
-            result,
-            declared,
-            [(one.name, getattr(one, "symbol", one.name)) for one in getattr(model, declared)],
-        )
+        raise _breach(function, name, "nothing" if result is None else _shape_of(result), "a named tuple")
+    if name in _FIELDS:
+        records = getattr(model, _FIELDS[name])
+        names = [(record.name, getattr(record, "symbol", record.name)) for record in records]
+        _compare(function, name, result, _FIELDS[name], names)
     _refuse_other_than_numbers(function, name, result)
     return result
 
 
-def _run(function: Callable[..., Any], name: str, arguments: tuple[Any, ...]) -> Any:
+def _run(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     """What a function gives on arrays; on numbers where it negates a mask, which lanes can and arrays cannot."""
     try:
-        try:
-            return function(*arguments)
-        except ValueError as error:
-            if not _negates(error):
-                raise
-            return function(*(_first(one) for one in arguments))
+        with _counted_rounds():
+            try:
+                return function(*arguments)
+            except ValueError as error:
+                if not _negates(error):
+                    raise
+                return function(*(_first(one) for one in arguments))
     except ZeroDivisionError as error:
         raise _ByZero from error
+    except Breach:
+        raise
     except Exception as error:
-        raise Breach(fault_sentence(name, error)) from None
+        raise Breach(fault_of_trial(error)) from None
+
+
+@contextmanager
+def _counted_rounds() -> Iterator[None]:
+    """Breach where the loops of the model go round too often, or for ever: every line is traced."""
+    left = _MOST_ROUNDS
+    last: dict[FrameType, int] = {}  # the line that each frame was at last
+
+    def on_line(frame: FrameType, event: str, _: Any) -> Any:
+        nonlocal left
+        if event == "line":
+            left -= frame.f_lineno <= last.get(frame, 0)
+            last[frame] = frame.f_lineno
+        elif event == "return":
+            last.pop(frame, None)
+        if left < 0:
+            place = source_place(frame.f_code.co_filename, frame.f_lineno)
+            raise Breach(f"{place}: loops go round more than {_MOST_ROUNDS:,} times in one step; shorten them")
+        return on_line
+
+    def on_call(frame: FrameType, event: str, _: Any) -> Any:
+        return None if frame.f_code.co_filename.startswith(_ENGINE) else on_line
+
+    before = sys.gettrace()
+    sys.settrace(on_call)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
+
+
+def _shape_of(result: Any) -> str:
+    """A record as "State(x, y)", anything else by its type."""
+    fields = getattr(result, "_fields", None)
+    return type(result).__name__ if fields is None else f"{type(result).__name__}({', '.join(fields)})"
 
 
 def _negates(error: ValueError) -> bool:
@@ -213,23 +246,19 @@ def _first(value: Any) -> Any:
 def _compare(function: Callable[..., Any], name: str, result: Any, declared: str, named: list[tuple[str, str]]) -> None:
     """Breach if the result has not one field for each declared one, in their order.
 
-    named : the declared names with and without their units; fields may have names of their own, but not one another's.
+    named : the declared names with and without their units; fields may have names of their own, but not one another's,
+    and those of events are the declared ones.
     """
     fields, symbols = list(result._fields), [symbol for _, symbol in named]
-    if len(fields) != len(symbols):
-        missing = [one for one in symbols if one not in fields]
-        more = [one for one in fields if one not in symbols]
-        which = f"; {listed(missing)} is missing" if missing else (f"; {listed(more)} is too many" if more else "")
-        raise Breach(f"{place_of(function)}: `{name}` gives {len(fields)} numbers, the model declares {len(symbols)} "
-                     f"in `{declared}`{which}")  # fmt: skip
-    displaced = [f not in own for f, own in zip(fields, named, strict=True)]
-    swapped = set(fields) == {full for full, _ in named}
-    if any(out and (swapped or f in symbols) for f, out in zip(fields, displaced, strict=True)):
-        raise Breach(f"{place_of(function)}: `{name}` gives {listed(fields)}; `{declared}` declares them in the order "
-                     f"{listed(symbols)}")  # fmt: skip
-    if name == "events" and fields != symbols:
-        raise Breach(f"{place_of(function)}: `events` gives {listed(fields)}, event_list names {listed(symbols)}; use "
-                     "the same names")  # fmt: skip
+    known = {*symbols}.union(full for full, _ in named if {full for full, _ in named} == {*fields})
+    pairs = zip(fields, named, strict=False)
+    in_place = all(field in pair or (field not in known and name != "events") for field, pair in pairs)
+    if len(fields) != len(named) or not in_place:
+        raise _breach(function, name, listed(fields), f"what `{declared}` declares, in its order: {listed(symbols)}")
+
+
+def _breach(function: Callable[..., Any], name: str, gives: str, wanted: str) -> Breach:
+    return Breach(f"{place_of(function)}: `{name}` gives {gives}; it must give {wanted}")
 
 
 def _refuse_other_than_numbers(function: Callable[..., Any], name: str, result: Any) -> None:
@@ -240,25 +269,17 @@ def _refuse_other_than_numbers(function: Callable[..., Any], name: str, result: 
         except ValueError:
             array = np.asarray(None)
         if array.dtype == bool:
-            fix = ('give a number that crosses zero, such as a difference' if name == "events"
-                   else "write where(condition, 1.0, 0.0)")  # fmt: skip
-            raise Breach(f'{place_of(function)}: `{name}` gives a truth value for "{field}"; {fix}')
+            wanted = "one that crosses zero" if name == "events" else "where(condition, 1.0, 0.0)"
+            raise _breach(function, name, f'a truth value for "{field}"', f"a number, such as {wanted}")
         if array.dtype.kind not in "iuf" or array.shape not in ((), (FEW,)):
             what = f"{value!r}" if array.ndim == 0 and len(repr(value)) < 40 else type(value).__name__
-            raise Breach(f'{place_of(function)}: `{name}` gives {what} for "{field}"; it must be one number')
+            raise _breach(function, name, f'{what} for "{field}"', "one number")
 
 
 def _refuse_other_tables(model: Model, o: Any) -> None:
-    """Breach unless the tables are numbers in one row.  o : the settings, with the tables as an array."""
-    if model.tables is None:
-        return
-    if o.tables.ndim != 1 or o.tables.size == 0:
-        what = f"an array of shape {o.tables.shape}"
-    elif o.tables.size == 1 and np.isnan(o.tables[0]):  # what NumPy makes of None
-        what = "no number"
-    else:
-        return
-    raise Breach(f"{place_of(model.tables)}: `tables` gives {what}; it must give float64[n], numbers in one row")
+    """Breach unless the tables are numbers in one row, which is not what NumPy makes of None.  o : the settings."""
+    if model.tables is not None and (o.tables.ndim != 1 or o.tables.size == 0 or np.isnan(o.tables).all()):
+        raise _breach(model.tables, "tables", f"an array of shape {o.tables.shape}", "float64[n], numbers in one row")
 
 
 def _refuse_infinite(

@@ -32,42 +32,20 @@ def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespac
 
 @contextmanager
 def _explaining(model: Model) -> Iterator[None]:
+    """ModelError with the line, the error and the rules of `prepare` for errors of a wrong use."""
     try:
         yield
     except (TypeError, KeyError, AttributeError, ValueError) as error:
-        if words := _meaning(error, model):
-            raise ModelError(f"{place_in_model(error) or 'the model'}: `prepare`: {words}") from error
-        raise
+        words = f"{type(error).__name__}: {error}"
+        if isinstance(error, AttributeError) and isinstance(error.obj, SimpleNamespace):
+            words += hint(str(error.name), vars(error.obj))
+        raise ModelError(f"{place_in_model(error) or 'the model'}: `prepare`: {words}; {_rules(model)}") from error
 
 
-def _meaning(error: Exception, model: Model) -> str:
-    """What an error says of the use of inputs, settings and refusals, or of arrays; "" for any other."""
-    text, handed = str(error), getattr(error, "obj", None)
-    if isinstance(error, KeyError):
-        name = error.args[0] if error.args else None
-        return _no_input(name, model, [one.symbol for one in model.parameters]) if isinstance(name, str) else ""
-    if isinstance(handed, SimpleNamespace) and isinstance(error, AttributeError):
-        return _no_input(str(error.name), model, list(vars(handed)))
-    if "SimpleNamespace" in text:
-        first = next((one.symbol for one in model.parameters), "altitude")
-        return f"inputs and settings are attributes, as in inputs.{first}; vars(inputs) is a dictionary of them all"
-    if isinstance(handed, Refusals) or "Refusals" in text:
-        return 'cases are refused by refusals.add(mask, "why they cannot start")'
-    if "truth value of an array" in text:
-        return "`if`, `and`, `or` or `not` on the numbers of many cases; use np.where(condition, a, b), and & | ~"
-    if "only length-1 arrays" in text or "only 0-dimensional arrays" in text or "must be real number, not" in text:
-        return "a function of `math`, or int() or float(), on the numbers of many cases; take it from NumPy"
-    return ""
-
-
-def _no_input(name: str, model: Model, known: list[str]) -> str:
-    """There is none of this name among those that were handed over: of another kind, or without its unit.
-
-    known : the names that there are.
-    """
-    for place, items in (("inputs", model.parameters), ("settings", model.settings)):
-        for one in items:
-            if name in (one.symbol, one.name):
-                unit = ", without its unit and in SI" if name != one.symbol else ""
-                return f'there is no "{name}" here; it is {place}.{one.symbol}{unit}'
-    return f'there is no "{name}" here{hint(name, known)}'
+def _rules(model: Model) -> str:
+    first = next((parameter.symbol for parameter in model.parameters), "altitude")
+    return (
+        f"`inputs` and `settings` have attributes in SI, without unit, such as inputs.{first}, and vars(inputs) is a "
+        "dictionary of them; each holds the numbers of many cases: use NumPy, np.where(condition, a, b), & and |; "
+        'cases are refused by refusals.add(mask, "why")'
+    )

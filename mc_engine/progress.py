@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, TextIO
 
-from mc_engine.user_streams import Words
+from mc_engine.text import CleanStream
 
 ProgressCall = Callable[[int, int, int], None]  # cases done, wanted, failed
 SECONDS_BETWEEN_LINES = 5.0
@@ -61,10 +61,13 @@ class Progress:
         from rich.progress import Progress as Bar
 
         columns = (BarColumn(), TextColumn("{task.description}", markup=False))
-        stream: Any = self.stream.steering() if isinstance(self.stream, Words) else self.stream
+        stream: Any = self.stream.steering() if isinstance(self.stream, CleanStream) else self.stream
         self._bar = Bar(*columns, console=Console(file=stream), transient=True)
         self._bar.start()
-        sys.stdout, sys.stderr = Words(sys.stdout), Words(sys.stderr)  # the bar has taken them, until it stops
+        sys.stdout, sys.stderr = (
+            CleanStream(sys.stdout),
+            CleanStream(sys.stderr),
+        )  # the bar has taken them, until it stops
         self._task = self._bar.add_task("preparing", total=None)
 
     def __call__(self, done: int, total: int, failed: int) -> None:

@@ -4,38 +4,32 @@ Parts, the nominal case and histories can be flown again; damaged lines of the j
 told of with them.  Campaign, manifest and the journal's first line say what the run is: nothing here replaces them.
 """
 
-from contextlib import suppress
-from hashlib import sha256
 from pathlib import Path
 
-from mc_engine.durable_file import make_way, read_short, write_inside
-from mc_engine.errors import StoreError
+from mc_engine.durable_file import make_way, write_inside
 from mc_engine.journal import Scan, encode, read_journal, scan, utc_now
-from mc_engine.manifest_file import parse_manifest
 from mc_engine.parts import PART_FOLDERS, problem_of, read_part
-from mc_engine.receipts import receipts_of, without_lost
-from mc_engine.store import JOURNAL, MANIFEST, Store, is_run_directory
+from mc_engine.receipts import receipts_of
+from mc_engine.store import JOURNAL, Store, is_run_directory
 from mc_engine.writer_lock import WriterLock
 
 
 def mend_journal(run: Path) -> None:
     """Drop the damaged lines of a journal, with a note of their numbers; nothing where none is, or the first one is.
 
-    An extension whose line is lost is written anew, up to the last case of the parts that other lines name.
     StoreError if another writer is at work.
     """
     if is_run_directory(run):
         for folder in PART_FOLDERS:
             make_way(run, f"{folder}/*")
-    if not (run / JOURNAL).is_file() or not _lost(run, scan(read_journal(run / JOURNAL))):
+    if not (run / JOURNAL).is_file() or not _lost(scan(read_journal(run / JOURNAL))):
         return
     with (lock := WriterLock(run)) as dead:
         found = scan(read_journal(run / JOURNAL))  # again: another writer may have been here
-        lost = _lost(run, found)
+        lost = _lost(found)
         if not lost:
             return
-        kept = without_lost(found.entries, lost, _cases(run, found))
-        events = [(entry.at, entry.event, entry.facts) for entry in kept]
+        events = [(entry.at, entry.event, entry.facts) for entry in found.entries if entry.number not in lost]
         events += [(utc_now(), "lock-taken-over", {"from": dead})] if dead is not None else []
         events += [(utc_now(), "mended", {"lost": lost})]
         lines = [encode(number, *event) for number, event in enumerate(events, start=1)]
@@ -43,19 +37,10 @@ def mend_journal(run: Path) -> None:
         write_inside(run, JOURNAL, b"".join(lines))
 
 
-def _lost(run: Path, found: Scan) -> list[int]:
+def _lost(found: Scan) -> list[int]:
     """Numbers of the lines that cannot be trusted; none if the first one is among them, for which nothing stands in."""
-    lost = sorted({*found.damaged, *receipts_of(found.entries, _cases(run, found))[1]})
+    lost = sorted({*found.damaged, *receipts_of(found.entries)[1]})
     return lost if lost and lost[0] > 1 else []
-
-
-def _cases(run: Path, found: Scan) -> int | None:
-    """How many cases the run began with; None where the manifest is damaged."""
-    with suppress(StoreError, ValueError):
-        content = read_short(run / MANIFEST)
-        if found.entries and sha256(content).hexdigest() == found.entries[0].facts.get("manifest"):
-            return int(parse_manifest(content)["campaign"]["cases"])
-    return None
 
 
 def withdraw_damaged(store: Store) -> None:

@@ -15,10 +15,9 @@ from typing import Any
 import numpy as np
 
 from mc_engine.campaign import Campaign
-from mc_engine.files_read import USER
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model_contract import nominal_inputs
-from mc_engine.model_imports import PACKAGES
+from mc_engine.model_imports import PACKAGES, USER
 
 _WHY = "a case must depend on its inputs and case_id alone: no clock, random numbers, hashes or environment"
 _read: dict[str, str] = {}  # by environment variable: where the model reads it

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,14 +22,12 @@ if TYPE_CHECKING:
 _LARGEST = 1e100  # of any unit; what a flight that is lost holds beyond it, no axis can have ticks for
 
 
-def write_replay(store: Store, case_id: int, history: pd.DataFrame) -> list[Path]:
-    """Write `RUN/replay/case-<id>.parquet` and `.png`; the two paths."""
-    table, picture = _table(case_id), f"{REPLAYS}/case-{case_id}.png"
-    quantities = store.manifest.get("quantities", [])
-    content, image = parquet_bytes(history_table(history, quantities, store.path / table)), BytesIO()
-    history_figure(history, quantities, f"case {case_id}").savefig(image, format="png", dpi=150)
-    derived_files(store.path).write({table: content, picture: image.getvalue()})
-    return [store.path / table, store.path / picture]
+def write_replay(store: Store, case_id: int, history: pd.DataFrame, picture: bytes) -> list[Path]:
+    """Write `RUN/replay/case-<id>.parquet` and `.png`, of which `picture` is the content; the two paths."""
+    table, image = _table(case_id), f"{REPLAYS}/case-{case_id}.png"
+    content = parquet_bytes(history_table(history, store.manifest.get("quantities", []), store.path / table))
+    derived_files(store.path).write({table: content, image: picture})
+    return [store.path / table, store.path / image]
 
 
 def _table(case_id: int) -> str:

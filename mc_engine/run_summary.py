@@ -1,17 +1,22 @@
 """What a run amounts to, in a few lines for a terminal.  The reports say the rest."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import StoreError
-from mc_engine.parts import CASE_COLUMNS, read_part
+from mc_engine.parts import CASE_COLUMNS, Column, Part, read_part
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 from mc_engine.store import Store
 
 if TYPE_CHECKING:
     import numpy as np
+    import pyarrow as pa
 
     from mc_engine.statistics import Summary, Verdict
+    from mc_engine.statistics.streaming import Passes, Streamed
+
+PARTS_AHEAD = 2
 
 
 def failed_cases(store: Store) -> int:
@@ -43,16 +48,10 @@ def verdicts(store: Store) -> "list[Verdict]":
 
 def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     """The verdicts on all requirements of the run, and the joint one where there are several."""
-    from mc_engine.statistics import judge_all, was_looked_at
-
     requirements = store.manifest.get("requirements", [])
-    if not requirements:
-        return [], None
-    table = store.cases(list(dict.fromkeys(["status", *(record["metric"] for record in requirements)])))
-    ok = (table["status"] == STATUS_NAME[OK]).to_numpy(dtype=bool)
-    design = store.manifest["campaign"].get("design", "mc")
-    looked = was_looked_at(store.manifest, store.n_cases)
-    return judge_all(requirements, lambda name: table[name].to_numpy(), ok, design, looked)
+    metrics = list(dict.fromkeys(str(record["metric"]) for record in requirements))
+    found = streamed(store, metrics, requirements) if requirements else None
+    return ([], None) if found is None else (found.verdicts, found.joint)
 
 
 def look_line(store: Store) -> str:
@@ -86,30 +85,76 @@ def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
 
 
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":
-    """Summary of every metric, or of those named, of a run of any size: it is read part by part, never whole.
+    """Summary of every metric, or of those named.
 
     StoreError for a name that is no column.  A failed case has no number, whatever stands in its row.
     """
-    from mc_engine.statistics.summary import summarize_parts
-
     known = [column.name for column in store.columns if column.role == "metric"]
     names = known if metrics is None else list(metrics)
     for name in names:
         if name not in known:
             raise StoreError(f'{store.path}: there is no metric "{name}"; there are {", ".join(known) or "none"}')
-    return summarize_parts(lambda: _metric_parts(store, names), names)
+    return streamed(store, names).summaries
 
 
-def _metric_parts(store: Store, names: Sequence[str]) -> "Iterator[dict[str, np.ndarray]]":
+def streamed(
+    store: Store,
+    metrics: Sequence[str],
+    requirements: Sequence[Mapping[str, Any]] = (),
+    passes: "Passes | None" = None,
+    probabilities: tuple[float, ...] | None = None,
+    confidence: float = 0.90,
+) -> "Streamed":
+    """Summaries and verdicts of a run of any size: it is read part by part, never whole.
+
+    passes : gives the parts a pass; by default `metric_parts`.
+    """
+    from mc_engine.statistics import was_looked_at
+    from mc_engine.statistics.order_statistics import QUANTILES
+    from mc_engine.statistics.streaming import stream
+
+    return stream(
+        passes or (lambda names: (found for _, found in metric_parts(store, names))),
+        metrics,
+        requirements=requirements,
+        design=store.manifest["campaign"].get("design", "mc"),
+        looked=was_looked_at(store.manifest, store.n_cases),
+        probabilities=probabilities or QUANTILES,
+        confidence=confidence,
+    )
+
+
+def metric_parts(
+    store: Store, metrics: Sequence[str], more: Sequence[str] = ()
+) -> "Iterator[tuple[pa.Table, dict[str, np.ndarray]]]":
+    """All parts in order: a table of the columns named, and the metrics, NaN for cases that were not completed.
+
+    While one part is in use, the next is read.
+    """
+    columns = [column for column in store.columns if column.name in ("status", *metrics, *more)]
+    with ThreadPoolExecutor(1) as pool:
+        ahead: list[Future[tuple[pa.Table, dict[str, np.ndarray]]]] = []
+        for part in store.parts:
+            ahead.append(pool.submit(_metrics_of, store, part, columns, metrics))
+            if len(ahead) > PARTS_AHEAD:
+                yield ahead.pop(0).result()
+        while ahead:
+            yield ahead.pop(0).result()
+
+
+def _metrics_of(
+    store: Store, part: Part, columns: Sequence[Column], metrics: Sequence[str]
+) -> "tuple[pa.Table, dict[str, np.ndarray]]":
     import numpy as np
+    import pyarrow.compute as pc
 
-    from mc_engine.parts import read_part
-
-    columns = [column for column in store.columns if column.name in ("status", *names)]
-    for part in store.parts:
-        table = read_part(store.path, part, columns)
-        ok = table["status"].to_numpy() == STATUS_NAME[OK]
-        yield {name: np.where(ok, table[name].to_numpy().astype(np.float64, copy=False), np.nan) for name in names}
+    whole = part.status == {STATUS_NAME[OK]: part.rows}  # the receipt says that no case failed: no word is read
+    table = read_part(store.path, part, [one for one in columns if not whole or one.name != "status"])
+    numbers = {name: table[name].to_numpy().astype(np.float64, copy=False) for name in metrics}
+    if whole:
+        return table, numbers
+    ok = pc.equal(table["status"], STATUS_NAME[OK]).to_numpy()
+    return table, {name: np.where(ok, values, np.nan) for name, values in numbers.items()}
 
 
 def summary_lines(metric: str, summary: "Summary", unit: str, random: bool) -> list[str]:

@@ -17,10 +17,10 @@ from mc_engine.backends import Backend
 from mc_engine.campaign import Campaign, load_campaign
 from mc_engine.cases import case_table, full_inputs
 from mc_engine.chunks import name_upstream
-from mc_engine.designs import EXTENSIBLE, block_problem
+from mc_engine.designs import block_problem, extension_problem
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight import fly_history
-from mc_engine.flown_campaign import campaign_of, companions_of
+from mc_engine.flown_campaign import campaign_of, companions_of, refuse_undeclared_data
 from mc_engine.lost_numbers import first_lost, may_be_lost
 from mc_engine.manifest import columns_of, manifest_of
 from mc_engine.model_contract import refuse_breaches
@@ -74,6 +74,7 @@ def run(
     path = Path(out) if out is not None else default_folder(campaign.name)
     session = session_of(progress, workers, chunk, backend)
     refuse_breaches(campaign)
+    refuse_undeclared_data(campaign)
     campaign = _after_first(campaign, path, session)
     manifest = manifest_of(campaign)
     if shard is not None:
@@ -145,17 +146,10 @@ def extend(
     StoreError if the design cannot grow or has as many cases already, CampaignError if its blocks do not fit so many.
     """
     store = open_store(path)
-    design = store.manifest["campaign"]["design"]
-    if design not in EXTENSIBLE:
-        raise StoreError(f'{path}: the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can')
-    if store.manifest.get("upstream") is not None:
-        raise StoreError(f"{path}: takes its inputs from another run; extend that one, and fly this campaign anew")
-    if store.manifest.get("shard") is not None:
-        raise StoreError(f"{path}: is a shard; merge the shards, and extend the whole")
-    if cases <= store.n_cases:
-        raise StoreError(f"{path}: has {store.n_cases} cases; give the number it is to have in all")
+    if sentence := extension_problem(store.manifest, store.n_cases, cases):
+        raise StoreError(f"{path}: {sentence}")
     campaign = campaign_of(store)  # refuses changed sources before anything is written
-    if sentence := block_problem(design, len(campaign.dispersions), cases):
+    if sentence := block_problem(campaign.design, len(campaign.dispersions), cases):
         raise CampaignError(campaign.name, [Problem("cases", sentence)])
     store.note("extended", cases=cases)
     return complete(store, campaign_of(store), session_of(progress, workers, chunk, backend))

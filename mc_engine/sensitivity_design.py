@@ -66,8 +66,7 @@ def check_sensitivity(
     if section is None:
         return None
     if design in (*BY_LEVELS, *IN_BLOCKS) or (design == "table" and upstream is None):
-        found.add("", f'the design "{design}" draws nothing from distributions; [sensitivity] is for mc, lhs, sobol, '
-                      "halton")  # fmt: skip
+        found.add("", f'the design "{design}" draws nothing from distributions; [sensitivity] is for mc, lhs, sobol')
         return None
     problems = len(found.problems)
     groups = dict(_groups(section, model, dispersions, correlations, found.under("group")))

@@ -218,9 +218,10 @@ def _keep_nominal(store: Store, campaign: Campaign, flying: bool) -> None:
 def _orders(store: Store, session: Session) -> tuple[list[Order], int]:
     """Orders for what is missing, and how many cases a part has."""
     missing = store.missing()
-    along = stretches(store.notes(), min(store.wanted.stop, store.manifest["campaign"]["cases"]))
+    end = store.wanted.stop
+    along = stretches(store.notes(), min(end, store.manifest["campaign"]["cases"]), end)
     cases = sum(stop - first for first, stop in missing)
     size = session.chunk or along[-1].chunk or chunk_size(cases, session.workers)
     if session.chunk is not None:
-        along = [Stretch(store.wanted.stop, session.chunk)]
+        along = [Stretch(end, session.chunk)]
     return [Order(*bounds) for bounds in part_bounds(missing, store.notes(), along, size)], size

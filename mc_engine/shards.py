@@ -21,6 +21,7 @@ from mc_engine.errors import StoreError
 from mc_engine.flown_campaign import campaign_of, companions_of
 from mc_engine.manifest import columns_of, manifest_of
 from mc_engine.parts import Part
+from mc_engine.receipts import gaps
 from mc_engine.shell_words import shell_word
 from mc_engine.store import Store, create_store, open_store
 
@@ -114,18 +115,14 @@ def _check_one_campaign(stores: Sequence[Store]) -> None:
 
 def _check_parts(stores: Sequence[Store]) -> None:
     """StoreError that names the first part that is damaged, or is no part of these tables."""
-    schema = parts.arrow_schema(stores[0].columns)
     for store in stores:
         for part in store.parts:
-            table = parts.read_part(store.path, part)
-            if table.num_rows != part.rows or not table.schema.equals(schema, check_metadata=True):
-                verify = f"`mc-engine verify {shell_word(store.path)}`"
-                raise StoreError(f"{store.path / part.file}: is no part of this table; {verify}")
+            parts.read_part(store.path, part, stores[0].columns)
 
 
 def _check_nothing_missing(stores: Sequence[Store]) -> None:
     """StoreError that names the command for every range of cases that no directory holds."""
-    missing = _gaps([piece for store in stores for piece in store.committed()], stores[0].n_cases)
+    missing = gaps([piece for store in stores for piece in store.committed()], range(stores[0].n_cases))
     if not missing:
         return
     commands = {store.path: f"mc-engine resume {shell_word(store.path)}" for store in stores if store.missing()}
@@ -168,15 +165,6 @@ def _shards_of(of: int, ranges: Sequence[tuple[int, int]], n_cases: int) -> Iter
             if shard.number > last:
                 yield shard
             last, case = shard.number, shard.cases(n_cases).stop
-
-
-def _gaps(ranges: Sequence[tuple[int, int]], n_cases: int) -> list[tuple[int, int]]:
-    gaps, begin = [], 0
-    for first, stop in [*sorted(ranges), (n_cases, n_cases)]:
-        if first > begin:
-            gaps.append((begin, first))
-        begin = max(begin, stop)
-    return gaps
 
 
 def _cover(stores: Sequence[Store]) -> Iterator[Piece]:

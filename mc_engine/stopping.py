@@ -3,8 +3,8 @@
 The schedule stands in the manifest before the first case flies.  Runs of this kind, and runs that were given more
 cases after the first had been seen, are judged by limits that hold at every number of cases at once
 (`statistics.time_uniform`), so that stopping early, going on after all, or extending by hand takes nothing from the
-confidence.  Only for the design "mc": cases of "lhs" are a sample as a whole only, and those of "sobol" and
-"halton" depend on one another, which the limits do not allow for.
+confidence.  Only for the design "mc": cases of "lhs" are a sample as a whole only, and those of "sobol"
+depend on one another, which the limits do not allow for.
 """
 
 from collections.abc import Mapping

@@ -29,13 +29,13 @@ from mc_engine.history_tables import history_columns, history_table, read_histor
 from mc_engine.journal import Entry, Journal, damaged_line, encode, utc_now
 from mc_engine.manifest_file import cases_in, columns_in, manifest_bytes, parse_manifest
 from mc_engine.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
-from mc_engine.receipts import Range, Receipts, receipts_of
+from mc_engine.receipts import NOMINAL, Range, Receipts, receipts_of
 from mc_engine.shell_words import shell_word
 from mc_engine.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock, writer_of_new
 
 __all__ = ["JOURNAL", "Column", "Part", "Store", "create_store", "is_run_directory", "open_store", "refuse_occupied"]
 
-CAMPAIGN, NOMINAL = "campaign.toml", "nominal.parquet"
+CAMPAIGN = "campaign.toml"
 SENSITIVITY = "sensitivity"  # the run directory, inside a run, of the flights for contributions
 NO_FOLDER = "the folder is gone"
 _EDITED = "damaged or edited, it is not the one this run began with; put the original back"
@@ -143,18 +143,8 @@ class Store:
         self._created = self._journal.entries[0].facts
 
     def _record(self, event: str, facts: dict[str, Any]) -> None:
-        """Put a line into the journal, unless it is one that no reader would let pass."""
-        counted = self._counted.copy()
-
-        def judge(entry: Entry) -> None:
-            try:
-                counted.take(entry)
-            except ValueError as error:
-                raise StoreError(f"{self.path / JOURNAL}: {event}: {error}") from None
-
         self._lock.check()
-        self._journal.append(event, facts, judge)
-        self._counted = counted
+        self._counted.take(self._journal.append(event, facts))
 
     @property
     def campaign_text(self) -> str:

@@ -42,6 +42,20 @@ def imported_names(source: bytes, package: str = "") -> frozenset[str]:
     return frozenset(name for node in ast.walk(tree) for name in _names(node, package))
 
 
+@lru_cache(maxsize=512)
+def data_names(source: bytes) -> frozenset[str]:
+    """The texts that stand in the argument `data` of a call of `Model`; none of a broken source."""
+    try:
+        tree = parse(source)
+    except (SyntaxError, ValueError, MemoryError, RecursionError):
+        return frozenset()
+    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+    models = (call for call in calls if getattr(call.func, "attr", getattr(call.func, "id", None)) == "Model")
+    values = (keyword.value for call in models for keyword in call.keywords if keyword.arg == "data")
+    texts = (node.value for value in values for node in ast.walk(value) if isinstance(node, ast.Constant))
+    return frozenset(text for text in texts if isinstance(text, str))
+
+
 def _names(node: ast.AST, package: str) -> Iterator[str]:
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)

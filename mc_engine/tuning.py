@@ -17,10 +17,9 @@ from mc_engine.campaign import Campaign
 from mc_engine.candidates import Scores, cases_per_candidate, fly_candidates
 from mc_engine.directory_kinds import TUNING
 from mc_engine.errors import CampaignError, Problem, RunInterrupted
-from mc_engine.genetic_search import GeneticSearch
+from mc_engine.genetic_search import GeneticSearch, hypervolume, non_dominated
 from mc_engine.interruption import stop_signal
 from mc_engine.manifest import manifest_of
-from mc_engine.pareto import hypervolume, non_dominated
 from mc_engine.parts import Column
 from mc_engine.result_folder import ColumnsAndArrays, write_result
 from mc_engine.run_folder import default_folder

@@ -60,10 +60,14 @@ def check(
     declared dispersion, metric and event must matter.
     """
     from mc_engine.campaign import load_campaign
+    from mc_engine.flown_campaign import refuse_undeclared_data
     from mc_engine.model_contract import breaches, flight_faults
 
     campaign = load_campaign(file)
-    found = (breaches(campaign) or flight_faults(campaign, file)) if model else []
+    found = breaches(campaign) if model else []
+    if model and not found:
+        refuse_undeclared_data(campaign)
+        found = flight_faults(campaign, file)
     if found:
         leave(
             USAGE,

@@ -30,6 +30,7 @@ from mc_engine.command_line import (
     new_folder,
     ranges,
     refuse_occupied_folder,
+    replay_picture,
     run_here,
     write_reports,
 )
@@ -285,19 +286,12 @@ def extend(
     publish: Publish = None,
 ) -> None:
     """Add cases to a run; 1000 extended to 2000 are the same as 2000 from the start."""
-    from mc_engine.designs import EXTENSIBLE
+    from mc_engine.designs import extension_problem
 
     _refuse_publication(publish)
     store = existing_run(folder)
-    wanted, design = store.n_cases, store.manifest["campaign"]["design"]
-    if store.manifest.get("upstream") is not None:
-        leave(USAGE, f"{folder}: takes its inputs from another run; extend that one, and fly this campaign anew")
-    if store.manifest.get("shard"):
-        leave(USAGE, f"{folder}: is a shard; merge the shards, and extend the whole")
-    if design not in EXTENSIBLE:
-        leave(USAGE, f'{folder}: the design "{design}" cannot be extended; {", ".join(EXTENSIBLE)} can')
-    if cases <= wanted:
-        leave(USAGE, f"--cases {cases}: {folder} has {wanted} cases; give the number it is to have in all")
+    if sentence := extension_problem(store.manifest, store.n_cases, cases):
+        leave(USAGE, f"{folder}: {sentence}")
     crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
     store = _fly(lambda runner, note: runner.extend(folder, cases, progress=note, **crew), _kept(folder, publish))
     _finish(store, no_report, url=publish)
@@ -363,7 +357,7 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
     from mc_engine.replay_files import write_replay
 
     flight = runner.replay(folder, case)
-    for path in write_replay(store, case, flight.history):
+    for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
         typer.echo(str(path))
     if flight.lost:
         typer.echo(flight.lost)

@@ -19,7 +19,7 @@ from mc_engine.history_tables import read_histories
 from mc_engine.journal import Scan, read_journal, scan
 from mc_engine.manifest_file import cases_in, columns_in, parse_manifest
 from mc_engine.parts import PART_FOLDERS, Part, is_part_file, problem_of, read_part
-from mc_engine.receipts import Receipts, receipts_of, without_lost
+from mc_engine.receipts import Receipts, receipts_of
 from mc_engine.result_folder import VERBS, read_result, result_files
 from mc_engine.shell_words import shell_word
 from mc_engine.store import CAMPAIGN, CUT_SHORT, JOURNAL, MANIFEST, NO_FOLDER, NOMINAL, SENSITIVITY
@@ -113,9 +113,7 @@ def _run_damages(run: Path) -> tuple[list[Damage], Collection[str]]:
         return [Damage(_inner(run, error), ORIGINAL)], ()
     begun, problems = _begun_with(journal), [Damage(text, ORIGINAL) for text in _head_problems(run, journal)]
     manifest = None if problems else parse_manifest(read_short(run / MANIFEST))
-    wrong = receipts_of(journal.entries, _cases(manifest))[1]
-    kept = without_lost(journal.entries, {*journal.damaged, *wrong}, _cases(manifest))
-    counted = receipts_of(kept, _cases(manifest))[0]
+    counted, wrong = receipts_of(journal.entries, None if manifest is None else manifest["campaign"]["cases"])
     killed = not busy and is_left_by_dead(run) and not (journal.damaged or wrong)
     remedy = RESUME if killed else REPAIR  # a part without a line is damage where a line is: it may be that one's
     problems += _line_problems(journal, wrong, busy, remedy)
@@ -138,10 +136,6 @@ def _beside(run: Path, journal: Scan) -> Iterator[Damage]:
     elif _is_folder(run / SENSITIVITY):
         for one in damages(run / SENSITIVITY) if kind_of(run / SENSITIVITY) == RUN else ():
             yield Damage(f"{SENSITIVITY}/{one.what}", one.mended_by)
-
-
-def _cases(manifest: dict[str, Any] | None) -> int | None:
-    return None if manifest is None else int(manifest["campaign"]["cases"])
 
 
 def _begun_with(journal: Scan) -> dict[str, str]:
@@ -188,11 +182,8 @@ def _is_folder(path: Path) -> bool:
 
 
 def _obstacles(run: Path) -> Iterator[Damage]:
-    """What lies beside manifest and journal and keeps every writer from its work."""
-    lock = run / LOCK_NAME
-    if os.path.lexists(lock) and (lock.is_symlink() or not lock.is_file()):
-        yield Damage(f"{LOCK_NAME}: is no regular file", IN_THE_WAY)
-    for name in CUT_SHORT:
+    """Folders beside manifest and journal that keep every writer from its work."""
+    for name in (LOCK_NAME, *CUT_SHORT):
         if _is_folder(run / name):
             yield Damage(f"{name}: is a folder", IN_THE_WAY)
 

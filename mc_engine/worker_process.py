@@ -43,7 +43,7 @@ class Site:
     memory_mib: int | None = None
 
 
-def perform(site: Site, order: Order) -> Written | None:
+def perform(site: Site, order: Order) -> Written:
     """Carry out one order in this process."""
     if site.memory_mib is not None:
         _limit_memory(site.memory_mib)

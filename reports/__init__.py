@@ -11,10 +11,18 @@ if TYPE_CHECKING:
     from reports.contents import build
     from reports.html import render_html
     from reports.pdf import render_pdf
+    from reports.replays import replay_picture
 
-_HOME = {"build": "contents", "render_html": "html", "render_pdf": "pdf", "report": "cli", "write_reports": "cli"}
+_HOME = {
+    "build": "contents",
+    "render_html": "html",
+    "render_pdf": "pdf",
+    "replay_picture": "replays",
+    "report": "cli",
+    "write_reports": "cli",
+}
 
-__all__ = ["build", "render_html", "render_pdf", "report", "write_reports"]
+__all__ = ["build", "render_html", "render_pdf", "replay_picture", "report", "write_reports"]
 
 
 def __getattr__(name: str) -> Any:

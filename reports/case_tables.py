@@ -62,15 +62,16 @@ def input_words(flown: Flown, row: int) -> str:
 
 
 def worst_tables(flown: Flown) -> Iterator[Table]:
-    """The worst cases of the metrics that matter, then the first failed cases; each with its replay command."""
-    for metric in flown.key_metrics[:WORST_METRICS]:
-        rows = flown.worst(metric, WORST)
-        if rows.size and not flown.summaries[metric].constant:
-            yield _case_table(flown, _worst_words(flown, metric), metric, rows)
-    failed = np.flatnonzero(~flown.ok)
-    if failed.size:
-        title = f"Failed cases: the first {min(FAILED_SHOWN, failed.size)} of {count(failed.size)}"
-        yield _case_table(flown, title, None, failed[:FAILED_SHOWN])
+    """The worst cases of the metrics that matter, those of requirements not met first; then the first failed cases."""
+    passed = {verdict.metric: verdict.outcome == "pass" for verdict in flown.verdicts}
+    for metric in sorted(flown.key_metrics, key=lambda one: passed.get(one, True))[:WORST_METRICS]:
+        cases = flown.worst(metric, WORST)
+        if len(cases) and not flown.summaries[metric].constant:
+            yield _case_table(flown, _worst_words(flown, metric), metric, cases)
+    failed = flown.n_tried - flown.every.completed
+    if failed:
+        title = f"Failed cases: the first {min(FAILED_SHOWN, failed)} of {count(failed)}"
+        yield _case_table(flown, title, None, flown.every.failed(FAILED_SHOWN))
 
 
 def _worst_words(flown: Flown, metric: str) -> str:
@@ -81,7 +82,7 @@ def _worst_words(flown: Flown, metric: str) -> str:
     return f"Cases with the smallest margin of {flown.words(metric)} to its limits, {ends[0]} and {ends[1]}"
 
 
-def _case_table(flown: Flown, caption: str, metric: str | None, rows: np.ndarray) -> Table:
+def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFrame) -> Table:
     """Cases with their status, or a metric and its margin, the inputs that contribute most, and the command to replay.
 
     Without a metric the inputs are those that contribute most to being inside all limits.
@@ -91,22 +92,22 @@ def _case_table(flown: Flown, caption: str, metric: str | None, rows: np.ndarray
     found = found or [Contributor(name, np.nan) for name in flown.inputs]
     shown = [flown.columns[one.name] for one in found[:INPUTS_SHOWN]]
     columns = [Column("Case", "number", 0.9)]
-    cells = [[Cell(count(int(case)), int(case), case=int(case)) for case in flown.case_ids[rows]]]
+    cells = [[Cell(count(int(case)), int(case), case=int(case)) for case in cases["case_id"]]]
     if metric is None:
         columns.append(Column("Status", "code", 1.4))
-        cells.append([Cell(str(word)) for word in flown.cases["status"].iloc[rows]])
+        cells.append([Cell(str(word)) for word in cases["status"]])
     else:
-        values, limits = flown.values(metric)[rows], flown.limits(metric)
+        values, limits = cases[metric].to_numpy(dtype=np.float64), flown.limits(metric)
         columns.append(Column(axis_label(flown.words(metric), flown.unit(metric)), "number", 1.6))
         cells.append(_number_cells(values))
         if limits != Limits():
-            columns.append(Column("Margin", "number", 1.3))
+            columns.append(Column(axis_label("Margin", flown.unit(metric)), "number", 1.3))
             cells.append(_number_cells(limits.margins(values) * limits.width))
     for fact in shown:
         columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.3))
-        cells.append(_input_cells(flown.cases[fact.name].iloc[rows]))
+        cells.append(_input_cells(cases[fact.name]))
     columns.append(Column("Command to replay", "code", 3.6))
-    cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in flown.case_ids[rows]])
+    cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in cases["case_id"]])
     return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, found, len(shown)))
 
 

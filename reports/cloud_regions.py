@@ -10,11 +10,10 @@ import numpy as np
 from mc_engine.statistics.moments import in_units, near_one
 from mc_engine.statistics.regions import covariance_ellipses, density_regions
 from reports.figures.scatter import CloudRegion
-from reports.flown import CONFIDENCE, Flown
+from reports.flown import Flown, Stated
 from reports.numbers import count, percent
 
-ELLIPSES = (0.9, 0.99)
-REGION = 0.9
+MIDDLE = 0.5  # the fraction in the inner ellipse
 FEWEST = 20  # cases, and different numbers of each metric
 THINNEST = 1e-6  # standard deviations
 
@@ -34,25 +33,25 @@ def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.nda
         return in_units(centre + outline * scale, exponent)
 
     ranges = np.transpose([flown.range(name) for name in names])
-    return tuple(_regions((points - centre) / scale, placed, ranges))
+    return tuple(_regions((points - centre) / scale, placed, ranges, flown.stated))
 
 
 def _regions(
-    points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray], ranges: np.ndarray
+    points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray], ranges: np.ndarray, stated: Stated
 ) -> Iterator[CloudRegion]:
     """Regions of standardised points.  ranges : float64[2, 2], lowest and highest possible x and y.
 
     A normal distribution whose ellipse reaches what is impossible is not that of these metrics: no ellipse then.
     """
-    n = count(len(points))
-    ellipses = [(one, placed(one.outline())) for one in covariance_ellipses(points, ELLIPSES, THINNEST)]
+    n, contents = count(len(points)), (MIDDLE, stated.probability)
+    ellipses = [(one, placed(one.outline())) for one in covariance_ellipses(points, contents, THINNEST)]
     if all((ranges[0] <= outline).all() and (outline <= ranges[1]).all() for _, outline in ellipses):
         for one, outline in ellipses:
             held = f"holds {count(one.inside)} of {n} cases, {percent(one.inside / one.n, 1)}"
-            yield CloudRegion(True, f"{percent(one.content)} ellipse of a normal distribution: {held}", (outline,))
-    for region in density_regions(points, (REGION,), CONFIDENCE, THINNEST):
+            yield CloudRegion(True, f"{percent(one.content, 3)} ellipse of a normal distribution: {held}", (outline,))
+    for region in density_regions(points, contents[1:], stated.confidence, THINNEST):
         text = (
-            f"distribution-free region, at least {percent(region.content)} with {percent(region.confidence)} "
+            f"distribution-free region, at least {percent(region.content, 3)} with {percent(region.confidence)} "
             f"confidence: holds {count(region.inside)} of {n} cases"
         )
         yield CloudRegion(False, text, tuple(np.clip(placed(outline), *ranges) for outline in region.outlines))

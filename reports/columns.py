@@ -13,6 +13,9 @@ INSET = 7.0  # of a column, both sides together
 JUMPS = (4.0, 8.0, 16.0, 32.0, 64.0, 128.0)  # points that a column may get at a time
 MONO = 0.602  # of the type size, the width of every letter of a column's name
 BADGE = 18.0  # mark and margins of a verdict
+_WORD = re.compile(r"\[[^\]]{1,22}\]|[^\s_/-]*[\s_/-]?")  # what is not broken: a word, an interval
+COMMAND = 36  # letters of a command that is not broken
+BOLD = 1.15  # of the head
 SLACK = 1.06  # of a text over its lines: a line seldom ends at the edge
 
 
@@ -23,9 +26,10 @@ def widths(table: Table) -> list[float]:
     for k, column in enumerate(table.columns):
         for row, cell in enumerate((Cell(column.title.replace("_", " ")), *(cells[k] for cells in table.rows))):
             for part, text in enumerate((cell.text, cell.small)):
-                scale = _scale(column, text) if part == 0 and row else 1.0 if row else 1.1
+                scale = _scale(column, text) if part == 0 and row else 1.0 if row else BOLD
                 size[row, k, part] = lettering.width(text, TYPE) * scale + BADGE * bool(cell.tone and part == 0)
-                longest = max((lettering.width(word, TYPE) for word in re.split(r"(?<=[\s_/-])", text)), default=0.0)
+                words = [text] if column.kind == "code" and len(text) <= COMMAND else _WORD.findall(text)
+                longest = max((lettering.width(word, TYPE) for word in words), default=0.0)
                 least[k] = max(least[k], longest * scale + BADGE * bool(cell.tone and part == 0))
     if least.sum() + INSET * len(least) >= ROOM:
         return list((least + INSET) * ROOM / (least + INSET).sum())

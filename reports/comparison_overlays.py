@@ -7,41 +7,41 @@ import numpy as np
 from mc_engine.figures import FootprintFigure, HistoryFigure
 from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
 from reports.document import FigureBlock
-from reports.figures.overlays import Overlay, OverlayDrawing, OverlayPanel
+from reports.figures.marks import Axis, Band, Line, Panels, Plot, Points, between
+from reports.figures.palette import BLUE, VERMILION
 from reports.flown import Flown
-from reports.footprints import landed, planet_of
 from reports.history_bands import fair_cases, history_bands
+from reports.landings import landed, planet_of
 from reports.numbers import count
 
 MOST_PANELS = 9
 MOST_POINTS = 2000  # of each run
 BINS = 40
+BINNED = "fraction of the cases in each bin"
+HEIGHT = 260.0  # pixels of a panel
+NAMES, COLOURS, SIGNS = ("run A", "run B"), (BLUE, VERMILION), ("circle", "diamond")
+FORM = "Two runs over one another"
 TAILS = (0.001, 0.999)  # of both runs, ends of the axis of a distribution
 
 
 def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterator[FigureBlock]:
     """Figures of what both runs have; metrics : those whose distributions are drawn, in this order."""
-    names = ("run A", "run B")
     panels = tuple(panel for name in metrics[:MOST_PANELS] if (panel := _distribution(runs, name)) is not None)
     if panels:
-        drawing = OverlayDrawing(names, {"line": "fraction of the cases in each bin"}, panels)
-        yield FigureBlock("Distributions of the metrics that changed, the largest change first.", drawing, "small")
+        caption = "Distributions of the metrics that changed, the largest change first."
+        yield FigureBlock(caption, Panels(panels, across=3, form=FORM), "small")
     panels = tuple(_histories(runs))[:MOST_PANELS]
     if panels:
-        meanings = {"band": "5 to 95 %", "line": "median"}
-        yield FigureBlock(
-            "Time histories of both runs: of the saved cases, or the nominal case where fewer than 20 are saved.",
-            OverlayDrawing(names, meanings, panels),
-            "half",
-        )
+        caption = "Time histories of both runs: of the saved cases, or the nominal case where fewer than 20 are saved."
+        yield FigureBlock(caption, Panels(panels, across=3, form=FORM), "half")
     for figure in (one for one in runs[1].figures if isinstance(one, FootprintFigure)):
         footprint = _footprint(runs, figure)
         if footprint is not None:
-            drawing = OverlayDrawing(names, {"points": "impact points"}, (footprint,))
-            yield FigureBlock(f"{figure.title}, both runs. {_thinned_words(runs)}", drawing, "wide")
+            caption = f"{figure.title}, both runs. {_thinned_words(runs)}"
+            yield FigureBlock(caption, Panels((footprint,), form=FORM), "wide")
 
 
-def _distribution(runs: tuple[Flown, Flown], name: str) -> OverlayPanel | None:
+def _distribution(runs: tuple[Flown, Flown], name: str) -> Plot | None:
     """Outlines of two histograms over common bins."""
     values = [one[np.isfinite(one)] for one in (run.values(name) for run in runs)]
     if min(one.size for one in values) == 0:
@@ -53,33 +53,38 @@ def _distribution(runs: tuple[Flown, Flown], name: str) -> OverlayPanel | None:
     marks = []
     for run, one in enumerate(values):
         height = np.histogram(one, edges)[0] / one.size
-        marks.append(Overlay(run, "line", np.repeat(edges, 2), np.r_[0.0, np.repeat(height, 2), 0.0]))
-    return OverlayPanel(runs[1].axis(name), "fraction of the cases", tuple(marks))
+        marks.append(_line(run, np.repeat(edges, 2), np.r_[0.0, np.repeat(height, 2), 0.0], BINNED))
+    return Plot(tuple(marks), Axis(runs[1].axis(name)), Axis("fraction of the cases"), height=HEIGHT)
 
 
-def _histories(runs: tuple[Flown, Flown]) -> Iterator[OverlayPanel]:
+def _histories(runs: tuple[Flown, Flown]) -> Iterator[Plot]:
     wanted = [name for one in runs[1].figures if isinstance(one, HistoryFigure) for name in one.quantities]
     for name in dict.fromkeys(wanted):
         if all(len(run.histories) and name in run.histories.columns for run in runs):
             marks = [mark for run, flown in enumerate(runs) for mark in _history_marks(run, flown, name)]
             if marks:
-                yield OverlayPanel("time [s]", runs[1].axis(name), tuple(marks))
+                yield Plot(tuple(marks), Axis("time [s]"), Axis(runs[1].axis(name)), height=HEIGHT)
 
 
-def _history_marks(run: int, flown: Flown, name: str) -> Iterator[Overlay]:
+def _history_marks(run: int, flown: Flown, name: str) -> Iterator[Band | Line]:
     """The band and the median of the first cases; the nominal case where too few are saved."""
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
     band = history_bands(flown.histories, fair, [name]).get(name)
     if band is not None:
-        yield Overlay(run, "band", band.t, band.curves[0.05], band.curves[0.95])
-        yield Overlay(run, "line", band.t, band.curves[0.5])
+        key = f"{NAMES[run]}: smallest to largest"
+        yield between(band.t, band.curves[0.0], band.curves[1.0], COLOURS[run], 0.2, key=key)
+        yield _line(run, band.t, band.curves[0.5], "median")
         return
     rows = flown.histories[flown.histories["case_id"] == -1].sort_values("t_s")
     if len(rows):
-        yield Overlay(run, "line", rows["t_s"].to_numpy(np.float64), rows[name].to_numpy(np.float64))
+        yield _line(run, rows["t_s"].to_numpy(np.float64), rows[name].to_numpy(np.float64), "nominal")
 
 
-def _footprint(runs: tuple[Flown, Flown], figure: FootprintFigure) -> OverlayPanel | None:
+def _line(run: int, x: np.ndarray, y: np.ndarray, what: str) -> Line:
+    return Line(x, y, COLOURS[run], NAMES[run], key=f"{NAMES[run]}: {what}")
+
+
+def _footprint(runs: tuple[Flown, Flown], figure: FootprintFigure) -> Plot | None:
     """Impact points in the plane about the mean impact point of run A."""
     places = [landed(run, figure) for run in runs]
     if min(latitude.size for latitude, _ in places) == 0:
@@ -91,9 +96,10 @@ def _footprint(runs: tuple[Flown, Flown], figure: FootprintFigure) -> OverlayPan
     for run, (latitude, longitude) in enumerate(places):
         rows = np.unique(np.linspace(0, latitude.size - 1, min(latitude.size, MOST_POINTS)).astype(np.int64))
         points = plane.points(latitude[rows], longitude[rows]) / 1000.0
-        marks.append(Overlay(run, "points", points[:, 0], points[:, 1]))
+        key = f"{NAMES[run]}: impact points"
+        marks.append(Points(points[:, 0], points[:, 1], COLOURS[run], NAMES[run], SIGNS[run], opacity=0.5, key=key))
     east, north = "east of the mean impact point of run A [km]", "north of it [km]"
-    return OverlayPanel(east, north, tuple(marks), equal=True)
+    return Plot(tuple(marks), Axis(east), Axis(north), height=500.0, equal=True)
 
 
 def _thinned_words(runs: tuple[Flown, Flown]) -> str:

@@ -1,13 +1,15 @@
-"""The contents of a report, in reading order: first the verdicts, last what is needed to reproduce the numbers."""
+"""The contents of a report, in reading order: verdicts, what was flown, results; the appendices hold the evidence."""
 
 from collections.abc import Iterable, Iterator
 
 from reports.case_tables import case_table, worst_tables
+from reports.chosen_units import ShownRun
 from reports.convergence import convergence_blocks
 from reports.corridors import corridor_blocks
 from reports.data import run_data
-from reports.document import Block, Document, Section, Table, Text, numbered
-from reports.drawings import distribution_blocks, history_blocks, map_blocks, scatter_blocks
+from reports.diagnostics import correlation_blocks, normal_probability_blocks
+from reports.document import Block, Document, Section, Text, numbered
+from reports.drawings import distribution_blocks, history_blocks, map_blocks, other_distributions, scatter_blocks
 from reports.flown import Flown, Run
 from reports.footprints import FootprintContents, footprint_contents
 from reports.glossary import GLOSSARY
@@ -15,26 +17,24 @@ from reports.headline import cost_cards, summary_sentence, verdict_cards, warnin
 from reports.levels import level_blocks
 from reports.profiles import profile_blocks
 from reports.provenance import campaign_facts, provenance_table
-from reports.published import published_table
+from reports.published import published_blocks
 from reports.published_statistics import statistics_tables
-from reports.requirement_tables import requirement_table, risk_table
+from reports.requirement_tables import requirement_blocks
+from reports.scenario import scenario_blocks
 from reports.sensitivity import sensitivity_blocks
 from reports.single_cases import ANCHOR as CASES
 from reports.single_cases import case_blocks, case_data
-from reports.tables import (
-    fixed_table,
-    input_table,
-    quantile_table,
-    status_table,
-    summary_table,
-)
+from reports.tables import fixed_table, quantile_table, status_table, summary_table
+
+Found = Iterable[Block | str | None]
 
 
 def build(run: Run, name: str) -> Document:
     """The report of a run; `name` is its directory's name, as commands in the report spell it."""
-    flown = Flown(run, name)
-    landing = footprint_contents(flown)
-    sections = tuple(section for section in _sections(flown, landing) if section.blocks)
+    own = Flown(run, name)
+    flown = ShownRun(own)
+    landing = footprint_contents(own)
+    sections = tuple(_kept([*_chapters(flown, landing), *_appendices(flown)]))
     return numbered(
         Document(
             title=titled(flown),
@@ -47,7 +47,7 @@ def build(run: Run, name: str) -> Document:
             sections=sections,
             files=tuple(landing.files),
             cases=case_data(flown, sections),
-            data=run_data(flown),
+            data=run_data(own),
         )
     )
 
@@ -57,47 +57,61 @@ def titled(flown: Flown) -> str:
     return str(flown.campaign.get("title") or flown.manifest.get("model", {}).get("title") or flown.name)
 
 
-def _sections(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
-    yield Section("requirements", "Requirements", _requirements(flown))
-    yield Section("corridor", "Corridor", blocks(corridor_blocks(flown)))
-    yield Section("footprint", "Footprint", blocks(landing.blocks))
-    yield Section("levels", "Comparison of options", blocks(level_blocks(flown)))
-    yield Section("drivers", "Contributors", blocks(sensitivity_blocks(flown)))
-    yield Section("maps", "Maps", blocks(map_blocks(flown)))
-    yield Section("distributions", "Distributions", blocks(distribution_blocks(flown)))
-    yield Section("metrics", "All metrics", _metrics(flown))
-    yield Section("convergence", "Convergence", blocks(convergence_blocks(flown)))
-    yield Section("histories", "Time histories", blocks([*profile_blocks(flown), *history_blocks(flown)]))
-    yield Section("scatter", "Scatter plots", blocks(scatter_blocks(flown)))
-    yield Section(CASES, "Cases by outcome", blocks(case_blocks(flown)))
-    yield Section("worst", "Worst and failed cases", blocks(worst_tables(flown)))
-    yield Section("status", "Completion of the cases", (status_table(flown),))
-    yield Section(
-        "published", "Validation against published results", blocks([*statistics_tables(flown), published_table(flown)])
-    )
-    yield Section("inputs", "Inputs", blocks(_inputs(flown)))
-    yield Section("provenance", "Provenance", (provenance_table(flown),))
-    yield Section("reading", "Glossary", (GLOSSARY,))
+def _chapters(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
+    yield _section("requirements", "Verification matrix", requirement_blocks(flown))
+    yield _section("scenario", "Scenario", scenario_blocks(flown))
+    yield _section("distributions", "Distributions", distribution_blocks(flown))
+    yield _section("drivers", "Contributors", sensitivity_blocks(flown))
+    yield _section("maps", "Maps", map_blocks(flown), "part")
+    yield _section("levels", "Comparison of options", level_blocks(flown), "part")
+    yield _section("histories", "Time histories", [*profile_blocks(flown), *history_blocks(flown)])
+    yield _section("scatter", "Scatter and footprint", scatter_blocks(flown))
+    yield _section("footprint", "Footprint", landing.blocks, "part")
+    yield _section("corridor", "Corridor", corridor_blocks(flown), "part")
+    yield _section(CASES, "Cases by outcome", case_blocks(flown), "part")
+    yield _section("worst", "Worst and failed cases", worst_tables(flown))
 
 
-def blocks(found: Iterable[Block | str | None]) -> tuple[Block, ...]:
+def _appendices(flown: Flown) -> Iterator[Section]:
+    yield _section("metrics", "All metrics", _metrics(flown), "appendix")
+    yield _section("correlations", "Correlation matrix", correlation_blocks(flown), "appendix")
+    yield _section("normality", "Normal probability plots", normal_probability_blocks(flown), "appendix")
+    yield _section("convergence", "Convergence", convergence_blocks(flown), "appendix")
+    fixed = fixed_table(flown, "Parameters and settings at the model’s own values, common to all cases", False)
+    yield _section("inputs", "Inputs", (fixed,), "appendix")
+    yield _section("status", "Completion of the cases", (status_table(flown),), "appendix")
+    published = [*statistics_tables(flown.own), *published_blocks(flown.own)]
+    yield _section("published", "Validation against published results", published, "appendix")
+    yield _section("provenance", "Provenance", (provenance_table(flown),), "appendix")
+    yield _section("reading", "Glossary", (GLOSSARY,), "appendix")
+
+
+def _section(anchor: str, title: str, found: Found, kind: str = "chapter") -> Section:
+    return Section(anchor, title, blocks(found), kind)
+
+
+def _kept(sections: list[Section]) -> Iterator[Section]:
+    """Sections with something in them; a chapter without blocks stays where one of its parts has some."""
+    for place, section in enumerate(sections):
+        parts = []
+        for later in sections[place + 1 :]:
+            if later.kind != "part":
+                break
+            parts.append(later)
+        if section.blocks or (section.kind == "chapter" and any(part.blocks for part in parts)):
+            yield section
+
+
+def blocks(found: Found) -> tuple[Block, ...]:
     """Blocks without the absent ones; a sentence becomes a paragraph."""
     return tuple(Text((item,)) if isinstance(item, str) else item for item in found if item is not None)
 
 
-def _requirements(flown: Flown) -> tuple[Block, ...]:
-    if flown.verdicts:
-        return blocks([requirement_table(flown), risk_table(flown)])
-    return (Text(("The campaign file sets no requirement; [requirement.NAME] with a metric and a limit adds one.",)),)
-
-
-def _metrics(flown: Flown) -> tuple[Block, ...]:
+def _metrics(flown: Flown) -> Iterator[Block | str | None]:
     if not flown.summaries:
-        return (Text(("The model declares no metric.",)),)
-    return blocks([case_table(flown), summary_table(flown), quantile_table(flown)])
-
-
-def _inputs(flown: Flown) -> Iterator[Table | str | None]:
-    yield input_table(flown) or "No input is dispersed: all cases are the nominal one."
-    yield fixed_table(flown, "parameters", "Parameters common to all cases")
-    yield fixed_table(flown, "settings", "Settings of the run")
+        yield "The model declares no metric."
+        return
+    yield case_table(flown)
+    yield summary_table(flown)
+    yield quantile_table(flown)
+    yield from other_distributions(flown)

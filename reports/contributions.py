@@ -4,19 +4,19 @@ From the flights beside the run where it has them ([sensitivity]), else from the
 it cannot assign to an input is a row of its own.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, sensitivity
 from mc_engine.store import SENSITIVITY, Store, is_run_directory, open_store
 from reports.flown import Flown
 
-NORMAL_90 = 1.6448536269514722  # standard errors on each side of a 90 % interval
 UNEXPLAINED = "unexplained"
-MOST_METRICS = 12
+MOST_METRICS = 8
 MOST_ROWS = 20_000  # of a table, above which cases are picked evenly
 
 Interval = tuple[float, float]
@@ -27,7 +27,7 @@ class Contributor:
     """What one input, group of inputs, or the random draws contribute to one metric, as shares of its variance.
 
     first : the share that goes when it alone becomes known.  total : the share that stays when all others are known.
-    None where that is not known.  Intervals hold with 90 %.
+    None where that is not known.  Intervals hold with the report's confidence.
     """
 
     metric: str
@@ -49,6 +49,7 @@ class Contributions:
 
     flights : of the companion, 0 where all comes from the table of cases.  n_used, n_tried : by metric, the blocks or
     cases that the indices rest on.  members : the inputs in each group of the flights; empty without them.
+    trends : what the table of cases tells besides; None with flights.
     """
 
     by_metric: dict[str, tuple[Contributor, ...]]
@@ -56,6 +57,7 @@ class Contributions:
     n_used: dict[str, int]
     n_tried: int
     members: dict[str, list[str]]
+    trends: Sensitivity | None = None
 
     def rows(self) -> Iterator[Contributor]:
         """All contributors, metric by metric."""
@@ -67,8 +69,8 @@ def contributions(flown: Flown) -> Contributions | None:
     """Contributions to the metrics that matter; None where neither a companion nor a random table tells them."""
     store, metrics = companion_of(flown), flown.key_metrics[:MOST_METRICS]
     if store is not None:
-        return _of_companion(store, metrics)
-    return _of_table(flown, metrics) if flown.random and flown.n_tried >= FEWEST_CASES else None
+        return _of_companion(flown, store, metrics)
+    return _of_table(flown, metrics) if flown.random and flown.n_held >= FEWEST_CASES else None
 
 
 def companion_of(flown: Flown) -> Store | None:
@@ -80,70 +82,65 @@ def companion_of(flown: Flown) -> Store | None:
     return None if store.missing() else store
 
 
-def _of_companion(store: Store, metrics: list[str]) -> Contributions:
+def _of_companion(flown: Flown, store: Store, metrics: list[str]) -> Contributions:
     record = store.manifest["sensitivity"]
     layout = layout_of(record)
     cases = store.cases(["case_id", *metrics])
     values = {name: cases[name].to_numpy(dtype=np.float64) for name in metrics}
     found = pick_freeze(layout, cases["case_id"].to_numpy(), values)
-    by_metric = {}
-    for k, metric in enumerate(metrics):
-        rows = [
-            Contributor(
-                metric,
-                group,
-                _number(found.first[g, k]),
-                _number(found.total[g, k]),
-                _interval(found.first[g, k], found.first_error[g, k]),
-                _interval(found.total[g, k], found.total_error[g, k]),
-            )
-            for g, group in enumerate(layout.groups)
-            if np.isfinite(found.total[g, k])
-        ]
-        by_metric[metric] = tuple(sorted(rows, key=lambda one: -one.size))
+    shares = (found.first, found.first_error, found.total, found.total_error)
+    by_metric = {
+        metric: _ranked(flown, metric, layout.groups, *(one[:, k] for one in shares))
+        for k, metric in enumerate(metrics)
+    }
     used = {metric: int(n) for metric, n in zip(metrics, found.n_used, strict=True)}
     members = {group["name"]: list(group["members"]) for group in record["groups"]}
     return Contributions(by_metric, len(cases), used, found.n_tried, members)
 
 
 def _of_table(flown: Flown, metrics: list[str]) -> Contributions | None:
-    inputs = {fact.name: flown.cases[fact.name].to_numpy() for fact in flown.with_role("dispersion")}
-    if not inputs:
+    if not flown.inputs:
         return None
-    rows = np.arange(flown.n_tried)[:: -(-flown.n_tried // MOST_ROWS)]
+    rows = np.arange(flown.n_held)[:: -(-flown.n_held // MOST_ROWS)]
     found = sensitivity(
-        {name: values[rows] for name, values in inputs.items()}, {name: flown.values(name)[rows] for name in metrics}
+        {name: values[rows] for name, values in flown.inputs.items()},
+        {name: flown.values(name)[rows] for name in metrics},
     )
-    by_metric = {metric: tuple(_table_rows(found, k)) for k, metric in enumerate(metrics)}
+    shares = (found.first_order, found.first_order_error, found.total, found.total_error)
+    by_metric = {}
+    for k, metric in enumerate(metrics):
+        ranked = _ranked(flown, metric, found.inputs, *(one[:, k] for one in shares))
+        left = _number(found.unexplained[k]) if ranked else None
+        rest = [] if left is None else [Contributor(metric, UNEXPLAINED, left, left, None, None)]
+        by_metric[metric] = (*ranked, *rest)
     used = {metric: int(n) for metric, n in zip(metrics, found.n_used, strict=True)}
-    return Contributions(by_metric, 0, used, found.n_tried, {})
+    return Contributions(by_metric, 0, used, found.n_tried, {}, found)
 
 
-def _table_rows(found: Sensitivity, k: int) -> Iterator[Contributor]:
-    metric = found.metrics[k]
+def _ranked(
+    flown: Flown,
+    metric: str,
+    names: Sequence[str],
+    first: np.ndarray,
+    first_error: np.ndarray,
+    total: np.ndarray,
+    total_error: np.ndarray,
+) -> tuple[Contributor, ...]:
+    """The contributors of one metric that have an effect, float64[n_names] each, the strongest first."""
+    errors = float(ndtri(0.5 * (1.0 + flown.stated.confidence)))  # standard errors on each side of an interval
+
+    def interval(value: float, error: float) -> Interval | None:
+        if not (np.isfinite(value) and np.isfinite(error)):
+            return None
+        return float(value - errors * error), float(value + errors * error)
+
     rows = [
-        Contributor(
-            metric,
-            name,
-            _number(found.first_order[g, k]),
-            _number(found.total[g, k]),
-            _interval(found.first_order[g, k], found.first_order_error[g, k]),
-            _interval(found.total[g, k], found.total_error[g, k]),
-        )
-        for g, name in enumerate(found.inputs)
-        if np.isfinite(found.first_order[g, k])
+        Contributor(metric, name, _number(a), _number(b), interval(a, da), interval(b, db))
+        for name, a, da, b, db in zip(names, first, first_error, total, total_error, strict=True)
+        if np.isfinite(a) or np.isfinite(b)
     ]
-    yield from sorted(rows, key=lambda one: -one.size)
-    if rows and np.isfinite(found.unexplained[k]):
-        left = float(found.unexplained[k])
-        yield Contributor(metric, UNEXPLAINED, left, left, None, None)
+    return tuple(sorted(rows, key=lambda one: -one.size))
 
 
 def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
-
-
-def _interval(value: float, error: float) -> Interval | None:
-    if not (np.isfinite(value) and np.isfinite(error)):
-        return None
-    return float(value - NORMAL_90 * error), float(value + NORMAL_90 * error)

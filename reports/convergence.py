@@ -12,11 +12,10 @@ from mc_engine.statistics.convergence import (
     running_quantile,
 )
 from reports.document import Cell, Column, FigureBlock, Table
-from reports.figures import RunningDrawing, RunningPanel
-from reports.flown import CONFIDENCE, Flown
-from reports.headline import HIGH, LOW
+from reports.figures.marks import Axis, Line, Panels, Plot, between
+from reports.figures.palette import BLUE, SKY
+from reports.flown import Flown
 from reports.numbers import count, interval, number, percent, percentile
-from reports.tables import metric_cell
 
 MOST_METRICS = 8
 MOST_DRAWN = 4
@@ -30,9 +29,9 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     told = {name: pair for name, pair in runs.items() if pair}
     if told:
         drawn = list(told)[:MOST_DRAWN]
-        panels = tuple(RunningPanel(_what(run), flown.axis(name), run) for name in drawn for run in told[name])
-        caption = "Mean and outer percentile of the key metrics against the number of cases"
-        yield FigureBlock(caption, RunningDrawing(panels, CONFIDENCE), "half")
+        panels = tuple(_panel(flown, name, run) for name in drawn for run in told[name])
+        caption = f"Mean and outer percentile of the key metrics against the number of cases{flown.sample_words}"
+        yield FigureBlock(caption, Panels(panels, across=4, form="Running estimates"), "half")
         yield _table(flown, told)
     silent = [name for name in runs if name not in told]
     if silent:
@@ -42,12 +41,25 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         )
 
 
+def _panel(flown: Flown, name: str, run: RunningEstimate) -> Plot:
+    """One estimate and its bounds over the number of cases."""
+    what, interval = _what(run), f"{percent(flown.stated.confidence)} confidence bounds"
+    band_key = f"{interval}, where the cases are enough for both ends"
+    key = "from the first so many cases, in the order of their numbers"
+    marks = (
+        between(run.cases, run.lower, run.upper, SKY, 0.35, interval, band_key),
+        Line(run.cases, run.estimate, BLUE, what, width=2.0, key=key),
+    )
+    return Plot(marks, Axis("cases", log=True, margin=0.0), Axis(flown.axis(name), most=5), what, 230.0)
+
+
 def _runs(flown: Flown, name: str) -> tuple[RunningEstimate, ...]:
     if flown.summaries[name].constant:
         return ()
     values = flown.values(name)
-    outer = HIGH if flown.largest_is_worst(name) else LOW
-    found = running_mean(values, CONFIDENCE), running_quantile(values, outer, CONFIDENCE)
+    outer = flown.stated.probability if flown.largest_is_worst(name) else flown.stated.low
+    bounds = flown.stated.two_sided
+    found = running_mean(values, bounds), running_quantile(values, outer, bounds)
     return tuple(run for run in found if run is not None)
 
 
@@ -57,25 +69,25 @@ def _what(run: RunningEstimate) -> str:
 
 def _table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
     columns = (
-        Column("Metric", "name", 2.6),
+        Column("Metric", "text", 2.6),
         Column("Estimate", "text", 1.5),
         Column("From half the cases", "number", 1.7),
-        Column("From all", "number", 1.9),
-        Column("Interval reaches", "number", 1.3),
+        Column("From the sample" if flown.sampled else "From all", "number", 1.9),
+        Column("Bounds within", "number", 1.3),
         Column("Halves differ by chance", "number", 1.3),
         Column("Converged", "text", 1.5),
     )
     rows = tuple(_row(flown, name, run) for name, pair in told.items() for run in pair)
     note = (
-        f"Converged: the {percent(CONFIDENCE)} interval of the estimate reaches no farther from it than "
+        f"Converged: the {percent(flown.stated.confidence)} bounds of the estimate lie no farther from it than "
         f"{number(CLOSE_MEAN)} standard deviations of the metric for a mean, {number(CLOSE_QUANTILE)} for a percentile "
-        "(column “interval reaches”), and the first and second half of the cases do not differ beyond chance "
+        "(column “bounds within”), and the first and second half of the cases do not differ beyond chance "
         f"(probability at least {percent(DRIFT)}; Welch’s test of the means, Fisher’s of the cases beyond the "
-        "percentile). Intervals are those of independent draws: Student’s for the mean, order statistics for "
+        "percentile). Bounds are those of independent draws: Student’s for the mean, order statistics for "
         "percentiles. "
         "A metric that has not converged may have a certain verdict: that depends on its requirement alone."
     )
-    return Table("Convergence of the estimates", columns, rows, note)
+    return Table(f"Convergence of the estimates{flown.sample_words}", columns, rows, note)
 
 
 def _row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, ...]:
@@ -84,7 +96,7 @@ def _row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, ...]:
     low, high = (float(end[-1]) if end[-1] == end[-1] else None for end in (run.lower, run.upper))
     reach = "open end" if run.reach is None else f"{number(run.reach, 2)} σ"
     return (
-        metric_cell(flown, name),
+        Cell(flown.axis(name)),
         Cell(_what(run), small=f"{count(run.n_used)} of {count(run.n_tried)} cases"),
         Cell(
             number(float(run.estimate[half]), scale=sd),

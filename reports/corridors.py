@@ -7,16 +7,15 @@ import contourpy
 import numpy as np
 
 from mc_engine.figures import CorridorFigure
-from mc_engine.statistics import SurfaceMap, Verdict, clopper_pearson, map_metric
-from reports.document import Cell, Column, FigureBlock, Table
+from mc_engine.statistics import SurfaceMap, Verdict, map_metric
+from reports.document import FigureBlock, Table
 from reports.drawings import nominal_point, thinned_rows
 from reports.figures import CorridorDrawing, LimitLine
 from reports.flown import Flown
-from reports.numbers import count, number, percent, with_unit
+from reports.numbers import count
 from reports.outcomes import inside, inside_words
 from reports.tables import limit_text
 
-CONFIDENCE = 0.95
 FEWEST_BEYOND = 12  # cases on either side of a limit that is drawn
 TOLD_RIGHT = 0.75  # share of the cases beyond a limit that its line must put there
 MOST_CLASSES = 7  # colours that can be told apart, "inside" among them
@@ -30,7 +29,6 @@ def corridor_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
             if verdicts:
                 violated = np.array([~inside(flown, [verdict]) for verdict in verdicts])
                 yield _corridor(flown, figure, verdicts, violated)
-                yield _violation_table(flown, verdicts, violated)
 
 
 def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray) -> FigureBlock | str:
@@ -38,7 +36,7 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     placed = np.isfinite(x) & np.isfinite(y)
     used = np.flatnonzero(placed)
     if not used.size:
-        lacking = f"none of {count(flown.n_tried)} cases has both {figure.x} and {figure.y}"
+        lacking = f"none of {count(flown.n_held)} cases has both {figure.x} and {figure.y}"
         return f"{figure.title}: not drawn; {flown.absence(figure.x, figure.y) or lacking}."
     words, member = _classes([verdict.name for verdict in verdicts], violated, inside_words(flown, verdicts))
     # every violation stays in the picture, as far as there is room
@@ -53,12 +51,12 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
         x_label=flown.axis(figure.x),
         y_label=flown.axis(figure.y),
         n_used=int(used.size),
-        n_tried=flown.n_tried,
+        n_tried=flown.n_held,
         nominal=nominal_point(flown, figure.x, figure.y),
         columns=(figure.x, figure.y),
     )
-    missing = flown.n_tried - used.size
-    lost = f" {count(missing)} of {count(flown.n_tried)} cases have no values to draw." if missing else ""
+    missing = flown.n_held - used.size
+    lost = f" {count(missing)} of {count(flown.n_held)} cases have no values to draw." if missing else ""
     return FigureBlock(f"{figure.title}.{_limits_said(flown, drawing.limits, verdicts)}{lost}", drawing, "wide")
 
 
@@ -73,7 +71,7 @@ def _limits_said(flown: Flown, limits: tuple[LimitLine, ...], verdicts: list[Ver
 def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[list[str], np.ndarray]:
     """Words of the classes, and the class of each case: inside, then the sets of limits violated, most frequent first.
 
-    violated : bool[n_requirements, n_tried].  What is too rare for a colour of its own shares the last one.
+    violated : bool[n_requirements, n_held].  What is too rare for a colour of its own shares the last one.
     """
     code = (violated * (1 << np.arange(len(names)))[:, None]).sum(axis=0)
     found, cases = np.unique(code[code > 0], return_counts=True)
@@ -137,46 +135,3 @@ def _nearest(axis: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Index of the node of an ascending axis nearest to each place; any for a place that is not a number."""
     middles = 0.5 * (axis[1:] + axis[:-1])
     return np.searchsorted(middles, np.nan_to_num(places))
-
-
-def _violation_table(flown: Flown, verdicts: list[Verdict], violated: np.ndarray) -> Table:
-    """Per limit, and for any of them: how many cases violate it, and the interval on the probability."""
-    columns = (
-        Column("Limit", "text", 2.6),
-        Column("Violated / tried", "number", 1.5),
-        Column("Fraction" if not flown.random else "Probability", "number", 1.5),
-        Column(f"{percent(CONFIDENCE)} interval", "number", 1.8),
-        Column("Without a number", "number", 1.3),
-    )
-    rows = []
-    for verdict, beyond in zip(verdicts, violated, strict=True):
-        text = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
-        rows.append(_violation_row(flown, Cell(verdict.name, small=text), beyond, verdict.no_number))
-    if len(verdicts) > 1:
-        lost = ~np.all([np.isfinite(flown.values(verdict.metric)) for verdict in verdicts], axis=0)
-        row = _violation_row(flown, Cell("any of them"), np.asarray(violated.any(axis=0)), int(lost.sum()))
-        rows.append(row)
-    note = "A failed case, or one without a number, counts as a violation."
-    if flown.random:
-        note += " Intervals: Clopper–Pearson, two-sided; with no violation only the upper limit is informative."
-    else:
-        note += (
-            " Fractions of the cases flown; these were chosen, not drawn at random, so they estimate no probabilities."
-        )
-    return Table("How often the limits are violated", columns, tuple(rows), note)
-
-
-def _violation_row(flown: Flown, name: Cell, beyond: np.ndarray, no_number: int) -> tuple[Cell, ...]:
-    cases, tried = int(beyond.sum()), flown.n_tried
-    bounds = "–"
-    if flown.random and tried:
-        low, high = clopper_pearson(cases, tried, CONFIDENCE)
-        bounds = with_unit(f"[{number(100.0 * low, 3)}, {number(100.0 * high, 3)}]", "%")
-    share = cases / tried if tried else None
-    return (
-        name,
-        Cell(f"{count(cases)} / {count(tried)}", cases),
-        Cell(percent(share, 3), share),
-        Cell(bounds),
-        Cell(count(no_number), no_number),
-    )

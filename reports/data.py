@@ -11,10 +11,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict
 
 from mc_engine.statistics import Summary, Verdict
-from mc_engine.statistics.worst import Limits, worst_cases
+from mc_engine.statistics.worst import Limits
 from reports.document import Document, FigureBlock, Table, Terms, Text
 from reports.flown import Flown
-from reports.outcomes import INSIDE, case_outcomes
 
 FILE = "report.json"
 WORST = 10  # cases of a requirement
@@ -125,13 +124,18 @@ class SectionRecord(_Record):
 
 
 class ReportRecord(_Record):
-    """What `report.json` holds.  contributor_flights : cases flown for the contributors alone; 0: from the table."""
+    """What `report.json` holds.  contributor_flights : cases flown for the contributors alone; 0: from the table.
+
+    probability, confidence : of all statistics but the requirements' own; each bound of a quantile holds with it.
+    """
 
     format: Literal[1] = 1
     title: str
     summary: str
     campaign: dict[str, str]
     warnings: list[str]
+    probability: float | None = None
+    confidence: float | None = None
     counts: Counts | None = None
     requirements: list[RequirementRecord] = []
     metrics: list[MetricRecord] = []
@@ -166,6 +170,8 @@ def run_data(flown: Flown) -> dict[str, Any]:
     """The numbers of a run's report, by the fields of ReportRecord."""
     found = flown.contributions
     return {
+        "probability": flown.stated.probability,
+        "confidence": flown.stated.confidence,
         "counts": _counts(flown),
         "requirements": [_requirement(flown, one) for one in flown.verdicts],
         "metrics": [_metric(flown, name, summary) for name, summary in flown.summaries.items()],
@@ -176,8 +182,8 @@ def run_data(flown: Flown) -> dict[str, Any]:
 
 
 def _counts(flown: Flown) -> Counts:
-    inside = int((case_outcomes(flown) == INSIDE).sum())
-    return Counts(cases=flown.n_wanted, flown=flown.n_tried, completed=int(flown.ok.sum()), inside_all_limits=inside)
+    inside = flown.every.inside_all
+    return Counts(cases=flown.n_wanted, flown=flown.n_tried, completed=flown.every.completed, inside_all_limits=inside)
 
 
 def _requirement(flown: Flown, one: Verdict) -> RequirementRecord:
@@ -233,14 +239,13 @@ def _contributor(one: Any) -> ContributorRecord:
 
 
 def _worst(flown: Flown, verdict: Verdict) -> list[WorstRecord]:
-    limits, values = Limits(verdict.at_most, verdict.at_least), flown.values(verdict.metric)
-    rows = worst_cases(values, flown.ok, WORST, limits=limits)
-    margins = limits.margins(values[rows]) * limits.width
+    limits = Limits(verdict.at_most, verdict.at_least)
+    found = flown.every.worst(verdict.metric, WORST, limits)
+    values = found[verdict.metric].to_numpy(dtype=np.float64)
+    margins = limits.margins(values) * limits.width
     return [
-        WorstRecord(
-            requirement=verdict.name, case_id=int(flown.case_ids[row]), value=float(values[row]), margin=float(m)
-        )
-        for row, m in zip(rows, margins, strict=True)
+        WorstRecord(requirement=verdict.name, case_id=int(case), value=float(value), margin=float(margin))
+        for case, value, margin in zip(found["case_id"], values, margins, strict=True)
     ]
 
 

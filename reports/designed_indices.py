@@ -5,15 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.statistics.designed_indices import CONFIDENCE, FEWEST_BLOCKS, DesignedIndices, designed_indices
+from mc_engine.statistics.designed_indices import FEWEST_BLOCKS, DesignedIndices, designed_indices
+from reports.contributions import Contributor
+from reports.contributor_figures import contributor_figure
 from reports.document import Cell, Column, FigureBlock, Table
-from reports.figures import IndexMap
 from reports.flown import Flown
 from reports.numbers import axis_label, count, number, percent
 from reports.outcomes import ALL_LIMITS, inside, inside_words
 
 MOST_METRICS = 8
-MOST_INPUTS = 12  # in the figure, and a metric in the table
+MOST_INPUTS = 12  # of a metric in the table
 BLOCKS = {"saltelli": "blocks", "morris": "trajectories"}
 _TITLES = {
     "first_order": "First-order index",
@@ -28,10 +29,10 @@ def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureB
     """Indices of the metrics that matter and, if cases failed, of passing; a sentence for metrics without any."""
     metrics = {name: flown.values(name) for name in flown.key_metrics[:MOST_METRICS]}
     names = {name: flown.words(name) for name in metrics}
-    if flown.verdicts or not flown.ok.all():
+    if flown.verdicts or flown.every.completed < flown.n_tried:
         names[ALL_LIMITS] = inside_words(flown)
         metrics[ALL_LIMITS] = inside(flown).astype(np.float64)
-    found = designed_indices(flown.design, flown.case_ids, inputs, metrics)
+    found = designed_indices(flown.design, flown.case_ids, inputs, metrics, flown.stated.confidence)
     main = "total" if flown.design == "saltelli" else "mu_star"
     shown = np.flatnonzero(np.isfinite(found.values[main]).any(axis=0))
     silent = [names[name] for k, name in enumerate(found.metrics) if k not in shown]
@@ -48,20 +49,21 @@ def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureB
 
 
 def _figure(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:
-    total = found.values["total"][:, shown]
-    order = np.argsort(-np.nan_to_num(total, nan=-1.0).max(axis=1), kind="stable")[:MOST_INPUTS]
-    drawing = IndexMap(
-        inputs=tuple(flown.words(found.inputs[k]) for k in order),
-        metrics=tuple(names[found.metrics[k]] for k in shown),
-        share=total[order],
-        n_used=(int(found.n_used[shown].min()), int(found.n_used[shown].max())),
-        n_tried=found.n_tried,
-        index="total index",
-        none="the input contributes nothing",
-        all="all of the variance involves it",
-        counted="blocks",
-    )
-    return FigureBlock("Total Sobol’ index of each input and metric.", drawing, "wide")
+    by_metric = [(found.metrics[k], names[found.metrics[k]], _contributors(found, int(k))) for k in shown]
+    source = f"from {count(int(found.n_used[shown].min()))} of {count(found.n_tried)} blocks of the design"
+    return contributor_figure(flown, by_metric, source, "rest: interactions, random draws")
+
+
+def _contributors(found: DesignedIndices, k: int) -> list[Contributor]:
+    def known(index: str, row: int) -> tuple[float, tuple[float, float]]:
+        value, reach = float(found.values[index][row, k]), float(found.reach[index][row, k])
+        return value, (value - reach, value + reach)
+
+    rows = []
+    for row, name in enumerate(found.inputs):
+        (first, first_interval), (total, total_interval) = known("first_order", row), known("total", row)
+        rows.append(Contributor(found.metrics[k], name, first, total, first_interval, total_interval))
+    return rows
 
 
 def _table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str], main: str) -> Table:
@@ -81,8 +83,18 @@ def _table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mappi
             cells = [_cell(found.values[index][row, k], found.reach[index][row, k]) for index in indices]
             rows.append((metric, Cell(flown.words(found.inputs[row])), *cells))
     if found.design == "saltelli":
-        return Table("Sobol’ indices of Saltelli’s blocks", columns, tuple(rows), _saltelli_note(found))
-    return Table("Elementary effects of Morris’s trajectories", columns, tuple(rows), _morris_note())
+        return Table(
+            "Sobol’ indices of Saltelli’s blocks",
+            columns,
+            tuple(rows),
+            _saltelli_note(found, percent(flown.stated.confidence)),
+        )
+    return Table(
+        "Elementary effects of Morris’s trajectories",
+        columns,
+        tuple(rows),
+        _morris_note(percent(flown.stated.confidence)),
+    )
 
 
 def _cell(value: float, reach: float) -> Cell:
@@ -90,18 +102,18 @@ def _cell(value: float, reach: float) -> Cell:
     return Cell(text, float(value), f"± {number(reach, 2)}" if np.isfinite(reach) else "")
 
 
-def _saltelli_note(found: DesignedIndices) -> str:
+def _saltelli_note(found: DesignedIndices, confidence: str) -> str:
     return (
-        f"± half the {percent(CONFIDENCE)} interval (bootstrap over blocks; analysis by SALib). First-order index: "
+        f"± half the {confidence} interval (bootstrap over blocks; analysis by SALib). First-order index: "
         "fraction of the variance due to this input alone; total index: fraction due to it and its interactions. A "
         f"block is {len(found.inputs) + 2} cases; one with a case that has no number is left out whole. Random draws "
         "in flight count into every total index."
     )
 
 
-def _morris_note() -> str:
+def _morris_note(confidence: str) -> str:
     return (
-        f"± half the {percent(CONFIDENCE)} interval (bootstrap; analysis by SALib). An effect is the metric’s change "
+        f"± half the {confidence} interval (bootstrap; analysis by SALib). An effect is the metric’s change "
         "as one input steps between the middles of quarters of its distribution that lie two apart, divided by 2/3. "
         "μ*: mean size; μ: mean; σ: standard deviation, large where the effect bends or depends on other inputs. It "
         "ranks inputs; Sobol’ indices need the design saltelli. A trajectory with a case that has no number is left "

@@ -6,6 +6,8 @@ renderers' work, and no renderer meets a character that steers, reorders or hide
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from itertools import count
+from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -65,7 +67,7 @@ class Table:
 
 @dataclass(frozen=True)
 class FigureBlock:
-    """A numbered figure; size: "wide", "half" or "small", the least width of a panel on the screen."""
+    """A numbered figure; size: "wide", "half", "small" or "matrix", the least width of a panel on the screen."""
 
     caption: str
     drawing: Drawing
@@ -78,11 +80,16 @@ Block = Text | Terms | Table | FigureBlock
 
 @dataclass(frozen=True)
 class Section:
-    """A titled part of the report; anchor is unique in it."""
+    """A titled part of the report; anchor is unique in it.
+
+    kind : "chapter", "part" of the chapter before it, or "appendix".  number : 1, 2, ..., A, B, ..., none of a part.
+    """
 
     anchor: str
     title: str
     blocks: tuple[Block, ...]
+    kind: str = "chapter"
+    number: str = ""
 
 
 @dataclass(frozen=True)
@@ -181,8 +188,9 @@ def _cleaned(value: Any) -> Any:
 
 
 def numbered(document: Document) -> Document:
-    """The document with its tables and figures numbered from 1 in reading order."""
+    """The document with its sections, tables and figures numbered in reading order."""
     counts: dict[type, int] = {Table: 0, FigureBlock: 0}
+    numbers = {"chapter": map(str, count(1)), "appendix": iter(ascii_uppercase)}
     sections = []
     for section in document.sections:
         blocks: list[Block] = []
@@ -191,7 +199,8 @@ def numbered(document: Document) -> Document:
                 counts[type(block)] += 1
                 block = replace(block, number=counts[type(block)])
             blocks.append(block)
-        sections.append(replace(section, blocks=tuple(blocks)))
+        number = next(numbers[section.kind]) if section.kind in numbers else ""
+        sections.append(replace(section, blocks=tuple(blocks), number=number))
     return replace(document, sections=tuple(sections))
 
 

@@ -1,27 +1,32 @@
 """The figures of a run: picks the data, bounds how much of it is drawn, and says what was left out."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
+from math import ceil
 
 import numpy as np
 
-from mc_engine.figures import HistoryFigure, MapFigure, ScatterFigure
+from mc_engine.figures import MapFigure, ScatterFigure
 from mc_engine.statistics import map_metric
 from mc_engine.statistics.maps import FEWEST, LEAST_EXPLAINED, explained_share
 from mc_engine.statistics.summary import nearly_equal
 from reports.case_tables import FEW_CASES, input_words
 from reports.cloud_regions import cloud_regions
+from reports.default_figures import history_figures, scatter_figures
 from reports.document import FigureBlock
 from reports.figures import DistributionPanel, Distributions, Histories, HistoryLine, MapDrawing, ScatterDrawing
 from reports.flown import Flown
-from reports.history_bands import fair_cases, history_bands
-from reports.numbers import axis_label, count, number, percent, words
+from reports.history_bands import FEWEST_CASES, OUTER, fair_cases, history_bands, outer_percentile
+from reports.history_limits import history_limits
+from reports.numbers import axis_label, count, counted, number, percent
 from reports.outcomes import case_outcomes, outcome_names
 from reports.published import published_law
 
 POINTS_SHOWN = 2000
 FEWEST_SHOWN = 50  # of an outcome, as far as there are so many
-PANELS_IN_A_FIGURE = 12
+MOST_PANELS = 16  # of a figure
+LOW_PANEL = 160.0  # height of the histograms of other metrics
 STRONGEST_INPUTS = 4  # among whose pairs the one is looked for that explains most
 COLOURED_CASES = 8
 COLOURED_OVER_BANDS = 2  # more would hide the band
@@ -79,7 +84,7 @@ def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
         unsure = (f"nowhere is its surface over {figure.x} and {figure.y} sure enough: other inputs scatter it, the "
                   f"{count(used.size)} cases are too few, or they lie on a line")  # fmt: skip
         return f"{figure.title}: not drawn; {few if used.size < FEWEST else unsure}."
-    rows = thinned_rows(used, flown.worst(figure.metric, WORST_RANKS))
+    rows = thinned_rows(used, flown.rows(flown.worst(figure.metric, WORST_RANKS)["case_id"]))
     drawing = MapDrawing(
         surface=surface,
         x_label=flown.axis(figure.x),
@@ -132,8 +137,8 @@ def nominal_point(flown: Flown, x: str, y: str) -> tuple[float, float] | None:
 
 def scatter_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     """The model's scatter figures; a sentence in place of an empty one, none where the run upstream is another."""
-    for figure in flown.figures:
-        if isinstance(figure, ScatterFigure) and not (figure.upstream and flown.absence(figure.x, figure.y)):
+    for figure in scatter_figures(flown):
+        if not (figure.upstream and flown.absence(figure.x, figure.y)):
             yield _scatter_block(flown, figure)
 
 
@@ -154,7 +159,7 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
         x_label=flown.axis(figure.x),
         y_label=flown.axis(figure.y),
         n_used=int(used.size),
-        n_tried=flown.n_tried,
+        n_tried=flown.n_held,
         nominal=nominal_point(flown, figure.x, figure.y),
         outcome=outcome[rows],
         outcomes=tuple(zip(outcome_names(flown), np.bincount(outcome[used], minlength=3).tolist(), strict=True)),
@@ -167,15 +172,10 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
 
 
 def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
-    """Histograms: first the metrics that matter, then the others; constant ones in a sentence."""
-    drawable = [name for name, item in flown.summaries.items() if item.n_used >= FEWEST_VALUES and not item.constant]
-    others = [name for name in drawable if name not in flown.key_metrics]
-    key = [name for name in flown.key_metrics if name in drawable]
-    if key:
-        title = "Distributions of the key metrics" if others else "Distributions of the metrics"
-        yield from _distribution_figures(flown, key, title)
-    if others:
-        yield from _distribution_figures(flown, others, "Distributions of the other metrics")
+    """Histograms of the metrics that matter, with limits and percentiles; those not drawn, in sentences."""
+    key, others = _drawable(flown)
+    title = "Distributions of the key metrics" if others else "Distributions of the metrics"
+    yield from _distribution_figures(flown, key, title)
     few = [name for name, item in flown.summaries.items() if 0 < item.n_used < FEWEST_VALUES and not item.constant]
     if few:
         yield f"Not drawn, fewer than {FEWEST_VALUES} cases have a number: {', '.join(few)}."
@@ -187,12 +187,29 @@ def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
         yield f"Not drawn, no case has a number: {', '.join(silent)}."
 
 
-def _distribution_figures(flown: Flown, names: list[str], title: str) -> Iterator[FigureBlock]:
-    pages = [names[first : first + PANELS_IN_A_FIGURE] for first in range(0, len(names), PANELS_IN_A_FIGURE)]
-    for page, group in enumerate(pages, start=1):
+def other_distributions(flown: Flown) -> Iterator[FigureBlock]:
+    """Histograms of all other metrics."""
+    yield from _distribution_figures(flown, _drawable(flown)[1], "Distributions of the other metrics", LOW_PANEL)
+
+
+def _drawable(flown: Flown) -> tuple[list[str], list[str]]:
+    """Metrics with a distribution: those that matter, and the others."""
+    names = [name for name, item in flown.summaries.items() if item.n_used >= FEWEST_VALUES and not item.constant]
+    return [name for name in flown.key_metrics if name in names], [one for one in names if one not in flown.key_metrics]
+
+
+def _distribution_figures(flown: Flown, names: list[str], title: str, height: float = 240.0) -> Iterator[FigureBlock]:
+    pages = -(-len(names) // MOST_PANELS)
+    for page in range(pages):
+        group = names[len(names) * page // pages : len(names) * (page + 1) // pages]
         panels = tuple(_distribution_panel(flown, name) for name in group)
-        part = f" ({page} of {len(pages)})" if len(pages) > 1 else ""
-        yield FigureBlock(f"{title}{part}", Distributions(panels, (0.00135, 0.99865), flown.random), "small")
+        part = f" ({page + 1} of {pages})" if pages > 1 else ""
+        drawing = Distributions(panels, flown.stated.outer, flown.random, height)
+        yield FigureBlock(f"{title}{part}, {_used(flown)}", drawing, "small")
+
+
+def _used(flown: Flown) -> str:
+    return f"{counted(flown.n_tried, 'case')}, fewer where a panel says so."
 
 
 def _distribution_panel(flown: Flown, name: str) -> DistributionPanel:
@@ -204,7 +221,7 @@ def _distribution_panel(flown: Flown, name: str) -> DistributionPanel:
         for limit in (verdict.at_most, verdict.at_least)
         if limit is not None
     }
-    used = f"{summary.n_used:,} of {summary.n_tried:,} cases".replace(",", "\u202f")
+    used = "" if summary.n_used == summary.n_tried else f"{count(summary.n_used)} of {count(summary.n_tried)} cases"
     return DistributionPanel(
         title=used,
         label=flown.axis(name),
@@ -212,42 +229,87 @@ def _distribution_panel(flown: Flown, name: str) -> DistributionPanel:
         summary=summary,
         nominal=flown.nominal_value(name),
         limits=tuple(sorted(limits)),
-        law=published_law(flown, name),
+        law=_law(flown, name),
+        column=name,
     )
+
+
+def _law(flown: Flown, name: str) -> tuple[float, float] | None:
+    """Mean and standard deviation that the source prints, in the unit chosen for the metric."""
+    law = published_law(flown.own, name)
+    return None if law is None else (flown.told(name, law[0]), flown.told(name, law[1]))
 
 
 def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     """The model's history figures over all retained cases; a sentence in place of one without histories."""
-    wanted = [figure for figure in flown.figures if isinstance(figure, HistoryFigure)]
+    wanted = history_figures(flown)
     if not wanted:
         return
     if not len(flown.histories):
         yield "No time histories were saved in this run; [retention] in the campaign file selects cases."
         return
-    cases = history_cases(flown)
-    fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
-    constant = []
-    missing = [name for figure in wanted for name in figure.quantities if name not in flown.histories.columns]
+    saved = [name for name in flown.histories.columns if name not in ("case_id", "t_s")]
+    asked = list(dict.fromkeys(name for figure in wanted for name in figure.quantities))
+    missing = [name for name in asked if name not in saved]
+    constant = [name for name in asked if name in saved and is_constant(flown.histories[name].to_numpy())]
+    drawn = [name for name in asked if name not in missing and name not in constant]
+    whole = history_drawing(flown, drawn)
+    yield from _envelope_words(flown, whole)
     for figure in wanted:
-        known = [name for name in figure.quantities if name in flown.histories.columns]
-        names = [name for name in known if not _is_constant(flown.histories[name].to_numpy())]
-        constant += [name for name in known if name not in names]
+        names = [name for name in figure.quantities if name in drawn]
         if names:
-            bands = history_bands(flown.histories, fair, names)
-            lines = tuple(
-                history_line(flown, case, label, rank, names)
-                for case, (label, rank) in cases.items()
-                if not bands or (rank is not None and rank <= COLOURED_OVER_BANDS)
-            )
-            labels = {name: axis_label(words(name, flown.unit(name)), flown.unit(name)) for name in names}
-            yield FigureBlock(figure.title, Histories(lines, labels, bands), "half")
+            labels = {name: whole.labels[name] for name in names}
+            yield FigureBlock(figure.title, replace(whole, labels=labels), "half")
     if constant:
         yield f"Not drawn, constant in every saved case: {', '.join(constant)}."
     if missing:
-        yield f"Not drawn, the histories have no such quantity: {', '.join(dict.fromkeys(missing))}."
+        yield f"Not drawn, the histories have no such quantity: {', '.join(missing)}."
 
 
-def _is_constant(values: np.ndarray) -> bool:
+def history_drawing(
+    flown: Flown, names: list[str], cases: dict[int, tuple[str, int | None]] | None = None
+) -> Histories:
+    """Quantities with their envelopes and limits; cases : name and rank of the lines, by default those worth a line."""
+    labels = {name: flown.axis(name) for name in names}
+    if not len(flown.histories):
+        return Histories((), labels)
+    fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
+    bands = history_bands(flown.histories, fair, names)
+    if cases is None:
+        cases = {
+            case: (label, rank)
+            for case, (label, rank) in history_cases(flown).items()
+            if not bands or (rank is not None and rank <= COLOURED_OVER_BANDS)
+        }
+    lines = tuple(history_line(flown, case, label, rank, names) for case, (label, rank) in cases.items())
+    limits, time = history_limits(flown, names), axis_label("time", flown.unit("t_s"))
+    return Histories(lines, labels, bands, limits, time)
+
+
+def _envelope_words(flown: Flown, drawn: Histories) -> Iterator[str]:
+    """What the envelopes and limits of all history figures are."""
+    sizes = {band.n_cases for band in drawn.bands.values()}
+    if sizes:
+        n = sizes.pop()
+        outer = outer_percentile(n)
+        why = (
+            f", the outermost that {count(n)} cases support; {percent(OUTER[0], 3)} needs {count(ceil(1.0 / OUTER[0]))}"
+        )
+        yield (
+            f"Envelopes: smallest to largest, {percent(outer, 3)} to {percent(1.0 - outer, 3)}"
+            f"{why if outer > OUTER[0] else ''}, and median of the first {count(n)} cases, "
+            "at every time of those that still fly. These cases were saved whatever their result."
+        )
+    elif flown.random:
+        yield f"Envelopes need {FEWEST_CASES} saved cases from case 0 on: `first = {FEWEST_CASES}` under [retention]."
+    if drawn.limits:
+        yield (
+            "A limit is drawn where the requirement’s metric is the largest or smallest value of the quantity, as the "
+            "saved histories confirm."
+        )
+
+
+def is_constant(values: np.ndarray) -> bool:
     numbers = values[np.isfinite(values)]
     return not numbers.size or nearly_equal(numbers.min(), numbers.max())
 
@@ -277,9 +339,9 @@ def _worst_reasons(flown: Flown) -> dict[int, tuple[int, str]]:
     for order, metric in enumerate(name for name in flown.key_metrics if not flown.summaries[name].constant):
         one_sided = "largest" if flown.largest_is_worst(metric) else "smallest"
         which = "worst" if flown.limits(metric).two_sided else one_sided
-        for place, row in enumerate(flown.worst(metric, WORST_RANKS), start=1):
+        for place, case in enumerate(flown.worst(metric, WORST_RANKS)["case_id"], start=1):
             text = f"{which} {flown.words(metric)}" + (f", no. {place}" if place > 1 else "")
-            reasons.setdefault(int(flown.case_ids[row]), (place + WORST_RANKS * order, text))
+            reasons.setdefault(int(case), (place + WORST_RANKS * order, text))
     return reasons
 
 

@@ -3,35 +3,49 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
 from mc_engine.figures import KINDS, MapFigure, ScatterFigure, from_record
-from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
+from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, was_looked_at
 from mc_engine.statistics.contributors import Contributor, contributors
 from mc_engine.statistics.worst import Limits, limits_on
-from mc_engine.status import OK, STATUS_NAME, STATUS_TEXT
-from reports.numbers import axis_label, named, words
-
-CONFIDENCE = 0.90
-
+from mc_engine.status import STATUS_NAME, STATUS_TEXT
+from reports.all_cases import Run, all_cases, without_attributes
+from reports.numbers import axis_label, count, named, words
 
 if TYPE_CHECKING:
     from reports.contributions import Contributions
 
 
-class Run(Protocol):
-    """What a report needs of a store."""
+@dataclass(frozen=True)
+class Stated:
+    """The probability and the confidence of all statistics of a report: [report] of the campaign file."""
+
+    probability: float = 0.9973
+    confidence: float = 0.90
 
     @property
-    def manifest(self) -> dict[str, Any]: ...
+    def outer(self) -> tuple[float, float]:
+        """The percentiles between which a case lies with the probability."""
+        return round(0.5 * (1.0 - self.probability), 12), round(0.5 * (1.0 + self.probability), 12)
+
     @property
-    def n_cases(self) -> int: ...
-    def cases(self) -> pd.DataFrame: ...
-    def nominal(self) -> dict[str, Any]: ...
-    def histories(self) -> pd.DataFrame: ...
+    def low(self) -> float:
+        """The percentile above which a case lies with the probability."""
+        return round(1.0 - self.probability, 12)
+
+    @property
+    def percentiles(self) -> tuple[float, ...]:
+        """All that are told, ascending."""
+        return self.outer[0], self.low, 0.5, self.probability, self.outer[1]
+
+    @property
+    def two_sided(self) -> float:
+        """The confidence of an interval whose bounds each hold with the confidence."""
+        return 2.0 * self.confidence - 1.0
 
 
 @dataclass(frozen=True)
@@ -45,15 +59,21 @@ class ColumnFacts:
 
 
 class Flown:
-    """A run with its tables read once.  name : of the run directory, as the commands in the report spell it."""
+    """A run with its tables read once.  name : of the run directory, as the commands in the report spell it.
+
+    `cases` is the table at hand, one row for each of `n_held` cases: all `n_tried`, unless the run is too large to be
+    held.  Its columns (`values`, `inputs`, `ok`, `case_ids`) are what figures are drawn of; all that is told of all
+    cases (counts, summaries, verdicts, worst and failed ones) comes from `every`.
+    """
 
     def __init__(self, run: Run, name: str):
         self.run = run
         self.name = name
         self.manifest = run.manifest
-        self.cases = run.cases()
+        self.every = all_cases(run, self.stated.two_sided, self.stated.percentiles)
+        self.cases = self.every.table
         self.nominal = run.nominal()
-        self.histories = run.histories()
+        self.histories = without_attributes(run.histories())
         self.n_wanted = int(run.n_cases)
         self._contributors: dict[str, list[Contributor]] = {}
 
@@ -62,6 +82,16 @@ class Flown:
     @cached_property
     def campaign(self) -> Mapping[str, Any]:
         return self.manifest.get("campaign", {})
+
+    @cached_property
+    def stated(self) -> Stated:
+        """Probability and confidence of all statistics."""
+        return Stated(**self.manifest.get("report", {}))
+
+    @property
+    def own(self) -> "Flown":
+        """The run with each column in its own unit."""
+        return self
 
     @cached_property
     def design(self) -> str:
@@ -91,6 +121,14 @@ class Flown:
         low, high = self.manifest.get("ranges", {}).get(name, (None, None))
         return -np.inf if low is None else float(low), np.inf if high is None else float(high)
 
+    def told(self, name: str, value: Any) -> Any:
+        """A number, or an array of them, of a column's own unit in the unit that it is told in."""
+        return value
+
+    def told_table(self, table: pd.DataFrame) -> pd.DataFrame:
+        """A table of histories in the units that they are told in."""
+        return table
+
     def unit(self, name: str) -> str:
         return self.columns[name].unit if name in self.columns else ""
 
@@ -118,41 +156,56 @@ class Flown:
         """The model's figures, of the kinds that this report knows."""
         return [from_record(record) for record in self.manifest.get("figures", []) if record.get("kind") in KINDS]
 
-    # ---- the table
+    # ---- the table at hand
 
     @property
-    def n_tried(self) -> int:
+    def n_held(self) -> int:
+        """How many cases the table at hand has."""
         return len(self.cases)
 
-    @cached_property
+    @property
+    def sampled(self) -> bool:
+        """Whether these are some of the cases only."""
+        return self.n_held < self.n_tried
+
+    @property
+    def sample_words(self) -> str:
+        """What a caption says of a sample, as its end; empty where all cases are held."""
+        return f", from {count(self.n_held)} of {count(self.n_tried)} cases picked evenly" if self.sampled else ""
+
+    @property
     def ok(self) -> np.ndarray:
-        """bool[n_tried]: completed."""
-        return np.asarray(self.cases["status"] == STATUS_NAME[OK], dtype=bool)
+        """bool[n_held]: completed."""
+        return self.every.ok
 
     @cached_property
     def case_ids(self) -> np.ndarray:
         return self.cases["case_id"].to_numpy(dtype=np.int64)
 
+    def rows(self, case_ids: np.ndarray | pd.Series) -> np.ndarray:
+        """Rows of the table at hand for these cases, in their order, without those that it does not hold."""
+        found = pd.Index(self.case_ids).get_indexer(np.asarray(case_ids, dtype=np.int64))
+        return found[found >= 0]
+
     def values(self, name: str) -> np.ndarray:
-        """float64[n_tried] of a column; NaN for words, for a missing column, and for metrics of failed cases."""
-        if name not in self.cases.columns:
-            return np.full(self.n_tried, np.nan)
-        values = pd.to_numeric(self.cases[name], errors="coerce").to_numpy(dtype=np.float64)
-        return values if self.columns[name].role == "dispersion" else np.where(self.ok, values, np.nan)
+        """float64[n_held] of a column; NaN for words, for a missing column, and for metrics of failed cases."""
+        return self.every.values(name)
 
     def nominal_value(self, name: str) -> float | None:
         """The nominal case's number in a column, None if it has none."""
         value = self.nominal.get(name)
         return float(value) if isinstance(value, int | float | np.number) and np.isfinite(float(value)) else None
 
-    # ---- statistics, made once
+    # ---- statistics of all cases
 
-    @cached_property
+    @property
+    def n_tried(self) -> int:
+        return self.every.n_tried
+
+    @property
     def summaries(self) -> dict[str, Summary]:
         """Summary per metric."""
-        return {
-            fact.name: summarize(self.values(fact.name), confidence=CONFIDENCE) for fact in self.with_role("metric")
-        }
+        return self.every.summaries
 
     @property
     def verdicts(self) -> list[Verdict]:
@@ -164,9 +217,13 @@ class Flown:
         """The verdict on all requirements at once; None unless there are several."""
         return self._judgement[1]
 
-    @cached_property
+    @property
     def _judgement(self) -> tuple[list[Verdict], Verdict | None]:
-        return judge_all(self.manifest.get("requirements", []), self.values, self.ok, self.design, self.looked)
+        return self.every.judgement
+
+    def worst(self, metric: str, most: int) -> pd.DataFrame:
+        """The worst cases of a metric: those with the smallest margin to its limits."""
+        return self.every.worst(metric, most, self.limits(metric))
 
     @property
     def looked(self) -> bool:
@@ -189,15 +246,12 @@ class Flown:
 
     def largest_is_worst(self, metric: str) -> bool:
         """Whether the bad end of a metric is the upper one; with two limits, that with the smaller margin."""
-        return self.limits(metric).largest_is_worst(self.values(metric))
-
-    def worst(self, metric: str, count: int) -> np.ndarray:
-        """Rows of the worst cases of a metric: those with the smallest margin to a limit."""
-        return worst_cases(self.values(metric), self.ok, count, limits=self.limits(metric))
+        summary = self.summaries[metric]
+        return self.limits(metric).largest_is_worst(np.array([summary.minimum, summary.maximum], dtype=np.float64))
 
     @property
     def inputs(self) -> dict[str, np.ndarray]:
-        """The columns of the dispersed inputs by name."""
+        """The columns at hand of the dispersed inputs by name."""
         return {fact.name: self.cases[fact.name].to_numpy() for fact in self.with_role("dispersion")}
 
     def contributors(self, metric: str) -> list[Contributor]:

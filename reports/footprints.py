@@ -1,53 +1,34 @@
 """Where the flights end: the footprint's figure, its tables, and the files for maps."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from mc_engine.figures import FootprintFigure
 from mc_engine.statistics import clopper_pearson, summarize
-from mc_engine.statistics.footprint import Footprint, footprint
-from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, LocalPlane
+from mc_engine.statistics.footprint import Footprint
 from mc_engine.statistics.regions import DensityRegion, Ellipse, next_case_scale
+from reports.coastlines import coastlines, nearest_coast
 from reports.document import Attachment, Cell, Column, FigureBlock, Table
 from reports.drawings import thinned_rows
 from reports.figures import FootprintCurve, FootprintDrawing
-from reports.flown import CONFIDENCE, Flown
+from reports.flown import Flown
+from reports.landings import TARGET, Landing, height_limit, landing_of, on_earth
 from reports.map_files import Mark, Outline, Places, geojson, kml
-from reports.numbers import count, counted, interval, number, percent, with_unit
+from reports.numbers import count, counted, interval, number, percent
 
 DRAWN_REGION = 0.9  # content of the one region in the figure; more would hide the ellipses
 DISTANCES = (0.5, 0.9, 0.99)
 CONFIDENCE_INSIDE = 0.95
 LONG = 4.0
 PLACES_IN_A_FILE = 20_000
-
-
-@dataclass(frozen=True)
-class _Landing:
-    """What is known of one footprint.  rows : of the cases that came down;  above : that ended above the limit.
-
-    latitude, longitude : float64[n_tried], degrees.
-    """
-
-    figure: FootprintFigure
-    latitude: np.ndarray
-    longitude: np.ndarray
-    rows: np.ndarray
-    above: int
-    found: Footprint
-    aim: Mark | None
-
-    @property
-    def distances(self) -> np.ndarray:
-        """Kilometres of all cases from the aim; NaN for those that did not come down."""
-        distances = np.full(self.latitude.size, np.nan)
-        if self.aim is not None:
-            plane = LocalPlane(self.aim.latitude, self.aim.longitude, self.found.plane.ellipsoid)
-            points = plane.points(self.latitude[self.rows], self.longitude[self.rows])
-            distances[self.rows] = np.hypot(points[:, 0], points[:, 1]) / 1000.0
-        return distances
+KILOMETRES = {"km": 1.0, "m": 1e-3}
+CORNERS = 120  # of a circle
+SAME_DISTANCE = 0.005  # relative, of a metric that is the distance from the target
+WIDER = 1.25  # of a map of the surroundings, beyond the nearest coast
+LEAST_AROUND = 500e3  # m, of such a map
+AROUND = 4.0  # times its reach to the north: as wide as the page
 
 
 @dataclass(frozen=True)
@@ -62,98 +43,23 @@ def footprint_contents(flown: Flown) -> FootprintContents:
     """All footprints that the model asks for; a sentence in place of one that cannot be drawn."""
     contents = FootprintContents()
     for place, figure in enumerate(one for one in flown.figures if isinstance(one, FootprintFigure)):
-        landing = _landing(flown, figure)
+        landing = landing_of(flown, figure)
         if isinstance(landing, str):
             contents.blocks.append(landing)
             continue
         stem = "footprint" if place == 0 else f"footprint-{place + 1}"
         contents.blocks.extend(_blocks(flown, landing, stem))
-        if _on_earth(flown, figure):
+        if on_earth(flown, figure):
             places = _places(flown, landing)
             contents.files.append(Attachment(f"{stem}.kml", kml(places)))
             contents.files.append(Attachment(f"{stem}.geojson", geojson(places)))
     return contents
 
 
-# ---- the data
-
-
-def _landing(flown: Flown, figure: FootprintFigure) -> _Landing | str:
-    """The footprint, or the sentence that says why there is none."""
-    above_of = () if figure.ends_below is None else figure.ends_below[:1]
-    absent = flown.absence(figure.latitude, figure.longitude, *above_of)
-    if absent:
-        return f"{figure.title}: not drawn; {absent}."
-    latitude, longitude = flown.values(figure.latitude), flown.values(figure.longitude)
-    placed = _placed(flown, figure)
-    rows = np.flatnonzero(placed & _down(flown, figure))
-    above = int(placed.sum() - rows.size)
-    if not rows.size:
-        high = f"; {count(above)} ended above {_limit(flown, figure)}" if above else ""
-        return f"{figure.title}: not drawn; none of {count(flown.n_tried)} cases has an impact point{high}."
-    ellipsoid = ELLIPSOIDS.get(planet_of(flown, figure), WGS84)
-    found = footprint(latitude[rows], longitude[rows], ellipsoid, flown.random)
-    if found is None:
-        return f"{figure.title}: not drawn; the {count(rows.size)} impact points lie too far apart for one figure."
-    if found.reach < 1.0 and rows.size > 1:
-        return f"{figure.title}: not drawn; all {count(rows.size)} impact points lie within one metre."
-    return _Landing(figure, latitude, longitude, rows, above, found, _aim(flown, figure))
-
-
-def landed(flown: Flown, figure: FootprintFigure) -> tuple[np.ndarray, np.ndarray]:
-    """Latitude and longitude, float64[k] degrees, of the cases that came down."""
-    rows = _placed(flown, figure) & _down(flown, figure)
-    return flown.values(figure.latitude)[rows], flown.values(figure.longitude)[rows]
-
-
-def _placed(flown: Flown, figure: FootprintFigure) -> np.ndarray:
-    latitude, longitude = flown.values(figure.latitude), flown.values(figure.longitude)
-    return np.isfinite(latitude) & np.isfinite(longitude) & (np.abs(latitude) <= 90.0)
-
-
-def _down(flown: Flown, figure: FootprintFigure) -> np.ndarray:
-    if figure.ends_below is None:
-        return np.ones(flown.n_tried, dtype=bool)
-    column, limit = figure.ends_below
-    with np.errstate(invalid="ignore"):
-        return np.asarray(flown.values(column) <= limit)
-
-
-def _limit(flown: Flown, figure: FootprintFigure) -> str:
-    column, limit = figure.ends_below or ("", 0.0)
-    return with_unit(number(limit), flown.unit(column))
-
-
-def planet_of(flown: Flown, figure: FootprintFigure) -> str:
-    settings = {record["name"]: record.get("value") for record in flown.manifest.get("settings", [])}
-    return str(settings.get(figure.planet, "earth")).lower()
-
-
-def _on_earth(flown: Flown, figure: FootprintFigure) -> bool:
-    return planet_of(flown, figure) not in ELLIPSOIDS or planet_of(flown, figure) == "earth"
-
-
-def _aim(flown: Flown, figure: FootprintFigure) -> Mark | None:
-    """The target if there is one, else the end of the nominal case."""
-    if figure.target is not None:
-        latitude, longitude = (_shared_value(flown, name) for name in figure.target)
-        if latitude is not None and longitude is not None:
-            return Mark("target", latitude, longitude)
-    latitude, longitude = flown.nominal_value(figure.latitude), flown.nominal_value(figure.longitude)
-    return None if latitude is None or longitude is None else Mark("end of the nominal case", latitude, longitude)
-
-
-def _shared_value(flown: Flown, name: str) -> float | None:
-    """A parameter of the run, or the nominal case's number in a column."""
-    values = {record["name"]: record.get("value") for record in flown.manifest.get("parameters", [])}
-    value = values.get(name)
-    return float(value) if isinstance(value, int | float) else flown.nominal_value(name)
-
-
 # ---- figure and tables
 
 
-def _blocks(flown: Flown, landing: _Landing, stem: str) -> Iterator[FigureBlock | Table | str]:
+def _blocks(flown: Flown, landing: Landing, stem: str) -> Iterator[FigureBlock | Table | str]:
     yield FigureBlock(_caption(flown, landing), _drawing(flown, landing), "wide")
     if landing.found.ellipses:
         yield _region_table(flown, landing)
@@ -162,7 +68,7 @@ def _blocks(flown: Flown, landing: _Landing, stem: str) -> Iterator[FigureBlock 
     distances = _distance_table(flown, landing)
     if distances is not None:
         yield distances
-    if _on_earth(flown, landing.figure):
+    if on_earth(flown, landing.figure):
         shown = min(landing.rows.size, PLACES_IN_A_FILE)
         which = "all" if shown == landing.rows.size else f"{count(shown)} of"
         yield (
@@ -172,9 +78,9 @@ def _blocks(flown: Flown, landing: _Landing, stem: str) -> Iterator[FigureBlock 
         )
 
 
-def _caption(flown: Flown, landing: _Landing) -> str:
+def _caption(flown: Flown, landing: Landing) -> str:
     plane = landing.found.plane
-    above = f" {count(landing.above)} cases ended above {_limit(flown, landing.figure)} and are left out." * bool(
+    above = f" {count(landing.above)} cases ended above {height_limit(flown, landing.figure)} and are left out." * bool(
         landing.above
     )
     return f"{landing.figure.title}. Mean impact point {_place_words(plane.latitude, plane.longitude)}.{above}"
@@ -185,7 +91,7 @@ def _place_words(latitude: float, longitude: float) -> str:
     return f"{abs(latitude):.4f}° {north}, {abs(longitude):.4f}° {east}"
 
 
-def _drawing(flown: Flown, landing: _Landing) -> FootprintDrawing:
+def _drawing(flown: Flown, landing: Landing) -> FootprintDrawing:
     points = landing.found.points
     ends = [int(pick(points[:, k])) for k in (0, 1) for pick in (np.argmin, np.argmax)]
     shown = thinned_rows(np.arange(landing.rows.size), np.array(ends))
@@ -197,19 +103,62 @@ def _drawing(flown: Flown, landing: _Landing) -> FootprintDrawing:
         )
     )
     aim = landing.aim
-    here = landing.found.plane.points(np.array([aim.latitude]), np.array([aim.longitude]))[0] / 1e3 if aim else None
+    here = None if aim is None else landing.at(aim)
+    curves = (*_curves(landing.found), *_circles(flown, landing))
+    coasts, around, reach = _coasts(landing, curves) if on_earth(flown, landing.figure) else ((), (), 0.0)
     return FootprintDrawing(
         points=points[shown] / 1000.0,
         names=names,
-        curves=tuple(_curves(landing.found)),
+        curves=curves,
         n_used=int(landing.rows.size),
-        n_tried=flown.n_tried,
+        n_tried=flown.n_held,
         aim=(aim.name, (float(here[0]), float(here[1]))) if aim is not None and here is not None else None,
         long_axis=_long_axis(landing.found),
         case_ids=flown.case_ids[rows],
         everywhere=points / 1000.0,
         every_case=flown.case_ids[landing.rows],
+        coasts=coasts,
+        around=around,
+        around_reach=reach,
     )
+
+
+def _circles(flown: Flown, landing: Landing) -> Iterator[FootprintCurve]:
+    """The circular error probable, and the limit of a requirement on the distance from the target."""
+    centre, distances = landing.centre, landing.distances(landing.centre)
+    if flown.random and landing.rows.size > 2:
+        radius = float(np.nanmedian(distances))
+        text = f"CEP {number(radius, 3)} km: the circle about the {centre.name} that holds 50 % of the cases"
+        yield FootprintCurve("CEP", text, (_circle(landing.at(centre), radius),))
+    for verdict in flown.verdicts if centre.name == TARGET else ():
+        scale = KILOMETRES.get(flown.unit(verdict.metric))
+        if scale is None or verdict.at_most is None:
+            continue
+        misses = scale * flown.values(verdict.metric)
+        if np.nanmax(np.abs(misses - distances) / distances, initial=0.0) < SAME_DISTANCE:
+            radius = scale * verdict.at_most
+            text = f"required: {flown.words(verdict.metric)} at most {number(radius)} km"
+            yield FootprintCurve("target", text, (_circle(landing.at(centre), radius),))
+
+
+def _circle(middle: np.ndarray, radius: float) -> np.ndarray:
+    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS)
+    return middle + radius * np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _coasts(
+    landing: Landing, curves: Iterable[FootprintCurve]
+) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...], float]:
+    """The coasts on the map, or else those of a wider one, and how many km it reaches to the north."""
+    plane = landing.found.plane
+    places = [landing.found.points / 1000.0, *(one for curve in curves for one in curve.outlines)]
+    places += [landing.at(landing.aim)[None, :]] if landing.aim else []
+    ends = np.abs(np.concatenate(places)).max(axis=0)
+    on_map = coastlines(plane, 3000.0 * float(ends.max()))
+    if any((np.abs(line) < ends).all(axis=1).any() for line in on_map):
+        return tuple(on_map), (), 0.0
+    reach = max(WIDER * nearest_coast(plane), LEAST_AROUND)
+    return (), tuple(coastlines(plane, AROUND * reach)), reach / 1000.0
 
 
 def _long_axis(found: Footprint) -> float | None:
@@ -240,7 +189,7 @@ def _name(region: Ellipse | DensityRegion) -> str:
     return f"{content} ellipse" if isinstance(region, Ellipse) else f"at least {content} region"
 
 
-def _region_table(flown: Flown, landing: _Landing) -> Table:
+def _region_table(flown: Flown, landing: Landing) -> Table:
     """Contents stated and shares really inside."""
     found = landing.found
     columns = (
@@ -264,7 +213,7 @@ def _region_table(flown: Flown, landing: _Landing) -> Table:
         f"across that direction the plane stretches them by at most {percent(found.plane.stretch(found.reach), 3)}."
     )
     return Table(
-        f"Regions of the {count(landing.rows.size)} of {count(flown.n_tried)} cases that came down", columns, rows, note
+        f"Regions of the {count(landing.rows.size)} of {count(flown.n_held)} cases that came down", columns, rows, note
     )
 
 
@@ -299,7 +248,7 @@ def _parts(outlines: int) -> str:
     return "one outline" if outlines == 1 else f"{outlines} outlines"
 
 
-def _no_ellipses(flown: Flown, landing: _Landing) -> str:
+def _no_ellipses(flown: Flown, landing: Landing) -> str:
     if not flown.random:
         return f"No regions: the cases of the design “{flown.design}” are chosen, not drawn."
     if landing.rows.size < 3:
@@ -307,18 +256,31 @@ def _no_ellipses(flown: Flown, landing: _Landing) -> str:
     return f"No ellipses: the {count(landing.rows.size)} impact points lie on a line."
 
 
-def _distance_table(flown: Flown, landing: _Landing) -> Table | None:
-    """Distances from the target or the nominal place; the median is the circular error probable."""
-    if landing.aim is None:
+def _distance_table(flown: Flown, landing: Landing) -> Table | None:
+    """Distances from the target or the mean impact point, and from the end of the nominal case."""
+    if landing.rows.size < 2:
         return None
-    summary = summarize(landing.distances, probabilities=DISTANCES, confidence=CONFIDENCE)
-    titles = ("CEP, 50 %", *(percent(p) for p in DISTANCES[1:]))
+    places = [landing.centre, *([landing.aim] if landing.aim is not None and landing.aim != landing.centre else [])]
+    titles = ("50 %", *(percent(p) for p in DISTANCES[1:]))
     columns = (
         Column("Distance from", "text", 2.6),
         Column("Used / tried", "number", 1.5),
         *(Column(f"{title} [km]", "number", 1.8) for title in titles),
         Column("Largest [km]", "number", 1.2),
     )
+    rows = tuple(_distance_row(flown, landing, place) for place in places)
+    each = percent(flown.stated.confidence)
+    note = (
+        f"50 % of the cases end within the first distance; from the {landing.centre.name} it is the circular error "
+        f"probable (CEP). In brackets: distribution-free limits, each holding with {each}."
+        if flown.random
+        else "Percentiles of the flown cases, not of a population."
+    )
+    return Table("Distances along the ground", columns, rows, note)
+
+
+def _distance_row(flown: Flown, landing: Landing, place: Mark) -> tuple[Cell, ...]:
+    summary = summarize(landing.distances(place), probabilities=DISTANCES, confidence=flown.stated.two_sided)
     spread = summary.spread
     cells = [
         Cell(
@@ -327,30 +289,21 @@ def _distance_table(flown: Flown, landing: _Landing) -> Table | None:
         for item in summary.quantiles
     ]
     used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
-    where = Cell(landing.aim.name, small=_place_words(landing.aim.latitude, landing.aim.longitude))
     largest = Cell(number(summary.maximum, 4, spread), summary.maximum)
-    each = percent(0.5 * (1.0 + CONFIDENCE))
-    note = (
-        f"CEP, circular error probable: half of the cases end within this distance. In brackets: distribution-free "
-        f"limits, each holding with {each}."
-        if flown.random
-        else "Percentiles of the flown cases, not of a population."
-    )
-    return Table("Distances along the ground", columns, ((where, used, *cells, largest),), note)
+    return (Cell(place.name, small=_place_words(place.latitude, place.longitude)), used, *cells, largest)
 
 
 # ---- the files
 
 
-def _places(flown: Flown, landing: _Landing) -> Places:
+def _places(flown: Flown, landing: Landing) -> Places:
     rows = landing.rows
     if rows.size > PLACES_IN_A_FILE:
         rows = rows[np.linspace(0, rows.size - 1, PLACES_IN_A_FILE).astype(np.int64)]
     title = str(flown.campaign.get("title") or flown.name)
-    note = f"{landing.figure.title}; {count(rows.size)} of {count(flown.n_tried)} cases"
+    note = f"{landing.figure.title}; {count(rows.size)} of {count(flown.n_held)} cases"
     status = [str(word) for word in flown.cases["status"].iloc[rows]]
-    plane = landing.found.plane
-    marks = [Mark("mean impact point", plane.latitude, plane.longitude)]
+    marks = [landing.mean]
     marks += [landing.aim] if landing.aim else []
     return Places(
         title=title,

@@ -47,19 +47,19 @@ GLOSSARY = Terms(
         ),
         (
             "percentile",
-            "The value below which the stated percentage of cases lies. 0.135, 2.275, 50, 97.725 and 99.865 % are "
-            "a normal distribution’s −3, −2, 0, +2 and +3 standard deviations; no normality is assumed here.",
+            "The value below which the stated percentage of cases lies. No normal distribution is assumed.",
         ),
         (
-            "interval of a percentile",
-            "Two order statistics, each on its side of the true percentile with 95 % for a 90 % "
-            "interval. A dash: the cases are too few for that limit.",
+            "confidence bounds",
+            "Of a percentile two order statistics, each on its side of the true percentile with the confidence of the "
+            "report. A dash: the cases are too few for that bound. Probability and confidence are those of [report] in "
+            "the campaign file, 99.73 % and 90 % by default; a requirement may have its own.",
         ),
         (
             "exactness of the bounds",
             "Bounds and intervals are exact for independent draws (mc), in a number that was fixed in advance unless "
-            "the report says otherwise. Latin hypercube, "
-            "Sobol and Halton designs scatter less, so the same bounds are then on the safe side. Nothing is said "
+            "the report says otherwise. Latin hypercube "
+            "and Sobol designs scatter less, so the same bounds are then on the safe side. Nothing is said "
             "of the correctness of the model.",
         ),
         (
@@ -79,7 +79,7 @@ GLOSSARY = Terms(
             "are free of the scatter of the draws.",
         ),
         (
-            "first-order index",
+            "first-order effect",
             "First-order Sobol’ index: the fraction of a metric’s variance that is due to the input alone, estimated "
             "from bins of the flown cases. SRC, PRCC and Spearman measure trends only, and give their direction.",
         ),
@@ -91,8 +91,18 @@ GLOSSARY = Terms(
         (
             "map",
             "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by a local "
-            "quadratic regression. Its error, within twice which the true surface lies at about 95 % of the points, "
-            "adds the scatter of the cases and the bias where the surface bends. Blank outside the cases.",
+            "quadratic regression. Its error is one standard deviation: the scatter of the cases, and the bias where "
+            "the surface bends. Blank outside the cases.",
+        ),
+        (
+            "1σ budget",
+            "The contribution of each input to the σ of a metric: √(first-order effect) × σ. Their root sum square "
+            "is below σ by what interactions, or draws that are no input, add.",
+        ),
+        (
+            "circular error probable (CEP)",
+            "The radius of the circle that holds 50 % of the impact points: about the target where there is one, "
+            "else about the mean impact point.",
         ),
     )
 )

@@ -7,12 +7,11 @@ from mc_engine.shell_words import shell_word
 from mc_engine.statistics import Summary, Verdict
 from mc_engine.statistics.worst import Limits
 from reports.document import Card
-from reports.flown import CONFIDENCE, Flown
+from reports.flown import Flown
 from reports.numbers import count, number, percent, percentile, with_unit
 from reports.tables import TONES, limit_text
 
 MOST_COSTS = 4
-HIGH, LOW = 0.99865, 0.00135
 
 
 def verdict_cards(flown: Flown) -> tuple[Card, ...]:
@@ -76,24 +75,29 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         rest = [f"nominal {number(nominal, 4, spread)}"] if nominal is not None else []
         rest.append(f"median {number(median.value, 4, spread) if median else '–'}")
         if limits == Limits() or limits.two_sided:
-            rest += _tails(flown, summary, (LOW, HIGH))
+            rest += _tails(flown, summary, flown.stated.outer)
             low, high = (number(end, 4, spread) for end in (summary.minimum, summary.maximum))
             answer = f"{low} to {with_unit(high, unit)}{_of_limits(limits, unit)}"
             yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
             continue
         large = limits.at_most is not None
-        end, tail = (summary.maximum, summary.at(HIGH)) if large else (summary.minimum, summary.at(LOW))
-        bound = None if tail is None or not flown.random else (tail.upper if large else tail.lower)
+        probability = flown.stated.probability if large else flown.stated.low
+        end, tail = summary.maximum if large else summary.minimum, summary.at(probability)
         rest.append(f"{'largest' if large else 'smallest'} {number(end, 4, spread)}")
-        rest += _tails(flown, summary, (HIGH,) if large else (LOW,))
-        shown, where = (end, "in the cases flown") if bound is None else (bound, f"in {percent(HIGH, 3)} of cases")
-        answer = f"at {'most' if large else 'least'} {with_unit(number(shown, 4, spread), unit)} {where}"
+        rest += [f"{percentile(probability)} {number(tail.value, 4, spread)}"] if tail and flown.random else []
+        shown, where = number(end, 4, spread), "in the cases flown"
+        for one in flown.verdicts:  # what the verification matrix says is demonstrated, in the same digits
+            if one.metric == name and one.demonstrated is not None:
+                shown = number(one.demonstrated)
+                where = f"in {percent(one.share, 3)} of cases, {percent(one.confidence)} confidence"
+                break
+        answer = f"at {'most' if large else 'least'} {with_unit(shown, unit)} {where}"
         yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
 
 
 def _tails(flown: Flown, summary: Summary, probabilities: tuple[float, ...]) -> Iterator[str]:
     """Outer percentiles with their confidence bounds, those that the cases are enough for."""
-    each = percent(0.5 * (1.0 + CONFIDENCE))
+    each = percent(flown.stated.confidence)
     for probability in probabilities if flown.random else ():
         found, upper = summary.at(probability), probability > 0.5
         bound = None if found is None else (found.upper if upper else found.lower)
@@ -129,15 +133,20 @@ def warnings(flown: Flown) -> tuple[str, ...]:
             f"The run is not complete: {count(missing)} of {count(flown.n_wanted)} cases are missing; "
             f"mc-engine resume {shell_word(flown.name)} flies them."
         )
-    if flown.n_tried and not flown.ok.any():
+    if flown.n_tried and not flown.every.completed:
         found.append(f"All {count(flown.n_tried)} cases failed: no metric has a number.")
-    elif not flown.ok.all():
-        failed = int((~flown.ok).sum())
+    elif failed := flown.n_tried - flown.every.completed:
         found.append(f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement.")
     if flown.looked and flown.n_tried and flown.verdicts:
         found.append(_how_looked_at(flown))
     if flown.n_tried == 0:
         found.append("No case was flown.")
+    if flown.sampled:
+        found.append(
+            f"Requirements, statistics, percentiles, worst and failed cases are those of all "
+            f"{count(flown.n_tried)} cases. Figures, convergence, contributors and regions show {count(flown.n_held)} "
+            "of them, one picked at random from each of equal stretches of the case numbers."
+        )
     if not flown.random:
         found.append(
             f"The design is “{flown.design}”: its cases are chosen, not drawn at random. Fractions and percentiles "

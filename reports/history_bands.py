@@ -1,4 +1,4 @@
-"""What the flights of many cases have in common: percentile bands of a history quantity over the time."""
+"""What the flights of many cases have in common: envelopes of a history quantity over the time."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,18 @@ from reports.figures import HistoryBand
 
 FEWEST_CASES = 20  # of a band
 INSTANTS = 300
-PROBABILITIES = (0.05, 0.25, 0.5, 0.75, 0.95)
+OUTER = (0.00135, 0.005, 0.01, 0.025, 0.05)  # percentiles, the first of which a number of cases supports is drawn
+
+
+def outer_percentile(n_cases: int) -> float:
+    """The lowest percentile that so many cases support: beyond it, one of them is expected at least."""
+    return next((p for p in OUTER if p * n_cases >= 1.0), OUTER[-1])
+
+
+def envelope_probabilities(n_cases: int) -> tuple[float, ...]:
+    """Probabilities of the curves of an envelope: the extremes, the outer percentiles, the median."""
+    outer = outer_percentile(n_cases)
+    return (0.0, outer, 0.5, 1.0 - outer, 1.0)
 
 
 def fair_cases(case_ids: Sequence[int]) -> list[int]:
@@ -22,9 +33,10 @@ def fair_cases(case_ids: Sequence[int]) -> list[int]:
 
 
 def history_bands(histories: pd.DataFrame, case_ids: Sequence[int], names: Sequence[str]) -> dict[str, HistoryBand]:
-    """Bands of the quantities over these cases; none if the cases are too few.
+    """Envelopes of the quantities over these cases; none if the cases are too few.
 
-    Between its own rows a flight is a straight line; after its end it counts no more.
+    Between its own rows a flight is a straight line; after its end it counts no more.  Where so few still fly that they
+    do not support the outer percentiles, these end.
     """
     if len(case_ids) < FEWEST_CASES:
         return {}
@@ -50,11 +62,12 @@ def _band(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -
     used = flying >= FEWEST_CASES
     table, flying = table[:, used], flying[used]
     curves = {}
-    for probability in PROBABILITIES:
+    for probability in envelope_probabilities(len(times)):
         place = probability * (flying - 1)
         low = np.floor(place).astype(int)
         high = np.minimum(low + 1, flying - 1)
         columns = np.arange(flying.size)
         below, above = table[low, columns], table[high, columns]
-        curves[probability] = below + (place - low) * (above - below)
+        supported = (flying * min(probability, 1.0 - probability) >= 1.0) | (probability in (0.0, 1.0))
+        curves[probability] = np.where(supported, below + (place - low) * (above - below), np.nan)
     return HistoryBand(grid[used], curves, len(times))

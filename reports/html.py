@@ -12,7 +12,8 @@ from markupsafe import Markup
 
 from reports.document import CaseData, Document, FigureBlock, blocks_of
 from reports.figures import Histories, screen
-from reports.figures.marks import Band, Limit
+from reports.figures.histories import MEDIAN
+from reports.figures.marks import Band, Limit, Line
 
 SCRIPTS = ("tables.js", "figures.js", "cases.js", "histories.js")
 
@@ -91,7 +92,7 @@ def _by_row(panel: dict[str, Any], cases: CaseData | None) -> dict[str, Any]:
             row = np.searchsorted(cases.ids, trace["customdata"])
             held = row < cases.ids.size
             known = bool(held.all() and (cases.ids[row] == trace["customdata"]).all())
-            if known and trace["columns"] is not None and names.issuperset(trace["columns"]):
+            if known and len(trace["columns"] or ()) > 1 and names.issuperset(trace["columns"]):
                 for member in ("x", "y", "customdata", *["text"] * (len(trace["columns"]) > 2)):
                     del trace[member]
                 trace["rows"] = screen.typed(row, "u4")
@@ -128,11 +129,12 @@ def _values(values: np.ndarray | tuple[str, ...]) -> Any:
 
 
 def _behind(document: Document) -> dict[str, list[dict[str, Any]]]:
-    """Envelopes and limits of history quantities, which a single case's curve is drawn over."""
+    """Envelopes, medians and limits of history quantities, which a single case's curve is drawn over."""
     found: dict[str, list[dict[str, Any]]] = {}
     for block in blocks_of(document, FigureBlock):
         if isinstance(block.drawing, Histories):
             for name, plot in zip(block.drawing.labels, block.drawing.plots, strict=True):
-                marks = [mark for mark in plot.marks if isinstance(mark, Band | Limit)]
+                marks = [mark for mark in plot.marks if isinstance(mark, Band | Limit)
+                         or (isinstance(mark, Line) and mark.name.startswith(MEDIAN))]  # fmt: skip
                 found.setdefault(name, [trace for mark in marks for trace in screen.traced(mark, plot)])
     return found

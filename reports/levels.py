@@ -10,7 +10,7 @@ from mc_engine.statistics.paired import matching_rows, paired_difference
 from reports.document import Cell, Column, FigureBlock, Table
 from reports.figures import LevelPanel, LevelsDrawing
 from reports.figures.levels import SPREAD
-from reports.flown import CONFIDENCE, Flown
+from reports.flown import Flown
 from reports.numbers import axis_label, count, interval, number, percent
 
 MOST_LEVELS = 20
@@ -71,7 +71,7 @@ def _pairs_said(flown: Flown, matched: np.ndarray) -> str:
     share = len(matched) * matched.shape[1]
     return (
         f"{count(len(matched))} sets of cases differ in it alone, one case a level: the same draws for all "
-        f"({count(share)} of {count(flown.n_tried)} cases)."
+        f"({count(share)} of {count(flown.n_held)} cases)."
     )
 
 
@@ -93,15 +93,15 @@ def _level_table(
         Column(flown.words(name), "text", 1.4),
         Column("Used / tried", "number", 1.3),
         Column("Median", "number", 1.5),
-        Column("95 %", "number", 1.4),
+        Column(percent(flown.stated.probability, 3), "number", 1.4),
         Column("Largest", "number", 1.3),
         Column(f"Median difference to {levels[0]}", "number", 2.2),
         Column(f"Smaller than {levels[0]}", "number", 1.9),
     )
     values = flown.values(metric)
-    body = []
+    body, probabilities = [], (0.5, flown.stated.probability)
     for place, (level, group) in enumerate(zip(levels, rows, strict=True)):
-        summary = summarize(values[group], probabilities=(0.5, 0.95), confidence=CONFIDENCE)
+        summary = summarize(values[group], probabilities=probabilities, confidence=flown.stated.two_sided)
         cells = [
             Cell(
                 number(item.value, 4, summary.spread),
@@ -126,7 +126,7 @@ def _difference_cells(flown: Flown, values: np.ndarray, matched: np.ndarray, pla
     """The paired difference of a level to the first one, and in how many pairs it is negative."""
     if place == 0 or not len(matched):
         return Cell("–"), Cell("–")
-    found = paired_difference(values[matched[:, place]], values[matched[:, 0]], CONFIDENCE)
+    found = paired_difference(values[matched[:, place]], values[matched[:, 0]], flown.stated.confidence)
     if found.median is None or found.smaller_share is None or found.smallest is None or found.largest is None:
         return Cell("–", small=f"0 of {count(found.n_tried)} pairs"), Cell("–")
     if _drawn(flown):
@@ -152,7 +152,7 @@ def _note(flown: Flown, first: str, paired: bool) -> str:
         return (
             note + "Below the median: smallest to largest difference; the cases were chosen, so there is no interval."
         )
-    share = percent(CONFIDENCE)
+    share = percent(flown.stated.confidence)
     return note + (
         f"In brackets: {share} distribution-free interval of the median (sign test) and Clopper–Pearson interval of "
         "the fraction of pairs, for pairs that were drawn independently."

@@ -28,8 +28,8 @@ MARKS = {"good": "✓ ", "bad": "✗ ", "open": "? "}
 def render_markdown(document: Document) -> bytes:
     """The text, UTF-8; `figure_files` are the pictures that it shows."""
     lines = [*_head(document), *_contents(document.sections)]
-    for number, section in enumerate(document.sections, start=1):
-        lines += [f"## {number} {escaped(section.title)}", ""]
+    for section in document.sections:
+        lines += [f"{'###' if section.kind == 'part' else '##'} {escaped(_titled(section))}", ""]
         for block in section.blocks:
             lines += [*_block(block), ""]
     return ("\n".join(lines).rstrip() + "\n").encode("utf-8")
@@ -71,10 +71,16 @@ def _cards(title: str, cards: Iterable[Card]) -> Iterator[str]:
 
 def _contents(sections: Iterable[Section]) -> Iterator[str]:
     yield from ("**Contents**", "")
-    for number, section in enumerate(sections, start=1):
-        place = re.sub(r"[^\w\- ]", "", f"{number} {section.title}".lower()).replace(" ", "-")
-        yield f"{number}. [{escaped(section.title)}](#{place})"
+    for section in sections:
+        place = re.sub(r"[^\w\- ]", "", _titled(section).lower()).replace(" ", "-")
+        yield f"{'  ' * (section.kind == 'part')}- [{escaped(_titled(section))}](#{place})"
     yield ""
+
+
+def _titled(section: Section) -> str:
+    """A section's title with its number, if it has one."""
+    word = "Appendix " if section.kind == "appendix" else ""
+    return f"{word}{section.number} {section.title}".strip()
 
 
 def _block(block: Block) -> list[str]:

@@ -69,6 +69,8 @@ def _plain(document: Document) -> dict[str, Any]:
             {
                 "title": section.title,
                 "anchor": section.anchor,
+                "kind": section.kind,
+                "number": section.number,
                 "blocks": list(_blocks(section.blocks)),
             }
             for section in document.sections

@@ -10,7 +10,7 @@ from reports.document import FigureBlock
 from reports.drawings import COLOURED_OVER_BANDS, history_cases, history_line
 from reports.figures import ProfileBand, ProfileDrawing
 from reports.flown import Flown
-from reports.history_bands import FEWEST_CASES, PROBABILITIES, fair_cases
+from reports.history_bands import FEWEST_CASES, envelope_probabilities, fair_cases
 
 LEVELS = 200
 LEAST_LEG = 0.05  # of the range of y: a smaller rise or fall is no change of direction
@@ -56,7 +56,7 @@ def _band_words(flown: Flown, figure: ProfileFigure, bands: tuple[ProfileBand, .
     ways = " and ".join("up" if band.rising else "down" for band in bands)
     again = "climbs" if not bands[0].rising else "descends"
     return (
-        f" The bands are percentiles of {x} at equal {y} on the way {ways}, over the first {bands[0].n_cases} cases. "
+        f" The envelopes are of {x} at equal {y} on the way {ways}, over the first {bands[0].n_cases} cases. "
         f"Of a flight that {again} again, the first way {'up' if bands[0].rising else 'down'} to a level counts; "
         f"a level that fewer than {FEWEST_CASES} flights reach has no band."
     )
@@ -115,7 +115,7 @@ def _band(flights: list[np.ndarray], levels: np.ndarray, rising: bool) -> Profil
     used = np.count_nonzero(np.isfinite(table), axis=0) >= FEWEST_CASES
     if np.count_nonzero(used) < 2:
         return None
-    curves = {p: np.nanquantile(table[:, used], p, axis=0) for p in PROBABILITIES}
+    curves = {p: np.nanquantile(table[:, used], p, axis=0) for p in envelope_probabilities(len(flights))}
     return ProfileBand(levels[used], curves, len(flights), rising)
 
 

@@ -74,7 +74,7 @@ def campaign_facts(flown: Flown) -> tuple[tuple[str, str], ...]:
         ("Model", str(flown.manifest.get("model", {}).get("title", ""))),
         (
             "Cases",
-            f"{count(flown.n_tried)} flown of {count(flown.n_wanted)}, {count(int(flown.ok.sum()))} completed",
+            f"{count(flown.n_tried)} flown of {count(flown.n_wanted)}, {count(flown.every.completed)} completed",
         ),
         ("Design", f"{flown.design}, seed {exact(str(campaign.get('seed', '–')))}"),
         ("Run", str(flown.manifest.get("created_utc", ""))[:16].replace("T", " ") + " UTC"),

@@ -7,7 +7,7 @@ A record of the manifest's `published`:
   unit       unit of both
   source     place in the source: table, figure, page (optional)
   column     a column of the run that holds the same quantity, in the same unit, or
-  ours       a number (or words) of our own that is no column; a test of the campaign holds it
+  ours       a number (or words) that the campaign’s tests hold and no run computes; no report shows it
   at         inputs of the case to compare with, {column: value}; without it, the nominal case (optional)
   tolerance  how far ours may lie from the printed number, from its digits (optional)
   status     how sure the print is: "legible", "restored", "not reproduced", ... (optional)
@@ -22,22 +22,23 @@ the table of `published_statistics`, beside the statistic of that run:
   cases      how many cases the source has, where that matters to the number (optional)
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from mc_engine.statistics import Summary, summarize
 from reports.document import Cell, Column, Table
 from reports.flown import Flown
-from reports.numbers import count, exact, number, with_unit
+from reports.numbers import count, counted, exact, number, with_unit
 
 
-def published_table(flown: Flown) -> Table | None:
-    """Published and computed side by side; None if the model states nothing published."""
+def published_blocks(flown: Flown) -> Iterator[Table | str]:
+    """Published values beside those that this run computes; of the others, how many there are."""
     records = [record for record in flown.manifest.get("published", []) if own_statistic(flown, record) is None]
-    if not records:
-        return None
+    computed = [(record, *our_value(flown, record)) for record in records]
+    rows = tuple(_row(record, ours, where) for record, ours, where in computed if ours is not None)
     columns = (
         Column("Quantity", "text", 2.4),
         Column("Published", "number", 1.6),
@@ -46,17 +47,22 @@ def published_table(flown: Flown) -> Table | None:
         Column("Remark", "text", 2.5),
     )
     note = (
-        "Computed: by the nominal case of this run, or by the case named; “fixed” is a number that the campaign’s "
-        "tests check. Difference: computed less published, marked as inside or outside the tolerance where there is "
-        "one."
+        "Computed: by the nominal case of this run, or by the case named. Difference: computed less published, marked "
+        "as inside or outside the tolerance where there is one."
     )
-    return Table("Published and computed values", columns, tuple(_row(flown, record) for record in records), note)
+    if rows:
+        yield Table("Published and computed values", columns, rows, note)
+    left = len(records) - len(rows)
+    if left:
+        yield (
+            f"{counted(left, 'further published value')} of the model {'is' if left == 1 else 'are'} not computed by "
+            "the cases of this run; the campaign’s tests compare them."
+        )
 
 
-def _row(flown: Flown, record: Mapping[str, Any]) -> tuple[Cell, ...]:
+def _row(record: Mapping[str, Any], ours: Any, where: str) -> tuple[Cell, ...]:
     unit = str(record.get("unit", ""))
     published = record.get("published", "")
-    ours, where = our_value(flown, record)
     return (
         Cell(str(record.get("quantity", "")), small=str(record.get("source", ""))),
         Cell(_text(published, unit, exact), _as_number(published)),
@@ -68,7 +74,7 @@ def _row(flown: Flown, record: Mapping[str, Any]) -> tuple[Cell, ...]:
 
 def our_value(flown: Flown, record: Mapping[str, Any]) -> tuple[Any, str]:
     """Our number and where it comes from; (None, why not) if this run does not have it."""
-    column = record.get("column") or record.get("computed_column")
+    column = record.get("column")
     at = record.get("at") or {}
     if column:
         value = flown.nominal_value(column)
@@ -77,8 +83,6 @@ def our_value(flown: Flown, record: Mapping[str, Any]) -> tuple[Any, str]:
         row = _matching_case(flown, at) if at else None
         if row is not None and column in flown.cases.columns:
             return float(flown.values(column)[row]), f"case {count(int(flown.case_ids[row]))}"
-    if "ours" in record:
-        return record["ours"], "fixed"
     return None, "not flown in this run"
 
 
@@ -89,9 +93,11 @@ def own_statistic(flown: Flown, record: Mapping[str, Any]) -> float | None:
     alike = set(record.get("over", ())) == inputs and _holds(shared, record.get("at") or {})
     if statistic not in STATISTICS or not alike or not flown.random:
         return None
-    values = flown.values(record["of"])[: record.get("cases")]
-    values = values[np.isfinite(values)]
-    return float(STATISTICS[statistic](values)) if values.size > 1 else None
+    cases = record.get("cases")
+    summary = (
+        flown.summaries[record["of"]] if cases is None else summarize(flown.every.first_values(record["of"], cases))
+    )
+    return STATISTICS[statistic](summary) if summary.n_used > 1 else None
 
 
 def published_law(flown: Flown, name: str) -> tuple[float, float] | None:
@@ -104,13 +110,14 @@ def published_law(flown: Flown, name: str) -> tuple[float, float] | None:
     return None if mean is None or deviation <= 0.0 else (mean, deviation)
 
 
-def _farthest(values: np.ndarray) -> float:
-    return float(values[np.argmax(np.abs(values - values.mean()))])
+def _farthest(summary: Summary) -> float:
+    ends, mean = (summary.minimum or 0.0, summary.maximum or 0.0), summary.mean or 0.0
+    return max(ends, key=lambda end: abs(end - mean))
 
 
-STATISTICS: dict[str, Callable[[np.ndarray], float]] = {
-    "mean": lambda values: float(values.mean()),
-    "standard deviation": lambda values: float(values.std(ddof=1)),
+STATISTICS: dict[str, Callable[[Summary], float]] = {
+    "mean": lambda summary: float(summary.mean or 0.0),
+    "standard deviation": lambda summary: float(summary.sd or 0.0),
     "farthest": _farthest,
 }
 
@@ -135,7 +142,7 @@ def _same(ours: Any, wanted: Any) -> bool:
 def _matching_case(flown: Flown, at: Mapping[str, Any]) -> int | None:
     """Row of the first case with the inputs of `at`; inputs that are not dispersed must be those of the run."""
     shared = _shared_inputs(flown)
-    match = np.ones(flown.n_tried, dtype=bool)
+    match = np.ones(flown.n_held, dtype=bool)
     for name, value in at.items():
         if name in flown.cases.columns:
             match &= _equal(flown.cases[name], value)

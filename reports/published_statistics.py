@@ -34,8 +34,8 @@ def _table(flown: Flown, place: str, rows: Mapping[str, Mapping[str, Mapping[str
             cells += _pair(flown, row[name]) if name in row else [Cell("–"), Cell("–")]
         body.append(tuple(cells))
     note = (
-        f"Computed: {count(int(flown.ok.sum()))} cases of this run, with its own dispersions; for the farthest as many "
-        "as the source has. Marked where the record gives a tolerance."
+        f"Computed: {count(flown.every.completed)} cases of this run, with its own dispersions; for the farthest as "
+        "many as the source has. Marked where the record gives a tolerance."
     )
     return Table(f"{place} compared with this run", tuple(columns), tuple(body), note)
 

@@ -8,10 +8,12 @@ import numpy as np
 from mc_engine.rare_event_folder import RareEventRecord
 from reports.contents import blocks
 from reports.document import Block, Card, Cell, Column, Document, FigureBlock, Section, Table, Terms, Text, numbered
-from reports.figures.tails import Tail
-from reports.numbers import SPACE, axis_label, count, exact, number, percent, with_unit
+from reports.figures.marks import Axis, Limit, Line, Mark, Panels, Plot, Points, nominal_ring
+from reports.figures.palette import BLUE, INK, PAPER, SKY, VERMILION
+from reports.numbers import SPACE, axis_label, count, exact, named, number, percent, with_unit, words
 from reports.provenance import git_text
 
+MOST_POINTS = 2000  # of a kind
 METHODS = {
     "subset": "subset simulation",
     "cross-entropy": "importance sampling by cross entropy",
@@ -147,7 +149,7 @@ def _costs(result: dict[str, Any]) -> Iterator[Card]:
         )
 
 
-def _failures(record: RareEventRecord) -> Iterator[Table | str | None]:
+def _failures(record: RareEventRecord) -> Iterator[FigureBlock | Table | str | None]:
     result = record.result
     yield (
         f"{count(result['failed'])} of {count(result['cases'])} cases failed"
@@ -155,7 +157,44 @@ def _failures(record: RareEventRecord) -> Iterator[Table | str | None]:
         + ". All are in cases.parquet, with the level and the weight of each; the weights of those that "
         "failed add up to the probability."
     )
+    yield _failure_figure(record)
     yield _input_table(result) if result["inputs"] else None
+
+
+def _main_inputs(result: dict[str, Any]) -> list[dict[str, Any]]:
+    """The inputs, the one whose failed cases lie farthest from its middle first."""
+    return sorted(result["inputs"], key=lambda one: -abs(one["likeliest_sigma"]))
+
+
+def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
+    """The failed cases over their two main inputs, with the cases drawn from the dispersions beneath."""
+    cases, shown = record.cases, [one for one in _main_inputs(record.result) if one["name"] in record.cases][:2]
+    if len(shown) < 2 or not record.result["failed"] or "failed" not in cases:
+        return None
+    failed = cases["failed"].to_numpy(dtype=bool)
+    drawn = ~failed & (cases["level"].to_numpy() == 0)
+    x, y = (cases[one["name"]].to_numpy(dtype=np.float64) for one in shown)
+    marks: list[Mark] = []
+    for rows, colour, sign, what in (
+        (np.flatnonzero(drawn), SKY, "circle", "cases drawn from the dispersions, not failed"),
+        (np.flatnonzero(failed), VERMILION, "diamond", "failed cases"),
+    ):
+        some = rows[np.unique(np.linspace(0, rows.size - 1, min(rows.size, MOST_POINTS)).astype(np.int64))]
+        thinned = f", {count(some.size)} shown" if some.size < rows.size else ""
+        key = f"{count(rows.size)} {what}{thinned}" if rows.size else ""
+        marks.append(Points(x[some], y[some], colour, what, sign, 4.0, 0.6, cases=some, key=key))
+    for what, colour in (("likeliest", INK), ("across", BLUE)):
+        if shown[0].get(what) is not None:
+            name = "likeliest failed case" if what == "likeliest" else "the likeliest across"
+            marks.append(nominal_ring((shown[0][what], shown[1][what]), colour, name, PAPER))
+    axes = (Axis(axis_label(named(words(one["name"], one["unit"]), one["description"]), one["unit"])) for one in shown)
+    x_axis, y_axis = axes
+    caption = (
+        "Failed cases over the two inputs in which they lie farthest from the middle. Where the method explored, cases "
+        "are denser than the dispersions would draw them; their weights tell how probable they are."
+    )
+    plot = Plot(tuple(marks), x_axis, y_axis, height=420.0)
+    return FigureBlock(caption, Panels((plot,), form="Failed cases over two inputs"), "wide")
 
 
 def _input_table(result: dict[str, Any]) -> Table:
@@ -168,7 +207,7 @@ def _input_table(result: dict[str, Any]) -> Table:
     ]
     columns += [Column("Across", "number", 1.5)] if across else []
     rows = []
-    for one in sorted(result["inputs"], key=lambda one: -abs(one["likeliest_sigma"])):
+    for one in _main_inputs(result):
         label = Cell(axis_label(one["name"], one["unit"]), small=one["description"])
         cells = [Cell(number(one[key], 3), one[key]) for key in ("mean_sigma", "spread_sigma")]
         for what in ("likeliest", "across")[: 1 + across]:
@@ -180,18 +219,30 @@ def _input_table(result: dict[str, Any]) -> Table:
 
 
 def _levels(result: dict[str, Any]) -> tuple[Block, ...]:
-    unit, shown = result["metric"]["unit"], [one for one in result["levels"] if one["margin"] is not None]
+    shown = [one for one in result["levels"] if one["margin"] is not None]
     found: list[Block] = [_level_table(result)]
     if shown and result["probability"] and result["method"] != "plain":
-        drawing = Tail(
-            axis_label("margin", unit),
-            np.array([one["margin"] for one in shown]),
-            np.array([one["probability"] for one in shown]),
-            (result["probability"], result["lower"], result["upper"]),
-        )
-        found.append(FigureBlock("Probability over the margin to the limit, level by level", drawing))
+        found.append(FigureBlock("Probability over the margin to the limit, level by level", _tail(result, shown)))
     chains = result["method"] == "subset"
     return (Text((_level_words(chains),)), *found) if result["method"] != "plain" else tuple(found)
+
+
+def _tail(result: dict[str, Any], shown: list[dict[str, Any]]) -> Panels:
+    """The probability of each level over its margin, down to the limit."""
+    margin, probability = (np.array([one[key] for one in shown]) for key in ("margin", "probability"))
+    p, lower, upper = (np.array([result[key]]) for key in ("probability", "lower", "upper"))
+    marks = (
+        Limit(0.0, "x", INK, "limit", width=1.0),
+        Line(margin, probability, BLUE, "levels", width=2.0, key="levels"),
+        Points(margin, probability, BLUE, "levels", size=6.0),
+        Points(np.zeros(1), p, VERMILION, "not met", size=8.0, y_ends=(lower, upper), key="not met, with its interval"),
+    )
+    x = Axis(axis_label("margin", result["metric"]["unit"]), reach=Axis().ends([margin, np.zeros(1)])[::-1])
+    words = (
+        f"The probability falls over {margin.size} levels as the margin falls to zero, where it is "
+        f"{number(p[0], 4)}, interval {number(lower[0], 4)} to {number(upper[0], 4)}."
+    )
+    return Panels((Plot(marks, x, Axis("probability of being nearer", log=True), height=340.0),), words)
 
 
 def _level_words(chains: bool) -> str:

@@ -1,31 +1,65 @@
 """The tables of requirements: what was asked, what the cases show, and how much the verdicts can be wrong."""
 
+from collections.abc import Iterator
+
+import numpy as np
+
 from mc_engine.statistics import Verdict
-from reports.document import Cell, Column, Table
+from mc_engine.statistics.worst import Limits
+from reports.document import Cell, Column, FigureBlock, Table
+from reports.figures.margins import MarginDrawing, MarginRow
 from reports.flown import Flown
-from reports.numbers import count, number, percent, with_unit
+from reports.numbers import SPACE, count, number, percent, with_unit
 from reports.tables import TONES, limit_text
 
 
+def requirement_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str | None]:
+    """The verification matrix, the figure of all margins, and the risks of the verdicts."""
+    if not flown.verdicts:
+        yield "The campaign file sets no requirement; [requirement.NAME] with a metric and a limit adds one."
+        return
+    yield requirement_table(flown)
+    yield margin_figure(flown)
+    yield risk_table(flown)
+
+
+def margin_figure(flown: Flown) -> FigureBlock | None:
+    """Margins of all requirements on one axis; None where no case has a number."""
+    rows = []
+    for verdict in flown.own.verdicts:
+        limits = Limits(verdict.at_most, verdict.at_least)
+        worst = limits.margins(flown.every.worst(verdict.metric, 1, limits)[verdict.metric].to_numpy(dtype=np.float64))
+        demonstrated = None if verdict.margin is None else verdict.margin / limits.width
+        if worst.size:
+            rows.append(MarginRow(verdict.name, demonstrated, float(worst[0]), TONES[verdict.outcome]))
+    if not rows:
+        return None
+    return FigureBlock(
+        "Margins of all requirements, relative to the width of the limits: the distance between two limits, the size "
+        "of a single one, 1 for a limit of 0. Margins beyond 100 % either way are drawn at the edge.",
+        MarginDrawing(tuple(rows)),
+    )
+
+
 def requirement_table(flown: Flown) -> Table:
-    """Every requirement with its counts, bounds and verdict, and all of them at once."""
+    """The verification matrix: every requirement with what is demonstrated, its margin and verdict; all at once."""
     columns = (
         Column("Requirement", "text", 2.3),
         Column("Limit", "text", 1.9),
-        Column("Required", "number", 1.3),
+        Column("Demonstrated", "text", 1.8),
+        Column("Margin", "number", 1.4),
         Column("Inside / tried", "number", 1.5),
         Column("Demonstrated probability", "number", 1.8),
-        Column("Demonstrated bound", "text", 1.8),
         Column("Verdict", "text", 2.0),
     )
     records = flown.manifest.get("requirements", [])
     sources = [str(record.get("source") or "") for record in records]
     rows = [_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True)]
     note = (
-        f"Demonstrated probability: observed fraction of the cases, below it {_bounds_named(flown)}. Demonstrated "
-        "bound: the tolerance limit that these cases demonstrate with the probability and confidence required "
-        "(Wilks), below it its margin to the limit. A failed case, or one whose metric is not a number, counts as "
-        "outside."
+        "Demonstrated: the tolerance limit that these cases demonstrate with the probability and confidence required "
+        "(Wilks). Margin: from there to the nearest limit; in brackets, relative to the width of the limits. "
+        f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. A failed case, "
+        "or one whose metric is not a number, counts as outside."
     )
     if flown.joint is not None:
         rows.append(_requirement_row(flown, flown.joint, ""))
@@ -34,7 +68,7 @@ def requirement_table(flown: Flown) -> Table:
             "passes where that is demonstrated and every requirement passes, and fails where one of them fails with "
             "confidence shared (next table)."
         )
-    return Table("Requirements and their verdicts", columns, tuple(rows), note)
+    return Table("Verification matrix", columns, tuple(rows), note)
 
 
 def _bounds_named(flown: Flown) -> str:
@@ -50,17 +84,26 @@ def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell,
     unit = flown.unit(verdict.metric)
     lost = f"{count(verdict.no_number)} without a number" if verdict.no_number else ""
     bounds = f"[{percent(verdict.lower)}, {percent(verdict.upper)}]" if verdict.lower is not None else ""
-    margin = "" if verdict.margin is None else f"margin {with_unit(number(verdict.margin, 3), unit)}"
     needed = f"needs {count(verdict.needed)} cases" if verdict.needed else ""
+    asked = f"for {percent(verdict.share, 3)} with {percent(verdict.confidence)} confidence"
+    what = "; ".join(filter(None, (flown.words(verdict.metric), source)))
     return (
-        Cell(verdict.name, small=verdict.metric),
-        Cell(limit_text(verdict, unit), small=source) if verdict.metric else Cell("all limits"),
-        Cell(percent(verdict.share, 3), verdict.share, f"with {percent(verdict.confidence)} confidence"),
+        Cell(verdict.name, small=what),
+        Cell(limit_text(verdict, unit) if verdict.metric else "all limits", small=asked),
+        Cell(_limit_shown(verdict, unit)),
+        _margin_cell(verdict, unit),
         Cell(f"{count(verdict.passed)} / {count(verdict.tried)}", verdict.passed, lost),
         Cell(percent(verdict.estimate), verdict.estimate, bounds),
-        Cell(_limit_shown(verdict, unit), verdict.margin, margin),
         Cell(verdict.outcome, small=needed, tone=TONES[verdict.outcome]),
     )
+
+
+def _margin_cell(verdict: Verdict, unit: str) -> Cell:
+    if verdict.margin is None:
+        return Cell("–")
+    width = Limits(verdict.at_most, verdict.at_least).width
+    share = f"({number(100.0 * verdict.margin / width, 3)}{SPACE}%)"
+    return Cell(with_unit(number(verdict.margin, 3), unit), verdict.margin, share)
 
 
 def _limit_shown(verdict: Verdict, unit: str) -> str:

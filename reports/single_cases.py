@@ -17,7 +17,7 @@ from reports.drawings import nominal_point, thinned_by_outcome, thinned_rows
 from reports.figures import ScatterDrawing
 from reports.figures.histories import thinned
 from reports.flown import ColumnFacts, Flown
-from reports.numbers import axis_label, words
+from reports.numbers import axis_label
 from reports.outcomes import INSIDE, case_outcomes, outcome_names, outcome_sentence
 
 ANCHOR = "cases"
@@ -53,7 +53,7 @@ def _outcome_figure(flown: Flown, x_name: str, y_name: str) -> FigureBlock:
         x_label=flown.axis(x_name),
         y_label=flown.axis(y_name),
         n_used=int(used.size),
-        n_tried=flown.n_tried,
+        n_tried=flown.n_held,
         nominal=nominal_point(flown, x_name, y_name),
         outcome=outcome[rows],
         outcomes=tuple(zip(outcome_names(flown), np.bincount(outcome[used], minlength=3).tolist(), strict=True)),
@@ -100,7 +100,7 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
     everything = most >= len(key)
     facts = _facts(flown, min(most, len(key) + MOST_METRICS) if everything else len(key))
     histories, left_out = case_histories(flown)
-    rows = np.arange(flown.n_tried) if everything else _rows(flown, sections, histories, max(1, len(facts)))
+    rows = np.arange(flown.n_held) if everything else _rows(flown, sections, histories, max(1, len(facts)))
     return CaseData(
         n_tried=flown.n_tried,
         ids=flown.case_ids[rows],
@@ -129,7 +129,7 @@ def _facts(flown: Flown, most: int) -> list[ColumnFacts]:
 
 def _column(flown: Flown, fact: ColumnFacts, rows: np.ndarray) -> CaseColumn:
     values = flown.cases[fact.name].iloc[rows]
-    label = axis_label(fact.name, fact.unit)
+    label = axis_label(flown.words(fact.name), fact.unit)
     if pd.api.types.is_bool_dtype(values) or not pd.api.types.is_numeric_dtype(values):
         return CaseColumn(fact.name, label, fact.role, tuple(values.astype(str)))
     return CaseColumn(fact.name, label, fact.role, flown.values(fact.name)[rows])
@@ -150,7 +150,7 @@ def _rows(flown: Flown, sections: Iterable[Section], histories: Iterable[int], c
     """Row numbers of the cases that a page holds that cannot hold all, in the order of the table."""
     most = min(MOST_CASES, max(MOST_NUMBERS // columns, 1))
     place = pd.Index(flown.case_ids)
-    worst = [flown.worst(metric, WORST_RANKS) for metric in flown.key_metrics]
+    worst = [flown.rows(flown.worst(metric, WORST_RANKS)["case_id"]) for metric in flown.key_metrics]
     lost = thinned_rows(np.flatnonzero(case_outcomes(flown) != INSIDE), np.empty(0, np.int64), most // 2)
     drawn = [place.get_indexer(np.asarray(ids)) for ids in _drawn_cases(sections)]
     wanted = np.concatenate([place.get_indexer(np.array(list(histories), np.int64)), *worst, lost, *drawn])
@@ -188,7 +188,7 @@ def case_histories(flown: Flown) -> tuple[dict[int, dict[str, tuple[Any, Any]]],
 
 def _first_of_all(flown: Flown) -> Iterator[int]:
     for metric in flown.key_metrics:
-        yield from (int(flown.case_ids[row]) for row in flown.worst(metric, WORST_RANKS))
+        yield from (int(case) for case in flown.worst(metric, WORST_RANKS)["case_id"])
     yield from _replayed(flown)
     yield from (int(case) for case in flown.case_ids[~flown.ok])
 
@@ -203,15 +203,17 @@ def _all_histories(flown: Flown) -> pd.DataFrame:
     """The run's histories and those of cases that were replayed since."""
     kept = set(flown.histories["case_id"]) if len(flown.histories) else set()
     quantities = flown.manifest.get("quantities", [])
-    replayed = [read_replay(_folder(flown), case, quantities) for case in _replayed(flown) if case not in kept]
+    replays = [read_replay(_folder(flown), case, quantities) for case in _replayed(flown) if case not in kept]
+    replayed = [flown.told_table(table) for table in replays]
     tables = [table for table in (flown.histories, *replayed) if len(table)]
     return pd.concat(tables, ignore_index=True) if tables else flown.histories
 
 
 def _replayed(flown: Flown) -> list[int]:
     """Cases of the table that `mc-engine replay` left a history of in the run."""
-    known = set(flown.case_ids.tolist())
-    return [case for case in replayed_cases(_folder(flown)) if case in known] if hasattr(flown.run, "path") else []
+    return (
+        [case for case in replayed_cases(_folder(flown)) if flown.every.has(case)] if hasattr(flown.run, "path") else []
+    )
 
 
 def _folder(flown: Flown) -> Path:
@@ -226,4 +228,4 @@ def _quantities(flown: Flown, histories: dict[int, dict[str, tuple[Any, Any]]]) 
 
 
 def _quantity_label(flown: Flown, name: str) -> str:
-    return axis_label(words(name, flown.unit(name)), flown.unit(name))
+    return axis_label(flown.words(name), flown.unit(name))

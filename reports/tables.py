@@ -3,15 +3,16 @@
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from mc_engine.statistics import Summary, Verdict
+from mc_engine.units import convert
+from reports.chosen_units import chosen_unit
 from reports.document import Cell, Column, Table
 from reports.flown import Flown
 from reports.numbers import axis_label, count, exact, interval, number, percent, with_unit
 
 TONES = {"pass": "good", "fail": "bad", "not demonstrable": "open"}
 REASONS_SHOWN = 20
+LONGEST_NUMBER = 14  # letters of a parameter’s value; a longer one is a computed number
 
 
 def limit_text(verdict: Verdict, unit: str) -> str:
@@ -24,9 +25,9 @@ def limit_text(verdict: Verdict, unit: str) -> str:
 
 
 def summary_table(flown: Flown) -> Table:
-    """Moments and range of every metric beside its nominal value."""
+    """Moments and range of every metric that has a number, beside its nominal value."""
     columns = (
-        Column("Metric", "name", 3.0),
+        Column("Metric", "text", 3.0),
         Column("Used / tried", "number", 1.75),
         Column("Nominal", "number", 1.45),
         Column("Mean", "number", 1.45),
@@ -38,6 +39,8 @@ def summary_table(flown: Flown) -> Table:
     rows = []
     for name, summary in flown.summaries.items():
         nominal = flown.nominal_value(name)
+        if not summary.n_used:
+            continue
         cells = [(value, number(value, scale=summary.spread)) for value in (nominal, summary.mean)]
         cells += [(summary.sd, "0" if summary.constant and summary.sd else number(summary.sd, scale=summary.spread))]
         cells += [(value, number(value, scale=summary.spread)) for value in (summary.minimum, summary.maximum)]
@@ -53,8 +56,8 @@ def summary_table(flown: Flown) -> Table:
 
 
 def metric_cell(flown: Flown, name: str) -> Cell:
-    """A column's name with its unit, its meaning below."""
-    return Cell(axis_label(name, flown.unit(name)), small=flown.columns[name].description)
+    """A metric with its unit; below, its meaning, or its column's name."""
+    return Cell(axis_label(flown.words(name), flown.unit(name)), small=flown.columns[name].description or name)
 
 
 def shape_cell(summary: Summary) -> Cell:
@@ -70,13 +73,14 @@ def shape_cell(summary: Summary) -> Cell:
 
 def quantile_table(flown: Flown) -> Table | None:
     """The quantiles of every metric with their intervals; None if no metric has one."""
-    drawn = {name: summary for name, summary in flown.summaries.items() if summary.quantiles}
+    drawn = {name: one for name, one in flown.summaries.items() if one.quantiles and not one.constant}
     if not drawn:
         return None
-    first = next(iter(drawn.values()))
+    shown = (flown.stated.outer[0], 0.5, flown.stated.outer[1])
     columns = (
-        Column("Metric", "name", 2.6),
-        *(Column(percent(item.probability, 3), "number", 2.0) for item in first.quantiles),
+        Column("Metric", "text", 2.6),
+        Column("Used / tried", "number", 1.75),
+        *(Column(percent(probability, 3), "number", 2.0) for probability in shown),
     )
     rows = []
     for name, summary in drawn.items():
@@ -87,10 +91,11 @@ def quantile_table(flown: Flown) -> Table | None:
                 interval(item.lower, item.upper, summary.spread) if flown.random else "",
             )
             for item in summary.quantiles
+            if item.probability in shown
         ]
-        label = Cell(axis_label(name, flown.unit(name)), small=f"{count(summary.n_used)} of {count(summary.n_tried)}")
-        rows.append((label, *cells))
-    each = percent(0.5 * (1.0 + first.confidence))
+        used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
+        rows.append((Cell(axis_label(flown.words(name), flown.unit(name))), used, *cells))
+    each = percent(flown.stated.confidence)
     note = (
         f"In brackets: distribution-free limits from order statistics, each holding with {each}{_for_fixed(flown)}; "
         if flown.random
@@ -117,19 +122,16 @@ def status_table(flown: Flown) -> Table:
         Column("Fraction", "number", 1.0),
         Column("Meaning", "text", 6.0),
     )
-    counts = flown.cases["status"].astype(str).value_counts(sort=False)
-    words = sorted(counts.index, key=lambda word: (word != "ok", -counts[word], word))
-    rows = [_status_row(word, int(counts[word]), flown.n_tried, flown.status_text(word)) for word in words]
+    counts = flown.every.statuses
+    words = sorted(counts, key=lambda word: (word != "ok", -counts[word], word))
+    rows = [_status_row(word, counts[word], flown.n_tried, flown.status_text(word)) for word in words]
     rows += [_status_row("", cases, flown.n_tried, reason) for reason, cases in _reasons(flown)]
     rows.append(_status_row("all", flown.n_tried, flown.n_tried, f"flown of {count(flown.n_wanted)} required"))
     return Table("Completion of the cases", columns, tuple(rows))
 
 
 def _reasons(flown: Flown) -> list[tuple[str, int]]:
-    if "reason" not in flown.cases.columns:
-        return []
-    counts = flown.cases["reason"].dropna().astype(str).value_counts()
-    found = [(f"reason: {reason}", int(cases)) for reason, cases in counts.items() if reason]
+    found = [(f"reason: {reason}", cases) for reason, cases in flown.every.reasons.items()]
     if len(found) > REASONS_SHOWN:
         rest = found[REASONS_SHOWN - 1 :]
         found = [*found[: REASONS_SHOWN - 1], (f"{len(rest)} other reasons", sum(cases for _, cases in rest))]
@@ -141,22 +143,30 @@ def _status_row(word: str, cases: int, tried: int, text: str) -> tuple[Cell, ...
     return Cell(word), Cell(count(cases), cases), Cell(percent(share), share), Cell(text)
 
 
-def fixed_table(flown: Flown, key: str, caption: str) -> Table | None:
-    """The parameters or settings that all cases share; None if there are none."""
-    records = flown.manifest.get(key, [])
+def fixed_table(flown: Flown, caption: str, overridden: bool) -> Table | None:
+    """Parameters and settings that all cases share: those that the campaign file sets, or the others; None for none."""
+    records = [
+        record
+        for key in ("parameters", "settings")
+        for record in flown.manifest.get(key, [])
+        if bool(record.get("overridden")) == overridden
+    ]
     columns = (Column("Name", "name", 2.2), Column("Value", "number", 1.3), Column("Meaning", "text", 4.0))
     rows = tuple(_fixed_row(record) for record in records)
-    note = "* changed by the campaign file." if any(record.get("overridden") for record in records) else ""
-    return Table(caption, columns, rows, note) if rows else None
+    return Table(caption, columns, rows) if rows else None
 
 
 def _fixed_row(record: Mapping[str, Any]) -> tuple[Cell, ...]:
-    value = record.get("value", "")
-    text = with_unit(exact(value), record.get("unit", "")) + (" *" if record.get("overridden") else "")
-    choices = record.get("choices") or ()
-    small = f"one of: {', '.join(str(choice) for choice in choices)}" if choices else ""
+    value, unit = record.get("value", ""), record.get("unit", "")
+    text = exact(value)
+    if isinstance(value, float):
+        shown = chosen_unit(unit, [value])
+        converted = exact(float(f"{convert(value, unit, shown):.12g}")) if shown != unit else text
+        if len(converted) < len(text):
+            text, unit = converted, shown
+        text = text if len(text) <= LONGEST_NUMBER else number(value, 8)
     sort = float(value) if isinstance(value, int | float) else None
-    return Cell(str(record["name"])), Cell(text, sort), Cell(str(record.get("description", "")), small=small)
+    return Cell(str(record["name"])), Cell(with_unit(text, unit), sort), Cell(str(record.get("description", "")))
 
 
 def input_table(flown: Flown) -> Table | None:
@@ -172,9 +182,8 @@ def input_table(flown: Flown) -> Table | None:
     rows = []
     for record in records:
         name, unit = str(record["name"]), str(record.get("unit", ""))
-        values = flown.values(name)
-        values = values[np.isfinite(values)]
-        drawn = f"{number(float(values.min()), 4)} to {number(float(values.max()), 4)}" if values.size else "–"
+        ends = flown.every.ends(name)
+        drawn = f"{number(ends[0], 4)} to {number(ends[1], 4)}" if ends else "–"
         nominal = record.get("nominal", "")
         rows.append(
             (

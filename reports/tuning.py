@@ -9,7 +9,9 @@ from mc_engine.tuning_folder import UNFINISHED, TuningRecord, infeasibility
 from reports.contents import blocks
 from reports.document import Block, Card, Document, FigureBlock, Section, Table, Terms, Text, numbered
 from reports.drawings import POINTS_SHOWN, thinned_rows
-from reports.figures import Convergence, FrontDrawing
+from reports.figures import FrontDrawing
+from reports.figures.marks import Axis, Line, Panels, Plot
+from reports.figures.palette import BLUE
 from reports.numbers import SPACE, count
 from reports.tuned import Tuned, inside, limit_words, quantile_words
 from reports.tuning_tables import (
@@ -208,5 +210,16 @@ def _convergence(tuned: Tuned) -> tuple[Block, ...]:
     )
     if not curves:
         return (Text((text,)),)
-    drawing = Convergence(frame["evaluations"].to_numpy(dtype=float), curves)
-    return (Text((text,)), FigureBlock("Progress of the search", drawing, "half"))
+    x = frame["evaluations"].to_numpy(dtype=float)
+    key = f"after each of {count(x.size)} generations"
+    panels = tuple(
+        Plot(
+            (Line(x, y, BLUE, width=2.0, step="hv", key=key),),
+            Axis("candidates flown", most=4),
+            Axis(name=label, zero=True),
+            label,
+            250.0,
+        )
+        for label, y in curves.items()
+    )
+    return (Text((text,)), FigureBlock("Progress of the search", Panels(panels, form="Progress of the search"), "half"))

@@ -21,14 +21,15 @@ import re
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from mc_engine.errors import EngineError
 from mc_engine.journal import plain
-from mc_engine.statistics import summarize
+from mc_engine.statistics import Summary
 from reports import template_process
 from reports.document import Block, Document, FigureBlock, Table, numbered
 from reports.flown import Flown
@@ -69,13 +70,13 @@ class MetricFacts:
     sd: float | None
     minimum: float | None
     maximum: float | None
-    _values: Any = field(repr=False)
+    _summary: Callable[[float], Summary] = field(repr=False)
 
     def quantile(self, probability: float) -> QuantileFacts:
-        """The quantile and its limits, each holding with 95 %."""
+        """The quantile and its limits, each holding with the report's confidence."""
         if not 0.0 < probability < 1.0:
             raise ValueError(f"quantile({probability}): a probability lies between 0 and 1")
-        found = summarize(self._values, probabilities=(probability,)).at(probability)
+        found = self._summary(probability).at(probability)
         return QuantileFacts(found.value, found.lower, found.upper) if found else QuantileFacts(None, None, None)
 
 
@@ -113,7 +114,7 @@ def run_facts(flown: Flown, title: str) -> RunFacts:
             sd=found.sd,
             minimum=found.minimum,
             maximum=found.maximum,
-            _values=flown.values(name),
+            _summary=partial(flown.every.summary, name),
         )
         for name, found in flown.summaries.items()
     }
@@ -123,7 +124,7 @@ def run_facts(flown: Flown, title: str) -> RunFacts:
         design=flown.design,
         seed=flown.campaign.get("seed"),
         n_tried=flown.n_tried,
-        n_ok=int(flown.ok.sum()),
+        n_ok=flown.every.completed,
         n_wanted=flown.n_wanted,
         metrics=metrics,
         requirements={verdict.name: verdict for verdict in flown.verdicts},
@@ -198,9 +199,9 @@ def _filled_in(
 
 
 def _plain(run: RunFacts) -> dict[str, Any]:
-    """The facts as plain data; of a metric all but its values."""
+    """The facts as plain data; of a metric all but its other quantiles."""
     facts = {one.name: getattr(run, one.name) for one in fields(run)}
-    metrics = {name: {key: value for key, value in vars(one).items() if key != "_values"}
+    metrics = {name: {key: value for key, value in vars(one).items() if key != "_summary"}
                for name, one in run.metrics.items()}  # fmt: skip
     return {**facts, "metrics": metrics, "requirements": {name: asdict(one) for name, one in run.requirements.items()}}
 

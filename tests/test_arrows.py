@@ -40,6 +40,7 @@ def test_reports_know_of_the_engine_only_what_a_store_and_its_statistics_are():
         "durable_file",
         "journal",
         "run_folder",
+        "run_summary",
         "replay_files",
         "tuning_folder",
         "rare_event_folder",

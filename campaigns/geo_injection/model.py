@@ -171,5 +171,14 @@ MODEL = Model(
     observe=outcome.observe,
     evaluate=outcome.evaluate,
     figures=figures.FIGURES,
+    data=(
+        "programs/three_burns_28_5.toml",
+        "programs/three_burns_28_5_staged.toml",
+        "programs/three_burns_planar.toml",
+        "programs/two_burns_28_5.toml",
+        "programs/two_burns_28_5_staged.toml",
+        "programs/two_burns_55.toml",
+        "programs/two_burns_planar.toml",
+    ),
     published=read_published(Path(__file__).with_name("published.toml")),
 )

@@ -20,11 +20,13 @@ _MATHEMATICS = tuple(str(_HERE / name) for name in ("elementary.py", "functions.
 
 
 class Place(NamedTuple):
-    """A place in a source, under the names that an entry of a traceback has."""
+    """A line of a source."""
 
-    tb_frame: FrameType
-    tb_lasti: int
-    tb_lineno: int
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{Path(self.file).name}, line {self.line}"
 
 
 class Origin(NamedTuple):
@@ -138,7 +140,7 @@ def _origin(operation: str, arguments: tuple[Any, ...], value: float) -> Origin:
             operation = code.co_name
             arguments = tuple(frame.f_locals[name] for name in code.co_varnames[: code.co_argcount])
         elif _HERE not in Path(code.co_filename).parents:
-            places.append(Place(frame, frame.f_lasti, frame.f_lineno))
+            places.append(Place(code.co_filename, frame.f_lineno))
         frame = frame.f_back
     return Origin(operation, arguments, value)  # of the engine's own loops
 

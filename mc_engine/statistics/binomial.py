@@ -1,6 +1,6 @@
 """Exact limits on the share of passing cases, for a number of cases that was fixed in advance.
 
-Valid for independent cases drawn from the dispersions (design `mc`).  For `lhs`, `sobol` and `halton` the
+Valid for independent cases drawn from the dispersions (design `mc`).  For `lhs` and `sobol` the
 spread of a share is smaller than binomial, so the limits are then on the safe side; for `grid` and
 `one_at_a_time` a share of cases is no probability and none of this applies.  Where the number of cases was decided
 by looking at them, `time_uniform` has the limits that hold.
@@ -15,7 +15,8 @@ Clopper & Pearson, Biometrika 26 (1934), 404-413.
 
 from collections.abc import Callable
 
-from scipy.special import bdtr, betainc, betaincinv
+import numpy as np
+from scipy.special import bdtr, betainc, betaincinv, gammaln
 
 
 def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
@@ -104,6 +105,15 @@ def _demonstrates(cases: int, share: float, confidence: float, failures: int) ->
 def half_rate_share(share: float) -> float:
     """The share of success of a system that fails half as often as `share` allows."""
     return 0.5 * (1.0 + share)
+
+
+def hypergeometric_tails(total: int, marked: int, drawn: int, found: int) -> tuple[float, float]:
+    """Probabilities of at most, and of at least, `found` marked ones among `drawn` of `total`, of which some are."""
+    k = np.arange(max(0, drawn - (total - marked)), min(marked, drawn) + 1)
+    chance = -gammaln(k + 1.0) - gammaln(marked - k + 1.0)
+    chance -= gammaln(drawn - k + 1.0) + gammaln(total - marked - drawn + k + 1.0)
+    chance = np.exp(chance - chance.max())
+    return float(chance[k <= found].sum() / chance.sum()), float(chance[k >= found].sum() / chance.sum())
 
 
 def check_counts(passed: int, tried: int, confidence: float) -> None:

@@ -10,7 +10,7 @@ Unpaired
     share    Fisher's exact test
 
 All of them hold for any shape of distribution; what they assume is that the cases are independent of each other, so
-for `lhs`, `sobol` and `halton` they are on the safe side.  The size of a change is of the same quantity as its test:
+for `lhs` and `sobol` they are on the safe side.  The size of a change is of the same quantity as its test:
 the shift, or the ratio of the spreads, that the test does not tell from none at all, and as its interval all those
 that it does not reject (Hodges & Lehmann, Ann. Math. Stat. 34 (1963), 598-611); a difference of shares has an
 interval of its own.  Intervals are not widened for their number.  Of pairs, tests and sizes are of those that differ.

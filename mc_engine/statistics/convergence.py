@@ -14,8 +14,8 @@ from math import erfc, sqrt
 
 import numpy as np
 from scipy.special import stdtrit
-from scipy.stats import hypergeom
 
+from mc_engine.statistics.binomial import hypergeometric_tails
 from mc_engine.statistics.order_statistics import quantile
 
 FEWEST = 20  # cases with a number
@@ -115,9 +115,7 @@ def running_quantile(values: np.ndarray, probability: float, confidence: float =
     reach = float(ends.max() / scale / (finite / scale).std(ddof=1)) if np.isfinite(ends).all() else None
     above = finite > estimate[-1]
     half = -(-finite.size // 2)
-    law = hypergeom(finite.size, int(above.sum()), half)
-    in_first = int(above[:half].sum())
-    p = min(1.0, 2.0 * min(float(law.cdf(in_first)), float(law.sf(in_first - 1))))
+    p = min(1.0, 2.0 * min(hypergeometric_tails(finite.size, int(above.sum()), half, int(above[:half].sum()))))
     return RunningEstimate(probability, cases, estimate, lower, upper, finite.size, values.size, reach, p)
 
 

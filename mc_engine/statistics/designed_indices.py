@@ -18,7 +18,6 @@ from mc_engine.statistics.input_columns import input_columns
 from mc_engine.statistics.pick_freeze import whole_blocks
 
 FEWEST_BLOCKS = 10
-CONFIDENCE = 0.95
 RESAMPLES = 200
 _SEED = 1  # of the bootstrap behind the intervals: the same cases give the same report
 
@@ -43,7 +42,11 @@ class DesignedIndices:
 
 
 def designed_indices(
-    design: str, case_ids: np.ndarray, inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]
+    design: str,
+    case_ids: np.ndarray,
+    inputs: Mapping[str, Any],
+    metrics: Mapping[str, np.ndarray],
+    confidence: float = 0.90,
 ) -> DesignedIndices:
     """Indices of a run of design "saltelli" or "morris".  case_ids : int64[n]; metrics : float64[n], NaN where none."""
     size = block_size(design, len(inputs))
@@ -61,7 +64,10 @@ def designed_indices(
         y = y[flown]
         if n_used[k] < FEWEST_BLOCKS or np.ptp(y) <= 1e-12 * np.abs(y).max():
             continue
-        found = _saltelli(tuple(inputs), y) if design == "saltelli" else _morris(tuple(inputs), coded[flown], y)
+        if design == "saltelli":
+            found = _saltelli(tuple(inputs), y, confidence)
+        else:
+            found = _morris(tuple(inputs), coded[flown], y, confidence)
         for name, (value, half) in found.items():
             values[name][:, k], reach[name][:, k] = value, half
     return DesignedIndices(design, tuple(inputs), tuple(metrics), values, reach, n_used, len(rows))
@@ -71,16 +77,18 @@ def _problem(names: tuple[str, ...]) -> dict[str, Any]:
     return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
 
 
-def _saltelli(names: tuple[str, ...], y: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _saltelli(names: tuple[str, ...], y: np.ndarray, confidence: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     from SALib.analyze import sobol  # imports matplotlib and pandas
 
     found = sobol.analyze(
-        _problem(names), y.ravel(), calc_second_order=False, num_resamples=RESAMPLES, conf_level=CONFIDENCE, seed=_SEED
+        _problem(names), y.ravel(), calc_second_order=False, num_resamples=RESAMPLES, conf_level=confidence, seed=_SEED
     )
     return {"first_order": (found["S1"], found["S1_conf"]), "total": (found["ST"], found["ST_conf"])}
 
 
-def _morris(names: tuple[str, ...], coded: np.ndarray, y: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _morris(
+    names: tuple[str, ...], coded: np.ndarray, y: np.ndarray, confidence: float
+) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Of the inputs SALib takes only which one moved, and whether up; a move to an equal value has no effect."""
     from SALib.analyze import morris
 
@@ -90,7 +98,7 @@ def _morris(names: tuple[str, ...], coded: np.ndarray, y: np.ndarray) -> dict[st
         y.ravel(),
         num_levels=MORRIS_LEVELS,
         num_resamples=RESAMPLES,
-        conf_level=CONFIDENCE,
+        conf_level=confidence,
         seed=_SEED,
     )
     unknown = np.full(len(names), np.nan)

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import false_discovery_control, hypergeom, norm, rankdata
+from scipy.special import ndtr
 
-from mc_engine.statistics.binomial import clopper_pearson
-from mc_engine.statistics.input_columns import InputColumn, equal_bins, finite_rows, input_columns
+from mc_engine.statistics.binomial import clopper_pearson, hypergeometric_tails
+from mc_engine.statistics.input_columns import InputColumn, average_ranks, equal_bins, finite_rows, input_columns
 
 FALSE_DISCOVERIES = 0.05  # at most this share of what is reported, on average
 FEWEST = 5  # failed, and passed, cases for a single driver
@@ -156,16 +156,25 @@ def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
 def _discovered(tested: list[Driver], rate: float) -> tuple[Driver, ...]:
     if not tested:
         return ()
-    adjusted = false_discovery_control([one.p_value for one in tested], method="bh")
+    adjusted = _adjusted(np.array([one.p_value for one in tested]))
     found = [replace(one, adjusted=float(value)) for one, value in zip(tested, adjusted, strict=True) if value <= rate]
     return tuple(sorted(found, key=lambda one: (one.p_value, -one.effect)))
+
+
+def _adjusted(p_values: np.ndarray) -> np.ndarray:
+    """Adjusted p-values, float64[n]: the rate of false discoveries if this one is the last that counts as one."""
+    order = np.argsort(p_values)
+    scaled = p_values[order] * p_values.size / np.arange(1, p_values.size + 1)
+    adjusted = np.empty(p_values.size)
+    adjusted[order] = np.minimum.accumulate(scaled[::-1])[::-1].clip(0.0, 1.0)
+    return adjusted
 
 
 def _single(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
     if column.levels:
         return _group(requirement, column, failed)
-    ranks = rankdata(column.values)
-    ends = rankdata(np.abs(ranks - 0.5 * (ranks.size + 1)))
+    ranks = average_ranks(column.values)
+    ends = average_ranks(np.abs(ranks - 0.5 * (ranks.size + 1)))
     (trend, p_trend), (spread, p_spread) = _separation(ranks, failed), _separation(ends, failed)
     if p_trend <= p_spread:
         where, effect = ("high" if trend > 0.0 else "low"), abs(trend)
@@ -187,7 +196,7 @@ def _separation(ranks: np.ndarray, failed: np.ndarray) -> tuple[float, float]:
     variance = n_failed * n_passed / (n * (n - 1.0)) * float(((ranks - 0.5 * (n + 1)) ** 2).sum())
     if variance == 0.0:
         return 0.0, 1.0
-    return 2.0 * excess / (n_failed * n_passed), float(2.0 * norm.sf(abs(excess) / np.sqrt(variance)))
+    return 2.0 * excess / (n_failed * n_passed), float(2.0 * ndtr(-abs(excess) / np.sqrt(variance)))
 
 
 def _group(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
@@ -196,7 +205,8 @@ def _group(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
     n, n_failed = failed.size, int(failed.sum())
     size = np.array([np.count_nonzero(column.values == level) for level in levels])
     hits = np.array([np.count_nonzero(failed & (column.values == level)) for level in levels])
-    tail = np.minimum(hypergeom.cdf(hits, n, n_failed, size), hypergeom.sf(hits - 1, n, n_failed, size))
+    drawn = zip(size.tolist(), hits.tolist(), strict=True)
+    tail = np.array([min(hypergeometric_tails(n, n_failed, one, found)) for one, found in drawn])
     effects = hits / n_failed - (size - hits) / (n - n_failed)
     best = int(np.lexsort((-effects, tail))[0])
     # of two levels one test says all
@@ -217,7 +227,7 @@ def _group(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
 def _scores(column: InputColumn) -> list[np.ndarray]:
     """Centred scores of a column that products are made of: the rank, or a column for each level of a group."""
     if column.ordered:
-        ranks = rankdata(column.values)
+        ranks = average_ranks(column.values)
         return [2.0 * ranks / (ranks.size + 1) - 1.0]
     indicators = [(column.values == level).astype(np.float64) for level in np.unique(column.values)]
     return [one - one.mean() for one in indicators]
@@ -251,7 +261,7 @@ def _pairs(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> 
             z.setdefault((name, scored[m][0]), []).append(np.abs(row))
     for pair, rows in z.items():
         for requirement, largest in zip(failed, np.max(rows, axis=0), strict=True):
-            p_value = float(min(1.0, 2.0 * norm.sf(largest) * len(rows)))
+            p_value = float(min(1.0, 2.0 * ndtr(-largest) * len(rows)))
             yield Driver(requirement, pair, ("", ""), 0.0, p_value, p_value)
 
 

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import rankdata
 
 
 @dataclass(frozen=True)
@@ -53,6 +52,22 @@ def finite_rows(columns: Sequence[InputColumn], n: int) -> np.ndarray:
     return rows
 
 
+def average_ranks(values: np.ndarray) -> np.ndarray:
+    """Ranks from 1 of float64[n], or of each column of float64[n, k]; equal values share the middle of theirs.
+
+    `scipy.stats.rankdata`, without the third of a second that `scipy.stats` takes to load.
+    """
+    if values.ndim == 2:
+        return np.column_stack([average_ranks(column) for column in values.T])
+    order = np.argsort(values, kind="stable")
+    ordered = values[order]
+    first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]])[: values.size])
+    sizes = np.diff(first, append=values.size)
+    ranks = np.empty(values.size)
+    ranks[order] = np.repeat(first + 0.5 * (sizes + 1), sizes)
+    return ranks
+
+
 def equal_bins(column: InputColumn, bins: int) -> tuple[np.ndarray, int]:
     """Bin of each case (int64[n]) and the number of bins: about equally full, ties together, no bin empty.
 
@@ -60,6 +75,6 @@ def equal_bins(column: InputColumn, bins: int) -> tuple[np.ndarray, int]:
     """
     distinct, index = np.unique(column.values, return_inverse=True)
     if not column.levels and distinct.size > bins:
-        place = ((rankdata(column.values) - 0.5) * bins / column.values.size).astype(np.int64)
+        place = ((average_ranks(column.values) - 0.5) * bins / column.values.size).astype(np.int64)
         distinct, index = np.unique(place, return_inverse=True)
     return index.astype(np.int64), int(distinct.size)

@@ -14,7 +14,8 @@ from mc_engine.statistics.normality import Normality, normality_of
 
 def finite_values(values: np.ndarray) -> np.ndarray:
     """The finite ones of float64[n], with -0.0 as 0.0, which it equals."""
-    return values[np.isfinite(values)] + 0.0
+    finite = np.isfinite(values)
+    return (values if finite.all() else values[finite]) + 0.0
 
 
 def near_one(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,6 +17,7 @@ allowed, 1 - confidence, divided by their number (Bonferroni); `shared_outcome` 
 those hold all at once.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -31,7 +32,7 @@ NOT_DEMONSTRABLE = "not demonstrable"
 JOINT = "all at once"
 
 # Designs whose cases are a sample of the dispersions, so that a share of cases estimates a probability.
-SAMPLING_DESIGNS = ("mc", "lhs", "sobol", "halton")
+SAMPLING_DESIGNS = ("mc", "lhs", "sobol", "halton")  # the last one of runs of older versions
 
 
 class ShareLimits(Protocol):
@@ -105,6 +106,44 @@ def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple
     return passed / tried, binomial.lower_bound(passed, tried, confidence)
 
 
+class LimitCounts:
+    """How many cases are outside which limits: all that verdicts count, added up over the parts of a table.
+
+    A case that was not completed, or whose metric is not a number, is outside.
+    """
+
+    def __init__(self, requirements: Sequence[Mapping[str, Any]]):
+        self.requirements = requirements
+        self.tried = 0
+        self._outside: Counter[int] = Counter()  # by the set of requirements, as the bits of a whole number
+        self._lost: Counter[int] = Counter()
+
+    def add(self, column: Callable[[str], np.ndarray], ok: np.ndarray) -> None:
+        """Count cases.  column : metric to float64[n].  ok : bool[n]."""
+        self.tried += ok.size
+        kept = [inside_all([one], column, ok) for one in self.requirements]
+        numbers = [ok & np.isfinite(np.asarray(column(str(one["metric"])), np.float64)) for one in self.requirements]
+        for found, good in ((self._outside, kept), (self._lost, numbers)):
+            beyond = ~np.array(good, dtype=bool).reshape(len(good), ok.size)
+            some = beyond[:, beyond.any(axis=0)]
+            if some.size:
+                codes, cases = np.unique(np.packbits(some, axis=0, bitorder="little").T, axis=0, return_counts=True)
+                for code, n in zip(codes, cases.tolist(), strict=True):
+                    found[int.from_bytes(code.tobytes(), "little")] += n
+
+    def outside(self, requirements: Iterable[int] | None = None) -> int:
+        """Cases outside any of these requirements, of all by default; they are named by their index."""
+        return self._any(self._outside, requirements)
+
+    def without_number(self, requirements: Iterable[int] | None = None) -> int:
+        """Cases without a number for any of them."""
+        return self._any(self._lost, requirements)
+
+    def _any(self, found: Counter[int], requirements: Iterable[int] | None) -> int:
+        asked = sum(1 << k for k in (range(len(self.requirements)) if requirements is None else requirements))
+        return sum(cases for code, cases in found.items() if code & asked)
+
+
 def judge_all(
     requirements: Sequence[Mapping[str, Any]],
     column: Callable[[str], np.ndarray],
@@ -112,23 +151,42 @@ def judge_all(
     design: str = "mc",
     looked: bool = False,
 ) -> tuple[list[Verdict], Verdict | None]:
-    """The verdict on each requirement record, and the joint one; None for a single one or none.
+    """The verdict on each requirement record, and the joint one; see `judge_counted`.
 
-    column : metric to float64[n_tried].  There is no joint verdict either where the requirements together leave
-    nothing to be asked for.  Its confidence is the smallest of theirs.
+    column : metric to float64[n_tried].  ok : bool[n_tried], whether the case was completed.
     """
     ok = np.asarray(ok, dtype=bool)
+    counts = LimitCounts(requirements)
+    counts.add(column, ok)
+    ordered: dict[str, np.ndarray] = {}
+
+    def ranked(metric: str, rank: int) -> float:
+        if metric not in ordered:
+            values = np.asarray(column(metric), dtype=np.float64)
+            ordered[metric] = np.sort(values[ok & np.isfinite(values)])
+        return float(ordered[metric][rank - 1])
+
+    return judge_counted(counts, ranked, design, looked)
+
+
+def judge_counted(
+    counts: LimitCounts, ranked: Callable[[str, int], float], design: str = "mc", looked: bool = False
+) -> tuple[list[Verdict], Verdict | None]:
+    """The verdict on each requirement that was counted, and the joint one; None for a single one or none.
+
+    ranked : metric and rank to the order statistic of the usable values, from 1.  looked : whether the number of cases
+    was decided by looking at them.  There is no joint verdict either where the requirements together leave nothing
+    to be asked for.  Its confidence is the smallest of theirs.
+    """
+    requirements = counts.requirements
     share = joint_share([float(one["share"]) for one in requirements]) if len(requirements) > 1 else None
     among = len(requirements) + (share is not None)
-    verdicts = [judge(one, column(one["metric"]), ok, design, looked, among) for one in requirements]
+    verdicts = [_verdict(one, counts, (k,), ranked, design, looked, among) for k, one in enumerate(requirements)]
     if share is None:
         return verdicts, None
-    inside, usable = inside_all(requirements, column, ok), ok.copy()
-    for verdict in verdicts:
-        usable &= np.isfinite(np.asarray(column(verdict.metric), dtype=np.float64))
     confidence = min(verdict.confidence for verdict in verdicts)
     asked = {"name": JOINT, "metric": "", "share": share, "confidence": confidence}
-    alone = _verdict(asked, None, inside, usable, design, looked, among)
+    alone = _verdict(asked, counts, None, ranked, design, looked, among)
     return verdicts, _joined(alone, [*verdicts, alone])
 
 
@@ -153,36 +211,28 @@ def joint_share(shares: Sequence[float]) -> float | None:
 
 
 def judge(
-    requirement: Mapping[str, Any],
-    values: np.ndarray,
-    ok: np.ndarray,
-    design: str = "mc",
-    looked: bool = False,
-    among: int = 1,
+    requirement: Mapping[str, Any], values: np.ndarray, ok: np.ndarray, design: str = "mc", looked: bool = False
 ) -> Verdict:
     """Verdict on one requirement record ("name", "metric", "at_most", "at_least", "share", "confidence").
 
     values : float64[n_tried], the metric; ok : bool[n_tried], whether the case was completed.
-    looked : whether the number of cases was decided by looking at them.  among : how many requirements there are.
     """
-    values = np.asarray(values, dtype=np.float64)
-    usable = np.asarray(ok, dtype=bool) & np.isfinite(values)
-    inside = inside_all([requirement], lambda _: values, ok)
-    return _verdict(requirement, values, inside, usable, design, looked, among)
+    return judge_all([requirement], lambda _: values, ok, design, looked)[0][0]
 
 
 def _verdict(
     requirement: Mapping[str, Any],
-    values: np.ndarray | None,
-    inside: np.ndarray,
-    usable: np.ndarray,
+    counts: LimitCounts,
+    which: tuple[int, ...] | None,
+    ranked: Callable[[str, int], float],
     design: str,
     looked: bool,
     among: int,
 ) -> Verdict:
     limits: ShareLimits = time_uniform if looked else binomial
     share, confidence = float(requirement["share"]), float(requirement["confidence"])
-    passed, tried = int(inside.sum()), int(inside.size)
+    tried = counts.tried
+    passed = tried - counts.outside(which)
     random = design in SAMPLING_DESIGNS
     known = random and tried > 0
     outcome, lower, upper = _outcome(limits, passed, tried, share, confidence) if known else _UNKNOWN
@@ -199,7 +249,7 @@ def _verdict(
         outcome=outcome,
         passed=passed,
         tried=tried,
-        no_number=tried - int(usable.sum()),
+        no_number=counts.without_number(which),
         estimate=passed / tried if tried else None,
         lower=lower,
         upper=upper,
@@ -215,7 +265,7 @@ def _verdict(
         random=random,
         looked=looked,
     )
-    return verdict if values is None or not known else _with_limits_shown(verdict, values[usable], limits)
+    return _with_limits_shown(verdict, ranked, limits) if which is not None and known else verdict
 
 
 _UNKNOWN: tuple[str, float | None, float | None] = (NOT_DEMONSTRABLE, None, None)
@@ -232,21 +282,27 @@ def _outcome(
     return (FAIL if upper < share else NOT_DEMONSTRABLE), lower, upper
 
 
-def _with_limits_shown(verdict: Verdict, usable: np.ndarray, limits: ShareLimits) -> Verdict:
+def _with_limits_shown(verdict: Verdict, ranked: Callable[[str, int], float], limits: ShareLimits) -> Verdict:
     """The verdict with the tolerance limits that the usable values show."""
-    lost = verdict.no_number
+    lost, usable = verdict.no_number, verdict.tried - verdict.no_number
+
+    def value(rank: int | None) -> float | None:
+        return None if rank is None else ranked(verdict.metric, rank)
+
     if verdict.at_least is None:
-        return replace(verdict, demonstrated=tolerance.upper_limit(usable, verdict.accepted, lost))
+        return replace(verdict, demonstrated=value(tolerance.upper_rank(usable, verdict.accepted, lost)))
     if verdict.at_most is None:
-        return replace(verdict, demonstrated=tolerance.lower_limit(usable, verdict.accepted, lost))
-    if not verdict.looked:
-        return replace(verdict, enclosed=tolerance.interval(usable, verdict.accepted, lost))
-    # Blocks of values are exchangeable at one number of cases only; at all of them each end stands for itself,
-    # with half of what may lie outside and half of the error.
-    half = limits.acceptance_number(
-        verdict.tried, binomial.half_rate_share(verdict.share), 1.0 - 0.5 * (1.0 - verdict.confidence)
-    )
-    low, high = tolerance.lower_limit(usable, half, lost), tolerance.upper_limit(usable, half, lost)
+        return replace(verdict, demonstrated=value(tolerance.lower_rank(usable, verdict.accepted, lost)))
+    if verdict.looked:
+        # Blocks of values are exchangeable at one number of cases only; at all of them each end stands for itself,
+        # with half of what may lie outside and half of the error.
+        half = limits.acceptance_number(
+            verdict.tried, binomial.half_rate_share(verdict.share), 1.0 - 0.5 * (1.0 - verdict.confidence)
+        )
+        ends = (tolerance.lower_rank(usable, half, lost), tolerance.upper_rank(usable, half, lost))
+    else:
+        ends = tolerance.enclosing_ranks(usable, verdict.accepted, lost) or (None, None)
+    low, high = value(ends[0]), value(ends[1])
     return replace(verdict, enclosed=None if low is None or high is None else (low, high))
 
 

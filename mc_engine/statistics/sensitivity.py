@@ -11,7 +11,7 @@ total        E[Var(metric | all other inputs)] / Var(metric): what the input doe
 
 For inputs that are correlated with each other src and prcc tell them apart as far as the cases do, while spearman and
 first_order also hold what an input owes to its partners.  Errors are standard errors for independent cases (`mc`);
-`lhs`, `sobol` and `halton` scatter less.  NaN: not defined, or too few cases.
+`lhs` and `sobol` scatter less.  NaN: not defined, or too few cases.
 
 Saltelli et al., Global Sensitivity Analysis: The Primer (2008), ch. 1 (SRC, first-order index); Marino et al.,
 J. Theor. Biol. 254 (2008), 178-196 (PRCC).
@@ -22,10 +22,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.stats import rankdata
 
 from mc_engine.statistics.first_order import first_order, standardised
-from mc_engine.statistics.input_columns import InputColumn, finite_rows, input_columns
+from mc_engine.statistics.input_columns import InputColumn, average_ranks, finite_rows, input_columns
 from mc_engine.statistics.moments import near_one
 from mc_engine.statistics.total_order import total_order
 
@@ -137,7 +136,7 @@ def _fill(
     groups = _indicators([columns[k] for k in live if not columns[k].ordered])
     place = np.ix_(np.array(ordered), where)
     plain = np.column_stack([columns[k].values for k in ordered])
-    ranks, metric_ranks = rankdata(plain, axis=0), rankdata(varying, axis=0)
+    ranks, metric_ranks = average_ranks(plain), average_ranks(varying)
     rho = standardised(ranks).T @ standardised(metric_ranks) / n
     found["spearman"][place] = rho
     # Bonett & Wright, Psychometrika 65 (2000), 23-28, carried from Fisher's z to the correlation.
@@ -210,7 +209,7 @@ def _strongest_correlation(columns: Sequence[InputColumn], n: int) -> tuple[str,
     usable = [one for one in (column.at(rows) for column in columns) if one.ordered and one.varies]
     if len(usable) < 2 or rows.size < FEWEST_CASES:
         return None
-    ranks = standardised(rankdata(np.column_stack([column.values for column in usable]), axis=0))
+    ranks = standardised(average_ranks(np.column_stack([column.values for column in usable])))
     rho = ranks.T @ ranks / rows.size
     np.fill_diagonal(rho, 0.0)
     first, second = np.unravel_index(np.abs(rho).argmax(), rho.shape)

@@ -2,18 +2,16 @@
 
 Every summary says n_used of n_tried: failed cases and NaN have no number, and are never dropped silently.
 Nothing in it is an approximation of a stream: mean and quantiles are exact whether the values are at hand
-(`summarize`) or seen part by part (`summarize_parts`), and no bit depends on the order or the size of the parts.
+(`summarize`) or seen part by part (`streaming`), and no bit depends on the order or the size of the parts.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from mc_engine.statistics.moments import Spread, Tally, finite_values
+from mc_engine.statistics.moments import Spread, Tally
 from mc_engine.statistics.normality import Normality
-from mc_engine.statistics.order_statistics import QUANTILES, Quantile, quantile, ranked_quantile, ranks_read
-from mc_engine.statistics.selection import PASSES, Selection
+from mc_engine.statistics.order_statistics import QUANTILES, Quantile, quantile
 
 _ROUNDING = 1e-12  # of the size of two numbers: more than rounding adds up to over thousands of steps
 
@@ -63,59 +61,20 @@ def summarize(values: np.ndarray, *, probabilities: tuple[float, ...] = QUANTILE
     tally = Tally()
     finite = tally.add(np.asarray(values, dtype=np.float64))
     if not finite.size:
-        return _without_number(tally, confidence)
+        return without_number(tally, confidence)
     spread = Spread(tally)
     spread.add(finite)
     ordered = np.sort(finite)
-    return _summary(spread, tuple(quantile(ordered, one, confidence) for one in probabilities), confidence)
+    return summary_of(spread, tuple(quantile(ordered, one, confidence) for one in probabilities), confidence)
 
 
-def summarize_parts(
-    passes: Callable[[], Iterable[Mapping[str, np.ndarray]]],
-    names: Sequence[str],
-    *,
-    probabilities: tuple[float, ...] = QUANTILES,
-    confidence: float = 0.90,
-) -> dict[str, Summary]:
-    """`summarize` for every name, to the same bits, of a table that is never held whole.
-
-    passes : called four times; each time all parts of the same table in any order, float64[n_part] by name.
-    """
-    tallies = {name: Tally() for name in names}
-    digits = {name: Selection() for name in names}
-    for part in passes():
-        for name in names:
-            digits[name].add(tallies[name].add(np.asarray(part[name], dtype=np.float64)))
-    used = [name for name in names if tallies[name].n_used]
-    spreads = {name: Spread(tallies[name]) for name in used}
-    for name in used:
-        ranks = set().union(*(ranks_read(tallies[name].n_used, one, confidence) for one in probabilities))
-        digits[name] = digits[name].next(ranks)
-    for later in range(1, PASSES):
-        for part in passes():
-            for name in used:
-                finite = finite_values(np.asarray(part[name], dtype=np.float64))
-                digits[name].add(finite)
-                if later == 1:
-                    spreads[name].add(finite)
-        digits.update({name: digits[name].next() for name in used})
-    found = {}
-    for name in names:
-        if name not in spreads:
-            found[name] = _without_number(tallies[name], confidence)
-            continue
-        at = digits[name].values.__getitem__
-        n = tallies[name].n_used
-        quantiles = tuple(ranked_quantile(n, at, one, confidence) for one in probabilities)
-        found[name] = _summary(spreads[name], quantiles, confidence)
-    return found
-
-
-def _without_number(tally: Tally, confidence: float) -> Summary:
+def without_number(tally: Tally, confidence: float) -> Summary:
+    """The summary of cases of which none has a number."""
     return Summary(0, tally.n_tried, None, None, None, None, (), confidence, None)
 
 
-def _summary(spread: Spread, quantiles: tuple[Quantile, ...], confidence: float) -> Summary:
+def summary_of(spread: Spread, quantiles: tuple[Quantile, ...], confidence: float) -> Summary:
+    """The summary of what two passes have counted."""
     tally = spread.tally
     return Summary(
         n_used=tally.n_used,

@@ -20,11 +20,10 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.special import eval_legendre
-from scipy.stats import chi2, norm, rankdata
+from scipy.special import chdtrc, eval_legendre, ndtri
 
 from mc_engine.statistics.first_order import first_order
-from mc_engine.statistics.input_columns import InputColumn
+from mc_engine.statistics.input_columns import InputColumn, average_ranks
 
 MOST_DEGREE = 12  # of a single input, and of a product in all
 PLAIN_DEGREE = 3  # powers of the values themselves; above, polynomials of their ranks, which have no tails
@@ -98,7 +97,7 @@ def _functions(column: InputColumn, n: int) -> _Functions:
     degree = min(MOST_DEGREE, distinct - 1, max(n // (4 * CASES_PER_TERM), 1))
     z = column.values - column.values.mean()
     z /= np.abs(z).max()
-    u = (2.0 * rankdata(column.values) - 1.0) / n - 1.0
+    u = (2.0 * average_ranks(column.values) - 1.0) / n - 1.0
     raw = [(z**k, k) for k in range(1, min(degree, PLAIN_DEGREE) + 1)]
     raw += [(eval_legendre(k, u), k) for k in range(1, degree + 1)]
     raw.sort(key=lambda one: one[1])  # of a degree, the power comes first
@@ -131,7 +130,7 @@ def _steps(columns: Sequence[InputColumn], left: np.ndarray) -> tuple[np.ndarray
     open_ = left.var(axis=0) > _NEARLY_ALL
     for one, column in enumerate(columns if open_.any() else []):
         share[one, open_], error[one, open_] = np.nan_to_num(first_order(column, left[:, open_]))
-    sure = share > float(norm.isf(0.05 / len(columns))) * error
+    sure = share > float(-ndtri(0.05 / len(columns))) * error
     share = np.where(sure, share, 0.0)
     share /= np.maximum(share.sum(axis=0), 1.0)
     return share, np.where(sure, error, 0.0)
@@ -181,7 +180,7 @@ def _extended(basis: Sequence[_Functions], fit: _Fit, groups: Sequence[Group]) -
         if room <= 0 or fit.noise < _ENOUGH:
             break
         terms, scores = _candidates(basis, groups, fit.left)
-        threshold = float(norm.isf(0.5 / len(terms)))  # one false term in all of them, on average
+        threshold = float(-ndtri(0.5 / len(terms)))  # one false term in all of them, on average
         known = set(fit.terms)
         order = [k for k in np.argsort(-scores, kind="stable") if scores[k] > threshold and terms[k] not in known]
         fresh = [terms[k] for k in order[:room] if _has_no_tail(_column(basis, terms[k]))]
@@ -247,7 +246,7 @@ def _acting_pairs(basis: Sequence[_Functions], low: np.ndarray, left: np.ndarray
     squares = member.T @ (low.T @ (low * left[:, None])) ** 2 @ member / (left**2).sum()
     one, two = np.triu_indices(len(basis), 1)
     freedom = member.sum(axis=0)
-    p_value = chi2.sf(squares[one, two], freedom[one] * freedom[two])
+    p_value = chdtrc(freedom[one] * freedom[two], squares[one, two])
     found = np.flatnonzero(p_value < FALSE_PAIRS / max(one.size, 1))
     order = found[np.lexsort((-squares[one, two][found], p_value[found]))][:MOST_PAIRS]
     return [(int(one[k]), int(two[k])) for k in order]

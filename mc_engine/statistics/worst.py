@@ -49,6 +49,13 @@ def limits_on(metric: str, requirements: Iterable[Mapping[str, Any]]) -> Limits:
     return Limits(min(upper, default=None), max(lower, default=None))
 
 
+def _goodness(values: np.ndarray, largest: bool, limits: Limits | None) -> np.ndarray:
+    """float64[n], smallest for the worst: the margin to the nearest limit, or without one the size or its negative."""
+    if limits is not None and limits != Limits():
+        return limits.margins(values)
+    return -values if largest else values
+
+
 def worst_cases(
     values: np.ndarray, ok: np.ndarray, count: int, largest: bool = True, limits: Limits | None = None
 ) -> np.ndarray:
@@ -59,10 +66,30 @@ def worst_cases(
     """
     values = np.asarray(values, dtype=np.float64)
     rows = np.flatnonzero(np.asarray(ok, dtype=bool) & np.isfinite(values))
-    goodness = -values[rows] if largest else values[rows]
-    if limits is not None and limits != Limits():
-        goodness = limits.margins(values[rows])
+    goodness = _goodness(values[rows], largest, limits)
     if 0 < count < rows.size:  # sort none but those that can be among them: a table may have a million rows
         among = np.flatnonzero(goodness <= np.partition(goodness, count - 1)[count - 1])
         rows, goodness = rows[among], goodness[among]
     return rows[np.argsort(goodness, kind="stable")[:count]]
+
+
+class WorstSoFar:
+    """The same of cases that are seen part by part, in the order of their numbers.  case_ids : of the worst, int64."""
+
+    def __init__(self, count: int, limits: Limits):
+        self.count, self.limits = count, limits
+        self.case_ids, self._goodness = np.zeros(0, dtype=np.int64), np.zeros(0)
+
+    def add(self, values: np.ndarray, first: int) -> None:
+        """values : float64[n] of the cases `first` and on, NaN for one that was not completed."""
+        found = np.isfinite(values)
+        goodness = _goodness(values if found.all() else np.where(found, values, np.nan), True, self.limits)
+        if self.case_ids.size == self.count:
+            found &= goodness < self._goodness[-1]
+        rows = np.flatnonzero(found)
+        if rows.size:
+            rows = rows[worst_cases(-goodness[rows], np.ones(rows.size, dtype=bool), self.count)]
+            together = np.concatenate([self._goodness, goodness[rows]])
+            best = np.argsort(together, kind="stable")[: self.count]
+            self.case_ids = np.concatenate([self.case_ids, first + rows])[best]
+            self._goodness = together[best]

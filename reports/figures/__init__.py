@@ -1,21 +1,17 @@
 """The kinds of figures: data in, panels of marks out; `screen` and `paper` draw them."""
 
-from reports.figures.convergence import Convergence
 from reports.figures.corridors import CorridorDrawing, LimitLine
 from reports.figures.distributions import DistributionPanel, Distributions
 from reports.figures.footprints import FootprintCurve, FootprintDrawing
 from reports.figures.fronts import FrontDrawing
 from reports.figures.histories import Histories, HistoryBand, HistoryLine
-from reports.figures.indices import IndexMap
 from reports.figures.levels import LevelPanel, LevelsDrawing
 from reports.figures.maps import MapDrawing
 from reports.figures.profiles import ProfileBand, ProfileDrawing
-from reports.figures.running_estimates import RunningDrawing, RunningPanel
 from reports.figures.scatter import ScatterDrawing
 from reports.figures.success import SuccessDrawing, SuccessPanel
 
 __all__ = [
-    "Convergence",
     "CorridorDrawing",
     "DistributionPanel",
     "Distributions",
@@ -25,15 +21,12 @@ __all__ = [
     "Histories",
     "HistoryBand",
     "HistoryLine",
-    "IndexMap",
     "LevelPanel",
     "LevelsDrawing",
     "LimitLine",
     "MapDrawing",
     "ProfileBand",
     "ProfileDrawing",
-    "RunningDrawing",
-    "RunningPanel",
     "ScatterDrawing",
     "SuccessDrawing",
     "SuccessPanel",

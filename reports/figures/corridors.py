@@ -1,7 +1,6 @@
 """The cases over two columns, coloured by the limits that they violate, with the limits where they run."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -41,7 +40,7 @@ class CorridorDrawing(Drawing):
     n_tried: int
     nominal: tuple[float, float] | None
     columns: tuple[str, str] | None = None
-    form: ClassVar[str] = "Cases by the limits that they violate"
+    form = "Cases by the limits that they violate"
 
     @property
     def plots(self) -> tuple[Plot, ...]:

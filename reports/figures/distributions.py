@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from textwrap import fill
-from typing import ClassVar
 
 import numpy as np
 
@@ -26,6 +25,7 @@ class DistributionPanel:
     """One metric: finite values (float64[n]), its summary, nominal value and required limits.
 
     law : mean and standard deviation of the normal law that the source prints for such cases
+    column : the metric's name in the table of cases
     """
 
     title: str
@@ -35,6 +35,7 @@ class DistributionPanel:
     nominal: float | None
     limits: tuple[float, ...]
     law: tuple[float, float] | None = None
+    column: str = ""
 
     @cached_property
     def edges(self) -> np.ndarray:
@@ -112,7 +113,8 @@ class Distributions(Drawing):
     panels: tuple[DistributionPanel, ...]
     outer: tuple[float, ...]
     with_intervals: bool
-    across: ClassVar[int] = 4
+    height: float = 240.0
+    across = 4
 
     @property
     def alternative(self) -> str:
@@ -141,7 +143,8 @@ class Distributions(Drawing):
             for (a, b), n in zip(pairwise(edges), counts, strict=True)
         )
         marks: list[Mark] = [self._box(panel, low, high, top) for low, high in self._bands(panel)]
-        marks.append(Bar(edges[:-1], edges[1:], np.zeros(counts.size), counts, SKY, texts=told, key="cases"))
+        sides = edges[:-1], edges[1:], np.zeros(counts.size), counts
+        marks.append(Bar(*sides, SKY, texts=told, column=panel.column, key="cases"))
         marks += [Limit(at, "x", colour, what, dash, key=key) for at, colour, dash, what, key in self._lines(panel)]
         if panel.law:
             what = f"printed normal law, {number(panel.law[0])} ± {number(panel.law[1])} (1 σ)"
@@ -153,7 +156,7 @@ class Distributions(Drawing):
             Axis(panel.label, most=5, whole=whole, grid=False, margin=0.03),
             Axis("cases", reach=(0.0, top), most=4, whole=True),
             title,
-            240.0,
+            self.height,
         )
 
     def _bands(self, panel: DistributionPanel) -> list[tuple[float, float]]:
@@ -176,8 +179,8 @@ class Distributions(Drawing):
         for found in self._quantiles(panel):
             colour, dash = (ORANGE, "solid") if found.probability == 0.5 else (BLUE, "dash")
             bounds = f" {interval(found.lower, found.upper)}" if self.with_intervals else ""
-            what = f"{percent(found.probability, 3)} quantile {number(found.value)}{bounds}"
-            outer = f"{' and '.join(percent(p, 3) for p in self.outer)} quantiles"
+            what = f"{percent(found.probability, 3)} percentile {number(found.value)}{bounds}"
+            outer = f"{' and '.join(percent(p, 3) for p in self.outer)} percentiles"
             lines.append((found.value, colour, dash, what, "median" if found.probability == 0.5 else outer))
         if panel.nominal is not None and panel.near(panel.nominal):
             lines.append((panel.nominal, INK, "dot", f"nominal {number(panel.nominal)}", "nominal"))
@@ -187,5 +190,6 @@ class Distributions(Drawing):
 
     def _box(self, panel: DistributionPanel, low: float, high: float, top: float) -> Bar:
         """An interval of a quantile, as high as the panel."""
-        key = f"{percent(panel.summary.confidence)} interval of a quantile, distribution-free"
+        each = percent(0.5 * (1.0 + panel.summary.confidence))
+        key = f"{each} confidence bounds of a percentile, distribution-free"
         return Bar(np.array([low]), np.array([high]), np.zeros(1), np.array([top]), BLUE, 0.3, key=key)

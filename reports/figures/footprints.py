@@ -1,21 +1,26 @@
 """A footprint: the ends of the flights about their mean place, with the regions that hold them."""
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Line, Plot, Points, nominal_ring, region
-from reports.figures.palette import BLUE, DASHES, GREEN, INK, VERMILION
+from reports.figures.marks import Axis, Drawing, Line, Mark, Plot, Points, joined, nominal_ring, region
+from reports.figures.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PURPLE, VERMILION
 from reports.numbers import count
 
-EAST, NORTH = "east of the mean place [km]", "north of the mean place [km]"
+EAST, NORTH = "east of the mean [km]", "north of the mean [km]"
+WIDE = 3.0  # width over height of the map of the surroundings
+COAST = "coastline (Natural Earth)"
 ALONG, ACROSS = "along the long axis [km]", "across it, to the left [km]"
+
+
+MEAN = Points(np.zeros(1), np.zeros(1), INK, "mean impact point", "cross", 11.0, key="mean impact point")
+STYLES = {"ellipse": VERMILION, "region": GREEN, "CEP": PURPLE, "target": ORANGE}  # colour by kind; a dash for each
 
 
 @dataclass(frozen=True)
 class FootprintCurve:
-    """A region's outlines, each float64[k, 2] in km east and north, and the words for the key.  kind : as `Outline`."""
+    """Outlines, each float64[k, 2] in km east and north, and the words for the key.  kind : one of STYLES."""
 
     kind: str
     text: str
@@ -29,6 +34,8 @@ class FootprintDrawing(Drawing):
     n_used of n_tried have a place; aim : words and point of the place that distances count from, if there is one.
     long_axis : direction of a cloud much longer than wide [rad, from east to north].
     case_ids : of the points;  everywhere, every_case : the same of all n_used cases, those not shown among them.
+    coasts : float64[k, 2] in km, those in reach of the map;  around : of a wider map, up to so many km north and
+    south, where the first has none.
     """
 
     points: np.ndarray
@@ -41,28 +48,31 @@ class FootprintDrawing(Drawing):
     case_ids: np.ndarray | None = None
     everywhere: np.ndarray | None = None
     every_case: np.ndarray | None = None
-    across: ClassVar[int] = 1
-    form: ClassVar[str] = "Ends of flights about their mean place"
+    coasts: tuple[np.ndarray, ...] = ()
+    around: tuple[np.ndarray, ...] = ()
+    around_reach: float = 0.0
+    across = 1
+    form = "Ends of flights about their mean place"
 
     @property
     def styled(self) -> list[tuple[FootprintCurve, str, str]]:
-        """Curves with colour and dash: ellipses vermilion, regions green, a dash for each content."""
-        counts = {"ellipse": 0, "region": 0}
+        """Curves with colour and dash."""
+        counts = dict.fromkeys(STYLES, 0)
         found = []
         for curve in self.curves:
-            colour = VERMILION if curve.kind == "ellipse" else GREEN
-            found.append((curve, colour, DASHES[counts[curve.kind] % len(DASHES)]))
+            found.append((curve, STYLES[curve.kind], DASHES[counts[curve.kind] % len(DASHES)]))
             counts[curve.kind] += 1
         return found
 
     @property
     def plots(self) -> tuple[Plot, ...]:
-        return tuple(self._plot(view) for view in self.views)
+        maps = tuple(self._plot(view) for view in self.views)
+        return (*maps, self._wider()) if self.around else maps
 
     def _plot(self, view: "View") -> Plot:
         points = view.turned(self.points)
         shown = "all shown" if len(points) == self.n_used else f"{count(len(points))} shown"
-        marks: list[Line | Points] = [
+        marks: list[Mark] = [
             Points(
                 points[:, 0],
                 points[:, 1],
@@ -76,11 +86,19 @@ class FootprintDrawing(Drawing):
         ]
         for curve, colour, dash in self.styled:
             marks.append(region([view.turned(one) for one in curve.outlines], colour, dash, curve.text))
+        marks.append(MEAN)
         if self.aim:
             x, y = view.turned(np.array([self.aim[1]]))[0].tolist()
             marks.append(nominal_ring((x, y), INK, self.aim[0]))
         height = 60.0 + 720.0 * self._flatness() if view.equal else 380.0
-        return Plot(tuple(marks), Axis(view.x_label), Axis(view.y_label), height=height, equal=view.equal)
+        plot = Plot(tuple(marks), Axis(view.x_label), Axis(view.y_label), height=height, equal=view.equal)
+        return plot if not (view.equal and self.coasts) else _over(self.coasts, plot)
+
+    def _wider(self) -> Plot:
+        """Where the footprint lies, when its own map shows no coast."""
+        x, y = (Axis(label, reach=(-reach, reach)) for label, reach in
+                ((EAST, WIDE * self.around_reach), (NORTH, self.around_reach)))  # fmt: skip
+        return _over(self.around, Plot((MEAN,), x, y, "The surroundings", 300.0, True))
 
     @property
     def places(self) -> dict[str, tuple[str, np.ndarray, np.ndarray]]:
@@ -106,6 +124,14 @@ class FootprintDrawing(Drawing):
         outlines = [outline for curve in self.curves for outline in curve.outlines]
         spans = np.ptp(np.concatenate([self.points, *outlines]), axis=0)
         return float(np.clip(spans[1] / max(spans[0], 1e-9), 0.25, 0.75))
+
+
+def _over(coasts: tuple[np.ndarray, ...], plot: Plot) -> Plot:
+    """The map over its coasts, which do not make it larger."""
+    line = joined(coasts)
+    coast = Line(line[:, 0], line[:, 1], MUTED, COAST, width=1.2, text=COAST, key=COAST)
+    x, y = (replace(axis, reach=ends) for axis, ends in zip((plot.x, plot.y), plot.ends, strict=True))
+    return replace(plot, marks=(coast, *plot.marks), x=x, y=y)
 
 
 @dataclass(frozen=True)

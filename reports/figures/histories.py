@@ -2,16 +2,17 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 
 from reports.figures.marks import Axis, Drawing, Limit, Line, Mark, Plot, between
-from reports.figures.palette import DASHES, INK, LINES, MUTED, SKY, VERMILION
+from reports.figures.palette import BLUE, DASHES, INK, LINES, MUTED, SKY, VERMILION
 from reports.numbers import count, number, percent
 
 SAMPLES = 400  # on the screen and on paper; extremes between them are kept
 OUTER, INNER = 0.25, 0.45  # opacity of the wider and of the narrower band
+MEDIAN = "median"
+FAR = 3.0  # times the range of a panel: a limit farther away is told, not drawn
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,8 @@ def back_to_front(lines: Sequence[HistoryLine]) -> list[HistoryLine]:
 
 
 def band_name(low: float, high: float, n_cases: int) -> str:
-    return f"{percent(low)} to {percent(high)} of {count(n_cases)} cases"
+    reach = "smallest to largest" if low == 0.0 else f"{percent(low, 3)} to {percent(high, 3)}"
+    return f"{reach} of {count(n_cases)} saved cases"
 
 
 def case_lines(
@@ -100,15 +102,16 @@ def case_lines(
 class Histories(Drawing):
     """Lines of retained cases; labels : axis label per quantity, in the order of the panels; bands by quantity.
 
-    limits : required limits of a quantity, by its name.
+    limits : of a quantity by its name: required limits with their words.
     """
 
     lines: tuple[HistoryLine, ...]
     labels: dict[str, str]
     bands: dict[str, HistoryBand] = field(default_factory=dict)
-    limits: dict[str, tuple[float, ...]] = field(default_factory=dict)
-    across: ClassVar[int] = 3
-    form: ClassVar[str] = "Curves against time, the nominal case among them"
+    limits: dict[str, tuple[tuple[float, str], ...]] = field(default_factory=dict)
+    time: str = "time [s]"
+    across = 3
+    form = "Curves against time, the nominal case among them"
 
     @property
     def plots(self) -> tuple[Plot, ...]:
@@ -116,15 +119,21 @@ class Histories(Drawing):
 
     def _plot(self, name: str, label: str) -> Plot:
         marks: list[Mark] = []
-        for band in [self.bands[name]] if name in self.bands else []:
+        band = self.bands.get(name)
+        if band is not None:
             for low, high, opacity in band.pairs:
-                name_of_band = band_name(low, high, band.n_cases)
-                marks.append(
-                    between(band.t, band.curves[low], band.curves[high], SKY, opacity, name_of_band, name_of_band)
-                )
+                said = band_name(low, high, band.n_cases)
+                marks.append(between(band.t, band.curves[low], band.curves[high], SKY, opacity, said, said))
+            said = f"{MEDIAN} of them"
+            marks.append(Line(band.t, band.curves[0.5], BLUE, said, "dash", 1.6, key=said))
         marks += case_lines(self.lines, lambda line: thinned(line.t, line.quantities[name]))
-        marks += [
-            Limit(at, "y", VERMILION, f"required limit {number(at)}", key="required limit")
-            for at in self.limits.get(name, ())
-        ]
-        return Plot(tuple(marks), Axis("time [s]", margin=0.0), Axis(name=label, most=5), label, 260.0)
+        ends = Plot(tuple(marks), Axis(), Axis()).ends[1]
+        room = FAR * (ends[1] - ends[0])
+        far = []
+        for at, said in self.limits.get(name, ()):
+            near = ends[0] - room <= at <= ends[1] + room
+            marks.append(Limit(at, "y", VERMILION, said, "solid", 2.0, near, key="required limit" if near else ""))
+            far += [] if near else [f"limit {number(at)} beyond the axis"]
+        return Plot(
+            tuple(marks), Axis(self.time, margin=0.0), Axis(name=label, most=5), "\n".join([label, *far]), 260.0
+        )

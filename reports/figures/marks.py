@@ -7,8 +7,9 @@ scales them.  Colours with an @ are the page's own.  A mark's `key` is its text 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,8 @@ class Points:
 
     name : of them all.  texts : of each of them, in place of its coordinates.  x_ends, y_ends : ends of intervals.
     cases : their case numbers, so that a reader can choose them; columns : names of the columns of cases that x and y
-    are, and of one that `texts` tell, so that a page with all cases finds those that are not drawn.
+    are, and of one that `texts` tell, so that a page with all cases finds those that are not drawn; of x alone where y
+    is the rank.
     """
 
     x: np.ndarray
@@ -102,6 +104,7 @@ class Bar:
     """Boxes from (left, bottom) to (right, top), each float64[n]; colour : one for all, or one each.
 
     texts : of each box, for the pointer; labels : written in it, in `ink`, one for all or one each.
+    column : of the cases that the boxes count, from left to right.
     """
 
     left: np.ndarray
@@ -114,6 +117,7 @@ class Bar:
     labels: Sequence[str] = ()
     ink: str | Sequence[str] = "@ink"
     key: str = ""
+    column: str = ""
 
 
 @dataclass(frozen=True)
@@ -258,9 +262,16 @@ class Drawing(ABC):
     across : most panels in a row on paper;  form : the kind of the figure, for those who do not see it.
     """
 
-    across: ClassVar[int] = 2
+    across: int = 2
+    form: str = "Figure"
 
-    form: ClassVar[str] = "Figure"
+    def __init_subclass__(cls) -> None:
+        """The panels are made once: the page, the paper, the key and the words ask for them."""
+        super().__init_subclass__()
+        if isinstance(own := cls.__dict__.get("plots"), property) and own.fget is not None:
+            made_once = cached_property(own.fget)
+            made_once.__set_name__(cls, "plots")
+            cls.plots = made_once  # type: ignore[assignment,method-assign]
 
     @property
     def key(self) -> tuple[Key, ...]:
@@ -283,6 +294,24 @@ class Drawing(ABC):
     @abstractmethod
     def plots(self) -> tuple[Plot, ...]:
         """The panels in reading order."""
+
+
+@dataclass(frozen=True)
+class Panels(Drawing):
+    """A figure of panels that were made where its numbers are.  words : all of it; without them, what marks reach."""
+
+    made: tuple[Plot, ...]
+    words: str = ""
+    across: int = 2
+    form: str = "Figure"
+
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        return self.made
+
+    @property
+    def alternative(self) -> str:
+        return self.words or super().alternative
 
 
 def _entry(mark: Mark) -> Key:

@@ -10,7 +10,7 @@ INK, MUTED, GRID, PAPER = "@ink", "@muted", "@grid", "@paper"
 # What the page colours are on paper.
 ON_PAPER = {INK: "#1b1f23", MUTED: "#6c757d", GRID: "#dfe3e6", PAPER: "#ffffff"}
 
-LINES = (VERMILION, BLUE, GREEN, ORANGE, PURPLE, SKY)
+LINES = (ORANGE, PURPLE, GREEN, SKY, BLUE, VERMILION)  # of cases; the last ones also stand for medians and limits
 DASHES = ("solid", "dash", "dot")
 KEY_MARK = {"solid": "line", "dash": "dash", "dot": "dot"}  # of a line in a figure's key, by its dash
 CIVIDIS = ("#00224e", "#003170", "#2a3f6d", "#434e6c", "#575d6d", "#6a6c71", "#7d7c78", "#918b78", "#a59c74",
@@ -28,3 +28,9 @@ def field_colour(part: float) -> str:
     low = min(int(place), len(CIVIDIS) - 2)
     ends = [[int(colour[k : k + 2], 16) for k in (1, 3, 5)] for colour in CIVIDIS[low : low + 2]]
     return "#" + "".join(f"{round(a + (place - low) * (b - a)):02x}" for a, b in zip(*ends, strict=True))
+
+
+def blended(colour: str, part: float) -> str:
+    """From nearly white at 0 to the colour at 1."""
+    ends = [(247, int(colour[k : k + 2], 16)) for k in (1, 3, 5)]
+    return "#" + "".join(f"{round(a + min(part, 1.0) * (b - a)):02x}" for a, b in ends)

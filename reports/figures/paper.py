@@ -169,7 +169,7 @@ class _Box:
 
     @property
     def head(self) -> float:
-        power = LINE if self.y_ticks.power and not self.title else 0.0
+        power = LINE if self.y_ticks.power else 0.0
         return 3.0 + LINE * len(self.title) + power + (self.tick_room if self.plot.x.top else 0.0)
 
     @property
@@ -219,13 +219,16 @@ class _Box:
                 yield lettering.text(frame.left - 3.0, y, line, anchor="end")
         yield from self._x_ticks(frame)
         if self.y_ticks.power:
-            yield lettering.text(frame.left + 1.0, frame.top + (6.0 if self.title else -2.0), self.y_ticks.power)
+            yield lettering.text(frame.left + 1.0, frame.top - 2.0, self.y_ticks.power)
         middle = 0.5 * (frame.top + frame.bottom)
         for k, line in enumerate(self.y_label):
             yield lettering.text(self.left + 7.0 + LINE * k, middle, line, anchor="middle", turned=True)
         below = frame.bottom + (0.0 if self.plot.x.top else self.tick_room)
+        taken = lettering.width(self.x_ticks.power, TYPE) + 3.0 if self.x_ticks.power else 0.0
         for k, line in enumerate(self.x_label):
-            yield lettering.text(0.5 * (frame.left + frame.right), below + LINE * (k + 1) - 2.4, line, anchor="middle")
+            farthest = frame.right - taken - 0.5 * lettering.width(line, TYPE)
+            x = min(0.5 * (frame.left + frame.right), farthest)
+            yield lettering.text(x, below + LINE * (k + 1) - 2.4, line, anchor="middle")
         if self.x_ticks.power:
             yield lettering.text(frame.right, below + LINE - 2.4, self.x_ticks.power, anchor="end")
 

@@ -1,7 +1,6 @@
 """One quantity of the flight against another, as altitude against speed, with percentile bands."""
 
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -42,7 +41,7 @@ class ProfileDrawing(Drawing):
     y_label: str
     band: ProfileBand | None = None
     second: ProfileBand | None = None  # of the way down after the way up
-    form: ClassVar[str] = "Curves along flights, the nominal case among them"
+    form = "Curves along flights, the nominal case among them"
 
     @property
     def bands(self) -> list[ProfileBand]:

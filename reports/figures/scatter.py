@@ -1,7 +1,6 @@
 """One column against another, a point a case, marked by how the case came out."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -46,7 +45,7 @@ class ScatterDrawing(Drawing):
     outcomes: tuple[tuple[str, int], ...]
     regions: tuple[CloudRegion, ...] = ()
     columns: tuple[str, str] | None = None
-    form: ClassVar[str] = "Scatter of cases"
+    form = "Scatter of cases"
 
     @property
     def styled(self) -> list[tuple[CloudRegion, str, str]]:

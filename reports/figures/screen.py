@@ -23,6 +23,8 @@ FEW = 24  # numbers that are written as such
 NEAR = 100.0  # a float32 keeps enough digits of numbers up to so many times their spread
 TITLE_LINE = 17  # pixels
 WRAP = 32  # characters of a title
+FRAME = 56  # pixels above and below the rows of a panel that has rows
+BINS = "bins"  # the mark of bars that count cases
 CASES = "cases"  # the mark of a cloud whose points are cases, with their numbers as its customdata
 
 
@@ -173,7 +175,10 @@ def _bar(mark: Bar, plot: Plot) -> Iterator[dict[str, Any]]:
         "marker": {"color": mark.colour, "opacity": mark.opacity, "line": {"width": 0}},
         **({"customdata": [plain(text) for text in mark.texts]} if len(mark.texts) else {}),
         **({"text": list(mark.labels), "textposition": "inside", "insidetextanchor": "middle", "textangle": 0,
+            "constraintext": "none",
             "insidetextfont": {"color": mark.ink}} if len(mark.labels) else {"textposition": "none"}),
+        **({"meta": BINS, "columns": [mark.column], "edges": rounded(np.append(mark.left, mark.right[-1:]), 12)}
+           if mark.column else {}),
         "hovertemplate": "%{customdata}<extra></extra>" if len(mark.texts) else _pointed(plot),
     }  # fmt: skip
 
@@ -225,12 +230,12 @@ def _axis(axis: Axis, ends: tuple[float, float], **more: Any) -> dict[str, Any]:
 
 def _layout(plot: Plot) -> dict[str, Any]:
     x_ends, y_ends = plot.ends
-    cases = any(isinstance(mark, Points) and mark.cases is not None for mark in plot.marks)
+    cases = any(getattr(mark, "cases", None) is not None or getattr(mark, "column", "") for mark in plot.marks)
     equal = {"scaleanchor": "x", "scaleratio": 1} if plot.equal else {}
     title = _title(plot.title)
     lines = title["text"].count("<br>") if title else -1
     return {
-        "height": round(plot.height + TITLE_LINE * max(lines, 0)),
+        "height": round(plot.height + TITLE_LINE * max(lines, 0) + (FRAME if plot.y.ticks else 0)),
         "margin": {"l": 50, "r": 14, "t": TITLE_LINE * (lines + 1) + 17 if title else 12, "b": 44, "pad": 0},
         "font": {"family": "inherit", "size": 12, "color": INK},
         "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",

@@ -118,10 +118,30 @@ const reportCases = (function () {
     }
   }
 
+  // How the chosen cases spread over the bins of a histogram, as high as its tallest bar.
+  function chosenBars(bins, ids) {
+    const values = columns.get(bins.columns[0]).values, edges = bins.edges, many = edges.length - 1;
+    const counts = new Array(many).fill(0);
+    for (const id of ids) {
+      const value = place.has(id) ? values[place.get(id)] : NaN;
+      const rounding = 1e-6 * (edges[many] - edges[0]); // of numbers of four bytes
+      if (!(value >= edges[0] - rounding && value <= edges[many] + rounding)) continue;
+      let low = 0, high = many; // edges[low] <= value, and value < edges[high] but at the end
+      while (high - low > 1) { const half = (low + high) >> 1; if (edges[half] <= value) low = half; else high = half; }
+      counts[low] += 1;
+    }
+    const tallest = Math.max(...reportFigures.numbers(bins.y)), most = Math.max(1, ...counts);
+    return { ...bins, meta: "chosen", y: counts.map((count) => (count * tallest) / most), base: 0,
+      marker: { color: "#D55E00", opacity: 0.75, line: { width: 0 } },
+      customdata: counts.map((count, k) => `${shown(edges[k])} to ${shown(edges[k + 1])}: ${grouped(count)} of the chosen cases`) };
+  }
+
   function lift(ids) {
     choices += 1;
     for (const figure of clouds) {
-      for (const trace of figure.data) {
+      figure.data = figure.data.filter((trace) => trace.meta !== "chosen");
+      for (const trace of [...figure.data]) {
+        if (trace.meta === "bins" && ids && columns.has(trace.columns[0])) figure.data.push(chosenBars(trace, ids));
         if (trace.meta !== "cases") continue;
         delete trace.selectedpoints;
         if (!ids) continue;
@@ -163,13 +183,25 @@ const reportCases = (function () {
   // All cases of the page in the box or lasso, those among them that the figure does not draw.
   function caught(figure, event) {
     const within = inside(event), found = new Set();
+    const between = (name, low, high) => { // of figures with one column of the cases along x
+      const values = columns.has(name) ? columns.get(name).values : [];
+      for (const row of all) if (values[row] >= low && values[row] <= high) found.add(data.ids[row]);
+    };
     for (const trace of figure.data) {
+      if (trace.meta === "bins") {
+        const ends = event.range ? event.range.x : event.lassoPoints.x;
+        between(trace.columns[0], Math.min(...ends), Math.max(...ends));
+      }
       if (trace.meta !== "cases") continue;
-      if (trace.columns && trace.columns.every((name) => columns.has(name))) {
+      if (trace.columns && trace.columns.length === 1 && columns.has(trace.columns[0])) {
+        const [xs, ys] = [trace.x, trace.y].map(reportFigures.numbers), caughtHere = Array.from(xs).filter((x, k) => within(x, ys[k]));
+        if (caughtHere.length) between(trace.columns[0], Math.min(...caughtHere), Math.max(...caughtHere));
+      } else if (trace.columns && trace.columns.every((name) => columns.has(name))) {
         const [x, y] = trace.columns.map((name) => columns.get(name).values);
         for (const row of all) if (within(x[row], y[row])) found.add(data.ids[row]);
       } else {
-        trace.customdata.forEach((id, k) => within(trace.x[k], trace.y[k]) && found.add(id));
+        const [xs, ys] = [trace.x, trace.y].map(reportFigures.numbers);
+        trace.customdata.forEach((id, k) => within(xs[k], ys[k]) && found.add(id));
       }
     }
     return found;

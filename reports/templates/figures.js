@@ -35,7 +35,7 @@ const reportFigures = (function () {
     return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, coloured(item, key)]));
   }
 
-  const hasCases = (figure) => figure.data.some((trace) => trace.meta === "cases");
+  const hasCases = (figure) => figure.data.some((trace) => trace.meta === "cases" || trace.meta === "bins");
 
   // A figure's cases can be chosen with a box or a lasso; all others only zoom.
   function draw(figure) {

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 
 from mc_engine import dispatch, durable_file, parts, store
+from mc_engine.chunks import Lost, Order
 from mc_engine.writer_lock import WriterLock
 
 
@@ -25,16 +26,17 @@ def line_before_part(patch):
 
 def dead_worker_forgotten(patch):
     """Nobody flies again what a dead worker was flying."""
-    patch(dispatch.Dispatch, "_mourn", lambda self, landing: None)
+    patch(dispatch.Dispatch, "_on_worker_death", lambda self, landing: None)
 
 
 def suspects_given_up(patch):
     """All cases that were in flight when a worker died are blamed for its death."""
 
-    def suspect(self, order, cases, fate):
-        self._waiting.append(order.without([replace(fate, case_id=int(case)) for case in cases], None))
+    def without_all(self, cases):
+        lost = tuple(Lost(int(case), "worker-died", dispatch.DIED) for case in cases)
+        return replace(self, suspected=True, lost=(*self.lost, *lost))
 
-    patch(dispatch.Dispatch, "_suspect", suspect)
+    patch(Order, "suspecting", without_all)
 
 
 def disk_unheard(patch):

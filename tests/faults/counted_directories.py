@@ -37,7 +37,7 @@ def a_run(folder):
     """A run of sixty cases with a table of its own beside the campaign, two replays and reports."""
     store = runner.run(trapped(folder / "campaign", 60), folder / "run", workers=2, chunk=20)
     for case in (3, 17):
-        write_replay(store, case, runner.replay(store.path, case).history)
+        write_replay(store, case, runner.replay(store.path, case).history, b"a picture")
     return reported(store.path)
 
 

@@ -195,14 +195,21 @@ class OneProcess(Crew):
         flying = self.under_way[:1] if self._unbegun else self.under_way
         dies = any(self._killers & set(order.flown().tolist()) for order in flying)
         for order in flying if dies else ():
-            cases = order.flown()
             if order.suspected:
-                (self._folder / "cases" / f".in_flight-{cases[0]}-{cases[-1]}.tmp").touch()
+                first, last = self._in_flight(order)
+                (self._folder / "cases" / f".in_flight-{first}-{last}.tmp").touch()
         fallen = self.under_way if dies else self.under_way[:1]
         for order in fallen:
-            written = None if order.probe else Written(Part("", order.first, order.stop - order.first, 0, "", {}), "")
+            written = Written(Part("", order.first, order.stop - order.first, 0, "", {}), "")
             self._landed.put(Landing(order, died=True) if dies else Landing(order, written))
         self.under_way = [order for order in self.under_way if order not in fallen]
+
+    def _in_flight(self, order):
+        """First and last case of what is flown at a time when a killer is among it, or at first."""
+        cases = order.flown().tolist()
+        pieces = [[case] for case in cases[: len(order.alone)]] + [cases[len(order.alone) :]]
+        piece = next((piece for piece in pieces if self._killers & set(piece)), pieces[0])
+        return min(piece), max(piece)
 
     def close(self, at_once):
         pass

@@ -135,7 +135,7 @@ ELSEWHERE = {
     "mc_engine/durable_file.py": "the one place",
     "mc_engine/kernel.py": "the cache of compiled kernels",
     "mc_engine/object_store.py": "scratch folders beside a fetched copy",
-    "mc_engine/user_streams.py": "the null device",
+    "mc_engine/text.py": "the null device",
     "mc_engine/verbs_before_flight.py": "init makes a folder that the user named",
     "mc_engine/documentation/website.py": "the site of the documentation",
     "mc_engine/unforeseen.py": "the log of an error, in the folder of temporary files",

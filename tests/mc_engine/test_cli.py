@@ -272,7 +272,7 @@ def test_extend_takes_the_new_number_of_cases(here, calls):
     assert result.exit_code == 0
     assert calls.runner == [("extend", "flown", 60)]
     assert "40 of 60 cases" in result.stdout
-    fails_with(2, call("extend", "flown", "--cases", 60), "--cases 60: flown has 60 cases")
+    fails_with(2, call("extend", "flown", "--cases", 60), "flown: has 60 cases; give the number it is to have in all")
 
 
 def test_a_design_that_cannot_grow_is_a_usage_error(here, calls):

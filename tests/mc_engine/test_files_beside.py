@@ -8,9 +8,10 @@ import pytest
 from small_run import ENVIRONMENT
 
 from mc_engine.campaign import SHIPPED, load_campaign
-from mc_engine.errors import CampaignError
+from mc_engine.errors import CampaignError, StoreError
 from mc_engine.flown_campaign import companions_of
 from mc_engine.kernel import source_digest
+from mc_engine.model import load_model
 from mc_engine.runner import extend, replay, run
 from mc_engine.store import open_store
 
@@ -40,10 +41,15 @@ def campaign_in(folder, files, imports, model="model.py"):
     return folder
 
 
-def flown(folder, *words):
+def said(folder, *words):
     """What the command line says in a process of its own."""
     command = [sys.executable, "-m", "mc_engine", *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, env=ENVIRONMENT, cwd=folder)
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=ENVIRONMENT, cwd=folder)
+
+
+def flown(folder, *words):
+    """The same, of a command that succeeds."""
+    done = said(folder, *words)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -113,26 +119,35 @@ AERO = """import numpy as np
 from pathlib import Path
 
 FACTORS = np.loadtxt(Path(__file__).with_name("factors.csv"), delimiter=",")
-
+MU = float(FACTORS[0])
+"""
+LATER = """
 
 def tables(o):
     return np.loadtxt(Path(__file__).parent / "data" / "table.csv", delimiter=",", ndmin=1)
 """
 
 
-def test_data_that_a_model_reads_goes_with_the_run_and_counts_as_its_source(tmp_path, monkeypatch):
-    model = MODEL.replace("State = namedtuple", AERO + "\nMU = float(FACTORS[0])\nState = namedtuple", 1)
-    model = model.replace(PULL, "g = -MU * look_up(o.tables, 0.0) / (r2 * sqrt(r2))").replace(
-        "cos, physics", "cos, look_up, physics"
-    )
-    model = model.replace("    initial=initial,", "    initial=initial,\n    tables=tables,")
-    folder = tmp_path / "mine"
-    (folder / "data").mkdir(parents=True)
-    (folder / "model.py").write_text(model)
-    (folder / "campaign.toml").write_text(CAMPAIGN)
-    (folder / "factors.csv").write_text("3.986004418e14,0.0\n")
-    (folder / "data" / "table.csv").write_text("1.0\n")
-    (folder / "thesis.csv").write_text("2.0\n")
+def model_with_data(declared='("factors.csv",)', first=AERO, later=""):
+    """The minimal model with a number from a file; declared : the argument `data`.  later : text with `tables`."""
+    text = MODEL.replace("State = namedtuple", f"{first}{later}\nState = namedtuple", 1)
+    text = text.replace(PULL, "g = -MU / (r2 * sqrt(r2))")
+    arguments = f"    data={declared},\n" + ("    tables=tables,\n" if later else "")
+    return text.replace("    initial=initial,\n", f"    initial=initial,\n{arguments}")
+
+
+def put(folder, files):
+    """Write a campaign with its files.  files : name -> text."""
+    for name, text in {"campaign.toml": CAMPAIGN, "factors.csv": "3.986004418e14,0.0\n", **files}.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text)
+    return folder
+
+
+def test_declared_data_goes_with_the_run_and_counts_as_the_models_source(tmp_path):
+    model = model_with_data('("factors.csv", "data/table.csv")', later=LATER)
+    folder = put(tmp_path / "mine", {"model.py": model, "data/table.csv": "1.0\n", "thesis.csv": "2.0\n"})
+    flown(tmp_path, "check", folder)
     flown(tmp_path, "run", folder, "--cases", 16, "--no-report", "--out", "first")
     assert {path.name for path in (tmp_path / "first").rglob("*.csv")} == {"factors.csv", "table.csv"}
     (folder / "factors.csv").write_text("3.9e14,0.0\n")
@@ -140,12 +155,13 @@ def test_data_that_a_model_reads_goes_with_the_run_and_counts_as_its_source(tmp_
     flown(tmp_path, "run", folder, "--cases", 16, "--no-report", "--out", "edited")
     first, edited = (next((tmp_path / run / "cases").iterdir()).read_bytes() for run in ("first", "edited"))
     assert first != edited
+    (tmp_path / "first" / "factors.csv").write_text("3.9e14,0.0\n")
+    with pytest.raises(StoreError, match=r"factors.csv"):
+        extend(tmp_path / "first", 32)
 
 
 def test_an_edited_table_of_numbers_is_read_again_in_the_same_process(tmp_path):
-    model = MODEL.replace("State = namedtuple", AERO + "\nMU = float(FACTORS[0])\nState = namedtuple", 1)
-    (tmp_path / "model.py").write_text(model.replace(PULL, "g = -MU / (r2 * sqrt(r2))"))
-    (tmp_path / "campaign.toml").write_text(CAMPAIGN)
+    put(tmp_path, {"model.py": model_with_data()})
     digests = set()
     for number in ("3.986004418e14", "3.9e14", "3.986004418e14"):
         (tmp_path / "factors.csv").write_text(f"{number},0.0\n")
@@ -155,19 +171,70 @@ def test_an_edited_table_of_numbers_is_read_again_in_the_same_process(tmp_path):
     assert len(digests) == 2
 
 
-def test_what_another_model_of_the_folder_reads_is_no_source_of_this_one(tmp_path):
-    one = MODEL.replace("State = namedtuple", AERO + "\nMU = float(FACTORS[0])\nState = namedtuple", 1)
-    for name, text in {"a.csv": "3.9e14,0.0\n", "b.csv": "3.8e14,0.0\n"}.items():
-        (tmp_path / name).write_text(text)
+def test_data_of_another_model_of_the_folder_is_no_source_of_this_one(tmp_path):
     for name in ("a", "b"):
-        model = one.replace("factors.csv", f"{name}.csv").replace(PULL, "g = -MU / (r2 * sqrt(r2))")
-        (tmp_path / f"model_{name}.py").write_text(model)
+        model = model_with_data().replace("factors.csv", f"{name}.csv")
+        put(tmp_path, {f"model_{name}.py": model, f"{name}.csv": "3.9e14,0.0\n"})
         (tmp_path / f"{name}.toml").write_text(CAMPAIGN.replace("model.py", f"model_{name}.py"))
     read = {}
     for name in ("a", "b"):
-        campaign = load_campaign(tmp_path / f"{name}.toml")
-        read[name] = [path.name for path in campaign.model.sources.late]
+        read[name] = [path.name for path in load_campaign(tmp_path / f"{name}.toml").model.sources.data]
     assert read == {"a": ["a.csv"], "b": ["b.csv"]}
+
+
+CHANGING = f"{AERO}\nPath(__file__).with_name('factors.csv').write_text('3.9e14,0.0')\n"
+MISTAKES = {
+    "missing": ({"model.py": model_with_data().replace("factors.csv", "aero.csv")},
+                r'model.py, line \d+: there is no file "aero.csv"; .*Model\(data=\("aero.csv",\)\)'),
+    "missing and not read": ({"model.py": model_with_data('("aero.csv",)')},
+                             'data: there is no file "aero.csv" beside the model'),
+    "outside": ({"model.py": model_with_data('("../factors.csv",)'), "../factors.csv": ""},
+                'data: "../factors.csv" lies outside the folder of the model'),
+    "computed": ({"model.py": model_with_data("NAMES", f"{AERO}\nNAMES = ('factors.csv',)")},
+                 r'data: write "factors.csv" into the call itself'),
+    "a text": ({"model.py": model_with_data('"factors.csv"')}, r"`data`; it must be a tuple"),
+    "changing": ({"model.py": model_with_data(first=CHANGING)},
+                 r'"factors.csv" was changed while the model was loaded'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_wrong_data_is_refused_with_a_sentence(mistake, tmp_path):
+    files, sentence = MISTAKES[mistake]
+    with pytest.raises(CampaignError, match=sentence):
+        load_campaign(put(tmp_path / "mine", files))
+
+
+@pytest.mark.parametrize("later", ["", LATER])
+def test_a_file_that_is_read_and_not_declared_is_named_before_anything_flies(later, tmp_path):
+    model = model_with_data('("factors.csv",)' if later else "()", later=later)
+    folder = put(tmp_path / "mine", {"model.py": model, "data/table.csv": "1.0\n"})
+    for command in (["check", folder], ["run", folder, "--out", tmp_path / "run"]):
+        done = said(tmp_path, *command)
+        assert done.returncode == 2
+        assert ("table.csv" if later else "factors.csv") in done.stderr
+        assert "a run keeps copies of the model's sources and of the files in Model(data=...)" in done.stderr
+        assert str(tmp_path) not in done.stderr
+        assert not (tmp_path / "run").exists()
+
+
+def test_data_of_an_installed_model_count_as_its_source(tmp_path, monkeypatch):
+    put(tmp_path / "pkg_data", {"model.py": model_with_data()})
+    put(tmp_path, {"campaign.toml": CAMPAIGN.replace("model.py", "pkg_data.model")})
+    monkeypatch.syspath_prepend(tmp_path)
+    digests = set()
+    for number in ("3.986004418e14", "3.9e14"):
+        (tmp_path / "pkg_data" / "factors.csv").write_text(f"{number},0.0\n")
+        sys.modules.pop("pkg_data.model", None)
+        model = load_campaign(tmp_path / "campaign.toml").model
+        assert model.rhs.function.__globals__["MU"] == float(number)
+        digests.add(source_digest(model, None))
+    assert len(digests) == 2
+
+
+def test_all_programs_that_are_kept_for_the_injection_are_declared():
+    kept = {f"programs/{path.name}" for path in (SHIPPED / "geo_injection" / "programs").glob("*")}
+    assert set(load_model("campaigns.geo_injection").data) == kept
 
 
 def test_folders_of_a_model_cannot_have_the_names_of_those_of_a_run(tmp_path):

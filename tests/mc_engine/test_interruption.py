@@ -10,7 +10,8 @@ import pytest
 from cart import small_store
 from small_run import ENVIRONMENT
 
-from mc_engine.interruption import BUSY, LANDING, NOTHING_BEGUN, ONCE_MORE
+from mc_engine import load_campaign, runner
+from mc_engine.interruption import LANDING, NOTHING_BEGUN, ONCE_MORE
 from mc_engine.next_step import after_flight, after_search, is_complete
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
@@ -41,7 +42,7 @@ sys.argv = ["mc-engine", *{arguments!r}]
 main()
 """
 CAMPAIGN, REPORTS = "mc_engine.campaign.load_campaign", "reports.write_reports"
-NOMINAL = "mc_engine.sessions.fly_nominal"
+KERNEL = "mc_engine.flight._bound_kernel"
 
 
 def command(place, body, *arguments, by="SIGTERM", then=""):
@@ -99,25 +100,26 @@ def test_a_signal_to_a_verb_that_keeps_nothing_says_to_give_it_again():
     assert ended(CAMPAIGN, "send()", "check", "minimal") == (4, ONCE_MORE)
 
 
-@pytest.mark.parametrize("pauses_s", [(0.5, 1.0), (0.5, 0.2, 0.2, 0.2)])
-def test_two_signals_end_what_python_cannot_interrupt_while_it_flies(tmp_path, pauses_s):
+def test_two_signals_end_a_kernel_that_python_cannot_interrupt(tmp_path):
     run = tmp_path / "run"
-    done = command(NOMINAL, f"work{pauses_s}", "run", "minimal", "--out", run)
+    done = command(KERNEL, "return lambda: work(0.5, 1.0)", "run", "minimal", "--out", run)
     rest = f"interrupted; what was committed is safe, `mc-engine resume {run}` flies the rest"
     assert done.returncode == 4
     assert done.stderr.splitlines()[-2:] == [LANDING, rest]
 
 
-def test_two_signals_end_what_python_cannot_interrupt_at_other_times():
-    done = command(CAMPAIGN, "work(0.5, 1.0)", "check", "minimal")
-    assert (done.returncode, done.stderr.splitlines()) == (4, [BUSY, ONCE_MORE])
+def test_one_signal_ends_a_kernel_of_a_command_that_keeps_nothing(tmp_path):
+    runner.run(load_campaign("minimal", cases=8), tmp_path / "flown")
+    done = command(KERNEL, "return lambda: work(0.5)", "replay", tmp_path / "flown", 3)
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (4, ONCE_MORE)
 
 
 def test_a_signal_that_is_sent_twice_at_once_is_one(tmp_path):
     """As by `timeout`, to the process and to its group: what flies still lands."""
-    body = "\n    ".join(["work(0.2, 0.0, rounds=4_000_000)", "return original(*arguments)"])
+    flight = "original(*arguments, **options)"
+    body = f"return lambda: (work(0.2, 0.0, rounds=4_000_000), {flight}())[1]"
     run = tmp_path / "run"
-    status, said = ended(NOMINAL, body, "run", "minimal", "--cases", 20, "--out", run)
+    status, said = ended(KERNEL, body, "run", "minimal", "--cases", 20, "--out", run)
     assert (status, said) == (4, f"interrupted with 0 of 20 cases; `mc-engine resume {run}` flies the rest")
     assert (run / "nominal.parquet").exists()
 

@@ -79,7 +79,7 @@ def test_check_names_the_line_of_a_mach_number_that_no_slow_rocket_has(tmp_path)
     campaign = rocket(tmp_path, *BY_TABLE, (DRAG, BY_MACH.format(slowest=200.0)))
     line = line_of(tmp_path, "    mach = ")
     assert only(breaches(campaign)).startswith(
-        f"model.py, line {line}: mach = sqrt(speed - 200.0) / 340.0: the square root of -176.3"
+        f"model.py, line {line}: `mach = sqrt(speed - 200.0) / 340.0`: the square root of -176.3"
     )
 
 
@@ -89,7 +89,7 @@ def test_check_and_replay_name_the_line_of_a_number_that_is_lost_in_flight(tmp_p
     campaign = rocket(model, *BY_TABLE, (DRAG, BY_MACH.format(slowest=slowest)), SHORT)
     assert breaches(campaign) == []
     sentence = (
-        f"model.py, line {line_of(model, '    mach = ')}: mach = sqrt(speed - {slowest}) / 340.0: the square root of -"
+        f"model.py, line {line_of(model, '    mach = ')}: `mach = sqrt(speed - {slowest}) / 340.0`: the square root"
     )
     found = only(faults(campaign))
     assert found.startswith(sentence)
@@ -119,7 +119,7 @@ LOST = {
         [("from figures import", "from guidance import lag\nfrom figures import"),
          ("    turn = force", "    swivel = swivel + lag(t)\n    turn = force")],
         "    swivel = swivel + lag(t)",
-        "guidance.py, line 6: return 0.1 * log(1.0 - t): the logarithm of",
+        "guidance.py, line 6: `return 0.1 * log(1.0 - t)`: the logarithm of",
     ),
     "in the engine's physics": (
         [(PUSH, f"{PUSH}    force = force + 0.0 * sutton_graves(1.0 - t, 9.0, 1.0)\n"),
@@ -131,7 +131,7 @@ LOST = {
         [("import cos, exp", "import cos, exp, floor"),
          (PUSH, "    lever = floor(t) - 1.0\n    force = m.burning / lever\n")],
         "    force = m.burning / lever",
-        "force = m.burning / lever: 1 / 0 is infinite (t = ",
+        "`force = m.burning / lever`: 1 / 0 is infinite (t = ",
     ),
     "in the control, and used later": (
         [(HELD, f"    nozzle = nozzle + acos(1.5 * t)\n{HELD}"),
@@ -181,7 +181,7 @@ def test_a_metric_that_evaluate_loses_is_named_though_the_case_is_ok(tmp_path):
     campaign = campaign_with(tmp_path / "minimal", ("t, best.speed)", "t, sqrt(-best.speed))"))
     found = runner.replay(runner.run(replace(campaign, cases=3), tmp_path / "run").path, 2).lost
     line = line_of(tmp_path / "minimal", "    return Metrics(")
-    assert found.startswith(f'"top_speed_m_s": model.py, line {line}: return Metrics(')
+    assert found.startswith(f'"top_speed_m_s": model.py, line {line}: `return Metrics(')
     assert "the square root of -" in found
 
 

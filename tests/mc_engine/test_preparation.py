@@ -26,25 +26,27 @@ def campaign(folder, line):
     )
 
 
-ATTRIBUTES = "inputs and settings are attributes, as in inputs.altitude; vars(inputs) is a dictionary of them all"
-REFUSE = 'cases are refused by refusals.add(mask, "why they cannot start")'
+USE = (
+    "`inputs` and `settings` have attributes in SI, without unit, such as inputs.altitude, and vars(inputs) is a "
+    "dictionary of them; each holds the numbers of many cases: use NumPy, np.where(condition, a, b), & and |; "
+    'cases are refused by refusals.add(mask, "why")'
+)
 
 
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        ('r = inputs["altitude"]', ATTRIBUTES),
-        ('inputs["altitude"] = 1.0', ATTRIBUTES),
-        ("more = {**inputs}", ATTRIBUTES),
-        ("r = inputs.altitud", 'there is no "altitud" here; did you mean "altitude"?'),
-        ("r = inputs.altitude_km", 'there is no "altitude_km" here; it is inputs.altitude, without its unit and in SI'),
-        ("r = inputs.limit", 'there is no "limit" here; it is settings.limit'),
-        ("r = settings.altitude", 'there is no "altitude" here; it is inputs.altitude'),
-        ('r = vars(inputs)["burn_dv_m_s"]', 'there is no "burn_dv_m_s" here; it is inputs.burn_dv, without its unit'),
-        ("refusals.append(inputs.altitude < 0.0)", REFUSE),
-        ("refusals.add(inputs.altitude < 0.0)", REFUSE),
-        ("r = 1.0 if inputs.altitude > 0.0 else 2.0", "use np.where(condition, a, b), and & | ~"),
-        ("import math; r = math.sqrt(inputs.altitude)", "take it from NumPy"),
+        ('r = inputs["altitude"]', USE),
+        ('inputs["altitude"] = 1.0', USE),
+        ("more = {**inputs}", USE),
+        ("r = inputs.altitud", f"no attribute 'altitud'; did you mean \"altitude\"?; {USE}"),
+        ("r = inputs.altitude_km", f"no attribute 'altitude_km'; did you mean \"altitude\"?; {USE}"),
+        ("r = settings.altitude", f"no attribute 'altitude'; known is \"limit\"; {USE}"),
+        ('r = vars(inputs)["burn_dv_m_s"]', f"KeyError: 'burn_dv_m_s'; {USE}"),
+        ("refusals.append(inputs.altitude < 0.0)", f"no attribute 'append'; {USE}"),
+        ("refusals.add(inputs.altitude < 0.0)", f"missing 1 required positional argument: 'sentence'; {USE}"),
+        ("r = 1.0 if inputs.altitude > 0.0 else 2.0", USE),
+        ("import math; r = math.sqrt(inputs.altitude)", USE),
         ('more["altitude"] = inputs.altitude + 0j', '`prepare` gives "altitude" as complex numbers; it must be a num'),
         ('more["altitude"] = inputs.altitude[:1]', '`prepare` gives "altitude" as shape (1,); it must be a number for'),
         ('more["altitude"] = None', '`prepare` gives "altitude" as NoneType; it must be a number for each of 3 cases'),
@@ -71,7 +73,7 @@ def test_one_number_counts_for_all_cases_and_an_array_has_one_for_each(tmp_path)
 
 
 def test_an_error_of_the_models_own_stays_what_it_is(tmp_path):
-    with pytest.raises(EngineError, match=r"model\.py, line \d+: KeyError: 7"):
+    with pytest.raises(EngineError, match=r"model\.py, line \d+: `prepare`: KeyError: 7"):
         campaign(tmp_path, "{}[7]")
 
 

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -51,7 +52,7 @@ def test_1000_cases_extended_to_2000_are_a_fresh_2000(flown, tmp_path):
 
 def test_a_design_that_cannot_grow_is_not_extended(tmp_path):
     runner.run(load_campaign("deorbit/demonstration"), tmp_path / "run")
-    with pytest.raises(StoreError, match='"grid" cannot be extended; mc, sobol, halton, saltelli, morris can'):
+    with pytest.raises(StoreError, match='"grid" cannot be extended; mc, sobol, saltelli, morris can'):
         runner.extend(tmp_path / "run", 100)
 
 
@@ -204,25 +205,14 @@ def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
         runner.run(load_campaign(tmp_path, cases=100), tmp_path / "run")
 
 
-@pytest.mark.parametrize(
-    ("slip", "sentence"),
-    [
-        (
-            "s.y // 2.0",
-            r"cannot be flown: model.py, line \d+: `//` takes no lanes; write floor\(x / y\)",
-        ),
-        (
-            "s.y**0.5",
-            r"cannot be flown: model.py, line \d+: `\*\*` takes a whole number .*; `mc-engine check` tells more",
-        ),
-    ],
-)
-def test_physics_that_does_not_compile_is_named_with_its_line(tmp_path, slip, sentence):
+@pytest.mark.parametrize("slip", ["s.y // 2.0", "s.y**0.5"])
+def test_physics_that_does_not_compile_is_named_with_its_line(tmp_path, slip):
+    line = rf"cannot be flown: model.py, line 27: `r2 = s.x \* s.x \+ {re.escape(slip)}`: "
     source = (load_campaign("minimal").directory / "model.py").read_text()
     source = source.replace("s.x * s.x + s.y * s.y\n    g", f"s.x * s.x + {slip}\n    g")
     (tmp_path / "model.py").write_text(source)
     (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
-    with pytest.raises(ModelError, match=sentence):
+    with pytest.raises(ModelError, match=f"{line}.*calls of .*floor, pow.*; `mc-engine check` tells more"):
         runner.run(load_campaign(tmp_path), tmp_path / "run")
 
 

@@ -126,8 +126,8 @@ def test_what_an_encoding_lacks_is_written_as_an_escape(encoding):
 def test_a_bar_still_moves_the_cursor_and_what_others_say_beside_it_does_not(tmp_path):
     script = """if True:
         import logging, sys, warnings
-        from mc_engine.user_streams import user_streams
-        with user_streams():
+        from mc_engine.text import clean_streams
+        with clean_streams():
             from mc_engine.progress import Progress
             with Progress() as progress:
                 progress(1, 10, 0)

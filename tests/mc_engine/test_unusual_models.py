@@ -134,3 +134,52 @@ def test_the_unusual_ways_fly(tmp_path):
 
 def test_an_excess_that_no_case_has_is_no_fixed_metric(tmp_path):
     assert faults(campaign_with(tmp_path, *UNUSUAL["an excess that no case has"])) == []
+
+
+# (lines in `rhs`, what stands before it)
+LINES = [
+    ("if MU_EARTH < 0.0:\n        raise ValueError", ""),
+    ('assert MU_EARTH > 0.0, "positive"', ""),
+    ("match LAW:\n        case 2:\n            g = g * 1.0\n        case _:\n            g = 0.0 * g", "LAW = 2"),
+    ("g = (h := g) + 0.0 * h", ""),
+    ("q: float = g * 1.0\n    a = b = q", ""),
+    ("g = g + 0.0 * add(s.x, s.y)", "@physics\ndef add(*v):\n    return v[0] + v[1]"),
+    ("f = lambda q: q * 1.0\n    g = f(g)", ""),
+    ("for c in (1.0, 2.0):\n        g = g + 0.0 * c", ""),
+    ("for c in s:\n        g = g + 0.0 * c", ""),
+    ("for a, b in zip((1.0, 2.0), (s.x, s.y)):\n        g = g + 0.0 * a * b", ""),
+    ("for k, b in enumerate((s.x, s.y)):\n        g = g + 0.0 * k * b", ""),
+    ("for k in range(4):\n        if k % 2 == 0 or k // 2 == 1:\n            g = g + 0.0 * k\n            break", ""),
+    ("g = g + 0.0 * s.x ** 2 + 0.0 * abs(s.y) + 0.0 * s[-1] * s[1:3][0]", ""),
+    ("g = g + 0.0 * K[1] * K[-1] * len(K) * K.size * K.sum()", "K = np.ones(3)"),
+    ("g = g + 0.0 * np.pi * np.deg2rad(2.0) * np.float64(3.0)", ""),
+    ("g = g + 0.0 * K[1, 2]", "K = np.eye(3)"),
+    ("g = g + 0.0 * K[1][0]", "K = ((1.0, 2.0), (3.0, 4.0))"),
+    ("g = g + 0.0 * K[1](s.x)", "K = (sin, cos)"),
+    ("g = g + 0.0 * LAWS.a(s.x)", 'LAWS = namedtuple("Laws", "a b")(sin, cos)'),
+    ("lib = np\n    g = g + 0.0 * lib.pi", ""),
+    ("g = g + 0.0 * two(s.x)", "@njit\ndef two(x):\n    return x * 2.0"),
+    ("if MODE is Mode.A:\n        g = g * Mode.A.value", "class Mode(Enum):\n    A = 1.0\n\n\nMODE = Mode.A"),
+    ("g = g + 0.0 * law(s.x, 'a')", "@physics\ndef law(x, kind):\n    return x if kind == 'a' else 2.0 * x"),
+    ("g = g * Earth.mu", "@dataclass\nclass Earth:\n    mu: float = 1.0"),
+    ("v = V(s.x, s.y)\n    g = g + 0.0 * v.x", "class V(NamedTuple):\n    x: float\n    y: float"),
+    ("g = g + 0.0 * F(s.x)", "def made(k):\n    return physics(lambda x: k * x)\n\n\nF = made(2)"),
+    ("f = sin if MU_EARTH > 0.0 else cos\n    g = g + 0.0 * f(s.x)", ""),
+    ("if 0.0 < MU_EARTH < 1.0e20:\n        g = g * 1.0", ""),
+    ("(a, b), c = (s.x, s.y), s.vx\n    a, b = b, a\n    g = g + 0.0 * a", ""),
+    ("try:\n        g = g * 1.0\n    finally:\n        g = g + 0.0", ""),
+    ("if not o.drag and o.drag < 1.0:\n        g = g * 1.0\n    for k in range(int(o.drag)):\n        g = g * 1.0", ""),
+]  # fmt: skip
+MODULES = """import numpy as np
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+from numba import njit
+"""
+
+
+def test_an_unusual_line_is_no_breach(tmp_path):
+    for number, (lines, text) in enumerate(LINES):
+        imports = (IMPORTS, f"{MODULES}{IMPORTS}")
+        edits = [imports, before(text), *with_setting("drag"), then(lines)]
+        assert breaches(campaign_with(tmp_path / str(number), *edits)) == [], lines

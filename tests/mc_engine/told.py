@@ -5,7 +5,7 @@ import io
 import sys
 
 from mc_engine.cli import app
-from mc_engine.user_streams import user_streams
+from mc_engine.text import clean_streams
 
 STEERING = {*map(chr, range(32)), *map(chr, range(127, 160))} - {"\n", "\t"}
 HIDDEN = set("\u00ad\u061c\u200b\u200c\u200d\u200e\u200f\u2028\u2029\u202a\u202b\u202c\u202d\u202e\u2060\u2066\u2067"
@@ -20,7 +20,7 @@ def told(*words, encoding="utf-8"):
     status = 0
     with contextlib.redirect_stdout(streams[0]), contextlib.redirect_stderr(streams[1]):
         try:
-            with user_streams():
+            with clean_streams():
                 app([str(word) for word in words], prog_name="mc-engine")
         except SystemExit as leaving:
             status = leaving.code or 0

@@ -59,7 +59,7 @@ MODEL = Model(
 def load(body: str, design: str = "mc", seed: int = 1, directory: Path = HERE, head: str = HEAD, **options) -> Campaign:
     """The campaign of the toy model with this body; 100 cases where the design needs a number."""
     text = head.format(design=design, seed=seed)
-    if design in ("mc", "lhs", "sobol", "halton") and "cases" not in text + body.split("[")[0]:
+    if design in ("mc", "lhs", "sobol") and "cases" not in text + body.split("[")[0]:
         text += "cases = 100\n"
     return load_campaign("toy.toml", text=text + body, directory=directory, **options)
 

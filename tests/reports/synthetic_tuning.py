@@ -3,7 +3,7 @@
 import numpy as np
 
 from mc_engine.directory_kinds import TUNING
-from mc_engine.pareto import non_dominated
+from mc_engine.genetic_search import non_dominated
 from mc_engine.parts import Column
 from mc_engine.result_folder import write_result
 from mc_engine.tuning_folder import UNFINISHED, open_tuning

@@ -87,6 +87,9 @@ def test_failed_cases_are_chosen_without_a_mouse_and_listed_with_their_inputs(pa
 
 
 def test_a_box_drawn_over_a_cloud_lists_its_cases_and_lifts_them_out_in_every_figure(page):
+    figure = "document.getElementById(document.getElementById('explorer').dataset.figure)"
+    page.run(f"{figure}.scrollIntoView({{behavior: 'instant'}})")  # figures are drawn when they come in sight
+    page.until(f"{figure}.querySelector('.nsewdrag') !== null")
     x, y, width, height = page.settled(PLACE)
     page.drag([(x + 3, y + 3), (x + width / 3, y + height / 4), (x + width - 3, y + height / 3)])
     page.until("!document.getElementById('selection').hidden")
@@ -101,6 +104,38 @@ def test_a_box_drawn_over_a_cloud_lists_its_cases_and_lifts_them_out_in_every_fi
     assert chosen == set().union(*lifted)
     page.click("#selection-close")
     assert page.run("document.getElementById('selection').hidden")
+
+
+def test_a_range_of_a_histogram_chooses_all_its_cases_and_shows_them_in_every_other(page):
+    page.run(SCROLLED)
+    page.until(f"{DRAWN}.every(Boolean)")
+    bars = "document.querySelectorAll('.panel')].filter((p) => (p.data || []).some((t) => t.meta === 'bins'))"
+    first = f"[...{bars}[0]"
+    box = page.settled(
+        f"(() => {{ const panel = {first}.querySelector('.nsewdrag'); "
+        "panel.scrollIntoView({block: 'center', behavior: 'instant'}); const box = panel.getBoundingClientRect(); "
+        "return [box.x, box.y, box.width, box.height]; })()"
+    )
+    x, y, width, height = box
+    page.drag([(x + 0.3 * width, y + 5), (x + 0.4 * width, y + 9), (x + 0.6 * width, y + height - 5)])
+    page.until("!document.getElementById('selection').hidden")
+    low, high = page.run(
+        f"(() => {{ const axis = {first}._fullLayout.xaxis; "
+        "return [0.3, 0.6].map((k) => axis.p2l(k * axis._length)); })()"
+    )
+    column = page.run(f"{first}.data.find((t) => t.meta === 'bins').columns[0]")
+    values = synthetic_run(600).table[column]
+    wide = 0.01 * (high - low)
+    number = int(page.run(COUNT).split()[0])
+    assert (values.between(low + wide, high - wide)).sum() <= number <= (values.between(low - wide, high + wide)).sum()
+    told = page.run(
+        f"[...{bars}.map((p) => p.data.find((t) => t.meta === 'chosen').customdata.map("
+        "(text) => Number(text.split(': ')[1].split(' ')[0])).reduce((a, b) => a + b, 0))"
+    )
+    assert len(told) >= 4
+    assert max(told) == number  # less where cases lie beyond the axis, or have no number
+    page.click("#selection-close")
+    assert not page.run(f"[...{bars}.some((p) => p.data.some((t) => t.meta === 'chosen'))")
 
 
 def test_a_long_table_is_searched_by_words(page):
@@ -122,7 +157,7 @@ def test_the_figure_of_cases_takes_other_axes_and_a_range_of_any_column(page):
         " s.value = 3; s.dispatchEvent(new Event('change')); })()"
     )
     axis = "document.getElementById(document.getElementById('explorer').dataset.figure).layout.xaxis.title.text"
-    assert page.run(axis) == "peak_force_n [N]"
+    assert page.run(axis) == "peak force [N]"
     page.run(
         "document.getElementById('explorer-column').value = 3; document.getElementById('explorer-low').value = '100'"
     )
@@ -158,6 +193,8 @@ def test_the_history_of_a_worst_case_opens_over_the_nominal_one_and_closes_with_
 
 def test_figures_follow_the_dark_mode(page):
     ink = "document.querySelector('.panel').layout.font.color"
+    page.run("document.querySelector('.panel').scrollIntoView({behavior: 'instant'})")
+    page.until("document.querySelector('.panel').layout !== undefined")
     light = page.run(ink)
     page.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
     page.until(f"{ink} !== '{light}'")
@@ -263,3 +300,22 @@ def test_the_verdicts_are_in_sight_in_a_narrow_window(browser, file, width):
         browser.ask("Emulation.clearDeviceMetricsOverride")
     assert beyond[0].startswith("Verdict")
     assert beyond[1] <= 0
+
+
+BEYOND = """[...document.querySelectorAll('table, figure, .card, p, h1, h2')]
+  .filter((one) => one.getClientRects().length)
+  .filter((one) => one.getBoundingClientRect().right > document.documentElement.clientWidth + 1.5)
+  .map((one) => one.outerHTML)"""
+
+
+def test_nothing_reaches_beyond_a_printed_page(browser, file):
+    a4_without_margins = 718
+    browser.ask("Emulation.setDeviceMetricsOverride", width=a4_without_margins, height=1000, deviceScaleFactor=1,
+                mobile=False)  # fmt: skip
+    browser.ask("Emulation.setEmulatedMedia", media="print")
+    try:
+        browser.open(file)
+        assert browser.run(BEYOND) == []
+    finally:
+        browser.ask("Emulation.setEmulatedMedia", media="")
+        browser.ask("Emulation.clearDeviceMetricsOverride")

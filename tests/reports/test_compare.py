@@ -83,12 +83,13 @@ def test_both_runs_are_laid_over_one_another_with_the_counts_of_the_table():
     a, b = two_runs(1.0)
     document = build_comparison(compare_runs(a, b, ("before", "after")), (a, b))
     section = next(one for one in document.sections if one.anchor == "overlays")
-    distribution = section.blocks[0].drawing.panels[1]
-    assert distribution.x_label == "settling time [s]"
+    distribution = section.blocks[0].drawing.plots[1]
+    assert distribution.x.label == "settling time [s]"
     for mark, run in zip(distribution.marks, (a, b), strict=True):
         values, edges = run.table["settling_time_s"], np.unique(mark.x)
         assert mark.y[1:-1:2] == pytest.approx(np.histogram(values, edges)[0] / 1200)
-    assert {mark.run for panel in section.blocks[1].drawing.panels for mark in panel.marks} == {0, 1}
+    keys = {mark.key[:5] for panel in section.blocks[1].drawing.plots for mark in panel.marks}
+    assert keys == {"run A", "run B"}
     page = render_html(document).decode()
     assert "run B: fraction of the cases" in page
 

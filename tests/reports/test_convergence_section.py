@@ -21,8 +21,8 @@ def test_every_metric_that_matters_has_a_mean_and_an_outer_quantile():
     assert isinstance(figure, FigureBlock)
     assert isinstance(table, Table)
     names = [row[0].text.split(" [")[0] for row in table.rows]
-    assert names[:4] == ["propellant_kg"] * 2 + ["peak_force_n"] * 2
-    assert [row[1].text for row in table.rows[:2]] == ["mean", "99.865th percentile"]
+    assert names[:4] == ["propellant"] * 2 + ["peak force"] * 2
+    assert [row[1].text for row in table.rows[:2]] == ["mean", "99.73rd percentile"]
     assert {row[6].text for row in table.rows} == {"converged", "not yet"}
     assert "1\u202f997 of 2\u202f000 cases" in table.rows[0][1].small
 

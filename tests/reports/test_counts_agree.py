@@ -1,16 +1,29 @@
-"""Every count of cases in a report is that of the table: on all shipped campaigns, each flown with a few cases."""
+"""Every count of cases in a report is that of the table, and what is labelled alike is equal in all its formats: on all
+shipped campaigns, each flown with a few cases.
+"""
 
+import json
 import re
+import shutil
+import subprocess
 import tomllib
 from dataclasses import fields, is_dataclass
+from html.parser import HTMLParser
 
+import jsonschema
 import numpy as np
 import pytest
 
 from mc_engine.campaign import load_campaign
 from mc_engine.campaign_search import list_campaigns
 from mc_engine.runner import run
+from reports import render_html, render_pdf
 from reports.contents import build
+from reports.data import render_json, schema
+from reports.document import Table, blocks_of
+from reports.markdown import code, render_markdown
+from reports.markdown_text import escaped
+from reports.numbers import words
 
 QUICK = ("reentry", "minimal")
 CASES = 120
@@ -58,14 +71,19 @@ def inside(table, records):
     return kept
 
 
-@pytest.mark.parametrize("name", list(flyable()))
-def test_every_count_of_a_report_is_that_of_the_table(name, tmp_path):
-    campaign = load_campaign(name)
-    if campaign.design in ("mc", "lhs", "sobol", "halton"):
-        campaign = load_campaign(name, cases=CASES)
-    store = run(campaign, tmp_path / "run")
+@pytest.fixture(scope="module", params=list(flyable()))
+def reported(request, tmp_path_factory):
+    """A shipped campaign flown with few cases: its store and its report."""
+    campaign = load_campaign(request.param)
+    if campaign.design in ("mc", "lhs", "sobol"):
+        campaign = load_campaign(request.param, cases=CASES)
+    store = run(campaign, tmp_path_factory.mktemp("flown") / "run")
+    return store, build(store, "run")
+
+
+def test_every_count_of_a_report_is_that_of_the_table(reported):
+    store, document = reported
     table, records = store.cases(), store.manifest["requirements"]
-    document = build(store, "run")
     said = list(texts(document))
     expected = int(inside(table, records).sum())
     found = [(whole(one), text) for text in said for count in COUNTS for one in count.findall(text)]
@@ -100,3 +118,151 @@ def corridors(document):
 
 def inside_class(classes):
     return re.sub(r"^inside the limits? of ", "", classes[0][0])
+
+
+# ---- the formats
+
+
+@pytest.fixture(scope="module")
+def record(reported):
+    return json.loads(render_json(reported[1]))
+
+
+def test_the_data_validate_against_their_schema_and_have_the_numbers_of_the_table(reported, record):
+    store, _ = reported
+    jsonschema.Draft202012Validator.check_schema(schema())
+    jsonschema.validate(record, schema())
+    table, requirements = store.cases(), store.manifest["requirements"]
+    counts = {"cases": store.n_cases, "flown": len(table), "completed": int((table["status"] == "ok").sum())}
+    assert record["counts"] == {**counts, "inside_all_limits": int(inside(table, requirements).sum())}
+    ok = (table["status"] == "ok").to_numpy()
+    for one in record["metrics"]:
+        values = table[one["name"]].to_numpy(dtype=float)[ok]
+        values = values[np.isfinite(values)]
+        assert one["n_used"] == values.size
+        if values.size > 1:
+            found = [one["mean"], one["sigma"], one["minimum"], one["maximum"]]
+            spread = np.ptp(values) * 1e-9 + 1e-14 * np.abs(values).max()
+            assert found == pytest.approx([values.mean(), values.std(ddof=1), values.min(), values.max()], abs=spread)
+    for limits, one in zip(requirements, record["requirements"], strict=True):
+        assert (one["name"], one["passed"]) == (limits["name"], int(inside(table, [limits]).sum()))
+        worst = [case for case in record["worst"] if case["requirement"] == limits["name"]]
+        values = table.set_index("case_id")[limits["metric"]]
+        assert [case["value"] for case in worst] == [values[case["case_id"]] for case in worst]
+        assert sorted(case["margin"] for case in worst) == [case["margin"] for case in worst]
+        ends = np.array([np.inf if limits["at_most"] is None else limits["at_most"],
+                         -np.inf if limits["at_least"] is None else limits["at_least"]])  # fmt: skip
+        margins = np.minimum(ends[0] - values[ok], values[ok] - ends[1])
+        assert worst[0]["margin"] == pytest.approx(np.nanmin(margins[np.isfinite(margins)]), rel=1e-12)
+
+
+def test_the_tables_show_the_numbers_of_the_data(reported, record):
+    _, document = reported
+    tables = list(blocks_of(document, Table))
+    for one in record["metrics"]:
+        numbers = [one["mean"], one["sigma"], one["minimum"], one["maximum"]]
+        numbers += [
+            quantile["value"] for quantile in one["quantiles"] if quantile["probability"] in (0.00135, 0.5, 0.99865)
+        ]
+        shown = [
+            cell.value for row in rows_about(tables, words(one["name"], one["unit"])) for cell in row if cell.value
+        ]
+        assert in_one_unit([number for number in numbers if number], shown), one["name"]
+
+
+def test_the_worst_cases_of_the_tables_are_those_of_the_data(reported, record):
+    store, document = reported
+    rows = [row for table in blocks_of(document, Table) for row in table.rows if row[0].case is not None]
+    metrics = [one["metric"] for one in store.manifest["requirements"]]
+    alone = [
+        one for one in record["requirements"] if metrics.count(one["metric"]) == 1 and one["metric"] in metrics[:4]
+    ]
+    for one in alone:
+        worst = [case for case in record["worst"] if case["requirement"] == one["name"]][:5]
+        values = {case["case_id"]: case["value"] for case in worst if case["value"]}
+        if values and np.ptp(list(values.values())) > 1e-9 * max(map(abs, values.values())):  # else it is constant
+            first = next(iter(values))
+            factors = {cell.value / values[first] for row in rows if row[0].case == first for cell in row if cell.value}
+            assert any(all(holds(rows, case, factor * value) for case, value in values.items()) for factor in factors)
+
+
+def holds(rows, case, value):
+    shown = [cell.value for row in rows if row[0].case == case for cell in row if cell.value]
+    return bool(np.isclose(shown, value, rtol=1e-9, atol=0.0).any())
+
+
+def rows_about(tables, name):
+    for table in tables:
+        yield from (row for row in table.rows if re.match(rf"{re.escape(name)}( |$)", row[0].text))
+
+
+def in_one_unit(numbers, shown):
+    """Whether all numbers are among those shown, in their own unit or all in the same other one."""
+    factors = {cell / numbers[0] for cell in shown} if numbers else {1.0}
+    known = np.array(shown, dtype=float)
+    return any(all(np.isclose(known, one * factor, rtol=1e-9, atol=0.0).any() for one in numbers) for factor in factors)
+
+
+class _Tables(HTMLParser):
+    """Rows of cells by the number of their table: the text of each cell without white space."""
+
+    def __init__(self):
+        super().__init__()
+        self.tables, self.rows, self.cell = {}, None, None
+
+    def handle_starttag(self, tag, attributes):
+        name = dict(attributes).get("id") or ""
+        if tag == "figure" and name.startswith("table-"):
+            self.rows = self.tables.setdefault(int(name.removeprefix("table-")), [])
+        elif tag == "tr" and self.rows is not None:
+            self.rows.append([])
+        elif tag == "td" and self.rows is not None:
+            self.rows[-1].append("")
+            self.cell = True
+
+    def handle_endtag(self, tag):
+        self.cell = None if tag == "td" else self.cell
+        self.rows = None if tag == "figure" else self.rows
+
+    def handle_data(self, data):
+        if self.cell:
+            self.rows[-1][-1] += bare(data)
+
+
+def bare(text):
+    return re.sub(r"[\s\u200b\u2060\u00ad]", "", text)
+
+
+def test_page_markdown_pdf_and_data_have_the_same_tables_and_cards(reported, record, tmp_path):
+    _, document = reported
+    page = _Tables()
+    page.feed(render_html(document).decode())
+    text, markdown = bare(pdf_text(render_pdf(document), tmp_path)), render_markdown(document).decode()
+    assert [[card.answer in markdown, bare(card.answer) in text] for card in document.verdicts + document.costs] == [
+        [True, True] for _ in document.verdicts + document.costs
+    ]
+    held = {one["number"]: one for part in record["sections"] for one in part["blocks"] if one["kind"] == "table"}
+    tables = list(blocks_of(document, Table))
+    assert [table.number for table in tables] == list(held)
+    for table in tables:
+        said = [[f"{cell.text} ({cell.small})" if cell.small else cell.text for cell in row] for row in table.rows]
+        assert held[table.number]["rows"] == said
+        shown = [row for row in page.tables[table.number] if row]
+        assert len(shown) == len(table.rows)
+        for row, cells in zip(table.rows, shown, strict=True):
+            for column, cell, there in zip(table.columns, row, cells, strict=True):
+                assert bare(cell.text) in there, table.caption
+                assert bare(cell.small) in there, table.caption
+                written = code(cell.text) if column.kind in ("code", "name") else escaped(cell.text)
+                assert written in markdown, table.caption
+                if column.kind == "number":
+                    assert bare(cell.text) in text, table.caption
+                    assert bare(cell.small) in text, table.caption
+
+
+def pdf_text(pdf, tmp_path):
+    if shutil.which("pdftotext") is None:
+        pytest.skip("needs the Debian package poppler-utils")
+    (tmp_path / "report.pdf").write_bytes(pdf)
+    done = subprocess.run(["pdftotext", "-raw", tmp_path / "report.pdf", "-"], capture_output=True, check=True)
+    return done.stdout.decode()

@@ -82,8 +82,8 @@ def test_a_report_draws_bands_with_the_nominal_and_the_two_worst(drawing):
     assert list(histories_drawing.bands) == ["semi_major_axis_error_km", "eccentricity_error", "force_n"]
     assert sorted(line.rank for line in histories_drawing.lines) == [0, 1, 2]
     texts = [entry.text for entry in histories_drawing.key]
-    assert "5\u202f% to 95\u202f% of 60 cases" in texts
-    assert "25\u202f% to 75\u202f% of 60 cases" in texts
+    assert "2.5\u202f% to 97.5\u202f% of 60 saved cases" in texts  # 60 cases support no percentile farther out
+    assert "smallest to largest of 60 saved cases" in texts
     filled = [trace for trace in screen.specifications(histories_drawing)[0]["data"] if trace.get("fill") == "toself"]
     assert len(filled) == 2
     assert paper.svg(histories_drawing) == paper.svg(histories_drawing)

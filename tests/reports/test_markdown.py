@@ -42,8 +42,10 @@ def test_every_table_figure_and_section_is_there(document):
     for kind, word in ((Table, "Table"), (FigureBlock, "Figure")):
         for block in blocks_of(document, kind):
             assert f"**{word} {block.number}.** {escaped(block.caption)}" in text
-    for number, section in enumerate(document.sections, start=1):
-        assert f"\n## {number} {escaped(section.title)}\n" in text
+    for section in document.sections:
+        mark = "###" if section.kind == "part" else "##"
+        title = f"{'Appendix ' * (section.kind == 'appendix')}{section.number} {section.title}".strip()
+        assert f"\n{mark} {escaped(title)}\n" in text
     assert sum(token.type == "table_open" for token in tokens(text)) == len(list(blocks_of(document, Table)))
 
 

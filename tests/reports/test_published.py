@@ -4,7 +4,7 @@ import pytest
 from synthetic_run import synthetic_run
 
 from reports.flown import Flown
-from reports.published import our_value, published_table
+from reports.published import our_value, published_blocks
 
 
 @pytest.fixture(scope="module")
@@ -36,13 +36,18 @@ def test_inputs_that_all_cases_share_must_agree_too(flown):
     assert our_value(flown, {"column": "propellant_kg", "at": {**at, "control": "continuous"}})[1] == "case 17"
 
 
-def test_a_fixed_number_stands_in_for_a_case_that_was_not_flown(flown):
-    record = {"column": "propellant_kg", "at": {"ve_pct": 40.0}, "ours": 3.759}
-    assert our_value(flown, record) == (3.759, "fixed")
-
-
-def test_a_gap_is_inside_or_outside_the_printed_digits(flown):
-    rows = published_table(flown).rows
-    assert [row[3].small for row in rows] == ["outside", "inside", ""]
-    assert rows[0][3].text == "−1.61\u202fkg"
-    assert rows[2][1].text == "zero"
+def test_only_what_the_run_computes_has_a_row():
+    column = {"unit": "s", "column": "settling_time_s"}
+    run = synthetic_run(100, failed=0)
+    run.manifest["published"] = [
+        {"quantity": "not flown", "published": 3.8, "unit": "kg", "column": "propellant_kg", "at": {"ve_pct": 40.0}},
+        {"quantity": "a constant of the tests", "published": 7.8, "unit": "km/s", "ours": 7.8, "tolerance": 0.05},
+        {"quantity": "far", "published": 351.61, "tolerance": 0.05, **column},
+        {"quantity": "near", "published": 350.01, "tolerance": 0.05, **column},
+        {"quantity": "in words", "published": "about six minutes", **column},
+    ]
+    table, sentence = published_blocks(Flown(run, "run"))
+    assert [row[0].text for row in table.rows] == ["far", "near", "in words"]
+    assert [row[3].small for row in table.rows] == ["outside", "inside", ""]
+    assert table.rows[0][3].text == "−1.61\u202fs"
+    assert sentence.startswith("2 further published values of the model are not computed by the cases of this run")

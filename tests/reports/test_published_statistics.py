@@ -7,7 +7,7 @@ from synthetic_run import synthetic_run
 from reports.drawings import distribution_blocks
 from reports.figures.distributions import bin_edges, law_curve
 from reports.flown import Flown
-from reports.published import own_statistic, published_law, published_table
+from reports.published import own_statistic, published_blocks, published_law
 from reports.published_statistics import statistics_tables
 
 BOTH = ["ve_pct", "oe_pct"]
@@ -55,8 +55,9 @@ def test_the_table_has_a_row_a_quantity_and_says_what_is_inside_its_tolerance(fu
 
 def test_such_a_record_then_leaves_the_other_table():
     shown = record("mean", 1.0)
-    assert published_table(flown(shown)) is None
-    assert len(published_table(flown(shown, {"quantity": "other", "published": 3.0, "ours": 3.0})).rows) == 1
+    assert list(published_blocks(flown(shown))) == []
+    other = {"quantity": "other", "published": 3.0, "column": "propellant_kg"}
+    assert len(next(published_blocks(flown(shown, other))).rows) == 1
 
 
 @pytest.mark.parametrize(
@@ -66,7 +67,7 @@ def test_such_a_record_then_leaves_the_other_table():
 def test_a_run_of_other_dispersions_or_settings_is_not_compared(elsewhere):
     run = flown(record("mean", 1.0, **elsewhere))
     assert list(statistics_tables(run)) == []
-    assert published_table(run).rows[0][2].small == "fixed"
+    assert next(published_blocks(run)).startswith("1 further published value of the model is not computed")
 
 
 def test_a_run_of_chosen_cases_is_not_compared():

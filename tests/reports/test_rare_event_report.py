@@ -1,6 +1,9 @@
 """The report of a rare event: verdict, failures, levels and cost, on the screen and on paper."""
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 
 import reports
@@ -10,7 +13,7 @@ from mc_engine.rare_event_folder import open_rare_event
 from mc_engine.result_folder import write_result
 from reports.document import FigureBlock, Table, blocks_of
 from reports.figures import screen
-from reports.figures.tails import Tail
+from reports.figures.marks import Panels
 from reports.rare_events import build_rare_event
 
 MANIFEST = {
@@ -80,8 +83,9 @@ def test_levels_and_failed_inputs_are_listed_and_drawn(tmp_path):
     assert [row[1] for row in table(document, "Levels")] == ["all", "1.4", "0.6", "0.2", "0.05"]
     assert table(document, "Failed cases by input") == [["a_pct [%]", "4.3", "0.2", "27"]]
     (figure,) = blocks_of(document, FigureBlock)
-    assert isinstance(figure.drawing, Tail)
-    np.testing.assert_array_equal(figure.drawing.probability, [0.1, 1e-2, 1e-3, 1e-4])
+    assert isinstance(figure.drawing, Panels)
+    _, levels, *_ = figure.drawing.plots[0].marks
+    np.testing.assert_array_equal(levels.y, [0.1, 1e-2, 1e-3, 1e-4])
     point = screen.specifications(figure.drawing)[0]["data"][-1]
     assert point["y"][0] - point["error_y"]["arrayminus"][0] == pytest.approx(1.5e-5)
     assert "interval 1.5·10⁻⁵ to 2.7·10⁻⁵" in figure.drawing.alternative
@@ -109,3 +113,20 @@ def test_page_and_paper_are_written_and_names_stay_text(tmp_path):
     assert b"Toy &lt;b&gt;" in pages["report.html"]
     assert b"Toy <b>" not in pages["report.html"]
     assert pages["report.pdf"].startswith(b"%PDF")
+
+
+def test_failed_cases_are_a_scatter_of_the_two_inputs_they_lie_farthest_in(tmp_path):
+    draw = np.random.Generator(np.random.Philox(key=4))
+    record = estimated(tmp_path, failed=300)
+    one = record.result["inputs"][0]
+    record.result["inputs"][:] = [
+        {**one, "name": name, "likeliest_sigma": sigma, "likeliest": sigma}
+        for name, sigma in zip("abc", (1, -5, 3), strict=True)
+    ]
+    cases = pd.DataFrame({name: draw.normal(size=1000) for name in "abc"})
+    cases["failed"], cases["level"] = np.arange(1000) >= 700, np.arange(1000) // 500
+    figure = next(blocks_of(build_rare_event(replace(record, cases=cases), "out"), FigureBlock))
+    ordinary, failed, likeliest = figure.drawing.plots[0].marks
+    np.testing.assert_array_equal(failed.x, cases["b"][700:])
+    np.testing.assert_array_equal(failed.y, cases["c"][700:])
+    assert (ordinary.x.size, likeliest.x[0], likeliest.y[0]) == (500, -5.0, 3.0)

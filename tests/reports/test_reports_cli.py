@@ -10,7 +10,7 @@ from synthetic_run import synthetic_run
 import reports
 from mc_engine.store import Column, create_store
 
-PUBLIC = {"build", "render_html", "render_pdf", "report", "write_reports"}
+PUBLIC = {"build", "render_html", "render_pdf", "replay_picture", "report", "write_reports"}
 SHARED = {
     "store", "statistics", "status", "units", "figures", "tuning_folder", "rare_event_folder", "comparison",
     "derived_files", "replay_files", "directory_kinds", "run_changes", "durable_file", "errors", "shell_words", "text",

@@ -30,7 +30,8 @@ def mc(cases=1000):
 
 def test_the_last_row_is_all_at_once_with_the_joint_share_asked_for():
     row = texts(requirement_table(flown(campaign=mc())))[-1]
-    assert row[:4] == ["all at once", "all limits", "99.46 % with 90 % confidence", "1 000 / 1 000"]
+    assert row[:2] == ["all at once", "all limits for 99.46 % with 90 % confidence"]
+    assert row[4] == "1 000 / 1 000"
     assert row[-1] == "pass"
 
 
@@ -71,10 +72,11 @@ def test_a_run_extended_by_hand_says_so():
 def test_two_limits_show_the_interval_and_its_margin():
     band = {**FUEL, "at_least": -1.0}
     row = texts(requirement_table(flown(2000, campaign=mc(2000), requirements=[band])))[0]
-    low, high = (float(word) for word in row[5].split(" kg")[0].split(" to "))
+    low, high = (float(word) for word in row[2].split(" kg")[0].split(" to "))
     assert 0.0 <= low < high < 2.5
-    margin = float(row[5].split("margin ")[1].split()[0])
+    margin, share = (float(word) for word in row[3].replace(" %)", "").split(" kg ("))
     assert margin == pytest.approx(min(2.5 - high, low + 1.0), abs=1e-3)
+    assert share == pytest.approx(100.0 * margin / 3.5, abs=0.1)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 40])
@@ -101,8 +103,8 @@ def test_a_grid_has_no_risks():
 def test_both_tables_stand_in_the_section_of_requirements():
     document = build(synthetic_run(300, 0, campaign=mc(300)), "run")
     section = next(section for section in document.sections if section.anchor == "requirements")
-    captions = [getattr(block, "caption", "") for block in section.blocks]
-    assert captions[:2] == ["Requirements and their verdicts", "Risks of the verdicts"]
+    captions = [getattr(block, "caption", "").split(",")[0] for block in section.blocks]
+    assert captions == ["Verification matrix", "Margins of all requirements", "Risks of the verdicts"]
 
 
 def test_the_joint_card_names_the_requirement_that_fails_it():

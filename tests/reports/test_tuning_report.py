@@ -9,7 +9,7 @@ from synthetic_tuning import synthetic_tuning
 import reports
 from mc_engine.tuning_folder import UNFINISHED
 from reports.document import FigureBlock, Table, blocks_of
-from reports.figures import Convergence, FrontDrawing, paper, screen
+from reports.figures import FrontDrawing, paper, screen
 from reports.html import render_html
 from reports.pdf import render_pdf
 from reports.tuning import build_tuning
@@ -102,8 +102,8 @@ def test_failed_cases_are_told(tmp_path):
 def test_a_search_that_was_killed_is_reported_with_what_it_has(tmp_path):
     found = build_tuning(synthetic_tuning(tmp_path / "out", end=UNFINISHED), "out")
     assert found.warnings == ("The search had not ended, or was killed, after 30 of 30 generations.",)
-    curves = [block.drawing for block in blocks_of(found, FigureBlock) if isinstance(block.drawing, Convergence)]
-    assert [list(one.curves) for one in curves] == [["feasible candidates so far"]]
+    progress = [block.drawing for block in blocks_of(found, FigureBlock) if block.caption == "Progress of the search"]
+    assert [[plot.title for plot in one.plots] for one in progress] == [["feasible candidates so far"]]
     assert render_pdf(found).startswith(b"%PDF")
 
 

@@ -53,7 +53,7 @@ def test_the_example_of_the_documentation_works_in_all_formats(filled, document)
     assert text.paragraphs[0].startswith(
         "Of 3\u202f000 cases, 2\u202f988 stay inside the tank; 99.865 % of them need 2."
     )
-    assert table.caption == "Requirements and their verdicts"
+    assert table.caption == "Verification matrix"
     assert isinstance(figure, FigureBlock)
     for kind in (Table, FigureBlock):
         numbers = [block.number for block in blocks_of(made, kind)]
@@ -109,7 +109,7 @@ def test_values_of_a_run_are_neither_markdown_nor_templates(filled, run, payload
     [
         ("# A\n\n{{ run.metrics.fuel_kg.mean }}", r"own\.md, line 3: .*no attribute 'fuel_kg'"),
         ("# A\n\n{{ table('requirments') }}", r"own\.md, line 3: there is no table “requirments”; this report has req"),
-        ("# A\n\n{{ figure('nothing') }}", r"own\.md, line 3: there is no figure “nothing”; this report has drivers"),
+        ("# A\n\n{{ figure('nothing') }}", r"own\.md, line 3: there is no figure “nothing”; this report has req"),
         ("# A\n{% if %}", r"own\.md, line 2: Expected an expression"),
         ("# A\n\n{{ run.metrics.propellant_kg.quantile(99.865) }}", r"line 3: quantile\(99\.865\): a probability lies"),
         ("# A\n{{ run.__class__.__mro__ }}", r"own\.md, line 2: access to attribute '__class__' .* is unsafe"),

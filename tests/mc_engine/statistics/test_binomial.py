@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, hypergeom
 
 from mc_engine.statistics import clopper_pearson, lower_bound, upper_bound
+from mc_engine.statistics.binomial import hypergeometric_tails
 
 # Clopper-Pearson 95 % intervals, printed to eight or more digits in the statement of the statistics package.
 INTERVALS = [
@@ -50,3 +51,11 @@ def test_the_lower_bound_lies_below_the_true_share_as_often_as_it_promises():
     draw = np.random.Generator(np.random.Philox(key=7))
     covered = [lower_bound(int(k), 300, 0.9) <= 0.97 for k in draw.binomial(300, 0.97, 2000)]
     assert np.mean(covered) >= 0.9 - 0.015
+
+
+@pytest.mark.parametrize(
+    ("total", "marked", "drawn", "found"), [(10_000, 14, 5000, 3), (100, 50, 30, 14), (9, 9, 4, 4)]
+)
+def test_tails_without_replacement_are_those_of_scipy(total, marked, drawn, found):
+    law = hypergeom(total, marked, drawn)
+    assert hypergeometric_tails(total, marked, drawn, found) == pytest.approx((law.cdf(found), law.sf(found - 1)))

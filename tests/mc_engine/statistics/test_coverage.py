@@ -77,13 +77,13 @@ def test_tolerance_limits_enclose_their_share_of_all_cases_flown_and_failed(n, n
     accepted = binomial.acceptance_number(n, share, confidence)
     held = {"above": [], "below": [], "both": []}
     for row, good in zip(values, usable, strict=True):
-        numbers, failed = row[good], int(n - good.sum())
-        high = tolerance.upper_limit(numbers, accepted, failed)
-        low = tolerance.lower_limit(numbers, accepted, failed)
-        ends = tolerance.interval(numbers, accepted, failed)
-        held["above"].append(np.inf if high is None else high)
-        held["below"].append(-np.inf if low is None else low)
-        held["both"].append((-np.inf, np.inf) if ends is None else ends)
+        ordered, failed = np.sort(row[good]), int(n - good.sum())
+        high = tolerance.upper_rank(ordered.size, accepted, failed)
+        low = tolerance.lower_rank(ordered.size, accepted, failed)
+        ends = tolerance.enclosing_ranks(ordered.size, accepted, failed)
+        held["above"].append(np.inf if high is None else ordered[high - 1])
+        held["below"].append(-np.inf if low is None else ordered[low - 1])
+        held["both"].append((-np.inf, np.inf) if ends is None else (ordered[ends[0] - 1], ordered[ends[1] - 1]))
     inside = 1.0 - lost
     ends = np.array(held["both"])
     before = np.nextafter(ends[:, 0], -np.inf)  # the limit itself is inside

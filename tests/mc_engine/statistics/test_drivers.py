@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from mc_engine.statistics import clopper_pearson
-from mc_engine.statistics.drivers import failure_drivers, success_along
+from mc_engine.statistics.drivers import _adjusted, failure_drivers, success_along
+from mc_engine.statistics.input_columns import average_ranks
 from mc_engine.streams import uniforms
 
 
@@ -135,3 +137,12 @@ def test_a_long_run_is_tested_on_all_its_failures():
     found = failure_drivers(x, {"limit": failed})
     assert [one.inputs for one in found.singles] == [("x1",)]
     assert found.singles[0].effect == pytest.approx((x["x1"] > 0.9995).sum() / failed.sum(), abs=0.1)
+
+
+@pytest.mark.parametrize("shape", [0, 1, 200, (60, 3)])
+def test_ranks_and_adjusted_p_values_are_those_of_scipy(shape):
+    draw = np.random.Generator(np.random.Philox(key=9))
+    values = np.round(draw.normal(size=shape), 1)
+    assert np.array_equal(average_ranks(values), stats.rankdata(values, axis=0))
+    p_values = draw.random(40) ** 3
+    assert _adjusted(p_values) == pytest.approx(stats.false_discovery_control(p_values, method="bh"), rel=1e-14)

@@ -6,21 +6,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mc_engine.statistics.selection import PASSES, Selection, from_sortable, sortable
+from mc_engine.statistics import selection
+from mc_engine.statistics.selection import Selection, from_sortable, sortable
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False).map(lambda value: value + 0.0)
 
 
 def selected(parts, ranks):
-    """Four passes, the parts counted apart and merged backwards."""
-    passed = Selection()
-    for step in range(PASSES):
-        counts = [Selection(dict(passed.wanted), passed.digit) for _ in parts]
+    """All passes, the parts counted apart and merged backwards."""
+    passed, step = Selection(), 0
+    while not passed.done:
+        counts = [Selection(dict(passed.wanted), passed.digit, passed.few) for _ in parts]
         for count, part in zip(counts, parts, strict=True):
             count.add(part)
         for count in reversed(counts):
             passed.merge(count)
         passed = passed.next(ranks if step == 0 else None)
+        step += 1
     return passed.values
 
 
@@ -31,8 +33,10 @@ def test_every_rank_of_any_values_is_the_sorted_one(values):
     assert selected([values], range(1, values.size + 1)) == {rank + 1: one for rank, one in enumerate(ordered.tolist())}
 
 
+@pytest.mark.parametrize("few", [selection.FEW, 100, 0])
 @pytest.mark.parametrize("kind", ["normal", "tied", "constant", "wide"])
-def test_large_and_tied_columns_in_uneven_parts(kind):
+def test_large_and_tied_columns_in_uneven_parts(kind, few, monkeypatch):
+    monkeypatch.setattr(selection, "FEW", few)
     draw = np.random.Generator(np.random.Philox(key=5))
     values = draw.normal(1000.0, 1e-6, 20_000)
     if kind == "tied":
@@ -54,5 +58,5 @@ def test_keys_sort_as_the_values_do(a, b):
 
 
 def test_values_are_told_only_after_the_last_pass():
-    with pytest.raises(ValueError, match="0 of 4 passes"):
+    with pytest.raises(ValueError, match="not all passes"):
         _ = Selection().values

@@ -9,7 +9,7 @@ import pytest
 
 from mc_engine.statistics import summarize
 from mc_engine.statistics.moments import Spread, Tally, finite_values
-from mc_engine.statistics.summary import summarize_parts
+from mc_engine.statistics.streaming import stream
 
 DRAW = np.random.Generator(np.random.Philox(key=2))
 
@@ -83,7 +83,7 @@ def test_ten_thousand_cases_reach_the_three_sigma_limits_with_their_intervals():
 def in_parts(values, ends, order):
     """The parts of a table with one column, cut at `ends`, in this order."""
     parts = np.split(values, ends)
-    return lambda: ({"metric": parts[place]} for place in order)
+    return lambda _: ({"metric": parts[place]} for place in order)
 
 
 def awkward(kind, n):
@@ -106,7 +106,7 @@ def test_part_by_part_gives_the_bits_of_the_whole_in_any_order_of_the_parts(kind
     values = awkward(kind, n)
     whole = summarize(values)
     for ends, order in (([], [0]), (sorted([n // 3, n // 3 + 1, n // 2]), [2, 0, 3, 1]), ([0, n], [1, 2, 0])):
-        assert summarize_parts(in_parts(values, ends, order), ["metric"]) == {"metric": whole}
+        assert stream(in_parts(values, ends, order), ["metric"]).summaries == {"metric": whole}
 
 
 def test_moments_merge_to_the_same_bits_in_any_tree():
@@ -164,17 +164,17 @@ def test_ten_million_rows_are_summarised_in_bounded_memory():
 TEN_MILLION = """
 import resource
 import numpy as np
-from mc_engine.statistics.summary import summarize_parts
+from mc_engine.statistics.streaming import stream
 
-def parts():
+def parts(names):
     for part in range(160):
         yield {"metric": np.random.Generator(np.random.Philox(key=part)).normal(size=62_500)}
 
 def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
-summarize_parts(lambda: ({"metric": np.zeros(62_500)} for _ in range(2)), ["metric"])
+stream(lambda _: ({"metric": np.zeros(62_500)} for _ in range(2)), ["metric"])
 before = peak()
-found = summarize_parts(parts, ["metric"])["metric"]
+found = stream(parts, ["metric"]).summaries["metric"]
 print(before, peak(), found.n_used, found.mean, found.at(0.99865).value)
 """

@@ -4,9 +4,26 @@ import numpy as np
 import pytest
 
 from mc_engine.statistics.binomial import acceptance_number, smallest_interval_sample, smallest_sample
-from mc_engine.statistics.tolerance import interval, lower_limit, upper_limit
+from mc_engine.statistics.tolerance import enclosing_ranks, lower_rank, upper_rank
 
 VALUES = np.array([3.0, 1.0, 5.0, 2.0, 4.0])
+
+
+def at(values, rank):
+    return None if rank is None else float(np.sort(values)[rank - 1])
+
+
+def upper_limit(values, accepted, no_number):
+    return at(values, upper_rank(values.size, accepted, no_number))
+
+
+def lower_limit(values, accepted, no_number):
+    return at(values, lower_rank(values.size, accepted, no_number))
+
+
+def interval(values, accepted, no_number):
+    ranks = enclosing_ranks(values.size, accepted, no_number)
+    return None if ranks is None else (at(values, ranks[0]), at(values, ranks[1]))
 
 
 # Wilks, two-sided: smallest n whose smallest and largest value enclose 0.95 or 0.99 with 95 %.

@@ -4,7 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mc_engine.pareto import hypervolume, non_dominated
+from mc_engine.genetic_search import hypervolume, non_dominated
+
+pytest.importorskip("pymoo")
 
 SMALL = st.integers(0, 6).map(float)  # few values, so that equal ones are frequent
 TABLES = st.tuples(st.integers(0, 30), st.integers(1, 3)).flatmap(lambda shape: arrays(float, shape, elements=SMALL))

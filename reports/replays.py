@@ -1,0 +1,32 @@
+"""The picture of one case: its history over the nominal one, the envelopes of the saved cases, and the limits."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from reports.drawings import NOMINAL, history_drawing, is_constant
+from reports.figures import Histories, HistoryLine, paper
+from reports.flown import Flown, Run
+from reports.pdf import render_picture
+
+LARGEST = 1e100  # of any unit: what a flight that is lost holds beyond it, no axis can have ticks for
+
+
+def replay_picture(run: Run, case_id: int, history: pd.DataFrame) -> bytes:
+    """A PNG in the style of the reports.  history : t_s and the quantities of the case."""
+    return render_picture(paper.svg(replay_drawing(run, case_id, history)), "png")
+
+
+def replay_drawing(run: Run, case_id: int, history: pd.DataFrame) -> Histories:
+    """A panel a quantity that varies."""
+    flown = Flown(run, "")
+    columns = {name: history[name].to_numpy(dtype=np.float64) for name in history.columns if name != "case_id"}
+    t = columns.pop("t_s")
+    varying = [name for name, values in columns.items() if not is_constant(values)] or list(columns)
+    quantities = {name: np.where(np.abs(columns[name]) < LARGEST, columns[name], np.nan) for name in varying}
+    line = HistoryLine(f"case {case_id}", t, quantities, 1)
+    held = set(flown.histories["case_id"]) if len(flown.histories) else set()
+    nominal: dict[int, tuple[str, int | None]] = {NOMINAL: ("nominal", 0)} if NOMINAL in held else {}
+    drawing = history_drawing(flown, varying, nominal)
+    return replace(drawing, lines=(*drawing.lines, line))

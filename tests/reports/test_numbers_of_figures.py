@@ -1,0 +1,209 @@
+"""What figures draw, against the same numbers computed in another way."""
+
+import io
+
+import numpy as np
+import pandas as pd
+import pytest
+from landing_run import FOOTPRINT, landing_run
+from PIL import Image
+from scipy import stats
+from synthetic_run import synthetic_run
+
+from mc_engine.statistics.geodesy import LocalPlane
+from reports.coastlines import coastlines, nearest_coast
+from reports.contents import build
+from reports.diagnostics import rank_correlations
+from reports.document import FigureBlock, blocks_of
+from reports.figures import FootprintDrawing, Histories
+from reports.figures.marks import Bar, Limit, Line, Points
+from reports.figures.probability_plots import plotting_positions, probability_plot, shown_ranks
+from reports.flown import Flown
+from reports.history_bands import OUTER, history_bands, outer_percentile
+from reports.history_limits import history_limits
+from reports.replays import replay_drawing, replay_picture
+
+TIMES = np.linspace(0.0, 10.0, 101)
+
+
+def section(run, anchor):
+    return next(one for one in build(run, "run").sections if one.anchor == anchor)
+
+
+def drawn(run, kind):
+    return next(one.drawing for one in blocks_of(build(run, "run"), FigureBlock) if isinstance(one.drawing, kind))
+
+
+# ---- contributors
+
+
+def test_a_budget_adds_up_to_the_sigma_of_the_cases():
+    run = synthetic_run(4000, failed=0)
+    plots = section(run, "drivers").blocks[0].drawing.plots
+    panel = next(one for one in plots if one.title == "settling time, 1σ budget")
+    bars = {
+        text.split(":")[0]: float(right)
+        for mark in panel.marks
+        for text, right in zip(mark.texts, mark.right, strict=False)
+    }
+    sigma = run.table["settling_time_s"].std()
+    assert bars["σ of the cases"] == pytest.approx(sigma, rel=1e-9)
+    # settling = 350 + 0.4 VE + 0.2 OE: each contribution is a coefficient times the spread of its input
+    assert bars["ve"] == pytest.approx(0.4 * run.table["ve_pct"].std(), rel=0.02)
+    assert bars["oe"] == pytest.approx(0.2 * run.table["oe_pct"].std(), rel=0.05)
+    assert bars["root sum square"] == pytest.approx(np.hypot(bars["ve"], bars["oe"]), rel=1e-9)
+    assert np.hypot(bars["root sum square"], bars["rest"]) == pytest.approx(sigma, rel=0.02)
+
+
+# ---- histories
+
+
+def peaked(peaks, seen=1.0, name="peak_force_n"):
+    """A run whose saved forces rise to `peaks` and fall again; its table says `seen` times as much."""
+    run = synthetic_run(300, failed=0)
+    run.table.loc[: len(peaks) - 1, name] = seen * peaks
+    shape = 1.0 - np.abs(TIMES - 5.03) / 5.03
+    frames = [pd.DataFrame({"case_id": case, "t_s": TIMES, "force_n": peak * shape}) for case, peak in enumerate(peaks)]
+    run.history = pd.concat(frames, ignore_index=True)
+    return run
+
+
+PEAKS = np.linspace(50.0, 90.0, 40)
+
+
+def test_a_limit_is_drawn_where_the_metric_is_the_extreme_of_the_quantity_in_all_saved_cases():
+    drawing = drawn(peaked(PEAKS), Histories)
+    (limit,) = [mark for mark in drawing.plots[0].marks if isinstance(mark, Limit)]
+    assert (limit.at, limit.axis, limit.key) == (100.0, "y", "required limit")
+
+
+@pytest.mark.parametrize("run", [peaked(PEAKS, 1.05), peaked(PEAKS, 0.9), peaked(PEAKS, name="propellant_kg")])
+def test_a_limit_that_the_saved_histories_do_not_bear_out_is_not_drawn(run):
+    assert history_limits(Flown(run, "run"), ["force_n"]) == {}
+
+
+def test_an_envelope_reaches_to_the_percentile_that_its_cases_support():
+    assert [outer_percentile(n) for n in (20, 100, 200, 740, 741)] == [0.05, 0.01, 0.005, 0.005, 0.00135]
+    slopes = np.random.Generator(np.random.Philox(key=7)).normal(size=800)
+    rows = pd.DataFrame({"case_id": np.repeat(np.arange(800), 2), "t_s": np.tile([0.0, 1.0], 800)})
+    rows["x_m"] = np.column_stack([0.0 * slopes, slopes]).ravel()
+    curves = history_bands(rows, range(800), ["x_m"])["x_m"].curves
+    for p in (0.0, OUTER[0], 0.5, 1.0 - OUTER[0], 1.0):
+        assert curves[p][-1] == pytest.approx(np.quantile(slopes, p), rel=1e-12)
+
+
+def test_a_replays_picture_has_nominal_envelopes_and_limits():
+    run = peaked(PEAKS)
+    history = run.history[run.history["case_id"] == 3].assign(case_id=77)
+    marks = replay_drawing(run, 77, history).plots[0].marks
+    names = [mark.name for mark in marks]
+    assert {"case 77", "median of them", "smallest to largest of 40 saved cases"} <= set(names)
+    assert any(isinstance(mark, Limit) and mark.at == 100.0 for mark in marks)
+    assert Image.open(io.BytesIO(replay_picture(run, 77, history))).width > 1000
+
+
+def test_a_model_without_figures_has_its_saved_histories_and_scatters():
+    run = peaked(PEAKS)
+    run.manifest["figures"] = []
+    document = build(run, "run")
+    titles = [one.caption for one in blocks_of(document, FigureBlock)]
+    assert "Saved time histories" in titles
+    assert "Propellant over its strongest contributor, ve." in titles
+
+
+# ---- footprints
+
+
+def footprint(target_limit=None, place=(36.0, -5.35)):
+    parameters = [{"name": "aim_latitude_deg", "value": place[0]}, {"name": "aim_longitude_deg", "value": place[1]}]
+    figure = FOOTPRINT | {"target": ["aim_latitude_deg", "aim_longitude_deg"]}
+    changes = {}
+    run = landing_run(figures=[figure], parameters=parameters, place=place)
+    if target_limit is not None:
+        there = run.table[["latitude_deg", "longitude_deg"]].to_numpy()
+        run.table["miss_km"] = np.hypot(*LocalPlane(*place).points(*there.T).T) / 1000.0
+        run.manifest["columns"].append({"name": "miss_km", "unit": "km", "role": "metric", "description": "miss"})
+        one = {"name": "landing", "metric": "miss_km", "at_most": target_limit, "at_least": None, "share": 0.9}
+        changes = {"requirements": [*run.manifest["requirements"], {**one, "confidence": 0.9}]}
+    run.manifest.update(changes)
+    return drawn(run, FootprintDrawing)
+
+
+def test_the_circular_error_probable_holds_half_of_the_cases_and_the_limit_is_a_circle():
+    drawing = footprint(target_limit=40.0)
+    circles = {curve.kind: curve.outlines[0] for curve in drawing.curves if curve.kind in ("CEP", "target")}
+    aim = np.array(drawing.aim[1])
+    radii = {kind: np.hypot(*(outline - aim).T) for kind, outline in circles.items()}
+    inside = np.hypot(*(drawing.everywhere - aim).T) <= radii["CEP"].mean()
+    assert inside.mean() == pytest.approx(0.5, abs=0.01)
+    np.testing.assert_allclose(radii["target"], 40.0, rtol=1e-9)
+    assert not [curve for curve in footprint().curves if curve.kind == "target"]
+
+
+def test_a_coast_in_the_window_is_on_the_map_and_a_far_one_on_a_wider_map():
+    strait, ocean = footprint(), footprint(place=(-47.0, -120.0))
+    assert strait.coasts
+    assert not strait.around
+    assert len(ocean.plots) == len(strait.plots) + 1
+    assert not ocean.coasts
+    plane = LocalPlane(-47.0, -120.0)
+    assert nearest_coast(plane) / 1000.0 < ocean.around_reach
+    for plot in (strait.plots[0], ocean.plots[-1]):
+        coast = plot.marks[0]
+        inside = [low <= x <= high for x, (low, high) in zip(coast_near(coast), plot.ends, strict=True)]
+        assert all(inside)
+
+
+def coast_near(coast):
+    """The coast's point nearest to the middle of the map."""
+    assert isinstance(coast, Line)
+    nearest = np.nanargmin(np.hypot(coast.x, coast.y))
+    return coast.x[nearest], coast.y[nearest]
+
+
+def test_the_coast_lies_where_it_is():
+    # Land’s End, Tarifa and Cape Agulhas to the few kilometres of the data; Null Island is far from land
+    for latitude, longitude in ((50.07, -5.72), (36.0, -5.61), (-34.83, 20.0)):
+        assert nearest_coast(LocalPlane(latitude, longitude)) < 12e3
+    assert nearest_coast(LocalPlane(0.0, 0.0)) > 400e3
+    assert coastlines(LocalPlane(0.0, 0.0), 300e3) == []
+
+
+# ---- diagnostics
+
+
+def test_rank_correlations_are_those_of_pandas_over_the_cases_with_both_numbers():
+    draw = np.random.Generator(np.random.Philox(key=8))
+    a = draw.normal(size=400)
+    table = np.array([a, a**3 + draw.normal(size=400), np.round(3.0 * draw.normal(size=400) - a), np.abs(a)])
+    table[3, :50] = np.nan
+    rho, fewest = rank_correlations(table)
+    np.testing.assert_allclose(rho, pd.DataFrame(table.T).corr("spearman"), atol=1e-12)
+    assert fewest == 350
+
+
+def test_a_probability_plot_puts_each_case_at_its_rank_and_normal_cases_on_the_line():
+    values = np.sort(np.random.Generator(np.random.Philox(key=9)).normal(5.0, 2.0, 3000))
+    plot = probability_plot(values, np.arange(3000), "x", "", (7.0, 100.0))
+    (points,) = [mark for mark in plot.marks if isinstance(mark, Points)]
+    (line,) = [mark for mark in plot.marks if isinstance(mark, Line)]
+    for x, z in zip(points.x, points.y, strict=True):
+        assert stats.norm.cdf(z) == pytest.approx(((values <= x).sum() - 0.375) / 3000.25, abs=1e-12)
+    on_line = np.interp(points.y, line.y, line.x)
+    assert np.abs(points.x - on_line)[np.abs(points.y) < 2.0].max() < 0.25
+    assert [mark.at for mark in plot.marks if isinstance(mark, Limit)] == [7.0]
+    assert {0, 1, 2998, 2999} <= set(shown_ranks(3000).tolist())
+    assert shown_ranks(3000).size < 200
+    assert plotting_positions(3)[1] == 0.0
+
+
+def test_every_new_section_of_a_report_has_its_figure():
+    run = synthetic_run(600, failed=3)
+    (matrix,) = section(run, "correlations").blocks
+    cells = next(mark for mark in matrix.drawing.plots[0].marks if isinstance(mark, Bar))
+    whole = run.table[run.table["status"] == "ok"]
+    expected = whole["peak_force_n"].corr(whole["ve_pct"], method="spearman")
+    told = dict(text.rsplit(": ", 1) for text in cells.texts)
+    name = next(one for one in told if set(one.split(", ")) == {"ve", "peak force"})
+    assert float(told[name].replace("−", "-")) == pytest.approx(expected, abs=0.006)
+    assert len(section(run, "normality").blocks[0].drawing.plots) >= 3
