@@ -7,26 +7,39 @@ from importlib import import_module
 
 TYPE_CHECKING = False  # not from `typing`, for which `python -m mc_engine` would look in the working folder
 if TYPE_CHECKING:
-    from mc_engine.campaign import Campaign, list_campaigns, load_campaign
-    from mc_engine.cases import case_table
+    from mc_engine.campaign.cases import case_table
+    from mc_engine.campaign.loading import Campaign, list_campaigns, load_campaign
     from mc_engine.errors import CampaignError, EngineError, ModelError, RunInterrupted, StoreError
-    from mc_engine.model import AdaptiveStep, Event, Extremum, Field, FixedStep, Model, Parameter, Refusals, Setting
-    from mc_engine.opened_run import Case, Run, open_run
-    from mc_engine.runner import Replay, extend, replay, resume, run
-    from mc_engine.store import Store, open_store
-    from mc_engine.tuning import tune
-    from mc_engine.tuning_folder import TuningRecord, open_tuning
+    from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedStep, Parameter, Setting
+    from mc_engine.model.record import Model, Refusals
+    from mc_engine.runner.runner import Replay, extend, replay, resume, run
+    from mc_engine.store.opening import open_store
+    from mc_engine.store.store import Store
+    from mc_engine.studies.opened_run import Case, Run, open_run
+    from mc_engine.studies.tuning import tune
+    from mc_engine.studies.tuning_folder import TuningRecord, open_tuning
 
 _HOME = {
-    "campaign": ("Campaign", "list_campaigns", "load_campaign"),
-    "cases": ("case_table",),
+    "campaign.loading": ("Campaign", "list_campaigns", "load_campaign"),
+    "campaign.cases": ("case_table",),
     "errors": ("CampaignError", "EngineError", "ModelError", "RunInterrupted", "StoreError"),
-    "model": ("AdaptiveStep", "Event", "Extremum", "Field", "FixedStep", "Model", "Parameter", "Refusals", "Setting"),
-    "opened_run": ("Case", "Run", "open_run"),
-    "runner": ("Replay", "extend", "replay", "resume", "run"),
-    "store": ("Store", "open_store"),
-    "tuning": ("tune",),
-    "tuning_folder": ("TuningRecord", "open_tuning"),
+    "model.record": (
+        "AdaptiveStep",
+        "Event",
+        "Extremum",
+        "Field",
+        "FixedStep",
+        "Model",
+        "Parameter",
+        "Refusals",
+        "Setting",
+    ),
+    "studies.opened_run": ("Case", "Run", "open_run"),
+    "runner.runner": ("Replay", "extend", "replay", "resume", "run"),
+    "store.opening": ("open_store",),
+    "store.store": ("Store",),
+    "studies.tuning": ("tune",),
+    "studies.tuning_folder": ("TuningRecord", "open_tuning"),
 }
 _MODULE = {name: module for module, names in _HOME.items() for name in names}
 

@@ -2,6 +2,7 @@
 
 import os
 import sys
+from importlib import import_module
 
 
 def _forget_working_folder() -> None:
@@ -25,9 +26,8 @@ def main() -> None:
     refuse_small_memory()
     with clean_streams():
         try:
-            from mc_engine.cli import app
-
-            app(prog_name="mc-engine")
+            # by name, since this file lies below all packages and its process stands above them
+            import_module("mc_engine.command_line.commands").app(prog_name="mc-engine")
         except (SystemExit, KeyboardInterrupt):
             raise
         except BaseException as error:  # while no command is at work, such as in loading itself

@@ -1,4 +1,4 @@
-"""The packages of the extras that verbs ask for, so that a message can say what to install."""
+"""The packages of the extras that commands ask for, so that a message can say what to install."""
 
 # as in pyproject.toml, which a test holds against this
 EXTRAS = {

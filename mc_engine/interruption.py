@@ -57,7 +57,7 @@ class _CommandLine:
     """What the signals of this process find: there is one set of handlers in a process, and so one of these.
 
     process : that listens.  heard : how many signals came since then.  last_s : when the last one came.
-    under_way : a verb is at work, which an exception may unwind.  done : the verb has ended.
+    under_way : a command is at work, which an exception may unwind.  done : the command has ended.
     abandoned : a kernel or the compiler is still at work, for nobody.
     """
 
@@ -161,7 +161,7 @@ def _settle(work: Callable[[], T], outcome: "Future[T]") -> None:
 
 @contextmanager
 def under_way() -> Iterator[None]:
-    """A verb is at work: the first signal raises KeyboardInterrupt in it."""
+    """A command is at work: the first signal raises KeyboardInterrupt in it."""
     _COMMAND_LINE.advice = lambda: ONCE_MORE
     try:
         _COMMAND_LINE.under_way = True
@@ -172,7 +172,7 @@ def under_way() -> Iterator[None]:
 
 
 def advise(advice: Advice) -> None:
-    """What the verb would say from here on, if it were interrupted."""
+    """What the command would say from here on, if it were interrupted."""
     _COMMAND_LINE.advice = advice
 
 

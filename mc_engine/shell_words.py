@@ -10,7 +10,7 @@ from pathlib import Path
 
 
 def shell_word(place: Path | str) -> str:
-    """A path, a URL or the name of a campaign as the shell takes it for one word, and no verb for an option."""
+    """A path, a URL or the name of a campaign as the shell takes it for one word, and no command for an option."""
     text = str(place)
     text = f"./{text}" if text.startswith("-") else text
     # Windows: its shells know double quotes alone, and leave a backslash in peace

@@ -17,13 +17,13 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from mc_engine.run_summary import metric_parts, streamed
+from mc_engine.runner.summary import metric_parts, streamed
 from mc_engine.statistics import Summary, Verdict, judge_all, summarize, was_looked_at, worst_cases
 from mc_engine.statistics.order_statistics import QUANTILES
 from mc_engine.statistics.requirements import LimitCounts
 from mc_engine.statistics.worst import Limits, WorstSoFar, limits_on
 from mc_engine.status import OK, STATUS_NAME
-from mc_engine.store import Part, Store
+from mc_engine.store.store import Part, Store
 
 MOST_CELLS = 1 << 24  # of a table that is held
 MOST_SAMPLED = 200_000

@@ -112,12 +112,9 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
 
 
 def _inputs_said(flown: Flown, found: list[Contributor], shown: int) -> str:
-    """Which inputs the columns are of."""
-    hidden = len(flown.with_role("dispersion")) - shown
-    if hidden <= 0:
-        return ""
-    which = "the strongest contributors" if np.isfinite(found[0].share) else "the first"
-    return f"Inputs: {which}; the case table holds {count(hidden)} more."
+    """Which inputs the columns are of, where nothing is known of their contributions."""
+    n = len(flown.with_role("dispersion"))
+    return f"The first {shown} of {n} inputs." if shown < n and not np.isfinite(found[0].share) else ""
 
 
 def _input_cells(column: pd.Series) -> list[Cell]:

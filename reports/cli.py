@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from mc_engine.derived_files import FIGURES, derived_files
-from mc_engine.directory_kinds import RARE_EVENT, TUNING, kind_of
-from mc_engine.run_folder import readable
-from mc_engine.store import open_store
+from mc_engine.store.derived_files import FIGURES, derived_files
+from mc_engine.store.opening import open_store
+from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
+from mc_engine.store.run_folder import readable
 from reports.contents import build, titled
 from reports.data import FILE as JSON
 from reports.data import render_json
@@ -83,12 +83,12 @@ def _document(path: Path, template: Path | None, beside: Sequence[Path]) -> Docu
     if kind in (TUNING, RARE_EVENT) and template is not None:
         raise TemplateError(f"{path}: is a {kind}; a template speaks of runs")
     if kind == TUNING:  # loaded here, since most reports are of runs
-        from mc_engine.tuning_folder import open_tuning
+        from mc_engine.studies.tuning_folder import open_tuning
         from reports.tuning import build_tuning
 
         return build_tuning(open_tuning(path), name)
     if kind == RARE_EVENT:
-        from mc_engine.rare_event_folder import open_rare_event
+        from mc_engine.studies.rare_event_folder import open_rare_event
         from reports.rare_events import build_rare_event
 
         return build_rare_event(open_rare_event(path), name)

@@ -23,12 +23,18 @@ def widths(table: Table) -> list[float]:
     """Points of each column, together as wide as the page: what the longest words leave goes where it saves lines."""
     shape = (len(table.rows) + 1, len(table.columns), 2)  # the head is a row, and a cell has its text and a small one
     size, least = np.zeros(shape), np.zeros(len(table.columns))
+    room = [1.0, *(max(0.5 * rows, 1.0) if rows else np.inf for rows in spans(table))]  # of all rows of a cell
     for k, column in enumerate(table.columns):
         for row, cell in enumerate((Cell(column.title.replace("_", " ")), *(cells[k] for cells in table.rows))):
             for part, text in enumerate((cell.text, cell.small)):
                 scale = _scale(column, text) if part == 0 and row else 1.0 if row else BOLD
                 size[row, k, part] = lettering.width(text, TYPE) * scale + BADGE * bool(cell.tone and part == 0)
-                words = [text] if column.kind == "code" and len(text) <= COMMAND else _WORD.findall(text)
+                size[row, k, part] /= room[row] if k == 0 else 1.0
+                words = (
+                    [text]
+                    if (cell.tone and not part) or (column.kind == "code" and len(text) <= COMMAND)
+                    else _WORD.findall(text)
+                )
                 longest = max((lettering.width(word, TYPE) for word in words), default=0.0)
                 least[k] = max(least[k], longest * scale + BADGE * bool(cell.tone and part == 0))
     if least.sum() + INSET * len(least) >= ROOM:
@@ -42,6 +48,14 @@ def widths(table: Table) -> list[float]:
             break
         width[k] += jump
     return list(width * ((ROOM - INSET * len(width)) / width.sum()) + INSET)
+
+
+def spans(table: Table) -> list[int]:
+    """How many rows the first cell of each row stands for, 0 where that of a row above does."""
+    cells = [row[0] for row in table.rows]
+    starts = [k for k, cell in enumerate(cells) if not (table.columns[0].grouped and k and cell == cells[k - 1])]
+    found = dict(zip(starts, np.diff([*starts, len(cells)]).tolist(), strict=True))
+    return [found.get(k, 0) for k in range(len(cells))]
 
 
 def _lines(size: np.ndarray, width: np.ndarray | float) -> np.ndarray:

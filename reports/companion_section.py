@@ -3,24 +3,22 @@
 From the flights beside the run, or from the table of cases, which also tells trends and leaves a share unexplained.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_chance
 from reports.contributions import UNEXPLAINED, Contributions, Contributor
-from reports.contributor_figures import SMALL, contributor_figure, name_of
+from reports.contributor_figures import STRONGEST, contributor_figure, name_of, strongest, surely
 from reports.document import Cell, Column, FigureBlock, Table
 from reports.flown import Flown
-from reports.numbers import count, number, percent
+from reports.numbers import count, number, percent, with_unit
 
-STRONGEST = 5  # of a metric in the table
-LEFT = 0.005  # an unexplained share below it is not told
 _TRENDS = {"src": "SRC", "prcc": "PRCC", "spearman": "Spearman"}
 
 
 def companion_blocks(flown: Flown, found: Contributions) -> Iterator[FigureBlock | Table | str]:
-    """The figure of the effects and budgets, and a table of the strongest contributors of each metric."""
+    """The figure of the effects, and a table of the strongest contributors of each metric with their 1σ budget."""
     shown = [metric for metric, rows in found.by_metric.items() if rows]
     if shown:
         yield _figure(flown, found, shown)
@@ -39,47 +37,55 @@ def _figure(flown: Flown, found: Contributions, shown: list[str]) -> FigureBlock
     used = [found.n_used[metric] for metric in shown]
     few, most = min(used), max(used)
     blocks = f"{count(most)}" if few == most else f"{count(few)} to {count(most)}"
-    by_metric = [(metric, flown.words(metric), found.by_metric[metric]) for metric in shown]
-    if found.trends is None:
-        source, rest = f"from {blocks} of {count(found.n_tried)} blocks flown for this purpose", "rest: interactions"
-    else:
-        source = f"from a surrogate model of {blocks} of {count(found.n_tried)} cases of the table"
-        rest = "rest: interactions, random draws, unexplained"
-    return contributor_figure(flown, by_metric, source, rest)
+    of = f"{blocks} of {count(found.n_tried)}"
+    source = f"from {of} blocks" if found.trends is None else f"from a surrogate model of {of} cases"
+    return contributor_figure(flown, [(flown.words(one), found.by_metric[one]) for one in shown], source)
 
 
 def _table(flown: Flown, found: Contributions, shown: list[str]) -> Table:
     columns = (
-        Column("Metric", "text", 2.4),
+        Column("Metric", "text", 2.4, grouped=True),
         Column("Contributor", "text", 2.6),
         Column("First-order effect", "number", 2.0),
         Column("Total effect", "number", 2.0),
+        Column("1σ contribution", "number", 1.4),
         *(Column(title, "number", 1.2) for title in (_TRENDS.values() if found.trends else ())),
     )
-    counted = "cases" if found.trends else "blocks"
     rows = []
     for k, metric in enumerate(found.by_metric):
-        whole = found.n_used[metric] == found.n_tried and found.trends is None
-        small = "" if whole else f"{count(found.n_used[metric])} / {count(found.n_tried)} {counted}"
-        if found.trends and np.isfinite(found.trends.r_squared[k]):
-            small += f", R² {found.trends.r_squared[k]:.2f}"
-        for one in _strongest(found.by_metric[metric]):
-            name = f"{UNEXPLAINED} by the inputs" if one.input == UNEXPLAINED else name_of(flown, one.input)
+        cell = Cell(flown.words(metric), small="; ".join(_about(flown, found, metric, k)))
+        for one in strongest(found.by_metric[metric]):
             cells = [_cell(one.first, one.first_interval), _cell(one.total, one.total_interval)]
+            cells.append(_sigma_cell(flown, metric, one))
             cells += _trends(found.trends, one.input, k) if found.trends else []
-            rows.append((Cell(flown.words(metric), small=small), Cell(name), *cells))
+            rows.append((cell, Cell(name_of(flown, one.input)), *cells))
     return Table(f"Contributors to each metric, at most {STRONGEST}", columns, tuple(rows), _note(flown, found))
 
 
-def _strongest(found: Sequence[Contributor]) -> list[Contributor]:
-    """The first one, others whose effect is surely more than nothing, and what is unexplained."""
-    named = [one for one in found if one.input != UNEXPLAINED]
-    sure = [one for one in named[1:STRONGEST] if one.size >= SMALL and _surely(one)]
-    return [*named[:1], *sure, *(one for one in found if one.input == UNEXPLAINED and one.size >= LEFT)]
+def _about(flown: Flown, found: Contributions, metric: str, k: int) -> Iterator[str]:
+    """What the effects rest on where that is not all, σ of the metric, and the root sum square of the contributions."""
+    if found.n_used[metric] != found.n_tried or found.trends is not None:
+        yield f"{count(found.n_used[metric])} / {count(found.n_tried)} {'cases' if found.trends else 'blocks'}"
+    if found.trends and np.isfinite(found.trends.r_squared[k]):
+        yield f"R² {found.trends.r_squared[k]:.2f}"
+    sigma = flown.summaries[metric].sd
+    if sigma:
+        explained = float(np.hypot.reduce([sigma_contribution(one, sigma) or 0.0 for one in found.by_metric[metric]]))
+        rest = float(np.sqrt(max(sigma**2 - explained**2, 0.0)))
+        told = [with_unit(number(value, 3), flown.unit(metric)) for value in (sigma, explained, rest)]
+        yield f"σ {told[0]}; root sum square {told[1]}, rest {told[2]}"
 
 
-def _surely(one: Contributor) -> bool:
-    return any(interval is not None and interval[0] > 0.0 for interval in (one.first_interval, one.total_interval))
+def sigma_contribution(one: Contributor, sigma: float) -> float | None:
+    """The part of a metric's σ that an input causes by itself; None where noise could have done so."""
+    if one.input == UNEXPLAINED or one.first is None or not surely(one.first_interval):
+        return None
+    return float(np.sqrt(max(one.first, 0.0))) * sigma
+
+
+def _sigma_cell(flown: Flown, metric: str, one: Contributor) -> Cell:
+    value = sigma_contribution(one, flown.summaries[metric].sd or 0.0)
+    return Cell("–") if not value else Cell(with_unit(number(value, 3), flown.unit(metric)), value)
 
 
 def _trends(found: Sensitivity, name: str, k: int) -> list[Cell]:
@@ -96,18 +102,14 @@ def _note(flown: Flown, found: Contributions) -> str:
     each = f"In brackets: {percent(flown.stated.confidence)} confidence interval."
     if found.trends is None:
         return (
-            f"From {count(found.flights)} cases in {count(found.n_tried)} blocks, flown for this purpose beside the "
-            "run; they are in none of its statistics. First-order effect: the fraction of the metric’s variance that "
-            "is removed when the contributor is known. Total effect: the fraction that remains when everything else is "
-            f"known. Random draws: noise made in flight, and inputs that only name a draw. {each} Pick-freeze "
-            "estimates (Janon 2014, Jansen 1999)."
+            f"From {count(found.flights)} cases in {count(found.n_tried)} blocks, flown for this purpose and in no "
+            f"other statistic. {each} Pick-freeze estimates (Janon 2014, Jansen 1999)."
         )
     note = (
-        f"Estimated from the table of cases. First-order effect: fraction of the variance due to this input alone. "
-        "Total effect: fraction due to this input and its interactions with others. Unexplained: fraction that the "
-        "surrogate model behind the total effects attributes to no input (random draws in flight, discontinuities); a "
-        f"total effect may be larger by up to it. {each} SRC, PRCC and Spearman: trends with their direction. "
-        "R²: fraction of the variance that the linear regression behind SRC explains."
+        "Estimated from the table of cases. Unexplained: fraction that the surrogate model behind the total effects "
+        "attributes to no input (random draws in flight, discontinuities); a total effect may be larger by up to it. "
+        f"{each} SRC, PRCC and Spearman: trends with their direction. R²: fraction of the variance that the linear "
+        "regression behind SRC explains."
     )
     if found.trends.correlated is not None:
         first, second, rho = found.trends.correlated

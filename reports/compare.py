@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from mc_engine.comparison import CONFIDENCE, Comparison, VerdictChange
 from mc_engine.durable_file import write_durably
-from mc_engine.run_changes import Difference
 from mc_engine.statistics.change_tests import UNKNOWN, Estimate, MetricChange, ShareChange, finite
+from mc_engine.studies.comparison import CONFIDENCE, Comparison, VerdictChange
+from mc_engine.studies.run_changes import Difference
 from reports.comparison_overlays import overlay_blocks
 from reports.contents import blocks
 from reports.document import Block, Card, Cell, Column, Document, FigureBlock, Section, Table, Terms, numbered
-from reports.figures.changes import ChangeDrawing, ChangePanel
+from reports.figures.changes import ChangePanel, change_figure
 from reports.flown import Flown, Run
 from reports.html import render_html
 from reports.numbers import count, number, percent, with_unit, words
@@ -188,7 +188,7 @@ def _figure(found: Comparison, moved: list[MetricChange]) -> FigureBlock:
             f"{words(one.metric, found.units[one.metric])} {number(one.shift_in_sigma.value, 3)} σ" for one in far
         )
         caption += f". Shifts beyond the axis, not drawn: {', '.join(values)}"
-    return FigureBlock(f"{caption}.", ChangeDrawing(names, panels, percent(CONFIDENCE)), "half")
+    return FigureBlock(f"{caption}.", change_figure(names, panels, percent(CONFIDENCE)), "half")
 
 
 def _reach(shifts: list[float]) -> float:

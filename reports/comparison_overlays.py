@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from mc_engine.figures import FootprintFigure, HistoryFigure
+from mc_engine.model.figures import FootprintFigure, HistoryFigure
 from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
 from reports.document import FigureBlock
 from reports.figures.marks import Axis, Band, Line, Panels, Plot, Points, between
@@ -21,19 +21,23 @@ BINNED = "fraction of the cases in each bin"
 HEIGHT = 260.0  # pixels of a panel
 NAMES, COLOURS, SIGNS = ("run A", "run B"), (BLUE, VERMILION), ("circle", "diamond")
 FORM = "Two runs over one another"
+NOISE = 1e-9  # of the range over all saved cases: curves of a smaller one are rounding errors
 TAILS = (0.001, 0.999)  # of both runs, ends of the axis of a distribution
 
 
-def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterator[FigureBlock]:
+def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterator[FigureBlock | str]:
     """Figures of what both runs have; metrics : those whose distributions are drawn, in this order."""
     panels = tuple(panel for name in metrics[:MOST_PANELS] if (panel := _distribution(runs, name)) is not None)
     if panels:
         caption = "Distributions of the metrics that changed, the largest change first."
         yield FigureBlock(caption, Panels(panels, across=3, form=FORM), "small")
-    panels = tuple(_histories(runs))[:MOST_PANELS]
+    drawn = dict(_histories(runs))
+    panels = tuple(one for one in drawn.values() if one is not None)[:MOST_PANELS]
     if panels:
         caption = "Time histories of both runs: of the saved cases, or the nominal case where fewer than 20 are saved."
         yield FigureBlock(caption, Panels(panels, across=3, form=FORM), "half")
+    if noise := [name for name, one in drawn.items() if one is None]:
+        yield f"Not drawn, rounding errors only in both nominal cases: {', '.join(noise)}."
     for figure in (one for one in runs[1].figures if isinstance(one, FootprintFigure)):
         footprint = _footprint(runs, figure)
         if footprint is not None:
@@ -57,13 +61,17 @@ def _distribution(runs: tuple[Flown, Flown], name: str) -> Plot | None:
     return Plot(tuple(marks), Axis(runs[1].axis(name)), Axis("fraction of the cases"), height=HEIGHT)
 
 
-def _histories(runs: tuple[Flown, Flown]) -> Iterator[Plot]:
+def _histories(runs: tuple[Flown, Flown]) -> Iterator[tuple[str, Plot | None]]:
+    """By quantity its panel, None where both curves are nothing beside those of the saved cases."""
     wanted = [name for one in runs[1].figures if isinstance(one, HistoryFigure) for name in one.quantities]
     for name in dict.fromkeys(wanted):
         if all(len(run.histories) and name in run.histories.columns for run in runs):
             marks = [mark for run, flown in enumerate(runs) for mark in _history_marks(run, flown, name)]
             if marks:
-                yield Plot(tuple(marks), Axis("time [s]"), Axis(runs[1].axis(name)), height=HEIGHT)
+                plot = Plot(tuple(marks), Axis("time [s]"), Axis(runs[1].axis(name)), height=HEIGHT)
+                low, high = Plot(tuple(marks), Axis(), Axis(margin=0.0)).ends[1]
+                saved = np.concatenate([run.histories[name].to_numpy(dtype=np.float64) for run in runs])
+                yield name, None if high - low < NOISE * np.ptp(saved[np.isfinite(saved)]) else plot
 
 
 def _history_marks(run: int, flown: Flown, name: str) -> Iterator[Band | Line]:

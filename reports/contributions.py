@@ -6,14 +6,19 @@ it cannot assign to an input is a row of its own.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import ndtri
 
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, sensitivity
-from mc_engine.store import SENSITIVITY, Store, is_run_directory, open_store
-from reports.flown import Flown
+from mc_engine.store.opening import open_store
+from mc_engine.store.run_files import SENSITIVITY, is_run_directory
+from mc_engine.store.store import Store
+
+if TYPE_CHECKING:
+    from reports.flown import Flown
 
 UNEXPLAINED = "unexplained"
 MOST_METRICS = 8
@@ -65,7 +70,7 @@ class Contributions:
             yield from found
 
 
-def contributions(flown: Flown) -> Contributions | None:
+def contributions(flown: "Flown") -> Contributions | None:
     """Contributions to the metrics that matter; None where neither a companion nor a random table tells them."""
     store, metrics = companion_of(flown), flown.key_metrics[:MOST_METRICS]
     if store is not None:
@@ -73,7 +78,7 @@ def contributions(flown: Flown) -> Contributions | None:
     return _of_table(flown, metrics) if flown.random and flown.n_held >= FEWEST_CASES else None
 
 
-def companion_of(flown: Flown) -> Store | None:
+def companion_of(flown: "Flown") -> Store | None:
     """The flights beside the run, if all of them are there."""
     path = getattr(flown.run, "path", None)  # a Run of tests has none
     if path is None or not is_run_directory(path / SENSITIVITY):
@@ -82,7 +87,7 @@ def companion_of(flown: Flown) -> Store | None:
     return None if store.missing() else store
 
 
-def _of_companion(flown: Flown, store: Store, metrics: list[str]) -> Contributions:
+def _of_companion(flown: "Flown", store: Store, metrics: list[str]) -> Contributions:
     record = store.manifest["sensitivity"]
     layout = layout_of(record)
     cases = store.cases(["case_id", *metrics])
@@ -98,7 +103,7 @@ def _of_companion(flown: Flown, store: Store, metrics: list[str]) -> Contributio
     return Contributions(by_metric, len(cases), used, found.n_tried, members)
 
 
-def _of_table(flown: Flown, metrics: list[str]) -> Contributions | None:
+def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
     if not flown.inputs:
         return None
     rows = np.arange(flown.n_held)[:: -(-flown.n_held // MOST_ROWS)]
@@ -118,7 +123,7 @@ def _of_table(flown: Flown, metrics: list[str]) -> Contributions | None:
 
 
 def _ranked(
-    flown: Flown,
+    flown: "Flown",
     metric: str,
     names: Sequence[str],
     first: np.ndarray,

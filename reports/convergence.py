@@ -69,7 +69,7 @@ def _what(run: RunningEstimate) -> str:
 
 def _table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
     columns = (
-        Column("Metric", "text", 2.6),
+        Column("Metric", "text", 2.6, grouped=True),
         Column("Estimate", "text", 1.5),
         Column("From half the cases", "number", 1.7),
         Column("From the sample" if flown.sampled else "From all", "number", 1.9),

@@ -6,7 +6,7 @@ from itertools import compress
 import contourpy
 import numpy as np
 
-from mc_engine.figures import CorridorFigure
+from mc_engine.model.figures import CorridorFigure
 from mc_engine.statistics import SurfaceMap, Verdict, map_metric
 from reports.document import FigureBlock, Table
 from reports.drawings import nominal_point, thinned_rows
@@ -55,17 +55,12 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
         nominal=nominal_point(flown, figure.x, figure.y),
         columns=(figure.x, figure.y),
     )
+    if not drawing.limits and not violated.any():
+        return f"{figure.title}: not drawn; all cases are {inside_words(flown, verdicts)}."
     missing = flown.n_held - used.size
     lost = f" {count(missing)} of {count(flown.n_held)} cases have no values to draw." if missing else ""
-    return FigureBlock(f"{figure.title}.{_limits_said(flown, drawing.limits, verdicts)}{lost}", drawing, "wide")
-
-
-def _limits_said(flown: Flown, limits: tuple[LimitLine, ...], verdicts: list[Verdict]) -> str:
-    if limits:
-        return ""
-    if all(verdict.passed == verdict.tried for verdict in verdicts):
-        return f" All cases are {inside_words(flown, verdicts)}."
-    return " No limit is drawn: none of them is decided by the two columns alone."
+    said = "" if drawing.limits else " No limit is drawn: none of them is decided by the two columns alone."
+    return FigureBlock(f"{figure.title}.{said}{lost}", drawing, "wide")
 
 
 def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[list[str], np.ndarray]:

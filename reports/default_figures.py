@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mc_engine.figures import HistoryFigure, ProfileFigure, ScatterFigure
+from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
 from reports.flown import Flown
 
 MOST_SCATTERS = 4

@@ -49,9 +49,9 @@ def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureB
 
 
 def _figure(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:
-    by_metric = [(found.metrics[k], names[found.metrics[k]], _contributors(found, int(k))) for k in shown]
+    by_metric = [(names[found.metrics[k]], _contributors(found, int(k))) for k in shown]
     source = f"from {count(int(found.n_used[shown].min()))} of {count(found.n_tried)} blocks of the design"
-    return contributor_figure(flown, by_metric, source, "rest: interactions, random draws")
+    return contributor_figure(flown, by_metric, source)
 
 
 def _contributors(found: DesignedIndices, k: int) -> list[Contributor]:
@@ -69,7 +69,7 @@ def _contributors(found: DesignedIndices, k: int) -> list[Contributor]:
 def _table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str], main: str) -> Table:
     indices = list(found.values)
     columns = (
-        Column("Metric", "text", 2.2),
+        Column("Metric", "text", 2.2, grouped=True),
         Column("Input", "text", 2.4),
         *(Column(_TITLES[index], "number", 1.6) for index in indices),
     )

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mc_engine.statistics.input_columns import average_ranks
 from reports.document import FigureBlock
 from reports.figures.correlations import correlation_matrix
 from reports.figures.marks import Panels
@@ -50,18 +51,16 @@ def rank_correlations(table: np.ndarray) -> tuple[np.ndarray, int]:
 
     A pair is over the cases that have both numbers.
     """
-    from scipy.stats import rankdata
-
     n = len(table)
     rho, fewest = np.eye(n), table.shape[1]
     finite = np.isfinite(table)
-    whole = [rankdata(row) if good.all() else None for row, good in zip(table, finite, strict=True)]
+    whole = [average_ranks(row) if good.all() else None for row, good in zip(table, finite, strict=True)]
     for i, k in zip(*np.tril_indices(n, -1), strict=True):
         both = finite[i] & finite[k]
         fewest = min(fewest, int(both.sum()))
         a, b = whole[i], whole[k]
         if a is None or b is None:
-            a, b = (rankdata(table[row][both]) for row in (i, k))
+            a, b = (average_ranks(table[row][both]) for row in (i, k))
         enough = a.size >= FEWEST_CASES and a.std() > 0.0 and b.std() > 0.0
         rho[i, k] = rho[k, i] = np.corrcoef(a, b)[0, 1] if enough else np.nan
     return rho, fewest

@@ -47,11 +47,15 @@ class Cell:
 
 @dataclass(frozen=True)
 class Column:
-    """kind: "text", "name" (a column name), "code" or "number"; width: relative, on paper."""
+    """kind: "text", "name" (a column name), "code" or "number"; width: relative, on paper.
+
+    grouped : of a first column, whether equal cells in consecutive rows are shown once.
+    """
 
     title: str
     kind: str = "text"
     width: float = 0.0
+    grouped: bool = False
 
 
 @dataclass(frozen=True)
@@ -120,7 +124,7 @@ class CaseData:
     """Cases that an interactive page can look up: all, or those drawn, the worst, and those that did not pass.
 
     outcome : per case an index into `outcomes`.  axes : names of the two columns that the figure of cases starts with.
-    histories : by case, then quantity, its times [s] and values; quantities : label by name; the nominal is case -1.
+    histories : by case, then quantity, its times and values; time, quantities : their labels; the nominal is case -1.
     """
 
     n_tried: int
@@ -129,6 +133,7 @@ class CaseData:
     outcomes: tuple[str, ...]
     columns: tuple[CaseColumn, ...]
     axes: tuple[str, str] | None
+    time: str
     quantities: dict[str, str]
     histories: dict[int, dict[str, tuple[Any, Any]]]
     histories_left_out: int = 0

@@ -7,7 +7,7 @@ from math import ceil
 
 import numpy as np
 
-from mc_engine.figures import MapFigure, ScatterFigure
+from mc_engine.model.figures import MapFigure, ScatterFigure
 from mc_engine.statistics import map_metric
 from mc_engine.statistics.maps import FEWEST, LEAST_EXPLAINED, explained_share
 from mc_engine.statistics.summary import nearly_equal
@@ -98,8 +98,7 @@ def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
         nominal=nominal_point(flown, figure.x, figure.y),
         columns=(figure.x, figure.y, figure.metric),
     )
-    caption = figure.title if surface.exact else f"{figure.title}. Blank where the cases do not support a surface."
-    return FigureBlock(caption, drawing, "wide")
+    return FigureBlock(f"{figure.title}.", drawing, "wide")
 
 
 def _too_little_explained(flown: Flown, figure: MapFigure, share: float) -> str:
@@ -302,11 +301,6 @@ def _envelope_words(flown: Flown, drawn: Histories) -> Iterator[str]:
         )
     elif flown.random:
         yield f"Envelopes need {FEWEST_CASES} saved cases from case 0 on: `first = {FEWEST_CASES}` under [retention]."
-    if drawn.limits:
-        yield (
-            "A limit is drawn where the requirement’s metric is the largest or smallest value of the quantity, as the "
-            "saved histories confirm."
-        )
 
 
 def is_constant(values: np.ndarray) -> bool:

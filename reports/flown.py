@@ -3,21 +3,20 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from mc_engine.figures import KINDS, MapFigure, ScatterFigure, from_record
+from mc_engine.model.figures import KINDS, MapFigure, ScatterFigure, from_record
 from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, was_looked_at
 from mc_engine.statistics.contributors import Contributor, contributors
 from mc_engine.statistics.worst import Limits, limits_on
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
 from reports.all_cases import Run, all_cases, without_attributes
+from reports.contributions import Contributions
+from reports.contributions import contributions as contributions_of
 from reports.numbers import axis_label, count, named, words
-
-if TYPE_CHECKING:
-    from reports.contributions import Contributions
 
 
 @dataclass(frozen=True)
@@ -271,11 +270,9 @@ class Flown:
         return [Contributor(name, one.size) for one in rows for name in found.members[one.input] if name in inputs]
 
     @cached_property
-    def contributions(self) -> "Contributions | None":
+    def contributions(self) -> Contributions | None:
         """Shares of the variance of the metrics that matter, by input and random draws."""
-        from reports.contributions import contributions
-
-        return contributions(self)
+        return contributions_of(self)
 
     def status_text(self, status: str) -> str:
         """The sentence behind a status word: the run's own, or this engine's."""

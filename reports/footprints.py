@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mc_engine.figures import FootprintFigure
+from mc_engine.model.figures import FootprintFigure
 from mc_engine.statistics import clopper_pearson, summarize
 from mc_engine.statistics.footprint import Footprint
 from mc_engine.statistics.regions import DensityRegion, Ellipse, next_case_scale
@@ -20,8 +20,7 @@ from reports.numbers import count, counted, interval, number, percent
 
 DRAWN_REGION = 0.9  # content of the one region in the figure; more would hide the ellipses
 DISTANCES = (0.5, 0.9, 0.99)
-CONFIDENCE_INSIDE = 0.95
-LONG = 4.0
+LONG = 12.0  # times its width, a cloud is also drawn with a scale of its own across
 PLACES_IN_A_FILE = 20_000
 KILOMETRES = {"km": 1.0, "m": 1e-3}
 CORNERS = 120  # of a circle
@@ -200,35 +199,36 @@ def _region_table(flown: Flown, landing: Landing) -> Table:
         Column("Semi-axes [km]", "number", 1.6),
         Column("Long axis [° from north]", "number", 1.2),
     )
-    rows = tuple(_region_row(region) for region in found.all_regions)
+    rows = tuple(_region_row(region, flown.stated.confidence) for region in found.all_regions)
     n = found.ellipses[0].n
     bigger = f"; the next case lies with 99 % in one of k = {next_case_scale(0.99, n):.3f}" if n > 3 else ""
     note = (
-        "Ellipses: covariance of the cases in the plane about the mean impact point, scaled by k = √(−2 ln(1 − P)), "
-        f"χ² with two degrees of freedom: P of a normal distribution of known covariance{bigger}. Fraction inside: "
-        f"counted, with its {percent(CONFIDENCE_INSIDE)} Clopper–Pearson interval; where that interval excludes the "
-        "stated content, the distribution is not normal. Distribution-free regions assume nothing but independent "
-        "draws: a level of a smoothed density of every second case, set by the ranks of the others. Lengths are "
-        f"geodesics through the mean impact point, the farthest case {number(found.reach / 1000.0, 3)} km from it; "
-        f"across that direction the plane stretches them by at most {percent(found.plane.stretch(found.reach), 3)}."
+        "Ellipses: covariance of the cases in the plane about the mean impact point, scaled by k = √(−2 ln(1 − P)) for "
+        f"the content P of a normal distribution of known covariance{bigger}. Fraction inside: counted, with its "
+        f"{percent(flown.stated.confidence)} Clopper–Pearson interval; where that excludes the stated content, the "
+        "distribution is not normal. Lengths are geodesics through the mean impact point, the farthest case "
+        f"{number(found.reach / 1000.0, 3)} km from it; across them the plane stretches by at most "
+        f"{percent(found.plane.stretch(found.reach), 3)}."
     )
     return Table(
         f"Regions of the {count(landing.rows.size)} of {count(flown.n_held)} cases that came down", columns, rows, note
     )
 
 
-def _region_row(region: Ellipse | DensityRegion) -> tuple[Cell, ...]:
+def _region_row(region: Ellipse | DensityRegion, confidence: float) -> tuple[Cell, ...]:
     share = region.inside / region.n
-    low, high = clopper_pearson(region.inside, region.n, CONFIDENCE_INSIDE)
+    low, high = clopper_pearson(region.inside, region.n, confidence)
     inside = (
         Cell(f"{count(region.inside)} / {count(region.n)}", region.inside),
         Cell(percent(share), share, f"[{percent(low)}, {percent(high)}]"),
     )
     if isinstance(region, DensityRegion):
-        stated = Cell(percent(region.content), region.content, f"with {percent(region.confidence)} confidence")
         return (
-            Cell("distribution-free region", small=_parts(len(region.outlines))),
-            stated,
+            Cell(
+                "distribution-free region",
+                small=f"{_parts(len(region.outlines))}, {percent(region.confidence)} confidence",
+            ),
+            Cell(percent(region.content), region.content),
             *inside,
             Cell("–"),
             Cell("–"),

@@ -74,14 +74,28 @@ GLOSSARY = Terms(
             "distribution: half of the cases draw it, the other half set its size.",
         ),
         (
+            "limit in a time history",
+            "Drawn where the metric of the requirement is the largest or smallest value of the quantity in the saved "
+            "histories.",
+        ),
+        (
             "comparison of options",
             "Cases that differ in one option and have all other inputs in common are pairs; differences within pairs "
             "are free of the scatter of the draws.",
         ),
         (
             "first-order effect",
-            "First-order Sobol’ index: the fraction of a metric’s variance that is due to the input alone, estimated "
-            "from bins of the flown cases. SRC, PRCC and Spearman measure trends only, and give their direction.",
+            "First-order Sobol’ index: the fraction of a metric’s variance that is due to the contributor alone, which "
+            "is removed when it is known. SRC, PRCC and Spearman measure trends only, and give their direction.",
+        ),
+        (
+            "total effect",
+            "Total Sobol’ index: the fraction of a metric’s variance that is due to the contributor and its "
+            "interactions with others, which remains when everything else is known.",
+        ),
+        (
+            "random draws",
+            "Noise made in flight, and inputs that only name a draw, such as the number of a day’s weather.",
         ),
         (
             "contributor to failures",
@@ -89,15 +103,21 @@ GLOSSARY = Terms(
             "among all that were tested. A difference, not a proof of a cause.",
         ),
         (
+            "worst cases",
+            "Those with the smallest margin to the nearest limit; of a metric without a requirement, the largest. The "
+            "tables show the inputs that contribute most.",
+        ),
+        (
             "map",
             "The surface is exact where a full grid was flown; else it is smoothed from scattered cases by a local "
-            "quadratic regression. Its error is one standard deviation: the scatter of the cases, and the bias where "
-            "the surface bends. Blank outside the cases.",
+            "quadratic regression on as many of the nearest cases as cross-validation finds best. Its error is one "
+            "standard deviation: the scatter of the cases, and the bias where the surface bends. Blank where the cases "
+            "do not support a surface.",
         ),
         (
             "1σ budget",
-            "The contribution of each input to the σ of a metric: √(first-order effect) × σ. Their root sum square "
-            "is below σ by what interactions, or draws that are no input, add.",
+            "1σ contribution: √(first-order effect) × σ of the metric, where the effect is more than noise. The root "
+            "sum square of all contributions is below σ by what interactions and unexplained draws add.",
         ),
         (
             "circular error probable (CEP)",

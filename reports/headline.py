@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from mc_engine.figures import MapFigure
+from mc_engine.model.figures import MapFigure
 from mc_engine.shell_words import shell_word
 from mc_engine.statistics import Summary, Verdict
 from mc_engine.statistics.worst import Limits

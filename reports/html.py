@@ -104,7 +104,7 @@ def case_record(document: Document) -> dict[str, Any] | None:
     cases = document.cases
     if cases is None:
         return None
-    clouds, panel = screen.outcome_clouds(cases.outcomes), screen.history_panel()
+    clouds, panel = screen.outcome_clouds(cases.outcomes), screen.history_panel(cases.time)
     return {
         "tried": cases.n_tried,
         "ids": screen.typed(cases.ids, "f8") if (np.diff(cases.ids) > 1).any() else [int(cases.ids[0]), cases.ids.size],

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mc_engine.figures import FootprintFigure
+from mc_engine.model.figures import FootprintFigure
 from mc_engine.statistics.footprint import Footprint, footprint
 from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, LocalPlane
 from reports.flown import Flown

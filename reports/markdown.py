@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator
 
-from mc_engine.derived_files import FIGURES
+from mc_engine.store.derived_files import FIGURES
 from reports.document import (
     Attachment,
     Block,

@@ -13,6 +13,7 @@ MOST_DIGITS = 8  # of one number in a table
 LONGEST_SYMBOL = 3  # letters
 LONGEST_LABEL = 44  # letters of an axis label, without its unit
 _ROUNDING = 1e-12  # of the size of two numbers: closer ones count as equal
+_NEGLIGIBLE = 1e-6  # of a spread
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
@@ -29,14 +30,14 @@ def counted(number: int, noun: str) -> str:
 def number(value: float | None, digits: int = 5, scale: float | None = None) -> str:
     """`value` to `digits` significant digits, or to three digits of `scale` (a spread) if that is finer.
 
-    None is a dash.  Very large and very small values are written as powers of ten.
+    None is a dash; what is nothing beside the scale is 0.  Very large and very small values are powers of ten.
     """
     if value is None:
         return "–"
     value = float(value)
     if not isfinite(value):
         return "not a number" if value != value else ("∞" if value > 0 else "−∞")
-    if value == 0.0:
+    if value == 0.0 or (scale is not None and abs(value) < _NEGLIGIBLE * scale):
         return "0"
     if not 1e-4 <= abs(value) < 1e7:
         mantissa, exponent = f"{value:.{max(digits - 2, 2)}e}".split("e")

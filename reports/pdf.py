@@ -13,7 +13,7 @@ from typing import Any
 import typst
 
 from mc_engine.errors import EngineError
-from reports.columns import widths
+from reports.columns import spans, widths
 from reports.document import Block, Document, FigureBlock, Table, Terms, Text
 from reports.figures import paper
 
@@ -103,7 +103,7 @@ def _block(block: Block, width: float = paper.WIDTH) -> dict[str, Any]:
         body = asdict(block)
         body["style"] = body.pop("kind", "")  # of a text; "kind" says which block it is
         if isinstance(block, Table):
-            body["widths"] = widths(block)
+            body |= {"widths": widths(block), "spans": spans(block)}
     return {"kind": KINDS[type(block)], **body}
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pandas as pd
 
-from mc_engine.figures import ProfileFigure
+from mc_engine.model.figures import ProfileFigure
 from reports.document import FigureBlock
 from reports.drawings import COLOURED_OVER_BANDS, history_cases, history_line
 from reports.figures import ProfileBand, ProfileDrawing
@@ -31,7 +31,7 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
     if missing:
         return f"{figure.title}: not drawn; the histories have no quantity {missing[0]}."
     if not np.isfinite(flown.histories[names].to_numpy(dtype=np.float64)).all(axis=1).any():
-        return f"{figure.title}: not drawn; no retained case has both {figure.x} and {figure.y}."
+        return f"{figure.title}: not drawn; no saved case has both {figure.x} and {figure.y}."
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
     found = profile_bands(flown.histories, fair, figure.x, figure.y)
     bands = found if isinstance(found, tuple) else ()
@@ -70,7 +70,7 @@ def profile_bands(histories: pd.DataFrame, case_ids: Sequence[int], x: str, y: s
     straight line.  Closed and oscillating curves have no band: they are at a level more often than once.
     """
     if len(case_ids) < FEWEST_CASES:
-        return f"Bands need {FEWEST_CASES} retained cases, numbered from 0 on"
+        return f"Bands need {FEWEST_CASES} saved cases, numbered from 0 on"
     chosen = histories[histories["case_id"].isin(case_ids)].sort_values(["case_id", "t_s"], kind="stable")
     table = chosen[["case_id", x, y]].to_numpy(dtype=np.float64)
     table = table[np.isfinite(table).all(axis=1)]

@@ -1,6 +1,6 @@
 """Where the numbers come from: versions, digests, seed, machine kind and timing, enough to make them again."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from reports.document import Cell, Column, Table
@@ -11,33 +11,43 @@ TIMED_EVENTS = ("timing", "finished")
 
 
 def provenance_table(flown: Flown) -> Table:
-    """Everything the manifest says of its own making, a line each."""
-    columns = (Column("What", "text", 1.6), Column("Value", "code", 4.0))
-    rows = tuple((Cell(what), Cell(text)) for what, text in _facts(flown) if text)
-    return Table("Provenance of the run", columns, rows)
+    """That of a run."""
+    campaign = flown.campaign
+    cases = f"{count(flown.n_tried)} / {count(flown.n_wanted)}"
+    own = [("design", flown.design), ("seed", campaign.get("seed", "")), ("cases flown / required", cases)]
+    return origin_table("run", flown.name, flown.manifest, own, timing_facts(flown))
 
 
-def _facts(flown: Flown) -> Iterator[tuple[str, str]]:
-    manifest, campaign = flown.manifest, flown.campaign
-    model, made = manifest.get("model", {}), manifest.get("provenance", {})
-    yield "run directory", flown.name
-    yield "run started (UTC)", str(manifest.get("created_utc", ""))
-    yield "engine", str(manifest.get("engine", ""))
-    yield "campaign", str(campaign.get("name", ""))
-    yield "campaign digest", str(campaign.get("digest", ""))
-    yield "model", str(campaign.get("model", "") or model.get("name", ""))
-    yield "model source digest", str(model.get("digest", ""))
-    yield "published source", str(model.get("source", ""))
-    yield "design", flown.design
-    yield "seed", str(campaign.get("seed", ""))
-    yield "seed contract", str(manifest.get("seed_contract", ""))
-    yield "cases flown / required", f"{count(flown.n_tried)} / {count(flown.n_wanted)}"
-    yield "git", git_text(made.get("git"))
-    for key in ("python", "platform", "cpu", "numba", "llvm"):
-        yield key, str(made.get(key, ""))
-    packages = made.get("packages", {})
-    yield "packages", ", ".join(f"{name} {version}" for name, version in sorted(packages.items()))
-    yield from timing_facts(flown)
+def origin_table(
+    what: str,
+    name: str,
+    manifest: Mapping[str, Any],
+    own: Iterable[tuple[str, Any]],
+    more: Iterable[tuple[str, Any]] = (),
+) -> Table:
+    """Everything a manifest says of its own making, a line each.  own, more : facts of this kind of result alone."""
+    campaign, model, made = (manifest.get(part, {}) for part in ("campaign", "model", "provenance"))
+    facts = (
+        ("directory", name),
+        ("started (UTC)", manifest.get("created_utc", "")),
+        ("engine", manifest.get("engine", "")),
+        ("campaign", campaign.get("name", "")),
+        ("campaign digest", campaign.get("digest", "")),
+        ("model", campaign.get("model", "") or model.get("name", "")),
+        ("model source digest", model.get("digest", "")),
+        ("published source", model.get("source", "")),
+        *own,
+        ("seed contract", manifest.get("seed_contract", "")),
+        ("git", git_text(made.get("git"))),
+        *((key, made.get(key, "")) for key in ("python", "platform", "cpu", "numba", "llvm")),
+        (
+            "packages",
+            ", ".join(f"{package} {version}" for package, version in sorted(made.get("packages", {}).items())),
+        ),
+        *more,
+    )
+    rows = tuple((Cell(label), Cell(str(value))) for label, value in facts if str(value))
+    return Table(f"Provenance of the {what}", (Column("What", "text", 1.6), Column("Value", "code", 4.0)), rows)
 
 
 def git_text(git: Mapping[str, Any] | None) -> str:

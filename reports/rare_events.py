@@ -5,19 +5,20 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.rare_event_folder import RareEventRecord
+from mc_engine.studies.rare_event_folder import RareEventRecord
 from reports.contents import blocks
 from reports.document import Block, Card, Cell, Column, Document, FigureBlock, Section, Table, Terms, Text, numbered
 from reports.figures.marks import Axis, Limit, Line, Mark, Panels, Plot, Points, nominal_ring
 from reports.figures.palette import BLUE, INK, PAPER, SKY, VERMILION
 from reports.numbers import SPACE, axis_label, count, exact, named, number, percent, with_unit, words
-from reports.provenance import git_text
+from reports.provenance import origin_table
+from reports.tables import dispersed_table
 
 MOST_POINTS = 2000  # of a kind
 METHODS = {
     "subset": "subset simulation",
     "cross-entropy": "importance sampling by cross entropy",
-    "plain": "plain cases, counted",
+    "plain": "plain Monte Carlo",
 }
 GLOSSARY = Terms(
     (
@@ -28,19 +29,20 @@ GLOSSARY = Terms(
         ),
         (
             "subset simulation",
-            "Cases are led to the failures in levels. The tenth that is nearest to the limit starts chains of cases "
-            "that may step anywhere but back; the probability is the product of the fractions. Several runs are made "
-            "in parallel, and the interval comes from their scatter. Au & Beck (2001); Papaioannou and others (2015).",
+            "The tenth of the cases of a level with the smallest margins starts Markov chains, which give the cases of "
+            "the next level. The probability is the product of the fractions. Several runs are made, and the interval "
+            "comes from their scatter. Au & Beck (2001); Papaioannou and others (2015).",
         ),
         (
             "cross entropy",
-            "Cases are drawn where failures are, from a density found in levels, and each counts for as much as the "
-            "dispersions give it. The interval is that of the last, fresh cases. Papaioannou, Geyer & Straub (2019).",
+            "Importance sampling: cases are drawn where failures are, from a density fitted in levels, and weighted by "
+            "the density of the dispersions over it. The interval is that of the last level. Papaioannou, Geyer & "
+            "Straub (2019).",
         ),
         (
-            "noise in the flight",
-            "Where the model draws noise, the probability is over inputs and noise together, as with plain cases: "
-            "chains draw the noise of a flight anew in half of their steps and keep it in the others.",
+            "noise in flight",
+            "Where the model draws noise, the probability is over inputs and noise together: chains draw the noise of "
+            "a case anew in half of their steps and keep it in the others.",
         ),
         (
             "sigma",
@@ -49,12 +51,8 @@ GLOSSARY = Terms(
         ),
         (
             "likeliest failed case",
-            "Of all failed cases the one nearest to the middle of all dispersions together: the design point. Across: "
+            "The design point: of all failed cases the one nearest to the medians of all dispersions together. Across: "
             "the nearest one on the other side.",
-        ),
-        (
-            "plain cases",
-            "How many independent draws from the dispersions would have the same standard error.",
         ),
     )
 )
@@ -65,9 +63,9 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
     campaign, result = record.record["campaign"], record.result
     sections = (
         Section("failures", "Failures", blocks(_failures(record))),
-        Section("levels", "How it was reached", _levels(result)),
-        Section("inputs", "Dispersed inputs", (_inputs(record.record["inputs"]),)),
-        Section("provenance", "Provenance", (_provenance(record, name),)),
+        Section("levels", "Levels of the estimate", _levels(result)),
+        Section("inputs", "Dispersed inputs", (dispersed_table(record.record["inputs"], "Dispersed inputs"),)),
+        Section("provenance", "Provenance", (origin_table("estimate", name, record.record, _asked(record)),)),
         Section("reading", "Glossary", (GLOSSARY,)),
     )
     return numbered(
@@ -86,17 +84,31 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
 
 
 def _sentence(result: dict[str, Any]) -> str:
-    limits = _limits(result)
+    event = f"P({_event(result)})"
     if not result["probability"]:
-        return f"No case failed: the limit {limits} is not met with a probability below {number(result['upper'], 4)}."
-    return f"The limit {limits} is not met with a probability of {number(result['probability'], 4)}."
+        return f"No case failed: {event} < {number(result['upper'], 3)}. Requirement {_judged(result)[0]}."
+    return f"{event} = {number(result['probability'], 3)} ({_interval(result)}). Requirement {_judged(result)[0]}."
 
 
-def _limits(result: dict[str, Any]) -> str:
+def _event(result: dict[str, Any]) -> str:
+    """What the probability is of: the metric beyond a limit."""
     one, unit = result["requirement"], result["metric"]["unit"]
-    found = [("at least", one["at_least"]), ("at most", one["at_most"])]
-    texts = [f"{word} {with_unit(exact(limit), unit)}" for word, limit in found if limit is not None]
-    return f"{one['metric']} {' and '.join(texts)}"
+    name = words(one["metric"], unit)
+    found = [("<", one["at_least"]), (">", one["at_most"])]
+    return " or ".join(f"{name} {sign} {with_unit(exact(limit), unit)}" for sign, limit in found if limit is not None)
+
+
+def _interval(result: dict[str, Any]) -> str:
+    ends = f"{number(result['lower'], 3)} to {number(result['upper'], 3)}"
+    return f"{percent(result['confidence'])} confidence interval {ends}"
+
+
+def _judged(result: dict[str, Any]) -> tuple[str, str]:
+    """The verdict and its tone."""
+    allowed = 1.0 - result["requirement"]["share"]
+    if result["upper"] <= allowed:
+        return "met", "good"
+    return ("not met", "bad") if result["lower"] > allowed else ("open", "open")
 
 
 def _facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
@@ -114,18 +126,12 @@ def _facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
 def _verdict(result: dict[str, Any]) -> Card:
     allowed = 1.0 - result["requirement"]["share"]
     source = f" Source: {result['requirement']['source']}." if result["requirement"]["source"] else ""
-    interval = f"{percent(result['confidence'])} interval {number(result['lower'], 4)} to {number(result['upper'], 4)}"
-    if result["upper"] <= allowed:
-        answer, tone = "met", "good"
-    elif result["lower"] > allowed:
-        answer, tone = "not met", "bad"
-    else:
-        answer, tone = "open", "open"
+    answer, tone = _judged(result)
     return Card(
         label=result["requirement"]["name"],
         answer=answer,
-        detail=f"Probability of failure {number(result['probability'], 4)}, {interval}; allowed: "
-        f"{number(allowed, 4)}.{source}",
+        detail=f"Probability of failure {number(result['probability'], 3)}, {_interval(result)}; allowed: "
+        f"{number(allowed, 3)}.{source}",
         tone=tone,
     )
 
@@ -135,16 +141,16 @@ def _costs(result: dict[str, Any]) -> Iterator[Card]:
     yield Card(
         label="standard error",
         answer="none" if error is None else percent(error, 1),
-        detail="of the probability; the interval reaches a fifth further than this error asks for."
+        detail="of the probability; the interval is a fifth wider than this error gives."
         if result["method"] != "plain"
-        else "of the probability; the interval is the exact one of a count.",
+        else "of the probability; the interval is Clopper and Pearson’s.",
     )
     plain = result["plain_cases"]
     if plain is not None and result["method"] != "plain":
         yield Card(
             label="cases",
             answer=count(result["cases"]),
-            detail=f"{number(plain, 3)} independent cases would give the same standard error: "
+            detail=f"Plain Monte Carlo needs {number(plain, 3)} for the same standard error, "
             f"{number(plain / result['cases'], 3)} times as many.",
         )
 
@@ -162,7 +168,7 @@ def _failures(record: RareEventRecord) -> Iterator[FigureBlock | Table | str | N
 
 
 def _main_inputs(result: dict[str, Any]) -> list[dict[str, Any]]:
-    """The inputs, the one whose failed cases lie farthest from its middle first."""
+    """The inputs, the one whose failed cases lie farthest from its median first."""
     return sorted(result["inputs"], key=lambda one: -abs(one["likeliest_sigma"]))
 
 
@@ -190,8 +196,8 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
     axes = (Axis(axis_label(named(words(one["name"], one["unit"]), one["description"]), one["unit"])) for one in shown)
     x_axis, y_axis = axes
     caption = (
-        "Failed cases over the two inputs in which they lie farthest from the middle. Where the method explored, cases "
-        "are denser than the dispersions would draw them; their weights tell how probable they are."
+        "Failed cases over the two inputs in which they lie farthest from the median. They are denser than the "
+        "dispersions draw them; their weights give their probabilities."
     )
     plot = Plot(tuple(marks), x_axis, y_axis, height=420.0)
     return FigureBlock(caption, Panels((plot,), form="Failed cases over two inputs"), "wide")
@@ -214,7 +220,7 @@ def _input_table(result: dict[str, Any]) -> Table:
             sigma = one[f"{what}_sigma"]
             cells.append(Cell(number(one[what], 5), one[what], small=f"{number(sigma, 3)}{SPACE}σ"))
         rows.append((label, *cells))
-    note = "Farthest from its middle first. Mean and spread are over the failed cases by weight."
+    note = "Weighted mean and spread of the failed cases; the input farthest from its median first."
     return Table("Failed cases by input", tuple(columns), tuple(rows), note)
 
 
@@ -222,7 +228,7 @@ def _levels(result: dict[str, Any]) -> tuple[Block, ...]:
     shown = [one for one in result["levels"] if one["margin"] is not None]
     found: list[Block] = [_level_table(result)]
     if shown and result["probability"] and result["method"] != "plain":
-        found.append(FigureBlock("Probability over the margin to the limit, level by level", _tail(result, shown)))
+        found.append(FigureBlock("Probability over the margin to the limit, level by level.", _tail(result, shown)))
     chains = result["method"] == "subset"
     return (Text((_level_words(chains),)), *found) if result["method"] != "plain" else tuple(found)
 
@@ -235,26 +241,27 @@ def _tail(result: dict[str, Any], shown: list[dict[str, Any]]) -> Panels:
         Limit(0.0, "x", INK, "limit", width=1.0),
         Line(margin, probability, BLUE, "levels", width=2.0, key="levels"),
         Points(margin, probability, BLUE, "levels", size=6.0),
-        Points(np.zeros(1), p, VERMILION, "not met", size=8.0, y_ends=(lower, upper), key="not met, with its interval"),
+        Points(
+            np.zeros(1), p, VERMILION, "not met", size=8.0, y_ends=(lower, upper), key="P(failure) with its interval"
+        ),
     )
     x = Axis(axis_label("margin", result["metric"]["unit"]), reach=Axis().ends([margin, np.zeros(1)])[::-1])
     words = (
         f"The probability falls over {margin.size} levels as the margin falls to zero, where it is "
         f"{number(p[0], 4)}, interval {number(lower[0], 4)} to {number(upper[0], 4)}."
     )
-    return Panels((Plot(marks, x, Axis("probability of being nearer", log=True), height=340.0),), words)
+    return Panels((Plot(marks, x, Axis("P(smaller margin)", log=True), height=340.0),), words)
 
 
 def _level_words(chains: bool) -> str:
     if chains:
         return (
-            "Level 0 holds plain cases. Each further level explores what lies at or below its margin with chains; "
-            "accepted is the fraction of their steps that did not lead back."
+            "Level 0 is plain Monte Carlo. Each further level samples the cases at or below its margin with Markov "
+            "chains. Accepted: fraction of the chains’ steps that were accepted."
         )
     return (
         "Each level is drawn from the density fitted to the level before. Its margin is the median of the cases that "
-        "the next density is fitted to; accepted is the effective fraction of these. The last level is the fresh cases "
-        "that the estimate rests on."
+        "the next density is fitted to. Accepted: effective fraction of these. The estimate is from the last level."
     )
 
 
@@ -281,38 +288,9 @@ def _level_table(result: dict[str, Any]) -> Table:
     return Table("Levels", columns, tuple(rows))
 
 
-def _inputs(records: list[dict[str, Any]]) -> Table:
-    columns = (Column("Input", "name", 2.4), Column("Distribution", "text", 2.6), Column("Source", "text", 3.0))
-    rows = tuple(
-        (
-            Cell(axis_label(one["name"], one["unit"]), small=one["description"]),
-            Cell(", ".join(text for text in (one["distribution"], one["bounds"]) if text)),
-            Cell(one["source"] or "not stated"),
-        )
-        for one in records
-    )
-    return Table("Dispersed inputs", columns, rows)
-
-
-def _provenance(record: RareEventRecord, name: str) -> Table:
-    manifest, asked = record.record, record.result["asked"]
-    campaign, model, made = manifest["campaign"], manifest["model"], manifest.get("provenance", {})
-    packages = made.get("packages", {})
-    facts = [
-        ("directory", name),
-        ("started (UTC)", manifest.get("created_utc", "")),
-        ("engine", manifest.get("engine", "")),
+def _asked(record: RareEventRecord) -> tuple[tuple[str, Any], ...]:
+    asked = record.result["asked"]
+    return (
         ("configured", f"{asked['method']}, {asked['cases_per_level']} cases per level"),
-        ("campaign", campaign["name"]),
-        ("campaign digest", campaign["digest"]),
-        ("model", campaign["model"]),
-        ("model source digest", model["digest"]),
-        ("published source", model["source"]),
-        ("seed", campaign["seed"]),
-        ("seed contract", manifest.get("seed_contract", "")),
-        ("git", git_text(made.get("git"))),
-        *((key, made.get(key, "")) for key in ("python", "platform", "cpu", "numba", "llvm")),
-        ("packages", ", ".join(f"{package} {version}" for package, version in sorted(packages.items()))),
-    ]
-    rows = tuple((Cell(what), Cell(str(text))) for what, text in facts if str(text))
-    return Table("Provenance of the estimate", (Column("What", "text", 1.6), Column("Value", "code", 4.0)), rows)
+        ("seed", record.record["campaign"]["seed"]),
+    )

@@ -25,9 +25,12 @@ def requirement_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str | Non
 
 def margin_figure(flown: Flown) -> FigureBlock | None:
     """Margins of all requirements on one axis; None where no case has a number."""
-    rows = []
+    rows, left_out = [], []
     for verdict in flown.own.verdicts:
         limits = Limits(verdict.at_most, verdict.at_least)
+        if not _has_width(limits):
+            left_out.append(verdict.name)
+            continue
         worst = limits.margins(flown.every.worst(verdict.metric, 1, limits)[verdict.metric].to_numpy(dtype=np.float64))
         demonstrated = None if verdict.margin is None else verdict.margin / limits.width
         if worst.size:
@@ -35,10 +38,17 @@ def margin_figure(flown: Flown) -> FigureBlock | None:
     if not rows:
         return None
     return FigureBlock(
-        "Margins of all requirements, relative to the width of the limits: the distance between two limits, the size "
-        "of a single one, 1 for a limit of 0. Margins beyond 100 % either way are drawn at the edge.",
+        "Margins of the requirements, relative to the width of the limits: the distance between two limits, the size "
+        "of a single one. Margins beyond 100 % are drawn at the edge."
+        + f" Not drawn, the limit is 0: {', '.join(left_out)}."
+        * bool(left_out),
         MarginDrawing(tuple(rows)),
     )
+
+
+def _has_width(limits: Limits) -> bool:
+    """Whether margins can be given relative to the limits: not to a single one of 0."""
+    return any(limits)
 
 
 def requirement_table(flown: Flown) -> Table:
@@ -56,8 +66,8 @@ def requirement_table(flown: Flown) -> Table:
     sources = [str(record.get("source") or "") for record in records]
     rows = [_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True)]
     note = (
-        "Demonstrated: the tolerance limit that these cases demonstrate with the probability and confidence required "
-        "(Wilks). Margin: from there to the nearest limit; in brackets, relative to the width of the limits. "
+        "Margin: from the demonstrated bound (tolerance limit) to the nearest limit; in brackets, relative to the "
+        "width of the limits. "
         f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. A failed case, "
         "or one whose metric is not a number, counts as outside."
     )
@@ -101,8 +111,8 @@ def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell,
 def _margin_cell(verdict: Verdict, unit: str) -> Cell:
     if verdict.margin is None:
         return Cell("–")
-    width = Limits(verdict.at_most, verdict.at_least).width
-    share = f"({number(100.0 * verdict.margin / width, 3)}{SPACE}%)"
+    limits = Limits(verdict.at_most, verdict.at_least)
+    share = f"({number(100.0 * verdict.margin / limits.width, 3)}{SPACE}%)" if _has_width(limits) else ""
     return Cell(with_unit(number(verdict.margin, 3), unit), verdict.margin, share)
 
 
@@ -128,11 +138,7 @@ def risk_table(flown: Flown) -> Table | None:
         Column("With confidence shared", "text", 1.7),
     )
     rows = tuple(_risk_row(verdict, len(judged)) for verdict in judged)
-    note = (
-        f"Allowed outside: the most of these {count(flown.n_tried)} cases with which the requirement still passes. "
-        "Consumer’s risk: the probability that so many cases pass a system that just misses the probability required. "
-        "Producer’s risk: the probability that they do not pass one that fails half as often as it may. "
-    )
+    note = f"Allowed outside: the most of these {count(flown.n_tried)} cases with which the requirement still passes. "
     if flown.looked:
         note += (
             "The number of cases was decided by interim analyses: the consumer’s risk is then below the figure given, "
@@ -141,8 +147,8 @@ def risk_table(flown: Flown) -> Table | None:
     if len(flown.verdicts) > 1:
         note += (
             "With confidence shared: the verdict if all verdicts together are to hold with their confidence, each "
-            f"taking 1/{len(judged)} of the error allowed (Bonferroni). Where every requirement passes, that "
-            "all are met holds without such sharing, with the smallest of their confidences (Berger 1982)."
+            f"taking 1/{len(judged)} of the error allowed (Bonferroni). That every requirement is met needs no such "
+            "sharing (Berger 1982)."
         )
     else:
         columns, rows = columns[:-1], tuple(row[:-1] for row in rows)

@@ -48,7 +48,7 @@ def timeline_table(flown: Flown) -> Table | None:
     rows = []
     for name in sorted(times, key=lambda one: _seconds(flown, one)):
         summary, event = flown.summaries[name], times[name]
-        spread = "–" if summary.sd is None else number(summary.sd, 3)
+        spread = "–" if summary.sd is None else number(0.0 if summary.constant else summary.sd, 3)
         rows.append(
             (
                 Cell(event[:1].upper() + event[1:], small=flown.columns[name].description),

@@ -9,7 +9,7 @@ from mc_engine.statistics.drivers import FALSE_DISCOVERIES, FEWEST, Driver, fail
 from reports.companion_section import companion_blocks, no_contributors
 from reports.designed_indices import designed_blocks
 from reports.document import Cell, Column, FigureBlock, Table
-from reports.figures import SuccessDrawing, SuccessPanel
+from reports.figures.success import SuccessPanel, success_figure
 from reports.flown import Flown
 from reports.numbers import count, number, percent
 from reports.outcomes import failures
@@ -73,7 +73,7 @@ def _driver_table(
     pairs_tested: int,
 ) -> Table:
     columns = (
-        Column("Requirement", "text", 1.7),
+        Column("Requirement", "text", 1.7, grouped=True),
         Column("Contributor", "text", 2.3),
         Column("Cases fail where it is", "text", 2.1),
         Column("Separation", "number", 1.2),
@@ -118,6 +118,6 @@ def _success_figure(
             panels.append(SuccessPanel(one.requirement, flown.axis(one.inputs[0]), curve, float(passed.mean())))
     return FigureBlock(
         f"Success probability along the inputs that separate failed from passed cases, {count(flown.n_held)} cases.",
-        SuccessDrawing(tuple(panels), flown.stated.confidence),
+        success_figure(panels, flown.stated.confidence),
         "half",
     )

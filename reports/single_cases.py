@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mc_engine.replay_files import read_replay, replayed_cases
+from mc_engine.studies.replay_files import read_replay, replayed_cases
 from reports.document import Block, CaseColumn, CaseData, FigureBlock, Section
-from reports.drawings import nominal_point, thinned_by_outcome, thinned_rows
+from reports.drawings import is_constant, nominal_point, thinned_by_outcome, thinned_rows
 from reports.figures import ScatterDrawing
 from reports.figures.histories import thinned
 from reports.flown import ColumnFacts, Flown
@@ -63,12 +63,18 @@ def _outcome_figure(flown: Flown, x_name: str, y_name: str) -> FigureBlock:
 
 
 def case_axes(flown: Flown) -> tuple[str, str] | None:
-    """The two columns along which the share of passed cases changes most, inputs before metrics; None without two."""
+    """The two columns along which the share of passed cases changes most, inputs before metrics; None without two.
+
+    Where all cases end alike, those that contribute most to the first metric.
+    """
     inputs = [fact.name for fact in flown.with_role("dispersion") if _differs(flown.values(fact.name))]
     metrics = [name for name in flown.key_metrics if _differs(flown.values(name))]
     lost = case_outcomes(flown) != INSIDE
     if lost.any() and not lost.all():
         inputs.sort(key=lambda name: -_told(flown.values(name), lost))
+    elif metrics:
+        size = {one.name: one.share for one in flown.contributors(metrics[0])}
+        inputs.sort(key=lambda name: -size.get(name, 0.0))
     names = [*inputs, *metrics][:2]
     return (names[0], names[1]) if len(names) == 2 else None
 
@@ -108,6 +114,7 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
         outcomes=outcome_names(flown),
         columns=tuple(_column(flown, fact, rows) for fact in facts) + tuple(_places(flown, sections, rows)),
         axes=case_axes(flown),
+        time=axis_label("time", flown.unit("t_s")),
         quantities={name: _quantity_label(flown, name) for name in _quantities(flown, histories)},
         histories=histories,
         histories_left_out=left_out,
@@ -221,10 +228,14 @@ def _folder(flown: Flown) -> Path:
 
 
 def _quantities(flown: Flown, histories: dict[int, dict[str, tuple[Any, Any]]]) -> list[str]:
-    """History quantities in the order of the model's figures, those that none of them draws last."""
-    held = list(dict.fromkeys(name for curves in histories.values() for name in curves))
+    """History quantities that vary, in the order of the model's figures, those that none of them draws last."""
+    every: dict[str, list[Any]] = {}
+    for curves in histories.values():
+        for name, (_, values) in curves.items():
+            every.setdefault(name, []).append(values)
     drawn = [name for figure in flown.figures for name in getattr(figure, "quantities", ())]
-    return [name for name in dict.fromkeys([*drawn, *held]) if name in held]
+    varying = {name for name, values in every.items() if not is_constant(np.concatenate(values))}
+    return [name for name in dict.fromkeys([*drawn, *every]) if name in varying]
 
 
 def _quantity_label(flown: Flown, name: str) -> str:

@@ -1,6 +1,6 @@
 """The tables of results: verdicts, summaries, quantiles, published values, statuses, worst cases."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from mc_engine.statistics import Summary, Verdict
@@ -151,9 +151,28 @@ def fixed_table(flown: Flown, caption: str, overridden: bool) -> Table | None:
         for record in flown.manifest.get(key, [])
         if bool(record.get("overridden")) == overridden
     ]
+    return value_table(records, caption)
+
+
+def value_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table | None:
+    """Parameters and settings with their values; None for none."""
     columns = (Column("Name", "name", 2.2), Column("Value", "number", 1.3), Column("Meaning", "text", 4.0))
     rows = tuple(_fixed_row(record) for record in records)
     return Table(caption, columns, rows) if rows else None
+
+
+def dispersed_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table:
+    """Inputs with their distributions and sources."""
+    columns = (Column("Input", "name", 2.4), Column("Distribution", "text", 2.6), Column("Source", "text", 3.0))
+    rows = tuple(
+        (
+            Cell(axis_label(one["name"], one["unit"]), small=one["description"]),
+            Cell(", ".join(filter(None, (one["distribution"], one.get("bounds", ""))))),
+            Cell(one["source"] or "not stated"),
+        )
+        for one in records
+    )
+    return Table(caption, columns, rows)
 
 
 def _fixed_row(record: Mapping[str, Any]) -> tuple[Cell, ...]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mc_engine.tuning_folder import TuningRecord
+from mc_engine.studies.tuning_folder import TuningRecord
 from reports.numbers import axis_label, exact, number, percent, with_unit, words
 
 

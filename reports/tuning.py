@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mc_engine.tuning_folder import UNFINISHED, TuningRecord, infeasibility
+from mc_engine.studies.tuning_folder import UNFINISHED, TuningRecord, infeasibility
 from reports.contents import blocks
 from reports.document import Block, Card, Document, FigureBlock, Section, Table, Terms, Text, numbered
 from reports.drawings import POINTS_SHOWN, thinned_rows

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mc_engine.tuning_folder import least_violating
+from mc_engine.studies.tuning_folder import least_violating
 from reports.document import Cell, Column, Table
 from reports.numbers import axis_label, count, exact, number, percent, with_unit
-from reports.provenance import git_text
+from reports.provenance import origin_table
+from reports.tables import dispersed_table, value_table
 from reports.tuned import Tuned, inside, limit_words
 
 ROWS_SHOWN = 30  # of the front
@@ -153,45 +154,12 @@ def _metric_cell(tuned: Tuned, one: Mapping[str, Any]) -> Cell:
 def input_tables(tuned: Tuned) -> Iterator[Table | str | None]:
     records = tuned.manifest.get("inputs", [])
     if records and int(tuned.plan["cases"]) > 1:
-        columns = (Column("Input", "name", 2.4), Column("Distribution", "text", 2.6), Column("Source", "text", 3.0))
-        rows = tuple(
-            (
-                Cell(axis_label(one["name"], one["unit"]), small=one["description"]),
-                Cell(one["distribution"]),
-                Cell(one["source"] or "not stated"),
-            )
-            for one in records
-        )
-        yield Table("Dispersed inputs of the cases that every candidate flies", columns, rows)
+        yield dispersed_table(records, "Dispersed inputs of the cases that every candidate flies")
     fixed = [one for key in ("settings", "parameters") for one in tuned.manifest.get(key, [])]
     fixed = [one for one in fixed if one["name"] not in tuned.parameters]
-    columns = (Column("Name", "name", 2.2), Column("Value", "number", 1.3), Column("Meaning", "text", 4.0))
-    rows = tuple(
-        (Cell(one["name"]), Cell(with_unit(exact(one["value"]), one["unit"])), Cell(one["description"]))
-        for one in fixed
-    )
-    yield Table("Settings and parameters common to all candidates", columns, rows) if rows else None
+    yield value_table(fixed, "Settings and parameters common to all candidates")
 
 
 def provenance_table(tuned: Tuned) -> Table:
-    manifest = tuned.manifest
-    campaign, model, made = manifest["campaign"], manifest["model"], manifest.get("provenance", {})
-    packages = made.get("packages", {})
-    facts = [
-        ("directory", tuned.name),
-        ("started (UTC)", manifest.get("created_utc", "")),
-        ("engine", manifest.get("engine", "")),
-        ("campaign", campaign["name"]),
-        ("campaign digest", campaign["digest"]),
-        ("model", campaign["model"]),
-        ("model source digest", model["digest"]),
-        ("published source", model["source"]),
-        ("seed of the search", tuned.plan["seed"]),
-        ("seed of the cases", campaign["seed"]),
-        ("seed contract", manifest.get("seed_contract", "")),
-        ("git", git_text(made.get("git"))),
-        *((key, made.get(key, "")) for key in ("python", "platform", "cpu", "numba", "llvm")),
-        ("packages", ", ".join(f"{name} {number_}" for name, number_ in sorted(packages.items()))),
-    ]
-    rows = tuple((Cell(what), Cell(str(text))) for what, text in facts if str(text))
-    return Table("Provenance of the tuning", (Column("What", "text", 1.6), Column("Value", "code", 4.0)), rows)
+    seeds = ("seed of the search", tuned.plan["seed"]), ("seed of the cases", tuned.manifest["campaign"]["seed"])
+    return origin_table("tuning", tuned.name, tuned.manifest, seeds)

@@ -28,8 +28,8 @@ from pathlib import Path
 from typing import Any
 
 from mc_engine.errors import EngineError
-from mc_engine.journal import plain
 from mc_engine.statistics import Summary
+from mc_engine.store.journal import plain
 from reports import template_process
 from reports.document import Block, Document, FigureBlock, Table, numbered
 from reports.flown import Flown

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from mc_engine.published import NOT_REACHED, OUTCOMES, REACHED, UNKNOWN, outcome, read_published, read_source
-from mc_engine.published_table import headline_table, published_files, written_into
+from mc_engine.studies.published import NOT_REACHED, OUTCOMES, REACHED, UNKNOWN, outcome, read_published, read_source
+from mc_engine.studies.published_table import headline_table, published_files, written_into
 
 README = Path(__file__).resolve().parents[1] / "README.md"
 FILES = {path.parent.name: path for path in published_files()}

@@ -1,6 +1,6 @@
 """Figures of the de-orbit campaign's report: fuel and impulse over the burn errors, errors and force in time."""
 
-from mc_engine.figures import HistoryFigure, MapFigure, ScatterFigure
+from mc_engine.model.figures import HistoryFigure, MapFigure, ScatterFigure
 
 FIGURES = (
     MapFigure("propellant_kg", "ve_pct", "oe_pct", "Correction propellant over the errors of the burn"),

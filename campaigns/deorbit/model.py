@@ -8,7 +8,7 @@ import numpy as np
 from campaigns.deorbit import dynamics, figures, outcome, path_design
 from mc_engine.model import Event, Field, FixedStep, Model, Parameter, Refusals, Setting
 from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY
-from mc_engine.published import read_published
+from mc_engine.studies.published import read_published
 
 SOURCE = (
     "S. Divsalar, R. Nadafi, M. Kabganian, Design of a trajectory-correction algorithm for a spacecraft in a "

@@ -1,6 +1,6 @@
 """Figures of the flexible satellite's report: attitude, rates, modes, torques and pulses in time, ends of the cases."""
 
-from mc_engine.figures import HistoryFigure, ScatterFigure
+from mc_engine.model.figures import HistoryFigure, ScatterFigure
 
 FIGURES = (
     HistoryFigure(("q0", "q1", "q2", "q3"), "Attitude in the orbital frame"),

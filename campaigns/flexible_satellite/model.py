@@ -9,7 +9,7 @@ from campaigns.flexible_satellite import control, dynamics, figures, outcome, st
 from mc_engine.model import Field, FixedStep, Model, Parameter, Refusals, Setting
 from mc_engine.physics.attitude import body_matrix, quaternion_product, rotation_quaternion
 from mc_engine.physics.constants import STANDARD_GRAVITY
-from mc_engine.published import read_published
+from mc_engine.studies.published import read_published
 
 SOURCE = (
     "H. Taei, S. Ayati, S. F. Mousavi, Robust PID control of a flexible satellite considering thruster actuator "

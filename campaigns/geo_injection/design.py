@@ -14,7 +14,7 @@ from campaigns.geo_injection.sequence import Sequence
 from campaigns.geo_injection.staged import staged
 from mc_engine.durable_file import make_folder, write_durably
 from mc_engine.errors import StoreError
-from mc_engine.kernel import cache_folder
+from mc_engine.flight.kernel import cache_folder
 
 KEPT = Path(__file__).with_name("programs")
 

@@ -1,6 +1,6 @@
 """Figures of an injection's report: the sequence in time and in the plane, clouds of the injection errors."""
 
-from mc_engine.figures import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure
+from mc_engine.model.figures import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure
 
 FIGURES = (
     HistoryFigure(("radius_km", "speed_m_s", "radial_speed_m_s"), "Radius and speeds"),

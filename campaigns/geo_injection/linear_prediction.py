@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from campaigns.geo_injection.model import MODEL
-from mc_engine.flight import fly
+from mc_engine.flight.flight import fly
 
 SMOOTH = ("semi_major_axis_km", "radius_error_km", "longitude_drift_deg_day", "propellant_kg", "final_mass_kg")
 LENGTHS = ("eccentricity", "inclination_deg", "correction_dv_m_s")
@@ -40,8 +40,8 @@ def predicted_sigmas(nominal: Mapping[str, Any], sigmas: Mapping[str, float]) ->
 
 
 def _report(name: str, n_cases: int = 4000) -> None:
-    from mc_engine.campaign import load_campaign
-    from mc_engine.cases import case_table
+    from mc_engine.campaign.cases import case_table
+    from mc_engine.campaign.loading import load_campaign
 
     campaign = load_campaign(name)
     ids = np.arange(n_cases)

@@ -17,7 +17,7 @@ from campaigns.geo_injection.sequence import Sequence, source_orbits
 from mc_engine.errors import ModelError
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.physics.frames import WGS84_RADIUS
-from mc_engine.published import read_published
+from mc_engine.studies.published import read_published
 
 SOURCE = (
     "M. Alavipour, A. A. Nikkhah, J. Roshanian, Optimal trajectory design of an upper stage for satellite injection "

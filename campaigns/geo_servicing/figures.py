@@ -1,6 +1,6 @@
 """Figures of the servicing campaigns' reports."""
 
-from mc_engine.figures import HistoryFigure, ProfileFigure, ScatterFigure
+from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
 
 FIGURES = (
     ProfileFigure("mean_longitude_deviation_deg", "drift_rate_deg_rev", "Phase portrait: longitude and drift"),

@@ -14,13 +14,13 @@ from campaigns.geo_servicing.inputs import GEOMETRIES, NAVIGATION, PARAMETERS, S
 from campaigns.geo_servicing.phasing_plan import plan_of
 from campaigns.geo_servicing.plan_cache import remembered
 from mc_engine.errors import ModelError
-from mc_engine.kernel import source_digest
+from mc_engine.flight.kernel import source_digest
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.physics.geopotential import COLUMNS, harmonics_rows, harmonics_table
 from mc_engine.physics.sun_moon import COLUMNS as SUN_MOON
 from mc_engine.physics.sun_moon import SPACING, ephemeris_table, node_before, sidereal_angle
-from mc_engine.published import read_published
+from mc_engine.studies.published import read_published
 
 SOURCE = (
     "Hoang Vu Tan, Development of motion control algorithms for a spacecraft of a geostationary communication "

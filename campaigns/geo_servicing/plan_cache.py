@@ -12,7 +12,7 @@ from hashlib import sha256
 import numpy as np
 import scipy
 
-from mc_engine.kernel import cache_folder
+from mc_engine.flight.kernel import cache_folder
 
 
 def remembered(inputs: np.ndarray, sources: str, compute: Callable[[], np.ndarray]) -> np.ndarray:

@@ -21,9 +21,9 @@ from campaigns.reentry.autopilot_gains import (
     STEPS,
     autopilot_tables,
 )
-from mc_engine.figures import HistoryFigure, ScatterFigure
 from mc_engine.lanes import floor, look_up, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Extremum, Field, FixedStep, Model, Parameter, Refusals, Setting
+from mc_engine.model.figures import HistoryFigure, ScatterFigure
 
 # alpha: angle of attack less that of trim; lead_..: states of the compensators; then integrals of squared errors, of
 # the size of the torques, and of the time at their limits

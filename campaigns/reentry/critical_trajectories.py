@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from campaigns.reentry.planets import PLANETS
-from mc_engine.campaign import load_campaign
-from mc_engine.flight import fly
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.flight.flight import fly
 from mc_engine.model import Parameter, Setting, load_model
 
 HERE = Path(__file__).parent

@@ -1,6 +1,6 @@
 """Figures of the entry campaigns' reports; a map is drawn where the run disperses its two inputs."""
 
-from mc_engine.figures import (
+from mc_engine.model.figures import (
     CorridorFigure,
     FootprintFigure,
     HistoryFigure,

@@ -15,7 +15,7 @@ from campaigns.reentry.plan import planned_entry, plans_of
 from campaigns.reentry.planets import of_planets
 from campaigns.reentry.reference import stored_references
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
-from mc_engine.published import read_published
+from mc_engine.studies.published import read_published
 
 SOURCE = (
     "N. Mahmoudian, Design of a re-entry guidance and control system based on nominal-trajectory tracking "

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mc_engine.campaign import SHIPPED, ShippedCampaign, list_campaigns
+from mc_engine.campaign.loading import SHIPPED, ShippedCampaign, list_campaigns
 from mc_engine.documentation.markdown_text import code, escaped, table
 from mc_engine.model import AdaptiveStep, Model, Named, Parameter, Setting, load_model
-from mc_engine.published_table import campaign_table
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
+from mc_engine.studies.published_table import campaign_table
 
 _COLUMNS = """# Columns of a run
 
@@ -55,7 +55,7 @@ def campaign_page(name: str, files: Sequence[ShippedCampaign]) -> str:
         shown = [one for one, flies in zip(files, references, strict=True) if flies == reference]
         parts += _model(model, reference, shown, len(models) == 1)
     if (folder / "published.toml").is_file():
-        parts += ["## Published and ours", campaign_table(folder / "published.toml")]
+        parts += ["## Validation against published results", campaign_table(folder / "published.toml")]
     return "\n\n".join(parts) + "\n"
 
 
@@ -85,7 +85,7 @@ def _columns(model: Model, level: str) -> Iterator[str]:
         yield f"{level} Settings"
         yield "The same for all cases of a run; `[parameters]` of a campaign file sets them."
         settings = [(*_meaning(one), code(_word(one.default)), _choices(one)) for one in model.settings]
-        yield table(("Setting", "Unit", "Meaning", "Unless said", "Allowed"), settings)
+        yield table(("Setting", "Unit", "Meaning", "Default", "Allowed"), settings)
     for title, fields in (("Metrics", model.metrics), ("States", model.states), ("Histories", model.quantities)):
         yield f"{level} {title}"
         yield _INTRODUCTION[title]

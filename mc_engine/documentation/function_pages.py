@@ -11,10 +11,14 @@ from mc_engine.documentation.markdown_text import prose
 SECTIONS = {
     "engine": (
         "Campaigns, runs and their results",
-        "runner campaign campaign_search store opened_run cases model tuning tuning_folder comparison rare_event "
-        "figures errors status",
+        "runner.runner campaign.loading campaign.search campaign.cases store.store store.opening studies.opened_run "
+        "model.fields model.record model.figures studies.tuning studies.tuning_folder studies.comparison "
+        "studies.rare_event errors status",
     ),
-    "random": ("Designs, distributions and random numbers", "designs distributions correlation streams units dates"),
+    "random": (
+        "Designs, distributions and random numbers",
+        "sampling.designs sampling.distributions sampling.correlation sampling.streams units dates",
+    ),
     "lanes": ("Mathematics inside models", "lanes.physics_function lanes.functions lanes.elementary"),
     "physics": ("Shared physics", "physics"),
     "statistics": ("Statistics", "statistics"),

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mc_engine.campaign import schema
+from mc_engine.campaign.loading import schema
 from mc_engine.documentation.markdown_text import code, escaped, table
 
 _HEAD = """# Keys of a campaign file
@@ -47,7 +47,7 @@ def _section(title: str, definition: Mapping[str, Any], definitions: Mapping[str
         )
         for key, one in definition.get("properties", {}).items()
     ]
-    yield table(("Key", "Value", "Unless said", "Meaning"), rows) + "\n"
+    yield table(("Key", "Value", "Default", "Meaning"), rows) + "\n"
 
 
 def _default(one: Mapping[str, Any]) -> str:

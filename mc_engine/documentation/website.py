@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from mc_engine.campaign_search import SHIPPED
-from mc_engine.documentation import campaign_pages, function_pages, schema_page, units_page, verbs_page, words_page
+from mc_engine.campaign.search import SHIPPED
+from mc_engine.documentation import campaign_pages, commands_page, function_pages, schema_page, units_page, words_page
 from mc_engine.errors import EngineError
 from mc_engine.extras import how_to_install
 
@@ -44,7 +44,7 @@ def build(folder: Path) -> bool:
 
 
 def write_pages(folder: Path) -> None:
-    """All sources of the site: what stands beside this file, and the reference from the program as it is."""
+    """All sources of the site: what lies next to this file, and the reference from the program as it is."""
     for path in handwritten():
         target = folder / path.relative_to(HOME)
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -78,7 +78,7 @@ def handwritten() -> list[Path]:
 def reference_pages() -> Iterator[tuple[str, str]]:
     """(name, Markdown) of each page that comes from schema, program, models and docstrings."""
     yield "campaign_file.md", schema_page.page()
-    yield "command_line.md", verbs_page.page()
+    yield "command_line.md", commands_page.page()
     yield "units.md", units_page.page()
     yield "words.md", words_page.page()
     yield from campaign_pages.pages()

@@ -278,7 +278,7 @@ def _studentised(product: np.ndarray, freed: np.ndarray, factor: float) -> np.nd
 
 
 def _located(driver: Driver, first: InputColumn, second: InputColumn, failed: np.ndarray) -> Driver:
-    """The driver with the cell of the two inputs where the largest share of cases fails, and how far it separates."""
+    """The pair with the cell of the two inputs where the largest share of cases fails, and how far it separates."""
     (row, n_rows), (place, n_places) = equal_bins(first, 3), equal_bins(second, 3)
     cell = row * n_places + place
     tried = np.bincount(cell, minlength=n_rows * n_places)

@@ -26,7 +26,7 @@ class Footprint:
 
     @property
     def all_regions(self) -> list[Ellipse | DensityRegion]:
-        """Ellipses, then regions of any shape."""
+        """Ellipses, then distribution-free regions."""
         return [*self.ellipses, *self.regions]
 
 

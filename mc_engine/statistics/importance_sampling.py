@@ -19,9 +19,9 @@ import numpy as np
 from scipy import stats
 from scipy.special import ndtr
 
+from mc_engine.sampling.streams import stream
 from mc_engine.statistics.direction_mixture import DirectionMixture, fit_mixture, log_normal_density
 from mc_engine.statistics.rare_events import ALLOWANCE, FRESH, Flights, Level, Margin, RareEvent, plain_count
-from mc_engine.streams import stream
 
 MOST_LEVELS = 25
 _VARIATION = 1.5  # wanted coefficient of variation of the weights; Papaioannou et al. (2019), section 3

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.block_layout import BlockLayout
+from mc_engine.sampling.block_layout import BlockLayout
 
 FEWEST_BLOCKS = 20
 

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mc_engine.sampling.streams import stream
 from mc_engine.statistics.rare_events import (
     FRESH,
     Flights,
@@ -29,7 +30,6 @@ from mc_engine.statistics.rare_events import (
     interval_of_mean,
     plain_count,
 )
-from mc_engine.streams import stream
 
 RUNS = 10
 SHARE = 0.1  # of a level's cases that start the chains of the next

@@ -9,7 +9,6 @@ from reports.figures.levels import LevelPanel, LevelsDrawing
 from reports.figures.maps import MapDrawing
 from reports.figures.profiles import ProfileBand, ProfileDrawing
 from reports.figures.scatter import ScatterDrawing
-from reports.figures.success import SuccessDrawing, SuccessPanel
 
 __all__ = [
     "CorridorDrawing",
@@ -28,6 +27,4 @@ __all__ = [
     "ProfileBand",
     "ProfileDrawing",
     "ScatterDrawing",
-    "SuccessDrawing",
-    "SuccessPanel",
 ]

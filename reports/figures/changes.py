@@ -1,10 +1,11 @@
 """Changes from one run to another: a row a metric, how far its mean moved and how much its spread grew or shrank."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Limit, Plot, Points
+from reports.figures.marks import Axis, Limit, Panels, Plot, Points
 from reports.figures.palette import BLUE, INK, VERMILION
 from reports.numbers import number
 
@@ -38,53 +39,33 @@ class ChangePanel:
         return (float(np.exp(low)), float(np.exp(high))) if self.none else (low, high)
 
 
-@dataclass(frozen=True)
-class ChangeDrawing(Drawing):
+def change_figure(metrics: Sequence[str], panels: Sequence[ChangePanel], content: str) -> Panels:
     """Panels over the same metrics, of which the first stands on top.  content : of the intervals."""
+    parts = []
+    for panel in panels:
+        sure = np.flatnonzero(panel.significant & np.isfinite(panel.value)).tolist()
+        moved = [f"{metrics[k]} {number(float(panel.value[k]), 3)}" for k in sure]
+        parts.append(f"{panel.title}: {', '.join(moved) if moved else 'no metric changed significantly'}")
+    return Panels(tuple(_plot(metrics, panel, content) for panel in panels), f"{'; '.join(parts)}.")
 
-    metrics: tuple[str, ...]
-    panels: tuple[ChangePanel, ...]
-    content: str
 
-    @property
-    def alternative(self) -> str:
-        parts = []
-        for panel in self.panels:
-            moved = [
-                f"{name} {number(float(value), 3)}"
-                for name, value, sure in zip(self.metrics, panel.value, panel.significant, strict=True)
-                if sure and np.isfinite(value)
-            ]
-            parts.append(f"{panel.title}: {', '.join(moved) if moved else 'no metric changed significantly'}")
-        return f"{'; '.join(parts)}."
-
-    @property
-    def plots(self) -> tuple[Plot, ...]:
-        return tuple(self._panel(panel) for panel in self.panels)
-
-    def _panel(self, panel: ChangePanel) -> Plot:
-        marks: list[Limit | Points] = [Limit(panel.none, "x", INK, "no change", "dash", 1.0, key="no change")]
-        keys = "not significant", f"significant, with its {self.content} interval"
-        for sure, (colour, sign) in enumerate(MARKS):
-            rows = np.flatnonzero(np.isfinite(panel.value) & (panel.significant == bool(sure)))
-            ends = panel.lower[rows], panel.upper[rows]
-            texts = tuple(self._words(panel, int(row)) for row in rows)
-            marks.append(
-                Points(panel.value[rows], rows, colour, sign=sign, size=8.0, texts=texts, x_ends=ends, key=keys[sure])
-            )
-        ticks = tuple((tick, number(tick, 3)) for tick in ratio_ticks(panel.span)) if panel.none else None
-        names = tuple(enumerate(self.metrics))
-        return Plot(
-            tuple(marks),
-            Axis(reach=panel.span, log=bool(panel.none), ticks=ticks),
-            Axis(reach=(len(self.metrics) - 0.5, -0.5), ticks=names),
-            panel.title,
-            70.0 + 24.0 * len(self.metrics),
+def _plot(metrics: Sequence[str], panel: ChangePanel, content: str) -> Plot:
+    marks: list[Limit | Points] = [Limit(panel.none, "x", INK, "no change", "dash", 1.0, key="no change")]
+    keys = "not significant", f"significant, with its {content} interval"
+    told = [
+        f"{name}: {number(value, 3)}, {number(low, 3)} to {number(high, 3)}"
+        for name, value, low, high in zip(metrics, panel.value, panel.lower, panel.upper, strict=True)
+    ]
+    for sure, (colour, sign) in enumerate(MARKS):
+        rows = np.flatnonzero(np.isfinite(panel.value) & (panel.significant == bool(sure)))
+        ends, texts = (panel.lower[rows], panel.upper[rows]), [told[k] for k in rows]
+        marks.append(
+            Points(panel.value[rows], rows, colour, sign=sign, size=8.0, texts=texts, x_ends=ends, key=keys[sure])
         )
-
-    def _words(self, panel: ChangePanel, row: int) -> str:
-        ends = f"{number(float(panel.lower[row]), 3)} to {number(float(panel.upper[row]), 3)}"
-        return f"{self.metrics[row]}: {number(float(panel.value[row]), 3)}, {ends}"
+    ticks = tuple((tick, number(tick, 3)) for tick in ratio_ticks(panel.span)) if panel.none else None
+    x = Axis(reach=panel.span, log=bool(panel.none), ticks=ticks)
+    y = Axis(reach=(len(metrics) - 0.5, -0.5), ticks=tuple(enumerate(metrics)))
+    return Plot(tuple(marks), x, y, panel.title, 70.0 + 24.0 * len(metrics))
 
 
 def ratio_ticks(span: tuple[float, float]) -> list[float]:

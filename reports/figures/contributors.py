@@ -1,15 +1,14 @@
-"""What contributes to a metric: a tornado of effects, and a budget of 1σ contributions, a panel a metric."""
+"""What contributes to a metric: a tornado of total and first-order effects."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from reports.figures.marks import Axis, Bar, Mark, Plot, Points
-from reports.figures.palette import BLUE, INK, MUTED, ORANGE, SKY
+from reports.figures.palette import BLUE, INK, SKY
 from reports.numbers import number
 
 ROW, AROUND = 20.0, 34.0  # pixels of a row, and of what stands above and below the rows
-SUMS = {"sum": ORANGE, "rest": MUTED, "all": INK}  # colours of the rows below the contributions
 
 
 def tornado(metric: str, names: Sequence[str], total: np.ndarray, first: np.ndarray, interval: str) -> Plot:
@@ -32,19 +31,3 @@ def tornado(metric: str, names: Sequence[str], total: np.ndarray, first: np.ndar
     y = Axis(reach=(len(names) - 0.5, -0.5), ticks=tuple(enumerate(names)), grid=False)
     x = Axis("fraction of the variance", zero=True, most=5)
     return Plot(tuple(marks), x, y, metric, AROUND + ROW * len(names))
-
-
-def budget(metric: str, rows: Sequence[tuple[str, float, str]], unit: str) -> Plot:
-    """Contributions to σ, in the unit of the metric: names, values, and "" or what a row below them is, as in SUMS."""
-    values = np.array([value for _, value, _ in rows])
-    place = np.arange(values.size)
-    marks = [
-        Bar(np.zeros(these.size), values[these], place[these] - 0.33, place[these] + 0.33, SUMS.get(kind, BLUE), 0.9,
-            tuple(f"{rows[k][0]}: {number(values[k], 3)} {unit}" for k in these.tolist()))
-        for kind in ("", *SUMS)
-        if (these := np.flatnonzero([kind == one for _, _, one in rows])).size
-    ]  # fmt: skip
-    ticks = tuple((k, f"{name}: {number(float(f'{value:.3g}'))}") for k, (name, value, _) in enumerate(rows))
-    y = Axis(reach=(len(rows) - 0.5, -0.5), ticks=ticks, grid=False)
-    x = Axis(f"1σ contribution [{unit}]" if unit else "1σ contribution", zero=True, most=4)
-    return Plot(tuple(marks), x, y, metric, AROUND + ROW * len(rows))

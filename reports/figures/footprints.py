@@ -91,7 +91,8 @@ class FootprintDrawing(Drawing):
             x, y = view.turned(np.array([self.aim[1]]))[0].tolist()
             marks.append(nominal_ring((x, y), INK, self.aim[0]))
         height = 60.0 + 720.0 * self._flatness() if view.equal else 380.0
-        plot = Plot(tuple(marks), Axis(view.x_label), Axis(view.y_label), height=height, equal=view.equal)
+        title = "" if view.equal else "Along and across, each with a scale of its own"
+        plot = Plot(tuple(marks), Axis(view.x_label), Axis(view.y_label), title, height, view.equal)
         return plot if not (view.equal and self.coasts) else _over(self.coasts, plot)
 
     def _wider(self) -> Plot:

@@ -87,7 +87,7 @@ def case_lines(
     lines: Sequence[HistoryLine], curve: Callable[[HistoryLine], tuple[np.ndarray, np.ndarray]]
 ) -> list[Line]:
     """The curves of cases in their styles, from back to front."""
-    others = f"{sum(line.rank is None for line in lines)} other retained cases"
+    others = f"{sum(line.rank is None for line in lines)} other saved cases"
     found = []
     for line in back_to_front(lines):
         colour, dash, width = line_style(line.rank)

@@ -44,8 +44,8 @@ class MapDrawing(Drawing):
         if surface.n_smoothed < surface.n_used:
             used = f"{count(surface.n_smoothed)} cases picked evenly out of {used}"
         return (
-            f"local quadratic regression on the {surface.neighbours} nearest of {used}, as many as foretell left-out "
-            f"cases best; error, bias included, {errors[0]} (median) to {with_unit(errors[1], self.unit)} (largest)"
+            f"local quadratic regression on the {surface.neighbours} nearest of {used}; error {errors[0]} (median) to "
+            f"{with_unit(errors[1], self.unit)} (largest)"
         )
 
     @property

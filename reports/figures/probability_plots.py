@@ -1,8 +1,7 @@
 """A normal probability plot: the sorted cases over the normal distribution with their mean and σ."""
 
 import numpy as np
-from scipy.special import ndtri
-from scipy.stats import beta
+from scipy.special import betaincinv, ndtri
 
 from reports.figures.marks import Axis, Limit, Line, Mark, Plot, Points, between
 from reports.figures.palette import BLUE, INK, SKY, VERMILION
@@ -36,7 +35,7 @@ def probability_plot(
     n, z = values.size, plotting_positions(values.size)
     mean, deviation = float(values.mean()), float(values.std(ddof=1))
     ranks = shown_ranks(n)
-    low, high = (ndtri(beta.ppf(p, ranks + 1, n - ranks)) for p in (0.5 - 0.5 * CONTENT, 0.5 + 0.5 * CONTENT))
+    low, high = (ndtri(betaincinv(ranks + 1, n - ranks, p)) for p in (0.5 - 0.5 * CONTENT, 0.5 + 0.5 * CONTENT))
     normal = f"normal distribution with the same mean and σ, with {percent(CONTENT)} band of every rank"
     ends = z[[0, -1]]
     marks: list[Mark] = [

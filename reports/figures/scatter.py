@@ -49,7 +49,7 @@ class ScatterDrawing(Drawing):
 
     @property
     def styled(self) -> list[tuple[CloudRegion, str, str]]:
-        """Regions with colour and dash: ellipses purple, a dash for each, regions of any shape green."""
+        """Regions with colour and dash: ellipses purple, a dash for each, distribution-free regions green."""
         ellipses = [one for one in self.regions if one.elliptic]
         others = [one for one in self.regions if not one.elliptic]
         return [

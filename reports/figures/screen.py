@@ -84,9 +84,9 @@ def outcome_clouds(names: Sequence[str]) -> list[dict[str, Any]]:
     return [trace for mark in marks for trace in traced(mark, Plot((), Axis(), Axis()))]
 
 
-def history_panel() -> dict[str, Any]:
+def history_panel(time: str) -> dict[str, Any]:
     """The layout of one quantity of a single case, still without its title."""
-    layout = _layout(Plot((), Axis("time [s]"), Axis(most=5), "quantity", 240.0))
+    layout = _layout(Plot((), Axis(time), Axis(most=5), "quantity", 240.0))
     for axis in ("xaxis", "yaxis"):
         del layout[axis]["range"]
     return layout

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from mc_engine import flight
+from mc_engine.flight import flight
 
 
 class KernelClock:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 import mc_engine
-from mc_engine.campaign import load_campaign
-from mc_engine.lane_speed import Flight, campaign_flight, measure
+from mc_engine.campaign.loading import load_campaign
 from mc_engine.model import load_model
+from mc_engine.studies.lane_speed import Flight, campaign_flight, measure
 
 HERE = Path(__file__).resolve().parent
 ROCKET = Path(mc_engine.__file__).parent / "documentation" / "tutorial" / "sounding_rocket"

@@ -44,7 +44,9 @@ class Stopwatch:
 
 def fly(cases: int, workers: int) -> dict[str, float]:
     """One run in this process: wall [s], peak memory [MiB], thread-seconds by part, parts and cases in the largest."""
-    from mc_engine import chunks, load_campaign, runner
+    from mc_engine import load_campaign
+    from mc_engine.flight import chunks
+    from mc_engine.runner import runner
     from tests.benchmarks.kernel_clock import KernelClock
 
     with tempfile.TemporaryDirectory() as folder, KernelClock() as kernels:

@@ -10,8 +10,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from mc_engine import load_campaign, runner
-from mc_engine.campaign import Retention
+from mc_engine import load_campaign
+from mc_engine.campaign.loading import Retention
+from mc_engine.runner import runner
 from tests.benchmarks.kernel_clock import KernelClock
 
 

@@ -9,8 +9,9 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from mc_engine import flight, load_campaign
-from mc_engine.cases import case_table
+from mc_engine import load_campaign
+from mc_engine.campaign.cases import case_table
+from mc_engine.flight import flight
 from tests.benchmarks.kernel_clock import KernelClock
 
 

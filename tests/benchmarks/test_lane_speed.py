@@ -4,7 +4,7 @@ import pytest
 from lanes import LONG, deorbit, flexible, flexible_pulses, orbit, sounding_rocket
 from llvmlite import binding
 
-from mc_engine.lane_speed import measure
+from mc_engine.studies.lane_speed import measure
 
 ATTEMPTS = 12  # a neighbour on the machine can spoil several measurements
 # of what the registers allow: where thrusters switch, the lanes that do not switch wait for those that do, and a

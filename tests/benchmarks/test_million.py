@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from mc_engine import load_campaign
-from mc_engine.chunks import chunk_size, fly_cases
+from mc_engine.flight.chunks import chunk_size, fly_cases
 from tests.benchmarks.leo.model import AXES
 from tests.benchmarks.million import CAMPAIGN, line, measured
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mc_engine.flight import prepare
+from mc_engine.flight.flight import prepare
 from tests.benchmarks.phasing import flown
 
 sys.path.append(str(Path(__file__).parents[1] / "campaigns" / "geo_servicing"))

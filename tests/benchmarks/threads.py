@@ -12,8 +12,9 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from mc_engine import load_campaign, runner
-from mc_engine.campaign import Campaign, Retention
+from mc_engine import load_campaign
+from mc_engine.campaign.loading import Campaign, Retention
+from mc_engine.runner import runner
 
 
 def seconds(campaign: Campaign, workers: int) -> float:

@@ -13,8 +13,9 @@ import typer
 import yaml
 
 import mc_engine
-from mc_engine import load_campaign, open_store, runner
-from mc_engine.cli import app
+from mc_engine import load_campaign, open_store
+from mc_engine.command_line.commands import app
+from mc_engine.runner import runner
 
 EXAMPLES = Path(mc_engine.__file__).parent / "documentation" / "examples"
 WORKFLOW = EXAMPLES / "campaign.yml"

@@ -9,11 +9,11 @@ import pytest
 from handwritten_pages import PAGES, blocks, commands, name_of
 
 import mc_engine
-from mc_engine.campaign import SHIPPED
-from mc_engine.chunks import fly_nominal
-from mc_engine.documentation.verbs_page import commands as verbs
+from mc_engine.campaign.loading import SHIPPED
+from mc_engine.documentation.commands_page import commands as verbs
 from mc_engine.documentation.website import HOME
-from mc_engine.model_contract import breaches
+from mc_engine.flight.chunks import fly_nominal
+from mc_engine.flight.contract import breaches
 from mc_engine.status import STATUS_NAME
 
 RECIPES = [
@@ -82,7 +82,7 @@ def test_the_overviews_name_every_page():
 def unknown_words(command):
     """The verb or options of a command that the program does not have."""
     words = [word for word in shlex.split(command.replace("…", "")) if word not in ("|", ">")]
-    if words[0] in ("VERB", "--help"):
+    if words[0] in ("COMMAND", "--help"):
         return []
     if words[0] not in verbs():
         return [words[0]]

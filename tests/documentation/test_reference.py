@@ -6,8 +6,8 @@ import re
 import pytest
 
 import mc_engine
-from mc_engine.campaign import list_campaigns, schema
-from mc_engine.documentation import function_pages, schema_page, verbs_page
+from mc_engine.campaign.loading import list_campaigns, schema
+from mc_engine.documentation import commands_page, function_pages, schema_page
 from mc_engine.documentation.campaign_pages import model_reference
 from mc_engine.documentation.markdown_text import escaped, prose
 from mc_engine.documentation.website import reference_pages
@@ -26,8 +26,8 @@ def test_every_key_of_a_campaign_file_is_explained():
 
 
 def test_every_verb_and_option_is_explained():
-    text = verbs_page.page()
-    for name, command in verbs_page.commands().items():
+    text = commands_page.page()
+    for name, command in commands_page.commands().items():
         section = text.split(f"\n## {name}\n")[1].split("\n## ")[0]
         assert [
             one.opts[0] for one in command.params if one.param_type_name == "option" and one.opts[0] not in section

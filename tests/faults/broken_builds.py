@@ -8,9 +8,11 @@ import os
 from contextlib import suppress
 from dataclasses import asdict, replace
 
-from mc_engine import dispatch, durable_file, parts, store
-from mc_engine.chunks import Lost, Order
-from mc_engine.writer_lock import WriterLock
+from mc_engine import durable_file
+from mc_engine.flight.chunks import Lost, Order
+from mc_engine.runner import dispatch
+from mc_engine.store import parts, store
+from mc_engine.store.writer_lock import WriterLock
 
 
 def line_before_part(patch):

@@ -7,14 +7,14 @@ import numpy as np
 from stones import call
 from trapped import trapped
 
-from mc_engine import runner
-from mc_engine.derived_files import derived_files
-from mc_engine.directory_kinds import RARE_EVENT, TUNING
-from mc_engine.object_store import publish
-from mc_engine.parts import Column
-from mc_engine.replay_files import write_replay
-from mc_engine.result_folder import result_files, write_result
-from mc_engine.store import open_store
+from mc_engine.runner import runner
+from mc_engine.store.derived_files import derived_files
+from mc_engine.store.object_store import publish
+from mc_engine.store.opening import open_store
+from mc_engine.store.parts import Column
+from mc_engine.store.result_folder import result_files, write_result
+from mc_engine.store.run_files import RARE_EVENT, TUNING
+from mc_engine.studies.replay_files import write_replay
 
 PAGES = {"report.html": b"<!doctype html>" + 50 * b"a page ", "report.pdf": b"%PDF" + 50 * b" a page"}
 TEXTS = {"report.md": b"# A report\n", "report-figures/figure-1.svg": b"<svg>1</svg>"}

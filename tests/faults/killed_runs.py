@@ -17,10 +17,12 @@ SERVER = """
 import json, os, sys, time
 from pathlib import Path
 import broken_builds
-from mc_engine import crews, load_campaign, runner
-from mc_engine.cases import nominal_row
-from mc_engine.chunks import NOMINAL_NOISE, fly_nominal
-from mc_engine.flight import fly_history
+from mc_engine import load_campaign
+from mc_engine.runner import pools as crews
+from mc_engine.runner import runner
+from mc_engine.campaign.cases import nominal_row
+from mc_engine.flight.chunks import NOMINAL_NOISE, fly_nominal
+from mc_engine.flight.flight import fly_history
 
 folder, chunk, workers = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
 if len(sys.argv) > 4:

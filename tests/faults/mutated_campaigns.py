@@ -7,7 +7,7 @@ import re
 import shutil
 from dataclasses import dataclass
 
-from mc_engine.campaign import SHIPPED
+from mc_engine.campaign.loading import SHIPPED
 
 # Every model, every design, every section, every kind of value.
 BASES = (

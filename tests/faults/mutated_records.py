@@ -6,8 +6,8 @@ from hashlib import sha256
 
 from typer.testing import CliRunner
 
-from mc_engine.cli import app
-from mc_engine.journal import encode, scan
+from mc_engine.command_line.commands import app
+from mc_engine.store.journal import encode, scan
 
 ODD = (
     None, True, False, 0, -1, 1, 10**30, 2**63, 1e308, -1e308, float("nan"), float("inf"), 1e-300, "", "x", "\x1b[31m",

@@ -5,9 +5,11 @@ import shutil
 import numpy as np
 from typer.testing import CliRunner
 
-from mc_engine import load_campaign, open_store, runner
-from mc_engine.cli import app
+from mc_engine import load_campaign, open_store
+from mc_engine.command_line.commands import app
 from mc_engine.durable_file import is_temporary
+from mc_engine.runner import runner
+from mc_engine.store.verification import damage
 
 TEXT = """[campaign]
 model = "tests.faults.traps.model"
@@ -71,7 +73,7 @@ def assert_as_unbroken(run, whole):
 
     whole : what `results` says of the unbroken run.
     """
-    assert open_store(run).verify() == []
+    assert damage(run) == []
     assert results(run) == whole
     expected = {file for file in whole if file.startswith("cases/")}
     assert {path.relative_to(run).as_posix() for path in (run / "cases").iterdir()} == expected

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 from trapped import campaign_folder, files_of, trapped
 
-from mc_engine import cluster_crew, load_campaign, runner
-from mc_engine.backends import Backend
-from mc_engine.chunks import Order
-from mc_engine.crews import ThreadCrew
+from mc_engine import load_campaign
 from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
-from mc_engine.shards import Shard
-from mc_engine.verification import damage
-from mc_engine.worker_process import Site, perform
+from mc_engine.flight.chunks import Order
+from mc_engine.runner import cluster_pool as cluster_crew
+from mc_engine.runner import runner
+from mc_engine.runner.backends import Backend
+from mc_engine.runner.pools import ThreadCrew
+from mc_engine.runner.shards import Shard
+from mc_engine.runner.worker_process import Site, perform
+from mc_engine.store.verification import damage
 
 CASES, CHUNK = 1500, 100
 
@@ -83,7 +85,7 @@ def test_shards_in_any_order_some_killed_and_some_twice_merge_to_the_whole(campa
     merged = runner.merge(tmp_path / "merged", [folders[i] for i in rng.permutation(len(folders))], chunk=CHUNK)
     assert files_of(merged.path) == files_of(whole.path)
     record_property("files equal byte by byte", len(files_of(whole.path)))
-    assert merged.verify() == []
+    assert damage(merged.path) == []
 
 
 def lose_parts(folder):
@@ -139,8 +141,8 @@ def test_shards_that_differ_or_are_of_another_campaign_are_not_merged(campaign, 
 
 def change_a_number(folder):
     """A part whose receipt holds, and in which case 7 has another metric."""
-    from mc_engine import parts
-    from mc_engine.store import open_store
+    from mc_engine.store import parts
+    from mc_engine.store.opening import open_store
 
     store = open_store(folder)
     part = store.parts[0]
@@ -198,7 +200,7 @@ def test_a_damaged_part_is_flown_again_and_only_that(campaign, whole, tmp_path):
     lost.unlink()
     times = {path: path.stat().st_mtime_ns for path in (tmp_path / "run" / "cases").iterdir()}
     store = runner.resume(tmp_path / "run", repair=True)
-    assert store.verify() == []
+    assert damage(store.path) == []
     assert files_of(store.path) == files_of(whole.path)
     assert store.cases().equals(whole.cases())
     changed = {path.name for path, time in times.items() if path.stat().st_mtime_ns != time}
@@ -224,7 +226,7 @@ def test_a_worker_of_other_sources_is_refused(campaign, whole):
     """A machine with another engine would write other numbers: it says so, and writes none."""
     site = Site(str(whole.path), str(campaign.directory), CASES)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mc_engine.flown_campaign.sampling_digest", lambda: "another")
+        patch.setattr("mc_engine.runner.flown_campaign.sampling_digest", lambda: "another")
         with pytest.raises(StoreError, match="was flown by other sources"):
             perform(site, Order(0, 10))
     assert perform(site, Order(0, 10)).part.rows == 10

@@ -16,11 +16,14 @@ import pyarrow.parquet as pq
 import pytest
 from mutated_records import assert_answered, call, put_companion
 
-from mc_engine import case_files, load_campaign, open_store, runner
-from mc_engine.case_files import FileFault, numbers, read_columns
+from mc_engine import load_campaign, open_store
+from mc_engine.campaign import tables_beside as case_files
+from mc_engine.campaign.orbit_messages import MessageFault, _number
+from mc_engine.campaign.tables_beside import numbers, read_columns
 from mc_engine.errors import CampaignError
-from mc_engine.journal import encode, scan
-from mc_engine.orbit_messages import MessageFault, _number
+from mc_engine.model.files import FileFault
+from mc_engine.runner import runner
+from mc_engine.store.journal import encode, scan
 
 HEAD = '[campaign]\nmodel = "campaigns.deorbit"\n'
 RANDOM = HEAD + 'design = "mc"\ncases = 10\nseed = 1\n'
@@ -117,7 +120,7 @@ def test_rows_columns_and_lines_of_a_table_have_bounds(tmp_path, monkeypatch):
 MEMORY = """
 import resource, sys, time
 from pathlib import Path
-from mc_engine.case_files import FileFault, read_columns
+from mc_engine.campaign.tables_beside import FileFault, read_columns
 begin = time.monotonic()
 try:
     read_columns(Path(sys.argv[1]))
@@ -257,7 +260,7 @@ def chain(tmp_path_factory):
     return runner.run(load_campaign(folder / "two"), folder / "second", workers=1).path
 
 
-FACTS = b"mc_engine.upstream"
+FACTS = b"mc_engine.campaign.upstream"
 
 
 def facts_changed(change):
@@ -323,7 +326,7 @@ def falsified(run, change):
     entry = next(one for one in entries if one.event == "part")
     from hashlib import sha256
 
-    from mc_engine.parts import parquet_bytes
+    from mc_engine.store.parts import parquet_bytes
 
     content = parquet_bytes(change(pq.ParquetFile(run / entry.facts["file"]).read(use_threads=False)))
     (run / entry.facts["file"]).write_bytes(content)
@@ -340,7 +343,7 @@ def test_a_deleted_column_of_a_part_is_named_by_every_command(chain, tmp_path, n
                     ("replay", run, "3")):  # fmt: skip
         done = call(*command)
         assert_answered(done, 5)
-        assert f'"{name}" is missing' in done.output
+        assert "part-0000000000-0000000029.parquet: is no part of this run, it has other rows or columns" in done.output
 
 
 # ---- many of them

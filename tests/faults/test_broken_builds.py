@@ -10,8 +10,8 @@ import test_worker_deaths
 from broken_builds import BREAKS
 from stones import results, stones
 
-from mc_engine import runner
 from mc_engine.errors import EngineError
+from mc_engine.runner import runner
 
 RED = (AssertionError, EngineError)
 

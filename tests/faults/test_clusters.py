@@ -11,13 +11,14 @@ import pytest
 from distributed import LocalCluster
 from trapped import ENVIRONMENT, campaign_folder, files_of, trapped
 
-from mc_engine import open_store, runner
-from mc_engine.backends import Backend
-from mc_engine.chunks import Order
-from mc_engine.crew import Crew, Landing
-from mc_engine.dispatch import DRAIN_S, Dispatch
 from mc_engine.errors import RunInterrupted
-from mc_engine.parts import Part, Written
+from mc_engine.flight.chunks import Order
+from mc_engine.runner import runner
+from mc_engine.runner.backends import Backend
+from mc_engine.runner.dispatch import DRAIN_S, Dispatch
+from mc_engine.runner.workers import Crew, Landing
+from mc_engine.store.parts import Part, Written
+from mc_engine.store.verification import damage
 
 CASES, CHUNK = 400, 50
 PATIENCE_S = 2.0
@@ -132,7 +133,7 @@ def test_a_scheduler_that_answers_no_more_ends_the_run_and_its_drain(tmp_path):
                 process.send_signal(signal.SIGTERM)
             errors = ended(process, 60.0)
             assert f"`mc-engine resume {tmp_path / name / 'run'} --backend dask" in errors
-            assert open_store(tmp_path / name / "run").verify() == []
+            assert damage(tmp_path / name / "run") == []
             os.kill(scheduler.pid, signal.SIGCONT)
     finally:
         scheduler.send_signal(signal.SIGCONT)

@@ -22,11 +22,11 @@ from counted_directories import (
 )
 from stones import call
 
-from mc_engine import counted_files
-from mc_engine.derived_files import derived_files
-from mc_engine.directory_kinds import RARE_EVENT, TUNING
 from mc_engine.errors import StoreError
-from mc_engine.verification import damage
+from mc_engine.store import counted_files
+from mc_engine.store.derived_files import derived_files
+from mc_engine.store.run_files import RARE_EVENT, TUNING
+from mc_engine.store.verification import damage
 
 RECORDS = {TUNING: ("tuning.json", a_tuning), RARE_EVENT: ("rare.json", a_rare_event)}
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from stones import call, copy_of, flown_stones, results, stones
 
-from mc_engine import open_store, runner
+from mc_engine import open_store
 from mc_engine.errors import StoreError
-from mc_engine.journal import encode, scan
-from mc_engine.repair import mend_journal
-from mc_engine.verification import damage
+from mc_engine.runner import runner
+from mc_engine.store.journal import encode, scan
+from mc_engine.store.repair import mend_journal
+from mc_engine.store.verification import damage
 
 CASES, CHUNK = 200, 40
 RECOMPUTED = ("cases/", "history/", "nominal.parquet")  # what repair can fly again; the rest is told and refused
@@ -100,7 +101,7 @@ def repaired(run, flown):
     """Repair the run; the parts that were written anew.  All results are then those of the unbroken run."""
     before = {path: path.stat().st_mtime_ns for path in (run / "cases").iterdir()}
     store = runner.resume(run, workers=2, repair=True)
-    assert store.verify() == []
+    assert damage(store.path) == []
     assert results(run) == {**results(flown.path)}
     return {path.name for path in (run / "cases").iterdir() if before.get(path) != path.stat().st_mtime_ns}
 
@@ -206,7 +207,7 @@ def test_a_lost_extension_costs_no_case(grown, tmp_path, which, spoil):
     assert damage(run) == [f"journal.jsonl, line {number}: damaged" for number in numbers]
     store = runner.resume(run, workers=2, repair=True)
     assert store.n_cases == 350
-    assert store.verify() == []
+    assert damage(store.path) == []
     assert all_bytes(run) == before
     assert {name: (run / name).stat().st_mtime_ns for name in before} == stamps
 
@@ -288,5 +289,5 @@ def test_a_folder_that_is_gone_is_named_and_made_anew(run, flown, folder):
     assert said.exit_code == 5
     assert f"{folder}: the folder is gone; `mc-engine resume {run} --repair`" in said.stderr
     assert call("resume", run, "--repair", "--no-report").exit_code == 0
-    assert open_store(run).verify() == []
+    assert damage(run) == []
     assert results(run) == results(flown.path)

@@ -7,8 +7,8 @@ import pytest
 from stones import assert_as_unbroken, assert_no_wrong_row, completed, results, stones
 from watched_disk import BROKEN, FORBIDDEN, FULL, FailingCall, watched_disk
 
-from mc_engine import runner
 from mc_engine.errors import EngineError
+from mc_engine.runner import runner
 
 CASES, CHUNK = 200, 20
 

@@ -15,11 +15,12 @@ import pyarrow.parquet as pq
 import pytest
 from stones import call, copy_of, flown_stones, results, stones
 
-from mc_engine import load_campaign, open_store, runner
-from mc_engine.journal import encode, scan
-from mc_engine.parts import parquet_bytes
-from mc_engine.shards import Shard
-from mc_engine.verification import damage
+from mc_engine import load_campaign, open_store
+from mc_engine.runner import runner
+from mc_engine.runner.shards import Shard
+from mc_engine.store.journal import encode, scan
+from mc_engine.store.parts import parquet_bytes
+from mc_engine.store.verification import damage
 
 CASES, CHUNK = 120, 40
 
@@ -100,7 +101,7 @@ def test_what_verify_says_a_repair_mends_it_mends(run, flown, case):
     assert words in found[0]
     done = call("resume", run, "--repair", "--no-report")
     assert done.exit_code == 0, (done.output, done.exception)
-    assert open_store(run).verify() == []
+    assert damage(run) == []
     assert results(run) == results(flown.path)
 
 
@@ -127,7 +128,7 @@ def test_shards_and_runs_that_keep_no_history_verify_clean(tmp_path):
     (tmp_path / "campaign" / "campaign.toml").write_text(text)
     plain = runner.run(load_campaign(tmp_path / "campaign" / "campaign.toml"), tmp_path / "plain", workers=1)
     assert plain.history_part is None
-    assert [shard.verify(), plain.verify()] == [[], []]
+    assert [damage(shard.path), damage(plain.path)] == [[], []]
 
 
 # ---- files that no memory takes
@@ -207,9 +208,9 @@ def test_a_pipe_for_a_lock_is_named(run):
 THREADS = """
 import os, sys
 from mc_engine import open_store
-from mc_engine.verification import damage
+from mc_engine.store.verification import damage
 import pyarrow.parquet, numpy, pandas
-import mc_engine.repair, mc_engine.store
+import mc_engine.store.repair, mc_engine.store.store
 before = len(os.listdir("/proc/self/task"))
 assert damage(open_store(sys.argv[1]).path) == []
 store = open_store(sys.argv[1])

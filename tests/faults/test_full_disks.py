@@ -8,7 +8,7 @@ import pytest
 from stones import assert_as_unbroken, assert_no_wrong_row, results, stones
 from trapped import ENVIRONMENT
 
-from mc_engine import runner
+from mc_engine.runner import runner
 
 MIB = 2**20
 KIB_OF_LARGEST_FILE = 6

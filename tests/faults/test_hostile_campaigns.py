@@ -10,7 +10,7 @@ import pytest
 from mutated_campaigns import lay_out, mutate, slip
 from typer.testing import CliRunner
 
-from mc_engine.cli import app
+from mc_engine.command_line.commands import app
 
 SEED = 20161109
 FEW, ALL = 240, 20_000  # mutations; half as many slips of one letter come on top of few, a quarter is among all

@@ -14,8 +14,8 @@ import pandas as pd
 import pytest
 
 import mc_engine
-from mc_engine.campaign import load_campaign
-from mc_engine.case_files import csv_text, read_columns
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.tables_beside import csv_text, read_columns
 from mc_engine.errors import CampaignError
 from mc_engine.model import Model
 

@@ -17,11 +17,12 @@ import pyarrow.parquet as pq
 import pytest
 from stones import call, copy_of, flown_stones, results, stones
 
-from mc_engine import open_store, runner
+from mc_engine import open_store
 from mc_engine.errors import StoreError
-from mc_engine.journal import encode, scan
-from mc_engine.shards import Shard
-from mc_engine.verification import damage, damages
+from mc_engine.runner import runner
+from mc_engine.runner.shards import Shard
+from mc_engine.store.journal import encode, scan
+from mc_engine.store.verification import damage, damages
 
 CASES, CHUNK = 200, 40
 READERS = (("verify",), ("status",), ("summary",), ("resume", "--no-report"))
@@ -90,7 +91,7 @@ def test_repair_neither_opens_nor_removes_a_file_that_is_no_part(run, flown, vic
     done = call("resume", run, "--repair", "--no-report")
     assert done.exit_code == 0, done.output
     assert victim.read_text() == "mine"
-    assert open_store(run).verify() == []
+    assert damage(run) == []
     assert results(run) == results(flown.path)
 
 
@@ -128,7 +129,7 @@ def test_a_line_that_no_engine_can_have_written_is_damage_with_its_number(run, f
     for verb, *options in READERS:
         assert_a_sentence(call(verb, run, *options), place)
     runner.resume(run, workers=2, repair=True)
-    assert open_store(run).verify() == []
+    assert damage(run) == []
     assert results(run) == results(flown.path)
 
 
@@ -292,7 +293,7 @@ def assert_repaired_in_place(run, lost):
     runner.resume(run, workers=2, repair=True)
     assert bytes_of(run) == before
     assert {file for file in before if (run / file).stat().st_mtime_ns != stamps[file]} == set(lost)
-    assert open_store(run).verify() == []
+    assert damage(run) == []
 
 
 def test_repair_of_a_merged_run_gives_the_parts_back_and_flies_nothing_else(tmp_path):
@@ -345,7 +346,7 @@ def test_a_merge_that_fails_leaves_nothing_in_the_way_of_the_next(tmp_path):
 
 def test_a_fetch_that_fails_leaves_nothing_in_the_way_of_the_next(run, tmp_path):
     pytest.importorskip("fsspec")
-    from mc_engine.object_store import fetch, publish
+    from mc_engine.store.object_store import fetch, publish
 
     away, back = tmp_path / "away", tmp_path / "back"
     publish(run, f"file://{away}")
@@ -360,7 +361,7 @@ def test_a_fetch_that_fails_leaves_nothing_in_the_way_of_the_next(run, tmp_path)
 
 
 def test_names_of_unfinished_parts_leave_room_in_a_path_of_windows(run, monkeypatch):
-    from mc_engine import parts
+    from mc_engine.store import parts
 
     store = open_store(run)
     arrays = {name: column.to_numpy() for name, column in store.cases().iloc[:CHUNK].items()}

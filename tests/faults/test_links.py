@@ -10,11 +10,12 @@ from counted_directories import PAGES, TEXTS, a_rare_event, a_run, a_tuning, cop
 from stones import call
 from trapped import ROOT
 
-from mc_engine import durable_file, open_store, runner
-from mc_engine.derived_files import derived_files
+from mc_engine import durable_file, open_store
 from mc_engine.durable_file import make_way, names_in, publish, read_inside, remove_file, temporary_name, write_inside
 from mc_engine.errors import EngineError, StoreError
-from mc_engine.verification import damage
+from mc_engine.runner import runner
+from mc_engine.store.derived_files import derived_files
+from mc_engine.store.verification import damage
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links need rights")
 
@@ -133,13 +134,13 @@ WRITES = re.compile(
 )
 ELSEWHERE = {
     "mc_engine/durable_file.py": "the one place",
-    "mc_engine/kernel.py": "the cache of compiled kernels",
-    "mc_engine/object_store.py": "scratch folders beside a fetched copy",
+    "mc_engine/flight/kernel.py": "the cache of compiled kernels",
+    "mc_engine/store/object_store.py": "scratch folders beside a fetched copy",
     "mc_engine/text.py": "the null device",
-    "mc_engine/verbs_before_flight.py": "init makes a folder that the user named",
+    "mc_engine/command_line/before_flight.py": "init makes a folder that the user named",
     "mc_engine/documentation/website.py": "the site of the documentation",
     "mc_engine/unforeseen.py": "the log of an error, in the folder of temporary files",
-    "mc_engine/writer_lock.py": "the lock of a directory",
+    "mc_engine/store/writer_lock.py": "the lock of a directory",
     "reports/figures/table_figures.py": "a picture, to the place that the user names",
 }
 

@@ -9,8 +9,8 @@ import time
 import pytest
 from trapped import ENVIRONMENT
 
-from mc_engine.campaign import SHIPPED, load_campaign
-from mc_engine.chunks import fly_nominal
+from mc_engine.campaign.loading import SHIPPED, load_campaign
+from mc_engine.flight.chunks import fly_nominal
 from mc_engine.interruption import LANDING
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
@@ -78,7 +78,7 @@ def test_a_first_signal_is_answered_while_a_kernel_flies_and_a_second_one_ends_i
 
 
 # A process that checks a campaign, and gives one case a tenth of the time.
-HASTY = "import sys, mc_engine.contract_flight as flight\nflight.LONGEST_S = {}\nflight.main()"
+HASTY = "import sys, mc_engine.flight.contract_flight as flight\nflight.LONGEST_S = {}\nflight.main()"
 
 
 @pytest.mark.parametrize(("burn", "who"), [(NEVER, "the nominal case has"), (SOON, "the first 32 cases have")])

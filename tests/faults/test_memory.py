@@ -13,7 +13,8 @@ RUN = """
 import json, sys
 from pathlib import Path
 import psutil
-from mc_engine import load_campaign, runner
+from mc_engine import load_campaign
+from mc_engine.runner import runner
 
 process, samples = psutil.Process(), []
 def note(done, total, failed):

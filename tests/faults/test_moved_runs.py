@@ -7,7 +7,8 @@ import signal
 import pytest
 from test_signals import begin, end
 
-from mc_engine import open_store, runner
+from mc_engine.runner import runner
+from mc_engine.store.verification import damage
 
 
 def rename(run, moved):
@@ -49,7 +50,7 @@ def test_a_run_whose_directory_is_gone_says_so_and_goes_on_at_its_new_place(tmp_
     assert errors.endswith(f"`mc-engine resume NEW_PLACE{option}` flies the rest\n")
     assert str(run) not in errors.splitlines()[-1].replace(f"{run}: was moved", "")
     if happen is not remove:
-        assert open_store(moved).verify() == []
+        assert damage(moved) == []
         assert runner.resume(moved, workers=2).missing() == []
-        assert open_store(moved).verify() == []
+        assert damage(moved) == []
         assert [path.name for path in tmp_path.glob("run/**/*")] == []  # nothing came back at the old place

@@ -11,7 +11,8 @@ import pytest
 from mutated_records import assert_answered, call, dumped, mutated, put_manifest
 from stones import flown_stones
 
-from mc_engine import load_campaign, runner
+from mc_engine import load_campaign
+from mc_engine.runner import runner
 
 READERS = ("status", "verify", "summary", "compare", "report", "replay", "resume", "export")
 OPTIONS = {"replay": ("3",), "resume": ("--no-report",), "report": ("--format", "md")}

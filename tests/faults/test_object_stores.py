@@ -15,13 +15,12 @@ from small_run import block, created, filled
 from stones import stones
 
 from mc_engine import run as fly
-from mc_engine.cli import app
-from mc_engine.derived_files import derived_files
+from mc_engine.command_line.commands import app
 from mc_engine.errors import StoreError
-from mc_engine.object_store import _Remote, fetch, publish
-from mc_engine.publisher import Publisher
-from mc_engine.store import open_store
-from mc_engine.verification import damage
+from mc_engine.store.derived_files import derived_files
+from mc_engine.store.object_store import Publisher, _Remote, fetch, publish
+from mc_engine.store.opening import open_store
+from mc_engine.store.verification import damage
 
 fsspec = pytest.importorskip("fsspec")
 

@@ -13,7 +13,8 @@ from stones import assert_as_unbroken, assert_no_wrong_row, completed, results, 
 from test_full_disks import engine
 from watched_disk import Listener, watched_disk
 
-from mc_engine import open_store, runner
+from mc_engine.runner import runner
+from mc_engine.store.verification import damage
 
 CASES, CHUNK = 200, 20
 
@@ -171,7 +172,7 @@ def test_the_record_holds_the_whole_run(record, tmp_path):
         disk.play(*operation)
     again = disk.cut(tmp_path / "cut", "all lost", None)
     assert results(again) == whole
-    assert open_store(again).verify() == []
+    assert damage(again) == []
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -196,7 +197,7 @@ def test_a_run_cut_short_while_it_was_made_is_begun_anew_in_the_same_folder(reco
     assert "has no journal.jsonl, and so no case that counts; `run` the campaign anew" in done.stderr
     done = engine("run", campaign.directory, "--out", after, "--no-report")
     assert done.returncode == 0, done.stderr
-    assert open_store(after).verify() == []
+    assert damage(after) == []
     assert results(after)["nominal.parquet"] == whole["nominal.parquet"]
 
 

@@ -16,9 +16,8 @@ from cart import call
 from small_run import ENVIRONMENT, created, filled
 
 from mc_engine.errors import StoreError
-from mc_engine.object_store import _Remote, fetch, publish
-from mc_engine.publisher import Publisher
-from mc_engine.store import open_store
+from mc_engine.store.object_store import Publisher, _Remote, fetch, publish
+from mc_engine.store.opening import open_store
 
 pytest.importorskip("fsspec")
 
@@ -97,7 +96,7 @@ def test_a_copy_that_is_kept_up_to_date_reads_back_what_it_sends_and_no_more(run
 
 KILLED = """
 import sys, time
-from mc_engine import object_store
+from mc_engine.store import object_store
 object_store._place = lambda *_: (print("copying", flush=True), time.sleep(60))
 object_store.fetch(sys.argv[1], object_store.Path(sys.argv[2]))
 """

@@ -13,7 +13,8 @@ import pytest
 from killed_runs import FORKING
 from stones import assert_as_unbroken, results, stones
 
-from mc_engine import open_store, runner
+from mc_engine import open_store
+from mc_engine.runner import runner
 
 CASES, CHUNK = 400, 40
 LONG = 4000
@@ -34,8 +35,9 @@ SERVER = """
 import json, mmap, os, sys, time
 from pathlib import Path
 import broken_builds
-from mc_engine import load_campaign, runner
-from mc_engine.chunks import fly_nominal
+from mc_engine import load_campaign
+from mc_engine.runner import runner
+from mc_engine.flight.chunks import fly_nominal
 from mc_engine.errors import EngineError
 
 if len(sys.argv) > 3:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from trapped import ENVIRONMENT, campaign_folder, files_of
 
-from mc_engine import load_campaign, runner
+from mc_engine import load_campaign
+from mc_engine.runner import runner
 
 CASES, OF = 4000, 20
 

@@ -13,7 +13,9 @@ import psutil
 import pytest
 from trapped import ENVIRONMENT, campaign_folder
 
-from mc_engine import open_store, runner
+from mc_engine import open_store
+from mc_engine.runner import runner
+from mc_engine.store.verification import damage
 
 CASES = 3200  # sixteen chunks for two workers
 GONE_WITHIN_S = 20.0
@@ -84,7 +86,7 @@ def test_one_signal_lets_what_is_in_flight_land_and_says_how_to_go_on(tmp_path, 
     store = open_store(tmp_path / "run")
     assert store.missing()
     assert len(store.parts) > len(before)
-    assert store.verify() == []
+    assert damage(store.path) == []
     whole = runner.resume(tmp_path / "run")
     assert whole.status_counts() == {"ok": CASES}
 

@@ -16,7 +16,7 @@ from mutated_records import assert_answered, call
 
 import mc_engine
 from mc_engine import unforeseen
-from mc_engine.command_line import exit_status
+from mc_engine.command_line.app import exit_status
 
 ROOT = Path(mc_engine.__file__).resolve().parents[1]
 

@@ -12,9 +12,11 @@ import pytest
 from killed_runs import FORKING
 from trapped import files_of, trapped
 
-from mc_engine import open_store, runner
-from mc_engine.backends import Backend
+from mc_engine import open_store
 from mc_engine.errors import EngineError, ModelError
+from mc_engine.runner import runner
+from mc_engine.runner.backends import Backend
+from mc_engine.store.verification import damage
 
 SLEEP_S = 0.2  # of every flight: a chunk takes long enough to be hit in the middle
 CHUNK = 50
@@ -25,7 +27,7 @@ WORKERS = {"loky": "popen_loky_posix", "dask": "spawn_main"}  # words of their c
 COMMAND = """
 import runpy, sys
 import broken_builds
-from mc_engine import sessions
+from mc_engine.runner import sessions
 
 chunk, broken = int(sys.argv[1]), sys.argv[2]
 sessions.chunk_size = lambda cases, workers: chunk
@@ -92,7 +94,7 @@ def check_kills(folder, backend, seed, kills, cases, broken=""):
     assert left == 0
     whole = runner.run(campaign, folder / "whole", workers=2, chunk=CHUNK)
     assert files_of(run) == files_of(whole.path)
-    assert open_store(run).verify() == []
+    assert damage(run) == []
 
 
 def test_workers_killed_at_random_instants_lose_nothing_and_repeat_nothing(tmp_path, record_property):
@@ -125,7 +127,7 @@ def check_isolated(folder, cases, killers, backend, broken="", longest_s=LONGEST
     assert frame[inputs].equals(plain[inputs])
     rest = frame["status"] == "ok"
     assert frame[rest].drop(columns="trap").equals(plain[rest].drop(columns="trap"))
-    assert run.verify() == []
+    assert damage(run.path) == []
     return run
 
 
@@ -133,7 +135,7 @@ def rerun(run, backend, **environment):
     """Fly the failed cases of a run again on the command line; the parts of before and of after, by name."""
     before = parts_of(run)
     completed(command("rerun", "--failed", run, "--workers", 2, "--backend", backend, "--no-report", **environment))
-    assert open_store(run).verify() == []
+    assert damage(run) == []
     return before, parts_of(run)
 
 

@@ -3,8 +3,8 @@
 from small_run import COLUMNS, MANIFEST, TEXT, filled
 from typer.testing import CliRunner
 
-from mc_engine.cli import app
-from mc_engine.store import create_store
+from mc_engine.command_line.commands import app
+from mc_engine.store.store import create_store
 
 MODEL = """
 from collections import namedtuple

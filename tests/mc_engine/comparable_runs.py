@@ -4,9 +4,9 @@ import numpy as np
 from cart import REQUIREMENT
 from scipy.stats import norm
 
+from mc_engine.sampling.streams import uniforms
 from mc_engine.status import NO_STOP, OK
-from mc_engine.store import Column, Store, create_store
-from mc_engine.streams import uniforms
+from mc_engine.store.store import Column, Store, create_store
 
 COLUMNS = [
     Column("ve_pct", "%", "dispersion", "error of the burn"),

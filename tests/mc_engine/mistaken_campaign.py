@@ -1,6 +1,6 @@
 """The smallest campaign with deliberate mistakes, for the tests of what the engine says about them."""
 
-from mc_engine.campaign import SHIPPED, load_campaign
+from mc_engine.campaign.loading import SHIPPED, load_campaign
 
 MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from mc_engine.status import NO_STOP, OK
-from mc_engine.store import Column, create_store
+from mc_engine.store.store import Column, create_store
 
 _HERE = Path(__file__).resolve().parent
 # For processes that a test starts: they find the engine and this module from any working folder.

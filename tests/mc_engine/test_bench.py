@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from mc_engine.campaign import SHIPPED, load_campaign
-from mc_engine.case_columns import END_TIME
-from mc_engine.cases import case_table, full_inputs
-from mc_engine.cli import app
+from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.columns import END_TIME
+from mc_engine.campaign.loading import SHIPPED, load_campaign
+from mc_engine.command_line.commands import app
 from mc_engine.errors import ModelError
-from mc_engine.flight import bound_flight, fly
-from mc_engine.lane_speed import Timing, campaign_flight, measure
+from mc_engine.flight.flight import bound_flight, fly
+from mc_engine.studies.lane_speed import Timing, campaign_flight, measure
 
 
 @pytest.fixture(scope="module")

@@ -12,13 +12,15 @@ import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
 from small_run import ENVIRONMENT
 
-from mc_engine import sessions, store, tuning
-from mc_engine.campaign import SHIPPED
+from mc_engine.campaign.loading import SHIPPED
+from mc_engine.command_line.next_step import after_flight, after_search
 from mc_engine.errors import DiskError, EngineError, StoreError
-from mc_engine.journal import damaged_line
-from mc_engine.next_step import after_flight, after_search
+from mc_engine.runner import sessions
 from mc_engine.shell_words import shell_word
-from mc_engine.store import open_store
+from mc_engine.store import store
+from mc_engine.store.journal import damaged_line
+from mc_engine.store.opening import open_store
+from mc_engine.studies import tuning
 
 
 @pytest.fixture
@@ -118,10 +120,10 @@ def test_without_a_failed_case_nothing_is_flown_again(here):
 
 
 def test_a_run_without_a_case_that_flew_names_the_check_of_its_model(here, monkeypatch):
-    monkeypatch.setattr("mc_engine.run_summary.failed_cases", lambda store: 20)
+    monkeypatch.setattr("mc_engine.runner.summary.failed_cases", lambda store: 20)
     answer = call("run", "minimal", "--cases", 20, "--out", "flown", "--no-report")
     assert answer.exit_code == 0, answer.output
-    assert "no case flew to its end; `mc-engine check minimal` looks for the reason in the model" in answer.stderr
+    assert "no case completed; `mc-engine check minimal` looks for the reason in the model" in answer.stderr
     monkeypatch.undo()
     monkeypatch.chdir(here)
     assert "no case flew" not in call("run", "minimal", "--cases", 20, "--out", "again", "--no-report").stderr

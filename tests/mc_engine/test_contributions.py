@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mc_engine import load_campaign, open_store, runner
+from mc_engine import load_campaign, open_store
 from mc_engine.errors import CampaignError, RunInterrupted
+from mc_engine.runner import runner
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 
 MODEL = Path(__file__).parent / "contributions" / "model.py"

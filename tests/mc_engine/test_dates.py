@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mc_engine.campaign_problems import Findings
-from mc_engine.case_files import FileFault
-from mc_engine.case_table_file import _dates
+from mc_engine.campaign.case_table import _dates
+from mc_engine.campaign.inputs import accepted_range, check_value
+from mc_engine.campaign.reading import Findings
 from mc_engine.dates import date_text, modified_julian_date
-from mc_engine.input_values import accepted_range, check_value
 from mc_engine.model import Setting
+from mc_engine.model.files import FileFault
 
 EPOCH = Setting("epoch_utc", "", "start", "2019-01-01T12:00:00", (), 33282.0, 88068.0, date=True)
 

@@ -7,13 +7,13 @@ import sys
 import pytest
 from small_run import ENVIRONMENT
 
-from mc_engine.campaign import SHIPPED, load_campaign
+from mc_engine.campaign.loading import SHIPPED, load_campaign
 from mc_engine.errors import CampaignError, StoreError
-from mc_engine.flown_campaign import companions_of
-from mc_engine.kernel import source_digest
+from mc_engine.flight.kernel import source_digest
 from mc_engine.model import load_model
-from mc_engine.runner import extend, replay, run
-from mc_engine.store import open_store
+from mc_engine.runner.flown_campaign import companions_of
+from mc_engine.runner.runner import extend, replay, run
+from mc_engine.store.verification import damage
 
 MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()
@@ -305,7 +305,7 @@ def test_a_run_stands_alone_whatever_way_the_campaign_names_its_files(model, fil
     monkeypatch.chdir(tmp_path)
     run(load_campaign(tmp_path / "mine"), tmp_path / "flown", workers=1)
     (tmp_path / "mine").rename(tmp_path / "away")
-    assert open_store(tmp_path / "flown").verify() == []
+    assert damage(tmp_path / "flown") == []
     assert replay(tmp_path / "flown", 3).equal
     assert extend(tmp_path / "flown", 12, workers=1).n_cases == 12
 

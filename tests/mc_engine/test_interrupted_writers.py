@@ -6,8 +6,8 @@ import pytest
 from cart import call
 from small_run import block
 
-from mc_engine import parts
-from mc_engine.verification import RESUME
+from mc_engine.store import parts
+from mc_engine.store.verification import RESUME, damage
 
 STRAY = "cases/part-0000000010-0000000019.parquet"
 
@@ -36,7 +36,7 @@ def test_what_a_kill_leaves_is_told_and_is_no_damage(killed, name):
     assert f"{killed.path / name}: " in done.stderr
     assert RESUME in done.stderr
     assert done.stdout == f"{killed.path}: every byte is as it was written\n"
-    assert killed.verify() == []
+    assert damage(killed.path) == []
     with killed.lock():  # as `resume` does
         assert not (killed.path / name).exists()
     assert call("verify", killed.path).stderr == ""
@@ -45,7 +45,7 @@ def test_what_a_kill_leaves_is_told_and_is_no_damage(killed, name):
 def test_a_part_without_a_line_is_damage_where_no_writer_was_killed(killed):
     (killed.path / ".lock").write_bytes(b"")
     leave(killed, STRAY)
-    assert killed.verify() == [f"{STRAY}: has no line in the journal and does not count"]
+    assert damage(killed.path) == [f"{STRAY}: has no line in the journal and does not count"]
     assert call("verify", killed.path).exit_code == 5
 
 

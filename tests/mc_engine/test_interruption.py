@@ -10,9 +10,10 @@ import pytest
 from cart import small_store
 from small_run import ENVIRONMENT
 
-from mc_engine import load_campaign, runner
+from mc_engine import load_campaign
+from mc_engine.command_line.next_step import after_flight, after_search, is_complete
 from mc_engine.interruption import LANDING, NOTHING_BEGUN, ONCE_MORE
-from mc_engine.next_step import after_flight, after_search, is_complete
+from mc_engine.runner import runner
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
 
@@ -41,8 +42,8 @@ sys.argv = ["mc-engine", *{arguments!r}]
 {then}
 main()
 """
-CAMPAIGN, REPORTS = "mc_engine.campaign.load_campaign", "reports.write_reports"
-KERNEL = "mc_engine.flight._bound_kernel"
+CAMPAIGN, REPORTS = "mc_engine.campaign.loading.load_campaign", "reports.write_reports"
+KERNEL = "mc_engine.flight.flight._bound_kernel"
 
 
 def command(place, body, *arguments, by="SIGTERM", then=""):
@@ -138,7 +139,7 @@ def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun()
         "import os, signal, sys, time\n"
         "class Finder:\n"
         "    def find_spec(self, name, path=None, target=None):\n"
-        "        if name == 'mc_engine.cli':\n"
+        "        if name == 'mc_engine.command_line.commands':\n"
         "            os.kill(os.getpid(), signal.SIGTERM)\n"
         "            time.sleep(30.0)\n"
         "from mc_engine.__main__ import main\n"

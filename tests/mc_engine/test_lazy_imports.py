@@ -9,7 +9,7 @@ from small_run import ENVIRONMENT
 def loaded_by(*arguments):
     """The modules that a process of its own has loaded after the verb."""
     script = (
-        "import sys\nfrom mc_engine.cli import app\n"
+        "import sys\nfrom mc_engine.command_line.commands import app\n"
         f"try:\n    app({list(map(str, arguments))!r})\nexcept SystemExit as end:\n    assert not end.code, end.code\n"
         "print('\\n'.join(['LOADED', *sys.modules]))"
     )

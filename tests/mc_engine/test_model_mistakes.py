@@ -9,13 +9,13 @@ import pytest
 from mistaken_campaign import campaign_with, line_of, write_campaign
 from small_run import ENVIRONMENT
 
-from mc_engine import flight
-from mc_engine.contract_flight import faults
 from mc_engine.errors import ModelError
+from mc_engine.flight import flight
+from mc_engine.flight.contract import breaches
+from mc_engine.flight.contract_flight import faults
 from mc_engine.lanes import any_lane, where
-from mc_engine.model_contract import breaches
-from mc_engine.model_faults import MORE
-from mc_engine.runner import run
+from mc_engine.model.faults import MORE
+from mc_engine.runner.runner import run
 
 ACCELERATION = "    g = -MU_EARTH / (r2 * sqrt(r2))\n"
 DERIVATIVE = "    return State(s.vx, s.vy, g * s.x, g * s.y)"

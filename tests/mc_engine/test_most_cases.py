@@ -3,8 +3,8 @@
 import pytest
 from cart import call, fails_with
 
-from mc_engine import runner
 from mc_engine.errors import CampaignError
+from mc_engine.runner import runner
 from mc_engine.status import MOST_CASES
 
 LIMIT = f"{MOST_CASES + 1} is not allowed; it must be at most {MOST_CASES}"

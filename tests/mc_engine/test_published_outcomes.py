@@ -3,10 +3,10 @@
 import pytest
 from typer.testing import CliRunner
 
-from mc_engine.cli import app
+from mc_engine.command_line.commands import app
 from mc_engine.errors import EngineError, ModelError
-from mc_engine.published import NOT_REACHED, REACHED, UNKNOWN, half_a_unit, outcome, read_published, read_source
-from mc_engine.published_table import campaign_table, headline_table, written_into
+from mc_engine.studies.published import NOT_REACHED, REACHED, UNKNOWN, half_a_unit, outcome, read_published, read_source
+from mc_engine.studies.published_table import campaign_table, headline_table, written_into
 
 RECORD = {"quantity": "fuel", "published": 3.8, "unit": "kg", "ours": 3.84, "status": "legible"}
 TEXT = """

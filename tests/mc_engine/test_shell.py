@@ -12,7 +12,8 @@ from cart import call, fails_with
 from small_run import ENVIRONMENT
 
 import mc_engine
-from mc_engine.store import open_store
+from mc_engine.store.opening import open_store
+from mc_engine.store.verification import damage
 
 
 def test_list_names_the_source_of_each_system_once_below_its_campaigns():
@@ -48,7 +49,9 @@ def test_the_shell_completes_campaigns_by_name_and_by_path(tmp_path, begun, offe
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["check", "--help"]])
 def test_help_takes_less_than_150_ms_of_a_processor(words):
     """User time of the whole process, the best of some tries; a fresh one, as in a shell."""
-    script = f"import resource; from mc_engine.cli import app\ntry: app({words})\nfinally: print(chr(10), "
+    script = (
+        f"import resource; from mc_engine.command_line.commands import app\ntry: app({words})\nfinally: print(chr(10), "
+    )
     script += "resource.getrusage(resource.RUSAGE_SELF).ru_utime)"
     command = [sys.executable, "-c", script]
     tries = [subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT).stdout for _ in range(5)]
@@ -121,7 +124,7 @@ def test_streams_that_the_shell_closed_are_those_of_no_file(tmp_path):
     command = [sys.executable, "-m", "mc_engine", *RUN, str(tmp_path / "run")]
     closed = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", *command]
     assert subprocess.run(closed, env=ENVIRONMENT, timeout=60).returncode == 0
-    assert open_store(tmp_path / "run").verify() == []
+    assert damage(tmp_path / "run") == []
 
 
 def test_words_that_are_gathered_in_memory_are_those_of_the_command_line():

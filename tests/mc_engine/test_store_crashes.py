@@ -7,9 +7,11 @@ import pandas as pd
 import pytest
 from small_run import COLUMNS, ENVIRONMENT, MANIFEST, TEXT, block, filled
 
-from mc_engine import parts
 from mc_engine.errors import StoreError
-from mc_engine.store import create_store, open_store
+from mc_engine.store import parts
+from mc_engine.store.opening import open_store
+from mc_engine.store.store import create_store
+from mc_engine.store.verification import damage
 
 
 def fail_at(monkeypatch, n, target):
@@ -43,7 +45,7 @@ def test_whichever_system_call_fails_the_error_names_a_path_and_the_run_can_go_o
         store = open_store(run)
         for first, stop in store.missing():
             store.append(first, stop - first, block(first, stop - first))
-        assert store.verify() == []
+        assert damage(store.path) == []
         assert store.cases()["ve_pct"].tolist() == block(0, 40)["ve_pct"].tolist()
         assert len(pd.read_parquet(run / "cases")) == 40
         if not failed:
@@ -91,9 +93,9 @@ def test_a_torn_last_line_takes_its_part_with_it_and_the_next_writer_mends_both(
     journal.write_bytes(journal.read_bytes()[:-9])
     again = open_store(store.path)
     assert again.missing() == [(30, 40)]
-    assert any("torn" in problem for problem in again.verify())
+    assert any("torn" in problem for problem in damage(again.path))
     again.append(30, 10, block(30, 10))
-    assert again.verify() == []
+    assert damage(again.path) == []
     assert again.cases()["ve_pct"].tolist() == block(0, 40)["ve_pct"].tolist()
 
 
@@ -133,6 +135,6 @@ def test_a_killed_writer_loses_nothing_it_committed_and_is_taken_over_with_a_not
         for first, stop in store.missing():
             store.append(first, stop - first, block(first, stop - first))
     assert store.notes("lock-taken-over")[0].facts["from"]["pid"] == writer.pid
-    assert store.verify() == []
+    assert damage(store.path) == []
     assert store.cases()["ve_pct"].tolist() == block(0, 40)["ve_pct"].tolist()
     assert len(pd.read_parquet(run / "cases")) == 40

@@ -16,9 +16,10 @@ from told import LONE, PAYLOAD, assert_harmless, told
 
 from mc_engine import load_campaign, open_run
 from mc_engine.errors import CampaignError, EngineError, Problem
-from mc_engine.journal import encode, scan
-from mc_engine.replay_files import history_figure
-from mc_engine.store import create_store, open_store
+from mc_engine.store.journal import encode, scan
+from mc_engine.store.opening import open_store
+from mc_engine.store.store import create_store
+from mc_engine.studies.replay_files import history_figure
 from mc_engine.text import clean
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals, and names are not bytes")
@@ -128,7 +129,7 @@ def test_a_bar_still_moves_the_cursor_and_what_others_say_beside_it_does_not(tmp
         import logging, sys, warnings
         from mc_engine.text import clean_streams
         with clean_streams():
-            from mc_engine.progress import Progress
+            from mc_engine.runner.progress import Progress
             with Progress() as progress:
                 progress(1, 10, 0)
                 print("said \\x1b[2J", file=sys.stderr)

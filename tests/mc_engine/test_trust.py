@@ -9,8 +9,8 @@ import pytest
 from cart import call
 from small_run import ENVIRONMENT, created, filled
 
-from mc_engine import cli
-from mc_engine.documentation.verbs_page import commands
+from mc_engine.command_line import commands as cli
+from mc_engine.documentation.commands_page import commands
 from mc_engine.documentation.website import HOME
 
 MARK = "import pathlib; pathlib.Path({!r}).touch()\n"
@@ -33,7 +33,7 @@ IN_ONE_PROCESS = """
 import json, os, sys
 from pathlib import Path
 from typer.testing import CliRunner
-from mc_engine.cli import app
+from mc_engine.command_line.commands import app
 answers = {}
 for words in json.loads(sys.argv[1]):
     done = CliRunner().invoke(app, words)

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from mc_engine.cli import app
+from mc_engine.command_line.commands import app
 from mc_engine.model import Field
 from mc_engine.units import UNITS, by_quantity, compatible, convert, nearest_unit, unit_hint
 

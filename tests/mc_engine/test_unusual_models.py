@@ -3,8 +3,8 @@
 import pytest
 from mistaken_campaign import campaign_with
 
-from mc_engine.contract_flight import faults
-from mc_engine.model_contract import breaches
+from mc_engine.flight.contract import breaches
+from mc_engine.flight.contract_flight import faults
 
 IMPORTS = "from mc_engine.lanes import"
 RHS = "@physics\ndef rhs"

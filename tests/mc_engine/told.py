@@ -4,7 +4,7 @@ import contextlib
 import io
 import sys
 
-from mc_engine.cli import app
+from mc_engine.command_line.commands import app
 from mc_engine.text import clean_streams
 
 STEERING = {*map(chr, range(32)), *map(chr, range(127, 160))} - {"\n", "\t"}

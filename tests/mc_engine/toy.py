@@ -3,7 +3,7 @@
 from collections import namedtuple
 from pathlib import Path
 
-from mc_engine.campaign import Campaign, load_campaign
+from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import CampaignError
 from mc_engine.model import Field, FixedStep, Model, Parameter, Setting
 

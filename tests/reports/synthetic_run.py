@@ -38,7 +38,7 @@ QUANTITIES = [
 
 @dataclass
 class SyntheticRun:
-    """What `mc_engine.store.open_store` gives to a report."""
+    """What `mc_engine.store.store.open_store` gives to a report."""
 
     manifest: dict[str, Any]
     table: pd.DataFrame

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from mc_engine.directory_kinds import TUNING
-from mc_engine.genetic_search import non_dominated
-from mc_engine.parts import Column
-from mc_engine.result_folder import write_result
-from mc_engine.tuning_folder import UNFINISHED, open_tuning
+from mc_engine.store.parts import Column
+from mc_engine.store.result_folder import write_result
+from mc_engine.store.run_files import TUNING
+from mc_engine.studies.genetic_search import non_dominated
+from mc_engine.studies.tuning_folder import UNFINISHED, open_tuning
 
 MEASURES = ["cost", "error", "limited"]
 

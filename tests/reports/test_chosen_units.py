@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import re
+from base64 import b64decode
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from reports.contents import build
 from reports.data import render_json
 from reports.document import FigureBlock, blocks_of
 from reports.flown import Flown
-from reports.html import render_html
+from reports.html import case_record, render_html
 from reports.markdown import render_markdown
 
 
@@ -85,3 +86,11 @@ def test_the_data_of_a_report_stay_in_the_columns_own_units(slow):
     metric = next(one for one in record["metrics"] if one["name"] == "settling_time_s")
     assert metric["unit"] == "s"
     assert metric["mean"] == pytest.approx(slow.table["settling_time_s"][:397].mean(), rel=1e-12)
+
+
+def test_a_single_case_is_drawn_over_time_in_the_unit_of_its_label(slow):
+    record = case_record(build(slow, "run"))
+    assert record["panel"]["xaxis"]["title"]["text"] == "time [day]"
+    times = record["histories"]["-1"]["force_n"][0]
+    own = slow.history.loc[slow.history["case_id"] == -1, "t_s"].max()
+    assert max(np.frombuffer(b64decode(times["bdata"]), times["dtype"])) == pytest.approx(own / 86400.0, rel=1e-6)

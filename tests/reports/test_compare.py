@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from synthetic_run import synthetic_run
 
-from mc_engine.comparison import compare_runs
 from mc_engine.errors import StoreError
+from mc_engine.studies.comparison import compare_runs
 from reports.compare import build_comparison, write_comparison
 from reports.document import FigureBlock, Table, blocks_of
 from reports.figures.changes import ratio_ticks
@@ -72,7 +72,7 @@ def test_a_shift_far_beyond_the_others_is_said_and_the_axis_shows_the_others():
     a, b = two_runs(1.0)
     document = build_comparison(compare_runs(a, b, ("before", "after")))
     (figure,) = blocks_of(document, FigureBlock)
-    low, high = figure.drawing.panels[0].span
+    low, high = figure.drawing.plots[0].x.reach
     assert -10.0 < low < high < 10.0
     assert "beyond the axis, not drawn: entry speed" in figure.caption
     rows = tables(document)["Metrics of both runs"].rows
@@ -92,6 +92,22 @@ def test_both_runs_are_laid_over_one_another_with_the_counts_of_the_table():
     assert keys == {"run A", "run B"}
     page = render_html(document).decode()
     assert "run B: fraction of the cases" in page
+
+
+def test_rounding_errors_of_nominal_cases_are_not_drawn_over_one_another():
+    a, b = two_runs(1.0)
+    for seed, run in enumerate((a, b)):
+        keep = run.history["case_id"] < 3  # too few for envelopes
+        run.history = run.history[keep].copy()
+        nominal = run.history["case_id"] == -1
+        assert nominal.any()
+        run.history.loc[nominal, "force_n"] = 1e-13 * np.random.default_rng(seed).random(nominal.sum())
+    document = build_comparison(compare_runs(a, b, ("before", "after")), (a, b))
+    section = next(one for one in document.sections if one.anchor == "overlays")
+    labels = [panel.y.label for panel in section.blocks[1].drawing.plots]
+    assert "position error [m]" in labels
+    assert "force [N]" not in labels
+    assert section.blocks[2].paragraphs == ("Not drawn, rounding errors only in both nominal cases: force_n.",)
 
 
 def test_the_same_run_twice_has_no_figure_and_says_so():

@@ -50,10 +50,12 @@ def test_a_limit_that_the_two_columns_do_not_decide_is_not_drawn():
     assert corridor(build(run, "run")).drawing.limits == ()
 
 
-def test_without_a_violation_the_caption_says_that_all_cases_are_inside():
+def test_without_a_violation_a_sentence_says_that_all_cases_are_inside():
     run = landing_run(1000, failed=0)
     run.table = run.table.assign(peak_load_g=8.0 + 1e-3 * run.table["angle_deg"], exits=0.0)
-    assert corridor(build(run, "run")).caption == "Entry corridor. All cases are inside all limits."
+    (section,) = [one for one in build(run, "run").sections if one.anchor == "corridor"]
+    (said,) = section.blocks
+    assert said.paragraphs == ("Entry corridor: not drawn; all cases are inside all limits.",)
 
 
 @pytest.mark.parametrize("cases", [0, 1, 2, 60])

@@ -14,9 +14,9 @@ import jsonschema
 import numpy as np
 import pytest
 
-from mc_engine.campaign import load_campaign
-from mc_engine.campaign_search import list_campaigns
-from mc_engine.runner import run
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import list_campaigns
+from mc_engine.runner.runner import run
 from reports import render_html, render_pdf
 from reports.contents import build
 from reports.data import render_json, schema

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic_run import SyntheticRun, fly, synthetic_run
 
-from mc_engine.designs import unit_cube
+from mc_engine.sampling.designs import unit_cube
 from reports.contents import build
 from reports.document import FigureBlock, Table
 

@@ -2,6 +2,8 @@
 
 import json
 import re
+from dataclasses import replace
+from types import SimpleNamespace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,6 +14,7 @@ from reports import render_html, render_pdf
 from reports.contents import build
 from reports.document import FigureBlock, Table, Text
 from reports.figures import FootprintDrawing, screen
+from reports.footprints import _long_axis
 from reports.map_files import cut_at_date_line
 
 KML = "{http://www.opengis.net/kml/2.2}"
@@ -165,3 +168,18 @@ def test_what_cannot_be_drawn_is_said(change, said):
 def test_no_path_gets_into_the_files(document):
     for one in document.files:
         assert not re.search(rb"/(tmp|home|work|root)/", one.content)
+
+
+@pytest.mark.parametrize(("semi_axes", "enlarged"), [((70e3, 9.5e3), False), ((130e3, 10e3), True)])
+def test_a_scale_of_its_own_across_is_for_clouds_far_longer_than_wide(semi_axes, enlarged):
+    found = SimpleNamespace(ellipses=[SimpleNamespace(semi_axes=semi_axes, direction=0.3)])
+    assert (_long_axis(found) is not None) == enlarged
+
+
+def test_a_view_with_two_scales_says_so():
+    (block,) = blocks(build(landing_run(), "run"), FigureBlock)
+    views = replace(block.drawing, long_axis=0.3).plots
+    assert [(plot.equal, plot.title) for plot in views[:2]] == [
+        (True, ""),
+        (False, "Along and across, each with a scale of its own"),
+    ]

@@ -88,3 +88,9 @@ def test_units_are_printed_with_raised_powers_and_greek_letters(unit, printed):
     assert typeset(unit) == printed
     assert axis_label("load", unit) == f"load [{printed}]"
     assert with_unit("1", unit) == f"1\u202f{printed}"
+
+
+def test_a_number_that_is_nothing_beside_the_spread_is_0():
+    assert number(6.66e-16, 4, 0.35) == "0"
+    assert number(6.66e-16, 4) == "6.66·10⁻¹⁶"
+    assert number(-2e-6, 4, 1e-5) != "0"

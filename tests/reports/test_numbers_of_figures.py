@@ -1,6 +1,7 @@
 """What figures draw, against the same numbers computed in another way."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,15 +13,19 @@ from synthetic_run import synthetic_run
 
 from mc_engine.statistics.geodesy import LocalPlane
 from reports.coastlines import coastlines, nearest_coast
+from reports.companion_section import sigma_contribution
 from reports.contents import build
+from reports.contributions import Contributor
+from reports.contributor_figures import strongest
 from reports.diagnostics import rank_correlations
-from reports.document import FigureBlock, blocks_of
+from reports.document import FigureBlock, Table, blocks_of
 from reports.figures import FootprintDrawing, Histories
 from reports.figures.marks import Bar, Limit, Line, Points
 from reports.figures.probability_plots import plotting_positions, probability_plot, shown_ranks
 from reports.flown import Flown
 from reports.history_bands import OUTER, history_bands, outer_percentile
 from reports.history_limits import history_limits
+from reports.numbers import number
 from reports.replays import replay_drawing, replay_picture
 
 TIMES = np.linspace(0.0, 10.0, 101)
@@ -39,20 +44,25 @@ def drawn(run, kind):
 
 def test_a_budget_adds_up_to_the_sigma_of_the_cases():
     run = synthetic_run(4000, failed=0)
-    plots = section(run, "drivers").blocks[0].drawing.plots
-    panel = next(one for one in plots if one.title == "settling time, 1σ budget")
-    bars = {
-        text.split(":")[0]: float(right)
-        for mark in panel.marks
-        for text, right in zip(mark.texts, mark.right, strict=False)
-    }
-    sigma = run.table["settling_time_s"].std()
-    assert bars["σ of the cases"] == pytest.approx(sigma, rel=1e-9)
+    table = next(one for one in section(run, "drivers").blocks if isinstance(one, Table))
+    rows = [row for row in table.rows if row[0].text == "settling time"]
+    place = [column.title for column in table.columns].index("1σ contribution")
+    found = {row[1].text: row[place].value for row in rows}
     # settling = 350 + 0.4 VE + 0.2 OE: each contribution is a coefficient times the spread of its input
-    assert bars["ve"] == pytest.approx(0.4 * run.table["ve_pct"].std(), rel=0.02)
-    assert bars["oe"] == pytest.approx(0.2 * run.table["oe_pct"].std(), rel=0.05)
-    assert bars["root sum square"] == pytest.approx(np.hypot(bars["ve"], bars["oe"]), rel=1e-9)
-    assert np.hypot(bars["root sum square"], bars["rest"]) == pytest.approx(sigma, rel=0.02)
+    assert found["ve"] == pytest.approx(0.4 * run.table["ve_pct"].std(), rel=0.02)
+    assert found["oe"] == pytest.approx(0.2 * run.table["oe_pct"].std(), rel=0.05)
+    sigma, sums = run.table["settling_time_s"].std(), np.hypot(found["ve"], found["oe"])
+    assert f"; σ {number(sigma, 3)}\u202fs; root sum square {number(sums, 3)}\u202fs, rest " in rows[0][0].small
+    assert sums == pytest.approx(sigma, rel=0.02)
+
+
+def test_an_effect_that_noise_could_have_made_contributes_nothing_to_sigma():
+    sure = Contributor("miss", "ve", 0.25, 0.3, (0.2, 0.3), (0.25, 0.35))
+    unsure = Contributor("miss", "oe", 0.04, 0.3, (-0.01, 0.09), (0.25, 0.35))
+    assert sigma_contribution(sure, 2.0) == pytest.approx(1.0)
+    assert sigma_contribution(unsure, 2.0) is None
+    assert strongest([unsure, sure]) == [unsure, sure]  # its total effect is sure
+    assert strongest([sure, replace(unsure, total=0.1, total_interval=(-0.02, 0.22))]) == [sure]
 
 
 # ---- histories

@@ -15,6 +15,7 @@ from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_pdf
+from reports.columns import spans
 from reports.document import Cell, Column, Section, Table
 
 MARKUP = [
@@ -99,7 +100,7 @@ def test_the_creation_date_is_that_of_the_run(pdf):
 def test_numbered_tables_figures_and_pages_are_there(pdf, tmp_path):
     text = text_of(pdf, tmp_path)
     assert "Table 1. Verification matrix" in text
-    assert "Figure 1. Margins of all requirements" in text
+    assert "Figure 1. Margins of the requirements" in text
     assert "Figure 5. Correction fuel" in text
     assert re.search(r"\b2 ?/ ?\d", text)
     assert re.search(r"Provenance\W+\d", text)
@@ -163,3 +164,11 @@ def test_a_table_leaves_no_row_alone_on_a_page():
             before, after = (lines[k + step] if 0 <= k + step < len(lines) else "" for step in (-1, 1))
             assert not (line.startswith("last of") and before == "head"), line
             assert not (line.startswith("first of") and not re.match(r"\d|last", after)), line
+
+
+def test_a_grouped_cell_is_shown_once_and_stands_for_all_its_rows():
+    rows = tuple((Cell(metric), Cell(name)) for metric, name in (("load", "ld"), ("load", "cd"), ("miss", "cd")))
+    columns = Column("Metric", grouped=True), Column("Contributor")
+    assert spans(Table("Contributors", columns, rows)) == [2, 0, 1]
+    assert spans(Table("Contributors", columns[1:] * 2, rows)) == [1, 1, 1]
+    assert spans(Table("Contributors", columns, ())) == []

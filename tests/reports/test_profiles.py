@@ -94,7 +94,7 @@ def test_closed_curves_have_no_band(turns):
 def test_too_few_flights_have_lines_and_no_band():
     block = profile(build(landing_run(60, flights=5), "run"))
     assert block.drawing.band is None
-    assert "Bands need 20 retained cases" in block.caption
+    assert "Bands need 20 saved cases" in block.caption
     assert len(block.drawing.lines) == 6
 
 

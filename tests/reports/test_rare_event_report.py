@@ -7,10 +7,10 @@ import pandas as pd
 import pytest
 
 import reports
-from mc_engine.directory_kinds import RARE_EVENT
-from mc_engine.parts import Column
-from mc_engine.rare_event_folder import open_rare_event
-from mc_engine.result_folder import write_result
+from mc_engine.store.parts import Column
+from mc_engine.store.result_folder import write_result
+from mc_engine.store.run_files import RARE_EVENT
+from mc_engine.studies.rare_event_folder import open_rare_event
 from reports.document import FigureBlock, Table, blocks_of
 from reports.figures import screen
 from reports.figures.marks import Panels
@@ -63,11 +63,12 @@ def table(document, caption):
 
 def test_the_headline_is_the_probability_against_what_is_allowed(tmp_path):
     document = build_rare_event(estimated(tmp_path), "out")
-    assert document.subtitle == "The limit fuel_kg at most 2.5\u202fkg is not met with a probability of 2·10⁻⁵."
+    interval = "95\u202f% confidence interval 1.5·10⁻⁵ to 2.7·10⁻⁵"
+    assert document.subtitle == f"P(fuel > 2.5\u202fkg) = 2·10⁻⁵ ({interval}). Requirement met."
     (card,) = document.verdicts
     assert (card.answer, card.tone) == ("met", "good")
-    assert "1.5·10⁻⁵ to 2.7·10⁻⁵; allowed: 0.0027. Source: tank." in card.detail
-    assert document.costs[1].detail.startswith("2 960 000 independent cases".replace(" ", "\u202f", 2))
+    assert f"{interval}; allowed: 0.0027. Source: tank." in card.detail
+    assert document.costs[1].detail.startswith("Plain Monte Carlo needs 2\u202f960\u202f000 for the same")
 
 
 @pytest.mark.parametrize(
@@ -102,7 +103,7 @@ def test_without_a_failed_case_the_report_says_below(tmp_path):
         remarks=["Nothing varies."],
     )
     document = build_rare_event(record, "out")
-    assert document.subtitle.endswith("with a probability below 0.0003.")
+    assert document.subtitle == "No case failed: P(fuel > 2.5\u202fkg) < 0.0003. Requirement met."
     assert document.warnings == ("Nothing varies.",)
     assert not list(blocks_of(document, FigureBlock))
 

@@ -7,7 +7,7 @@ from synthetic_run import synthetic_run
 from reports.contents import build
 from reports.flown import Flown
 from reports.headline import verdict_cards, warnings
-from reports.requirement_tables import requirement_table, risk_table
+from reports.requirement_tables import margin_figure, requirement_table, risk_table
 from reports.tables import quantile_table
 
 FUEL = {"name": "fuel", "metric": "propellant_kg", "at_most": 2.5, "at_least": None, "share": 0.9973, "confidence": 0.9}
@@ -104,7 +104,7 @@ def test_both_tables_stand_in_the_section_of_requirements():
     document = build(synthetic_run(300, 0, campaign=mc(300)), "run")
     section = next(section for section in document.sections if section.anchor == "requirements")
     captions = [getattr(block, "caption", "").split(",")[0] for block in section.blocks]
-    assert captions == ["Verification matrix", "Margins of all requirements", "Risks of the verdicts"]
+    assert captions == ["Verification matrix", "Margins of the requirements", "Risks of the verdicts"]
 
 
 def test_the_joint_card_names_the_requirement_that_fails_it():
@@ -116,3 +116,14 @@ def test_the_joint_card_names_the_requirement_that_fails_it():
     card = verdict_cards(found)[-1]
     assert (card.label, card.answer) == ("all at once", "fail")
     assert card.detail.endswith("inside; fuel fails with confidence shared.")
+
+
+def test_margins_of_a_limit_of_zero_have_no_width():
+    spare = {**FUEL, "name": "spare", "metric": "propellant_kg", "at_most": None, "at_least": 0.0}
+    one = flown(campaign=mc(), requirements=[spare, FORCE])
+    cells = [row[3].small for row in requirement_table(one).rows]
+    assert cells[0] == ""
+    assert cells[1].endswith("\u202f%)")
+    figure = margin_figure(one)
+    assert [row.name for row in figure.drawing.rows] == ["force"]
+    assert figure.caption.endswith("Not drawn, the limit is 0: spare.")

@@ -8,7 +8,7 @@ from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document import FigureBlock, Table, Text
-from reports.figures import SuccessDrawing, paper, screen
+from reports.figures import paper, screen
 
 
 def section(run):
@@ -40,8 +40,8 @@ def test_the_settling_time_is_shared_as_its_closed_form_says(drawn):
 def test_the_table_says_how_many_cases_each_index_rests_on(drawn):
     rows = block(drawn, Table, "Contributors to each metric").rows
     by_metric = {row[0].text: row[0].small for row in rows}
-    assert by_metric["propellant"].startswith("3\u202f988 / 4\u202f000 cases, R² 0.0")
-    assert by_metric["settling time"] == "3\u202f988 / 4\u202f000 cases, R² 1.00"
+    assert by_metric["propellant"].startswith("3\u202f988 / 4\u202f000 cases; R² 0.0")
+    assert by_metric["settling time"].startswith("3\u202f988 / 4\u202f000 cases; R² 1.00; σ ")
 
 
 def test_the_driver_of_the_force_is_the_burns_size_at_both_ends(drawn):
@@ -50,10 +50,12 @@ def test_the_driver_of_the_force_is_the_burns_size_at_both_ends(drawn):
     assert [cell.text for cell in force[1:3]] == ["ve", "at both ends"]
     assert force[3].value > 0.7
     assert force[4].value < 1e-6
-    panel = block(drawn, FigureBlock, "Success probability").drawing.panels[0]
+    panel = block(drawn, FigureBlock, "Success probability").drawing.plots[0]
     assert panel.title == "force"
-    assert panel.curve.tried.sum() == 4000
-    assert panel.share[0] < panel.overall * 100.0 < panel.share[5]
+    *_, overall, bins = panel.marks
+    tried = [int(text.split(" of ")[1].split(" cases")[0].replace("\u202f", "")) for text in bins.texts]
+    assert sum(tried) == 4000
+    assert bins.y[0] < overall.at < bins.y[5]
 
 
 def test_chosen_cases_have_a_sentence_and_no_index():
@@ -75,8 +77,8 @@ def test_words_and_switches_have_names_in_the_figures():
     found = section(run)
     row = block(found, Table, "What separates failed").rows[0]
     assert [cell.text for cell in row[:3]] == ["force", "mode", "coast"]
-    panel = block(found, FigureBlock, "Success probability").drawing.panels[0]
-    assert panel.names == ("aim", "burn", "coast")
+    panel = block(found, FigureBlock, "Success probability").drawing.plots[0]
+    assert [text for _, text in panel.x.ticks] == ["aim", "burn", "coast"]
     drawable(found)
 
 
@@ -91,7 +93,8 @@ def drawable(found):
 
 def test_both_drawings_hold_what_the_table_says(drawn):
     drawable(drawn)
-    assert isinstance(block(drawn, FigureBlock, "Success probability").drawing, SuccessDrawing)
+    words = block(drawn, FigureBlock, "Success probability").drawing.alternative
+    assert words.startswith("Success probability in bins of single inputs. force along ")
 
 
 @pytest.mark.parametrize("cases", [0, 1, 2, 60])

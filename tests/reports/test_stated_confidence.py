@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from synthetic_run import synthetic_run
 
-from mc_engine.campaign import load_campaign
+from mc_engine.campaign.loading import load_campaign
 from mc_engine.errors import CampaignError
-from mc_engine.manifest import manifest_of
+from mc_engine.runner.manifest import manifest_of
 from reports.contents import build
 from reports.data import render_json
 from reports.document import Table, blocks_of

@@ -8,10 +8,11 @@ import pytest
 from synthetic_run import COLUMNS, manifest, synthetic_run
 
 import reports.all_cases as all_cases
-from mc_engine.run_summary import judgement, summaries
+from mc_engine.runner.summary import judgement, summaries
 from mc_engine.statistics import selection
 from mc_engine.statistics.worst import Limits
-from mc_engine.store import Column, create_store, open_store
+from mc_engine.store.opening import open_store
+from mc_engine.store.store import Column, create_store
 from reports.cli import write_reports
 from reports.contents import build
 from reports.flown import Flown

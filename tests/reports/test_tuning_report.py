@@ -7,7 +7,7 @@ import pytest
 from synthetic_tuning import synthetic_tuning
 
 import reports
-from mc_engine.tuning_folder import UNFINISHED
+from mc_engine.studies.tuning_folder import UNFINISHED
 from reports.document import FigureBlock, Table, blocks_of
 from reports.figures import FrontDrawing, paper, screen
 from reports.html import render_html

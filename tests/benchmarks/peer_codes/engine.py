@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from mc_engine import flight
-from mc_engine.kernel import build_kernel, usual_width
-from mc_engine.kernel_parts import settings_class
+from mc_engine.flight import flight
+from mc_engine.flight.kernel import build_kernel, usual_width
+from mc_engine.flight.kernel_parts import settings_class
 from mc_engine.model import AdaptiveStep, Model, load_model
 from tests.benchmarks.peer_codes.entrant import TOLERANCES, Entrant, Flight, portions, shared
 from tests.benchmarks.peer_codes.problems import Problem

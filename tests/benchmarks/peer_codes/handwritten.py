@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mc_engine import flight
+from mc_engine.flight import flight
 from tests.benchmarks.peer_codes.engine import load
 from tests.benchmarks.peer_codes.entrant import Entrant, Flight
 from tests.benchmarks.peer_codes.problems import Problem

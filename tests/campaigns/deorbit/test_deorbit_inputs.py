@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from deorbit_flights import DEMONSTRATION, MODEL, NOMINAL, PULSED, fly_cases, fly_one, history
 
-from mc_engine.campaign import load_campaign
-from mc_engine.cases import case_table
+from mc_engine.campaign.cases import case_table
+from mc_engine.campaign.loading import load_campaign
 
 OFF = {"control": "off"}
 CLIPPED = DEMONSTRATION | {"control": "clipped"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from deorbit_flights import PULSED, fly_one, pulses
 
-from mc_engine.flight import fly
+from mc_engine.flight.flight import fly
 from mc_engine.model import load_model
 from mc_engine.physics.pulse_modulators import lag_rate
 from tests.campaigns.pulse_trains import first_on_time, pause_time, pulse_time

@@ -7,7 +7,7 @@ import pytest
 from deorbit_flights import DEMONSTRATION, MODEL, NOMINAL, PULSED, fly_one, history, pulses, table_2_entry
 
 import campaigns.deorbit
-from mc_engine.published import read_published
+from mc_engine.studies.published import read_published
 
 FILE = Path(campaigns.deorbit.__file__).with_name("published.toml")
 RECORDS = read_published(FILE)

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 import campaigns.flexible_satellite
-from mc_engine.campaign import load_campaign
-from mc_engine.cases import case_table, full_inputs
-from mc_engine.flight import fly, fly_history, prepare
+from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.flight.flight import fly, fly_history, prepare
 from mc_engine.model import load_model
 
 MODEL = load_model("campaigns.flexible_satellite")

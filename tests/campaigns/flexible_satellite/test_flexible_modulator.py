@@ -7,7 +7,7 @@ import pytest
 from flexible_flights import MODEL, NOMINAL, SEED, TABLE_4, TABLE_8, TABLE_9, fly_cases, fly_one, history
 from scipy.integrate import solve_ivp
 
-from mc_engine.flight import fly
+from mc_engine.flight.flight import fly
 from mc_engine.physics.pulse_modulators import at_rest, sampled_pulses
 from tests.campaigns.pulse_trains import dead_band, first_on_time, pause_time, pulse_time, shortest_pulse
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flexible_flights import END, FOLDER, fly_campaign
 
-from mc_engine.campaign import load_campaign
+from mc_engine.campaign.loading import load_campaign
 
 N_CASES = 2000  # a deviation of the sample is then good to 1.6 %
 # Table 12: mean, standard deviation; that of q1 is printed ten times as large

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from flexible_flights import FOLDER, MODEL, NOMINAL, TABLE_4, TABLE_8, TABLE_9, fly_campaign, fly_one, history
 
-from mc_engine.campaign import load_campaign
-from mc_engine.published import read_published
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.studies.published import read_published
 from tests.campaigns.pulse_trains import shortest_pulse
 
 RECORDS = read_published(FOLDER / "published.toml")

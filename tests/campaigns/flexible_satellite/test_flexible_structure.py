@@ -5,7 +5,7 @@ import pytest
 from flexible_flights import ALONE, C0, LAMBDA, MODEL, NOMINAL, J, fly_cases, fly_one, prepared
 
 from campaigns.flexible_satellite import dynamics, structure
-from mc_engine.kernel_parts import settings_class
+from mc_engine.flight.kernel_parts import settings_class
 
 # recomputed from Tables 10 and 11: rad/s and kg m^2, to the digits written
 FREE_FREQUENCIES = [0.96281, 1.24016, 1.92937, 2.69062]

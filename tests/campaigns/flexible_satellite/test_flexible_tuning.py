@@ -5,8 +5,8 @@ import pytest
 from flexible_flights import FOLDER, TABLE_8, TABLE_9, fly_one
 
 from mc_engine import load_campaign, tune
-from mc_engine.candidates import fly_candidates
-from mc_engine.tuning_folder import infeasibility
+from mc_engine.studies.candidates import fly_candidates
+from mc_engine.studies.tuning_folder import infeasibility
 
 STAGES = ["stage_1", "stage_2", "stage_2_unconstrained", "stage_3", "stage_3_robust"]
 IMPULSE, ATTITUDE = 50.4, 133.8  # recomputed objectives of Table 8's thrusters

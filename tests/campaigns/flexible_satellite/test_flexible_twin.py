@@ -5,8 +5,8 @@ import pytest
 from flexible_flights import MODEL, NOMINAL, PWPF, SEED, TABLE_8, fly_one
 from flexible_twin import fly_twin
 
-from mc_engine.flight import fly, fly_history, prepare
-from mc_engine.kernel_parts import settings_class
+from mc_engine.flight.flight import fly, fly_history, prepare
+from mc_engine.flight.kernel_parts import settings_class
 from mc_engine.lanes.philox import Draws, noise_key
 
 # both fly the same samples; what is left is that of Runge-Kutta steps of 10 ms, and trapezoids of |q| at their corners

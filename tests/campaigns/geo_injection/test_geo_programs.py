@@ -10,9 +10,9 @@ from campaigns.geo_injection import design
 from campaigns.geo_injection.kept_programs import SEQUENCES
 from campaigns.geo_injection.model import sequence_of
 from campaigns.geo_injection.program import from_text, to_text
-from mc_engine.campaign import list_campaigns, load_campaign
-from mc_engine.cases import case_table
-from mc_engine.flight import fly
+from mc_engine.campaign.cases import case_table
+from mc_engine.campaign.loading import list_campaigns, load_campaign
+from mc_engine.flight.flight import fly
 
 FILES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "geo_injection")
 

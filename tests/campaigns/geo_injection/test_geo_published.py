@@ -12,7 +12,7 @@ import campaigns.geo_injection
 from campaigns.geo_injection.avoidance import AVOIDANCE, analytic_guess, burn_of, converged
 from campaigns.geo_injection.design import program_for
 from campaigns.geo_injection.kept_programs import SEQUENCES
-from mc_engine.published import read_published
+from mc_engine.studies.published import read_published
 
 FILE = Path(campaigns.geo_injection.__file__).with_name("published.toml")
 RECORDS = {one["quantity"]: one for one in read_published(FILE)}

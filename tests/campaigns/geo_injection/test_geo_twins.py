@@ -66,7 +66,7 @@ def test_a_case_has_the_same_bits_in_one_lane_and_in_eight():
 
 def test_the_thrust_direction_interpreted_is_the_one_in_the_history():
     flown = history(yaw_error_deg=0.4, pitch_error_deg=-0.2)
-    from mc_engine.flight import prepare, settings_of
+    from mc_engine.flight.flight import prepare, settings_of
 
     ready = prepare(MODEL, NOMINAL | {"yaw_error_deg": 0.4, "pitch_error_deg": -0.2}, 1)
     p = MODEL.kernel_parameters(*(float(value) for value in ready.parameters[:, 0]))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mc_engine.flight import fly, fly_history
+from mc_engine.flight.flight import fly, fly_history
 from mc_engine.model import load_model
 
 MODEL = load_model("campaigns.geo_servicing")

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from mc_engine.campaign import list_campaigns, load_campaign
+from mc_engine.campaign.loading import list_campaigns, load_campaign
 from mc_engine.errors import CampaignError
-from mc_engine.flight import fly
+from mc_engine.flight.flight import fly
 from mc_engine.model import load_model
 
 NAMES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "geo_servicing")

@@ -8,7 +8,7 @@ from servicing_flights import INSPECTION, MODEL, NOMINAL, fly_cases, fly_one, hi
 from servicing_twin import R0, RATE, SIDEREAL_DAY, Twin, elements
 
 from campaigns.geo_servicing.inspection import Relative, correction, wait_until
-from mc_engine.flight import prepare
+from mc_engine.flight.flight import prepare
 
 EPOCH, DAY = 58828.0, 86_400.0
 FIVE_DAYS = {"duration_days": 5.0, "settle_time_days": 4.0}

@@ -6,7 +6,7 @@ from servicing_flights import KEPLER, MODEL, NOMINAL, PUBLISHED, fly_cases, fly_
 from servicing_twin import R0, RATE, SIDEREAL_DAY, Twin, elements, sidereal
 
 from campaigns.geo_servicing import dynamics
-from mc_engine.flight import prepare
+from mc_engine.flight.flight import prepare
 from mc_engine.model import load_model
 
 FREE = {"phase": "free", "navigation": "perfect"}

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from servicing_flights import KEPLER, PUBLISHED, fly_cases, fly_one, history, normal
 
-from mc_engine.campaign import load_campaign
-from mc_engine.flight import fly
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.flight.flight import fly
 
 N = 2000
 ERRORS = ("thrust_error_pct", "out_of_plane_deg", "radial_deg")

@@ -15,8 +15,8 @@ from campaigns.geo_servicing.inspection import correction
 from campaigns.geo_servicing.model import MODEL, _nominal
 from campaigns.geo_servicing.planned_flight import Craft
 from mc_engine.errors import ModelError
-from mc_engine.flight import settings_of
-from mc_engine.kernel_parts import settings_class
+from mc_engine.flight.flight import settings_of
+from mc_engine.flight.kernel_parts import settings_class
 from mc_engine.physics.geopotential import harmonics_table
 
 PERFECT = {"navigation": "perfect", "schedule": "designed"}

@@ -10,10 +10,10 @@ from test_servicing_plan import PERFECT, craft_of
 
 import campaigns.geo_servicing
 from campaigns.geo_servicing.phasing_plan import design
-from mc_engine.campaign import load_campaign
-from mc_engine.cases import case_table, full_inputs
-from mc_engine.flight import fly
-from mc_engine.published import read_published
+from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.flight.flight import fly
+from mc_engine.studies.published import read_published
 
 FILE = Path(campaigns.geo_servicing.__file__).with_name("published.toml")
 RECORDS = read_published(FILE)

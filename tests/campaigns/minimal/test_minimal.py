@@ -5,8 +5,8 @@ import tomllib
 import pytest
 from typer.testing import CliRunner
 
-from mc_engine.campaign import load_campaign
-from mc_engine.cli import app
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.command_line.commands import app
 
 FILE_LINES, MODEL_LINES = 20, 75
 

@@ -12,7 +12,7 @@ from campaigns.reentry.autopilot import air_at, bank_command, pitch_gains
 from campaigns.reentry.autopilot_gains import STEEPEST, STEPS, bank_design, pitch_design, planned_profile
 from campaigns.reentry.bode_figure import bode_figure
 from campaigns.reentry.lead_compensator import Lead, crossover_of, design_lead, margins_of, short_period
-from mc_engine.flight import fly, fly_history, prepare, settings_of
+from mc_engine.flight.flight import fly, fly_history, prepare, settings_of
 from mc_engine.model import load_model
 
 MODEL = load_model("campaigns.reentry.autopilot")

@@ -5,8 +5,8 @@ import pytest
 from reentry_flights import EXACT, PLANAR, ballistic, fly_cases
 
 from campaigns.reentry.critical_trajectories import APOAPSIS, boundary, critical_periapses, interface_km
-from mc_engine.campaign import list_campaigns, load_campaign
-from mc_engine.flight import fly
+from mc_engine.campaign.loading import list_campaigns, load_campaign
+from mc_engine.flight.flight import fly
 
 NAMES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "reentry")
 AIMED = [name for name in NAMES if "target_downrange_km" in load_campaign(name).parameters and "from_" not in name]

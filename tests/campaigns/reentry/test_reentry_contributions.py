@@ -9,8 +9,9 @@ from SALib.analyze import sobol as analysis
 from SALib.sample import sobol as sampling
 from scipy.stats import norm
 
-from mc_engine import load_campaign, open_store, runner
-from mc_engine.campaign_search import find_campaign
+from mc_engine import load_campaign, open_store
+from mc_engine.campaign.search import find_campaign
+from mc_engine.runner import runner
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 
 METRICS = ("peak_load_g", "peak_heat_rate_w_m2", "peak_dynamic_pressure_pa")

@@ -6,7 +6,7 @@ from guidance_twin import Stored, fly_guided
 from reentry_flights import MODEL, NOMINAL, PLANAR, fly_cases, fly_one, history, plan_of
 
 from mc_engine.errors import ModelError
-from mc_engine.flight import prepare
+from mc_engine.flight.flight import prepare
 
 PLANNED = PLANAR | {"plan": "given"}
 REFERENCE_KM = 2548.676

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from reentry_flights import MODEL, MU, NOMINAL, RADIUS, fly_one
 
 from campaigns.reentry.vehicles import VEHICLES
-from mc_engine.flight import prepare
+from mc_engine.flight.flight import prepare
 
 RATE = 7.292115e-5
 

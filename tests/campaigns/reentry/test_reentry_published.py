@@ -24,10 +24,10 @@ from campaigns.reentry.apollo_final_phase import FLOWN
 from campaigns.reentry.closed_forms import critical_roll_angle, glide_range, shallow_peak
 from campaigns.reentry.critical_trajectories import critical_periapses
 from campaigns.reentry.lead_compensator import design_lead, margins_of
-from mc_engine.campaign import load_campaign
+from mc_engine.campaign.loading import load_campaign
 from mc_engine.physics.atmosphere import us76
-from mc_engine.published import read_published
 from mc_engine.statistics.binomial import lower_bound, smallest_sample
+from mc_engine.studies.published import read_published
 
 FILE = Path(campaigns.reentry.__file__).with_name("published.toml")
 RECORDS = read_published(FILE)

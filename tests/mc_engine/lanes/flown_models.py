@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mc_engine.flight import fly
+from mc_engine.flight.flight import fly
 from mc_engine.model import load_model
 
 FOLDER = Path(__file__).resolve().parent / "models"

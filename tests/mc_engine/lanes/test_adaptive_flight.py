@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from mc_engine.flight import fly, fly_history
+from mc_engine.flight.flight import fly, fly_history
 from mc_engine.model import load_model
 
 FOLDER = Path(__file__).resolve().parent / "adaptive"

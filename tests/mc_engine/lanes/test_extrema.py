@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flown_models import FOLDER, OSCILLATOR, flown
 
-from mc_engine.flight import fly_history
+from mc_engine.flight.flight import fly_history
 from mc_engine.lanes.extrema import crest, crest_time, crest_value
 
 RANDOM = np.random.default_rng(5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flown_models import FOLDER, OSCILLATOR, flown, same_bytes
 
-from mc_engine.flight import fly_history
+from mc_engine.flight.flight import fly_history
 from mc_engine.lanes.functions import fma
 from mc_engine.lanes.philox import Draws, noise_key
 

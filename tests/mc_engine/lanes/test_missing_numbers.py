@@ -7,7 +7,7 @@ import pytest
 from compiled_physics import bits, by_every_width
 
 from mc_engine import lanes
-from mc_engine.flight import fly
+from mc_engine.flight.flight import fly
 from mc_engine.lanes import physics
 from mc_engine.lanes.number import Number, calling
 from mc_engine.model import load_model

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flown_models import FOLDER, flown, same_bytes
 
-from mc_engine.flight import settings_of
+from mc_engine.flight.flight import settings_of
 from mc_engine.lanes import look_up
 from mc_engine.model import load_model
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, fisher_exact, norm
 
-from mc_engine.comparison import ALPHA
+from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics.change_tests import FEWEST, holm, metric_change, share_change
-from mc_engine.streams import uniforms
+from mc_engine.studies.comparison import ALPHA
 
 N = 1000
 METRICS = 8

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from mc_engine.runner.stopping import schedule
 from mc_engine.statistics import binomial, clopper_pearson, quantile_ranks, time_uniform, tolerance
 from mc_engine.statistics.order_statistics import QUANTILES
 from mc_engine.statistics.regions import density_regions
-from mc_engine.stopping import schedule
 
 CAMPAIGNS = 5000
 SIZES = [59, 300, 1000]

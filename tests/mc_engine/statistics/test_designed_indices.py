@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mc_engine.designs import unit_cube
+from mc_engine.sampling.designs import unit_cube
 from mc_engine.statistics.designed_indices import FEWEST_BLOCKS, designed_indices
 
 

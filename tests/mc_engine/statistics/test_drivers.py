@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics import clopper_pearson
 from mc_engine.statistics.drivers import _adjusted, failure_drivers, success_along
 from mc_engine.statistics.input_columns import average_ranks
-from mc_engine.streams import uniforms
 
 
 def draws(count, n, seed=5):

@@ -10,10 +10,10 @@ import pytest
 from scipy import stats
 from scipy.special import log_ndtr, ndtri
 
+from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics.importance_sampling import cross_entropy
 from mc_engine.statistics.rare_events import interval_of_mean
 from mc_engine.statistics.subset_simulation import subset_simulation
-from mc_engine.streams import uniforms
 
 SEEDS = 50
 # Cases per level: fewer serve importance sampling.

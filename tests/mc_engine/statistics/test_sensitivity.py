@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
+from mc_engine.sampling.streams import uniforms
 from mc_engine.statistics.sensitivity import sensitivity
-from mc_engine.streams import uniforms
 
 N = 2**13
 

@@ -1,6 +1,6 @@
 """What the report draws of the sounding rocket."""
 
-from mc_engine.figures import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure
+from mc_engine.model import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure
 
 FIGURES = (
     MapFigure("apogee_km", "thrust_pct", "drag_pct", "Apogee over thrust and drag"),

@@ -1,0 +1,92 @@
+"""The file of the design "table": a case a row, a dispersed parameter a column."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from mc_engine.campaign.dispersions import Dispersion
+from mc_engine.campaign.inputs import accepted_range, check_value, inputs_of, number
+from mc_engine.campaign.reading import Findings
+from mc_engine.campaign.tables_beside import numbers, read_columns, switches, words
+from mc_engine.model.fields import Parameter, Setting
+from mc_engine.model.files import FileFault
+from mc_engine.model.record import Model
+from mc_engine.suggestions import hint
+from mc_engine.units import convert
+
+_CASE_ID = "case_id"  # `mc-engine sample` writes it; here it may only count the rows
+
+
+def read_case_table(path: Path, model: Model, units: Mapping[str, str], found: Findings) -> dict[str, np.ndarray]:
+    """Column name -> values in declared units: float64[n], object[n] of words, or bool[n].
+
+    units : of the columns that are not in their parameter's own unit.
+    """
+    items = inputs_of(model)
+    table: dict[str, np.ndarray] = {}
+    try:
+        columns = read_columns(path)
+    except FileFault as fault:
+        found.add("", str(fault))
+        return table
+    for name, cells in columns.items():
+        try:
+            if name == _CASE_ID:
+                _check_case_ids(path, cells)
+            elif name in items:
+                table[name] = _values(path, items[name], cells, units.get(name))
+            else:
+                found.add("", f'the column "{name}" is not a parameter of {model.name}{hint(name, items)}')
+        except FileFault as fault:
+            found.add("", str(fault))
+    if table and not len(next(iter(table.values()))):
+        found.add("", f'"{path.name}" has no rows below its first line')
+    elif not table and not found.problems:
+        found.add("", f'"{path.name}" has no column of a parameter')
+    return table
+
+
+def _check_case_ids(path: Path, cells: np.ndarray) -> None:
+    ids = numbers(path, _CASE_ID, cells)
+    wrong = np.flatnonzero(ids != np.arange(len(ids)))
+    if wrong.size:
+        row = wrong[0]
+        raise FileFault(f'"{path.name}", row {row + 1}: case_id is {number(ids[row])}; rows are numbered 0, 1, 2, ...')
+
+
+def _values(path: Path, item: Parameter | Setting, cells: np.ndarray, unit: str | None) -> np.ndarray:
+    if isinstance(item, Setting) and item.choices:
+        return words(path, item.name, cells, item.choices)
+    if isinstance(item, Setting) and isinstance(item.default, bool):
+        return switches(path, item.name, cells)
+    if isinstance(item, Setting) and item.date:
+        return _dates(path, item, cells)
+    values = numbers(path, item.name, cells)
+    if unit is not None:
+        values = convert(values, unit, item.unit)
+    wrong = np.flatnonzero(~((values >= item.low) & (values <= item.high)))
+    if wrong.size:
+        where = f'"{path.name}", row {wrong[0] + 1}, column "{item.name}"'
+        raise FileFault(f"{where}: {number(values[wrong[0]])} is not within {accepted_range(item)}")
+    return values
+
+
+def _dates(path: Path, item: Setting, cells: np.ndarray) -> np.ndarray:
+    """object[n]: the cells as dates of the setting."""
+    found = Findings()
+    dates = [check_value(str(cell), item, found, "") for cell in cells]
+    if found.problems:
+        row = dates.index(None)
+        raise FileFault(f'"{path.name}", row {row + 1}, column "{item.name}": {found.problems[0].message}')
+    return np.array(dates, dtype=object)
+
+
+def table_dispersions(
+    table: Mapping[str, np.ndarray], declared: Mapping[str, Dispersion], found: Findings
+) -> tuple[Dispersion, ...]:
+    """One dispersion per column, with the source that the campaign file gives it."""
+    for name in declared:
+        if name not in table:
+            found.under("dispersion").add(name, f"the table has no such column{hint(name, table)}")
+    return tuple(declared.get(name, Dispersion(name, None, {}, "", "")) for name in table)

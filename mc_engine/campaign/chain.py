@@ -1,0 +1,127 @@
+"""Campaigns that take inputs from another run: [inputs] checked against that run, or the one to be flown first."""
+
+import os
+from collections.abc import Callable
+from contextvars import ContextVar, copy_context
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mc_engine.campaign.reading import Findings, Sections
+from mc_engine.campaign.sections import CampaignSection
+from mc_engine.errors import CampaignError, Problem, StoreError
+from mc_engine.model.record import Model
+from mc_engine.sampling.designs import BY_LEVELS, IN_BLOCKS, RANDOM
+from mc_engine.store.urls import without_secrets
+
+if TYPE_CHECKING:
+    from mc_engine.campaign.loading import Campaign
+    from mc_engine.campaign.upstream import Rows, Upstream
+
+_LONGEST_CHAIN = 5  # campaigns, each flown for the next
+_waiting: ContextVar[int] = ContextVar("_waiting", default=0)  # campaigns of the chain that is being read
+
+
+class _Endless(CampaignError):
+    """A chain that comes back to itself, or is longer than any that is meant; told once, where it begins."""
+
+
+def take_inputs(
+    sections: Sections,
+    model: Model,
+    directory: Path,
+    run: Path | None,
+    design: str | None,
+    load: "Callable[..., Campaign]",
+    found: Findings,
+) -> "tuple[Upstream | None, Campaign | None]":
+    """What is taken from another run, and the campaign to be flown for it where there is none yet.
+
+    run : in place of the one that [inputs] names.  load : reads that campaign, as `load_campaign` does.
+    """
+    if sections.inputs is None:
+        return None, None
+    from mc_engine.campaign.columns import result_columns
+    from mc_engine.campaign.upstream import find_run, link, read_rows
+
+    spot = found.under("inputs")
+    taken = [column.name for column in result_columns(model)]
+    source = sections.inputs.source
+    first = None
+    try:
+        run = run or find_run(source, directory)
+        if run is not None:
+            rows = read_rows(run)
+        else:
+            cases = sections.campaign.cases if sections.campaign is not None else None
+            beside = directory / source
+            if _waiting.get() == _LONGEST_CHAIN:
+                message = f"the campaigns take their inputs from one another, round and round ({source}, ...)"
+                raise _Endless(source, [Problem("from", message)])
+            below = copy_context()
+            below.run(_waiting.set, _waiting.get() + 1)
+            first = below.run(
+                load, beside if os.path.exists(beside) else source, cases=cases
+            )  # not Path.exists: a name may be too long
+            rows = _rows_to_come(first)
+    except StoreError as error:
+        spot.add("from", str(error))
+        return None, None
+    except _Endless as error:
+        if _waiting.get():
+            raise
+        spot.add("from", error.problems[0].message)
+        return None, None
+    except CampaignError as error:
+        named = without_secrets(source)
+        spot.add("from", f'"{named}" is neither a run nor a campaign that can be flown: {error.problems[0]}')
+        return None, None
+    random = rows.facts["design"] in RANDOM
+    if design is not None and (design in (*BY_LEVELS, *IN_BLOCKS) or (design != "table" and not random)):
+        spot.add("from", f'its design "{rows.facts["design"]}" does not go with "{design}"; write design = "table"')
+    return link(rows, sections.inputs, model, taken, spot), first
+
+
+def _rows_to_come(first: "Campaign") -> "Rows":
+    """The columns that a campaign will have, without a case."""
+    from mc_engine.campaign.columns import case_columns
+    from mc_engine.campaign.upstream import Rows
+    from mc_engine.store.parts import CASE_COLUMNS
+
+    taken = () if first.upstream is None else first.upstream.columns
+    columns = (*CASE_COLUMNS, *case_columns(first.model, first.dispersions, taken))
+    facts: dict[str, Any] = {
+        "name": first.name,
+        "title": first.title,
+        "model": first.model_reference,
+        "design": first.design,
+    }
+    facts |= {"seed": first.seed, "digest": first.digest, "figures": [], "inputs": []}
+    nothing = {column.name: np.empty(0, dtype=object if column.kind == "word" else float) for column in columns}
+    return Rows(facts, columns, nothing, {column.name: 0.0 for column in columns})
+
+
+def check_taken(sections: Sections, upstream: "Upstream | None", design: str | None, found: Findings) -> None:
+    """Inputs that come from upstream and from this file too."""
+    if upstream is None:
+        return
+    if design == "table":
+        for name in sections.dispersions:
+            message = 'the design "table" takes all cases from the run upstream; write design = "mc" to disperse more'
+            found.under("dispersion").add(name, message)
+    for name in upstream.links:
+        for place, names in (("parameters", sections.parameters), ("dispersion", sections.dispersions)):
+            if name in names:
+                found.under(place).add(name, f"comes from the run of {upstream.name}; leave it out here")
+
+
+def chained_count(section: CampaignSection, rows: int, found: Findings) -> int:
+    """How many cases a chain has: all of those upstream, or the first so many."""
+    if section.design in RANDOM and section.seed is None:
+        found.add("seed", f"is missing: {CampaignSection.model_fields['seed'].description}")
+    if section.table is not None:
+        found.add("table", "cannot be there together with [inputs]")
+    if section.cases is not None and section.cases > rows:
+        found.add("cases", f"{section.cases} is not allowed; the run upstream has {rows} cases")
+    return section.cases or rows

@@ -1,0 +1,33 @@
+"""The columns of a case table after case_id, status and reason: what was taken, dispersions, metrics, last state."""
+
+from collections.abc import Sequence
+
+from mc_engine.campaign.dispersions import Dispersion
+from mc_engine.model.fields import Parameter, Setting
+from mc_engine.model.record import Model
+from mc_engine.store.parts import Column
+
+END_TIME = "end_time_s"
+
+
+def input_column(item: Parameter | Setting) -> Column:
+    """The column of an input that differs from case to case."""
+    kind = "number"
+    if isinstance(item, Setting) and (item.choices or item.date):
+        kind = "word"
+    elif isinstance(item.default, bool):
+        kind = "switch"
+    return Column(item.name, item.unit, "dispersion", item.description, kind)
+
+
+def result_columns(model: Model) -> list[Column]:
+    """Metrics, and time and state at the end of the flight."""
+    columns = [Column(one.name, one.unit, "metric", one.description) for one in model.metrics]
+    columns.append(Column(END_TIME, "s", "state", "time at the end of the flight, from its start"))
+    columns += [Column(f"end_{one.name}", one.unit, "state", f"{one.description}, at the end") for one in model.states]
+    return columns
+
+
+def case_columns(model: Model, dispersions: Sequence[Dispersion], taken: Sequence[Column] = ()) -> list[Column]:
+    """All columns of a campaign's table; `taken` are those of the run that it takes inputs from."""
+    return [*taken, *(input_column(model.input(one.name)) for one in dispersions), *result_columns(model)]

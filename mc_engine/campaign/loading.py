@@ -1,0 +1,391 @@
+"""A campaign: a model, how its inputs are dispersed, and what the results must meet, read from a TOML file.
+
+`load_campaign` reports every mistake of the file at once and imports neither numba nor scipy nor matplotlib
+by itself.  What the file may say is in `mc_engine.campaign.sections`.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mc_engine.campaign.case_table import read_case_table, table_dispersions
+from mc_engine.campaign.chain import chained_count, check_taken, take_inputs
+from mc_engine.campaign.covariances import spread_covariances
+from mc_engine.campaign.dispersions import Dispersion, build_dispersion
+from mc_engine.campaign.inputs import inputs_of
+from mc_engine.campaign.parts import (
+    Correlation,
+    Requirement,
+    Retention,
+    Worst,
+    check_correlations,
+    check_metric,
+    check_requirements,
+    check_retention,
+    check_size,
+    nominal_values,
+    refusal,
+)
+from mc_engine.campaign.reading import Findings, Sections, parse_toml, read_sections
+from mc_engine.campaign.search import SHIPPED, ShippedCampaign, campaign_name, find_campaign, list_campaigns
+from mc_engine.campaign.sections import CampaignSection, schema
+from mc_engine.campaign.sensitivity_design import SensitivityDesign, check_sensitivity
+from mc_engine.campaign.tuning_section import Tuning, check_tuning
+from mc_engine.errors import CampaignError, ModelError, Problem
+from mc_engine.model.fields import AdaptiveStep
+from mc_engine.model.files import FileFault, resolve_beside
+from mc_engine.model.record import Model, load_model
+from mc_engine.sampling.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, level_count
+from mc_engine.sampling.distributions import Scalar
+from mc_engine.section import ReportSection
+from mc_engine.status import MOST_CASES
+from mc_engine.suggestions import hint
+
+if TYPE_CHECKING:
+    from mc_engine.campaign.upstream import Upstream
+
+__all__ = [
+    "SHIPPED",
+    "Campaign",
+    "Correlation",
+    "Dispersion",
+    "Requirement",
+    "Retention",
+    "ShippedCampaign",
+    "Tuning",
+    "Worst",
+    "find_campaign",
+    "list_campaigns",
+    "load_campaign",
+    "schema",
+]
+
+_LARGEST_FILE = 250_000  # bytes; more of them could take the reader of TOML longer than a second
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign that can be flown.  Numbers are in the units that the model declares.
+
+    text : the file as read; `cases` and `seed` may have been changed on the command line since.
+    parameters : what [parameters] says.  nominal : every parameter and setting of the model.
+    upstream : what is taken from another run.  first : that run's campaign, where it has yet to be flown.
+    table : the columns of the design "table", else empty.  tuning : what [tuning] says, if it is there.
+    looks : numbers of cases at which a run that ends with its verdicts is judged; empty where all cases fly.
+    messages : orbit messages beside the file that covariances were read from.
+    sensitivity : what [sensitivity] says, if it is there.  report : probability and confidence of its statistics.
+    digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
+        cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
+    """
+
+    name: str
+    title: str
+    text: str
+    directory: Path
+    model: Model
+    model_reference: str
+    cases: int
+    design: str
+    seed: int
+    parameters: Mapping[str, Scalar]
+    nominal: Mapping[str, Scalar]
+    dispersions: tuple[Dispersion, ...]
+    correlations: tuple[Correlation, ...]
+    requirements: tuple[Requirement, ...]
+    retention: Retention
+    digest: str
+    table_path: Path | None = None
+    table: Mapping[str, np.ndarray] = field(default_factory=dict, compare=False, repr=False)
+    tuning: Tuning | None = None
+    upstream: "Upstream | None" = field(default=None, compare=False, repr=False)
+    first: "Campaign | None" = field(default=None, compare=False, repr=False)
+    looks: tuple[int, ...] = ()
+    messages: tuple[str, ...] = ()
+    sensitivity: SensitivityDesign | None = None
+    report: ReportSection = field(default_factory=ReportSection)
+
+
+def load_campaign(
+    reference: str | Path,
+    *,
+    cases: int | None = None,
+    seed: int | None = None,
+    text: str | None = None,
+    directory: Path | None = None,
+    upstream: Path | None = None,
+) -> Campaign:
+    """The campaign of a shipped name or of a path; CampaignError lists all that is wrong with it.
+
+    cases, seed : in place of what the file says.
+    text, directory : the text of the file and the folder it counts as being in, where it is kept elsewhere;
+        `reference` is then only its name.
+    upstream : the run to take inputs from, in place of the one that [inputs] names.
+    """
+    if text is None:
+        path = find_campaign(reference)
+        name, source, directory = campaign_name(path), path.name, path.resolve().parent
+        text = _read(path)
+    else:
+        name, source, directory = str(reference), Path(str(reference)).name, Path(directory or Path.cwd())
+    document = parse_toml(text, source)
+    _override(document, {"cases": cases, "seed": seed})
+    found = Findings()
+    campaign = _assemble(name, text, directory, document, cases is not None, upstream, found)
+    if campaign is None or found.problems:
+        raise CampaignError(source, found.problems)
+    return campaign
+
+
+def _read(path: Path) -> str:
+    try:
+        data = path.read_bytes() if path.stat().st_size <= _LARGEST_FILE else None
+    except OSError as error:
+        raise CampaignError(path.name, [Problem("", f"cannot be read: {error.strerror}")]) from None
+    if data is None:
+        raise CampaignError(
+            path.name, [Problem("", "is larger than 250 kB; a long table of cases belongs into a CSV file")]
+        )
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise CampaignError(path.name, [Problem(f"line {line}", "is not text in UTF-8")]) from None
+
+
+def _override(document: dict[str, Any], wanted: dict[str, int | None]) -> None:
+    section = document.get("campaign")
+    if isinstance(section, dict):
+        section.update({key: value for key, value in wanted.items() if value is not None})
+
+
+def _assemble(
+    name: str,
+    text: str,
+    directory: Path,
+    document: dict[str, Any],
+    shortened: bool,
+    run: Path | None,
+    found: Findings,
+) -> Campaign | None:
+    """The campaign, or None where it lacks a section or a model to hold the rest against."""
+    messages = spread_covariances(document, directory, found)
+    sections = read_sections(document, found)
+    model = _model(document, directory, found)
+    if model is None:
+        return None
+    inside = found.under("campaign")
+    section = sections.campaign
+    model = _within_budget(model, section, inside)
+    design = section.design if section is not None else _named_design(document)
+    upstream, first = take_inputs(sections, model, directory, run, design, load_campaign, found)
+    nominal = _nominal(model, sections, {} if upstream is None or first is not None else upstream.nominal, found)
+    requirements = check_requirements(sections.requirements, model, found.under("requirement"))
+    _unknown_names(document, sections, nominal, model, found)
+    check_taken(sections, upstream, design, found)
+    dispersions = _dispersions(sections, model, nominal, design, directory, found)
+    correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", found)
+    table_path, table = (None, {}) if upstream is not None else _table(section, model, dispersions, directory, found)
+    if design == "table" and upstream is None:
+        dispersions = table_dispersions(table, {one.name: one for one in dispersions}, found) if table else ()
+    count = None
+    if section is not None and (sections.inputs is None or upstream is not None):
+        rows = 0 if upstream is None else (first.cases if first is not None else upstream.rows.n_cases)
+        count = chained_count(section, rows, inside) if rows else _case_count(section, dispersions, table, inside)
+    if count is not None:
+        check_size(count, design or "", dispersions, correlations, inside)
+    retention = Retention()
+    if sections.retention is not None:
+        retention = check_retention(sections.retention, model, count, shortened, found.under("retention"))
+    tuning = None
+    if sections.tuning is not None:
+        names = [one.name for one in dispersions]
+        tuning = check_tuning(sections.tuning, model, names, design, found.under("tuning"))
+    flown_before = None if upstream is None else upstream.name
+    sensitivity = check_sensitivity(
+        sections.sensitivity, model, dispersions, correlations, design, flown_before, found.under("sensitivity")
+    )
+    if section is None or count is None or found.problems:
+        return None
+    return Campaign(
+        name=name,
+        title=section.title or model.title,
+        text=text,
+        directory=directory,
+        model=model,
+        model_reference=section.model,
+        cases=count,
+        design=section.design,
+        seed=section.seed or 0,
+        parameters={key: nominal[key] for key in sections.parameters},
+        nominal=nominal,
+        dispersions=dispersions,
+        correlations=correlations,
+        requirements=requirements,
+        retention=retention,
+        digest=_digest(document, section, directory, dispersions, table_path, upstream),
+        table_path=table_path,
+        table=table,
+        tuning=tuning,
+        upstream=upstream,
+        first=first,
+        messages=messages,
+        sensitivity=sensitivity,
+        report=sections.report or ReportSection(),
+    )
+
+
+def _named_design(document: dict[str, Any]) -> str | None:
+    """The design, even where other keys of [campaign] are wrong: the dispersions are read against it."""
+    section = document.get("campaign")
+    design = section.get("design") if isinstance(section, dict) else None
+    return design if isinstance(design, str) and design in DESIGNS else None
+
+
+def _model(document: dict[str, Any], directory: Path, found: Findings) -> Model | None:
+    """The model, even where other keys of [campaign] are wrong: the rest of the file is read against it."""
+    section = document.get("campaign")
+    reference = section.get("model") if isinstance(section, dict) else None
+    if not isinstance(reference, str) or not reference:
+        return None
+    try:
+        return load_model(reference, directory)
+    except ModelError as error:
+        known = [f"campaigns.{folder.parent.name}" for folder in SHIPPED.glob("*/campaign.toml")]
+        known += [file.name for file in directory.glob("*.py")]
+        near = "" if reference in known else hint(reference, known)
+        found.under("campaign").add("model", f"{error}{near if 'did you mean' in near else ''}")
+        return None
+
+
+def _within_budget(model: Model, section: CampaignSection | None, found: Findings) -> Model:
+    """The model with the file's own cap on integration steps."""
+    if section is None or section.max_steps is None:
+        return model
+    if not isinstance(model.clock, AdaptiveStep):
+        found.add("max_steps", f"is for models that choose their steps; {model.name} steps on a fixed grid")
+        return model
+    return replace(model, clock=replace(model.clock, attempts=section.max_steps))
+
+
+def _nominal(model: Model, sections: Sections, taken: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
+    spot = found.under("parameters")
+    before = len(found.problems)
+    nominal = {**nominal_values(model, sections.parameters, spot), **taken}
+    if len(found.problems) == before:
+        try:
+            sentence = refusal(model, nominal)
+        except ModelError as error:
+            found.under("campaign").add("model", str(error))
+        else:
+            if sentence:
+                spot.add("", f"the nominal case cannot be flown: {sentence}")
+    return nominal
+
+
+def _unknown_names(
+    document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: Model, found: Findings
+) -> None:
+    """Dispersions of no parameter and requirements of no metric, also where their section is wrong in itself."""
+    written = document.get("dispersion")
+    for name in written if isinstance(written, dict) else ():
+        if name not in sections.dispersions and name not in nominal:
+            found.under("dispersion", name).add("", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}")
+    written = document.get("requirement")
+    for name, raw in written.items() if isinstance(written, dict) else ():
+        metric = raw.get("metric") if isinstance(raw, dict) else None
+        if name not in sections.requirements and isinstance(metric, str):
+            check_metric(metric, model, found.under("requirement", name))
+
+
+def _dispersions(
+    sections: Sections,
+    model: Model,
+    nominal: Mapping[str, Scalar],
+    design: str | None,
+    directory: Path,
+    found: Findings,
+) -> tuple[Dispersion, ...]:
+    built = []
+    for name, section in sections.dispersions.items():
+        spot = found.under("dispersion", name)
+        if name not in nominal:
+            near = "" if found.full else hint(name, inputs_of(model))
+            spot.add("", f"is not a parameter of {model.name}{near}")
+        elif design is not None:  # without a design it is unknown which keys make sense
+            built.append(build_dispersion(name, section, model.input(name), nominal[name], design, directory, spot))
+    return tuple(built)
+
+
+def _table(
+    section: CampaignSection | None,
+    model: Model,
+    dispersions: tuple[Dispersion, ...],
+    directory: Path,
+    found: Findings,
+) -> tuple[Path | None, dict[str, np.ndarray]]:
+    spot = found.under("campaign", "table")
+    if section is None or (section.design != "table" and section.table is None):
+        return None, {}
+    if section.design != "table":
+        spot.add("", f'the design "{section.design}" reads no table; it is for design = "table"')
+    elif section.table is None:
+        spot.add("", "is missing: CSV or Parquet beside this file, a case a row")
+    else:
+        try:
+            path = resolve_beside(directory, section.table)
+            units = {one.name: one.spec["unit"] for one in dispersions if "unit" in one.spec}
+            return path, read_case_table(path, model, units, spot)
+        except FileFault as fault:
+            spot.add("", str(fault))
+    return None, {}
+
+
+def _case_count(
+    section: CampaignSection, dispersions: tuple[Dispersion, ...], table: Mapping[str, np.ndarray], found: Findings
+) -> int | None:
+    """How many cases the design has; None where that is unknown."""
+    if section.design in (*RANDOM, *IN_BLOCKS):
+        for key, value in (("cases", section.cases), ("seed", section.seed)):
+            if value is None:
+                found.add(key, f"is missing: {CampaignSection.model_fields[key].description}")
+        return section.cases
+    if found.problems:
+        return None
+    if section.design in BY_LEVELS:
+        count = level_count(section.design, [len(one.levels) for one in dispersions])
+    else:
+        count = len(next(iter(table.values())))
+    if count > MOST_CASES:
+        found.add("design", f"{count} cases; at most {MOST_CASES} are possible")
+        return None
+    if section.cases not in (None, count):
+        found.add("cases", f'{section.cases} is not allowed; the design "{section.design}" has {count} cases by itself')
+    return count
+
+
+def _digest(
+    document: dict[str, Any],
+    section: CampaignSection,
+    directory: Path,
+    dispersions: tuple[Dispersion, ...],
+    table_path: Path | None,
+    upstream: "Upstream | None",
+) -> str:
+    content = json.loads(json.dumps(document, default=str))  # TOML has dates, JSON has none
+    if section.design != "lhs":
+        content["campaign"].pop("cases", None)
+    content.pop("report", None)  # how a run is told, not what it is
+    content["campaign"]["seed"] = section.seed or 0  # a grid may do without one, and is resumed with 0
+    order = [one.name for one in dispersions]
+    digest = sha256(json.dumps([content, order], sort_keys=True).encode())
+    files = [directory / one.spec["file"] for one in dispersions if one.dist == "empirical"]
+    for path in [*files, *([table_path] if table_path is not None else [])]:
+        digest.update(sha256(path.read_bytes()).digest())
+    if upstream is not None:
+        digest.update(upstream.digest.encode())
+    return digest.hexdigest()

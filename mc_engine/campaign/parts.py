@@ -1,0 +1,225 @@
+"""The parts of a campaign, checked against its model: nominal values, correlations, requirements, retention."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from mc_engine.campaign.dispersions import Dispersion
+from mc_engine.campaign.inputs import accepted_range, check_value, inputs_of, number
+from mc_engine.campaign.reading import Findings
+from mc_engine.campaign.sections import CorrelationSection, RequirementSection, RetentionSection, WorstSection
+from mc_engine.errors import MOST_SHOWN
+from mc_engine.model.faults import naming_faults
+from mc_engine.model.fields import Parameter, Setting
+from mc_engine.model.preparation import call_prepare
+from mc_engine.model.record import Model, Refusals
+from mc_engine.sampling.correlation import group_matrix, is_positive_definite
+from mc_engine.sampling.designs import IN_BLOCKS, RANDOM, block_problem
+from mc_engine.sampling.distributions import Scalar
+from mc_engine.sampling.sobol import MAX_DIMENSIONS
+from mc_engine.suggestions import hint, listed
+
+_LARGEST_HYPERCUBE = 10_000_000  # cases; a Latin hypercube is held in memory as a whole
+_CASES_PER_CORRELATED = 10  # a Latin hypercube with fewer may not have room for the correlations asked for
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Spearman correlation of two dispersions."""
+
+    first: str
+    second: str
+    rank: float
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """`share` of the cases must keep `metric` within the limits, shown with `confidence`.  A limit may be None."""
+
+    name: str
+    metric: str
+    at_most: float | None
+    at_least: float | None
+    share: float
+    confidence: float
+    source: str = ""
+
+
+class Worst(NamedTuple):
+    """The `n_cases` worst cases of a metric: its "largest" or "smallest" values; of None, as its requirement says."""
+
+    metric: str
+    n_cases: int
+    side: str | None
+
+
+@dataclass(frozen=True)
+class Retention:
+    """Which cases keep their flight history, and of about how many rows."""
+
+    nominal: bool = True
+    first: int = 0
+    worst: tuple[Worst, ...] = ()
+    cases: tuple[int, ...] = ()
+    rows: int = 1500
+
+
+def nominal_values(model: Model, overrides: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
+    """Every parameter and setting at its nominal value: what [parameters] says, else the model's default."""
+    inputs = inputs_of(model)
+    for name in overrides:
+        if name not in inputs:
+            near = hint(name, inputs) if len(found.problems) < MOST_SHOWN else ""  # a search takes its time
+            found.add(name, f"is not a parameter of {model.name}{near}")
+    values: dict[str, Scalar] = {}
+    for item in inputs.values():
+        default = item.default if isinstance(item, Setting) else float(item.default)
+        if item.name in overrides:
+            checked = check_value(overrides[item.name], item, found, item.name)
+            values[item.name] = default if checked is None else checked
+        else:
+            _check_default(default, item, found)
+            values[item.name] = default
+    return values
+
+
+def _check_default(default: Scalar, item: Parameter | Setting, found: Findings) -> None:
+    if not isinstance(default, bool | str) and not item.low <= default <= item.high:
+        found.add(item.name, f"the model's own value {number(default)} is not within {accepted_range(item)}; give one")
+
+
+def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
+    """Why the model cannot start from these values, as one sentence; empty if it can.
+
+    Raises ModelError if `prepare` itself breaks.
+    """
+    if model.prepare is None:
+        return ""
+    inputs = {p.symbol: np.array([float(values[p.name]) * p.si_factor]) for p in model.parameters}
+    settings = {s.symbol: np.array([s.code(values[s.name])]) for s in model.settings}
+    refusals = Refusals.none(1)
+    with naming_faults(model.reference, "the nominal case", ""):
+        call_prepare(model, SimpleNamespace(**inputs), SimpleNamespace(**settings), refusals)
+    return str(refusals.reason[0])
+
+
+def check_correlations(
+    sections: Mapping[str, CorrelationSection],
+    dispersions: tuple[Dispersion, ...],
+    model: Model,
+    design: str,
+    found: Findings,
+) -> tuple[Correlation, ...]:
+    """The correlations; `sections` by place in the file."""
+    if sections and design not in RANDOM:
+        why = "is for independent inputs" if design in IN_BLOCKS else "has no chance in it"
+        found.add("correlation", f'the design "{design}" {why}; correlations are for {listed(RANDOM)}')
+        return ()
+    by_name = {dispersion.name: dispersion for dispersion in dispersions}
+    kept: list[Correlation] = []
+    for place, section in sections.items():
+        first, second = section.between
+        spot = found.under(place)
+        before = len(found.problems)
+        for name in section.between:
+            _check_correlated(name, by_name, model, spot)
+        if first == second:
+            spot.add("between", f'"{first}" is there twice')
+        elif any({first, second} == {other.first, other.second} for other in kept):
+            spot.add("between", f'"{first}" and "{second}" have a correlation already')
+        if len(found.problems) == before:
+            kept.append(Correlation(first, second, section.rank, section.source))
+    matrix = group_matrix(list(by_name), rank_pairs(kept))[1]
+    if kept and not is_positive_definite(matrix):
+        text = ", ".join(f"{one.first} ~ {one.second} = {number(one.rank)}" for one in kept)
+        found.add(
+            "correlation", f"no numbers can be correlated like this: {text} (the matrix is not positive definite)"
+        )
+    return tuple(kept)
+
+
+def _check_correlated(name: str, by_name: Mapping[str, Dispersion], model: Model, found: Findings) -> None:
+    if name not in by_name:
+        found.add("between", f'"{name}" is not dispersed{hint(name, by_name)}')
+    elif any(setting.name == name for setting in model.settings):
+        found.add("between", f'"{name}" is a setting; only parameters can be correlated')
+    elif by_name[name].dist == "constant":
+        found.add("between", f'"{name}" is constant; it cannot be correlated')
+
+
+def rank_pairs(correlations: Sequence[Correlation]) -> tuple[tuple[str, str, float], ...]:
+    """The correlations as plain tuples."""
+    return tuple((one.first, one.second, one.rank) for one in correlations)
+
+
+def check_size(
+    count: int, design: str, dispersions: tuple[Dispersion, ...], correlations: tuple[Correlation, ...], found: Findings
+) -> None:
+    """Note a number of cases, or of dispersions, that the design cannot have."""
+    if design == "lhs":
+        check_room_for_correlations(count, correlations, found)
+        if count > _LARGEST_HYPERCUBE:
+            found.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
+    most = {"sobol": MAX_DIMENSIONS, "saltelli": MAX_DIMENSIONS // 2}.get(design, len(dispersions))
+    if len(dispersions) > most:
+        found.add("design", f'"{design}" has at most {most} dispersions, here are {len(dispersions)}; use "mc"')
+    if design in IN_BLOCKS and not dispersions:
+        found.add("design", f'"{design}" needs a dispersion to find the effect of')
+    if sentence := block_problem(design, len(dispersions), count):
+        found.add("cases", sentence)
+
+
+def check_room_for_correlations(cases: int, correlations: tuple[Correlation, ...], found: Findings) -> None:
+    """A Latin hypercube of few cases has few ways to be paired."""
+    needed = _CASES_PER_CORRELATED * len({name for one in correlations for name in (one.first, one.second)})
+    if cases < needed:
+        found.add("cases", f'{cases} is not allowed; "lhs" with these correlations needs at least {needed}')
+
+
+def check_requirements(
+    sections: Mapping[str, RequirementSection], model: Model, found: Findings
+) -> tuple[Requirement, ...]:
+    """The requirements, each with a metric of the model and at least one limit."""
+    kept = []
+    for name, section in sections.items():
+        spot = found.under(name)
+        check_metric(section.metric, model, spot)
+        low, high = section.at_least, section.at_most
+        if low is None and high is None:
+            spot.add("", "has no limit; give at_most, at_least or both")
+        elif low is not None and high is not None and low > high:
+            spot.add("at_least", f"{number(low)} is above at_most = {number(high)}")
+        kept.append(Requirement(name, section.metric, high, low, section.share, section.confidence, section.source))
+    return tuple(kept)
+
+
+def check_retention(
+    section: RetentionSection, model: Model, cases: int | None, shortened: bool, found: Findings
+) -> Retention:
+    """The retention, its case numbers checked against `cases` (None: unknown).
+
+    shortened : the number of cases is not the file's; numbers beyond it are then dropped, not refused.
+    """
+    histories = section.histories
+    worst = histories.worst or []
+    entries = [worst] if isinstance(worst, WorstSection) else worst
+    spot = found.under("histories")
+    for k, entry in enumerate(entries, start=1):
+        check_metric(entry.metric, model, spot.under("worst" if entries is not worst else f"worst {k}"))
+    for case in histories.cases:
+        if cases is not None and case >= cases and not shortened:
+            spot.add("cases", f"there is no case {case}; they are 0 to {cases - 1}")
+    kept = tuple(case for case in histories.cases if cases is None or case < cases)
+    chosen = tuple(Worst(entry.metric, entry.count, entry.side) for entry in entries)
+    return Retention(histories.nominal, histories.first, chosen, kept, histories.rows)
+
+
+def check_metric(metric: str, model: Model, found: Findings) -> None:
+    """Note a name that is not a metric of the model."""
+    names = [field.name for field in model.metrics]
+    if metric not in names:
+        found.add("metric", f'"{metric}" is not a metric of {model.name}{hint(metric, names)}')

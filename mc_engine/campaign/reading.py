@@ -1,0 +1,355 @@
+"""Reading the sections of a campaign file one by one, every mistake turned into a sentence with its place."""
+
+import json
+import re
+import tomllib
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, TypeVar, get_args
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
+
+from mc_engine.campaign.sections import (
+    DISTRIBUTIONS,
+    CampaignFile,
+    CampaignSection,
+    ConstraintSection,
+    CorrelationSection,
+    DispersionSection,
+    InputsSection,
+    LevelsDispersion,
+    ObjectiveSection,
+    PublishedPointSection,
+    RequirementSection,
+    RetentionSection,
+    SensitivitySection,
+    TunedSection,
+    TuningSection,
+    Value,
+)
+from mc_engine.errors import MOST_SHOWN, CampaignError, Problem
+from mc_engine.sampling.distributions import Scalar
+from mc_engine.section import ReportSection, Section
+from mc_engine.suggestions import hint, listed, nearest
+
+_VALUE: TypeAdapter[Scalar] = TypeAdapter(Value)
+_TAGS = ("one", "many")  # pydantic puts the tag of a union into the place
+_AnySection = TypeVar("_AnySection", bound=Section)
+
+_FREE_NAME = re.compile(r"\w[\w-]{0,59}")  # of what the file itself names; it stands in reports and on terminals
+
+# tomllib takes a time that grows with the square of the parts of a dotted key; a campaign file has keys of three.
+_LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){32}""")
+
+_MESSAGES = {
+    "int_type": "{shown} is not a whole number{whole}",
+    "float_type": "{shown} is not a number",
+    "finite_number": "{shown} is not a finite number",
+    "scalar": "{shown} is neither a number, nor true or false, nor a word",
+    "string_type": "{shown} is not text in quotes",
+    "bool_type": "{shown} is neither true nor false",
+    "list_type": "{shown} is not a list in brackets",
+    "model_type": "{shown} is not a table",
+    "dict_type": "{shown} is not a table",
+    "greater_than": "{shown} is not allowed; it must be above {gt}",
+    "greater_than_equal": "{shown} is not allowed; it must be at least {ge}",
+    "less_than": "{shown} is not allowed; it must be below {lt}",
+    "less_than_equal": "{shown} is not allowed; it must be at most {le}",
+    "nearly_an_end": "{shown} is not allowed; it must be away from 0 and 1 by {least} at least",
+    "too_short": "{actual_length} given; at least {min_length} needed",
+    "too_long": "{actual_length} given; at most {max_length} allowed",
+    "string_too_short": "{shown} is empty",
+    "string_too_long": "{shown} is too long; at most {max_length} letters are allowed",
+    "not_printable": "{shown} has letters that cannot be seen; leave them out",
+    "not_one_line": "{shown} is of more than one line; write it in one",
+}
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The problems found so far, and the place in the file where we are looking."""
+
+    place: str = ""
+    problems: list[Problem] = field(default_factory=list)
+
+    def under(self, *names: str) -> "Findings":
+        """The same list, one or more steps further in."""
+        readable = [name if name.isprintable() else json.dumps(name) for name in names]
+        return Findings(".".join(part for part in (self.place, *readable) if part), self.problems)
+
+    @property
+    def full(self) -> bool:
+        """So much is wrong that no further sentence is shown; it need not say what was meant."""
+        return len(self.problems) >= MOST_SHOWN
+
+    def add(self, key: str, message: str) -> None:
+        """Note a problem with `key` of the place we are at; the place itself where `key` is empty."""
+        self.problems.append(Problem(self.under(key).place, message))
+
+
+@dataclass(frozen=True)
+class Sections:
+    """The sections that could be read; what could not is None or left out, and among the findings."""
+
+    campaign: CampaignSection | None
+    parameters: dict[str, Scalar]
+    dispersions: dict[str, DispersionSection]
+    correlations: dict[str, CorrelationSection]  # by place: "correlation 1", "correlation 2", ...
+    requirements: dict[str, RequirementSection]
+    retention: RetentionSection | None
+    tuning: "TuningSections | None"
+    inputs: InputsSection | None
+    sensitivity: SensitivitySection | None
+    report: ReportSection | None
+
+
+@dataclass(frozen=True)
+class TuningSections:
+    """What could be read of [tuning]; `head` has its plain keys alone, `objective_names` all that are there."""
+
+    head: TuningSection | None
+    parameters: dict[str, TunedSection]
+    objectives: dict[str, ObjectiveSection]
+    constraints: dict[str, ConstraintSection]
+    published: dict[str, PublishedPointSection]  # by place: "published 1", "published 2", ...
+    objective_names: tuple[str, ...]
+
+
+def parse_toml(text: str, source: str) -> dict[str, Any]:
+    """The text as a document; CampaignError with line and column where it is not TOML."""
+    if match := _LONG_KEY.search(text):
+        line = text.count("\n", 0, match.start()) + 1
+        raise CampaignError(source, [Problem(f"line {line}", "a name of so many parts is none of a campaign file's")])
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        match = re.fullmatch(r"(.*) \(at (line \d+, column \d+|end of document)\)", str(error), re.DOTALL)
+        message, place = match.groups() if match else (str(error), "")
+        raise CampaignError(source, [Problem(place, f"this is not TOML: {_lower_first(message)}")]) from None
+    except (ValueError, RecursionError) as error:
+        raise CampaignError(source, [Problem("", f"this is not TOML that can be read: {error}")]) from None
+
+
+def read_sections(document: dict[str, Any], found: Findings) -> Sections:
+    """Read every section, noting all that is wrong inside each."""
+    for name in document:
+        if name not in CampaignFile.model_fields:
+            found.add(name, f"is not a section{hint(name, CampaignFile.model_fields)}")
+    if "campaign" not in document:
+        found.add("campaign", "is missing: the table [campaign] with model, design, ...")
+    inside = {name: found.under(name) for name in CampaignFile.model_fields}
+    return Sections(
+        campaign=read(CampaignSection, document.get("campaign"), inside["campaign"])
+        if "campaign" in document
+        else None,
+        parameters=_parameters(document, inside["parameters"]),
+        dispersions=_read_each(_dispersion, _named(document, "dispersion", found)),
+        correlations=_read_each(_correlation, _listed(document, "correlation", found)),
+        requirements=_read_each(_requirement, _freely_named(document, "requirement", found)),
+        retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
+        tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
+        inputs=_optional(InputsSection, document, inside),
+        sensitivity=_optional(SensitivitySection, document, inside),
+        report=read(ReportSection, document.get("report", {}), inside["report"]),
+    )
+
+
+def _optional(section: type[_AnySection], document: dict[str, Any], inside: dict[str, Findings]) -> _AnySection | None:
+    name = section.__name__.removesuffix("Section").lower()
+    return read(section, document[name], inside[name]) if name in document else None
+
+
+def read(section: type[_AnySection], raw: Any, found: Findings) -> _AnySection | None:
+    """`raw` as a section, or None with all its mistakes noted."""
+    try:
+        return section.model_validate(raw)
+    except ValidationError as error:
+        mistakes = error.errors(include_url=False)
+        for details in mistakes[:MOST_SHOWN]:
+            found.add(_place(raw, details["loc"]), _sentence(section, details))
+        # nobody is shown the rest: it is only counted
+        found.problems.extend(Problem(found.place, details["msg"]) for details in mistakes[MOST_SHOWN:])
+        return None
+
+
+def shown(value: Any) -> str:
+    """A value as the campaign file writes it, shortened where it is long."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, dict):
+        return "a table"
+    try:
+        text = json.dumps(value, ensure_ascii=False) if isinstance(value, str) else str(value)
+    except ValueError:  # a whole number of thousands of digits
+        return "a number of that size"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _read_each(
+    reader: Callable[[Any, Findings], _AnySection | None], entries: Iterable[tuple[str, Any, Findings]]
+) -> dict[str, _AnySection]:
+    """The entries that could be read, by name."""
+    sections = {}
+    for name, raw, spot in entries:
+        section = reader(raw, spot)
+        if section is not None:
+            sections[name] = section
+    return sections
+
+
+def _named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+    raw = document.get(name, {})
+    if isinstance(raw, dict):
+        return [(key, entry, found.under(name, key)) for key, entry in raw.items()]
+    header = f"{found.place}.{name}" if found.place else name
+    found.add(name, f"{shown(raw)} is not a table; write [{header}.NAME]")
+    return []
+
+
+def _freely_named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+    """The tables whose names the file chooses; one that is no word is noted and left out."""
+    entries = _named(document, name, found)
+    wrong = [entry for entry in entries if not _FREE_NAME.fullmatch(entry[0])]
+    for key, _, _ in wrong:
+        found.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
+    return [entry for entry in entries if entry not in wrong]
+
+
+def _listed(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+    raw = document.get(name, [])
+    if isinstance(raw, list):
+        places = [f"{name} {k}" for k in range(1, len(raw) + 1)]
+        return [(place, entry, found.under(place)) for place, entry in zip(places, raw, strict=True)]
+    header = f"{found.place}.{name}" if found.place else name
+    found.add(name, f"{shown(raw)} is not a list of tables; write [[{header}]] with two brackets")
+    return []
+
+
+def _correlation(raw: Any, found: Findings) -> CorrelationSection | None:
+    return read(CorrelationSection, raw, found)
+
+
+def _requirement(raw: Any, found: Findings) -> RequirementSection | None:
+    return read(RequirementSection, raw, found)
+
+
+def _tuning(raw: Any, found: Findings) -> TuningSections | None:
+    """[tuning], each of its tables read for itself, so that a slip in one hides nothing in the others."""
+    if not isinstance(raw, dict):
+        found.add("", f"{shown(raw)} is not a table; write [tuning]")
+        return None
+    tables = ("parameter", "objective", "constraint", "published")
+    objectives = raw.get("objective")
+    return TuningSections(
+        head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, found),
+        parameters=_read_each(partial(read, TunedSection), _named(raw, "parameter", found)),
+        objectives=_read_each(partial(read, ObjectiveSection), _freely_named(raw, "objective", found)),
+        constraints=_read_each(partial(read, ConstraintSection), _freely_named(raw, "constraint", found)),
+        published=_read_each(partial(read, PublishedPointSection), _listed(raw, "published", found)),
+        objective_names=tuple(objectives) if isinstance(objectives, dict) else (),
+    )
+
+
+def _parameters(document: dict[str, Any], found: Findings) -> dict[str, Scalar]:
+    raw = document.get("parameters", {})
+    if not isinstance(raw, dict):
+        found.add("", f"{shown(raw)} is not a table; write [parameters]")
+        return {}
+    values: dict[str, Scalar] = {}
+    for name, value in raw.items():
+        try:
+            values[name] = _VALUE.validate_python(value)
+        except ValidationError as error:
+            found.add(name, _sentence(None, error.errors(include_url=False)[0]))
+    return values
+
+
+def _dispersion(raw: Any, found: Findings) -> DispersionSection | None:
+    """The section of the distribution that `dist` names; the keys allowed depend on it."""
+    dist = raw.get("dist") if isinstance(raw, dict) else None
+    if dist is None:
+        slip = _slip_of_dist(raw) if isinstance(raw, dict) else None
+        if slip is None:
+            return read(LevelsDispersion, raw, found)
+        found.add(slip, 'is not a known key; did you mean "dist"?')
+        dist = raw[slip]
+        raw = {"dist": dist, **{key: value for key, value in raw.items() if key != slip}}
+    if not isinstance(dist, str):
+        found.add("dist", f"{shown(dist)} is not text in quotes; known are {listed(DISTRIBUTIONS)}")
+        return None
+    if dist not in DISTRIBUTIONS:
+        found.add("dist", f'"{dist}" is not known{hint(dist, DISTRIBUTIONS)}')
+        return None
+    return read(DISTRIBUTIONS[dist], raw, found)
+
+
+def _slip_of_dist(raw: dict[str, Any]) -> str | None:
+    """The key that was to be `dist`, without which no other key of a dispersion could be judged."""
+    known = [*LevelsDispersion.model_fields, "dist"]
+    others = [key for key in raw if not any(key in section.model_fields for section in DISTRIBUTIONS.values())]
+    return next((key for key in others if nearest(key, known) == "dist"), None)
+
+
+def _place(raw: Any, location: tuple[int | str, ...]) -> str:
+    """The location as a reader finds it: names with dots, places in a list counted from 1."""
+    place = ""
+    for part in location:
+        if isinstance(part, int):
+            place += f" {part + 1}"
+            raw = raw[part]
+        elif part not in _TAGS or (isinstance(raw, dict) and part in raw):
+            place += f".{part}" if place else part
+            raw = raw.get(part) if isinstance(raw, dict) else None
+    return place
+
+
+def _sentence(section: type[Section] | None, details: ErrorDetails) -> str:
+    kind, context, location = details["type"], details.get("ctx", {}), details["loc"]
+    value = details["input"]
+    if kind == "missing" and section is not None:
+        return f"is missing: {_keys(_class_at(section, location))[str(location[-1])].description}"
+    if kind == "extra_forbidden" and section is not None:
+        return f"is not a known key{hint(str(location[-1]), _keys(_class_at(section, location)))}"
+    if kind == "literal_error" and location[-1:] == ("design",) and value == "halton":
+        return '"halton" is no longer offered; use "sobol"'
+    if kind == "literal_error":
+        allowed = re.findall(r"'([^']*)'", context["expected"])
+        if isinstance(value, str):
+            return f"{shown(value)} is not known{hint(value, allowed)}"
+        return f"{shown(value)} is not one of {listed(allowed)}"
+    whole = f"; write {int(value)}" if isinstance(value, float) and value.is_integer() else ""
+    limits = {key: _plain(limit) for key, limit in context.items()}
+    template = _MESSAGES.get(kind)
+    if template is None:
+        return f"{shown(value)}: {_lower_first(details['msg'])}"
+    return template.format(shown=shown(value), whole=whole, **limits)
+
+
+def _plain(limit: Any) -> Any:
+    return f"{limit:g}" if isinstance(limit, float) else limit
+
+
+def _keys(section: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The keys as the file writes them: `from` is a word of Python, and has another name inside."""
+    return {field.alias or name: field for name, field in section.model_fields.items()}
+
+
+def _class_at(section: type[BaseModel], location: tuple[int | str, ...]) -> type[BaseModel]:
+    """The class whose key stands last in `location`."""
+    for part in location[:-1]:
+        if part in section.model_fields:
+            section = _section_in(section.model_fields[str(part)].annotation) or section
+    return section
+
+
+def _section_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next((found for part in get_args(annotation) if (found := _section_in(part))), None)
+
+
+def _lower_first(message: str) -> str:
+    return message[:1].lower() + message[1:]

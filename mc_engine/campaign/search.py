@@ -1,0 +1,152 @@
+"""Where campaign files are: the shipped ones by name, any other by its path."""
+
+import re
+import tomllib
+from pathlib import Path
+from typing import NamedTuple
+
+from mc_engine.errors import CampaignError, ModelError, Problem
+from mc_engine.store.run_folder import NO_TEXT, readable
+from mc_engine.store.urls import is_url, without_secrets
+from mc_engine.suggestions import hint
+
+SHIPPED = Path(__file__).resolve().parents[2] / "campaigns"
+
+
+class ShippedCampaign(NamedTuple):
+    """A campaign that comes with the engine; `title` is the one in its file."""
+
+    name: str
+    path: Path
+    title: str
+
+
+def list_campaigns() -> list[ShippedCampaign]:
+    """Every shipped campaign file: "deorbit" is campaigns/deorbit/campaign.toml, "deorbit/map" its map.toml."""
+    return [ShippedCampaign(name, path, _title(path)) for name, path in sorted(_shipped().items())]
+
+
+def campaign_names() -> list[str]:
+    """The names of all shipped campaigns, without opening a file."""
+    return sorted(_shipped())
+
+
+def campaign_paths(begun: str) -> list[str]:
+    """Folders, and .toml files, whose path begins with `begun`; a folder ends in a slash."""
+    folder, _, name = begun.rpartition("/")
+    try:
+        entries = sorted(Path(f"{folder}/" if "/" in begun else ".").iterdir())
+    except (OSError, ValueError):
+        return []
+    before = f"{folder}/" if "/" in begun else ""
+    fitting = [one for one in entries if one.name.startswith(name) and (name or not one.name.startswith("."))]
+    return [
+        f"{before}{one.name}{'/' if one.is_dir() else ''}" for one in fitting if one.is_dir() or one.suffix == ".toml"
+    ]
+
+
+def model_sources() -> dict[str, str]:
+    """Where the model of each folder of shipped campaigns comes from; this loads the models.
+
+    A model that cannot be loaded, or has no source, is left out.
+    """
+    from mc_engine.model.record import load_model
+
+    found = {}
+    for folder in sorted(path.parent for path in SHIPPED.glob("*/campaign.toml")):
+        try:
+            reference = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8"))["campaign"]["model"]
+            source = load_model(reference, folder).source
+        except (ModelError, OSError, ValueError, LookupError, TypeError):
+            continue
+        if source:
+            found[folder.name] = source
+    return found
+
+
+def find_campaign(reference: str | Path) -> Path:
+    """The file of a shipped name, of a path to a .toml file, or of a folder that holds campaign.toml.
+
+    A shipped name goes before a folder of that name; write "./deorbit" for the folder.
+    """
+    text = str(reference)
+    shipped = _shipped()
+    if text in shipped:
+        return shipped[text]
+    path = Path(text)
+    try:
+        found = path / "campaign.toml" if path.is_dir() else path
+        if found.is_file():
+            if (place := str(found.resolve())) != readable(place):
+                raise CampaignError(readable(text), [Problem("", NO_TEXT)])
+            return found
+    except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
+        pass
+    raise CampaignError(without_secrets(text), [Problem("", _not_found(text, path, list(shipped)))])
+
+
+def requirement_names(reference: str) -> list[str]:
+    """The requirements of a campaign by their names in its file, for completion; none where there is no such file."""
+    try:
+        document = tomllib.loads(find_campaign(reference).read_text(encoding="utf-8"))
+    except (CampaignError, OSError, ValueError):
+        return []
+    written = document.get("requirement", {})
+    return list(written) if isinstance(written, dict) else []
+
+
+def campaign_name(path: Path) -> str:
+    """The shipped name of a file, or the name that its path suggests."""
+    path = path.resolve()
+    for name, shipped in _shipped().items():
+        if shipped == path:
+            return name
+    return path.parent.name if path.stem == "campaign" and path.parent.name else path.stem
+
+
+def _shipped() -> dict[str, Path]:
+    files = {}
+    for path in SHIPPED.glob("*/*.toml"):
+        name = path.parent.name if path.stem == "campaign" else f"{path.parent.name}/{path.stem}"
+        if path.stem != "published" and re.fullmatch(r"[\w-]+(/[\w-]+)?", name):
+            files[name] = path
+    return files
+
+
+def _title(path: Path) -> str:
+    """The title alone, without loading the model; empty where there is none."""
+    try:
+        campaign = tomllib.loads(path.read_text(encoding="utf-8")).get("campaign")
+    except (OSError, ValueError):
+        return ""
+    return str(campaign.get("title", "")) if isinstance(campaign, dict) else ""
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
+def _not_found(text: str, path: Path, names: list[str]) -> str:
+    if text and _is_folder(path):
+        others = [name for name in campaign_paths(f"{text.rstrip('/')}/") if name.endswith(".toml")]
+        found = f", but {others[0]}" if others else "; `mc-engine init DIR` makes a campaign in a new folder"
+        return f"holds no campaign.toml{found}"
+    if path.suffix == ".toml":
+        return (
+            "there is no such file; `mc-engine list` names the shipped campaigns, `mc-engine init DIR` makes a new one"
+        )
+    if is_url(text):
+        return "is a URL; a campaign is read from a file here"
+    if "/" not in text and not text.startswith("."):
+        near = hint(text, names)
+        known = near if "did you mean" in near else "; `mc-engine list` names the campaigns"
+        return f"there is no campaign of that name, and no such path{known}"
+    near = hint(text, names)
+    return (
+        f"there is no such path{near}"
+        if "did you mean" in near
+        else "there is no such path with a campaign.toml; `mc-engine init` makes one"
+    )

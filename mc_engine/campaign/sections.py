@@ -1,0 +1,380 @@
+"""The words of a campaign file: its sections, their keys, and the JSON schema of the whole.
+
+These classes know nothing of a model; `mc_engine.campaign.loading` holds the file against one.
+"""
+
+import math
+from datetime import date
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+from pydantic_core import PydanticCustomError
+
+from mc_engine.sampling.distributions import Scalar
+from mc_engine.section import ReportSection, Section, Share
+from mc_engine.status import MOST_CASES
+
+MOST_LEVELS = 1_000_000
+MOST_STEPS = 10**12
+LONGEST_LINE, LONGEST_NOTE = 300, 5000  # letters
+LARGEST = 1e50  # beyond it, squares and quotients of numbers leave the range of float64
+
+DesignName = Literal["mc", "lhs", "sobol", "saltelli", "morris", "grid", "one_at_a_time", "table"]
+
+
+def _scalar(value: Any) -> Scalar:
+    if isinstance(value, bool | str):
+        return value
+    if isinstance(value, date):  # TOML has dates of its own, with and without time
+        return value.isoformat()
+    if not isinstance(value, int | float):
+        raise PydanticCustomError("scalar", "{shown} is neither a number, nor true or false, nor a word")
+    if value != value or abs(value) == math.inf:
+        raise PydanticCustomError("finite_number", "not a finite number")
+    if abs(value) > LARGEST:  # also of a whole number that no float64 can hold
+        raise PydanticCustomError("less_than_equal", "too large", {"le": LARGEST})
+    return float(value)
+
+
+def _not_tiny(value: float) -> float:
+    if value < 1.0 / LARGEST:
+        raise PydanticCustomError("greater_than", "too small", {"gt": 1.0 / LARGEST})
+    return value
+
+
+def _printable(value: str) -> str:
+    """Text that is shown as it is written: nothing in it steers a terminal or hides from the eye."""
+    if not value.replace("\n", "").replace("\t", "").isprintable():
+        raise PydanticCustomError("not_printable", "letters that cannot be seen")
+    return value
+
+
+def _one_line(value: str) -> str:
+    if "\n" in value:
+        raise PydanticCustomError("not_one_line", "more than one line")
+    return value
+
+
+Line = Annotated[str, Field(max_length=LONGEST_LINE), AfterValidator(_printable), AfterValidator(_one_line)]
+Note = Annotated[str, Field(max_length=LONGEST_NOTE), AfterValidator(_printable)]
+Value = Annotated[
+    Any, PlainValidator(_scalar), WithJsonSchema({"anyOf": [{"type": t} for t in ("number", "boolean", "string")]})
+]
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+Positive = Annotated[float, Field(gt=0.0, le=LARGEST), AfterValidator(_not_tiny)]
+
+
+class CampaignSection(Section):
+    """[campaign]: which model, which cases."""
+
+    model: str = Field(min_length=1, description='a module such as "campaigns.deorbit", or "model.py" beside this file')
+    cases: int | None = Field(default=None, ge=1, le=MOST_CASES, description="number of cases; random designs only")
+    design: DesignName = Field(description="how the cases are laid out: mc, lhs, sobol, saltelli, grid, ...")
+    seed: int | None = Field(
+        default=None, ge=0, le=2**63 - 1, description="any whole number from 0 on; random designs only"
+    )
+    table: str | None = Field(
+        default=None, min_length=1, description='CSV or Parquet beside this file, with design = "table"'
+    )
+    max_steps: int | None = Field(
+        default=None, ge=1, le=MOST_STEPS, description="integration steps of a case, then it ends as step-limit"
+    )
+    title: Line = Field(default="", description="one line for the report")
+    note: Note = ""
+
+
+class DispersionSection(Section):
+    """Keys that every [dispersion.NAME] may have."""
+
+    unit: Line | None = Field(default=None, description="unit of the numbers here; default: the parameter's own")
+    levels: int | None = Field(
+        default=None, ge=2, le=MOST_LEVELS, description="grid, one_at_a_time: so many equal steps"
+    )
+    values: list[Value] | None = Field(
+        default=None, min_length=1, description="the levels themselves, or what discrete draws"
+    )
+    source: Line = Field(default="", description="where the spread comes from, for the report")
+    note: Note = ""
+
+
+class LevelsDispersion(DispersionSection):
+    """No distribution: the levels of a grid, or the source of a table's column."""
+
+    mean: Number | None = None
+    half_range: Positive | None = None
+    three_sigma: Positive | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+
+
+class NormalDispersion(DispersionSection):
+    dist: Literal["normal"]
+    mean: Number | None = Field(default=None, description="default: the nominal value")
+    sigma: Positive | None = None
+    three_sigma: Positive | None = None
+    lower: Number | None = Field(default=None, description="cuts the distribution")
+    upper: Number | None = Field(default=None, description="cuts the distribution")
+
+
+class UniformDispersion(DispersionSection):
+    """lower and upper, or half_range about mean."""
+
+    dist: Literal["uniform"]
+    mean: Number | None = Field(default=None, description="default: the nominal value")
+    half_range: Positive | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+
+
+class TriangularDispersion(DispersionSection):
+    """lower and upper, or half_range about mode."""
+
+    dist: Literal["triangular"]
+    mode: Number | None = Field(default=None, description="default: the nominal value")
+    half_range: Positive | None = None
+    lower: Number | None = None
+    upper: Number | None = None
+
+
+class LognormalDispersion(DispersionSection):
+    """median and log_sigma (standard deviation of ln x), or mean and sigma (of x itself)."""
+
+    dist: Literal["lognormal"]
+    median: Positive | None = Field(default=None, description="default: the nominal value")
+    log_sigma: Annotated[float, Field(gt=0.0, le=10.0)] | None = None
+    mean: Positive | None = Field(default=None, description="default: the nominal value")
+    sigma: Positive | None = None
+    lower: Number | None = Field(default=None, description="cuts the distribution")
+    upper: Number | None = Field(default=None, description="cuts the distribution")
+
+
+class BetaDispersion(DispersionSection):
+    """Between lower and upper, density (x - lower)^(alpha - 1) (upper - x)^(beta - 1)."""
+
+    dist: Literal["beta"]
+    alpha: Positive = Field(description="a positive number")
+    beta: Positive = Field(description="a positive number")
+    lower: Number = Field(description="where the distribution begins")
+    upper: Number = Field(description="where the distribution ends")
+
+
+class ExponentialDispersion(DispersionSection):
+    """Begins at origin; its mean is origin + scale."""
+
+    dist: Literal["exponential"]
+    scale: Positive = Field(description="mean distance from the origin")
+    origin: Number | None = Field(default=None, description="default: the nominal value")
+    lower: Number | None = Field(default=None, description="cuts the distribution")
+    upper: Number | None = Field(default=None, description="cuts the distribution")
+
+
+class DiscreteDispersion(DispersionSection):
+    dist: Literal["discrete"]
+    values: list[Value] = Field(min_length=1, description="what is drawn")
+    weights: list[Annotated[float, Field(ge=0.0, le=LARGEST)]] | None = Field(
+        default=None, description="default: equal; need not sum to 1"
+    )
+
+
+class EmpiricalDispersion(DispersionSection):
+    dist: Literal["empirical"]
+    file: str = Field(min_length=1, description="CSV or Parquet beside this file; each draw is one of its numbers")
+    column: str | None = Field(default=None, description="which column, where the file has more than one")
+    lower: Number | None = Field(default=None, description="leaves out the numbers below")
+    upper: Number | None = Field(default=None, description="leaves out the numbers above")
+
+
+class ConstantDispersion(DispersionSection):
+    dist: Literal["constant"]
+    value: Value = Field(description="the same for every case")
+
+
+DISTRIBUTIONS: dict[str, type[DispersionSection]] = {
+    "normal": NormalDispersion,
+    "uniform": UniformDispersion,
+    "triangular": TriangularDispersion,
+    "lognormal": LognormalDispersion,
+    "beta": BetaDispersion,
+    "exponential": ExponentialDispersion,
+    "discrete": DiscreteDispersion,
+    "empirical": EmpiricalDispersion,
+    "constant": ConstantDispersion,
+}
+
+
+class CorrelationSection(Section):
+    """[[correlation]]: one pair of dispersions; several entries make one matrix."""
+
+    between: list[str] = Field(min_length=2, max_length=2, description="the names of two dispersions")
+    rank: float = Field(gt=-1.0, lt=1.0, description="Spearman rank correlation, between -1 and 1")
+    source: Line = ""
+    note: Note = ""
+
+
+class CovarianceSection(Section):
+    """[covariance.NAME]: the covariance of an orbit message as the spread of six parameters."""
+
+    file: str = Field(min_length=1, description="a CCSDS OPM or OEM (KVN) beside this file")
+    parameters: list[str] = Field(
+        min_length=6, max_length=6, description="the parameters of position and velocity, in the order of the axes"
+    )
+    frame: str = Field(
+        min_length=1, description="axes of the parameters: RTN, TNW, or the frame of the message's state"
+    )
+    epoch: str | None = Field(default=None, description="which covariance, where an OEM has more than one")
+    source: Line = ""
+    note: Note = ""
+
+
+class RequirementSection(Section):
+    """[requirement.NAME]: at_most, at_least or both, by `share` of the cases with `confidence`."""
+
+    metric: str = Field(description="a metric of the model")
+    at_most: Number | None = None
+    at_least: Number | None = None
+    share: Share = 0.9973
+    confidence: Share = 0.90
+    source: Line = ""
+    note: Note = ""
+
+
+class WorstSection(Section):
+    metric: str = Field(description="a metric of the model")
+    count: int = Field(default=5, ge=1, le=1000)
+    side: Literal["largest", "smallest"] | None = Field(
+        default=None,
+        description="by default those with the smallest margin to a limit; without a requirement, the largest",
+    )
+
+
+def _one_or_many(value: Any) -> str:
+    return "many" if isinstance(value, list) else "one"
+
+
+Worst = Annotated[
+    Annotated[WorstSection, Tag("one")] | Annotated[list[WorstSection], Tag("many")], Discriminator(_one_or_many)
+]
+
+
+class HistoriesSection(Section):
+    """Which cases keep their flight history."""
+
+    nominal: bool = True
+    first: int = Field(default=0, ge=0, le=100_000, description="the first cases")
+    cases: list[Annotated[int, Field(ge=0)]] = Field(default_factory=list, description="these cases")
+    rows: int = Field(default=1500, ge=10, le=1_000_000, description="about how many instants each history has")
+    worst: Worst | None = Field(default=None, description="the worst cases of a metric")
+
+
+class RetentionSection(Section):
+    """[retention]"""
+
+    histories: HistoriesSection = Field(default=HistoriesSection())
+
+
+class TunedSection(Section):
+    """[tuning.parameter.NAME]: the range in which a parameter may be chosen."""
+
+    lower: Number = Field(description="the smallest value that may be chosen")
+    upper: Number = Field(description="the largest value that may be chosen")
+    source: Line = ""
+    note: Note = ""
+
+
+class ObjectiveSection(Section):
+    """[tuning.objective.NAME]: what is to be as small or as large as possible."""
+
+    metric: str = Field(description="a metric of the model")
+    goal: Literal["minimise", "maximise"] = "minimise"
+    quantile: Share | None = Field(
+        default=None, description="this quantile over the dispersed cases; default: the nominal case"
+    )
+    note: Note = ""
+
+
+class ConstraintSection(Section):
+    """[tuning.constraint.NAME]: at_most, at_least or both."""
+
+    metric: str = Field(description="a metric of the model")
+    at_most: Number | None = None
+    at_least: Number | None = None
+    quantile: Share | None = Field(
+        default=None, description="this quantile over the dispersed cases; default: the nominal case"
+    )
+    source: Line = ""
+    note: Note = ""
+
+
+class PublishedPointSection(Section):
+    """[[tuning.published]]: a point to be drawn beside the front."""
+
+    name: Line = Field(min_length=1, description="what the report calls the point")
+    values: dict[str, Number] = Field(description="a number for every objective, by its name")
+    source: Line = ""
+
+
+class TuningSection(Section):
+    """[tuning]: which parameters `mc-engine tune` chooses, what for, and how long it searches (NSGA-II)."""
+
+    parameter: dict[str, TunedSection] = Field(default_factory=dict)
+    objective: dict[str, ObjectiveSection] = Field(default_factory=dict)
+    constraint: dict[str, ConstraintSection] = Field(default_factory=dict)
+    published: list[PublishedPointSection] = Field(default_factory=list)
+    population: int = Field(default=48, ge=4, le=100_000, description="candidates in a generation")
+    generations: int = Field(default=60, ge=1, le=100_000, description="generations, the first one among them")
+    patience: int | None = Field(
+        default=None, ge=1, description="stop when so many generations in a row bring nothing; default: never"
+    )
+    seed: int | None = Field(default=None, ge=0, le=2**32 - 1, description="of the search; default: that of [campaign]")
+    crossover: float = Field(default=0.9, ge=0.0, le=1.0, description="probability that two parents are crossed")
+    mutation: float | None = Field(
+        default=None,
+        gt=0.0,
+        le=1.0,
+        description="probability that a parameter mutates; default: 1 / number tuned",
+    )
+
+
+AnyDispersion = (
+    LevelsDispersion | NormalDispersion | UniformDispersion | TriangularDispersion | LognormalDispersion
+    | BetaDispersion | ExponentialDispersion | DiscreteDispersion | EmpiricalDispersion | ConstantDispersion
+)  # fmt: skip
+
+
+class InputsSection(Section):
+    """[inputs]: parameters that every case takes from the same case of another run, flown before."""
+
+    source: str = Field(alias="from", min_length=1, description='a run, or the campaign to be flown first: "deorbit"')
+    columns: dict[str, str] = Field(
+        default_factory=dict,
+        description="parameter = column of that run; results that have a parameter's name need no line here",
+    )
+    note: Note = ""
+
+
+class SensitivitySection(Section):
+    """[sensitivity]: flights beside the cases, from which the contributions of inputs to each metric are computed."""
+
+    cases: int = Field(ge=32, le=10_000_000, description="base cases; each is flown twice, and once for each group")
+    group: dict[str, list[str]] = Field(default_factory=dict, description="dispersions computed together, by group")
+
+
+class CampaignFile(Section):
+    """A campaign of mc-engine: a model, the spread of its inputs, and what the results must meet."""
+
+    campaign: CampaignSection = Field(description="the table [campaign] with model, design, ...")
+    parameters: dict[str, Value] = Field(default_factory=dict, description="other nominal values and settings")
+    dispersion: dict[str, AnyDispersion] = Field(default_factory=dict)
+    correlation: list[CorrelationSection] = Field(default_factory=list)
+    covariance: dict[str, CovarianceSection] = Field(default_factory=dict)
+    inputs: InputsSection | None = Field(default=None, description="what is taken from another run, case by case")
+    requirement: dict[str, RequirementSection] = Field(default_factory=dict)
+    retention: RetentionSection = Field(default_factory=RetentionSection)
+    sensitivity: SensitivitySection | None = Field(default=None, description="contributions of the inputs")
+    report: ReportSection = Field(default=ReportSection(), description="probability and confidence of the report")
+    tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of a campaign file, for editors that complete and check TOML."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **CampaignFile.model_json_schema()}

@@ -1,0 +1,201 @@
+"""The flights beside a run from which the contributions of its inputs are computed: a pick-freeze design.
+
+The companion of a campaign is a campaign of its own, whose cases come in blocks (`statistics.pick_freeze`): groups of
+inputs are exchanged between independent points of the campaign's own distributions.  A group is a dispersion, the
+dispersions that a [sensitivity.group] names or that are correlated, the cases of the run upstream, or the random draws:
+the noise made in flight and the parameters that name a draw.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mc_engine.campaign.dispersions import Dispersion
+from mc_engine.campaign.parts import Correlation, Retention, rank_pairs
+from mc_engine.campaign.reading import Findings
+from mc_engine.campaign.sections import MOST_CASES, SensitivitySection
+from mc_engine.model.fields import Parameter
+from mc_engine.model.record import Model
+from mc_engine.sampling import correlation
+from mc_engine.sampling.block_layout import RANDOM_DRAWS, BlockLayout
+from mc_engine.sampling.designs import BY_LEVELS, IN_BLOCKS, sobol_key
+from mc_engine.sampling.distributions import quantiles
+from mc_engine.sampling.sobol import MAX_DIMENSIONS, scrambled_sobol
+from mc_engine.sampling.streams import uniforms
+from mc_engine.suggestions import hint
+
+if TYPE_CHECKING:
+    from mc_engine.campaign.loading import Campaign
+
+DESIGN = "pick_freeze"
+_POINTS = ("a", "b", "c")
+_NOISE = 2**50  # where no case of a run draws its noise
+
+
+@dataclass(frozen=True)
+class SensitivityDesign:
+    """cases : base cases, one a block.  groups : dispersions by the name of their group, each in exactly one."""
+
+    cases: int
+    groups: Mapping[str, tuple[str, ...]]
+
+    @property
+    def layout(self) -> BlockLayout:
+        """How the rows of a block lie."""
+        repeated = (RANDOM_DRAWS,) if RANDOM_DRAWS in self.groups else ()
+        return BlockLayout(tuple(self.groups), repeated)
+
+    @property
+    def flights(self) -> int:
+        """How many cases the companion has."""
+        return self.cases * self.layout.size
+
+
+def check_sensitivity(
+    section: SensitivitySection | None,
+    model: Model,
+    dispersions: Sequence[Dispersion],
+    correlations: Sequence[Correlation],
+    design: str | None,
+    upstream: str | None,
+    found: Findings,
+) -> SensitivityDesign | None:
+    """The design that [sensitivity] asks for, None without one.  upstream : name of the campaign flown before."""
+    if section is None:
+        return None
+    if design in (*BY_LEVELS, *IN_BLOCKS) or (design == "table" and upstream is None):
+        found.add("", f'the design "{design}" draws nothing from distributions; [sensitivity] is for mc, lhs, sobol')
+        return None
+    problems = len(found.problems)
+    groups = dict(_groups(section, model, dispersions, correlations, found.under("group")))
+    if upstream is not None:
+        groups = {f"cases of {upstream}": (), **groups}
+    chosen = SensitivityDesign(section.cases, groups)
+    if not groups:
+        found.add("", "there is no dispersion whose contribution could be computed")
+    elif chosen.flights > MOST_CASES:
+        found.add(
+            "cases", f"{section.cases} with {len(groups)} groups are {chosen.flights} flights; at most {MOST_CASES}"
+        )
+    return chosen if len(found.problems) == problems else None
+
+
+def _groups(
+    section: SensitivitySection,
+    model: Model,
+    dispersions: Sequence[Dispersion],
+    correlations: Sequence[Correlation],
+    found: Findings,
+) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Each group with its dispersions, in the order of the file; the random draws last."""
+    names = [one.name for one in dispersions]
+    draws = [name for name in names if _names_a_draw(model, name)]
+    home = {name: name for name in names}  # the group of each dispersion
+    for group, members in section.group.items():
+        for name in members:
+            if name not in home:
+                found.add(group, f'"{name}" is not dispersed{hint(name, names)}')
+            elif name in draws:
+                found.add(group, f'"{name}" names a random draw; it is in the group "{RANDOM_DRAWS}"')
+            elif home[name] != name:
+                found.add(group, f'"{name}" is in the group "{home[name]}" already')
+            else:
+                home[name] = group
+    for one in correlations:  # inputs that are correlated have no contributions of their own
+        first, second = home[one.first], home[one.second]
+        joined = f"{first}, {second}" if first != second else first
+        home = {name: joined if group in (first, second) else group for name, group in home.items()}
+    for group in dict.fromkeys(home[name] for name in names if name not in draws):
+        yield group, tuple(name for name in names if home[name] == group)
+    if draws or model.control is not None:
+        yield RANDOM_DRAWS, tuple(draws)
+
+
+def _names_a_draw(model: Model, name: str) -> bool:
+    item = model.input(name)
+    return isinstance(item, Parameter) and item.random_draw
+
+
+def companion(campaign: "Campaign") -> "Campaign":
+    """The campaign of the flights beside `campaign`, which has a [sensitivity]."""
+    assert campaign.sensitivity is not None  # the caller looked
+    digest = sha256(f"{campaign.digest}/{DESIGN}".encode()).hexdigest()
+    retention = Retention(nominal=campaign.retention.nominal, rows=campaign.retention.rows)
+    cases = campaign.sensitivity.flights
+    return replace(campaign, design=DESIGN, cases=cases, digest=digest, retention=retention, looks=(), tuning=None)
+
+
+def sensitivity_record(campaign: "Campaign") -> dict[str, Any]:
+    """What the manifest of a companion says of its design; `cases` are those of the run that it belongs to."""
+    assert campaign.sensitivity is not None  # the caller looked
+    chosen = campaign.sensitivity
+    groups = [{"name": name, "members": list(members)} for name, members in chosen.groups.items()]
+    record = {"base_cases": chosen.cases, "groups": groups, "repeated": list(chosen.layout.repeated)}
+    return {**record, "design": campaign.design, "cases": campaign.cases}
+
+
+def _blocks(campaign: "Campaign", case_ids: np.ndarray) -> tuple[BlockLayout, np.ndarray, np.ndarray]:
+    assert campaign.sensitivity is not None  # a companion has one
+    layout = campaign.sensitivity.layout
+    block, row = np.divmod(np.asarray(case_ids, dtype=np.int64), layout.size)
+    return layout, block, row
+
+
+def companion_table(campaign: "Campaign", case_ids: np.ndarray) -> dict[str, np.ndarray]:
+    """The dispersions of cases of a companion, in declared units.  case_ids : int64[n]."""
+    layout, block, row = _blocks(campaign, case_ids)
+    assert campaign.sensitivity is not None  # a companion has one
+    names = [one.name for one in campaign.dispersions]
+    pairs = rank_pairs(campaign.correlations)
+    points = [_point(campaign, names, pairs, k, block) for k in range(len(_POINTS))]
+    table = {}
+    for place, one in enumerate(campaign.dispersions):
+        group = next(name for name, members in campaign.sensitivity.groups.items() if one.name in members)
+        u = np.choose(layout.points(group)[row], [columns[place] for columns in points])
+        assert one.distribution is not None  # of a random design
+        table[one.name] = quantiles(one.distribution, u)
+    return table
+
+
+def _point(
+    campaign: "Campaign", names: Sequence[str], pairs: tuple[tuple[str, str, float], ...], k: int, block: np.ndarray
+) -> list[np.ndarray]:
+    """Uniform numbers of the k-th point of each block, a column a dispersion, correlated as the campaign's.
+
+    A and B are one point of a scrambled Sobol' sequence of twice the dimensions; C, and what names a draw, is random.
+    """
+    columns = []
+    for place, name in enumerate(names):
+        dimension, stream = 2 * place + k, f"{name}/{DESIGN} {_POINTS[k]}"
+        if k < 2 and dimension < MAX_DIMENSIONS and not _names_a_draw(campaign.model, name):
+            columns.append(scrambled_sobol(sobol_key(f"{campaign.seed}/{stream}"), dimension, block))
+        else:
+            columns.append(uniforms(campaign.seed, stream, block))
+    members, matrix = correlation.group_matrix(names, pairs)
+    if members:
+        mixed = correlation.gaussian_copula([columns[place] for place in members], matrix)
+        for place, column in zip(members, mixed, strict=True):
+            columns[place] = column
+    return columns
+
+
+def noise_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:
+    """int64[n]: the addresses of the noise made in flight; of a run its cases, of a companion those of its points."""
+    if campaign.design != DESIGN:
+        return case_ids
+    layout, block, row = _blocks(campaign, case_ids)
+    point = layout.points(RANDOM_DRAWS)[row] if RANDOM_DRAWS in layout.groups else np.zeros_like(row)
+    return _NOISE + len(_POINTS) * block + point
+
+
+def upstream_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:
+    """int64[n]: the cases upstream that cases take their inputs from; a companion draws them with replacement."""
+    if campaign.design != DESIGN or campaign.upstream is None:
+        return case_ids
+    layout, block, row = _blocks(campaign, case_ids)
+    points = layout.points(f"cases of {campaign.upstream.name}")[row]
+    draws = [uniforms(campaign.seed, f"upstream/{DESIGN} {point}", block) for point in _POINTS]
+    return (np.choose(points, draws) * campaign.upstream.rows.n_cases).astype(np.int64)

@@ -1,0 +1,172 @@
+"""Tables next to a campaign file: the cases of the design "table", the numbers of "empirical".
+
+CSV (comma, first line the names) or Parquet.  Every fault is a sentence with file, line and column.  What is read has
+bounds, so that no file fills the memory: of its size before it is opened, of its cells while it is read.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Iterator, Sequence
+from decimal import Decimal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mc_engine.campaign.sections import LARGEST
+from mc_engine.model.files import FileFault, open_beside
+from mc_engine.numbers_in_text import is_real
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_CSV_BYTES, MOST_CSV_CELLS = 2**28, 20_000_000
+MOST_PARQUET_BYTES, MOST_PARQUET_CELLS = 2**32, 2**28
+MOST_COLUMNS = 10_000
+_MOST_LINES = 5  # named in one sentence
+_LONGEST_NAME = 60  # written out in one
+
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")  # a spreadsheet calculates a cell that begins so
+_NUMBERS = (int, float, np.number, Decimal)  # of a table that has types
+_GUARD = "'"  # which makes it text
+
+
+def read_columns(path: Path) -> dict[str, np.ndarray]:
+    """Column name -> object[n] of text (CSV) or a plain array (Parquet), in the order of the file."""
+    if path.suffix.lower() in (".parquet", ".pq"):
+        return _read_parquet(path)
+    if path.suffix.lower() not in (".csv", ".txt"):
+        raise FileFault(f'"{path.name}" ends in neither .csv nor .parquet')
+    return _read_csv(path)
+
+
+def _read_parquet(path: Path) -> dict[str, np.ndarray]:
+    from mc_engine.store.parts import parquet_table
+
+    try:
+        with open_beside(path, MOST_PARQUET_BYTES) as file:
+            table = parquet_table(file, most=MOST_PARQUET_CELLS)
+    except ValueError as error:
+        raise FileFault(f'"{path.name}" is not a Parquet file that can be read: {error}') from None
+    _check_names(path, table.column_names)
+    return {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
+
+
+def _read_csv(path: Path) -> dict[str, np.ndarray]:
+    with open_beside(path, MOST_CSV_BYTES) as binary:
+        lines = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
+        try:
+            return _columns(path, csv.reader(lines, strict=True))
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise FileFault(f'"{path.name}" is not CSV text in UTF-8: {error}') from None
+
+
+def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
+    """The columns, gathered row by row; FileFault where they are more than a table of cases may have."""
+    filled = ((line, row) for line, row in enumerate(rows, start=1) if any(cell.strip() for cell in row))
+    names = [_as_meant(cell) for cell in next(filled, (0, []))[1]]
+    if not names:
+        raise FileFault(f'"{path.name}" is empty')
+    _check_names(path, names)
+    columns: list[list[str]] = [[] for _ in names]
+    most, ragged = MOST_CSV_CELLS // len(names), []
+    for line, row in filled:
+        if len(row) != len(names):
+            ragged.append(f"line {line}: {len(row)} fields")
+        elif len(columns[0]) == most:
+            raise FileFault(f'"{path.name}" has more than {MOST_CSV_CELLS:,} cells; a Parquet file may have more')
+        for column, cell in zip(columns, row, strict=False):
+            column.append(_as_meant(cell))
+        if len(ragged) > _MOST_LINES:
+            break
+    if ragged:
+        more = " and more" if len(ragged) > _MOST_LINES else ""
+        told = ", ".join(ragged[:_MOST_LINES])
+        raise FileFault(f'"{path.name}", {told}{more} where {len(names)} columns are named')
+    return {name: np.array(column, dtype=object) for name, column in zip(names, columns, strict=True)}
+
+
+def _check_names(path: Path, names: list[str]) -> None:
+    if len(names) > MOST_COLUMNS:
+        raise FileFault(f'"{path.name}" has {len(names):,} columns; at most {MOST_COLUMNS:,} are read')
+    for name in names:
+        if not name:
+            raise FileFault(f'"{path.name}" has a column without a name in its first line')
+        if names.count(name) > 1:
+            raise FileFault(f'"{path.name}" has the column "{name}" twice')
+
+
+def csv_text(frame: "pd.DataFrame") -> str:
+    """The table as CSV; text in which a spreadsheet would find a formula is guarded by an apostrophe.
+
+    Numbers stay numbers, with all their digits.  `read_columns` takes the apostrophes away again.
+    OWASP, "CSV Injection".
+    """
+    words = {name: frame[name].map(_without_formula) for name in frame.select_dtypes(exclude=["number", "bool"])}
+    guarded = frame.assign(**words).rename(columns=_without_formula)
+    # A carriage return ends a line for a reader, though not for this writer: it must stand in quotes.
+    broken = any("\r" in str(cell) for name in words for cell in words[name])
+    quoting = csv.QUOTE_NONNUMERIC if broken else csv.QUOTE_MINIMAL
+    return str(guarded.to_csv(index=False, lineterminator="\n", quoting=quoting))
+
+
+def _without_formula(cell: Any) -> Any:
+    text = isinstance(cell, str) and (cell.startswith(_FORMULA) or _is_guarded(cell))
+    return _GUARD + cell if text else cell
+
+
+def _is_guarded(cell: str) -> bool:
+    return cell.startswith(_GUARD) and cell.lstrip(_GUARD).startswith(_FORMULA)
+
+
+def _as_meant(cell: str) -> str:
+    cell = cell.strip()
+    return cell[1:] if _is_guarded(cell) else cell
+
+
+def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
+    """float64[n]: the cells as finite numbers."""
+    values = cells.astype(np.float64) if cells.dtype.kind in "fiu" else np.array([_number(cell) for cell in cells])
+    wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
+    if wrong.size:
+        row = wrong[0]
+        what = f"is beyond {LARGEST:g}" if np.isfinite(values[row]) else "is not a finite number"
+        raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{str(cells[row])[:_LONGEST_NAME]}" {what}')
+    return values
+
+
+def _number(cell: Any) -> float:
+    """A cell as a number; NaN for one that is none."""
+    known = is_real(cell) if isinstance(cell, str) else type(cell) is not bool and isinstance(cell, _NUMBERS)
+    return float(cell) if known else math.nan
+
+
+def words(path: Path, name: str, cells: np.ndarray, choices: Sequence[str]) -> np.ndarray:
+    """object[n]: the cells, each one of `choices`."""
+    for row, cell in enumerate(cells):
+        if cell not in choices:
+            raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{cell}" is none of {", ".join(choices)}')
+    return np.array(list(cells), dtype=object)
+
+
+def switches(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
+    """bool[n]: the cells, each true or false."""
+    return words(path, name, np.array([str(cell).lower() for cell in cells], dtype=object), ("true", "false")) == "true"
+
+
+def empirical_numbers(path: Path, column: str | None) -> tuple[float, ...]:
+    """The finite numbers of one column, sorted.  A CSV file of one column may do without a name."""
+    columns = read_columns(path)
+    if column is None and len(columns) > 1:
+        raise FileFault(f'"{path.name}" has {len(columns)} columns; say which with column = "{next(iter(columns))}"')
+    name = column if column is not None else next(iter(columns))
+    if name not in columns:
+        raise FileFault(f'"{path.name}" has no column "{name}"; it has {", ".join(columns)}')
+    cells = columns[name]
+    if column is None and is_real(name):
+        cells = np.array([name, *cells], dtype=object)
+    if len(cells) == 0:
+        raise FileFault(f'"{path.name}" has no numbers below its first line')
+    return tuple(sorted(numbers(path, name, cells).tolist()))

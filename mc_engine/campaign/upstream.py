@@ -1,0 +1,220 @@
+"""The run that a campaign takes inputs from: a chain, in which the end of one flight is the start of the next.
+
+Case i of the campaign takes its inputs from case i upstream, and its row keeps all columns of that case.  A run
+directory holds a copy of what was taken, so that it can be resumed and replayed by itself.
+"""
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from mc_engine.campaign.columns import input_column
+from mc_engine.campaign.inputs import inputs_of
+from mc_engine.campaign.reading import Findings
+from mc_engine.campaign.sections import InputsSection
+from mc_engine.durable_file import read_file
+from mc_engine.errors import StoreError
+from mc_engine.model.record import Model
+from mc_engine.sampling.distributions import Scalar
+from mc_engine.shell_words import shell_word
+from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store.manifest_file import columns_in, parse_upstream
+from mc_engine.store.opening import open_store
+from mc_engine.store.parts import CASE_COLUMNS, Column, arrow_schema, arrow_table, parquet_bytes, parquet_table
+from mc_engine.store.run_files import JOURNAL, is_run_directory
+from mc_engine.suggestions import hint
+from mc_engine.units import compatible, convert
+
+COMPANION = "upstream.parquet"
+_FACTS = b"mc_engine.campaign.upstream"
+_OURS = {column.name for column in CASE_COLUMNS}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The cases of a run as they stand in its store; `facts` say which run it was."""
+
+    facts: Mapping[str, Any]
+    columns: tuple[Column, ...]
+    table: Mapping[str, np.ndarray]
+    nominal: Mapping[str, Any]
+
+    @property
+    def n_cases(self) -> int:
+        """How many cases the run has."""
+        return len(self.table["case_id"])
+
+    @cached_property
+    def content(self) -> bytes:
+        """A Parquet file of all this: what a run directory keeps, and what digests are taken of."""
+        table = arrow_table(self.columns, self.table, self.n_cases, Path(COMPANION))
+        more = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
+        return parquet_bytes(table.replace_schema_metadata({_FACTS: json.dumps(more, sort_keys=True, default=float)}))
+
+
+@dataclass(frozen=True)
+class Upstream:
+    """What a campaign takes from a run.
+
+    links : input of the model -> column that it takes its values from.  columns : what every row of the campaign
+    keeps, under names that its own columns leave free.  names : a column upstream -> its name here.
+    table : their values, and those of the linked inputs in the units of the model.  nominal : the linked inputs of
+    the nominal case.  failed : bool[n], cases that did not fly to their end.
+    """
+
+    rows: Rows
+    links: Mapping[str, str]
+    columns: tuple[Column, ...]
+    names: Mapping[str, str]
+    table: Mapping[str, np.ndarray]
+    nominal: Mapping[str, Scalar]
+    failed: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Name of the campaign that was flown."""
+        return str(self.rows.facts["name"])
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all that is taken."""
+        return sha256(self.rows.content).hexdigest()
+
+    def nominal_row(self) -> dict[str, Any]:
+        """What the row of the nominal case keeps: the nominal case upstream, and the linked inputs."""
+        names = {self.names[column.name]: column.name for column in self.rows.columns if column.name in self.names}
+        return {**{name: self.rows.nominal[column] for name, column in names.items()}, **self.nominal}
+
+    def refusals(self, case_ids: np.ndarray) -> np.ndarray:
+        """object[n]: why a case has nothing to start from, empty where it has."""
+        words = self.rows.table["status"][case_ids]
+        return np.where(self.failed[case_ids], f"its case of {self.name} ended as " + words.astype(object), "")
+
+
+def read_rows(path: Path) -> Rows:
+    """The rows of a complete run, or of the copy that a run directory keeps; StoreError if it is neither."""
+    return _rows_of_copy(path) if path.name == COMPANION else _rows_of_run(path)
+
+
+def _rows_of_run(path: Path) -> Rows:
+    store = open_store(path)
+    if store.manifest.get("shard") is not None:
+        raise StoreError(f"{path}: is a shard; `mc-engine merge` makes a run of all shards")
+    if store.missing():
+        raise StoreError(f"{path}: is not complete; `mc-engine resume {shell_word(path)}` flies the rest")
+    frame = store.cases()
+    table = {name: frame[name].to_numpy() for name in frame.columns}
+    campaign = store.manifest["campaign"]
+    facts = {key: campaign[key] for key in ("name", "title", "model", "design", "seed", "digest")}
+    facts |= {"figures": store.manifest.get("figures", []), "inputs": store.manifest.get("inputs", [])}
+    nominal = {key: value.item() if hasattr(value, "item") else value for key, value in store.nominal().items()}
+    return Rows(facts, store.columns, table, nominal)
+
+
+def _rows_of_copy(path: Path) -> Rows:
+    try:
+        table = parquet_table(read_file(path))
+        facts = parse_upstream((table.schema.metadata or {}).get(_FACTS, b"null"))
+        columns = columns_in(facts)
+        if problem := _copy_problem(table, columns, facts["nominal"]):
+            raise ValueError(problem)
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path}: no copy of an upstream run: {error}") from error
+    arrays = {name: table[name].to_numpy(zero_copy_only=False) for name in table.column_names}
+    nominal = facts["nominal"]
+    return Rows({key: facts[key] for key in facts.keys() - {"columns", "nominal"}}, columns, arrays, nominal)
+
+
+def _copy_problem(table: pa.Table, columns: tuple[Column, ...], nominal: Mapping[str, Any]) -> str:
+    """What no engine writes into a copy; empty if every column is there, of its kind, and no value is missing."""
+    if not table.schema.equals(arrow_schema(columns)) or any(one.null_count for one in table.columns):
+        return "its columns are not those that it names, or have missing values"
+    if not np.array_equal(table["case_id"].to_numpy(), np.arange(table.num_rows)):
+        return "its case_id does not count from 0"
+    if not {*pc.unique(table["status"]).to_pylist()} <= {*STATUS_NAME.values()}:
+        return "it has a status that there is not"
+    kinds = {"number": (int, float), "integer": (int,), "word": (str,), "switch": (bool,)}
+    if table.num_rows and not all(type(nominal.get(one.name)) in kinds[one.kind] for one in columns):
+        return "its nominal case has not a value of the right kind for every column"
+    return ""
+
+
+def find_run(reference: str, directory: Path) -> Path | None:
+    """The run directory that `reference` names: beside the campaign file, or from the working folder.
+
+    The campaign file of a run directory, which may come from anyone, leads to the copy in that directory alone.
+    """
+    if (directory / JOURNAL).is_file():
+        return directory / COMPANION
+    try:
+        return next((path for path in (directory / reference, Path(reference)) if is_run_directory(path)), None)
+    except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
+        return None
+
+
+def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str], found: Findings) -> Upstream:
+    """Hold the rows against the model; what does not fit is noted.
+
+    taken : names that the campaign's own table has, beside those of the inputs.
+    """
+    upstream = {column.name: column for column in rows.columns}
+    links = _links(upstream, section, model, found)
+    if rows.n_cases and rows.nominal.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]:
+        found.add("from", f"the nominal case of that run ended as {rows.nominal['status']}; choose one that flies")
+    failed = np.asarray(rows.table["status"] != STATUS_NAME[OK], dtype=bool)
+    table: dict[str, np.ndarray] = {}
+    nominal: dict[str, Scalar] = {}
+    inputs = inputs_of(model)
+    for name, column in links.items():
+        item, unit = inputs[name], upstream[column].unit
+        values = rows.table[column].astype(np.float64)
+        table[name] = np.where(failed, np.nan, convert(values, unit, item.unit))
+        nominal[name] = float(convert(float(rows.nominal[column]), unit, item.unit))
+    kept = [input_column(inputs[name]) for name in links]
+    names: dict[str, str] = {}
+    used = {*taken, *_OURS, *inputs}
+    for column_ in rows.columns:
+        if column_.name == "case_id" or links.get(column_.name) == column_.name:
+            continue
+        name = column_.name if column_.name not in used else f"{_word(rows.facts['name'])}_{column_.name}"
+        role = "dispersion" if column_.role == "dispersion" else "upstream"
+        description = f"{rows.facts['name']}: {column_.description}"
+        names[column_.name] = name
+        kept.append(Column(name, column_.unit, role, description, column_.kind))
+        table[name] = rows.table[column_.name]
+    return Upstream(rows, links, tuple(kept), names, table, nominal, failed)
+
+
+def _word(name: str) -> str:
+    return re.sub(r"\W+", "_", name)
+
+
+def _links(upstream: Mapping[str, Column], section: InputsSection, model: Model, found: Findings) -> dict[str, str]:
+    """Input -> column: those of [inputs.columns], and inputs that have the name of a result upstream."""
+    spot = found.under("columns")
+    parameters = {item.name: item for item in model.parameters}
+    results = [name for name, column in upstream.items() if column.role in ("metric", "state")]
+    links = {name: name for name in results if name in parameters}
+    for name, column in section.columns.items():
+        if name not in parameters:
+            spot.add(name, f"is not a parameter of {model.name}{hint(name, parameters)}")
+        elif column not in upstream or upstream[column].kind != "number":
+            spot.add(name, f'"{column}" is no column of numbers of that run{hint(column, results)}')
+        elif upstream[column].unit not in compatible(parameters[name].unit):
+            spot.add(name, f'"{column}" is in {upstream[column].unit}, which does not fit {parameters[name].unit}')
+        else:
+            links[name] = column
+    if not links and not section.columns:
+        found.add(
+            "", f"no result of that run has the name of a parameter of {model.name}; name them in [inputs.columns]"
+        )
+    return links

@@ -1,0 +1,270 @@
+"""What all commands of the command line share: the application, exit statuses, kinds of arguments.
+
+Exit status: 0 done, 1 a requirement is not met (`run --judge`), 2 usage or campaign file, 3 more failed cases than
+allowed (`run --max-failed`), 4 interrupted or the disk full, and resumable, 5 store damaged or busy, 6 an error that
+nobody foresaw, or too little memory: a sentence, and a log file with the traceback.
+"""
+
+import errno
+import importlib
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from copy import copy
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+from typer.core import TyperGroup
+
+from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError
+from mc_engine.interruption import INTERRUPTED, last_words, under_way
+from mc_engine.numbers_in_text import LARGEST_WHOLE, is_real, is_whole
+from mc_engine.shell_words import shell_word
+from mc_engine.store.run_folder import NO_TEXT, readable
+from mc_engine.store.urls import is_url, store_url
+from mc_engine.unforeseen import UNFORESEEN, unforeseen
+
+if TYPE_CHECKING:
+    from mc_engine.store.store import Store
+
+NOT_MET, USAGE, TOO_MANY_FAILED, DAMAGED = 1, 2, 3, 5  # and INTERRUPTED, 4
+
+
+class _Commands(TyperGroup):
+    """The commands, whose options take numbers as people write them, and no other."""
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        command = super().get_command(ctx, cmd_name)
+        for param in command.params if command is not None else ():
+            kind = copy(param.type)
+            if kind.name.startswith(("int", "float")):
+                kind.convert = partial(_converted, param.type)  # type: ignore[method-assign]
+                param.type = kind
+        return command
+
+
+def _converted(kind: Any, value: Any, param: Any, ctx: Any) -> Any:
+    whole = kind.name.startswith("int")
+    if isinstance(value, str) and not (is_whole(value) if whole else is_real(value) and isfinite(float(value))):
+        most = f" of at most {LARGEST_WHOLE:,}" if whole else ", such as 0.5 or 1e-3"
+        kind.fail(f"{value!a} is not a {'whole ' if whole else ''}number{most}", param, ctx)
+    return kind.convert(value, param, ctx)
+
+
+app = typer.Typer(
+    cls=_Commands,
+    help="Monte Carlo dispersion campaigns for spacecraft guidance, navigation and control.",
+    epilog="Exit status: 0 done, 1 a requirement not met, 2 wrong usage or campaign, 3 too many failed cases, "
+    "4 interrupted or disk full, 5 damaged or busy directory, 6 unforeseen error or too little memory.",
+    no_args_is_help=True,
+    rich_markup_mode=None,  # plain help: rich's would take twice as long to load as all else
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
+)
+
+
+def beginning(words: Iterable[str]) -> Callable[[str], list[str]]:
+    """What the shell offers of these words."""
+    return lambda incomplete: [word for word in words if word.startswith(incomplete)]
+
+
+def campaigns_beginning(incomplete: str) -> list[str]:
+    """What the shell offers for a campaign: shipped names, folders with a campaign, and .toml files."""
+    from mc_engine.campaign.search import campaign_names, campaign_paths
+
+    return [name for name in (*campaign_names(), *campaign_paths(incomplete)) if name.startswith(incomplete)]
+
+
+CampaignFile = Annotated[
+    str,
+    typer.Argument(
+        metavar="FILE_OR_NAME",
+        help="A campaign file, its folder, or a shipped name such as deorbit.",
+        autocompletion=campaigns_beginning,
+    ),
+]
+
+
+# `parser=` of an argument or option gets the text before it becomes a Path, which mangles a URL.
+def object_store(text: str) -> str:
+    try:
+        return store_url(text)
+    except EngineError as error:
+        leave(USAGE, str(error))
+
+
+def _on_disk(text: str, instead: str) -> Path:
+    if is_url(text):
+        url = object_store(text)
+        leave(USAGE, f"{url}: is a URL, and what is wanted here lies on a disk; {instead.format(shell_word(url))}")
+    if text != readable(text):
+        leave(USAGE, f"{readable(text)}: {NO_TEXT}")
+    return Path(text)
+
+
+def run_here(text: str) -> Path:
+    return _on_disk(text, "`mc-engine fetch {} DIR` makes a directory of it, and --publish keeps it up to date")
+
+
+def new_folder(text: str) -> Path:
+    return _on_disk(text, "fly into a folder, and --publish {} or `mc-engine publish` keeps a copy up there")
+
+
+def new_file(text: str) -> Path:
+    return _on_disk(text, "name a file here, and copy it from there")
+
+
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="The directory of a run.", parser=run_here)]
+RunPlace = Annotated[str, typer.Argument(metavar="RUN", help="The directory of a run, or the URL of a published one.")]
+Cases = Annotated[int | None, typer.Option(min=1, help="Number of cases, in place of the file's.")]
+Workers = Annotated[
+    int | None, typer.Option(min=1, max=100_000, help="Threads or processes that fly cases; all cores by default.")
+]
+BackendName = Annotated[
+    str,
+    typer.Option(
+        "--backend",
+        metavar="NAME",
+        help="Who flies: threading, loky (processes), dask (a cluster).",
+        autocompletion=beginning(("threading", "loky", "dask")),
+    ),
+]
+Scheduler = Annotated[
+    str | None, typer.Option(metavar="ADDRESS", help="With dask: a scheduler such as tcp://node1:8786.")
+]
+CaseSeconds = Annotated[
+    float | None, typer.Option(min=0.1, max=1e8, help="With loky or dask: give a case up that takes longer.")
+]
+Memory = Annotated[
+    int | None, typer.Option(min=512, max=2**30, metavar="MIB", help="With loky or dask: memory of a worker.")
+]
+Patience = Annotated[
+    float | None,
+    typer.Option(
+        min=1.0, max=1e8, metavar="S", help="With dask: give up after so long without a worker; by default 300 s."
+    ),
+]
+Publish = Annotated[
+    str | None,
+    typer.Option(metavar="URL", parser=object_store, help="Keep a copy, such as s3://bucket/x, up to date in flight."),
+]
+NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the reports out.")]
+
+
+@contextmanager
+def exit_status() -> Iterator[None]:
+    """Turn what the engine raises on purpose into its sentence on stderr and an exit status."""
+    try:
+        with under_way():
+            yield
+    except (RunInterrupted, DiskError) as error:  # a disk may have room again
+        leave(INTERRUPTED, str(error))
+    except StoreError as error:
+        leave(DAMAGED, str(error))
+    except EngineError as error:  # of the campaign, the model, or a package that is missing
+        leave(USAGE, str(error))
+    except KeyboardInterrupt:
+        leave(INTERRUPTED, last_words())
+    except OSError as error:
+        if error.errno == errno.ENOMEM:
+            leave(UNFORESEEN, unforeseen(error))
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT)
+        leave(INTERRUPTED if full else USAGE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    except (typer.Exit, typer.Abort, typer.BadParameter, SystemExit):
+        raise
+    except BaseException as error:  # a panic of a library in Rust is no Exception
+        leave(UNFORESEEN, unforeseen(error))
+
+
+def leave(status: int, message: str) -> NoReturn:
+    typer.echo(message, err=True)
+    raise typer.Exit(status) from None
+
+
+def existing_run(path: Path) -> "Store":
+    """The run in `path`; a path that never was a run is a slip of the user's, not damage."""
+    from mc_engine.store.opening import open_store
+    from mc_engine.store.run_files import is_run_directory
+
+    _refuse_unreadable(path)
+    if not is_run_directory(path):
+        leave(USAGE, f"{path}: {_no_run(path)}")
+    return open_store(path)
+
+
+def _no_run(path: Path) -> str:
+    """What is wrong with a path where a run directory is wanted, and what to do."""
+    from mc_engine.campaign.search import campaign_names
+    from mc_engine.store.run_folder import runs_in
+
+    if str(path) in campaign_names():
+        return f"is a campaign and no run; `mc-engine run {shell_word(path)}` flies it"
+    if not path.exists():
+        return "there is no such folder; `mc-engine run` makes one"
+    if runs := runs_in(path):
+        return f"is no run directory; it holds {counted(runs, 'run')}, the latest is {runs[-1]}"
+    return "is no run directory; `mc-engine run` makes one"
+
+
+def run_at(place: str) -> Path:
+    """The directory `place`; of a URL, a copy that lasts as long as this process."""
+    from mc_engine.store.object_store import local_copy
+
+    folder = local_copy(place)
+    _refuse_unreadable(folder)
+    return folder
+
+
+def _refuse_unreadable(path: Path) -> None:
+    if os.path.isdir(path) and not os.access(path, os.R_OK | os.X_OK):
+        leave(USAGE, f"{path}: is a folder that this user may not read")
+
+
+def refuse_occupied_folder(path: Path) -> None:
+    """An occupied --out is a slip of the user's; told before anything is compiled."""
+    from mc_engine.store.opening import open_store
+    from mc_engine.store.run_files import JOURNAL, RUN, is_run_directory, kind_of
+    from mc_engine.store.store import refuse_occupied
+    from mc_engine.store.writer_lock import LOCK_NAME
+
+    if (path / JOURNAL).exists() and is_run_directory(path) and open_store(path).missing():
+        resume = f"`mc-engine resume {shell_word(path)}`"
+        leave(USAGE, f"--out {path}: holds a run that is not complete; {resume} flies the rest")
+    # of a creation that was cut short, it seems, whoever makes the run knows which files it left
+    whole = (path / JOURNAL).exists() or kind_of(path) not in (None, RUN)
+    if whole or not (path / LOCK_NAME).exists():
+        try:
+            refuse_occupied(path)
+        except StoreError as error:
+            leave(USAGE, f"--out {error}")
+    if run := next((one for one in path.absolute().parents if os.path.isfile(one / JOURNAL)), None):
+        leave(USAGE, f"--out {path}: lies inside the {kind_of(run)} {run.name}; choose another folder")
+    existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
+    if not (existing.is_dir() and os.access(existing, os.W_OK)):
+        leave(USAGE, f"--out {path}: {existing} is no folder that can be written to")
+
+
+def counted(things: Any, word: str) -> str:
+    return f"{len(things)} {word}{'' if len(things) == 1 else 's'}"
+
+
+def ranges(ranges: list[tuple[int, int]]) -> str:
+    return ", ".join(f"{first} to {stop - 1}" for first, stop in ranges) or "none"
+
+
+def write_reports(path: Path, formats: tuple[str, ...], **more: Any) -> list[Path]:
+    # The engine imports nothing of the reports, so that it can be used and tested without them; only this command,
+    # which exists for the user's convenience, looks for them, and at the moment they are asked for.
+    try:
+        return importlib.import_module("reports").write_reports(path, formats=formats, **more)
+    except DiskError as error:
+        report = f"`mc-engine report {shell_word(path)}`"
+        raise DiskError(f"{error}; what was flown is safe, {report} writes the reports") from error
+
+
+def replay_picture(store: Any, case: int, history: Any) -> bytes:
+    """The case's history over nominal, envelopes and limits, in the style of the reports."""
+    return bytes(importlib.import_module("reports").replay_picture(store, case, history))

@@ -1,0 +1,190 @@
+"""The commands that fly nothing: init, check, plan, sample, list, schema."""
+
+import json
+import shutil
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from mc_engine.command_line.app import (
+    USAGE,
+    CampaignFile,
+    Cases,
+    app,
+    counted,
+    exit_status,
+    leave,
+    new_file,
+)
+from mc_engine.numbers_in_text import LEAST_SHARE
+from mc_engine.shell_words import shell_word
+
+
+@app.command()
+@exit_status()
+def init(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the new campaign is to be.", parser=new_file)],
+) -> None:
+    """Copy the smallest campaign, a model and its file, to DIR as a start for your own."""
+    from mc_engine.campaign.loading import SHIPPED
+
+    names = ("campaign.toml", "model.py")
+    for name in names:
+        if (folder / name).exists():
+            leave(USAGE, f"{folder / name}: is there already; choose another folder")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in names:
+            shutil.copyfile(SHIPPED / "minimal" / name, folder / name)
+    except OSError as error:
+        leave(USAGE, f"{error.filename or folder}: {error.strerror}")
+    named = shell_word(folder)
+    typer.echo(
+        f"{folder}: campaign.toml and model.py\nnext: `mc-engine run {named}` flies them; change them, and "
+        f"`mc-engine check {named}` says what is wrong"
+    )
+
+
+@app.command()
+@exit_status()
+def check(
+    file: CampaignFile,
+    model: Annotated[bool, typer.Option(help="Hold the model to its contract too; flies a few cases.")] = True,
+) -> None:
+    """Report everything that is wrong with a campaign file, and with its model.
+
+    A few cases are flown in a process of their own: results must be there and be independent of the other cases in the
+    batch, and every declared dispersion, metric and event must matter.
+    """
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.flight.contract import breaches, flight_faults
+    from mc_engine.runner.flown_campaign import refuse_undeclared_data
+
+    campaign = load_campaign(file)
+    found = breaches(campaign) if model else []
+    if model and not found:
+        refuse_undeclared_data(campaign)
+        found = flight_faults(campaign, file)
+    if found:
+        leave(
+            USAGE,
+            "\n".join([f"{campaign.model_reference}: {counted(found, 'problem')}", *(f"  {one}" for one in found)]),
+        )
+    typer.echo(
+        f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}, "
+        f"{counted(campaign.dispersions, 'dispersion')}, {counted(campaign.correlations, 'correlation')}, "
+        f"{counted(campaign.requirements, 'requirement')}; valid"
+    )
+
+
+@app.command()
+@exit_status()
+def plan(
+    file: Annotated[
+        str | None, typer.Argument(metavar="[FILE_OR_NAME]", help="A campaign, for the requirements that it sets.")
+    ] = None,
+    share: Annotated[float | None, typer.Option(help="Share of cases to be demonstrated, such as 0.9973.")] = None,
+    confidence: Annotated[float | None, typer.Option(help="Confidence of the demonstration, such as 0.90.")] = None,
+    failures: Annotated[
+        int | None, typer.Option(min=0, max=1_000_000, help="Only the row for this many failures.")
+    ] = None,
+    two_sided: Annotated[
+        bool, typer.Option("--two-sided", help="Also the cases for an interval between order statistics (Wilks).")
+    ] = False,
+) -> None:
+    """How many cases demonstrate a share of success with a confidence, for 0, 1, 2, ... failures among them.
+
+    Give --share and --confidence, or a campaign whose requirements are planned for, one by one and together.
+    """
+    from mc_engine.studies.plan import ROWS
+
+    numbers = range(ROWS) if failures is None else [failures]
+    if file is not None:
+        if share is not None or confidence is not None:
+            leave(USAGE, f"{file}: says share and confidence itself; leave --share and --confidence out")
+        _plan_campaign(file, numbers, two_sided)
+        return
+    _plan_share(_probability("--share", share), _probability("--confidence", confidence), numbers, two_sided)
+
+
+def _probability(name: str, value: float | None) -> float:
+    if value is None:
+        leave(USAGE, f"{name} is missing; give --share and --confidence, or a campaign file")
+    if not LEAST_SHARE <= value <= 1.0 - LEAST_SHARE:
+        leave(USAGE, f"{name} is {value:g}; it must be above 0 and below 1 by {LEAST_SHARE:g}, such as 0.9973")
+    return value
+
+
+def _plan_campaign(file: str, failures: Sequence[int], two_sided: bool) -> None:
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.studies.plan import plan_lines
+
+    campaign = load_campaign(file)
+    if not campaign.requirements:
+        leave(USAGE, f"{file}: sets no requirement; add [requirement.NAME], or give --share and --confidence")
+    for line in plan_lines(campaign, failures, two_sided):
+        typer.echo(line)
+
+
+def _plan_share(share: float, confidence: float, failures: Sequence[int], two_sided: bool) -> None:
+    from mc_engine.studies.plan import interval_lines, plan_row, table_lines
+
+    typer.echo(f"share {share:.10g} with confidence {confidence:.10g}\n")
+    for line in table_lines([plan_row(share, confidence, one) for one in failures], share, confidence):
+        typer.echo(line)
+    for line in ["", *interval_lines(share, confidence)] if two_sided else []:
+        typer.echo(line)
+
+
+@app.command()
+@exit_status()
+def sample(
+    file: CampaignFile,
+    cases: Cases = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the whole table here, .parquet or .csv.", parser=new_file),
+    ] = None,
+) -> None:
+    """Draw the case table without flying it."""
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.campaign.sample_table import SUFFIXES, drawn_inputs, sample_text, write_sample
+
+    if out is not None and out.suffix not in SUFFIXES:
+        leave(USAGE, f"--out {out}: the name must end in {' or '.join(SUFFIXES)}")
+    if out is not None and not out.parent.is_dir():
+        leave(USAGE, f"--out {out}: there is no folder {out.parent}")
+    campaign = load_campaign(file, cases=cases)
+    table = drawn_inputs(campaign)
+    if out is None:
+        typer.echo(f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}\n\n{sample_text(table)}")
+    else:
+        write_sample(campaign, table, out)
+        typer.echo(f"{out}: {campaign.cases:,} cases of {campaign.name}")
+
+
+@app.command("list")
+@exit_status()
+def list_() -> None:
+    """The shipped campaigns, by the names that `run` takes, and what they are after."""
+    from mc_engine.campaign.search import list_campaigns, model_sources
+
+    campaigns, sources = list_campaigns(), model_sources()
+    width = max((len(campaign.name) for campaign in campaigns), default=0)
+    for folder, group in groupby(campaigns, key=lambda campaign: campaign.name.partition("/")[0]):
+        for campaign in group:
+            typer.echo(f"{campaign.name:<{width}}  {campaign.title}".rstrip())
+        if folder in sources:
+            typer.echo(f"{'':<{width}}  source: {sources[folder]}")
+
+
+@app.command()
+@exit_status()
+def schema() -> None:
+    """The JSON schema of campaign files, for an editor."""
+    from mc_engine.campaign.loading import schema as campaign_schema
+
+    typer.echo(json.dumps(campaign_schema(), indent=2, ensure_ascii=False))

@@ -1,0 +1,368 @@
+"""The commands that fly cases: run, resume, extend, rerun, merge, replay."""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mc_engine.command_line.app import (
+    DAMAGED,
+    NOT_MET,
+    TOO_MANY_FAILED,
+    USAGE,
+    BackendName,
+    CampaignFile,
+    Cases,
+    CaseSeconds,
+    Memory,
+    NoReport,
+    Patience,
+    Publish,
+    RunFolder,
+    Scheduler,
+    Workers,
+    app,
+    existing_run,
+    exit_status,
+    leave,
+    new_folder,
+    ranges,
+    refuse_occupied_folder,
+    replay_picture,
+    run_here,
+    write_reports,
+)
+from mc_engine.command_line.next_step import after_flight, is_complete
+from mc_engine.command_line.object_stores import echo_publication
+from mc_engine.interruption import advise, heed
+from mc_engine.shell_words import shell_word
+from mc_engine.status import MOST_CASES
+
+if TYPE_CHECKING:
+    from mc_engine.runner.backends import Backend
+    from mc_engine.runner.shards import Shard
+    from mc_engine.store.store import Store
+
+
+@app.command()
+@exit_status()
+def run(
+    file: CampaignFile,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Directory of the run; by default runs/<campaign>-<time>.", parser=new_folder),
+    ] = None,
+    cases: Cases = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
+    no_report: NoReport = False,
+    workers: Workers = None,
+    backend: BackendName = "threading",
+    scheduler: Scheduler = None,
+    case_seconds: CaseSeconds = None,
+    memory: Memory = None,
+    patience: Patience = None,
+    shard: Annotated[
+        str | None, typer.Option(metavar="K/N", help="Fly the K-th of N pieces; `merge` joins the pieces.")
+    ] = None,
+    upstream: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            metavar="RUN",
+            help="Run to take inputs from, in place of the one that [inputs] names.",
+            parser=run_here,
+        ),
+    ] = None,
+    judge: Annotated[bool, typer.Option("--judge", help="Exit with 1 unless every requirement passes.")] = False,
+    max_failed: Annotated[int | None, typer.Option(min=0, help="Exit with 3 if more cases fail.")] = None,
+    publish: Publish = None,
+    until: Annotated[
+        str | None,
+        typer.Option(help='"verdict": stop when every requirement passes or fails, at the number of cases at latest.'),
+    ] = None,
+) -> None:
+    """Fly a campaign and write its reports."""
+    advise(lambda: after_flight(None))
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.store.run_folder import default_folder
+
+    if upstream is not None:
+        existing_run(upstream)
+    _refuse_publication(publish)
+    if until not in (None, "verdict"):
+        leave(USAGE, f'--until "{until}" is not known; the word is verdict')
+    _refuse_with_shard(shard, {"--until": until, "--judge": judge or None, "--out": "missing" if out is None else None})
+    campaign = load_campaign(file, cases=cases, seed=seed, upstream=upstream)
+    path = out if out is not None else default_folder(campaign.name)
+    refuse_occupied_folder(path)
+    crew = _crew(path, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
+    kept = _kept(path, publish)
+    if until is None:
+        piece = _shard(shard)
+        store = _fly(lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **crew), kept)
+    else:
+        from mc_engine.runner.stopping import fly_until_decided, refuse_undecidable
+
+        refuse_undecidable(campaign)
+        store = _fly(lambda _, note: fly_until_decided(campaign, path, progress=note, **crew), kept)
+    _finish(store, no_report, judge, max_failed, publish, file)
+
+
+def _backend(
+    name: str, scheduler: str | None, case_seconds: float | None, memory: int | None, patience: float | None
+) -> "Backend":
+    from mc_engine.runner.backends import Backend
+
+    return Backend(name, scheduler, case_seconds, memory, patience)
+
+
+def _crew(folder: Path, workers: int | None, backend: "Backend", url: str | None = None, rerun: bool = False) -> Any:
+    """The arguments of a flight that say who flies it; from here on an interruption names the command that goes on."""
+    advise(lambda: after_flight(folder, backend.options(), url, rerun))
+    return {"workers": workers, "backend": backend}
+
+
+def _shard(text: str | None) -> "Shard | None":
+    from mc_engine.runner.shards import Shard
+
+    try:
+        return None if text is None else Shard.parse(text)
+    except ValueError as error:
+        leave(USAGE, f"--shard {error}")
+
+
+def _refuse_with_shard(shard: str | None, others: dict[str, Any]) -> None:
+    if shard is None:
+        return
+    if others["--out"] is not None:
+        leave(USAGE, "--shard needs --out, a folder of each shard's own")
+    for option in ("--until", "--judge"):
+        if others[option] is not None:
+            leave(USAGE, f"--shard and {option}: a shard alone decides nothing; judge the run that `merge` makes")
+
+
+def _refuse_publication(url: str | None) -> None:
+    """A URL where nothing can be listed is told before a long flight."""
+    if url is not None:
+        from mc_engine.store.object_store import refuse_unreachable
+
+        refuse_unreachable(url)
+
+
+def _kept(path: Path, url: str | None) -> AbstractContextManager[Any]:
+    """Keeps a copy of the run in `path` up to date at `url`, where there is one to be."""
+    if url is None:
+        return nullcontext()
+    from mc_engine.store.object_store import Publisher
+
+    return Publisher(path, url)
+
+
+def _fly(fly: Callable[[Any, Any], "Store"], kept: AbstractContextManager[Any] | None = None) -> "Store":
+    from mc_engine.runner import runner
+    from mc_engine.runner.progress import Progress
+
+    with Progress() as progress, kept or nullcontext():
+        if not progress.stream.isatty():
+            typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
+        store = fly(runner, progress)
+    heed()  # a signal after the last case finds nothing more to land
+    return store
+
+
+def _finish(
+    store: "Store",
+    no_report: bool,
+    judge: bool = False,
+    max_failed: int | None = None,
+    url: str | None = None,
+    campaign: str | None = None,
+) -> None:
+    """What every flight ends with: reports, a summary, and an exit status where one was asked for."""
+    from mc_engine.runner.summary import case_line, failed_cases, first_not_finite, judgement, look_line, verdict_line
+
+    if store.manifest.get("shard"):
+        if url is not None:
+            echo_publication(store.path, url)
+        _finish_shard(store, max_failed)
+        return
+    reports = [] if no_report else write_reports(store.path, ("html", "pdf"))
+    typer.echo(f"run          {store.path}")
+    typer.echo(f"cases        {case_line(store)}")
+    if looks := look_line(store):
+        typer.echo(f"looks        {looks}")
+    judged, joint = judgement(store)
+    for verdict in (*judged, joint) if joint is not None else judged:
+        typer.echo(f"requirement  {verdict_line(verdict, store.units)}")
+    for report_path in reports:
+        typer.echo(f"report       {report_path}")
+    if url is not None:
+        echo_publication(store.path, url)
+    failed = failed_cases(store)
+    if failed == sum(store.status_counts().values()):
+        named = shell_word(campaign or store.path / "campaign.toml")
+        typer.echo(f"no case completed; `mc-engine check {named}` looks for the reason in the model", err=True)
+    elif (case := first_not_finite(store)) is not None:
+        typer.echo(f"not finite   `mc-engine replay {shell_word(store.path)} {case}` names the line of the model")
+    _judge_failures(failed, max_failed)
+    if judge and any(verdict.outcome != "pass" for verdict in judged):
+        leave(NOT_MET, "not every requirement is met")
+
+
+def _finish_shard(store: "Store", max_failed: int | None) -> None:
+    from mc_engine.runner.summary import failed_cases
+
+    counts = store.status_counts()
+    typer.echo(f"shard        {store.path}")
+    typer.echo(f"cases        {ranges(store.committed())}: " + ", ".join(f"{n:,} {word}" for word, n in counts.items()))
+    typer.echo("next         `mc-engine merge RUN SHARD...` makes one run of all shards, and its reports")
+    _judge_failures(failed_cases(store), max_failed)
+
+
+def _judge_failures(failed: int, allowed: int | None) -> None:
+    if allowed is not None and failed > allowed:
+        leave(TOO_MANY_FAILED, f"{failed} cases failed; at most {allowed} were allowed")
+
+
+@app.command()
+@exit_status()
+def resume(
+    folder: RunFolder,
+    no_report: NoReport = False,
+    workers: Workers = None,
+    backend: BackendName = "threading",
+    scheduler: Scheduler = None,
+    case_seconds: CaseSeconds = None,
+    memory: Memory = None,
+    patience: Patience = None,
+    repair: Annotated[bool, typer.Option("--repair", help="Fly again what is damaged.")] = False,
+    publish: Publish = None,
+) -> None:
+    """Complete a run that was interrupted."""
+    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
+    crew["repair"] = repair
+    _refuse_publication(publish)
+    if repair:
+        from mc_engine.store.repair import mend_journal
+
+        mend_journal(folder)
+    looks = existing_run(folder).manifest.get("looks")
+    if not repair and not looks and is_complete(folder):
+        _leave_complete(folder, publish)
+        return
+    if looks:
+        from mc_engine.runner.stopping import carry_on
+
+        store = _fly(lambda _, note: carry_on(folder, progress=note, **crew), _kept(folder, publish))
+    else:
+        store = _fly(lambda runner, note: runner.resume(folder, progress=note, **crew), _kept(folder, publish))
+    _finish(store, no_report, url=publish)
+
+
+def _leave_complete(folder: Path, url: str | None) -> None:
+    named = shell_word(folder)
+    typer.echo(
+        f"{folder}: is complete; `mc-engine extend {named} --cases N` adds cases, "
+        f"`mc-engine report {named}` writes the reports anew"
+    )
+    if url is not None:
+        echo_publication(folder, url)
+
+
+@app.command()
+@exit_status()
+def extend(
+    folder: RunFolder,
+    cases: Annotated[int, typer.Option(min=1, help="How many cases the run is to have in all.")],
+    no_report: NoReport = False,
+    workers: Workers = None,
+    backend: BackendName = "threading",
+    scheduler: Scheduler = None,
+    case_seconds: CaseSeconds = None,
+    memory: Memory = None,
+    patience: Patience = None,
+    publish: Publish = None,
+) -> None:
+    """Add cases to a run; 1000 extended to 2000 are the same as 2000 from the start."""
+    from mc_engine.sampling.designs import extension_problem
+
+    _refuse_publication(publish)
+    store = existing_run(folder)
+    if sentence := extension_problem(store.manifest, store.n_cases, cases):
+        leave(USAGE, f"{folder}: {sentence}")
+    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
+    store = _fly(lambda runner, note: runner.extend(folder, cases, progress=note, **crew), _kept(folder, publish))
+    _finish(store, no_report, url=publish)
+
+
+@app.command()
+@exit_status()
+def rerun(
+    folder: RunFolder,
+    failed: Annotated[bool, typer.Option("--failed", help="The cases that did not complete.")] = False,
+    no_report: NoReport = False,
+    workers: Workers = None,
+    backend: BackendName = "loky",
+    scheduler: Scheduler = None,
+    case_seconds: CaseSeconds = None,
+    memory: Memory = None,
+    patience: Patience = None,
+) -> None:
+    """Fly failed cases of a run again, in processes: their worker may have died of something outside."""
+    store = existing_run(folder)
+    if not failed:
+        leave(USAGE, "rerun flies only failed cases again: add --failed; the others would come out with the same bits")
+    if store.missing():
+        leave(USAGE, f"{folder}: is not complete; `mc-engine resume {shell_word(folder)}` flies the rest first")
+    if not store.status_counts().keys() - {"ok"}:
+        typer.echo(f"{folder}: no case failed; there is nothing to fly again")
+        return
+    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), rerun=True)
+    _finish(_fly(lambda runner, progress: runner.rerun(folder, progress=progress, **crew)), no_report)
+
+
+@app.command()
+@exit_status()
+def merge(
+    out: Annotated[Path, typer.Argument(metavar="RUN", help="Directory of the run to be made.", parser=new_folder)],
+    shards: Annotated[
+        list[Path], typer.Argument(metavar="SHARD...", help="Directories of `run --shard`.", parser=run_here)
+    ],
+    no_report: NoReport = False,
+    chunk: Annotated[
+        int | None, typer.Option(min=1, max=MOST_CASES, help="Cases of a part; as `run` would have it by default.")
+    ] = None,
+    workers: Workers = None,
+) -> None:
+    """Make one run of the shards of a campaign: the same table as flown by one process."""
+    for shard in shards:
+        existing_run(shard)
+    refuse_occupied_folder(out)
+    advise(lambda: after_flight(out))
+    store = _fly(lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk))
+    _finish(store, no_report)
+
+
+# so that -1 is told to be no case, and not no option
+@app.command(context_settings={"ignore_unknown_options": True})
+@exit_status()
+def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:
+    """Fly one case again, alone: compare every stored number bit for bit, and write and plot its history."""
+    store = existing_run(folder)
+    if store.missing(range(case, case + 1)):
+        leave(USAGE, f"{folder}: case {case} is not there; the run has {ranges(store.committed())}")
+    from mc_engine.runner import runner
+    from mc_engine.studies.replay_files import write_replay
+
+    flight = runner.replay(folder, case)
+    for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
+        typer.echo(str(path))
+    if flight.lost:
+        typer.echo(flight.lost)
+    if not flight.equal:
+        for difference in flight.differences:
+            typer.echo(str(difference), err=True)
+        leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")
+    typer.echo(f"case {case}: every stored number has the same bits")

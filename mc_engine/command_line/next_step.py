@@ -1,0 +1,63 @@
+"""What an interrupted command leaves its user with: where things stand, and the command that goes on from there.
+
+Read from the journal as it lies on the disk, by the light half of the engine alone: the heavy half may be what the
+signal broke off the loading of.
+"""
+
+from pathlib import Path
+
+from mc_engine.interruption import NOTHING_BEGUN
+from mc_engine.shell_words import shell_word
+
+_JOURNAL, _MANIFEST = "journal.jsonl", "manifest.json"
+_UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that only `finished` makes good
+
+
+def after_flight(run: Path | None, options: str = "", url: str | None = None, rerun: bool = False) -> str:
+    """The sentence for a flight into directory `run` (None: not chosen yet) with such options of its backend.
+
+    url : where the run is published.  rerun : the flight was of failed cases, once more.
+    """
+    if run is None or not (run / _JOURNAL).is_file():
+        return NOTHING_BEGUN
+    import json  # not for `--help`
+
+    events, manifest = _events(run), json.loads((run / _MANIFEST).read_bytes())
+    # a run that is judged on the way is complete when the verdict has come, which `resume` finds out
+    if manifest.get("looks") or not _is_finished(events):
+        command = "rerun --failed" if rerun and "rerun" in events else "resume"
+        return (
+            f"interrupted; what was committed is safe, `mc-engine {command} {shell_word(run)}{options}` flies the rest"
+        )
+    if manifest.get("shard"):
+        return f"interrupted; all cases of the shard are in {run}, `mc-engine merge RUN SHARD...` joins the shards"
+    copy = f", `mc-engine publish {shell_word(run)} {shell_word(url)}` sends them and the cases" if url else ""
+    return f"interrupted; all cases are there, `mc-engine report {shell_word(run)}` writes the reports{copy}"
+
+
+def is_complete(run: Path) -> bool:
+    """True if the run in `run` is complete, and has all files that its cases are in, and no others."""
+    from mc_engine.store.opening import open_store
+    from mc_engine.store.writer_lock import is_left_by_dead
+
+    store = open_store(run)
+    whole = _is_finished(_events(run)) and not store.missing() and not store.lost_files()
+    return whole and not is_left_by_dead(run)
+
+
+def _events(run: Path) -> list[str]:
+    from mc_engine.store.journal import scan
+
+    return [entry.event for entry in scan((run / _JOURNAL).read_bytes()).entries]
+
+
+def _is_finished(events: list[str]) -> bool:
+    last = {event: number for number, event in enumerate(events)}
+    return last.get("finished", -1) > max((last[event] for event in _UNFINISHED if event in last), default=0)
+
+
+def after_search(folder: Path | None, record: str, words: str) -> str:
+    """The sentence for a search whose result is the file `record` of `folder`.  words : what is there, if it is."""
+    if folder is None or not (folder / record).is_file():
+        return NOTHING_BEGUN
+    return f"interrupted; {words} in {folder}, `mc-engine report {shell_word(folder)}` writes the report"

@@ -1,0 +1,57 @@
+"""The reference of the command line, from the program itself."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import typer
+
+from mc_engine.command_line import app as command_line
+from mc_engine.command_line.commands import app
+from mc_engine.documentation.markdown_text import code, escaped, prose, table
+
+_HEAD = """# The command line
+
+Made from the program: `mc-engine COMMAND --help` says the same. `python -m mc_engine COMMAND` is the same program.
+"""
+
+
+def commands() -> dict[str, Any]:
+    """The commands by name, as the command line reads them."""
+    group: Any = typer.main.get_command(app)
+    return dict(group.commands)
+
+
+def page() -> str:
+    """A section per command with its arguments and options; the exit statuses first."""
+    parts = [_HEAD, prose((command_line.__doc__ or "").split("\n", 1)[1]) + "\n"]
+    for name, command in commands().items():
+        parts += _verb(name, command)
+    return "\n".join(parts)
+
+
+def _verb(name: str, command: Any) -> Iterator[str]:
+    arguments = [_value(one) for one in command.params if one.param_type_name == "argument"]
+    usage = " ".join(["mc-engine", name, *arguments, "[OPTIONS]"])
+    yield f"## {name}\n\n```text\n{usage}\n```\n\n{prose(command.help or '')}\n\n{prose(command.epilog or '')}\n"
+    rows = [(code(_names(one)), escaped(one.help or ""), _default(one)) for one in command.params]
+    yield (table(("Argument or option", "Meaning", "Default"), rows) + "\n") if rows else ""
+
+
+def _value(one: Any) -> str:
+    """The word that stands for a value; of the library's own, which differ between its versions, none is used."""
+    return str(one.metavar or one.name.upper())
+
+
+def _names(one: Any) -> str:
+    if one.param_type_name == "argument":
+        return _value(one)
+    words = ", ".join([*one.opts, *one.secondary_opts])
+    return words if one.is_flag else f"{words} {_value(one)}"
+
+
+def _default(one: Any) -> str:
+    if one.required:
+        return "required"
+    if one.default is True:
+        return code(one.opts[0])
+    return "" if one.default in (None, False, (), []) or callable(one.default) else code(str(one.default))

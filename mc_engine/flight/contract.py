@@ -1,0 +1,64 @@
+"""What a model must keep, checked without compiling: each breach a sentence with its place and the fix.
+
+`mc_engine.model.reading` reads, `mc_engine.model.trial` runs the physics at the start of the nominal case.
+`mc_engine.flight.contract_flight` goes on with what only a flight can show.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import warnings
+
+import numpy as np
+
+from mc_engine.campaign.loading import Campaign
+from mc_engine.errors import EngineError, ModelError
+from mc_engine.flight.nominal_inputs import nominal_inputs
+from mc_engine.flight.repeatability import numbers
+from mc_engine.model.faults import MORE
+from mc_engine.model.reading import is_shipped, source_faults
+from mc_engine.model.trial import run_through
+from mc_engine.safe_path import SAFE_PATH
+
+_PATIENCE = 600.0  # s, for all flights and compilation; one case has a limit of its own
+
+
+def breaches(campaign: Campaign) -> list[str]:
+    """Sentences on what is wrong with the campaign's model, as far as it shows without compiling; empty if nothing."""
+    return source_faults(campaign.model) or _trial_faults(campaign)
+
+
+def refuse_breaches(campaign: Campaign) -> None:
+    """ModelError with the first breach, before anything of a campaign is flown or written."""
+    found = _trial_faults(campaign) if is_shipped(campaign.model) else breaches(campaign)
+    if found:
+        raise ModelError(f"{found[0]}{MORE}")
+
+
+def _trial_faults(campaign: Campaign) -> list[str]:
+    try:
+        with warnings.catch_warnings(), np.errstate(all="ignore"):
+            warnings.simplefilter("ignore")
+            p, o = nominal_inputs(campaign)
+            run_through(campaign.model, p, o, campaign.seed, finite=True)
+    except EngineError as error:
+        return [str(error)]
+    return []
+
+
+def flight_faults(campaign: Campaign, file: str) -> list[str]:
+    """What `mc_engine.flight.contract_flight` finds in a process of its own, which the model may kill or hang."""
+    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, json.dumps(numbers(campaign))]
+    path = os.pathsep.join(one or os.getcwd() for one in sys.path)  # the same packages as here
+    other = {"PYTHONHASHSEED": "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0", "TZ": "UTC-14"}
+    environment = {**os.environ, **SAFE_PATH, **other, "PYTHONPATH": path}
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, env=environment)
+    except subprocess.TimeoutExpired:
+        return [f"flights of a few cases have not ended after {_PATIENCE:.0f} s; shorten the clock's `until`, look for "
+                "a loop without end, or leave them out with `mc-engine check --no-model`"]  # fmt: skip
+    if done.returncode or not done.stdout:
+        last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+        return [f"a flight of a few cases killed its process: {last}"]
+    return [str(one) for one in json.loads(done.stdout.splitlines()[-1])]

@@ -1,0 +1,276 @@
+"""What only a flight shows of a model's contract: a few cases of the campaign, flown several times over.
+
+Results must be there, must be the same again and independent of the other cases in the batch, and every declared input,
+metric and event must matter.  `python -m mc_engine.flight.contract_flight FILE` prints the sentences as JSON; `check`
+calls it as a process of its own, which a model may kill or hang.
+"""
+
+import json
+import os
+import sys
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mc_engine.campaign.cases import case_table, full_inputs, nominal_row
+from mc_engine.campaign.dispersions import Dispersion
+from mc_engine.campaign.loading import Campaign, load_campaign
+from mc_engine.errors import EngineError
+from mc_engine.flight.chunks import NOMINAL_NOISE
+from mc_engine.flight.flight import fly, grid_of
+from mc_engine.flight.lost_numbers import first_lost
+from mc_engine.flight.nominal_inputs import nominal_inputs
+from mc_engine.flight.repeatability import influences, note_environment, numbers
+from mc_engine.model.event_watch import watching_events
+from mc_engine.model.faults import MORE, fault_of
+from mc_engine.model.fields import AdaptiveStep, FixedStep
+from mc_engine.model.trial import fixed_metrics
+from mc_engine.sampling.distributions import column, quantiles
+from mc_engine.status import NOT_FINITE, OK, STATUS_NAME, STATUS_TEXT
+
+_CASES = 32
+_BLOCKS = 4  # of lanes that they fill at most
+_CUT = 5  # cases of the smaller part when they are flown in two
+# where along its distribution an input is tried: not at its edges alone, where what works evenly does the same
+_PLACES = np.array([0.05, 0.8, 0.95])
+_PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
+LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
+_ZERO = 1e-6  # of an event function's reach: a flight that stops there has reached the zero
+
+Columns = Mapping[str, np.ndarray]
+
+
+def faults(campaign: Campaign) -> list[str]:
+    """Sentences on what a flight of a few cases shows to be wrong; empty if nothing.
+
+    A flight that takes far too long ends the process, after its sentence is printed as by `main`.
+    """
+    if campaign.first is not None:
+        return []  # its inputs come from a run that is not there yet
+    ids = np.arange(min(campaign.cases, _CASES))
+    inputs = full_inputs(campaign, case_table(campaign, ids))
+    try:
+        nominal = _fly_nominal(campaign)
+        with _landing_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
+            flown = _fly(campaign, inputs, ids)
+        lost = _not_finite(campaign, inputs, ids, flown, nominal)
+        found = [*(lost or _failed(campaign, flown)), *_other_bits(campaign, inputs, ids, flown)]
+        return found or [
+            *_never_set(campaign, flown),
+            *_always_the_same(campaign, flown),
+            *_moving_nothing(campaign, inputs, ids),
+            *_never_crossing(campaign, inputs, ids),
+        ]
+    except EngineError as error:
+        return [str(error).removesuffix(MORE)]
+    except Exception as error:
+        return [fault_of(error, campaign.model_reference)]
+
+
+def _fly_nominal(campaign: Campaign) -> Columns:
+    """Fly the nominal case, after a single step of it that compiles the kernel; end the process with a sentence if it
+    does not land."""
+    clock, inputs, ids = campaign.model.clock, nominal_row(campaign), np.array([NOMINAL_NOISE])
+    one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
+    fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
+    with _landing_within(LONGEST_S, "the nominal case has", campaign):
+        return _fly(campaign, inputs, ids)
+
+
+@contextmanager
+def _landing_within(seconds: float, who: str, campaign: Campaign) -> Iterator[None]:
+    """A kernel cannot be broken off: where the block takes longer, the process ends with a sentence."""
+
+    def give_up() -> None:
+        _answer([f"{who} not landed after {seconds:.0f} s: {_length(campaign)}"])
+        os._exit(0)
+
+    timer = threading.Timer(seconds, give_up)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def _length(campaign: Campaign) -> str:
+    """What the clock allows, and what to do about a flight that takes too long."""
+    clock, (_, settings) = campaign.model.clock, nominal_inputs(campaign)
+    if isinstance(clock, FixedStep):
+        n_steps, step, _ = grid_of(clock, settings)
+        what, fix = f"{n_steps:,} steps of {step:g} s", "take longer steps, or an earlier `until`"
+    else:
+        what, fix = f"up to {clock.attempts:,} attempts", "take a larger `rtol` or fewer `attempts`"
+    stops = "; look whether its stopping event crosses zero" if campaign.model.event_list else ""
+    return f"its clock allows {what}; {fix}{stops}, or leave the flight out with `mc-engine check --no-model`"
+
+
+def _fly(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
+    return fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
+
+
+def _failed(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    """One sentence if no case at all reached its end."""
+    status = flown["status"]
+    if (status == STATUS_NAME[OK]).any():
+        return
+    words, counts = np.unique(status.astype(str), return_counts=True)
+    word = str(words[counts.argmax()])
+    text = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}[word]
+    reasons = [str(reason) for reason in flown["reason"] if reason]
+    sentence = f"none of the first {status.size} cases completes: {counts.max()} are {word}"
+    stops = [f'"{event.name}"' for event in campaign.model.event_list if event.action == "stop"]
+    if word == "no-stop":
+        text = f"no stopping event crosses zero before the time limit, of {', '.join(stops)}; look at its function, "
+        text += "its direction and the clock's `until`"
+    yield f"{sentence} ({reasons[0] if word == 'refused' and reasons else text})"
+
+
+def _not_finite(
+    campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns, nominal: Columns
+) -> list[str]:
+    """One sentence with the line of the model if a flight ended not-finite: the nominal one, or the first of these."""
+    word = STATUS_NAME[NOT_FINITE]
+    bad = np.flatnonzero(flown["status"] == word)
+    own: tuple[Mapping[str, Any], int, str] = nominal_row(campaign), NOMINAL_NOISE, "the nominal case"
+    if nominal["status"][0] != word:
+        if not bad.size:
+            return []
+        row = {name: value[bad[0]] if np.ndim(value) else value for name, value in inputs.items()}
+        own = row, int(ids[bad[0]]), f"case {ids[bad[0]]}"
+    found = first_lost(campaign.model, own[0], own[1], campaign.seed, own[2])
+    return [f"{found}; {bad.size} of the first {ids.size} cases end {word}"] if found else []
+
+
+def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
+    """One sentence if the same cases come out differently a second time, or among other cases."""
+    why = "a case must depend on its inputs and case_id alone: no global state, clock or numpy.random"
+    again = _difference(flown, _fly(campaign, inputs, ids))
+    if again is not None:
+        yield f'case {ids[again[0]]} has another "{again[1]}" when the same cases fly a second time; {why}'
+        return
+    parts = [np.arange(ids.size)[_CUT:][::-1], np.arange(ids.size)[:_CUT]]
+    for part in parts:
+        if part.size:
+            own = {name: value[part] if np.ndim(value) else value for name, value in inputs.items()}
+            alone = _difference({name: values[part] for name, values in flown.items()}, _fly(campaign, own, ids[part]))
+            if alone is not None:
+                yield (
+                    f'case {ids[part[alone[0]]]} has another "{alone[1]}" when it flies among other cases; {why}, '
+                    "and `prepare` must treat each case by itself"
+                )
+                return
+
+
+def _difference(a: Columns, b: Columns) -> tuple[int, str] | None:
+    """Place and column of the first number with other bits, None if there is none."""
+    for name, values in a.items():
+        same = values == b[name]
+        if values.dtype != object:
+            same |= np.isnan(values) & np.isnan(b[name])
+        if not same.all():
+            return int(np.flatnonzero(~same)[0]), name
+    return None
+
+
+def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    """Metrics without a finite number in any case that flew."""
+    ok = flown["status"] == STATUS_NAME[OK]
+    for metric in campaign.model.metrics:
+        values = flown[metric.name][ok]
+        if not metric.sometimes and not np.isfinite(values).any():
+            word = "infinite in all" if np.isinf(values).any() else "not a number in any"
+            yield (
+                f'the metric "{metric.name}" is {word} of the {values.size} cases that flew; let `evaluate` '
+                "set it, or declare it with sometimes=True if it exists only with some settings"
+            )
+
+
+def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
+    """Metrics with one value in all cases that `evaluate` gives to any other flight as well.
+
+    A metric that only does not move in this campaign, such as a count that stays zero, is none of them.
+    """
+    ok = flown["status"] == STATUS_NAME[OK]
+    model = campaign.model
+    same = [one for one in model.metrics if not one.sometimes and np.unique(flown[one.name][ok]).size == 1]
+    fixed = fixed_metrics(model, *nominal_inputs(campaign)) if same else {}
+    for metric in same:
+        if metric.name in fixed:
+            value = fixed[metric.name] / metric.si_factor
+            yield (
+                f'the metric "{metric.name}" is {value:g} whatever happens; let `evaluate` work it out, leave it out, '
+                "or declare it with sometimes=True if it differs only with some settings"
+            )
+
+
+def _moving_nothing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
+    """Dispersions whose values all give the same metrics: of the nominal case and of some dispersed ones."""
+    idle = [one for one in campaign.dispersions if not _moves(campaign, one, campaign.nominal)]
+    for one in idle:
+        rows = [{k: v[i] if np.ndim(v) else v for k, v in inputs.items()} for i in range(min(_PARTNERS, ids.size))]
+        if not any(_moves(campaign, one, row) for row in rows):
+            yield f'dispersion "{one.name}" moves no metric; use it in the physics, or leave it out of the campaign'
+
+
+def _moves(campaign: Campaign, one: Dispersion, others: Mapping[str, Any]) -> bool:
+    """Whether some values of a dispersion give different results; one that has but one value does."""
+    places = _places(campaign, one)
+    if np.unique(places).size == 1:
+        return True
+    flown = _fly(campaign, {**others, one.name: places}, np.zeros(len(places), dtype=np.int64))
+    names = ["status", *(metric.name for metric in campaign.model.metrics)]
+    rows = [{name: flown[name][[i]] for name in names} for i in range(len(places))]
+    return any(_difference(rows[0], row) is not None for row in rows[1:])
+
+
+def _places(campaign: Campaign, one: Dispersion) -> np.ndarray:
+    if campaign.upstream is None and campaign.design != "table":
+        if one.levels:
+            return column(one.levels)
+        assert one.distribution is not None  # a loaded campaign has one for every random design
+        return quantiles(one.distribution, _PLACES)
+    values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[one.name]
+    return np.sort(values)[[0, 3 * values.size // 4, -1]]
+
+
+def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
+    """Events that fire in none of the cases: their functions keep one sign."""
+    model = campaign.model
+    if all(event.rare for event in model.event_list):
+        return
+    reached = fly(watching_events(model), inputs, ids, campaign.seed, folder=campaign.directory)
+    ok = reached["status"] == STATUS_NAME[OK]
+    for event in model.event_list:
+        least, most = reached[f"least_{event.name}"][ok], reached[f"most_{event.name}"][ok]
+        zero = _ZERO * np.fmax(np.abs(least), np.abs(most))
+        if not event.rare and not ((least <= zero) & (most >= -zero)).any():
+            sign = "above" if (least > 0.0).all() else "below"
+            yield (
+                f'the event "{event.name}" crosses zero in none of {ok.sum()} cases, its function stays {sign} it; '
+                "mend the function, or declare it with rare=True if it is for unusual cases"
+            )
+
+
+def main() -> None:
+    """Print the sentences on the campaign named on the command line as a JSON list.
+
+    Behind the name may stand the `numbers` of another process, as JSON.
+    """
+    note_environment()
+    campaign = load_campaign(sys.argv[1])
+    there = numbers(campaign)
+    _answer(influences(json.loads(sys.argv[2]) if sys.argv[2:] else there, there) or faults(campaign))
+
+
+def _answer(sentences: list[str]) -> None:
+    print(json.dumps(sentences), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,184 @@
+"""The engine's own loops run by Python on the Numbers of one case: the same flight, which knows what broke it.
+
+The loops are those that kernels are compiled of.  Only their intrinsics, which exist inside kernels alone, have a
+second meaning here, under the same names.
+"""
+
+import functools
+import math
+import operator
+import time
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from mc_engine.lanes.functions import TABLES, fma
+from mc_engine.lanes.number import Number, Origin, calling, number
+from mc_engine.model.fields import AdaptiveStep
+from mc_engine.model.record import Model
+
+
+class OutOfTime(Exception):
+    """The flight took longer than it may; `t` [s] is how far it came."""
+
+    def __init__(self, t: float):
+        self.t = t
+
+
+class InterpretedFlight:
+    """The loops of a model's clock, on one case.
+
+    origin : of the latest number that made a state, or an error of one, not finite.  metrics : what `evaluate` gave.
+    """
+
+    def __init__(self, model: Model, seconds: float):
+        from mc_engine.flight.kernel_parts import functions_of, settings_class
+
+        self.origin: Origin | None = None
+        self.metrics: tuple[Any, ...] = ()
+        self._end = time.monotonic() + seconds
+        self._t = 0.0
+        self._names: dict[str, dict[str, Any]] = {}
+        functions = functions_of(model, self)
+        self._functions = functions._replace(
+            **{name: self._called(name, getattr(functions, name)) for name in functions._fields[:8]}
+        )
+        self._model, self._settings = model, settings_class(model)
+
+    def kernel(self, parameters: np.ndarray, settings: np.ndarray, key: Any, cases: np.ndarray, *rest: Any) -> int:
+        """Fly the first case; arguments and results are those of the model's kernel."""
+        model, adaptive = self._model, isinstance(self._model.clock, AdaptiveStep)
+        fly = self._interpreted("adaptive_flight" if adaptive else "fixed_step")["fly"]
+        actions = [event.action for event in model.event_list]
+        inputs = (parameters, settings, key, cases)
+        common, must_stop = (model.kernel_parameters, self._settings, 1), "stop" in actions
+        if adaptive:
+            tables, (clock, atol, *out, history, spacing) = rest[:4], rest[4:]
+            order = (np.zeros(1, dtype=np.int64), *inputs, [Number(one) for one in clock], atol, must_stop)
+            return int(fly(self._functions, tables, *common, *order, out, history, spacing))
+        n_steps, h, every, *out, history, stride = rest
+        kinds = bool(actions), must_stop
+        return int(fly(self._functions, *common, *inputs, (n_steps, h, every), kinds, out, history, stride))
+
+    def _called(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any) -> Any:
+            if name not in ("initial", "start"):
+                self._t = float(arguments[0])
+            return calling(name, function, *arguments)
+
+        return call
+
+    def _interpreted(self, module: str) -> dict[str, Any]:
+        """The names of a module of loops, its compiled functions and intrinsics as Python runs them."""
+        if module not in self._names:
+            names = self._names[module] = dict(vars(import_module(f"mc_engine.lanes.{module}")))
+            for name, value in list(names.items()):
+                if isinstance(value, Dispatcher):
+                    home = value.py_func.__module__.rpartition(".")[2]
+                    names[name] = FunctionType(value.py_func.__code__, self._interpreted(home))
+                elif name in _INTRINSICS:
+                    names[name] = _INTRINSICS[name]
+            names |= {"total": self.total, "map_fields": self.map_fields}
+        return self._names[module]
+
+    def total(self, fields: Sequence[Number]) -> Number:
+        """Sum of the fields; the flight's `origin` is theirs, where it is not finite."""
+        if time.monotonic() > self._end:
+            raise OutOfTime(self._t)
+        value: Any = functools.reduce(operator.add, fields)
+        if not math.isfinite(value):
+            self.origin = value.origin
+        return value
+
+    def map_fields(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """function(a_i, b_i, ...) for every field i; the flight's `origin` is that of an event which is lost."""
+        first = next(one for one in arguments if isinstance(one, tuple))
+        rows = list(zip(*(one if isinstance(one, tuple) else [one] * len(first) for one in arguments), strict=True))
+        results = [function(*row) for row in rows]
+        if getattr(function, "__name__", "") == "is_lost":
+            self.origin = next((row[1].origin for row, lost in zip(rows, results, strict=True) if lost), self.origin)
+        return _record(type(first), results)
+
+    def counted(self, what: str, count: int) -> Callable[[Any], Any]:
+        def hand_on(fields: Any) -> Any:
+            self.metrics = fields if what == "evaluate" else ()
+            return fields
+
+        return hand_on
+
+    def picker(self, cls: Any, picks: Sequence[tuple[int, float, float]], count: Any = None) -> Callable[[Any], Any]:
+        def pick(fields: Any) -> Any:
+            values = [(-fields[i] if sign < 0 else fields[i], offset) for i, sign, offset in picks]
+            return _record(cls, [value - offset if offset else value for value, offset in values])
+
+        return pick
+
+    def directions(self, signs: Sequence[float]) -> Callable[[Any], Any]:
+        return lambda fields: _record(type(fields), [Number(sign) for sign in signs])
+
+    def any_of(self, indices: Sequence[int]) -> Callable[[Any], Any]:
+        return lambda masks: any(masks[i] for i in indices)
+
+
+def _record(cls: Any, values: Sequence[Any]) -> Any:
+    return cls(*values) if hasattr(cls, "_fields") else tuple(values)
+
+
+def _spread(value: Any, like: Any) -> Any:
+    return _record(type(value), [number(one) for one in value]) if isinstance(value, tuple) else number(value)
+
+
+def _load_scalars(cls: Any, array: np.ndarray) -> Any:
+    n = len(cls._fields) - (cls._fields[-1] == TABLES)
+    return cls(*map(Number, array[:n]), *([array[n + 2 :]] if n < len(cls._fields) else []))
+
+
+def _store(array: np.ndarray, column: int, value: Any, lane: int = 0) -> None:
+    array[..., column] = value
+
+
+def _record_row(array: np.ndarray, row: int, t: Any, fields: Any) -> None:
+    array[row] = (t, *fields)
+
+
+def _stage_sum(memory: list[Any], like: Any, first: int, last: int, columns: np.ndarray, weights: np.ndarray) -> Any:
+    sums = [Number(0.0)] * len(like)
+    for stage, weight in zip(columns[first:last], weights[first:last], strict=True):
+        sums = [fma(Number(weight), value, one) for value, one in zip(memory[stage], sums, strict=True)]
+    return _record(type(like), sums)
+
+
+_INTRINSICS: dict[str, Callable[..., Any]] = {
+    "spread": _spread,
+    "least": functools.partial(functools.reduce, lambda x, y: x if x < y else y),
+    "any_field": any,
+    "select": lambda mask, chosen, other: chosen if mask else other,
+    "add_scaled": lambda y, h, k: _record(type(y), [fma(number(h), one, to) for one, to in zip(k, y, strict=True)]),
+    "joined": lambda *tuples: sum(map(tuple, tuples), ()),
+    "first_fields": lambda fields, like: _record(type(like), fields[: len(like)]),
+    "load": lambda array, first, width: Number(array[first]),
+    "load_fields": lambda cls, array, first, width: cls(*_given(cls._fields, array[:, first])),
+    "load_scalars": _load_scalars,
+    "scalars_like": lambda like, array: _record(type(like), [Number(one) for one in array]),
+    "store": _store,
+    "store_fields": _store,
+    "store_lane": lambda array, column, value, lane: _store(array, column, value),
+    "record": _record_row,
+    "lane_holds": lambda mask, lane: mask,
+    "with_lane": lambda value, lane, one: number(one),
+    "align_stack": lambda: None,
+    "stage_memory": lambda like, count: [None] * count,
+    "put_stage": lambda memory, stage, derivative: memory.__setitem__(stage, derivative),
+    "take_stage": lambda memory, stage, like: memory[stage],
+    "stage_sum": _stage_sum,
+}
+
+
+def _given(names: Sequence[str], values: np.ndarray) -> list[Number]:
+    """The parameters of a case; one that is no number has an origin of its own, as nothing in the flight made it."""
+    return [number(value, Origin(f'"{name}" of the kernel_parameters is {value:g}') if math.isnan(value) else None)
+            for name, value in zip(names, values, strict=True)]  # fmt: skip

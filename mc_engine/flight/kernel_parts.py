@@ -1,0 +1,132 @@
+"""What a kernel needs of its model: the physics, completed by what the model leaves out, and picks of fields."""
+
+from collections import namedtuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from mc_engine.lanes import physics
+from mc_engine.lanes.functions import TABLES
+from mc_engine.model.event_watch import watching_events
+from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum
+from mc_engine.model.record import Model, NoMemory
+
+# The physics of a model, and intrinsics that pick or fill fields of tuples:
+# peaks_of, lasts_of : from the quantities, the values of which peaks and last times above zero are wanted
+# best_of, when_of : the model's extrema, from what the loop tracked;  smooth_of, kinds_of, signs_of : constants
+# states_of, metrics_of : refuse to be compiled for another number of fields than the model declares
+# stops_of, switches_of : whether an event fired that ends the case, or that calls `switch`
+Functions = namedtuple(
+    "Functions",
+    "initial start rhs control events switch observe evaluate peaks_of lasts_of best_of when_of smooth_of kinds_of "
+    "signs_of stops_of switches_of states_of metrics_of",
+)
+NoEvents = namedtuple("NoEvents", "unused")
+
+
+@physics
+def _no_start(p, o):
+    return NoMemory(0.0)
+
+
+@physics
+def _no_control(t, s, m, p, o, draws):
+    return m
+
+
+@physics
+def _no_events(t, s, m, p, o):
+    return NoEvents(1.0)
+
+
+@physics
+def _no_switch(t, s, m, p, o, hit):
+    return s, m
+
+
+class Parts(NamedTuple):
+    """What a kernel file needs from its model."""
+
+    functions: Functions
+    parameters: type
+    settings: type
+    has_events: bool
+    must_stop: bool
+
+
+def settings_class(model: Model) -> type:
+    """Named tuple of the model's settings, by symbol, with its tables at the end if it has any."""
+    names = [s.symbol for s in model.settings] or ["unused"]
+    return namedtuple("Settings", [*names, TABLES] if model.tables else names)
+
+
+def parts_of(model: Model, watching: bool) -> Parts:
+    """Functions, tuple classes and flags of the model that a kernel is for; `watching` : of its events."""
+    model = watching_events(model) if watching else model
+    actions = [event.action for event in model.event_list]
+    settings = settings_class(model)
+    return Parts(functions_of(model), model.kernel_parameters, settings, bool(actions), "stop" in actions)
+
+
+def functions_of(model: Model, makers: Any = None) -> Functions:
+    """The physics of a model, and picks of its fields as `makers` makes them: intrinsics by default."""
+    from mc_engine.lanes import tuples
+
+    return Functions(
+        model.initial,
+        model.start or _no_start,
+        model.rhs,
+        model.control or _no_control,
+        model.events or _no_events,
+        model.switch or _no_switch,
+        model.observe,
+        model.evaluate,
+        *_picks(model, makers or tuples),
+    )
+
+
+def _picks(model: Model, makers: Any) -> list[Any]:
+    from mc_engine.lanes.adaptive_step import CORNER, EVENT, LAST, PEAK
+
+    names = [quantity.name for quantity in model.quantities]
+    peaks = [e for e in model.extrema if e.kind in ("max", "min")]
+    lasts = [e for e in model.extrema if e.kind == "last_above"]
+    # a model without peaks or last times tracks its first quantity instead, so that no tuple of a loop is empty
+    peak_picks = [(names.index(e.quantity), _sign(e), 0.0) for e in peaks] or [(0, 1.0, 0.0)]
+    last_picks = [(names.index(e.quantity), 1.0, e.level) for e in lasts] or [(0, 1.0, 0.0)]
+    n_events = max(1, len(model.event_list))
+    first_peak = n_events if isinstance(model.clock, AdaptiveStep) else 0
+    best_picks, best_class = _tracked(model.extrema, peaks, lasts, first_peak, first_peak + len(peak_picks))
+    smooth = [1.0 if e.smooth else 0.0 for e in peaks] or [0.0]
+    kinds = [*[EVENT] * n_events, *(PEAK if one else CORNER for one in smooth), *([LAST] * len(lasts) or [CORNER])]
+    signs = [DIRECTIONS[e.direction] for e in model.event_list] or [-1.0]
+    if isinstance(model.clock, AdaptiveStep):  # its events, peaks and last times are tracked as one
+        signs += [-1.0] * (len(kinds) - n_events)
+    actions = [event.action for event in model.event_list]
+    return [
+        makers.picker(None, peak_picks, len(names)),
+        makers.picker(None, last_picks, len(names)),
+        makers.picker(best_class, best_picks),
+        makers.picker(best_class, [(i, 1.0, 0.0) for i, _, _ in best_picks]),
+        makers.directions(smooth),
+        makers.directions(kinds),
+        makers.directions(signs),
+        makers.any_of([i for i, action in enumerate(actions) if action == "stop"]),
+        makers.any_of([i for i, action in enumerate(actions) if action == "switch"]),
+        makers.counted("initial", len(model.states)),
+        makers.counted("evaluate", len(model.metrics)),
+    ]
+
+
+def _sign(extremum: Extremum) -> float:
+    return -1.0 if extremum.kind == "min" else 1.0
+
+
+def _tracked(
+    extrema: Sequence[Extremum], peaks: list[Extremum], lasts: list[Extremum], first_peak: int, first_last: int
+) -> tuple[list[tuple[int, float, float]], type]:
+    """Place and sign of each extremum among the tracked values, and the named tuple that `evaluate` gets."""
+    place = {e.name: first_peak + i for i, e in enumerate(peaks)}
+    place |= {e.name: first_last + i for i, e in enumerate(lasts)}
+    names = [e.name for e in extrema]
+    best_class = namedtuple("Best", names or ["unused"])  # type: ignore[misc]
+    return [(place[e.name], _sign(e), 0.0) for e in extrema] or [(first_peak, 1.0, 0.0)], best_class

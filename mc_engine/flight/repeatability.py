@@ -1,0 +1,85 @@
+"""What of a model differs in another process: it depends on the clock, random numbers, hashes or the environment.
+
+`check` takes the same numbers in two processes, at two times, with other seeds for hashes and in other time zones.
+"""
+
+import inspect
+import os
+import sys
+from collections.abc import Iterator
+from hashlib import blake2b
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from mc_engine.campaign.loading import Campaign
+from mc_engine.flight.nominal_inputs import nominal_inputs
+from mc_engine.lanes.physics_function import PhysicsFunction
+from mc_engine.model.imports import PACKAGES, USER
+
+_WHY = "a case must depend on its inputs and case_id alone: no clock, random numbers, hashes or environment"
+_read: dict[str, str] = {}  # by environment variable: where the model reads it
+
+
+def numbers(campaign: Campaign) -> dict[str, str]:
+    """Digests of what the kernel of a campaign is made of, and of what its nominal case begins with, by name."""
+    model = campaign.model
+    p, o = nominal_inputs(campaign)
+    found = {f'"{name}" of the nominal case, from `prepare`,': value for name, value in zip(p._fields, p, strict=True)}
+    found |= {f"the setting `{name}`": value for name, value in zip(o._fields, o, strict=True)}
+    found |= {f"`{name}` of the clock": value for name, value in vars(model.clock).items()}
+    found |= {f"`{name}`": value for name, value in vars(model).items() if isinstance(value, PhysicsFunction)}
+    seen: set[Any] = set()
+    return {key: digest for name, value in found.items() for key, digest in _digests(name, value, seen)}
+
+
+def _digests(name: str, value: Any, seen: set[Any]) -> Iterator[tuple[str, str]]:
+    """Of all numbers and texts in a value; in a function, of those that it names outside of it."""
+    inside: dict[str, Any] = {}
+    if isinstance(value, tuple | list):
+        inside = {f"{name}[{i}]": one for i, one in enumerate(value)}
+    elif isinstance(value, np.ndarray | np.generic | int | float | str):
+        content = value.tobytes() if hasattr(value, "tobytes") else repr(value).encode()
+        yield name, blake2b(content, digest_size=8).hexdigest()
+    elif isinstance(value, PhysicsFunction | type) and value not in seen:
+        seen.add(value)
+        inside = _named(name, value)
+    for key, one in inside.items():
+        yield from _digests(key, one, seen)
+
+
+def _named(name: str, value: PhysicsFunction | type) -> dict[str, Any]:
+    if isinstance(value, type):
+        return {f"{name}.{key}": one for key, one in vars(value).items() if not key.startswith("_")}
+    function = inspect.unwrap(value.function)
+    outside = inspect.getclosurevars(function)
+    file = Path(function.__code__.co_filename).name
+    return {f"`{key}` in {file}": one for key, one in {**outside.globals, **outside.nonlocals}.items()}
+
+
+def influences(here: dict[str, str], there: dict[str, str]) -> list[str]:
+    """Sentences on numbers that differ between two processes, and on what the model reads of the environment."""
+    found = [f"{name} differs between two processes; {_WHY}" for name in here if there.get(name, "") != here[name]]
+    reads = [f'{place} reads the environment variable "{key}"; make it a setting' for key, place in _read.items()]
+    return [*reads, *found[:1]]  # what one cause changes is one mistake
+
+
+def note_environment() -> None:
+    """From now on, note what models read of the environment of this process."""
+    os.environ.__class__ = _Noting
+
+
+class _Noting(type(os.environ)):  # type: ignore[misc]
+    def __getitem__(self, key: str) -> str:
+        reader: FrameType | None = sys._getframe(1)
+        while reader is not None and reader.f_globals.get("__name__") in ("os", "collections.abc"):
+            reader = None if reader.f_code.co_name == "setdefault" else reader.f_back
+        if reader is not None and _is_model(str(reader.f_globals.get("__name__", ""))):
+            _read.setdefault(key, f"{Path(reader.f_code.co_filename).name}, line {reader.f_lineno}")
+        return str(super().__getitem__(key))
+
+
+def _is_model(module: str) -> bool:
+    return module.startswith(USER) or module.partition(".")[0] in PACKAGES.contents

@@ -1,0 +1,146 @@
+"""Errors in a model's own code as one sentence each, with the file, the line and the usual fix.
+
+Errors of physics also show the source line and end with what physics may contain: arrays of cases and the compiler
+complain in words of their own, which no user has written.
+"""
+
+import linecache
+import re
+import sysconfig
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from traceback import walk_tb
+from types import FrameType
+
+from mc_engine.errors import EngineError, ModelError
+
+MORE = "; `mc-engine check` tells more"
+PHYSICS = (
+    "write it with + - * / and comparisons, where(condition, a, b), named tuples, `for k in range(n)`, and calls of "
+    "@physics functions and of mc_engine.lanes (floor, pow, maximum, ...)"
+)
+_EACH_CASE = (
+    "Python cannot decide, count or look up by a number that differs from case to case; use where(condition, a, b), "
+    "minimum, maximum, rint or look_up of mc_engine.lanes, & and | between conditions, and loops of a fixed number"
+)
+# How NumPy and Python complain of an array of cases where they take a single number.
+_OF_ARRAYS = re.compile(
+    "truth value of an array|integer scalar arrays|interpreted as an integer|only (length-1|0-dimensional) arrays|"
+    "must be real number, not|__round__|ind(ex|ices) must be integers|used as indices|boolean index"
+)
+_ARRAY = re.compile(r"'?(numpy\.)?ndarray'?( object)?")
+_COMPILER = ("numba", "llvmlite")
+_ENGINE = Path(__file__).resolve().parents[1]
+_PYTHON = Path(sysconfig.get_path("stdlib")).resolve()
+_LONG = 60  # characters of a source line in a sentence
+
+
+@contextmanager
+def naming_faults(reference: str, what: str, more: str = MORE) -> Iterator[None]:
+    """Turn any error of the model's own code into a ModelError that says where it is and what was being done.
+
+    more : how the sentence ends.
+    """
+    try:
+        yield
+    except EngineError:
+        raise
+    except SystemExit as error:  # in a thread it would end the thread alone, which is then waited for
+        raise ModelError(f"{reference}: {what} cannot be flown: the model ends its process{more}") from error
+    except Exception as error:
+        place, cause = _place_and_cause(error)
+        text = f"{what} cannot be flown: {place}: {cause}" if place else f"{reference}: {what} cannot be flown: {cause}"
+        raise ModelError(f"{text}{more}") from error
+
+
+def fault_of(error: Exception, reference: str) -> str:
+    """The error of a model's own code in one line, with its place."""
+    place, cause = _place_and_cause(error)
+    return f"{place or reference}: {cause}"
+
+
+def fault_of_trial(error: Exception) -> str:
+    """The same, of physics that was called with arrays of cases."""
+    frame, line = frame_in_model(error)
+    text = " ".join(str(error).split())
+    if _OF_ARRAYS.search(text):
+        text = _EACH_CASE
+    elif not isinstance(error, EngineError):  # which says the fix itself
+        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}; {PHYSICS}"
+    return f"{source_place(frame.f_code.co_filename, line) if frame else 'the model'}: {text}"
+
+
+def source_place(file: str, line: int) -> str:
+    """Such as "model.py, line 12: `r = sqrt(x)`"."""
+    text = " ".join(linecache.getline(file, line).split())
+    return f"{Path(file).name}, line {line}: `{text if len(text) <= _LONG else f'{text[: _LONG - 3].rstrip()}...'}`"
+
+
+def place_in_model(error: BaseException) -> str:
+    """Such as "model.py, line 12": the last place outside the engine and the libraries that the error came through."""
+    frame, line = frame_in_model(error)
+    return f"{Path(frame.f_code.co_filename).name}, line {line}" if frame else ""
+
+
+def frame_in_model(error: BaseException) -> tuple[FrameType | None, int]:
+    """Where `place_in_model` is: the frame and the line."""
+    frames = [
+        (frame, line)
+        for frame, line in walk_tb(error.__traceback__)
+        if frame.f_code.co_filename.endswith(".py") and is_the_users(Path(frame.f_code.co_filename))
+    ]
+    return frames[-1] if frames else (None, 0)
+
+
+def is_the_users(path: Path) -> bool:
+    """Whether a source is neither the engine's nor a library's."""
+    path = path.resolve()
+    libraries = {_ENGINE, _PYTHON} & set(path.parents) or "site-packages" in path.parts
+    return not libraries and not path.name.startswith("kernel_w")
+
+
+def wrong_record(error: BaseException) -> str:
+    """What is wrong with the arguments that a record of the model, such as a Field, is made with; "" for others."""
+    call = re.match(r"(\w+)\.__(?:init|new)__\(\) (.*)", str(error))
+    if not isinstance(error, TypeError) or not call:
+        return ""
+    *_, (frame, _) = walk_tb(error.__traceback__)
+    made = (frame.f_globals | frame.f_locals).get(call[1])
+    known = [item.name for item in fields(made)] if isinstance(made, type) and is_dataclass(made) else []
+    return f"{call[1]}: {call[2]}; it takes {', '.join(known)}" if known else ""
+
+
+def relative_import(error: BaseException) -> str:
+    """What is wrong with an import that begins with a dot, in a model that is a file; "" for other errors."""
+    if not isinstance(error, ImportError) or "relative import with no known parent" not in str(error):
+        return ""
+    return "an import from a dot, which a model's file cannot have; leave the dot out, as in from guidance import ..."
+
+
+def _place_and_cause(error: Exception) -> tuple[str, str]:
+    """(place, or nothing; the error in one line)."""
+    if _of_the_compiler(error):
+        return _compiler_fault(re.sub(r"\x1b\[[0-9;]*m", "", str(error)))  # without colours
+    return place_in_model(error), " ".join(f"{type(error).__name__}: {error}".split())
+
+
+def _of_the_compiler(error: Exception) -> bool:
+    """Whether an error is the compiler's, or broke out of it on the way."""
+    *_, (frame, _) = [(None, 0), *walk_tb(error.__traceback__)]
+    if isinstance(error, OSError | MemoryError):
+        return False  # the machine's
+    broken = frame is not None and frame.f_globals.get("__name__", "").split(".")[0] in _COMPILER
+    return broken or type(error).__module__.split(".")[0] in _COMPILER
+
+
+def _compiler_fault(text: str) -> tuple[str, str]:
+    """The same, from the compiler's pages: the first line that says something, and the first place in the model."""
+    places = re.finditer(r'File "([^"]+)", line (\d+)|(?:at|from) (\S[^\n]*?\.py) \((\d+)\)', text)
+    known = ((match[1] or match[3], int(match[2] or match[4])) for match in places)
+    file, number = next((place for place in known if is_the_users(Path(place[0].replace("\\", "/")))), ("", 0))
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    telling = (line for line in lines if line and not line.startswith(("Failed in", "- Resolution failure", "File ")))
+    words = re.sub(r" at 0x\w+|(?<=\s)(?:[A-Za-z]:)?[/\\]\S*[/\\]", "", next(telling, "no reason given"))
+    return source_place(file, number) if file else "", f"kernels cannot run this ({words.rstrip(':.')}); {PHYSICS}"

@@ -1,0 +1,211 @@
+"""What a model gives the engine: its fields, its physics, its events and its clock.
+
+A `Model` is a record.  It names every number that goes in (parameters, settings) and comes out (states,
+quantities along the flight, metrics), with unit and one-line meaning, and points to the physics: plain
+functions on named tuples of numbers, marked with `mc_engine.lanes.physics`.
+
+Inside physics everything is SI and radians and a parameter loses its unit suffix (`inclination_deg` is
+`inclination`, in radians); outside, every column has the unit its field declares.
+"""
+
+import ast
+import re
+import sys
+from collections import namedtuple
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.machinery import ModuleSpec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine.errors import ModelError
+from mc_engine.model.faults import place_in_model, relative_import, wrong_record
+from mc_engine.model.fields import (
+    AdaptiveStep,
+    Event,
+    Extremum,
+    Field,
+    FixedStep,
+    Parameter,
+    Setting,
+)
+from mc_engine.model.figures import Figure
+from mc_engine.model.files import FileFault, resolve_beside
+from mc_engine.model.imports import find_unimported
+from mc_engine.model.rules import refuse_contradictions
+from mc_engine.model.sources import Sources, sources_of_file, sources_of_module
+from mc_engine.model.syntax_tree import parse
+
+NoMemory = namedtuple("NoMemory", "unused")  # of a model without `start`
+
+
+@dataclass(frozen=True)
+class Model:
+    """A flyable system.  All functions are physics (see `mc_engine.lanes`) by default.
+
+    prepare(inputs, settings, refusals) : NumPy, whole chunk.  In: SI arrays and setting codes, attributes by symbol,
+        `inputs.altitude` for altitude_km.  Out: a dictionary of SI arrays, or of numbers for all cases, by the field
+        names of `kernel_parameters`, such as {**vars(inputs), "burn_dv": dv}.  Cases that cannot start join by
+        refusals.add(mask, "why").  Default: pass on.
+        An array "tables" [n, k] goes behind the model's tables: a parameter must say where each case's begins.
+    initial(p, o) -> State
+    rhs(t, s, m, p, o) -> State of derivatives
+    control(t, s, m, p, o, draws) -> memory, at samples (t = 0 first, with m = start(p, o)'s memory)
+    start(p, o) -> the first memory
+    events(t, s, m, p, o) -> named tuple, one component per Event
+    switch(t, s, m, p, o, hit) -> (state, memory) after a "switch" event; hit has 1.0 where the event fired
+    observe(t, s, m, p, o) -> named tuple of the quantities
+    evaluate(t, s, m, p, o, best, when) -> named tuple of the metrics; best and when hold value and time of
+        each Extremum
+    tables(o) -> float64[n], NumPy: numbers that all cases of the same settings share, such as a reference path;
+        physics reads them with look_up(o.tables, place)
+    data : files that the model reads while it is imported, such as ("aero.csv", "tables/wind.csv"), named from the
+        model's own folder and inside it.  They count as its source and a run directory keeps copies of them.
+    """
+
+    name: str
+    title: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    settings: tuple[Setting, ...]
+    states: tuple[Field, ...]
+    quantities: tuple[Field, ...]
+    metrics: tuple[Field, ...]
+    clock: FixedStep | AdaptiveStep
+    kernel_parameters: type
+    initial: Callable[..., Any]
+    rhs: Callable[..., Any]
+    observe: Callable[..., Any]
+    evaluate: Callable[..., Any]
+    prepare: Callable[..., Any] | None = None
+    start: Callable[..., Any] | None = None
+    control: Callable[..., Any] | None = None
+    events: Callable[..., Any] | None = None
+    switch: Callable[..., Any] | None = None
+    event_list: tuple[Event, ...] = ()
+    extrema: tuple[Extremum, ...] = ()
+    tables: Callable[..., np.ndarray] | None = None
+    figures: tuple[Figure, ...] = ()
+    data: tuple[str, ...] = ()
+    watching: bool = False  # see mc_engine.model.event_watch
+    published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
+    reference: str = field(default="", compare=False)
+    sources: Sources | None = field(default=None, compare=False, repr=False)  # of one that `load_model` gave
+
+    def __post_init__(self) -> None:
+        refuse_contradictions(self)
+
+    def input(self, name: str) -> Parameter | Setting:
+        """The parameter or setting called `name`; KeyError if the model has none."""
+        items: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
+        for item in items:
+            if item.name == name:
+                return item
+        raise KeyError(name)
+
+
+@dataclass
+class Refusals:
+    """Cases whose inputs the model cannot start from: a mask and one sentence per refused case."""
+
+    reason: np.ndarray
+
+    @classmethod
+    def none(cls, n_cases: int) -> "Refusals":
+        return cls(np.full(n_cases, "", dtype=object))
+
+    def add(self, mask: np.ndarray, sentence: str) -> None:
+        """Refuse the cases in `mask` (bool[n_cases]) unless they were refused before."""
+        self.reason[mask & (self.reason == "")] = sentence
+
+    @property
+    def mask(self) -> np.ndarray:
+        """bool[n_cases], true where the case is refused."""
+        return self.reason != ""
+
+
+def load_model(reference: str, beside: Path | None = None) -> Model:
+    """The `MODEL` of a module ("campaigns.deorbit") or of a `.py` file beside the campaign file.
+
+    Raises ModelError with one sentence when the module, the file or its MODEL is missing or broken.
+    """
+    sources = _from_file(reference, beside) if reference.endswith(".py") else _from_module(reference)
+    model = getattr(sources.module, "MODEL", None)
+    if not isinstance(model, Model):
+        raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
+    try:
+        sources = sources.with_data(model.data)
+    except ModelError as error:
+        raise ModelError(f'"{reference}": {error}') from None
+    object.__setattr__(model, "reference", reference)
+    object.__setattr__(model, "sources", sources)
+    return model
+
+
+def sources_of(model: Model, folder: Path | None = None) -> Sources:
+    """What a model was made of.  folder : of a `.py` model that was not loaded by `load_model`."""
+    return model.sources or sources_of(load_model(model.reference, folder))
+
+
+def _from_file(reference: str, beside: Path | None) -> Sources:
+    try:
+        path = resolve_beside(beside or Path.cwd(), reference)
+    except FileFault as fault:
+        raise ModelError(str(fault)) from None
+    try:
+        return sources_of_file(path)
+    except (Exception, SystemExit) as error:
+        raise ModelError(_fault(path.name, error)) from error
+
+
+def _from_module(reference: str) -> Sources:
+    """An installed module, if it is there and its source defines MODEL: a campaign file names no other code."""
+    if not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", reference):
+        raise ModelError(f'"{reference}" is neither a module such as "campaigns.deorbit" nor a .py file')
+    if reference.split(".")[0] in sys.stdlib_module_names:
+        raise ModelError(f'"{reference}" is a module of Python itself; a file beside the campaign ends in .py')
+    spec = find_unimported(reference)
+    if spec is None:
+        raise ModelError(f'there is no module "{reference}"; a file beside the campaign ends in .py')
+    if not _defines_model(spec):
+        raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
+    try:
+        return sources_of_module(reference, Path(spec.origin or "").parent)
+    except ModuleNotFoundError as error:
+        raise ModelError(f'"{reference}" needs the package "{error.name}", which is not installed') from None
+    except (Exception, SystemExit) as error:
+        raise ModelError(_fault(reference, error)) from error
+
+
+def _defines_model(spec: ModuleSpec) -> bool:
+    """Whether the source of a module gives the name MODEL a value; true where it cannot be read, for the import to
+    say why."""
+    if not spec.has_location or spec.origin is None or not spec.origin.endswith(".py"):
+        return False
+    try:
+        tree = parse(Path(spec.origin).read_bytes())
+    except (OSError, SyntaxError, ValueError):
+        return True
+    names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    names |= {node.asname or node.name for node in ast.walk(tree) if isinstance(node, ast.alias)}
+    return "MODEL" in names
+
+
+def _fault(reference: str, error: BaseException) -> str:
+    """The error of a model's own code in a sentence with its place."""
+    place = place_in_model(error) or f'"{reference}"'
+    if isinstance(error, SyntaxError):
+        place = f"{Path(error.filename or reference).name}, line {error.lineno}"
+    if isinstance(error, SystemExit):
+        return f"{place}: ends the program; a model only defines MODEL"
+    if isinstance(error, ModelError):
+        return f"{place}: {error}"
+    if isinstance(error, FileNotFoundError):
+        name = Path(error.filename or str(error).removesuffix(" not found.")).name
+        return f'{place}: there is no file "{name}"; a model\'s data lie next to it, named in Model(data=("{name}",))'
+    if words := wrong_record(error) or relative_import(error):
+        return f"{place}: {words}"
+    text = error.msg if isinstance(error, SyntaxError) else str(error)
+    return f"{place}: {type(error).__name__}: {text}"

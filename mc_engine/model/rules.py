@@ -1,0 +1,173 @@
+"""What a model's own record must keep before it flies: names, units, words of events, numbers of the clock."""
+
+import json
+from collections.abc import Iterable
+from keyword import iskeyword
+from math import inf
+from typing import TYPE_CHECKING, Any
+
+from mc_engine.errors import ModelError
+from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Event, Extremum, Field, FixedStep, Named, Setting
+from mc_engine.model.figure_rules import refuse_false_figures
+from mc_engine.model.record_types import refuse_other_types
+from mc_engine.suggestions import hint
+from mc_engine.units import UNITS, unit_hint, unit_suffix
+
+if TYPE_CHECKING:
+    from mc_engine.model.record import Model
+
+_CASE_COLUMNS = ("case_id", "status", "reason", "end_time_s")  # the engine's own, of cases and of histories
+_HISTORY_COLUMNS = ("case_id", "t_s")
+_ACTIONS = ("stop", "switch")
+_EXTREMA = ("max", "min", "last_above")
+_MOST_ATTEMPTS = 1e9  # of a case, as there are steps on a fixed grid: minutes of one core
+_METHODS = {"FixedStep": ("rk4",), "AdaptiveStep": ("dop853", "dp54")}
+
+
+def refuse_contradictions(model: "Model") -> None:
+    """ModelError with one sentence if the model contradicts itself or names what there is not."""
+    refuse_other_types(model, "the model")
+    named: tuple[Any, ...] = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
+    for record in (*named, *model.event_list, *model.extrema):
+        refuse_other_types(record, f'{type(record).__name__} "{record.name}"')
+    refuse_other_types(model.clock, "the clock")
+    for name in ("states", "quantities", "metrics"):
+        if not getattr(model, name):
+            raise ModelError(f"`{name}` is empty; a model has one at least")
+    if not hasattr(model.kernel_parameters, "_fields"):
+        raise ModelError("kernel_parameters must be a named tuple, whose fields are the parameters' names without unit")
+    _refuse_half_letters(model)
+    inputs: tuple[Named, ...] = (*model.parameters, *model.settings)
+    for one in (*inputs, *model.states, *model.quantities, *model.metrics):
+        _refuse_name(one)
+    outputs: tuple[Field, ...] = (*model.metrics, *(Field(f"end_{one.name}", "", "") for one in model.states))
+    _refuse_taken("column", [one.name for one in (*inputs, *model.metrics)], _CASE_COLUMNS)
+    _refuse_taken("quantity", [one.name for one in model.quantities], _HISTORY_COLUMNS)
+    _refuse_twice("input", [one.symbol for one in inputs])
+    _refuse_twice("column", [one.name for one in (*inputs, *outputs)])
+    _refuse_twice("quantity", [one.name for one in model.quantities])
+    _refuse_twice("extremum", [one.name for one in model.extrema])
+    _refuse_twice("event", [one.name for one in model.event_list])
+    for setting in model.settings:
+        _refuse_choice(setting)
+    for extremum in model.extrema:
+        _refuse_extremum(extremum, [one.name for one in model.quantities])
+    if model.control is not None and model.start is None:
+        raise ModelError("the model has `control`, but no function `start`; write start(p, o), which gives the first "
+                         "memory")  # fmt: skip
+    if model.event_list and model.events is None:
+        raise ModelError("event_list names events, but the model has no function `events`")
+    for event in model.event_list:
+        _refuse_event(event, model.switch is not None)
+    refuse_false_figures(model)
+    _refuse_clock(model.clock, [one.symbol for one in model.settings], len(model.states))
+
+
+def _refuse_half_letters(model: "Model") -> None:
+    """ModelError for text that no file can hold: half of a pair of UTF-16."""
+    records = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
+    texts = [model.name, model.title, model.source, model.figures, model.published, *map(vars, records)]
+    try:
+        json.dumps(texts, ensure_ascii=False, default=str).encode()
+    except UnicodeEncodeError as error:
+        before = error.object[: error.start][-30:].rpartition('"')[2]
+        letter = error.object[error.start]
+        raise ModelError(f'a text has {letter!a} after "{before}", which is no character; leave it out') from None
+
+
+def _refuse_name(one: Named) -> None:
+    if one.unit not in UNITS:
+        raise ModelError(f'"{one.name}" has the unit "{one.unit}"{unit_hint(one.unit)}')
+    suffix = unit_suffix(one.unit)
+    if not one.name.endswith(suffix):
+        raise ModelError(f'"{one.name}" has the unit "{one.unit}", so that its name must end in "{suffix}"; '
+                         "change the name or the unit")  # fmt: skip
+    _refuse_word("name", one.symbol)
+
+
+def _refuse_choice(setting: Setting) -> None:
+    """ModelError for a setting whose own value is none of its words."""
+    if setting.choices and str(setting.default) not in setting.choices:
+        raise ModelError(f'setting "{setting.name}" has the default {setting.default!r}'
+                         f"{hint(str(setting.default), setting.choices)}")  # fmt: skip
+
+
+def _refuse_taken(what: str, names: list[str], taken: tuple[str, ...]) -> None:
+    """ModelError for a name that the engine's own columns have."""
+    for name in names:
+        if name in taken:
+            raise ModelError(f'the {what} "{name}" has the name of a column that every table has; take another')
+
+
+def _refuse_word(what: str, name: str) -> None:
+    """ModelError for a name that no field of a named tuple can have."""
+    if not name.isidentifier() or iskeyword(name) or name.startswith("_"):
+        raise ModelError(f'the {what} "{name}" is no name for a number in Python; take letters, digits and "_", '
+                         "begin with a letter, and leave out words such as lambda and class")  # fmt: skip
+
+
+def _refuse_extremum(extremum: Extremum, quantities: list[str]) -> None:
+    spot = f'extremum "{extremum.name}"'
+    _refuse_word("extremum", extremum.name)
+    if extremum.quantity not in quantities:
+        raise ModelError(f'{spot}: there is no quantity "{extremum.quantity}"{hint(extremum.quantity, quantities)}')
+    _refuse_unknown(f"{spot} has the kind", extremum.kind, _EXTREMA)
+
+
+def _refuse_event(event: Event, switches: bool) -> None:
+    spot = f'event "{event.name}"'
+    _refuse_word("event", event.name)
+    _refuse_unknown(f"{spot} has the direction", event.direction, DIRECTIONS)
+    _refuse_unknown(f"{spot} has the action", event.action, _ACTIONS)
+    if event.action == "switch" and not switches:
+        raise ModelError(f'{spot} has the action "switch", but the model has no function `switch`')
+
+
+def _refuse_unknown(what: str, word: Any, known: Iterable[str]) -> None:
+    if word not in tuple(known):
+        raise ModelError(f'{what} "{word}"{hint(str(word), known)}')
+
+
+def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], n_states: int) -> None:
+    """ModelError for numbers by which nothing can fly.  settings : symbols that a clock may name."""
+    kind = type(clock).__name__
+    _refuse_unknown("the clock has the method", clock.method, _METHODS[kind])
+    _refuse_time("until", clock.until, settings)
+    if isinstance(clock, FixedStep):
+        _refuse_time("step", clock.step, settings)
+        _refuse_time("control_every", clock.control_every, settings, least=1.0)
+        if not isinstance(clock.control_every, str) and clock.control_every % 1 != 0:
+            raise ModelError(f"the clock's `control_every` is {clock.control_every}; it counts steps, in whole numbers")
+        return
+    _refuse_time("rtol", clock.rtol, settings)
+    if not callable(clock.control_period):
+        _refuse_time("control_period", clock.control_period, settings, most=inf)
+    _refuse_time("attempts", clock.attempts, [], least=1.0, most=_MOST_ATTEMPTS)
+    _refuse_time("first_step", clock.first_step, [], least=0.0)
+    tolerances = clock.atol if isinstance(clock.atol, tuple) else (clock.atol,) * n_states
+    if len(tolerances) != n_states:
+        raise ModelError(f"the clock's `atol` has {len(tolerances)} numbers, the model {n_states} states")
+    for one in tolerances:
+        _refuse_time("atol", one, [], least=0.0)
+
+
+def _refuse_time(name: str, value: Any, settings: list[str], least: float | None = None, most: float = 1e300) -> None:
+    """ModelError unless a number of the clock is positive, or at least `least`, or the symbol of a setting."""
+    if isinstance(value, str):
+        if value not in settings:
+            known = f"{hint(value, settings)}" if settings else "; write a number without quotes"
+            raise ModelError(
+                f'the clock\'s `{name}` is "{value}", and no setting has this name without its unit{known}'
+            )
+        return
+    allowed = "above 0" if least is None else f"at least {least:g}"
+    allowed += f", and {most:,.0f} at most" if most <= _MOST_ATTEMPTS else ""
+    if not (0.0 < value <= most if least is None else least <= value <= most):
+        raise ModelError(f"the clock's `{name}` is {value!r}; it must be a number {allowed}")
+
+
+def _refuse_twice(what: str, names: list[str]) -> None:
+    """ModelError if a name occurs twice; inputs are compared by their names inside SI code, without unit."""
+    for name in names:
+        if names.count(name) > 1:
+            raise ModelError(f'two {what}s of the model are called "{name}"; give each a name of its own')

@@ -1,0 +1,167 @@
+"""The source files that decide a model's numbers: those of its package or folder, and what they import.
+
+More than the model may need; an edit of a file that it does not need costs a compilation, no wrong number.  Each file
+is read once: its content is what runs, what the digest is of, and what a run directory keeps.
+"""
+
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+from mc_engine.errors import ModelError
+from mc_engine.lanes.physics_function import PhysicsFunction
+from mc_engine.model.files import FileFault, resolve_beside
+from mc_engine.model.imports import PACKAGES, USER, CapturedLoader, importable, new_module
+from mc_engine.model.syntax_tree import data_names, imported_names
+
+_ENGINE = "mc_engine"  # its own sources are counted apart
+
+
+@dataclass(frozen=True)
+class Sources:
+    """A model's module and the files that it was made of, as they were read.
+
+    home : folder that the names of the files begin in.  folder : the model's own.  data : contents of the files that
+    Model(data=...) names, as they were before the import.
+    """
+
+    module: ModuleType
+    home: Path
+    folder: Path
+    files: Mapping[Path, bytes]
+    data: Mapping[Path, bytes]
+
+    def named(self) -> Iterator[tuple[str, bytes]]:
+        """Names, such as "lib/guidance.py", and contents in a fixed order."""
+        contents = {**self.files, **self.data}
+        for path in sorted(contents):
+            name = path.relative_to(self.home).as_posix() if path.is_relative_to(self.home) else path.name
+            yield name, contents[path]
+
+    def with_data(self, names: Sequence[str]) -> "Sources":
+        """The same with the data of the model itself; ModelError for a name that is wrong.
+
+        The model opens its data itself while it is imported.  What lay there before the import and lies there after it
+        is what the model has read.
+        """
+        try:
+            paths = {resolve_beside(self.folder, name, "the model"): name for name in names}
+        except FileFault as fault:
+            raise ModelError(f"data: {fault}") from None
+        for path, name in paths.items():
+            if path not in self.data:
+                raise ModelError(f'data: write "{name}" into the call itself, as in Model(..., data=("{name}",))')
+            if _content(path) != self.data[path]:
+                raise ModelError(f'data: "{name}" was changed while the model was loaded; begin again')
+        return replace(self, data={path: self.data[path] for path in paths})
+
+
+_OF_FILES: dict[str, Sources] = {}  # by the name of the module
+
+
+def sources_of_file(path: Path) -> Sources:
+    """Import a user's file under a name that depends on its text and data, so that an edited file is a new module.
+
+    The files and packages beside it can be imported, and count as its text.
+    """
+    files = sources_beside(path)
+    data = _data_in(path.parent, files.values())
+    texts = (f"{file}\n{len(text)}\n".encode() + text for file, text in {**files, **data}.items())
+    mark = sha256(str(path).encode() + b"".join(texts)).hexdigest()[:12]
+    name = f"{USER}{path.stem}_{mark}"
+    if name not in _OF_FILES:
+        with importable(path.parent, mark, files):
+            module = new_module(name, path, files[path])
+        _OF_FILES[name] = Sources(module, path.parent, path.parent, files, data)
+    return _OF_FILES[name]
+
+
+def _data_in(folder: Path, sources: Iterable[bytes]) -> dict[Path, bytes]:
+    """Contents of the files that calls of `Model` in these sources name as their data; those that cannot be read are
+    left out."""
+    found = {}
+    for name in sorted({name for source in sources for name in data_names(source)}):
+        with suppress(FileFault):
+            path = resolve_beside(folder, name)
+            if (content := _content(path)) is not None:
+                found[path] = content
+    return found
+
+
+def sources_beside(file: Path) -> dict[Path, bytes]:
+    """Sources of a model that is a file: all beside it, and the folders beside it that they import, whole."""
+    found = {**_contents(file.parent.glob("*.py")), file: file.read_bytes()}
+    waiting, seen = [file], set[str]()
+    while waiting:
+        for root in {name.split(".")[0] for name in imported_names(found[waiting.pop()])} - seen - {""}:
+            seen.add(root)
+            package = _contents((file.parent / root).rglob("*.py"))
+            found |= package
+            waiting += [*package, *([beside] if (beside := file.parent / f"{root}.py") in found else [])]
+    return dict(sorted(found.items()))
+
+
+def _contents(paths: Iterable[Path]) -> dict[Path, bytes]:
+    return {path: content for path in paths if (content := _content(path)) is not None}
+
+
+def _content(path: Path) -> bytes | None:
+    """None where it cannot be read: a pipe or a folder of such a name is no source."""
+    try:
+        return path.read_bytes() if path.is_file() else None
+    except OSError:
+        return None
+
+
+def sources_of_module(name: str, folder: Path) -> Sources:
+    """Import a module with its model: its folder, and what it reaches of its package or of other physics.
+
+    What a program has imported before, by itself, counts as what its files say now.
+    """
+    root = name.partition(".")[0]
+    data = _data_in(folder, _contents(folder.glob("*.py")).values())
+    with PACKAGES.loading(root):
+        module = import_module(name)
+    assert module.__file__ is not None  # a model's module always comes from a file
+    home = Path(module.__file__)
+    inside_package = home.name == "__init__.py" or "." in name
+    beside = home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py")
+    found = {path: PACKAGES.read(root, path) for path in beside if path.is_file()}
+    waiting, seen = [name], {name}
+    while waiting:
+        for reached in _imports(waiting.pop()):
+            if reached not in seen and _decides(reached, name):
+                seen.add(reached)
+                waiting.append(reached)
+                found[Path(str(sys.modules[reached].__file__))] = _source(reached)
+    base = home.parents[name.count(".") + (home.name == "__init__.py")]
+    return Sources(module, base, folder, found, data)
+
+
+def _imports(name: str) -> list[str]:
+    """Modules, by name, that a loaded one imports."""
+    module = sys.modules[name]
+    package = module.__name__ if hasattr(module, "__path__") else module.__name__.rpartition(".")[0]
+    return [one for one in imported_names(_source(name), package) if one in sys.modules]
+
+
+def _source(name: str) -> bytes:
+    """What a loaded module was made of."""
+    module = sys.modules[name]
+    loader = getattr(module, "__loader__", None)
+    if isinstance(loader, CapturedLoader):
+        return loader.content
+    return PACKAGES.read(name.partition(".")[0], Path(str(module.__file__)))
+
+
+def _decides(name: str, model: str) -> bool:
+    """Whether a module may decide the model's numbers: of the same package, or with physics in it."""
+    module, root = sys.modules[name], name.split(".")[0]
+    if root == _ENGINE or not str(getattr(module, "__file__", None)).endswith(".py"):
+        return False
+    return root == model.split(".")[0] or any(isinstance(value, PhysicsFunction) for value in vars(module).values())

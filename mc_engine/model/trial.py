@@ -1,0 +1,293 @@
+"""A model's physics run through once, interpreted, on the numbers of a few cases: what it gives must be what the model
+declares.
+
+The numbers are arrays, as the lanes will hand them over, so that what takes one number only is found here.  A kernel
+trusts the counts that the model declares: nothing is flown that has not passed.
+"""
+
+import dis
+import sys
+from collections import namedtuple
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+import numpy as np
+
+from mc_engine.errors import ModelError
+from mc_engine.lanes.functions import TABLES
+from mc_engine.lanes.number import calling
+from mc_engine.lanes.philox import Draws, noise_key
+from mc_engine.model.faults import MORE, fault_of_trial, source_place
+from mc_engine.model.origins import sentence
+from mc_engine.model.reading import is_shipped, place_of, source_faults
+from mc_engine.model.record import Model, NoMemory
+from mc_engine.suggestions import listed
+
+FEW = 3  # cases on arrays
+_MOST_ROUNDS = 1_000_000  # of the loops of one call, which a flight makes in every step
+# what the fields of each function's result are declared by
+_FIELDS = {"initial": "states", "rhs": "states", "observe": "quantities", "events": "event_list", "evaluate": "metrics"}
+_MANY = 128  # values of everything that `evaluate` is handed
+_DECADES = (-9.0, 15.0)  # powers of ten that they reach over: from nanometres to light years, in SI
+_ENGINE = str(Path(__file__).parents[1])
+_passed: set[Model] = set()
+
+
+class Breach(ModelError):
+    """One breach of the contract; its text is the sentence."""
+
+
+class _ByZero(Exception):
+    """A function divided a plain number by zero, where kernels go on with an infinity: it is left unjudged."""
+
+
+def refuse_unfit(model: Model, parameters: np.ndarray, settings: Any) -> None:
+    """ModelError with the first breach of a model that is about to be flown; asked once per model and process.
+
+    parameters : float64[n_kernel_parameters, n], SI, n > 0.  settings : see `mc_engine.flight.flight.settings_of`.
+    """
+    if model in _passed:
+        return
+    found = [] if is_shipped(model) else source_faults(model)
+    if not found:
+        first = np.repeat(parameters[:, :1], FEW, axis=1)
+        try:
+            with np.errstate(all="ignore"):
+                run_through(model, model.kernel_parameters(*first), settings)
+        except Breach as breach:
+            found = [str(breach)]
+    if found:
+        raise ModelError(f"{found[0]}{MORE}")
+    _passed.add(model)
+
+
+def run_through(model: Model, p: Any, o: Any, seed: int = 0, *, finite: bool = False) -> None:
+    """Breach at the first function that breaks, or gives other numbers than the model declares.
+
+    p : named tuple of arrays [FEW].  o : the settings.  finite : the start and its derivative must be finite, too.
+    """
+    _refuse_other_tables(model, o)
+    with suppress(_ByZero):
+        _run_through(model, p, o, seed, finite)
+
+
+def _run_through(model: Model, p: Any, o: Any, seed: int, finite: bool) -> None:
+    # as in kernels: dividing by zero gives an infinity
+    o = type(o)(*(value if name == TABLES else np.float64(value) for name, value in zip(o._fields, o, strict=True)))
+    t = np.zeros(FEW)
+    s = _call(model, "initial", p, o)
+    m = NoMemory(0.0) if model.start is None else _call(model, "start", p, o)
+    if model.control is not None:
+        sampled = _call(model, "control", t, s, m, p, o, Draws(noise_key(seed), 0.0, 0.0))
+        _same_record(model.control, "control", sampled, "start", m)
+        m = sampled
+    if finite:
+        _refuse_infinite("initial", model.initial, (p, o), s, "the state")
+    with suppress(_ByZero):
+        derivative = _call(model, "rhs", t, s, m, p, o)
+        _same_record(model.rhs, "rhs", derivative, "initial", s)
+        if finite:
+            _refuse_infinite("rhs", model.rhs, (t, s, m, p, o), derivative, "the derivative")
+    with suppress(_ByZero):
+        _try_events(model, t, s, m, p, o)
+    seen = _call(model, "observe", t, s, m, p, o)
+    best = _looks(model, seen)
+    _call(model, "evaluate", t, s, m, p, o, best, type(best)(*(np.zeros(FEW) for _ in best)))
+
+
+def _looks(model: Model, seen: Any) -> Any:
+    """What `evaluate` is handed as `best` where the quantities stay what they are.  seen : result of `observe`."""
+    best = namedtuple("Best", [one.name for one in model.extrema] or ["unused"])  # type: ignore[misc]
+    names = [quantity.name for quantity in model.quantities]
+    return best(*[seen[names.index(one.quantity)] for one in model.extrema] or [np.zeros(FEW)])
+
+
+def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
+    """Metrics, by name, in SI, that `evaluate` gives the same value whatever it is handed.
+
+    p, o : as in `run_through`, which the model has passed.  Everything that a flight or an input could change is given
+    many values of either sign, near those of the start and over all the orders of magnitude of SI; a function that
+    breaks on them is not judged.
+    """
+    spread = np.random.default_rng(0)
+
+    def many(value: Any) -> Any:
+        if hasattr(value, "_fields"):
+            return type(value)(*(many(one) for one in value))
+        signs = spread.choice([-1.0, 1.0], (2, _MANY))
+        near = signs[0] * np.exp(spread.normal(0.0, 3.0, _MANY))
+        anywhere = signs[1] * 10.0 ** spread.uniform(*_DECADES, _MANY)
+        return near * np.ravel(value)[0] + anywhere * spread.integers(0, 2, _MANY)
+
+    values = []
+    for more in (0.0, 1.0, 2.0):
+        own = type(o)(*(value if name == TABLES else value + more for name, value in zip(o._fields, o, strict=True)))
+        try:
+            with np.errstate(all="ignore"):
+                s, m = model.initial(p, o), NoMemory(0.0) if model.start is None else model.start(p, o)
+                looks = _looks(model, model.observe(np.zeros(FEW), s, m, p, o))
+                given = model.evaluate(many(1.0), many(s), many(m), many(p), own, many(looks), many(looks))
+                values.append([np.broadcast_to(np.asarray(one, dtype=np.float64), _MANY) for one in given])
+        except Exception:
+            return {}  # no finding: the functions are judged by the trial itself
+    rows = np.concatenate(values, axis=1)  # [n_metrics, 3 * _MANY]
+    return {one.name: row[0] for one, row in zip(model.metrics, rows, strict=True) if (row == row[0]).all()}
+
+
+def _try_events(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any) -> None:
+    if model.events is None:
+        return
+    values = _call(model, "events", t, s, m, p, o)
+    if model.switch is None:
+        return
+    arguments = (t, s, m, p, o, type(values)(*(np.zeros(FEW) for _ in values)))
+    result = _run(model.switch, arguments)
+    if not isinstance(result, tuple) or len(result) != 2 or hasattr(result, "_fields"):
+        raise _breach(model.switch, "switch", _shape_of(result), "state and memory, (s, m)")
+    for given, wanted, source in zip(result, (s, m), ("initial", "start"), strict=True):
+        _same_record(model.switch, "switch", given, source, wanted)
+        _refuse_other_than_numbers(model.switch, "switch", given)
+
+
+def _same_record(function: Callable[..., Any], name: str, given: Any, source: str, wanted: Any) -> None:
+    if getattr(given, "_fields", None) != wanted._fields:
+        raise _breach(function, name, _shape_of(given), f"the named tuple of `{source}`, {_shape_of(wanted)}")
+
+
+def _call(model: Model, name: str, *arguments: Any) -> Any:
+    """The result of one function of the model, a named tuple with a field for each that the model declares."""
+    function = getattr(model, name)
+    result = _run(function, arguments)
+    if not hasattr(result, "_fields"):
+        raise _breach(function, name, "nothing" if result is None else _shape_of(result), "a named tuple")
+    if name in _FIELDS:
+        records = getattr(model, _FIELDS[name])
+        names = [(record.name, getattr(record, "symbol", record.name)) for record in records]
+        _compare(function, name, result, _FIELDS[name], names)
+    _refuse_other_than_numbers(function, name, result)
+    return result
+
+
+def _run(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """What a function gives on arrays; on numbers where it negates a mask, which lanes can and arrays cannot."""
+    try:
+        with _counted_rounds():
+            try:
+                return function(*arguments)
+            except ValueError as error:
+                if not _negates(error):
+                    raise
+                return function(*(_first(one) for one in arguments))
+    except ZeroDivisionError as error:
+        raise _ByZero from error
+    except Breach:
+        raise
+    except Exception as error:
+        raise Breach(fault_of_trial(error)) from None
+
+
+@contextmanager
+def _counted_rounds() -> Iterator[None]:
+    """Breach where the loops of the model go round too often, or for ever: every line is traced."""
+    left = _MOST_ROUNDS
+    last: dict[FrameType, int] = {}  # the line that each frame was at last
+
+    def on_line(frame: FrameType, event: str, _: Any) -> Any:
+        nonlocal left
+        if event == "line":
+            left -= frame.f_lineno <= last.get(frame, 0)
+            last[frame] = frame.f_lineno
+        elif event == "return":
+            last.pop(frame, None)
+        if left < 0:
+            place = source_place(frame.f_code.co_filename, frame.f_lineno)
+            raise Breach(f"{place}: loops go round more than {_MOST_ROUNDS:,} times in one step; shorten them")
+        return on_line
+
+    def on_call(frame: FrameType, event: str, _: Any) -> Any:
+        return None if frame.f_code.co_filename.startswith(_ENGINE) else on_line
+
+    before = sys.gettrace()
+    sys.settrace(on_call)
+    try:
+        yield
+    finally:
+        sys.settrace(before)
+
+
+def _shape_of(result: Any) -> str:
+    """A record as "State(x, y)", anything else by its type."""
+    fields = getattr(result, "_fields", None)
+    return type(result).__name__ if fields is None else f"{type(result).__name__}({', '.join(fields)})"
+
+
+def _negates(error: ValueError) -> bool:
+    """Whether the error came from `not` alone: not from `if`, nor from `and` or `or`."""
+    place = error.__traceback__
+    while place is not None and place.tb_next is not None:
+        place = place.tb_next
+    if place is None or "truth value of an array" not in str(error):
+        return False
+    steps = [one for one in dis.get_instructions(place.tb_frame.f_code) if one.offset >= place.tb_lasti]
+    return next(one.opname for one in steps if one.opname != "TO_BOOL") == "UNARY_NOT"
+
+
+def _first(value: Any) -> Any:
+    """The numbers of the first case: of an array, of a named tuple of arrays, or the number itself."""
+    if hasattr(value, "_fields"):
+        return value if TABLES in value._fields else type(value)(*(_first(one) for one in value))
+    return float(value[0]) if np.ndim(value) == 1 else value
+
+
+def _compare(function: Callable[..., Any], name: str, result: Any, declared: str, named: list[tuple[str, str]]) -> None:
+    """Breach if the result has not one field for each declared one, in their order.
+
+    named : the declared names with and without their units; fields may have names of their own, but not one another's,
+    and those of events are the declared ones.
+    """
+    fields, symbols = list(result._fields), [symbol for _, symbol in named]
+    known = {*symbols}.union(full for full, _ in named if {full for full, _ in named} == {*fields})
+    pairs = zip(fields, named, strict=False)
+    in_place = all(field in pair or (field not in known and name != "events") for field, pair in pairs)
+    if len(fields) != len(named) or not in_place:
+        raise _breach(function, name, listed(fields), f"what `{declared}` declares, in its order: {listed(symbols)}")
+
+
+def _breach(function: Callable[..., Any], name: str, gives: str, wanted: str) -> Breach:
+    return Breach(f"{place_of(function)}: `{name}` gives {gives}; it must give {wanted}")
+
+
+def _refuse_other_than_numbers(function: Callable[..., Any], name: str, result: Any) -> None:
+    """Breach unless every field is one real number, or one for each case."""
+    for field, value in zip(result._fields, result, strict=True):
+        try:
+            array = np.asarray(value)
+        except ValueError:
+            array = np.asarray(None)
+        if array.dtype == bool:
+            wanted = "one that crosses zero" if name == "events" else "where(condition, 1.0, 0.0)"
+            raise _breach(function, name, f'a truth value for "{field}"', f"a number, such as {wanted}")
+        if array.dtype.kind not in "iuf" or array.shape not in ((), (FEW,)):
+            what = f"{value!r}" if array.ndim == 0 and len(repr(value)) < 40 else type(value).__name__
+            raise _breach(function, name, f'{what} for "{field}"', "one number")
+
+
+def _refuse_other_tables(model: Model, o: Any) -> None:
+    """Breach unless the tables are numbers in one row, which is not what NumPy makes of None.  o : the settings."""
+    if model.tables is not None and (o.tables.ndim != 1 or o.tables.size == 0 or np.isnan(o.tables).all()):
+        raise _breach(model.tables, "tables", f"an array of shape {o.tables.shape}", "float64[n], numbers in one row")
+
+
+def _refuse_infinite(
+    name: str, function: Callable[..., Any], arguments: tuple[Any, ...], result: Any, what: str
+) -> None:
+    for field, value in zip(result._fields, result, strict=True):
+        if not np.isfinite(value).all():
+            bad = np.ravel(value)[~np.isfinite(np.ravel(value))][0]
+            lost = getattr(calling(name, function, *(_first(one) for one in arguments)), field)
+            first = sentence(lost.origin) if getattr(lost, "origin", None) else f"{place_of(function)}: out of range"
+            raise Breach(f'{first}; so `{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal '
+                         "case; keep square roots, logarithms and divisions in range")  # fmt: skip

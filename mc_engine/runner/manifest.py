@@ -1,0 +1,130 @@
+"""The manifest of a run: all that is known before the first case flies, as plain data; and the table's columns."""
+
+from dataclasses import asdict
+from hashlib import sha256
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from mc_engine.campaign.cases import dispersion_records
+from mc_engine.campaign.columns import case_columns
+from mc_engine.campaign.inputs import inputs_of
+from mc_engine.campaign.loading import Campaign
+from mc_engine.flight.kernel import source_digest
+from mc_engine.model.fields import Named, Setting
+from mc_engine.model.figures import to_record
+from mc_engine.model.record import Model
+from mc_engine.runner.provenance import engine_version, environment
+from mc_engine.sampling.streams import SEED_CONTRACT
+from mc_engine.status import STATUS_NAME, STATUS_TEXT
+from mc_engine.store.journal import utc_now
+from mc_engine.store.parts import Column
+
+
+def sampling_digest() -> str:
+    """SHA-256 over the sources that draw the inputs of a case and hand them to its kernel."""
+    engine, digest = Path(__file__).parents[1], sha256()
+    files = [path for folder in ("sampling", "campaign") for path in (engine / folder).iterdir() if path.is_file()]
+    for path in sorted(files):
+        digest.update(f"{path.name}\n".encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def columns_of(campaign: Campaign) -> list[Column]:
+    """Columns of the case table after case_id, status and reason."""
+    taken = () if campaign.upstream is None else campaign.upstream.columns
+    return case_columns(campaign.model, campaign.dispersions, taken)
+
+
+def manifest_of(campaign: Campaign) -> dict[str, Any]:
+    """The manifest, without the columns, which the store adds."""
+    model = campaign.model
+    return {
+        "format": 1,
+        "engine": engine_version(),
+        "created_utc": utc_now(),
+        "seed_contract": SEED_CONTRACT,
+        "campaign": {
+            "name": campaign.name,
+            "title": campaign.title,
+            "model": campaign.model_reference,
+            "design": campaign.design,
+            "seed": campaign.seed,
+            "cases": campaign.cases,
+            "digest": campaign.digest,
+        },
+        "model": {
+            "name": model.name,
+            "title": model.title,
+            "source": model.source,
+            "digest": source_digest(model, campaign.directory),
+            "sampling_digest": sampling_digest(),
+        },
+        "inputs": [*_taken_inputs(campaign), *dispersion_records(campaign)],
+        **_shared_inputs(campaign),
+        "quantities": [_record(one) for one in model.quantities],
+        "ranges": _ranges(campaign.model),
+        "requirements": [asdict(one) for one in campaign.requirements],
+        "report": campaign.report.model_dump(),
+        "looks": list(campaign.looks),
+        "figures": [*(to_record(figure) for figure in model.figures), *_taken_figures(campaign)],
+        "published": [dict(record) for record in model.published],
+        "upstream": _upstream_facts(campaign),
+        "status_texts": {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()},
+        "provenance": environment(),
+    }
+
+
+def _upstream_facts(campaign: Campaign) -> dict[str, Any] | None:
+    """Which run the campaign takes its inputs from."""
+    if campaign.upstream is None:
+        return None
+    facts = {key: campaign.upstream.rows.facts[key] for key in ("name", "title", "model", "design", "seed", "digest")}
+    failed = int(campaign.upstream.failed.sum())
+    return {**facts, "cases": campaign.upstream.rows.n_cases, "failed": failed, "links": dict(campaign.upstream.links)}
+
+
+def _taken_inputs(campaign: Campaign) -> list[dict[str, Any]]:
+    """The dispersions of the run upstream, under the names that they have here, as its own manifest told them."""
+    if campaign.upstream is None:
+        return []
+    here = {column.name for column in campaign.upstream.columns}
+    name = campaign.upstream.name
+    records = [record for record in campaign.upstream.rows.facts["inputs"] if record["name"] in here]
+    return [{**record, "note": f"in the run of {name}. {record['note']}".strip()} for record in records]
+
+
+def _taken_figures(campaign: Campaign) -> list[dict[str, Any]]:
+    """Maps and scatter plots of the run upstream whose columns this table has too."""
+    if campaign.upstream is None:
+        return []
+    here = {column.name for column in columns_of(campaign)}
+    records = campaign.upstream.rows.facts["figures"]
+    drawn = [record for record in records if record["kind"] in ("map", "scatter")]
+    return [record for record in drawn if {record["x"], record["y"], record.get("metric", record["x"])} <= here]
+
+
+def _record(item: Named) -> dict[str, str]:
+    return {"name": item.name, "unit": item.unit, "description": item.description}
+
+
+def _ranges(model: Model) -> dict[str, list[float | None]]:
+    """Ends of the physical range of the metrics and quantities that have one; None for an open end."""
+    fields = [*model.quantities, *model.metrics]
+    ends = {one.name: [end if isfinite(end) else None for end in (one.low, one.high)] for one in fields}
+    return {name: pair for name, pair in ends.items() if pair != [None, None]}
+
+
+def _shared_inputs(campaign: Campaign) -> dict[str, list[dict[str, Any]]]:
+    """Parameters and settings that are the same in all cases."""
+    dispersed = {one.name for one in campaign.dispersions}
+    parameters, settings = [], []
+    for name, item in inputs_of(campaign.model).items():
+        if name in dispersed:
+            continue
+        record = {**_record(item), "value": campaign.nominal[name], "overridden": name in campaign.parameters}
+        if isinstance(item, Setting):
+            settings.append({**record, "choices": list(item.choices)})
+        else:
+            parameters.append(record)
+    return {"parameters": parameters, "settings": settings}

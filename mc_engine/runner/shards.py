@@ -1,0 +1,196 @@
+"""Shards: a campaign flown in pieces that know nothing of one another, as in the job arrays of a cluster.
+
+Shard k of n holds the k-th n-th of the cases in a run directory of its own.  Merged, the shards are the run that one
+process would have made: the same table, and with the same chunk the same part files.
+"""
+
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+
+from mc_engine.campaign.loading import Campaign
+from mc_engine.errors import StoreError
+from mc_engine.flight.chunks import chunk_size, chunks_of
+from mc_engine.runner.flown_campaign import campaign_of, companions_of
+from mc_engine.runner.manifest import columns_of, manifest_of
+from mc_engine.shell_words import shell_word
+from mc_engine.store import parts
+from mc_engine.store.opening import open_store
+from mc_engine.store.parts import Part
+from mc_engine.store.receipts import gaps
+from mc_engine.store.store import Store, create_store
+
+_MOST_COMMANDS = 100  # that a sentence names
+
+
+@dataclass(frozen=True)
+class Shard:
+    """One of `of` pieces of a campaign; `number` counts from 1."""
+
+    number: int
+    of: int
+
+    @classmethod
+    def parse(cls, text: str) -> "Shard":
+        """The shard "3/20"; ValueError with a sentence if it is none."""
+        match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text)
+        shard = cls(*map(int, match.groups())) if match else cls(0, 0)
+        if not 1 <= shard.number <= shard.of:
+            raise ValueError(f'"{text}" is no shard; the third of twenty is 3/20')
+        return shard
+
+    def cases(self, n_cases: int) -> range:
+        """Its share of so many cases, which may be none; the shards differ by one case at most."""
+        return range(n_cases * (self.number - 1) // self.of, n_cases * self.number // self.of)
+
+    def record(self, n_cases: int) -> dict[str, int]:
+        """What the manifest says of it."""
+        cases = self.cases(n_cases)
+        return {"number": self.number, "of": self.of, "first": cases.start, "stop": cases.stop}
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Cases first .. stop - 1, which stand in a part of a shard."""
+
+    store: Store
+    part: Part
+    first: int
+    stop: int
+
+    def table(self) -> pa.Table:
+        """All columns of these cases."""
+        return parts.read_part(self.store.path, self.part).slice(self.first - self.part.first, self.stop - self.first)
+
+    def between(self, first: int, stop: int) -> "Piece":
+        """What it has of the cases first .. stop - 1."""
+        return Piece(self.store, self.part, max(first, self.first), min(stop, self.stop))
+
+
+def merge_shards(out: Path, folders: Sequence[Path], chunk: int | None = None) -> tuple[Store, Campaign]:
+    """A new run directory with the cases of all shards, and its campaign; nominal and histories are yet to be flown.
+
+    folders : run directories of shards, in any order, some perhaps twice or unfinished.  chunk : cases of a part; by
+    default as many as a run on all cores of this machine would have.
+    StoreError if cases are missing, if two directories differ on a case, or if they are not of one campaign.
+    """
+    stores = [open_store(folder) for folder in folders]
+    _check_one_campaign(stores)
+    _check_nothing_missing(stores)
+    _check_parts(stores)  # before anything is made that would be in the way of the next attempt
+    pieces = list(_cover(stores))
+    campaign = campaign_of(stores[0])
+    run = create_store(out, manifest_of(campaign), campaign.text, columns_of(campaign), companions_of(campaign))
+    size = chunk or chunk_size(campaign.cases, os.cpu_count() or 1)
+    with run.lock():
+        run.note("merged", shards=len(stores), chunk=size)
+        for first, stop in chunks_of([(0, campaign.cases)], size):
+            tables = [
+                piece.between(first, stop).table() for piece in pieces if piece.first < stop and first < piece.stop
+            ]
+            table = pa.concat_tables(tables)
+            columns = {name: table[name].to_numpy() for name in table.column_names}
+            run.append(first, stop - first, columns)
+    return run, campaign
+
+
+def _check_one_campaign(stores: Sequence[Store]) -> None:
+    def identity(store: Store) -> tuple[object, ...]:
+        campaign, model = store.manifest["campaign"], store.manifest.get("model", {})
+        digests = campaign.get("digest"), model.get("digest"), model.get("sampling_digest")
+        return *digests, store.manifest.get("seed_contract"), campaign.get("seed"), store.n_cases
+
+    for store in stores:
+        if identity(store) != identity(stores[0]):
+            raise StoreError(
+                f"{store.path}: is not of the campaign of {stores[0].path}: another file, seed, number of cases, "
+                "or other sources"
+            )
+
+
+def _check_parts(stores: Sequence[Store]) -> None:
+    """StoreError that names the first part that is damaged, or is no part of these tables."""
+    for store in stores:
+        for part in store.parts:
+            parts.read_part(store.path, part, stores[0].columns)
+
+
+def _check_nothing_missing(stores: Sequence[Store]) -> None:
+    """StoreError that names the command for every range of cases that no directory holds."""
+    missing = gaps([piece for store in stores for piece in store.committed()], range(stores[0].n_cases))
+    if not missing:
+        return
+    commands = {store.path: f"mc-engine resume {shell_word(store.path)}" for store in stores if store.missing()}
+    unfinished = [_within(missing, store.wanted) for store in stores if store.missing()]
+    lines = [f"`{command}`" for command, there in zip(commands.values(), unfinished, strict=True) if there]
+    lines += _commands_of_absent(stores, missing)
+    cases = ", ".join(f"{first} to {stop - 1}" for first, stop in missing)
+    raise StoreError(f"cases {cases} are missing; fly them with " + ", ".join(lines))
+
+
+def _within(missing: Sequence[tuple[int, int]], wanted: range) -> bool:
+    return any(first < wanted.stop and wanted.start < stop for first, stop in missing)
+
+
+def _commands_of_absent(stores: Sequence[Store], missing: Sequence[tuple[int, int]]) -> list[str]:
+    """A command for each shard, of as many as the given ones say there are, that has missing cases and no folder; for
+    the first of them where they are many."""
+    records = [store.manifest.get("shard") for store in stores]
+    counts = {record["of"] for record in records if record}
+    campaign = stores[0].manifest["campaign"]
+    n_cases = stores[0].n_cases
+    commands = []
+    for of in counts:
+        there = {record["number"] for record in records if record and record["of"] == of}
+        absent = (shard for shard in _shards_of(of, missing, n_cases) if shard.number not in there)
+        commands += [
+            f"`mc-engine run {shell_word(campaign['name'])} --cases {n_cases} --seed {campaign.get('seed')} "
+            f"--shard {shard.number}/{of} --out DIR`"
+            for shard in islice(absent, _MOST_COMMANDS + 1)
+        ]
+    return [*commands[:_MOST_COMMANDS], *["and more"] * (len(commands) > _MOST_COMMANDS)]
+
+
+def _shards_of(of: int, ranges: Sequence[tuple[int, int]], n_cases: int) -> Iterator[Shard]:
+    """The shards that hold any case of the ranges, which are in order."""
+    last = 0
+    for case, stop in ranges:
+        while case < stop:
+            shard = Shard(-(-of * (case + 1) // n_cases), of)
+            if shard.number > last:
+                yield shard
+            last, case = shard.number, shard.cases(n_cases).stop
+
+
+def _cover(stores: Sequence[Store]) -> Iterator[Piece]:
+    """Pieces that hold every case once, in order; what stands twice is compared, row for row."""
+    pieces = [Piece(store, part, part.first, part.stop) for store in stores for part in store.parts]
+    kept: list[Piece] = []
+    for piece in sorted(pieces, key=lambda piece: (piece.first, -piece.stop)):
+        covered = kept[-1].stop if kept else 0
+        for before in reversed(kept):
+            if before.stop <= piece.first:
+                break
+            _check_same(before.between(piece.first, piece.stop), piece.between(before.first, before.stop))
+        if piece.stop > covered:
+            kept.append(piece.between(covered, piece.stop))
+            yield kept[-1]
+
+
+def _check_same(one: Piece, other: Piece) -> None:
+    if one.part.sha256 == other.part.sha256:
+        return
+    if parts.parquet_bytes(one.table()) != parts.parquet_bytes(other.table()):
+        differ = np.flatnonzero([a != b for a, b in zip(_rows(one), _rows(other), strict=True)])
+        where = f"{one.store.path} and {other.store.path}"
+        raise StoreError(f"{where}: differ on case {one.first + int(differ[0])}; fly one of them anew")
+
+
+def _rows(piece: Piece) -> list[str]:
+    return [repr(row) for row in piece.table().to_pylist()]

@@ -1,0 +1,171 @@
+"""What a run amounts to, in a few lines for a terminal.  The reports say the rest."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+from mc_engine.errors import StoreError
+from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
+from mc_engine.store.parts import CASE_COLUMNS, Column, Part, read_part
+from mc_engine.store.store import Store
+
+if TYPE_CHECKING:
+    import numpy as np
+    import pyarrow as pa
+
+    from mc_engine.statistics import Summary, Verdict
+    from mc_engine.statistics.streaming import Passes, Streamed
+
+PARTS_AHEAD = 2
+
+
+def failed_cases(store: Store) -> int:
+    """How many committed cases did not complete."""
+    return sum(count for word, count in store.status_counts().items() if word != STATUS_NAME[OK])
+
+
+def first_not_finite(store: Store) -> int | None:
+    """The first committed case that ended not-finite, if one did."""
+    for part in store.parts:
+        if part.status.get(STATUS_NAME[NOT_FINITE]):
+            table = read_part(store.path, part, CASE_COLUMNS[:2])
+            lost = table["status"].to_numpy(zero_copy_only=False) == STATUS_NAME[NOT_FINITE]
+            return int(table["case_id"].to_numpy()[lost][0])
+    return None
+
+
+def case_line(store: Store) -> str:
+    """Such as "9,000 of 10,000 cases: 8,998 ok, 2 no-stop"."""
+    counts = store.status_counts()
+    words = ", ".join(f"{count:,} {word}" for word, count in sorted(counts.items(), key=lambda item: -item[1]))
+    return f"{sum(counts.values()):,} of {store.n_cases:,} cases" + (f": {words}" if words else "")
+
+
+def verdicts(store: Store) -> "list[Verdict]":
+    """Every requirement of the run, judged on the cases at hand."""
+    return judgement(store)[0]
+
+
+def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":
+    """The verdicts on all requirements of the run, and the joint one where there are several."""
+    requirements = store.manifest.get("requirements", [])
+    metrics = list(dict.fromkeys(str(record["metric"]) for record in requirements))
+    found = streamed(store, metrics, requirements) if requirements else None
+    return ([], None) if found is None else (found.verdicts, found.joint)
+
+
+def look_line(store: Store) -> str:
+    """How the number of cases came about, where it was not fixed in advance; else empty."""
+    from mc_engine.statistics import was_looked_at
+
+    if not was_looked_at(store.manifest, store.n_cases):
+        return ""
+    looks = store.manifest.get("looks", [])
+    begun = store.manifest["campaign"]["cases"]
+    if looks:
+        scheduled = sum(look <= store.n_cases for look in looks)
+        times = "once" if scheduled == 1 else f"{scheduled} times"
+        story = f"judged {times} on the way, at {store.n_cases:,} cases last, of at most {looks[-1]:,}"
+    else:
+        story = f"extended from {begun:,} to {store.n_cases:,} cases"
+    return f"{story}; the verdicts hold at every number of cases at once"
+
+
+def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
+    """Such as "fuel: pass, propellant_kg ≤ 2.5 kg in 9,998 of 10,000 cases (wanted 99.73 % with 90 % confidence)"."""
+    limits = [
+        f"{sign} {limit:g} {units.get(verdict.metric, '')}".rstrip()
+        for sign, limit in (("≤", verdict.at_most), ("≥", verdict.at_least))
+        if limit is not None
+    ]
+    wanted = f"wanted {100 * verdict.share:.6g} % with {100 * verdict.confidence:.6g} % confidence"
+    inside = f"in {verdict.passed:,} of {verdict.tried:,} cases"
+    asked = f"{verdict.metric} {' and '.join(limits)}" if limits else "every limit kept"
+    return f"{verdict.name}: {verdict.outcome}, {asked} {inside} ({wanted})"
+
+
+def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":
+    """Summary of every metric, or of those named.
+
+    StoreError for a name that is no column.  A failed case has no number, whatever stands in its row.
+    """
+    known = [column.name for column in store.columns if column.role == "metric"]
+    names = known if metrics is None else list(metrics)
+    for name in names:
+        if name not in known:
+            raise StoreError(f'{store.path}: there is no metric "{name}"; there are {", ".join(known) or "none"}')
+    return streamed(store, names).summaries
+
+
+def streamed(
+    store: Store,
+    metrics: Sequence[str],
+    requirements: Sequence[Mapping[str, Any]] = (),
+    passes: "Passes | None" = None,
+    probabilities: tuple[float, ...] | None = None,
+    confidence: float = 0.90,
+) -> "Streamed":
+    """Summaries and verdicts of a run of any size: it is read part by part, never whole.
+
+    passes : gives the parts a pass; by default `metric_parts`.
+    """
+    from mc_engine.statistics import was_looked_at
+    from mc_engine.statistics.order_statistics import QUANTILES
+    from mc_engine.statistics.streaming import stream
+
+    return stream(
+        passes or (lambda names: (found for _, found in metric_parts(store, names))),
+        metrics,
+        requirements=requirements,
+        design=store.manifest["campaign"].get("design", "mc"),
+        looked=was_looked_at(store.manifest, store.n_cases),
+        probabilities=probabilities or QUANTILES,
+        confidence=confidence,
+    )
+
+
+def metric_parts(
+    store: Store, metrics: Sequence[str], more: Sequence[str] = ()
+) -> "Iterator[tuple[pa.Table, dict[str, np.ndarray]]]":
+    """All parts in order: a table of the columns named, and the metrics, NaN for cases that were not completed.
+
+    While one part is in use, the next is read.
+    """
+    columns = [column for column in store.columns if column.name in ("status", *metrics, *more)]
+    with ThreadPoolExecutor(1) as pool:
+        ahead: list[Future[tuple[pa.Table, dict[str, np.ndarray]]]] = []
+        for part in store.parts:
+            ahead.append(pool.submit(_metrics_of, store, part, columns, metrics))
+            if len(ahead) > PARTS_AHEAD:
+                yield ahead.pop(0).result()
+        while ahead:
+            yield ahead.pop(0).result()
+
+
+def _metrics_of(
+    store: Store, part: Part, columns: Sequence[Column], metrics: Sequence[str]
+) -> "tuple[pa.Table, dict[str, np.ndarray]]":
+    import numpy as np
+    import pyarrow.compute as pc
+
+    whole = part.status == {STATUS_NAME[OK]: part.rows}  # the receipt says that no case failed: no word is read
+    table = read_part(store.path, part, [one for one in columns if not whole or one.name != "status"])
+    numbers = {name: table[name].to_numpy().astype(np.float64, copy=False) for name in metrics}
+    if whole:
+        return table, numbers
+    ok = pc.equal(table["status"], STATUS_NAME[OK]).to_numpy()
+    return table, {name: np.where(ok, values, np.nan) for name, values in numbers.items()}
+
+
+def summary_lines(metric: str, summary: "Summary", unit: str, random: bool) -> list[str]:
+    """The summary in lines for a terminal; limits of quantiles only where cases are a random sample."""
+    head = f"{metric}{f' [{unit}]' if unit else ''}: {summary.n_used:,} of {summary.n_tried:,} cases have a number"
+    if summary.n_used == 0:
+        return [head]
+    sd = "-" if summary.sd is None else f"{summary.sd:.6g}"
+    lines = [head, f"  mean {summary.mean:.8g}, sd {sd}, from {summary.minimum:.8g} to {summary.maximum:.8g}"]
+    for item in summary.quantiles:
+        limits = [f"{limit:.8g}" if limit is not None else "too few cases" for limit in (item.lower, item.upper)]
+        interval = f"  [{', '.join(limits)}]" if random else ""
+        lines.append(f"  {100.0 * item.probability:>7.3f} %  {item.value:.8g}{interval}")
+    return lines

@@ -1,0 +1,33 @@
+"""Files made from the results of a run, a tuning or a rare event: reports and replays, which `derived.jsonl` counts.
+
+They are made again whenever one wants, also while the run still flies; so their journal is one of their own.
+"""
+
+import re
+from pathlib import Path
+
+from mc_engine.store.counted_files import CountedFiles
+
+DERIVED, FIGURES, REPLAYS = "derived.jsonl", "report-figures", "replay"
+STRANGE = "move {1} out of the directory: it is none of the files that belong there"
+_LOCK = ".derived.lock"
+_NAMES = re.compile(
+    r"report\.(?P<format>html|pdf|md|json)|footprint(?:-[0-9]{1,4})?\.(?:kml|geojson)"
+    rf"|(?P<figure>{FIGURES}/figure-[0-9]{{1,6}}\.svg)|{REPLAYS}/case-(?P<case>[0-9]{{1,10}})\.(?:parquet|png)"
+)
+
+
+def derived_files(folder: Path) -> CountedFiles:
+    """The reports and replays in a directory of results."""
+    return CountedFiles(folder, DERIVED, _NAMES, (FIGURES, REPLAYS), _LOCK)
+
+
+def remade_by(name: str) -> str:
+    """What mends a file of this name, with the directory and the file in braces."""
+    match = _NAMES.fullmatch(name)
+    if match is None and not name.startswith(f"{DERIVED}, "):
+        return STRANGE
+    if match is not None and match["case"]:
+        return f"`mc-engine replay {{0}} {match['case']}` makes {{1}} anew"
+    kind = None if match is None else "md" if match["figure"] else match["format"]
+    return f"`mc-engine report {{0}}{f' --format {kind}' if kind else ''}` makes {{1}} anew"

@@ -1,0 +1,308 @@
+"""Run directories on object stores: published after commit, fetched to be read.  s3://, gs://, memory://, file://, ...
+
+A run is flown in a local directory, where files can be synced and renamed; an object store can do neither.  What the
+journal counts is copied: parts first, then campaign and manifest, then the journal that names them, reports last.  So
+the copy can be loaded at every moment, also while the run still flies, and one that was cut short is completed by
+publishing again: only what is missing or differs travels.  What lies there is listed and read back before it counts
+as published.  Credentials come from the environment, as fsspec and the packages below it read them.
+"""
+
+import atexit
+import json
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Self
+
+from mc_engine.durable_file import is_temporary, make_folder, naming, read_file, sync_folder, write_durably
+from mc_engine.errors import EngineError, StoreError
+from mc_engine.extras import how_to_install
+from mc_engine.shell_words import shell_word
+from mc_engine.store.counted_files import CountedFiles
+from mc_engine.store.derived_files import derived_files
+from mc_engine.store.journal import Entry, Scan, read_journal, scan
+from mc_engine.store.parts import PART_FOLDERS, is_part_file
+from mc_engine.store.receipts import receipts_of
+from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, is_run_directory
+from mc_engine.store.urls import is_url, store_url
+from mc_engine.store.writer_lock import LOCK_FILES, WriterLock
+
+PATIENCE = 10.0  # waits so many times as long as the last copy took, so that copying takes at most a tenth of the time
+
+
+@dataclass(frozen=True)
+class Publication:
+    """What was sent to `url`: names and bytes; and how many files lay there already."""
+
+    url: str
+    sent: tuple[str, ...]
+    sent_bytes: int
+    kept: int
+
+
+def publish(run: Path, url: str, trusting: bool = False) -> Publication:
+    """Copy the run in directory `run` to `url`; on return all of it is listed there, and was read back from there.
+
+    trusting : of what lies there already under the digest in its journal, only the size is looked at, for a copy
+    that is kept up to date.  Parts up there that the journal counts no more are removed.  StoreError if the store
+    cannot be reached, or holds anything else than an earlier state of this run; EngineError if `url` is incomplete.
+    """
+    if not is_run_directory(run):
+        raise StoreError(f"{run}: is no run directory")
+    journal = _sound(scan(read_journal(run / JOURNAL)), run / JOURNAL)
+    counted = _counted(journal.entries)
+    derived = derived_files(run)
+    made = derived.read_with_journal()
+    contents = {**counted, JOURNAL: None, **dict.fromkeys(_others(run, counted, derived)), **made}
+    with _reaching(url):
+        remote = _Remote(url)
+        before = remote.journal()
+        _refuse_another_run(remote, before, journal, set(contents))
+        trusted = _counted(before.entries) if before is not None and trusting else {}
+        sent, sizes = [], {}
+        for name in contents:
+            content = made[name] if name in made else read_file(run / name)
+            if name == JOURNAL:
+                content = content[: journal.length]  # the run may have flown on since
+            digest = sha256(content).hexdigest()
+            if counted.get(name, digest) != digest:
+                raise StoreError(f"{run / name}: damaged; `mc-engine verify {shell_word(run)}` names all damage")
+            if not remote.holds(name, content, trusted.get(name) == digest):
+                remote.write(name, content)
+                sent.append(name)
+            sizes[name] = len(content)
+        for name in remote.sizes:
+            if (is_part_file(name) or derived.are_called(name)) and name not in contents:
+                remote.remove(name)
+        listed = remote.listed()
+    if lost := [name for name, size in sizes.items() if listed.get(name) != size]:
+        raise StoreError(f"{remote.url}/{lost[0]}: was sent and does not lie there; publish again")
+    return Publication(remote.url, tuple(sent), sum(sizes[name] for name in sent), len(contents) - len(sent))
+
+
+def fetch(url: str, folder: Path) -> Path:
+    """Copy the run at `url` to the new directory `folder`, with its reports; the checksum of every part is verified.
+
+    The copy has another name until it is whole, so that one that failed leaves nothing in the way.  What one that was
+    killed has left is cleared away by the next; StoreError while another process copies to the same place.
+    """
+    url = store_url(url)
+    if folder.exists() and any(folder.iterdir()):
+        raise StoreError(f"{folder}: is not empty; choose another folder")
+    with _scratch(folder) as scratch:
+        _copy(url, scratch)
+        with naming(folder):
+            if folder.exists():
+                folder.rmdir()
+            os.replace(scratch, folder)
+        sync_folder(folder.parent)
+    return folder
+
+
+@contextmanager
+def _scratch(folder: Path) -> Iterator[Path]:
+    """Where a copy lies until it becomes `folder`; what processes that were killed have left beside it is removed."""
+    prefix, suffix = f".{folder.name}.", ".tmp"
+    make_folder(folder.parent)
+    with naming(folder):
+        left = [one for one in folder.parent.iterdir() if one.name.startswith(prefix) and one.suffix == suffix]
+        around = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=folder.parent))
+    for one in left:
+        with suppress(StoreError), _locked(one):  # of a process that is at work it cannot be
+            pass
+    with _locked(around):
+        yield around / "run"
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """A folder of this process alone, which goes with the block."""
+    lock = WriterLock(folder)
+    lock.acquire()
+    try:
+        yield
+    finally:
+        lock.release()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _copy(url: str, folder: Path) -> None:
+    with _reaching(url):
+        remote = _Remote(url)
+        journal = remote.journal()
+        if journal is None:
+            raise StoreError(f"{url}: holds no run")
+        counted = _counted(journal.entries)
+        others = [name for name in remote.sizes if name not in counted and name != JOURNAL and not is_part_file(name)]
+        for name in [*counted, *others]:
+            content = remote.read(name)
+            if counted.get(name, "") not in ("", sha256(content).hexdigest()):
+                raise StoreError(f"{url}/{name}: damaged, its SHA-256 is not the one in the journal")
+            _place(folder, name, content, url)
+        _place(folder, JOURNAL, remote.read(JOURNAL)[: journal.length], url)
+    for part_folder in PART_FOLDERS:
+        make_folder(folder / part_folder)
+
+
+def fetched(url: str) -> Path:
+    """A copy of the run at `url` in a directory that lasts as long as this process."""
+    scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))
+    atexit.register(shutil.rmtree, scratch, ignore_errors=True)
+    return fetch(url, scratch / url.rstrip("/").rpartition("/")[2])
+
+
+def local_copy(place: str | Path) -> Path:
+    """The directory that is named; of a URL, a copy that lasts as long as this process."""
+    return fetched(str(place)) if is_url(place) else Path(place)
+
+
+def refuse_unreachable(url: str) -> None:
+    """StoreError if nothing can be listed at `url`; to be asked before a long flight."""
+    with _reaching(url):
+        _Remote(url)
+
+
+def _counted(entries: tuple[Entry, ...]) -> dict[str, str]:
+    """SHA-256 by name of all that a run consists of by its journal, in the order in which it is to be sent."""
+    created = entries[0].facts
+    heads = {**created.get("companions", {}), CAMPAIGN: created["campaign"], MANIFEST: created["manifest"]}
+    return {**{part.file: part.sha256 for part in receipts_of(entries)[0].all_parts()}, **heads}
+
+
+def _others(run: Path, counted: Mapping[str, str], derived: CountedFiles) -> list[str]:
+    """All that lies in the run directory and is no part, no report or replay, no lock, no file half written."""
+    paths = [path for path in sorted(run.rglob("*")) if path.is_file() and not path.is_symlink()]
+    files = [path.relative_to(run).as_posix() for path in paths]
+    ours = {*counted, JOURNAL, *LOCK_FILES}
+    left = [name for name in files if name not in ours and not is_part_file(name) and not derived.are_called(name)]
+    return [name for name in left if not is_temporary(Path(name).name)]
+
+
+def _sound(found: Scan, place: Path | str) -> Scan:
+    if found.damaged or not found.entries or found.entries[0].event != "created":
+        raise StoreError(f"{place}, line {found.damaged[0] if found.damaged else 1}: damaged")
+    for number, why in receipts_of(found.entries)[1].items():
+        raise StoreError(f"{place}, line {number}: damaged, {why}")
+    return found
+
+
+def _refuse_another_run(remote: "_Remote", before: Scan | None, journal: Scan, ours: set[str]) -> None:
+    if before is not None:
+        theirs = before.entries[0]
+        if (theirs.at, theirs.facts) != (journal.entries[0].at, journal.entries[0].facts):
+            raise StoreError(f"{remote.url}: holds another run; choose another place")
+        if before.length > journal.length:
+            raise StoreError(f"{remote.url}: holds a later state of this run; fetch that one")
+    elif foreign := sorted(set(remote.sizes) - ours):
+        raise StoreError(f"{remote.url}: holds {foreign[0]} and no run; choose another place")
+
+
+def _place(folder: Path, name: str, content: bytes, url: str) -> None:
+    path = folder / name
+    if not path.resolve().is_relative_to(folder.resolve()):  # what lies in a store may come from anyone
+        raise StoreError(f"{url}: {json.dumps(name)} lies outside the run")
+    make_folder(path.parent)
+    write_durably(path, content)
+
+
+class _Remote:
+    """The objects below a URL; `sizes` has their lengths by name, as listed when it was made."""
+
+    def __init__(self, url: str):
+        from fsspec.core import url_to_fs
+
+        self.url = store_url(url)
+        self._files, root = url_to_fs(self.url, use_listings_cache=False)
+        self._root = str(root).rstrip("/")
+        self.sizes = self.listed()
+
+    def listed(self) -> dict[str, int]:
+        """What lies there at this moment."""
+        self._files.invalidate_cache()
+        listed: dict[str, dict[str, Any]] = self._files.find(self._root, detail=True)
+        return {path[len(self._root) :].lstrip("/"): int(facts["size"]) for path, facts in listed.items()}
+
+    def journal(self) -> Scan | None:
+        """The journal that lies there, or None."""
+        if JOURNAL not in self.sizes:
+            return None
+        found = scan(self.read(JOURNAL))
+        if not found.entries and not found.damaged:  # the sending of it was cut short in its first line
+            return None
+        return _sound(found, f"{self.url}/{JOURNAL}")
+
+    def read(self, name: str) -> bytes:
+        return bytes(self._files.cat_file(f"{self._root}/{name}"))
+
+    def holds(self, name: str, content: bytes, trusted: bool) -> bool:
+        """True if these bytes lie there; where the journal up there vouches for them, by their number alone."""
+        return self.sizes.get(name) == len(content) and (trusted or self.read(name) == content)
+
+    def write(self, name: str, content: bytes) -> None:
+        path = f"{self._root}/{name}"
+        self._files.makedirs(path.rpartition("/")[0], exist_ok=True)  # nothing, where folders are only names
+        self._files.pipe_file(path, content)
+        if self.read(name) != content:
+            raise StoreError(f"{self.url}/{name}: what was sent is not what lies there; publish again")
+
+    def remove(self, name: str) -> None:
+        self._files.rm_file(f"{self._root}/{name}")
+
+
+@contextmanager
+def _reaching(url: str) -> Iterator[None]:
+    """Turn what a store's package raises into a StoreError that begins with the URL."""
+    try:
+        yield
+    except EngineError:
+        raise
+    except ImportError as error:
+        raise StoreError(f"{url}: needs a package: {error}; {how_to_install('cloud')}") from error
+    except Exception as error:  # every store's package has errors of its own
+        raise StoreError(f"{url}: {type(error).__name__}: {error}") from error
+
+
+class Publisher:
+    """Within `with`, copies what the run in `run` has committed to `url`, every `every_s` seconds and at the end.
+
+    A machine that is lost takes at most what was committed since with it.  A copy that fails is tried again; what the
+    last one failed of is told on standard error, and the flight goes on.
+    """
+
+    def __init__(self, run: Path, url: str, every_s: float = 30.0):
+        self._run, self._url, self._every_s = run, store_url(url), every_s
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._keep_up, name="publisher", daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._done.set()
+        self._thread.join()
+        if trouble := self._copy():
+            print(f"not published: {trouble}", file=sys.stderr)
+
+    def _keep_up(self) -> None:
+        wait_s = self._every_s
+        while not self._done.wait(wait_s):
+            begin = time.monotonic()
+            self._copy()
+            wait_s = max(self._every_s, PATIENCE * (time.monotonic() - begin))
+
+    def _copy(self) -> EngineError | None:
+        if is_run_directory(self._run):
+            try:
+                publish(self._run, self._url, trusting=True)
+            except EngineError as error:
+                return error
+        return None

@@ -1,0 +1,287 @@
+"""Parts: the Parquet files of a run directory, one range of cases or one set of histories each.
+
+The same columns give the same bytes.  Unit, role and meaning of a column stand in its Arrow field's metadata, and
+once more where `pandas.read_parquet` looks for `DataFrame.attrs`.  Numbers are written without dictionaries, words
+with; every page has a checksum.  A part is read through its SHA-256: damaged bytes are an error, never a table.
+"""
+
+import json
+import re
+import uuid
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from mc_engine.durable_file import read_inside, temporary_name, write_inside, write_synced
+from mc_engine.errors import DiskError, StoreError
+from mc_engine.shell_words import shell_word
+from mc_engine.status import STATUS_NAME
+
+MOST_CELLS = 2**30  # of a Parquet file that is read whole
+PART_FOLDERS = ("cases", "history")  # of a run directory
+_SEE = "; `mc-engine verify"
+_CASE_PART = re.compile(r"cases/part-([0-9]{10,18})-([0-9]{10,18})(?:\.r[1-9][0-9]{0,8})?\.parquet")
+_HISTORY_PART = re.compile(r"history/part-[0-9]{5,9}\.parquet")
+ARROW_TYPES = {"number": pa.float64(), "integer": pa.int64(), "word": pa.string(), "switch": pa.bool_()}
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table: its name ends in the unit; role is "case", "dispersion", "metric" or "state".
+
+    kind : "number" (float64), "integer" (int64), "word" (string) or "switch" (bool).
+    """
+
+    name: str
+    unit: str
+    role: str
+    description: str
+    kind: str = "number"
+
+
+@dataclass(frozen=True)
+class Part:
+    """Receipt of a part that is on the disk: what its journal line says.  `file` is relative to the run directory."""
+
+    file: str
+    first: int
+    rows: int
+    bytes: int
+    sha256: str
+    status: dict[str, int]
+
+    @property
+    def stop(self) -> int:
+        """One past the last case."""
+        return self.first + self.rows
+
+
+@dataclass(frozen=True)
+class Written:
+    """A part whose bytes are on the disk under a temporary name.  Both names are relative to the run directory."""
+
+    part: Part
+    temporary: str
+
+
+CASE_COLUMNS = (
+    Column("case_id", "", "case", "number of the case, from 0; -1 is the nominal", "integer"),
+    Column("status", "", "case", "how the case ended", "word"),
+    Column("reason", "", "case", "why the case was refused or failed, in words", "word"),
+)
+
+
+def attributes(columns: Sequence[Column]) -> dict[str, dict[str, str]]:
+    """What a table's `DataFrame.attrs` holds: units, descriptions and roles by column name."""
+    return {
+        "units": {column.name: column.unit for column in columns},
+        "descriptions": {column.name: column.description for column in columns},
+        "roles": {column.name: column.role for column in columns},
+    }
+
+
+def arrow_schema(columns: Sequence[Column]) -> pa.Schema:
+    """The Arrow schema of tables of `columns`."""
+    fields = []
+    for column in columns:
+        metadata = {"unit": column.unit, "role": column.role, "description": column.description}
+        fields.append(pa.field(column.name, ARROW_TYPES[column.kind], metadata=metadata))
+    return pa.schema(fields, metadata={"PANDAS_ATTRS": json.dumps(attributes(columns))})
+
+
+def arrow_table(columns: Sequence[Column], arrays: Mapping[str, Any], n_rows: int, place: Path) -> pa.Table:
+    """The table of `columns` from arrays of `n_rows`; StoreError naming `place` and every column that does not fit."""
+    names = [column.name for column in columns]
+    problems = [f'column "{name}" is missing' for name in names if name not in arrays]
+    problems += [f'column "{name}" is not one of this run' for name in arrays if name not in names]
+    filled = {}
+    for column in columns:
+        if column.name not in arrays:
+            continue
+        values = np.asarray(arrays[column.name])
+        if values.shape != (n_rows,):
+            problems.append(f'column "{column.name}" has shape {values.shape}, not ({n_rows},)')
+            continue
+        try:
+            filled[column.name] = _arrow_array(column, values)
+        except (pa.ArrowException, ValueError, TypeError, KeyError) as error:
+            problems.append(f'column "{column.name}" is no {column.kind}: {error}')
+    if problems:
+        raise StoreError(f"{place}: " + "; ".join(problems))
+    return pa.Table.from_arrays([filled[name] for name in names], schema=arrow_schema(columns))
+
+
+def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
+    if column.name == "status" and values.dtype.kind in "iu":
+        codes, positions = np.unique(values, return_inverse=True)
+        words = pa.array([STATUS_NAME[int(code)] for code in codes], pa.string())
+        return words.take(pa.array(positions))
+    if column.kind == "word":
+        return pa.array(values, pa.string()).fill_null("")
+    if column.kind == "number":
+        return pa.array(values.astype(np.float64, copy=False))  # NaN stays NaN: it is no missing value
+    return pa.array(values, ARROW_TYPES[column.kind])
+
+
+def parquet_bytes(table: pa.Table) -> bytes:
+    """The bytes of a Parquet file of `table`."""
+    words = [field.name for field in table.schema if field.type == pa.string()]
+    sink = pa.BufferOutputStream()
+    pq.write_table(
+        table,
+        sink,
+        compression="zstd",
+        compression_level=1,
+        use_dictionary=words or False,
+        write_statistics=["case_id"] if "case_id" in table.column_names else False,
+        write_page_checksum=True,
+    )
+    return sink.getvalue().to_pybytes()
+
+
+def is_part_file(file: str) -> bool:
+    """True if `file`, relative to the run directory, is the name of a part, as the engine gives them."""
+    return is_history_file(file) or cases_in_name(file) is not None
+
+
+def is_history_file(file: str) -> bool:
+    """True if `file`, relative to the run directory, is the name of saved time histories."""
+    return _HISTORY_PART.fullmatch(file) is not None
+
+
+def cases_in_name(file: str) -> tuple[int, int] | None:
+    """The cases (first, stop) that a part has by its name, relative to the run; None if it is no name of one."""
+    match = _CASE_PART.fullmatch(file)
+    if match is None:
+        return None
+    first, last = int(match[1]), int(match[2])
+    return (first, last + 1) if file.startswith(f"cases/part-{first:010d}-{last:010d}.") and first <= last else None
+
+
+def part_name(first: int, rows: int) -> str:
+    """File name of the part of cases first .. first + rows - 1; names sort as the cases do."""
+    return f"part-{first:010d}-{first + rows - 1:010d}.parquet"
+
+
+def revised_name(file: str) -> str:
+    """The name of a part that takes the place of `file`: part-….parquet, part-….r1.parquet, part-….r2.parquet."""
+    stem, revision = re.fullmatch(r"(.*?)(?:\.r(\d+))?\.parquet", file).groups()  # type: ignore[union-attr]
+    return f"{stem}.r{int(revision or 0) + 1}.parquet"
+
+
+def write_part(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> Part:
+    """Put one range of cases durably into `run`/cases; it counts once its receipt is in the journal."""
+    table = _part_table(run, columns, first, count, arrays)
+    return write_table(run, f"cases/{part_name(first, count)}", table, first, _status_counts(table))
+
+
+def write_aside(
+    run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any], file: str | None = None
+) -> Written:
+    """Write one range of cases under a temporary name of its own, for the writer of the run to publish.
+
+    Needs no lock and no journal: workers of any kind write their parts so, and send the receipt alone.  The name is
+    new each time, since a chunk may be flown twice at once where a worker is taken for dead; it ends in the first
+    half of the SHA-256, by which `finished_parts` knows a part that is whole.  (Windows counts 260 letters of a path.)
+    file : name of the part, relative to the run directory, if not the usual one.
+    """
+    table = _part_table(run, columns, first, count, arrays)
+    content = parquet_bytes(table)
+    file = file or f"cases/{part_name(first, count)}"
+    digest = sha256(content).hexdigest()
+    temporary = temporary_name(f"{file}.{uuid.uuid4().hex[:8]}.{digest[:32]}")
+    write_synced(run, temporary, content, file)
+    return Written(Part(file, first, count, len(content), digest, _status_counts(table)), temporary)
+
+
+def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> pa.Table:
+    if first < 0 or count < 1:
+        raise StoreError(f"{run}: a part of {count} cases from {first} cannot be")
+    case_ids = np.arange(first, first + count, dtype=np.int64)
+    if "case_id" in arrays and not np.array_equal(arrays["case_id"], case_ids):
+        raise StoreError(f"{run}: case_id does not count from {first} to {first + count - 1}")
+    return arrow_table(columns, {**arrays, "case_id": case_ids}, count, run)
+
+
+def _status_counts(table: pa.Table) -> dict[str, int]:
+    return dict(sorted(Counter(table.column("status").to_pylist()).items()))
+
+
+def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: dict[str, int] | None = None) -> Part:
+    """Write any table durably as `run`/`file`."""
+    content = parquet_bytes(table)
+    write_inside(run, file, content)
+    return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), status or {})
+
+
+def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) -> pa.Table:
+    """The table of a part, all it has or these columns; StoreError naming the file if a byte of it changed.
+
+    The same where the bytes are those that were written, and the table is not what receipt and columns say.
+    """
+    path, more = run / part.file, f"{_SEE} {shell_word(run)}` names all damage"
+    try:
+        content = read_inside(run, part.file, part.bytes + 1)
+    except DiskError:
+        raise
+    except StoreError as error:
+        raise StoreError(f"{error}{more}") from None
+    if problem := content_problem(content, part):
+        raise StoreError(f"{path}: {problem}{more}")
+    try:
+        table = parquet_table(content, None if columns is None else [column.name for column in columns])
+    except ValueError as error:
+        raise StoreError(f"{path}: {error}{more}") from None
+    if table.num_rows != part.rows or not (columns is None or table.schema.equals(arrow_schema(columns))):
+        raise StoreError(f"{path}: is no part of this run, it has other rows or columns{more}")
+    return table
+
+
+def problem_of(path: Path, read: Callable[[], object]) -> str:
+    """What `read` says is wrong with the part in `path`; empty if it can be read."""
+    try:
+        read()
+    except StoreError as error:
+        return str(error).removeprefix(f"{path}: ").partition(_SEE)[0]
+    return ""
+
+
+def parquet_table(content: Any, names: Sequence[str] | None = None, most: int = MOST_CELLS) -> pa.Table:
+    """The table in a Parquet file, its bytes or open; all columns or those of `names` that it has.
+
+    ValueError if it is none, or has more cells than `most` by its own account, which is read before all else.
+    `pyarrow.parquet.read_table` would leave a thread behind, which can abort a process that is about to end.
+    """
+    try:
+        source = pa.BufferReader(content) if isinstance(content, bytes) else content
+        file = pq.ParquetFile(source, pre_buffer=False, page_checksum_verification=True)
+        _refuse_size(file.metadata, most)
+        table = file.read(names, use_threads=False)
+        table.validate(full=True)  # words are UTF-8, and offsets lie inside
+        return table
+    except (pa.ArrowException, OSError, KeyError, OverflowError) as error:
+        raise ValueError(f"no readable Parquet file: {next(iter(str(error).splitlines()), '')}") from error
+
+
+def _refuse_size(metadata: Any, most: int) -> None:
+    sizes = [metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups)]
+    if max(metadata.num_rows * metadata.num_columns, *sizes, sum(sizes) // 16, 0) > most:
+        raise ValueError(f"it has more than the {most:,} cells that are read at once")
+
+
+def content_problem(content: bytes, part: Part) -> str:
+    """What is wrong with the bytes of a part; empty if they are those that were written."""
+    if len(content) > part.bytes:  # a reader stops there
+        return f"damaged, more than the {part.bytes} bytes that were written"
+    if len(content) < part.bytes:
+        return f"damaged, {len(content)} bytes where {part.bytes} were written"
+    if sha256(content).hexdigest() != part.sha256:
+        return "damaged, its SHA-256 is not the one in the journal"
+    return ""

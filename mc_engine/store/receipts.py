@@ -1,0 +1,194 @@
+"""What counts in a run directory after all that its journal tells.
+
+A part counts from its line on, until a line replaces or withdraws it; of the nominal case and of the histories the
+last line counts.  Lines have the types that an engine gives them, so that names of files are those of parts.  Numbers
+that someone made up, and computed a checksum for, are taken as they are: checksums detect damage, not forgery.
+"""
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterable, Mapping
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from mc_engine.durable_file import inner_names
+from mc_engine.status import MOST_CASES
+from mc_engine.store.journal import Entry
+from mc_engine.store.parts import Part, cases_in_name, is_part_file
+from mc_engine.store.run_files import NOMINAL
+
+Range = tuple[int, int]
+
+
+def _part_file(file: str) -> str:
+    if not (is_part_file(file) or file == NOMINAL):
+        raise ValueError("is no name of a part")
+    return file
+
+
+def _inner_file(name: str) -> str:
+    inner_names(name)
+    return name
+
+
+Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+Chunk = Annotated[int, Field(ge=1, le=MOST_CASES)]
+
+
+class _Event(BaseModel):
+    model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
+
+
+class _Created(_Event):
+    manifest: Digest
+    campaign: Digest
+    companions: dict[Annotated[str, AfterValidator(_inner_file)], Digest] = {}
+
+
+class _Receipt(_Event):
+    file: Annotated[str, AfterValidator(_part_file)]
+    first: int = Field(ge=-1, le=MOST_CASES)
+    rows: int = Field(ge=0, le=2**40)
+    bytes: int = Field(ge=1, le=2**50)
+    sha256: Digest
+    status: dict[str, Annotated[int, Field(ge=1)]]
+    replaces: str | None = None
+
+
+class _Withdrawal(_Event):
+    file: str
+
+
+class _Extension(_Event):
+    cases: int = Field(ge=1, le=MOST_CASES)
+
+
+class _Begin(_Event):
+    model_config = ConfigDict(extra="allow")
+    chunk: Chunk | None = None
+
+
+_EVENTS: Mapping[str, type[_Event]] = {
+    "created": _Created,
+    "part": _Receipt,
+    "part-replaced": _Receipt,
+    "part-withdrawn": _Withdrawal,
+    "nominal": _Receipt,
+    "history": _Receipt,
+    "extended": _Extension,
+    "started": _Begin,
+    "merged": _Begin,
+}
+
+
+def receipt_of(facts: Any) -> Part:
+    """The receipt of a part from the facts that its line has; ValueError with a sentence if it can be none."""
+    return _part(_checked(_Receipt, facts))
+
+
+def _checked(kind: type[_Event], facts: Any) -> Any:
+    try:
+        return kind.model_validate(facts)
+    except ValidationError as error:
+        raise ValueError(first_mistake(error)) from None
+
+
+def first_mistake(error: ValidationError) -> str:
+    """Where the first mistake of a record stands, and what it is, in a sentence without the record's own text."""
+    first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+    place = ".".join(str(one) for one in first["loc"] if one != "[key]")
+    message = first["msg"].removeprefix("Value error, ")
+    return f"{place!a}: {message[:1].lower()}{message[1:]}"
+
+
+def _part(record: _Receipt) -> Part:
+    return Part(record.file, record.first, record.rows, record.bytes, record.sha256, dict(record.status))
+
+
+class Receipts:
+    """What counts after the lines taken so far.
+
+    parts : receipts of the parts of cases, by their first case; no case stands twice.
+    begun_with : cases by the manifest, if that is known.
+    nominal, histories : the receipts that count, or None.
+    """
+
+    def __init__(self, begun_with: int | None = None):
+        self.parts: list[Part] = []
+        self.begun_with = self._asked = begun_with
+        self.nominal: Part | None = None
+        self.histories: Part | None = None
+
+    @property
+    def cases(self) -> int | None:
+        """How many are wanted: by the last line that says so, and up to the last part where that line is lost."""
+        flown = self.parts[-1].stop if self.parts else 0
+        return None if self._asked is None else max(self._asked, flown)
+
+    def take(self, entry: Entry) -> None:
+        """Let one more line count; ValueError with a sentence, and nothing changed, if no engine writes such."""
+        kind = _EVENTS.get(entry.event)
+        record: Any = None if kind is None else _checked(kind, entry.facts)
+        if (entry.event == "created") != (entry.number == 1):
+            raise ValueError("a run is created in line 1, and once")
+        if entry.event in ("part", "part-replaced"):
+            self._count(_part(record))
+        elif entry.event == "part-withdrawn":
+            self.parts = [part for part in self.parts if part.file != record.file]
+        elif entry.event == "nominal":
+            self.nominal = _part(record)
+        elif entry.event == "nominal-withdrawn":
+            self.nominal = None
+        elif entry.event == "history":
+            self.histories = _part(record)
+        elif entry.event == "extended":
+            self._asked = record.cases
+
+    def _count(self, part: Part) -> None:
+        """In place of what has the same cases: a part that was replaced, or whose withdrawal is lost."""
+        if cases_in_name(part.file) != (part.first, part.stop):
+            raise ValueError("its file has the name of other cases")
+        before = bisect_right(self.parts, part.first, key=lambda other: other.stop)
+        self.parts[before : bisect_left(self.parts, part.stop, key=lambda other: other.first)] = [part]
+
+    def committed(self) -> list[Range]:
+        """The cases that count, as merged ranges in order."""
+        merged: list[Range] = []
+        for part in self.parts:
+            if merged and part.first == merged[-1][1]:
+                merged[-1] = (merged[-1][0], part.stop)
+            else:
+                merged.append((part.first, part.stop))
+        return merged
+
+    def missing(self, wanted: range) -> list[Range]:
+        """The ranges among the wanted cases that do not count."""
+        return gaps(self.committed(), wanted)
+
+    def all_parts(self) -> list[Part]:
+        """Receipts of every file that counts: parts of cases, nominal case, histories."""
+        return [*self.parts, *(part for part in (self.nominal, self.histories) if part is not None)]
+
+
+def gaps(ranges: Iterable[Range], wanted: range) -> list[Range]:
+    """The ranges of wanted cases that are in none of these, which may overlap."""
+    found, begin = [], wanted.start
+    for first, stop in [*sorted(ranges), (wanted.stop, wanted.stop)]:
+        if min(first, wanted.stop) > begin:
+            found.append((begin, min(first, wanted.stop)))
+        begin = max(begin, stop)
+    return found
+
+
+def receipts_of(entries: Iterable[Entry], begun_with: int | None = None) -> tuple[Receipts, dict[int, str]]:
+    """What counts after all the lines that an engine can have written; and what is wrong with the others, by number.
+
+    begun_with : cases by the manifest, where that can be read.
+    """
+    counted, wrong = Receipts(begun_with), {}
+    for entry in entries:
+        try:
+            counted.take(entry)
+        except ValueError as error:
+            wrong[entry.number] = f"{entry.event!a} as no engine writes it, {error}"
+    return counted, wrong

@@ -1,0 +1,88 @@
+"""What the directories of a tuning and of a rare event have in common: a record, tables, and the campaign's text.
+
+    <stem>.toml   <stem>.json   <table>.parquet ...   journal.jsonl      and what is derived of them, such as reports
+
+The journal counts them all with their SHA-256, see `counted_files`.
+"""
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mc_engine.durable_file import make_folder
+from mc_engine.errors import StoreError
+from mc_engine.store.counted_files import CountedFiles
+from mc_engine.store.journal import plain
+from mc_engine.store.parts import Column, arrow_schema, arrow_table, attributes, parquet_bytes, parquet_table
+from mc_engine.store.result_records import FORMAT, TABLES, parse_result
+from mc_engine.store.run_files import JOURNAL, RARE_EVENT, STEMS, TUNING, kind_of
+from mc_engine.store.writer_lock import WriterLock
+
+ColumnsAndArrays = tuple[Sequence[Column], Mapping[str, np.ndarray]]
+
+COMMANDS = {TUNING: "tune", RARE_EVENT: "rare"}
+
+
+def result_files(path: Path, kind: str) -> CountedFiles:
+    """The files of a directory of this kind."""
+    tables = "|".join(TABLES[kind])
+    return CountedFiles(path, JOURNAL, re.compile(rf"{STEMS[kind]}\.(?:toml|json)|(?:{tables})\.parquet"))
+
+
+def write_result(
+    path: Path,
+    kind: str,
+    text: str,
+    record: Mapping[str, Any],
+    tables: Mapping[str, ColumnsAndArrays],
+    lock: WriterLock | None = None,
+) -> None:
+    """Write a result into `path`, in place of what is there of the same search.  lock : of `path`, if it is held."""
+    make_folder(path)
+    files, about = {f"{STEMS[kind]}.toml": text.encode()}, {}
+    for name, (columns, arrays) in tables.items():
+        rows = len(next(iter(arrays.values())))
+        files[f"{name}.parquet"] = parquet_bytes(arrow_table(columns, arrays, rows, path / name))
+        about[name] = {"rows": rows, "columns": [asdict(column) for column in columns]}
+    whole = {**record, "format": FORMAT, "tables": about}
+    content = json.dumps(whole, indent=1, ensure_ascii=False, allow_nan=False, default=plain)
+    result_files(path, kind).write({**files, f"{STEMS[kind]}.json": content.encode()}, lock=lock)
+
+
+def read_result(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, pd.DataFrame]]:
+    """Record and tables of the result in `path`; StoreError if there is none, or a byte of it changed."""
+    again = f"`mc-engine {COMMANDS[kind]}` makes one"
+    if kind_of(path) != kind:
+        raise StoreError(f"{path}: {f'holds no {kind}; {again}' if path.exists() else 'there is no such folder'}")
+    if not (path / JOURNAL).exists():
+        why = f"an older version of the engine made this {kind}, or the file was removed"
+        raise StoreError(f"{path / JOURNAL}: is not there: {why}; {again} anew")
+    stem = STEMS[kind]
+    names = (f"{stem}.toml", f"{stem}.json", *(f"{name}.parquet" for name in TABLES[kind]))
+    contents = result_files(path, kind).read(names)
+    try:
+        record = parse_result(contents[f"{stem}.json"], kind)
+    except ValueError as error:
+        raise StoreError(f"{path / stem}.json: {error}") from None
+    return record, {name: _table(path, name, contents, record) for name in TABLES[kind]}
+
+
+def _table(path: Path, name: str, contents: Mapping[str, bytes], record: Mapping[str, Any]) -> pd.DataFrame:
+    known = Column.__dataclass_fields__
+    listed = record["tables"][name]["columns"]
+    columns = [Column(**{key: value for key, value in one.items() if key in known}) for one in listed]
+    try:
+        table = parquet_table(contents[f"{name}.parquet"])
+        if not table.schema.equals(arrow_schema(columns)):
+            raise ValueError("its columns are not those of the record")
+    except ValueError as error:
+        raise StoreError(f"{path / name}.parquet: {error}") from None
+    frame = table.to_pandas(use_threads=False)
+    frame.attrs.update(attributes(columns))
+    return frame

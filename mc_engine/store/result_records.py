@@ -1,0 +1,97 @@
+"""The records `tuning.json` and `rare.json` as they are read: what comes out is what status and reports work with.
+
+The shapes below are those of the files; a pydantic model is made of each.  (kind, value) is a key that may be missing.
+"""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, create_model
+
+from mc_engine.store.manifest_file import Head, Record, checked_record
+from mc_engine.store.run_files import RARE_EVENT, TUNING
+
+FORMAT = 2  # of the directories; 1 had no journal
+
+Shape = dict[str, Any]
+
+Count = Annotated[int, Field(ge=0, le=2**63)]
+Some = Annotated[int, Field(ge=1, le=2**63)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Limit = float | None
+Kind = Literal["number", "integer", "word", "switch"]
+
+_NAMED: Shape = {"name": str, "unit": (str, ""), "description": (str, "")}
+_COLUMN = {**_NAMED, "role": str, "kind": (Kind, "number")}
+_TABLE = {"rows": Count, "columns": [_COLUMN]}
+_HEAD: Shape = {
+    "format": Literal[2],
+}
+_LIMITS: Shape = {"metric": str, "at_most": Limit, "at_least": Limit, "source": (str, "")}
+_SEARCH: Shape = {
+    **dict.fromkeys(("population", "generations", "flown", "cases"), Some),
+    "seed": Count,
+    "end": str,
+    "crossover": NotNegative,
+    "mutation": NotNegative,
+    "parameters": [{**_NAMED, "lower": float, "upper": float, "nominal": float, "source": (str, "")}],
+    "objectives": [{**_NAMED, "metric": str, "goal": Literal["minimise", "maximise"], "quantile": Share | None}],
+    "constraints": [{**_NAMED, **_LIMITS, "quantile": Share | None}],
+    "published": [{**_NAMED, "values": dict[str, float], "source": (str, "")}],
+}
+_SIGMAS: Shape = dict.fromkeys(("mean_sigma", "spread_sigma", "likeliest_sigma", "likeliest"), float)
+_ESTIMATE: Shape = {
+    "asked": {"method": str, "cases_per_level": Some},
+    "requirement": {**_NAMED, **_LIMITS, "share": Share},
+    "metric": _NAMED,
+    "method": Literal["subset", "cross-entropy", "plain"],
+    **dict.fromkeys(("probability", "lower", "upper"), Annotated[float, Field(ge=0.0, le=10.0)]),  # of an estimate
+    "confidence": Share,
+    **dict.fromkeys(("relative_error", "plain_cases"), NotNegative | None),
+    "cases": Some,
+    **dict.fromkeys(("failed", "no_number"), Count),
+    "levels": [{"margin": Limit, "probability": NotNegative, "runs": Count, "cases": Count, "accepted": NotNegative}],
+    "inputs": [{**_NAMED, **_SIGMAS, "across_sigma": (Limit, None), "across": (Limit, None)}],
+    "remarks": list[str],
+}
+
+
+def _kind(shape: Any) -> Any:
+    """The type of what has this shape."""
+    if isinstance(shape, list):
+        return list[_kind(shape[0])]  # type: ignore[misc]
+    return _model(shape) if isinstance(shape, dict) else shape
+
+
+def _model(shape: Shape, base: type[Record] = Record) -> Any:
+    given = {key: one if isinstance(one, tuple) else (one, ...) for key, one in shape.items()}
+    fields: Shape = {key: (_kind(kind), value) for key, (kind, value) in given.items()}
+    return create_model("Record", __base__=base, **fields)
+
+
+TABLES = {TUNING: ("evaluations", "generations", "front"), RARE_EVENT: ("cases",)}
+_SHAPES: dict[str, Shape] = {TUNING: {"tuning": _SEARCH}, RARE_EVENT: {"rare_event": _ESTIMATE}}
+
+
+def parse_result(content: bytes, kind: str) -> dict[str, Any]:
+    """What the bytes of a record say, defaults put in; ValueError with a sentence if no engine can have written it."""
+    tables = {"tables": dict.fromkeys(TABLES[kind], _TABLE)}
+    record = checked_record(content, _model({**_HEAD, **_SHAPES[kind], **tables}, Head), FORMAT)[1].model_dump()
+    if kind == TUNING:
+        _refuse_other_columns(record)
+    elif len({one[key] is None for one in record["rare_event"]["inputs"] for key in ("across", "across_sigma")}) > 1:
+        raise ValueError("its inputs do not tell the same")
+    return record
+
+
+def _refuse_other_columns(record: dict[str, Any]) -> None:
+    asked = record["tuning"]
+    own = {"candidate", "violation", "feasible", "failed_cases", "commonest_failure"}
+    names = own | {one["name"] for key in ("parameters", "objectives", "constraints") for one in asked[key]}
+    for table in ("evaluations", "front"):
+        if missing := names - {column["name"] for column in record["tables"][table]["columns"]}:
+            raise ValueError(f"its table of the {table} has no column {min(missing)!a}")
+    if not asked["parameters"] or not asked["objectives"]:
+        raise ValueError("nothing is tuned, or for nothing")
+    if any({*point["values"]} != {one["name"] for one in asked["objectives"]} for point in asked["published"]):
+        raise ValueError("a published point has other objectives")

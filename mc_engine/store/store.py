@@ -1,0 +1,355 @@
+"""The run directory: what a campaign's run leaves behind, and the only meeting point of engine and reports.
+
+    campaign.toml   manifest.json   journal.jsonl   nominal.parquet   cases/part-*.parquet   history/part-*.parquet
+
+A part exists once its journal line is synced.  A file without a line is what a kill left: readers here ignore it,
+the next writer removes it.  (`pandas.read_parquet(run / "cases")` knows no journal and would show such a part;
+its rows are right, but not yet counted.)  Manifest and campaign are never changed: what came later is in the
+journal.  A `Store` is for one thread; one process at a time may write.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+
+from mc_engine import durable_file as disk
+from mc_engine.errors import StoreError
+from mc_engine.shell_words import shell_word
+from mc_engine.store import parts
+from mc_engine.store.finished_parts import count_finished, leave_receipt
+from mc_engine.store.histories import history_columns, history_table, read_histories
+from mc_engine.store.journal import Entry, Journal, damaged_line, encode, utc_now
+from mc_engine.store.manifest_file import cases_in, columns_in, edited_files, manifest_bytes, parse_manifest
+from mc_engine.store.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Written, is_part_file
+from mc_engine.store.receipts import Range, Receipts, receipts_of
+from mc_engine.store.run_files import CAMPAIGN, CUT_SHORT, JOURNAL, MANIFEST, NO_FOLDER, NOMINAL, is_run_directory
+from mc_engine.store.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock, writer_of_new
+
+_EDITED = "damaged or edited, it is not the one this run began with; put the original back"
+_OURS_BEFORE_THE_JOURNAL = {*LOCK_FILES, CAMPAIGN, MANIFEST, *PART_FOLDERS}
+
+
+def create_store(
+    path: str | Path,
+    manifest: Mapping[str, Any],
+    campaign_text: str,
+    columns: Sequence[Column],
+    companions: Mapping[str, bytes] | None = None,
+) -> "Store":
+    """Make `path` the directory of a new run; its `manifest["columns"]` are set from `columns`.
+
+    companions : files that the campaign reads from its own folder, by their names there; they are kept beside it.
+    case_id, status and reason come first, whether or not `columns` has them.  Refuses a directory that holds
+    anything, except what a creation that was cut short left there.
+    """
+    path, companions = Path(path), companions or {}
+    with writer_of_new(path, lambda: refuse_occupied(path, companions)) as lock:
+        names = {column.name for column in CASE_COLUMNS}
+        columns = [*CASE_COLUMNS, *(column for column in columns if column.name not in names)]
+        record = {**manifest, "columns": [asdict(column) for column in columns]}
+        content = manifest_bytes(record)
+        text = campaign_text.encode()
+        for name, companion in companions.items():
+            disk.make_way(path, name)
+            disk.write_inside(path, name, companion)
+        disk.write_inside(path, CAMPAIGN, text)
+        disk.write_inside(path, MANIFEST, content)
+        for folder in PART_FOLDERS:
+            disk.make_way(path, f"{folder}/*")
+        # The journal comes last: with it the store exists.
+        digests: dict[str, Any] = {"manifest": sha256(content).hexdigest(), "campaign": sha256(text).hexdigest()}
+        digests["companions"] = {name: sha256(companion).hexdigest() for name, companion in companions.items()}
+        lock.check()
+        disk.write_inside(path, JOURNAL, encode(1, utc_now(), "created", digests))
+    return Store(path)
+
+
+def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
+    """StoreError if no new run can be made in `path`: it holds a run, or anything else.
+
+    companions : files that an earlier attempt, cut short, may have left there.
+    """
+    expected = _OURS_BEFORE_THE_JOURNAL | {Path(name).parts[0] for name in companions}
+    with disk.naming(path):
+        names = {entry.name for entry in path.iterdir()} if path.exists() else set()
+    if JOURNAL in names and is_run_directory(path):
+        raise StoreError(f"{path}: holds a run already; `resume` or `extend` it, or choose another folder")
+    cut_short = LOCK_NAME in names and all(name in expected or disk.is_temporary(name) for name in names)
+    if names and not cut_short:
+        raise StoreError(f"{path}: is not empty and holds no run; choose another folder")
+
+
+class Store:
+    """One run directory.  Ranges of cases are half open: (first, stop)."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        if not is_run_directory(path):
+            raise StoreError(f"{path}: is no run directory" if path.exists() else f"{path}: there is no such folder")
+        self._lock = WriterLock(path)
+        self._counted = Receipts()
+        self._read_journal()
+        try:
+            self.manifest = parse_manifest(self._original(MANIFEST, "manifest"))
+        except ValueError as error:
+            raise StoreError(f"{path / MANIFEST}: {error}") from None
+        self.columns = columns_in(self.manifest)
+        self._count(self.manifest["campaign"]["cases"])
+
+    def _original(self, name: str, fact: str) -> bytes:
+        content = disk.read_short(self.path / name)
+        if sha256(content).hexdigest() != self._created[fact]:
+            raise StoreError(f"{self.path / name}: {_EDITED}")
+        return content
+
+    def _read_journal(self) -> None:
+        if not (self.path / JOURNAL).exists():
+            raise StoreError(f"{self.path}: has no {JOURNAL}, and so no case that counts; `run` the campaign anew")
+        self._journal = Journal(self.path / JOURNAL)
+        if not self._journal.entries or self._journal.entries[0].event != "created":
+            raise StoreError(f"{self.path / JOURNAL}, line 1: damaged, a journal begins with its creation")
+        self._count(self._counted.begun_with)
+
+    def _count(self, begun_with: int | None) -> None:
+        self._counted, wrong = receipts_of(self._journal.entries, begun_with)
+        for number, why in wrong.items():
+            raise damaged_line(self.path / JOURNAL, number, why)
+        self._created = self._journal.entries[0].facts
+
+    def _record(self, event: str, facts: dict[str, Any]) -> None:
+        self._lock.check()
+        self._counted.take(self._journal.append(event, facts))
+
+    @property
+    def campaign_text(self) -> str:
+        """The campaign file as it was flown; StoreError if someone changed it since."""
+        try:
+            return self._original(CAMPAIGN, "campaign").decode()
+        except UnicodeDecodeError as error:
+            raise StoreError(f"{self.path / CAMPAIGN}: is no text: {error}") from None
+
+    def check_companions(self) -> None:
+        """StoreError if a file that the campaign reads from its own folder is no more the one it was flown with."""
+        for problem in edited_files(self.path, self._created.get("companions", {})):
+            raise StoreError(f"{self.path}/{problem}; put the original back")
+
+    # ---- what the journal says
+
+    @property
+    def parts(self) -> list[Part]:
+        """Receipts of all committed parts, by their first case."""
+        return list(self._counted.parts)
+
+    @property
+    def nominal_part(self) -> Part | None:
+        """Receipt of the nominal case, if it was written."""
+        return self._counted.nominal
+
+    @property
+    def history_part(self) -> Part | None:
+        """Receipt of the saved time histories, if any were written."""
+        return self._counted.histories
+
+    def notes(self, event: str | None = None) -> list[Entry]:
+        """Journal entries in order, all or those of one event."""
+        return [entry for entry in self._journal.entries if event is None or entry.event == event]
+
+    @property
+    def n_cases(self) -> int:
+        """How many cases are wanted, after all extensions."""
+        return int(self._counted.cases or self.manifest["campaign"]["cases"])
+
+    @property
+    def wanted(self) -> range:
+        """The cases that this directory is to hold: all of the campaign's, or those of a shard."""
+        return cases_in(self.manifest, self.n_cases)
+
+    def committed(self) -> list[Range]:
+        """The cases on the disk, as merged ranges in order."""
+        return self._counted.committed()
+
+    def missing(self, cases: int | range | None = None) -> list[Range]:
+        """The ranges not committed among `cases`: the first so many, a range, or all wanted ones."""
+        wanted = self.wanted if cases is None else cases if isinstance(cases, range) else range(cases)
+        return self._counted.missing(wanted)
+
+    def status_counts(self) -> dict[str, int]:
+        """Committed cases by status word, without reading a part."""
+        counts: dict[str, int] = {}
+        for part in self.parts:
+            for word, count in part.status.items():
+                counts[word] = counts.get(word, 0) + count
+        return counts
+
+    def lost_files(self) -> list[str]:
+        """Folders, and parts that the journal counts, that are gone; `verify` looks for all other damage too."""
+        files = [*PART_FOLDERS, *(part.file for part in self._counted.all_parts())]
+        return [file for file in files if not (self.path / file).exists()]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every column of `cases`."""
+        return {column.name: column.unit for column in self.columns}
+
+    # ---- reading
+
+    def cases(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
+        """One row per committed case, by case_id; all columns or the named ones, each once.
+
+        `attrs["units"]`, `["descriptions"]` and `["roles"]` hold what the columns are.
+        """
+        wanted = self.columns if columns is None else tuple(self._column(name) for name in dict.fromkeys(columns))
+        tables = [parts.read_part(self.path, part, wanted) for part in self.parts]
+        return _frame(tables, wanted)
+
+    def _column(self, name: str) -> Column:
+        if named := [column for column in self.columns if column.name == name]:
+            return named[0]
+        raise StoreError(f'{self.path}: there is no column "{name}"; there are {", ".join(self.units)}')
+
+    def row(self, case_id: int) -> dict[str, Any]:
+        """One case by column name; StoreError if it is not there."""
+        for part in self.parts:
+            if part.first <= case_id < part.stop:
+                return parts.read_part(self.path, part, self.columns).slice(case_id - part.first, 1).to_pylist()[0]
+        raise StoreError(f"{self.path}: case {case_id} is not there")
+
+    def nominal(self) -> dict[str, Any]:
+        """The nominal case by column name (case_id is -1); empty if none was written."""
+        receipt = self.nominal_part
+        return parts.read_part(self.path, receipt, self.columns).to_pylist()[0] if receipt else {}
+
+    def histories(self) -> pd.DataFrame:
+        """The saved time histories: case_id, t_s and the quantities; no rows if none were written."""
+        quantities, receipt = self.manifest.get("quantities", []), self.history_part
+        tables = [read_histories(self.path, receipt, quantities)] if receipt else []
+        names = tables[0].column_names if tables else [quantity["name"] for quantity in quantities]
+        return _frame(tables, history_columns(names, quantities))
+
+    # ---- writing
+
+    @contextmanager
+    def lock(self) -> Iterator["Store"]:
+        """Be the one writer of this directory for the length of the block; may be nested.
+
+        On the way in, parts that a killed writer's workers had finished are counted, and all else that it left is
+        removed; StoreError if another writer is at work.
+        """
+        if self._lock.held:
+            self._lock.check()
+            yield self
+            return
+        with self._lock as dead:
+            self._read_journal()  # another writer may have been here since this object was made
+            if dead is not None:
+                self._record("lock-taken-over", {"from": dead})
+                count_finished(self)
+            self.sweep()
+            yield self
+
+    def sweep(self) -> None:
+        """Remove temporary files and parts without a journal line; for the holder of the lock."""
+        self._lock.check()
+        if not self._journal.certain:
+            self._read_journal()  # what an append that failed left there decides what counts
+        counted = {part.file for part in self._counted.all_parts()}
+        for folder in PART_FOLDERS:
+            if not (self.path / folder).exists():
+                repair = f"`mc-engine resume {shell_word(self.path)} --repair`"
+                raise StoreError(f"{self.path / folder}: {NO_FOLDER}; {repair} makes it anew")
+            for file in (f"{folder}/{name}" for name in disk.names_in(self.path, folder)):
+                if disk.is_temporary(Path(file).name) or (is_part_file(file) and file not in counted):
+                    disk.remove_file(self.path, file)
+        for name in CUT_SHORT:  # not all temporary files: another process may be writing reports
+            disk.remove_file(self.path, name)
+
+    def append(self, first: int, count: int, columns: Mapping[str, Any]) -> None:
+        """Commit the cases first .. first + count - 1; on return they survive a power cut.
+
+        columns : arrays of `count` for every column but case_id; status in words or codes.
+        """
+        with self.lock():
+            self._refuse_overlap(first, count)
+            self.commit(parts.write_part(self.path, self.columns, first, count, columns))
+
+    def commit(self, part: Part) -> None:
+        """Count a part that `parts.write_part` put into this directory."""
+        with self.lock():
+            self._refuse_overlap(part.first, part.rows)
+            self._record("part", asdict(part))
+
+    def publish(self, written: Written) -> None:
+        """Commit a part that a worker wrote aside in this directory; on return it survives a power cut."""
+        with self.lock():
+            self._refuse_overlap(written.part.first, written.part.rows)
+            leave_receipt(self.path, written.part)
+            self._name(written)
+            self._record("part", asdict(written.part))
+
+    def replace(self, before: Part, written: Written) -> None:
+        """Let a part written aside, of the same cases and another name, count in place of `before`."""
+        with self.lock():
+            self._name(written)
+            self._record("part-replaced", {**asdict(written.part), "replaces": before.file})
+            self._remove(before)
+
+    def _remove(self, before: Part) -> None:
+        with suppress(StoreError):  # it no longer counts, and the next writer tries again
+            disk.remove_file(self.path, before.file)
+
+    def _name(self, written: Written) -> None:
+        if not (self.path / written.temporary).exists():
+            raise StoreError(
+                f"{self.path / written.part.file}: a worker has written it, and it is not here; all workers must see "
+                "the run directory under the same path"
+            )
+        disk.publish(self.path, written.temporary, written.part.file)
+
+    def withdraw(self, part: Part) -> None:
+        """Count a part no more, so that its cases are missing again."""
+        with self.lock():
+            self._record("part-withdrawn", {"file": part.file})
+            self._remove(part)
+
+    def _refuse_overlap(self, first: int, count: int) -> None:
+        if count > 0 and self.missing(range(first, first + count)) != [(first, first + count)]:
+            raise StoreError(f"{self.path}: some of the cases {first} to {first + count - 1} are committed already")
+
+    def note(self, event: str, /, **facts: Any) -> None:
+        """Put an event that is no part into the journal: "started", "finished", "extended" (with cases), ..."""
+        with self.lock():
+            self._record(event, facts)
+
+    def write_nominal(self, row: Mapping[str, Any]) -> None:
+        """Keep the nominal case: a value for every column but case_id."""
+        arrays = {name: np.asarray([value]) for name, value in {**row, "case_id": -1}.items()}
+        table = parts.arrow_table(self.columns, arrays, 1, self.path / NOMINAL)
+        with self.lock():
+            if self.nominal_part is not None:
+                # A kill between the new file and its line must not leave the old line with the new file.
+                self._record("nominal-withdrawn", {})
+            self._record("nominal", asdict(parts.write_table(self.path, NOMINAL, table, first=-1)))
+
+    def write_histories(self, table: "pd.DataFrame | Mapping[str, Any]") -> None:
+        """Keep these histories (case_id, t_s and quantities, one row per sample) in place of any kept before."""
+        arrow = history_table(table, self.manifest.get("quantities", []), self.path / "history")
+        with self.lock():
+            before = self.history_part
+            file = f"history/part-{int(Path(before.file).stem[5:]) + 1 if before else 0:05d}.parquet"
+            self._record("history", asdict(parts.write_table(self.path, file, arrow)))
+            if before is not None:
+                self._remove(before)
+
+
+def _frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> pd.DataFrame:
+    table = pa.concat_tables(tables) if tables else parts.arrow_schema(columns).empty_table()
+    frame = table.to_pandas(use_threads=False)
+    frame.attrs.update(parts.attributes(columns))
+    return frame

@@ -1,0 +1,248 @@
+"""Verification of a run, a tuning or a rare event: every byte against what the journals say was written.
+
+Reads only, and runs no code of the campaign.  Unlike opening a directory, it goes on after the first damage and reports
+all of it.  Checksums detect damage, not forgery: who computes new ones can have the journals say anything.
+"""
+
+import os
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mc_engine.durable_file import is_temporary, names_in, read_short
+from mc_engine.errors import StoreError
+from mc_engine.shell_words import shell_word
+from mc_engine.store.derived_files import STRANGE, derived_files, remade_by
+from mc_engine.store.histories import read_histories
+from mc_engine.store.journal import Scan, read_journal, scan
+from mc_engine.store.manifest_file import cases_in, columns_in, edited_files, parse_manifest
+from mc_engine.store.parts import PART_FOLDERS, Part, is_part_file, problem_of, read_part
+from mc_engine.store.receipts import Receipts, receipts_of
+from mc_engine.store.result_folder import COMMANDS, read_result, result_files
+from mc_engine.store.run_files import (
+    CAMPAIGN,
+    CUT_SHORT,
+    JOURNAL,
+    MANIFEST,
+    NO_FOLDER,
+    NOMINAL,
+    RUN,
+    SENSITIVITY,
+    kind_of,
+)
+from mc_engine.store.writer_lock import LOCK_NAME, holder, is_left_by_dead
+
+# What mends a damage, with the directory in braces, and its file.
+REPAIR = "`mc-engine resume {0} --repair` flies bad parts again, and removes what does not count"
+ORIGINAL = "put back the original of {1}, or fetch a copy of the run; without it no repair can fly anything again"
+IN_THE_WAY = "move {1} out of the run, then `mc-engine resume {0} --repair`: no writer can go on with it in its way"
+RESUME = "left by an interrupted writer; the next `resume` removes it, and flies the rest"  # no damage
+AWAY = "move {1} out of the run: whatever reads its folder takes it for cases"
+AGAIN = "put back the original of {1}, or let `mc-engine %s` make the result again, in another folder"
+
+
+@dataclass(frozen=True)
+class Damage:
+    """What is wrong with a file of the directory, in words that begin with its name, and what mends it."""
+
+    what: str
+    mended_by: str
+
+    @property
+    def file(self) -> str:
+        """The file's name in the directory."""
+        return self.what.partition(": ")[0]
+
+
+def damage(folder: Path) -> list[str]:
+    """A sentence per damage, beginning with the file's name in `folder`; empty if all is as written.
+
+    While a writer is at work, a torn last line and parts without a line are its own business and not reported.
+    Neither are they after a writer was killed: the next one removes them.
+    """
+    return [one.what for one in damages(folder) if one.mended_by != RESUME]
+
+
+def remedies(folder: Path | str, found: list[Damage]) -> list[str]:
+    """A sentence for each kind of damage with what mends it; first what has to be done before all else."""
+    files: dict[str, list[str]] = {remedy: [] for remedy in (ORIGINAL, AWAY, STRANGE, IN_THE_WAY, REPAIR)}
+    for one in found:
+        files.setdefault(one.mended_by, []).append(one.file)
+    named = {remedy: ", ".join(dict.fromkeys(names)) for remedy, names in files.items() if names}
+    return [remedy.format(shell_word(folder), names) for remedy, names in named.items()]
+
+
+def damages(folder: Path) -> list[Damage]:
+    """All damage in the directory, and what an interrupted writer left, with what mends it."""
+    kind = kind_of(folder)
+    if kind is None:
+        raise StoreError(f"{folder}: is no run directory")
+    others: Collection[str] = ()
+    if kind == RUN:
+        found, others = _run_damages(folder)
+    else:
+        found = _result_damages(folder, kind)
+    return found + [Damage(f"{name}: {why}", remade_by(name)) for name, why in derived_files(folder).problems(others)]
+
+
+def _inner(folder: Path, error: StoreError) -> str:
+    """The sentence of an error, with the file's name in the directory."""
+    return str(error).removeprefix(f"{folder}/")
+
+
+# ---- tunings and rare events
+
+
+def _result_damages(folder: Path, kind: str) -> list[Damage]:
+    ours, derived, again = result_files(folder, kind), derived_files(folder), AGAIN % COMMANDS[kind]
+    found = [Damage(f"{name}: {why}", again) for name, why in ours.problems()] if (folder / JOURNAL).exists() else []
+    for name in names_in(folder):
+        if not (ours.are_called(name) or derived.are_called(name) or is_temporary(name)):
+            found.append(Damage(f"{name}: is not of this {kind}", STRANGE))
+    try:
+        if not found:
+            read_result(folder, kind)
+    except StoreError as error:
+        found.append(Damage(_inner(folder, error), again))
+    return found
+
+
+# ---- runs
+
+
+def _run_damages(run: Path) -> tuple[list[Damage], Collection[str]]:
+    """What is wrong with the run itself; and the files that it was made with."""
+    busy = holder(run) is not None
+    lying = sorted(_lying(run))  # before the journal: a part committed in between has its line by then
+    try:
+        journal = scan(read_journal(run / JOURNAL))
+    except StoreError as error:
+        return [Damage(_inner(run, error), ORIGINAL)], ()
+    begun, problems = _begun_with(journal), [Damage(text, ORIGINAL) for text in _head_problems(run, journal)]
+    manifest = None if problems else parse_manifest(read_short(run / MANIFEST))
+    counted, wrong = receipts_of(journal.entries, None if manifest is None else manifest["campaign"]["cases"])
+    killed = not busy and is_left_by_dead(run) and not (journal.damaged or wrong)
+    remedy = RESUME if killed else REPAIR  # a part without a line is damage where a line is: it may be that one's
+    problems += _line_problems(journal, wrong, busy, remedy)
+    problems += _part_problems(run, counted, manifest)
+    problems += _obstacles(run)
+    if not busy:
+        problems += _uncounted(run, lying, counted, remedy)
+        problems += _unfinished(journal, counted, manifest, remedy)
+        problems += _beside(run, journal)
+    if killed:
+        problems += _half_written(run)
+    return problems, begun
+
+
+def _beside(run: Path, journal: Scan) -> Iterator[Damage]:
+    """What is wrong with the flights beside the run, which its last session made or completed."""
+    flown = any(entry.event == "companion" for entry in journal.entries)
+    if flown and not _is_folder(run / SENSITIVITY):
+        yield Damage(f"{SENSITIVITY}: {NO_FOLDER}", REPAIR)
+    elif _is_folder(run / SENSITIVITY):
+        for one in damages(run / SENSITIVITY) if kind_of(run / SENSITIVITY) == RUN else ():
+            yield Damage(f"{SENSITIVITY}/{one.what}", one.mended_by)
+
+
+def _begun_with(journal: Scan) -> dict[str, str]:
+    """SHA-256 by name of the files that the run was made with; empty where the line that says so is lost."""
+    if not journal.entries or journal.entries[0].number != 1 or receipts_of(journal.entries[:1])[1]:
+        return {}
+    created = journal.entries[0].facts
+    return {MANIFEST: created["manifest"], CAMPAIGN: created["campaign"], **created.get("companions", {})}
+
+
+def _head_problems(run: Path, journal: Scan) -> Iterator[str]:
+    """Manifest, campaign and the files beside it against the digests in the journal's first line."""
+    begun = _begun_with(journal)
+    if not begun:
+        yield f"{JOURNAL}: its first line, the creation, is lost; {MANIFEST} and {CAMPAIGN} cannot be verified"
+        return
+    problems = list(edited_files(run, begun))
+    yield from problems
+    try:
+        if not any(problem.startswith(f"{MANIFEST}: ") for problem in problems):
+            parse_manifest(read_short(run / MANIFEST))
+    except (StoreError, ValueError) as error:
+        yield f"{MANIFEST}: {error}"
+
+
+def _part_problems(run: Path, counted: Receipts, manifest: dict[str, Any] | None) -> Iterator[Damage]:
+    columns = None if manifest is None else columns_in(manifest)
+    for part in counted.parts if counted.nominal is None else [*counted.parts, counted.nominal]:
+        yield from _damage_of(run, part, lambda: read_part(run, part, columns))  # noqa: B023
+    if (kept := counted.histories) is not None:
+        if manifest is None:
+            yield from _damage_of(run, kept, lambda: read_part(run, kept))
+        else:
+            yield from _damage_of(run, kept, lambda: read_histories(run, kept, manifest.get("quantities", [])))
+
+
+def _damage_of(run: Path, part: Part, read: Callable[[], object]) -> Iterator[Damage]:
+    if problem := problem_of(run / part.file, read):
+        yield Damage(f"{part.file}: {problem}", IN_THE_WAY if _is_folder(run / part.file) else REPAIR)
+
+
+def _is_folder(path: Path) -> bool:
+    return path.is_dir() and not path.is_symlink()
+
+
+def _obstacles(run: Path) -> Iterator[Damage]:
+    """Folders beside manifest and journal that keep every writer from its work."""
+    for name in (LOCK_NAME, *CUT_SHORT):
+        if _is_folder(run / name):
+            yield Damage(f"{name}: is a folder", IN_THE_WAY)
+
+
+def _lying(run: Path) -> Iterator[str]:
+    """All that lies where parts do, but for what the next writer removes."""
+    if (run / NOMINAL).exists():
+        yield NOMINAL
+    for folder in PART_FOLDERS:
+        if not _is_folder(run / folder):
+            yield folder
+            continue
+        for name in names_in(run, folder):
+            if not is_temporary(name) or (run / folder / name).is_dir():
+                yield f"{folder}/{name}"
+
+
+def _half_written(run: Path) -> Iterator[Damage]:
+    for path in sorted([*run.glob(".*.tmp"), *run.glob("*/.*.tmp")]):
+        if path.is_file():
+            yield Damage(f"{path.relative_to(run).as_posix()}: is a temporary file", RESUME)
+
+
+def _uncounted(run: Path, lying: list[str], counted: Receipts, remedy: str) -> Iterator[Damage]:
+    files = {part.file for part in counted.all_parts()}
+    for file in lying:
+        if file in PART_FOLDERS and not os.path.lexists(run / file):
+            yield Damage(f"{file}: {NO_FOLDER}", REPAIR)
+        elif file in PART_FOLDERS:
+            yield Damage(f"{file}: is no folder of this run's own", ORIGINAL)
+        elif file not in files and (file == NOMINAL or is_part_file(file)) and _is_folder(run / file):
+            yield Damage(f"{file}: is a folder", IN_THE_WAY)
+        elif file not in files and (file == NOMINAL or is_part_file(file)):
+            yield Damage(f"{file}: has no line in the journal and does not count", remedy)
+        elif file not in files:
+            yield Damage(f"{file}: is not of this run", AWAY)
+
+
+def _unfinished(journal: Scan, counted: Receipts, manifest: dict[str, Any] | None, remedy: str) -> Iterator[Damage]:
+    """A run that has all its cases, and whose session neither finished nor said that it was interrupted."""
+    told = [entry.event for entry in journal.entries if entry.event in ("started", "rerun", "finished", "interrupted")]
+    if manifest is None or counted.cases is None or not told or told[-1] in ("finished", "interrupted"):
+        return
+    if not counted.missing(cases_in(manifest, counted.cases)):
+        yield Damage(f"{JOURNAL}: all cases are there, and no line says that the run was finished", remedy)
+
+
+def _line_problems(journal: Scan, wrong: dict[int, str], busy: bool, remedy: str) -> Iterator[Damage]:
+    lines = {number: "" for number in journal.damaged} | {number: f", {why}" for number, why in wrong.items()}
+    for number, why in sorted(lines.items()):
+        yield Damage(f"{JOURNAL}, line {number}: damaged{why}", REPAIR if number > 1 else ORIGINAL)
+    if journal.torn and not busy:
+        last = len(journal.entries) + len(journal.damaged) + 1
+        yield Damage(f"{JOURNAL}, line {last}: torn; the next writer cuts it off", remedy)

@@ -1,0 +1,278 @@
+"""Comparison of two runs: which metrics, requirements and fractions of cases changed beyond chance.
+
+Cases are compared in pairs where both runs flew the same inputs under the same number, which takes what the inputs
+have in common out of the difference; else as two independent samples.  All tests of a comparison (shift and spread of
+each metric, the fraction of cases completed, the fraction inside each requirement) hold together at `alpha`
+(Holm): if nothing changed, the chance of even one false alarm is at most alpha.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+import pandas as pd
+
+from mc_engine.errors import EngineError
+from mc_engine.statistics.change_tests import MetricChange, ShareChange, holm, metric_change, share_change
+from mc_engine.statistics.requirements import (
+    FAIL,
+    NOT_DEMONSTRABLE,
+    PASS,
+    SAMPLING_DESIGNS,
+    Verdict,
+    inside_all,
+    judge_all,
+    was_looked_at,
+)
+from mc_engine.status import OK, STATUS_NAME
+from mc_engine.studies.run_changes import Difference, campaign_diff, campaign_differences, code_differences
+
+ALPHA = 0.003  # one false alarm in some 300 comparisons; 0.3 sigma is still found with 1000 cases and dozens of metrics
+TOLERANCE = 1e-6  # standard deviations: smaller differences of a pair are rounding
+CONFIDENCE = 0.95
+FLOWN = "completed"
+_RANK = {PASS: 0, NOT_DEMONSTRABLE: 1, FAIL: 2}
+
+
+class ComparedRun(Protocol):
+    """What a comparison needs of a store."""
+
+    @property
+    def manifest(self) -> dict[str, Any]: ...
+    @property
+    def campaign_text(self) -> str: ...
+    def cases(self) -> pd.DataFrame: ...
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """Rows of the two tables that are compared, int64[n] each; `reason` says in a sentence why they are (not) pairs."""
+
+    paired: bool
+    rows: tuple[np.ndarray, np.ndarray]
+    reason: str
+
+
+@dataclass(frozen=True)
+class VerdictChange:
+    """A requirement's verdict in each run, by that run's own limits; None where a run has no such requirement.
+
+    inside : by run, how many of its cases are inside the limits, of all.
+    """
+
+    name: str
+    before: str | None
+    after: str | None
+    inside: tuple[tuple[int, int] | None, tuple[int, int] | None] = (None, None)
+
+    @property
+    def words(self) -> str:
+        """Such as "fail → pass", or "pass in both runs"."""
+        ends = [one or "not required" for one in (self.before, self.after)]
+        return " → ".join(ends) if ends[0] != ends[1] else f"{ends[0]} in both runs"
+
+    def inside_words(self, counted: Callable[[int], str]) -> str:
+        """Such as "877 → 10,000 of 10,000 cases inside"; counted : how a number of cases is written."""
+        a, b = self.inside
+        if a is None or b is None:
+            return ""
+        (passed, tried), (now, of) = a, b
+        before = counted(passed) if tried == of else f"{counted(passed)} of {counted(tried)}"
+        return f"{before} → {counted(now)} of {counted(of)} cases inside"
+
+    @property
+    def worse(self) -> bool:
+        """Whether the verdict is worse than before, in the order pass, not demonstrable, fail."""
+        return self.before is not None and self.after is not None and _RANK[self.after] > _RANK[self.before]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Run A (before) and run B (after).  cases, ok : by run, all cases, and those flown to their end.
+
+    metrics in the order of B's columns; units by metric; left_out : metrics that are not compared, and why.
+    """
+
+    names: tuple[str, str]
+    titles: tuple[str, str]
+    created: tuple[str, str]
+    cases: tuple[int, int]
+    ok: tuple[int, int]
+    pairing: Pairing
+    alpha: float
+    tolerance: float
+    metrics: tuple[MetricChange, ...]
+    shares: tuple[ShareChange, ...]
+    verdicts: tuple[VerdictChange, ...]
+    units: Mapping[str, str]
+    left_out: tuple[str, ...]
+    code: tuple[Difference, ...]
+    campaign: tuple[Difference, ...]
+    diff: tuple[str, ...]
+
+    @property
+    def n_tests(self) -> int:
+        """Tests that were compared with alpha together."""
+        return int(np.isfinite(_p_values(self.metrics, self.shares)).sum())
+
+    @property
+    def shifted(self) -> tuple[MetricChange, ...]:
+        return tuple(one for one in self.metrics if one.shift_adjusted <= self.alpha)
+
+    @property
+    def spread(self) -> tuple[MetricChange, ...]:
+        return tuple(one for one in self.metrics if one.spread_adjusted <= self.alpha)
+
+    @property
+    def moved_shares(self) -> tuple[ShareChange, ...]:
+        return tuple(one for one in self.shares if one.adjusted <= self.alpha)
+
+    @property
+    def worse_verdicts(self) -> tuple[VerdictChange, ...]:
+        """Requirements with a worse verdict on the same cases; on other cases chance alone may change a verdict."""
+        return tuple(one for one in self.verdicts if one.worse) if self.pairing.paired else ()
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything changed beyond chance, or a requirement has a worse verdict on the same cases."""
+        return bool(self.shifted or self.spread or self.moved_shares or self.worse_verdicts)
+
+
+def compare_runs(
+    a: ComparedRun, b: ComparedRun, names: tuple[str, str], *, alpha: float = ALPHA, tolerance: float = TOLERANCE
+) -> Comparison:
+    """Run `a` (before) against run `b` (after).  names : what to call them, for example their directories.
+
+    EngineError if they have no metric of the same name and unit: that nothing changed would be no answer.
+    """
+    manifests = a.manifest, b.manifest
+    tables = a.cases(), b.cases()
+    facts = tuple({one["name"]: one for one in manifest["columns"]} for manifest in manifests)
+    pairing = pair_cases(tables, (_of_role(facts[0], "dispersion"), _of_role(facts[1], "dispersion")))
+    metrics, left_out = _shared_metrics(*facts)
+    if left_out and not metrics:
+        raise EngineError(f"{names[0]} and {names[1]} have no metric of the same name and unit: nothing to compare")
+    ok = tuple(np.asarray(table["status"] == STATUS_NAME[OK], dtype=bool) for table in tables)
+    values = [
+        {name: np.where(flown, table[name].to_numpy(dtype=np.float64), np.nan) for name in metrics}
+        for table, flown in zip(tables, ok, strict=True)
+    ]
+    first, second = pairing.rows
+    changes = [
+        metric_change(name, values[0][name][first], values[1][name][second], paired=pairing.paired,
+                      confidence=CONFIDENCE, tolerance=tolerance)
+        for name in metrics
+    ]  # fmt: skip
+    counted = {FLOWN: ok, **_inside(manifests[1], values, ok)}
+    shares = [
+        share_change(name, one[first], other[second], paired=pairing.paired, confidence=CONFIDENCE)
+        for name, (one, other) in counted.items()
+    ]
+    adjusted = iter(holm(_p_values(changes, shares)).tolist())
+    return Comparison(
+        names=names,
+        titles=_each(manifests, lambda one: str(one["campaign"].get("title") or one["campaign"].get("name", ""))),
+        created=_each(manifests, lambda one: str(one.get("created_utc", ""))),
+        cases=_each(tables, len),
+        ok=_each(ok, lambda one: int(one.sum())),
+        pairing=pairing,
+        alpha=alpha,
+        tolerance=tolerance,
+        metrics=tuple(replace(one, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for one in changes),
+        shares=tuple(replace(one, adjusted=next(adjusted)) for one in shares),
+        verdicts=_verdicts(manifests, tables, ok),
+        units={name: str(facts[1][name].get("unit", "")) for name in metrics},
+        left_out=left_out,
+        code=code_differences(*manifests),
+        campaign=campaign_differences(*manifests),
+        diff=campaign_diff(a.campaign_text, b.campaign_text),
+    )
+
+
+def pair_cases(tables: tuple[pd.DataFrame, pd.DataFrame], inputs: tuple[list[str], list[str]]) -> Pairing:
+    """Pairs of cases with the same number and the same inputs; all cases, unpaired, where fewer than half have one."""
+    everything = np.arange(len(tables[0])), np.arange(len(tables[1]))
+    if set(inputs[0]) != set(inputs[1]):
+        odd = ", ".join(sorted(set(inputs[0]) ^ set(inputs[1])))
+        return Pairing(False, everything, f"not paired: only one of the runs disperses {odd}")
+    _, first, second = np.intersect1d(
+        tables[0]["case_id"].to_numpy(), tables[1]["case_id"].to_numpy(), assume_unique=True, return_indices=True
+    )
+    same = np.ones(first.size, dtype=bool)
+    unlike = []
+    for name in inputs[0]:
+        equal = _equal(tables[0][name].to_numpy()[first], tables[1][name].to_numpy()[second])
+        same &= equal
+        unlike += [name] if not equal.all() else []
+    fewest = min(len(tables[0]), len(tables[1]))
+    if 2 * int(same.sum()) < fewest or not fewest:
+        why = f"the same case numbers have other inputs ({', '.join(unlike)})" if unlike else "no case is in both runs"
+        return Pairing(False, everything, f"not paired: {why}")
+    n = int(same.sum())
+    rest = len(tables[0]) + len(tables[1]) - 2 * n
+    more = f"; {rest} cases that only one run has, or with other inputs, are left out" if rest else ""
+    return Pairing(True, (first[same], second[same]), f"paired: {n} cases have the same inputs in both runs{more}")
+
+
+def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    if a.dtype.kind == "f" and b.dtype.kind == "f":
+        return (a == b) | (np.isnan(a) & np.isnan(b))
+    return np.asarray(a == b, dtype=bool)
+
+
+def _of_role(facts: Mapping[str, Mapping[str, Any]], role: str) -> list[str]:
+    return [name for name, one in facts.items() if one.get("role") == role]
+
+
+def _shared_metrics(
+    a: Mapping[str, Mapping[str, Any]], b: Mapping[str, Mapping[str, Any]]
+) -> tuple[list[str], tuple[str, ...]]:
+    """Metrics of both runs, in the same unit; and a sentence for each of the others."""
+    ours, theirs = _of_role(b, "metric"), _of_role(a, "metric")
+    left_out = [f"{name}: only in A" for name in theirs if name not in ours]
+    left_out += [f"{name}: only in B" for name in ours if name not in theirs]
+    shared = [name for name in ours if name in theirs]
+    units = {name: (a[name].get("unit", ""), b[name].get("unit", "")) for name in shared}
+    left_out += [f"{name}: in {one} in A, in {two} in B" for name, (one, two) in units.items() if one != two]
+    return [name for name in shared if units[name][0] == units[name][1]], tuple(left_out)
+
+
+def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok: Any) -> dict[str, Any]:
+    """bool[n] of both runs for each requirement of B: inside its limits."""
+    return {
+        str(record["name"]): tuple(
+            inside_all([record], one.__getitem__, flown) for one, flown in zip(values, ok, strict=True)
+        )
+        for record in manifest.get("requirements", [])
+        if record["metric"] in values[0]
+    }
+
+
+def _verdicts(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
+    found: list[dict[str, Verdict]] = []
+    for manifest, table, flown in zip(manifests, tables, ok, strict=True):
+        design = str(manifest["campaign"].get("design", "mc"))
+        records = manifest.get("requirements", []) if design in SAMPLING_DESIGNS else []
+        looked = was_looked_at(manifest, len(table))
+        columns = {one["metric"]: table[one["metric"]].to_numpy(dtype=np.float64) for one in records}
+        judged, joint = judge_all(records, columns.__getitem__, flown, design, looked)
+        found.append({verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]})
+    changes = []
+    for name in dict.fromkeys([*found[0], *found[1]]):
+        a, b = (_told(one.get(name)) for one in found)
+        changes.append(VerdictChange(name, a[0], b[0], (a[1], b[1])))
+    return tuple(changes)
+
+
+def _told(verdict: Verdict | None) -> tuple[str | None, tuple[int, int] | None]:
+    return (None, None) if verdict is None else (verdict.outcome, (verdict.passed, verdict.tried))
+
+
+def _p_values(metrics: Any, shares: Any) -> list[float]:
+    of_metrics = [p for one in metrics for p in (one.shift_p, one.spread_p)]
+    return of_metrics + [one.p_value for one in shares]
+
+
+def _each(pair: Any, function: Any) -> Any:
+    return tuple(function(one) for one in pair)

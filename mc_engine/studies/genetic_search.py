@@ -1,0 +1,102 @@
+"""The search behind `mc-engine tune`: NSGA-II of pymoo, asked for candidates and told what they came to.
+
+K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002), 182-197; its
+constraints: a feasible candidate beats any other, of two others the one with the smaller violation.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from mc_engine.campaign.tuning_section import Tuning
+from mc_engine.errors import EngineError
+from mc_engine.extras import how_to_install
+from mc_engine.studies.candidates import Scores
+
+_WORST = 1e30  # stands for an objective without a number; such a candidate is infeasible anyway
+_DEAD = 1e15  # violation of a candidate without a number for every metric
+_CROSSOVER_INDEX, _MUTATION_INDEX = 15.0, 20.0  # Deb's distribution indices: how near children stay to their parents
+
+
+class GeneticSearch:
+    """One search; `ask` and `tell` in turn.  The same seed and the same answers give the same candidates."""
+
+    def __init__(self, tuning: Tuning, population: int, seed: int):
+        """EngineError in a sentence if pymoo is not installed."""
+        pymoo = _pymoo()
+        n_tuned = len(tuning.parameters)
+        self._signs = np.array([1.0 if one.large_is_bad else -1.0 for one in tuning.objectives])
+        self._problem = pymoo["Problem"](
+            n_var=n_tuned,
+            n_obj=len(tuning.objectives),
+            n_ieq_constr=len(tuning.constraints) + 1,
+            xl=np.array([one.lower for one in tuning.parameters]),
+            xu=np.array([one.upper for one in tuning.parameters]),
+        )
+        self._evaluate, self._static = pymoo["Evaluator"]().eval, pymoo["StaticProblem"]
+        self._algorithm = pymoo["NSGA2"](
+            pop_size=population,
+            sampling=pymoo["LHS"](),
+            crossover=pymoo["SBX"](prob=tuning.crossover, eta=_CROSSOVER_INDEX),
+            mutation=pymoo["PM"](prob=1.0, prob_var=tuning.mutation or 1.0 / n_tuned, eta=_MUTATION_INDEX),
+        )
+        self._algorithm.setup(self._problem, seed=seed, termination=("n_gen", 10**9), verbose=False)
+        self._asked: Any = None
+
+    def ask(self) -> np.ndarray:
+        """The next generation, float64[n, n_tuned]; no rows where the search makes no child that is new to it."""
+        self._asked = self._algorithm.ask()
+        if self._asked is None or not len(self._asked):
+            return np.empty((0, self._problem.n_var))
+        return np.array(self._asked.get("X"), dtype=np.float64)
+
+    def tell(self, scores: Scores) -> None:
+        """What the candidates of the last `ask` came to."""
+        dead = ~np.isfinite(scores.violation)
+        objectives = np.where(np.isfinite(scores.objectives), scores.objectives * self._signs, _WORST)
+        excess = np.column_stack([np.nan_to_num(scores.excess, nan=0.0), np.where(dead, _DEAD, 0.0)])
+        self._evaluate(self._static(self._problem, F=objectives, G=excess), self._asked)
+        self._algorithm.tell(infills=self._asked)
+
+
+def _pymoo() -> dict[str, Any]:
+    """The names of pymoo that the search uses; imported here, so that only a search needs the package."""
+    try:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.evaluator import Evaluator
+        from pymoo.core.problem import Problem
+        from pymoo.operators.crossover.sbx import SBX
+        from pymoo.operators.mutation.pm import PM
+        from pymoo.operators.sampling.lhs import LHS
+        from pymoo.problems.static import StaticProblem
+    except ModuleNotFoundError as error:
+        if (error.name or "").split(".")[0] != "pymoo":
+            raise
+        raise EngineError(f"tuning needs pymoo, which is not installed; {how_to_install('tune')}") from None
+    names = (NSGA2, Evaluator, Problem, SBX, PM, LHS, StaticProblem)
+    return {one.__name__: one for one in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}
+
+
+def non_dominated(values: np.ndarray) -> np.ndarray:
+    """bool[n], true where no other row is as small in every column and smaller in one; of equal rows the first.
+
+    values : float64[n, n_objectives].  Rows that are not finite are never true.
+    """
+    from pymoo.util.nds.non_dominated_sorting import NonDominatedSorting
+
+    best = np.zeros(len(values), dtype=bool)
+    usable = np.flatnonzero(np.isfinite(values).all(axis=1))
+    rows = usable[np.unique(values[usable], axis=0, return_index=True)[1]]
+    if rows.size:
+        best[rows[NonDominatedSorting().do(values[rows], only_non_dominated_front=True)]] = True
+    return best
+
+
+def hypervolume(values: np.ndarray, reference: np.ndarray) -> float:
+    """Volume between `reference` and the rows that are below it in every column; 0 where there are none.
+
+    values : float64[n, n_objectives];  reference : float64[n_objectives].
+    """
+    from pymoo.indicators.hv import HV
+
+    return float(HV(ref_point=reference)(values))

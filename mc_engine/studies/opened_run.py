@@ -1,0 +1,242 @@
+"""A run and its cases for an interactive session: what was asked, what came out, and how each case went.
+
+    run = open_run("runs/deorbit")
+    run.verdicts                  every requirement, judged
+    run.cases                     the case table, a pandas DataFrame
+    run.case(17).history()        its flight, from the store or flown again
+
+`Run` and `Case` show themselves as tables in a notebook.  They read; what writes is in `mc_engine.store.store`.
+"""
+
+from base64 import b64encode
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from mc_engine.errors import StoreError
+from mc_engine.runner.summary import case_line, judgement, summaries, verdict_line
+from mc_engine.shell_words import shell_word
+from mc_engine.store.opening import open_store
+from mc_engine.store.store import Store
+from mc_engine.studies.replay_files import history_figure
+from mc_engine.suggestions import hint
+from mc_engine.text import clean
+
+if TYPE_CHECKING:
+    from mc_engine.runner.runner import Replay
+    from mc_engine.statistics import Summary, Verdict
+
+NOMINAL = -1  # case_id of the nominal case
+_DIGITS = 6
+
+
+def open_run(path: str | Path) -> "Run":
+    """The run in directory `path`; StoreError if there is none, or it is damaged."""
+    return Run(open_store(path))
+
+
+class _Metrics(dict[str, "Summary"]):
+    """Summaries by metric; a name that is not there is answered with the nearest."""
+
+    def __init__(self, path: Path, found: "dict[str, Summary]"):
+        super().__init__(found)
+        self._path = path
+
+    def __missing__(self, name: str) -> "Summary":
+        raise StoreError(f'{self._path}: there is no metric "{name}"{hint(str(name), self)}')
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run directory as it stands when it is first asked; open it again to see what was flown since."""
+
+    store: Store
+
+    @property
+    def path(self) -> Path:
+        """The run directory."""
+        return self.store.path
+
+    @property
+    def title(self) -> str:
+        """The campaign's title, or else its name."""
+        campaign = self.store.manifest["campaign"]
+        return str(campaign.get("title") or campaign.get("name", ""))
+
+    @cached_property
+    def cases(self) -> pd.DataFrame:
+        """A row a case, by case_id; `attrs["units"]` and `["descriptions"]` say what the columns are."""
+        return self.store.cases()
+
+    @property
+    def statuses(self) -> dict[str, int]:
+        """How many cases ended in which status."""
+        return self.store.status_counts()
+
+    @cached_property
+    def verdicts(self) -> "list[Verdict]":
+        """Every requirement judged on the cases at hand, and all of them at once where there are several."""
+        judged, joint = judgement(self.store)
+        return judged if joint is None else [*judged, joint]
+
+    @cached_property
+    def metrics(self) -> "dict[str, Summary]":
+        """Moments and quantiles of every metric, with n_used of n_tried; StoreError for a name that is no metric."""
+        return _Metrics(self.store.path, summaries(self.store))
+
+    @property
+    def nominal(self) -> "Case":
+        """The nominal case; StoreError if it has not been flown."""
+        return self.case(NOMINAL)
+
+    def case(self, case_id: int) -> "Case":
+        """One case by its number; -1 is the nominal one.  StoreError if it is not there, or no number."""
+        if not isinstance(case_id, int | np.integer) or isinstance(case_id, bool):
+            raise StoreError(f"{self.path}: case {case_id!r} is not there; cases are whole numbers, from 0 to "
+                             f"{self.store.n_cases - 1}, and {NOMINAL} is the nominal one")  # fmt: skip
+        row = self.store.nominal() if case_id == NOMINAL else self.store.row(case_id)
+        if not row:
+            resume = f"`mc-engine resume {shell_word(self.path)}`"
+            raise StoreError(f"{self.path}: the nominal case is not there; {resume} flies it")
+        return Case(self.store, case_id, row)
+
+    def __repr__(self) -> str:
+        lines = [f"Run {self.path}: {self.title}", f"  {case_line(self.store)}"]
+        return clean("\n".join([*lines, *(f"  {verdict_line(one, self.store.units)}" for one in self.verdicts)]))
+
+    def _repr_html_(self) -> str:
+        units = self.store.units
+        verdicts = [
+            [one.name, one.outcome, verdict_line(one, units).split(f"{one.outcome}, ", 1)[-1]] for one in self.verdicts
+        ]
+        metrics = [
+            [name, units[name], f"{one.n_used:,} of {one.n_tried:,}", one.mean, one.sd, one.minimum, one.maximum]
+            for name, one in self.metrics.items()
+        ]
+        return "".join(
+            [
+                f"<h4>{_html(self.title)}</h4><p>{_html(case_line(self.store))}</p>",
+                _table(["requirement", "verdict", "on which cases"], verdicts),
+                _table(["metric", "unit", "cases with a number", "mean", "sd", "smallest", "largest"], metrics),
+            ]
+        )
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case of a run: `row` is its line of the case table, by column name."""
+
+    store: Store
+    case_id: int
+    row: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Such as "case 17", or "nominal case"."""
+        return "nominal case" if self.case_id == NOMINAL else f"case {self.case_id}"
+
+    @property
+    def status(self) -> str:
+        """How it ended, a word of `mc_engine.status`."""
+        return str(self.row["status"])
+
+    @property
+    def reason(self) -> str:
+        """Why it was refused, else empty."""
+        return str(self.row["reason"])
+
+    @property
+    def inputs(self) -> pd.Series:
+        """Its dispersed inputs, in the units that their names end in."""
+        return self._with_role("dispersion")
+
+    @property
+    def metrics(self) -> pd.Series:
+        """What it came to; NaN where it failed."""
+        return self._with_role("metric")
+
+    @property
+    def end_state(self) -> pd.Series:
+        """Its last state, with the time."""
+        return self._with_role("state")
+
+    def _with_role(self, role: str) -> pd.Series:
+        names = [column.name for column in self.store.columns if column.role == role]
+        return pd.Series({name: self.row[name] for name in names}, name=self.name, dtype=object).infer_objects()
+
+    def history(self) -> pd.DataFrame:
+        """Its flight: case_id, t_s and the quantities.  Read if the run kept it, else flown again.
+
+        StoreError if what is flown again is not the case of the run, bit for bit.
+        """
+        kept = self._kept_history()
+        if len(kept):
+            return kept
+        again = self.replay()
+        if not again.equal:
+            raise StoreError(f"{self.store.path}: {again.differences[0]}; the run was changed, or flown elsewhere")
+        return again.history
+
+    def _kept_history(self) -> pd.DataFrame:
+        table = self.store.histories()
+        return table[table["case_id"] == self.case_id].reset_index(drop=True)
+
+    def replay(self) -> "Replay":
+        """The case flown again, alone, every stored number compared bit for bit.
+
+        StoreError for the nominal case, which is no draw of the campaign.
+        """
+        from mc_engine.runner.runner import replay  # which loads the compiler
+
+        if self.case_id == NOMINAL:
+            raise StoreError(f"{self.store.path}: the nominal case cannot be replayed; cases from 0 on can")
+        return replay(self.store.path, self.case_id)
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{name}={_text(value)}" for name, value in {**self.inputs, **self.metrics}.items())
+        return clean(f"{self.name} of {self.store.path}: {self.status}; {numbers}")
+
+    def _repr_html_(self) -> str:
+        units = self.store.units
+        rows = [[what, name, value, units[name]] for what, columns in (("input", self.inputs), ("metric", self.metrics))
+                for name, value in columns.items()]  # fmt: skip
+        why = f" ({_html(self.reason)})" if self.reason else ""
+        head = f"<h4>{_html(self.name)}: {_html(self.status)}{why}</h4>"
+        return head + _table(["", "column", "value", "unit"], rows) + self._picture()
+
+    def _picture(self) -> str:
+        """The kept history as a small picture; nothing is flown for being shown."""
+        history = self._kept_history()
+        if not len(history):
+            return "<p>Its history was not kept; <code>.history()</code> flies it again.</p>"
+        image = BytesIO()
+        figure = history_figure(history, self.store.manifest.get("quantities", []), self.name)
+        figure.savefig(image, format="png", dpi=60)
+        data = b64encode(image.getvalue()).decode()
+        return f'<img alt="history of {_html(self.name)}" src="data:image/png;base64,{data}">'
+
+
+def _html(text: str) -> str:
+    return escape(clean(text))
+
+
+def _table(heads: list[str], rows: list[list[Any]]) -> str:
+    if not rows:
+        return ""
+    head = "".join(f"<th>{_html(one)}</th>" for one in heads)
+    body = "".join("<tr>" + "".join(f"<td>{_html(_text(cell))}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, float | np.floating):
+        return f"{value:.{_DIGITS}g}"
+    return str(value)

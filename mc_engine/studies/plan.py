@@ -1,0 +1,125 @@
+"""How many cases demonstrate a required probability: tables for one, and for the requirements of a campaign."""
+
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import NamedTuple
+
+from mc_engine.campaign.loading import Campaign
+from mc_engine.campaign.parts import Requirement
+from mc_engine.statistics.binomial import (
+    acceptance_number,
+    half_rate_share,
+    lower_bound,
+    pass_chance,
+    smallest_interval_sample,
+    smallest_sample,
+)
+from mc_engine.statistics.requirements import JOINT, SAMPLING_DESIGNS, joint_share
+from mc_engine.statistics.time_uniform import smallest_sample as smallest_at_any_time
+
+ROWS = 6  # failures 0 to 5
+
+
+class PlanRow(NamedTuple):
+    """failures allowed among `cases`; `shown` is the share that they still demonstrate.
+
+    half_rate : probability that so many cases pass a system that fails half as often as it may.
+    """
+
+    failures: int
+    cases: int
+    shown: float
+    half_rate: float
+
+
+def plan_row(share: float, confidence: float, failures: int) -> PlanRow:
+    """The smallest sample for so many failures, and what it comes to."""
+    cases = smallest_sample(share, confidence, failures)
+    passes = pass_chance(cases, failures, half_rate_share(share))
+    return PlanRow(failures, cases, lower_bound(cases - failures, cases, confidence), passes)
+
+
+def plan_table(share: float, confidence: float, rows: int = ROWS) -> list[PlanRow]:
+    """The smallest samples for 0, 1, ..., rows - 1 failures."""
+    return [plan_row(share, confidence, failures) for failures in range(rows)]
+
+
+def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Iterator[str]:
+    """A line per row, under a heading; with the cases that `run --until verdict` takes for as many failures."""
+    heading = f"{'failures':>8}  {'cases':>9}  {'until verdict':>13}  {'demonstrated share':>18}"
+    yield f"{heading}  passes at half the failures"
+    for row in rows:
+        anytime = smallest_at_any_time(share, confidence, row.failures)
+        yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {row.shown:>18.6f}  {100.0 * row.half_rate:.1f} %"
+
+
+def interval_lines(share: float, confidence: float, rows: int = 3) -> Iterator[str]:
+    """Cases for an interval between order statistics that holds the share (two-sided, Wilks)."""
+    yield f"{'between the':>28}  {'cases':>9}"
+    for rank in range(1, rows + 1):
+        words = "smallest and the largest" if rank == 1 else f"{_ordinal(rank)} smallest and largest"
+        yield f"{words:>28}  {smallest_interval_sample(share, confidence, rank):>9}"
+
+
+def _ordinal(rank: int) -> str:
+    return f"{rank}{({2: 'nd', 3: 'rd'}).get(rank, 'th')}"
+
+
+def plan_lines(campaign: Campaign, failures: Sequence[int] = range(ROWS), two_sided: bool = False) -> Iterator[str]:
+    """The plan of a campaign with requirements, line by line.
+
+    failures : a row for each number of failed cases.  two_sided : also the cases for intervals by order statistics.
+    """
+    yield f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}"
+    if campaign.design not in SAMPLING_DESIGNS:
+        yield f'shares of cases of design "{campaign.design}" are no probabilities: what follows is for "mc"'
+    asked = sorted(campaign.requirements, key=_wanted, reverse=True)
+    for (share, confidence), group in groupby(asked, key=_wanted):
+        yield from _block(", ".join(one.name for one in group), share, confidence, failures, campaign.cases, two_sided)
+    if len(asked) > 1:
+        yield from _together(campaign, failures)
+
+
+def _wanted(requirement: Requirement) -> tuple[float, float]:
+    return requirement.share, requirement.confidence
+
+
+def _block(
+    names: str, share: float, confidence: float, failures: Sequence[int], cases: int, two_sided: bool
+) -> Iterator[str]:
+    yield ""
+    yield f"{names}: share {share:.10g} with confidence {confidence:.10g}"
+    yield from table_lines([plan_row(share, confidence, one) for one in failures], share, confidence)
+    yield _allowance(cases, share, confidence)
+    if two_sided:
+        yield from ["", *interval_lines(share, confidence)]
+
+
+def _allowance(cases: int, share: float, confidence: float) -> str:
+    """What the file's own number of cases comes to."""
+    accepted = acceptance_number(cases, share, confidence)
+    if accepted is None:
+        needed = plan_row(share, confidence, 0).cases
+        return f"  {cases:,} in the file are too few, even if none fails: {needed:,} are needed"
+    just, half = (pass_chance(cases, accepted, one) for one in (share, half_rate_share(share)))
+    return (
+        f"  {cases:,} cases allow {accepted:,} failures; they pass a system that just misses the share with "
+        f"{100.0 * just:.1f} %, one that fails half as often as it may with {100.0 * half:.1f} %"
+    )
+
+
+def _together(campaign: Campaign, failures: Sequence[int]) -> Iterator[str]:
+    """All requirements: the cases that show each, the joint share, and each with the confidence shared."""
+    asked = campaign.requirements
+    confidence = min(one.confidence for one in asked)
+    share = joint_share([one.share for one in asked])
+    among = len(asked) + (share is not None)  # as the joint verdict shares it
+    yield ""
+    yield f"every requirement: if each passes, all are met with confidence {confidence:.10g} (Berger 1982)"
+    yield f"{'failures':>8}  {'cases':>9}  cases with the confidence shared among {among} (Bonferroni)"
+    for number in failures:
+        each = max(plan_row(one.share, one.confidence, number).cases for one in asked)
+        shared = max(plan_row(one.share, 1.0 - (1.0 - one.confidence) / among, number).cases for one in asked)
+        yield f"{number:>8}  {each:>9}  {shared}"
+    if share is not None:
+        yield from _block(JOINT, share, confidence, failures, campaign.cases, two_sided=False)

@@ -1,0 +1,171 @@
+"""The probability that a campaign's requirement is not met, far below what its plain cases can show.
+
+The campaign is flown as it stands, on its own model, distributions and correlations; only where in their space the
+cases lie is chosen, by `statistics.subset_simulation` or `statistics.importance_sampling`.  The same campaign, method,
+numbers and seed give the same result, whatever the number of threads.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine.campaign.columns import input_column
+from mc_engine.campaign.loading import Campaign
+from mc_engine.errors import CampaignError, Problem, RunInterrupted
+from mc_engine.interruption import stop_signal
+from mc_engine.runner.manifest import manifest_of
+from mc_engine.statistics.importance_sampling import cross_entropy
+from mc_engine.statistics.rare_events import RareEvent
+from mc_engine.statistics.subset_simulation import subset_simulation
+from mc_engine.store.parts import Column
+from mc_engine.store.result_folder import write_result
+from mc_engine.store.run_files import RARE_EVENT
+from mc_engine.store.run_folder import default_folder
+from mc_engine.store.store import refuse_occupied
+from mc_engine.store.writer_lock import writer_of_new
+from mc_engine.studies.limit_state import LimitState, chosen_requirement
+from mc_engine.studies.rare_event_folder import RareEventRecord, open_rare_event
+
+METHODS: dict[str, Callable[..., RareEvent]] = {"subset": subset_simulation, "cross-entropy": cross_entropy}
+CASES_PER_LEVEL = 10_000
+_SEVERAL = "Failures lie in several places: their mean is between them, and describes none."
+_APART = 0.7  # distance of the mean of the failed cases over that of the nearest: below this, they lie apart
+
+
+def estimate_rare_event(
+    campaign: Campaign,
+    requirement: str | None = None,
+    out: Path | None = None,
+    *,
+    method: str = "subset",
+    cases_per_level: int = CASES_PER_LEVEL,
+    workers: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> RareEventRecord:
+    """Estimate the probability of not meeting a requirement and leave the result in the new directory `out`.
+
+    requirement : its name; the only one by default.  method : one of METHODS.  progress : called with the numbers of
+    cases flown and failed.  Raises RunInterrupted on Ctrl-C; nothing is stored then.
+    """
+    path = Path(out) if out is not None else default_folder(f"{campaign.name}-rare")
+    one = chosen_requirement(campaign, requirement)
+    manifest = manifest_of(campaign)
+    with writer_of_new(path, lambda: refuse_occupied(path)) as lock, stop_signal() as stop:
+
+        def watch(flown: int, failed: int) -> None:
+            if stop.is_set():
+                raise RunInterrupted(
+                    f"interrupted after {flown:,} cases, and nothing is stored: levels rest on one another, so "
+                    "the same command has to begin again"
+                )
+            if progress is not None:
+                progress(flown, failed)
+
+        limit = LimitState(campaign, one, workers, watch)
+        try:
+            found = METHODS[method](
+                limit, len(limit.names), cases_per_level=cases_per_level, seed=campaign.seed, noise=True
+            )
+        except ValueError as error:
+            raise CampaignError(campaign.name, [Problem("--cases-per-level", str(error))]) from None
+        columns, arrays = _case_table(limit, found)
+        facts = {"asked": {"method": method, "cases_per_level": cases_per_level}, **_facts(limit, found)}
+        record = {**manifest, "rare_event": facts}
+        write_result(path, RARE_EVENT, campaign.text, record, {"cases": (columns, arrays)}, lock)
+    return open_rare_event(path)
+
+
+def _case_table(limit: LimitState, found: RareEvent) -> tuple[list[Column], dict[str, np.ndarray]]:
+    campaign, cases = limit.campaign, found.cases
+    metric = next(one for one in campaign.model.metrics if one.name == limit.requirement.metric)
+    inputs = limit.inputs(cases.u)
+    columns = [
+        Column("case_id", "", "case", "number of the case, in the order flown", "integer"),
+        Column("level", "", "case", "level that it was flown for, from 0", "integer"),
+        Column("noise_id", "", "case", "case whose noise of the flight it had", "integer"),
+        Column("weight", "", "case", "what it counts for; those of the failed add up to the probability"),
+        Column("failed", "", "case", "whether the requirement is not met", "switch"),
+        Column("status", "", "case", "how the case ended", "word"),
+        *(input_column(campaign.model.input(name)) for name in inputs),
+        Column(metric.name, metric.unit, "metric", metric.description),
+        Column("margin", metric.unit, "case", "distance inside the limit; minus infinity without a number"),
+    ]
+    arrays = {
+        "case_id": np.arange(found.n_cases),
+        "level": cases.level,
+        "noise_id": cases.noise,
+        "weight": cases.weight,
+        "failed": cases.failed,
+        "status": np.concatenate(limit.status),
+        **inputs,
+        metric.name: np.concatenate(limit.metric),
+        "margin": cases.margin,
+    }
+    return columns, arrays
+
+
+def _facts(limit: LimitState, found: RareEvent) -> dict[str, Any]:
+    """The result as JSON knows it: None for what is infinite."""
+    metric = next(one for one in limit.campaign.model.metrics if one.name == limit.requirement.metric)
+    inputs, remark = _failed_inputs(limit, found)
+    return {
+        "requirement": asdict(limit.requirement),
+        "metric": {"name": metric.name, "unit": metric.unit, "description": metric.description},
+        "method": found.method,
+        "probability": found.probability,
+        "lower": found.lower,
+        "upper": found.upper,
+        "confidence": found.confidence,
+        "relative_error": _finite(found.relative_error),
+        "plain_cases": _finite(found.plain_cases),
+        "cases": found.n_cases,
+        "failed": int(found.cases.failed.sum()),
+        "no_number": int(np.isneginf(found.cases.margin).sum()),
+        "levels": [{**asdict(level), "margin": _finite(level.margin)} for level in found.levels],
+        "inputs": inputs,
+        "remarks": [*found.remarks, *remark],
+    }
+
+
+def _failed_inputs(limit: LimitState, found: RareEvent) -> tuple[list[dict[str, Any]], list[str]]:
+    """(where failures are, a record an input; a remark where one mean does not describe them).
+
+    The likeliest failed case is the one nearest to the origin of standard normal space, where the density is greatest:
+    the design point of structural reliability, as near as the cases came to it.  Where failures lie apart, the
+    likeliest one on the other side of the origin is added, if there is one.
+    """
+    failed = np.flatnonzero(found.cases.failed)
+    if not failed.size:
+        return [], []
+    u, weight = found.cases.u[failed], found.cases.weight[failed]
+    nearest = int(np.argmin((u * u).sum(axis=1)))
+    share = weight / weight.sum()
+    apart = float(np.linalg.norm(share @ u)) < _APART * float(np.linalg.norm(u[nearest]))
+    across = np.flatnonzero(u @ u[nearest] < 0.0) if apart else np.empty(0, int)
+    shown = {"likeliest": nearest}
+    if across.size:
+        shown["across"] = int(across[np.argmin((u[across] ** 2).sum(axis=1))])
+    sigmas, values = limit.sigmas(u), limit.inputs(u[list(shown.values())])
+    mean = share @ sigmas
+    spread = np.sqrt(np.maximum(share @ (sigmas - mean) ** 2, 0.0))
+    records = [
+        {
+            "name": name,
+            "unit": limit.campaign.model.input(name).unit,
+            "description": limit.campaign.model.input(name).description,
+            "mean_sigma": mean[k],
+            "spread_sigma": spread[k],
+            **{f"{what}_sigma": sigmas[row, k] for what, row in shown.items()},
+            **{what: values[name][place] for place, what in enumerate(shown)},
+        }
+        for k, name in enumerate(limit.names)
+    ]
+    return records, [_SEVERAL] * apart
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

@@ -1,0 +1,89 @@
+"""The directory of a tuning: what `mc-engine tune` leaves behind.
+
+    tuning.toml   tuning.json   evaluations.parquet   generations.parquet   front.parquet   journal.jsonl
+
+All of them are replaced together after each generation: whenever the search is killed, what counts is whole.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mc_engine.store.result_folder import read_result
+from mc_engine.store.run_files import TUNING
+
+UNFINISHED = "not ended"  # instead of why the search ended
+
+
+@dataclass(frozen=True)
+class TuningRecord:
+    """A tuning: all of it, or what there is of one that has not ended.
+
+    evaluations : every candidate flown, in order.  front : those of them inside all limits that no other one of these
+        beats; no rows if none is inside.  generations : how the search went on.
+    """
+
+    path: Path
+    manifest: dict[str, Any]
+    evaluations: pd.DataFrame
+    generations: pd.DataFrame
+    front: pd.DataFrame
+
+    @property
+    def feasible(self) -> bool:
+        """Whether a candidate was found inside all limits."""
+        return len(self.front) > 0
+
+
+def open_tuning(path: str | Path) -> TuningRecord:
+    """The tuning in directory `path`; StoreError if there is none, or a byte of it changed."""
+    manifest, tables = read_result(Path(path), TUNING)
+    return TuningRecord(Path(path), manifest, **tables)
+
+
+def outcome_lines(record: TuningRecord) -> list[str]:
+    """How the search ended, for the command line."""
+    tuning, evaluations = record.manifest["tuning"], record.evaluations
+    inside = int(evaluations["feasible"].sum())
+    lines = [
+        f"candidates   {len(evaluations):,} in {tuning['flown']} generations ({tuning['end']}), {inside:,} feasible"
+    ]
+    if not record.feasible:
+        return [*lines, f"front        {infeasibility(record)}"]
+    lines.append(f"front        {len(record.front)} candidates")
+    units = record.front.attrs["units"]
+    for one in tuning["objectives"]:
+        values = record.front[one["name"]]
+        lines.append(f"  {one['name']}  {values.min():.6g} to {values.max():.6g} {units[one['name']]}".rstrip())
+    return lines
+
+
+def infeasibility(record: TuningRecord) -> str:
+    """Why there is no front, in a sentence with the least violation found."""
+    tried = f"no feasible point among {len(record.evaluations):,} candidates"
+    row = least_violating(record)
+    if row is None:
+        return f"{tried}; none of them has a number for every metric{_commonest(record.evaluations)}"
+    units = record.evaluations.attrs["units"]
+    broken = []
+    for one in record.manifest["tuning"]["constraints"]:
+        value, unit = float(row[one["name"]]), units[one["name"]]
+        for word, limit, sign in (("at most", one["at_most"], 1.0), ("at least", one["at_least"], -1.0)):
+            if limit is not None and sign * (value - limit) > 0.0:
+                broken.append(f"{one['name']} {value:.4g}{' ' * bool(unit)}{unit} where {word} {limit:g} is allowed")
+    return f"{tried}; the least violation found is {float(row['violation']):.4g}: {', '.join(broken)}"
+
+
+def _commonest(evaluations: pd.DataFrame) -> str:
+    """The end that most of the candidates' failed cases came to, as an end of a sentence."""
+    ends = evaluations["commonest_failure"][evaluations["failed_cases"] > 0].value_counts(sort=False)
+    return f", most often ({ends.max():,} candidates) {ends.idxmax()}" if len(ends) else ""
+
+
+def least_violating(record: TuningRecord) -> pd.Series | None:
+    """The candidate nearest to the limits; None if none has a number for every metric."""
+    violation = record.evaluations["violation"]
+    return record.evaluations.loc[violation.idxmin()] if np.isfinite(violation.min()) else None

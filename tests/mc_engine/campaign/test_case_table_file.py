@@ -1,0 +1,102 @@
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pytest
+from toy import load, problems
+
+from mc_engine.campaign.cases import case_table, dispersion_records, nominal_row
+
+HEAD = '[campaign]\nmodel = "toy.py"\ndesign = "{design}"\ntable = "cases.csv"\n'
+CSV = "case_id,speed_pct,control,drag,height_km\n0,1.5,off,true,10\n1,-2,clipped,false,20\n2,3,off,TRUE,30\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "toy.py").write_text(Path(__file__).parents[1].joinpath("toy.py").read_text())
+    (tmp_path / "cases.csv").write_text(CSV)
+    return tmp_path
+
+
+def test_each_row_is_a_case_and_each_column_a_dispersion(folder):
+    campaign = load("", "table", head=HEAD, directory=folder)
+    assert campaign.cases == 3
+    table = case_table(campaign, np.array([2, 0]))
+    assert {name: values.tolist() for name, values in table.items()} == {
+        "speed_pct": [3.0, 1.5],
+        "control": ["off", "off"],
+        "drag": [True, True],
+        "height_km": [30.0, 10.0],
+    }
+
+
+def test_a_column_may_have_a_source_and_a_unit(folder):
+    body = '[dispersion.height_km]\nunit = "m"\nsource = "radar"'
+    campaign = load(body, "table", head=HEAD, directory=folder)
+    assert case_table(campaign, np.arange(3))["height_km"].tolist() == [0.01, 0.02, 0.03]
+    record = dispersion_records(campaign)[-1]
+    assert (record["name"], record["source"], record["distribution"]) == ("height_km", "radar", "column of cases.csv")
+
+
+def test_parquet_is_read_like_csv(folder):
+    pandas.read_csv(folder / "cases.csv").to_parquet(folder / "cases.parquet")
+    ours = load("", "table", head=HEAD.replace(".csv", ".parquet"), directory=folder)
+    theirs = load("", "table", head=HEAD, directory=folder)
+    for name, values in case_table(ours, np.arange(3)).items():
+        assert values.tolist() == case_table(theirs, np.arange(3))[name].tolist()
+
+
+def test_the_nominal_case_is_not_a_row_of_the_table(folder):
+    campaign = load("[parameters]\nspeed_pct = 7", "table", head=HEAD, directory=folder)
+    assert nominal_row(campaign)["speed_pct"] == 7.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("speed_pct", "sped_pct", 'the column "sped_pct" is not a parameter of toy; did you mean "speed_pct"?'),
+        ("1.5", "x", '"cases.csv", row 1, column "speed_pct": "x" is not a finite number'),
+        ("-2", "inf", '"cases.csv", row 2, column "speed_pct": "inf" is not a finite number'),
+        ("-2", "-200", '"cases.csv", row 2, column "speed_pct": -200 is not within -100 % and above'),
+        ("clipped", "cut", '"cases.csv", row 2, column "control": "cut" is none of continuous, clipped, off'),
+        ("false", "no", '"cases.csv", row 2, column "drag": "no" is none of true, false'),
+        ("\n1,", "\n7,", '"cases.csv", row 2: case_id is 7; rows are numbered 0, 1, 2, ...'),
+        ("\n1,-2,", "\n1,", '"cases.csv", line 3: 4 fields where 5 columns are named'),
+        ("height_km", "speed_pct", '"cases.csv" has the column "speed_pct" twice'),
+    ],
+)
+def test_a_fault_in_the_table_is_refused_with_row_and_column(folder, old, new, message):
+    (folder / "cases.csv").write_text(CSV.replace(old, new))
+    assert problems("", "table", head=HEAD, directory=folder) == {"campaign.table": message}
+
+
+def test_a_table_without_rows_or_without_parameters_is_refused(folder):
+    (folder / "cases.csv").write_text("speed_pct\n")
+    assert problems("", "table", head=HEAD, directory=folder)["campaign.table"].endswith("no rows below its first line")
+    (folder / "cases.csv").write_text("case_id\n0\n")
+    assert problems("", "table", head=HEAD, directory=folder)["campaign.table"].endswith("no column of a parameter")
+
+
+@pytest.mark.parametrize(
+    ("design", "head", "body", "place", "message"),
+    [
+        ("table", HEAD.replace("table = ", "# "), "", "campaign.table", "is missing: CSV or Parquet beside this file"),
+        ("mc", HEAD + "cases = 3\nseed = 1\n", "", "campaign.table", 'the design "mc" reads no table'),
+        ("table", HEAD.replace("cases.csv", "../x.csv"), "", "campaign.table", '"../x.csv" lies outside the folder'),
+        ("table", HEAD.replace("cases.csv", "x.csv"), "", "campaign.table", 'there is no file "x.csv"'),
+        ("table", HEAD + "cases = 2\n", "", "campaign.cases", '2 is not allowed; the design "table" has 3 cases'),
+        ("table", HEAD, "[dispersion.mass_kg]", "dispersion.mass_kg", "the table has no such column"),
+        ("table", HEAD, "[dispersion.height_km]\nhalf_range = 2", "dispersion.height_km.half_range", "the design"),
+        ("table", HEAD, '[dispersion.height_km]\nunit = "kg"', "dispersion.height_km.unit", '"kg" is not a unit'),
+    ],
+)
+def test_a_table_where_none_belongs_or_none_is_there_is_refused(folder, design, head, body, place, message):
+    found = problems(body, design, head=head, directory=folder)
+    assert list(found) == [place]
+    assert found[place].startswith(message)
+
+
+def test_the_digest_follows_the_table(folder):
+    before = load("", "table", head=HEAD, directory=folder).digest
+    (folder / "cases.csv").write_text(CSV.replace("1.5", "1.6"))
+    assert load("", "table", head=HEAD, directory=folder).digest != before

@@ -1,0 +1,304 @@
+"""A chain: every case takes its inputs from the same case of another run, and keeps that case's columns."""
+
+import json
+import os
+import shutil
+from hashlib import sha256
+
+import numpy as np
+import pandas as pd
+import pytest
+from cart import call, fails_with
+
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.errors import CampaignError, EngineError, StoreError
+from mc_engine.runner.runner import extend, replay, rerun, resume, run
+from mc_engine.store.journal import encode, scan
+from mc_engine.store.opening import open_store
+from mc_engine.store.verification import damage
+from mc_engine.studies.opened_run import open_run
+
+MODEL = '''
+"""A throw, straight up."""
+from collections import namedtuple
+from mc_engine.lanes import physics
+from mc_engine.model import Event, Field, FixedStep, Model, Parameter
+
+State = namedtuple("State", "height speed")
+Parameters = namedtuple("Parameters", "height speed gravity")
+Quantities = namedtuple("Quantities", "height")
+Events = namedtuple("Events", "top")
+Metrics = namedtuple("Metrics", "height fall")
+
+def prepare(inputs, settings, refusals):
+    refusals.add(inputs.speed < 1.5, "too slow")
+    return vars(inputs)
+
+@physics
+def initial(p, o):
+    return State(p.height, p.speed)
+
+@physics
+def rhs(t, s, m, p, o):
+    return State(s.speed, -p.gravity)
+
+@physics
+def events(t, s, m, p, o):
+    return Events(s.speed)
+
+@physics
+def observe(t, s, m, p, o):
+    return Quantities(s.height)
+
+@physics
+def evaluate(t, s, m, p, o, best, when):
+    return Metrics(s.height, t)
+
+MODEL = Model(
+    name="throw", title="A throw", source="Galilei",
+    parameters=(
+        Parameter("HEIGHT_km", "km", "first height", 0.0),
+        Parameter("speed_m_s", "m/s", "first speed", 10.0, low=0.0),
+        Parameter("gravity_m_s2", "m/s^2", "gravity", 9.80665),
+    ),
+    settings=(),
+    states=(Field("height_m", "m", "height"), Field("speed_m_s", "m/s", "speed")),
+    quantities=(Field("height_m", "m", "height"),),
+    metrics=(Field("RESULT_m", "m", "height of the top"), Field("fall_s", "s", "time to the top")),
+    clock=FixedStep(0.01, 5.0), kernel_parameters=Parameters, prepare=prepare, initial=initial, rhs=rhs, events=events,
+    event_list=(Event("top"),), observe=observe, evaluate=evaluate,
+)
+'''
+FIRST = """
+[campaign]
+model = "model.py"
+design = "mc"
+cases = 40
+seed = 1
+[dispersion.speed_m_s]
+dist = "normal"
+mean = 4.0
+sigma = 2.0
+lower = 0.0
+"""
+SECOND = """
+[campaign]
+model = "model.py"
+design = "mc"
+seed = 2
+[inputs]
+from = "{source}"
+[dispersion.gravity_m_s2]
+dist = "uniform"
+mean = 9.8
+half_range = 0.1
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two campaigns in folders of their own; the second begins at the top of the first one's throw."""
+    here = tmp_path_factory.mktemp("chain")
+    for name, text, height, result in (
+        ("first", FIRST, "height", "top"),
+        ("second", SECOND.format(source="../runs/first") + '[inputs.columns]\nheight_km = "top_m"\n', "height", "apex"),
+    ):
+        (here / name).mkdir()
+        (here / name / "model.py").write_text(MODEL.replace("HEIGHT", height).replace("RESULT", result))
+        (here / name / "campaign.toml").write_text(text)
+    run(load_campaign(here / "first"), here / "runs" / "first")
+    run(load_campaign(here / "second"), here / "runs" / "second")
+    return here
+
+
+@pytest.fixture(scope="module")
+def cases(folder):
+    return [pd.read_parquet(folder / "runs" / name / "cases").set_index("case_id") for name in ("first", "second")]
+
+
+def test_every_case_starts_where_its_own_case_ended(cases):
+    first, second = cases
+    flown = second["status"] == "ok"
+    assert flown.sum() == (first["status"] == "ok").sum() > 30
+    np.testing.assert_array_equal(second["height_km"][flown], first["top_m"][flown] / 1000.0)
+    rise = 10.0**2 / 2.0 / second["gravity_m_s2"]
+    assert second["apex_m"][flown].to_numpy() == pytest.approx((first["top_m"] + rise)[flown].to_numpy(), rel=1e-9)
+
+
+def test_the_rows_keep_the_columns_upstream_under_names_that_are_free(cases):
+    first, second = cases
+    assert list(second.columns[:2]) == ["status", "reason"]
+    for name, here in (("top_m", "top_m"), ("speed_m_s", "first_speed_m_s"), ("fall_s", "first_fall_s")):
+        np.testing.assert_array_equal(first[name], second[here])
+    assert second["first_status"].tolist() == first["status"].tolist()
+
+
+def test_roles_and_nominal_case_follow_the_chain(folder):
+    store = open_store(folder / "runs" / "second")
+    roles = {column.name: column.role for column in store.columns}
+    wanted = {"height_km": "dispersion", "first_speed_m_s": "dispersion", "top_m": "upstream", "apex_m": "metric"}
+    assert {name: roles[name] for name in wanted} == wanted
+    nominal = open_store(folder / "runs" / "first").nominal()
+    assert store.nominal()["height_km"] == nominal["top_m"] / 1000.0
+    assert store.nominal()["top_m"] == nominal["top_m"]
+    assert store.manifest["upstream"]["cases"] == 40
+    assert store.manifest["upstream"]["links"] == {"height_km": "top_m"}
+
+
+def test_a_case_that_failed_upstream_keeps_its_row_and_says_why(cases):
+    first, second = cases
+    failed = first["status"] != "ok"
+    assert failed.sum() >= 1
+    assert set(second["status"][failed]) == {"refused"}
+    assert set(second["reason"][failed]) == {"its case of first ended as refused"}
+    assert second["gravity_m_s2"][failed].notna().all()
+
+
+def test_a_run_in_a_chain_stands_alone(folder, tmp_path):
+    """Replay needs neither the campaign's folder nor the run upstream."""
+    shutil.copytree(folder / "runs" / "second", tmp_path / "moved")
+    assert replay(tmp_path / "moved", 3).equal
+    assert resume(tmp_path / "moved").n_cases == 40
+    assert damage(tmp_path / "moved") == []
+
+
+@pytest.mark.parametrize("kind", ["gone", "flipped"])
+def test_what_was_taken_is_verified_before_it_is_used(folder, tmp_path, kind):
+    shutil.copytree(folder / "runs" / "second", tmp_path / "run")
+    copy = tmp_path / "run" / "upstream.parquet"
+    content = bytearray(copy.read_bytes())
+    content[len(content) // 2] ^= 1
+    copy.unlink() if kind == "gone" else copy.write_bytes(content)
+    word = "No such file" if kind == "gone" else "damaged or edited"
+    assert [problem for problem in damage(tmp_path / "run") if word in problem]
+    for use in (replay, lambda path, case: resume(path)):
+        with pytest.raises(StoreError, match=rf"upstream.parquet: {word}"):
+            use(tmp_path / "run", 3)
+
+
+def test_a_case_that_failed_upstream_replays_the_same(folder, cases):
+    failed = int(np.flatnonzero(cases[0]["status"] != "ok")[0])
+    assert replay(folder / "runs" / "second", failed).differences == ()
+
+
+def test_the_reports_of_a_chain_with_failed_cases_are_written(folder):
+    from reports import write_reports
+
+    files = write_reports(folder / "runs" / "second", formats=("html", "pdf"))
+    assert {"report.html", "report.pdf"} <= {file.name for file in files}
+
+
+def test_a_run_whose_nominal_case_failed_is_no_start_of_a_chain(folder, tmp_path):
+    text = (folder / "first" / "campaign.toml").read_text() + "[parameters]\nspeed_m_s = 60\n"  # 6 s up, 5 s allowed
+    run(load_campaign("high", text=text, directory=folder / "first"), tmp_path / "high")
+    chain = (folder / "second" / "campaign.toml").read_text()
+    with pytest.raises(CampaignError, match="the nominal case of that run ended as no-stop; choose one that flies"):
+        load_campaign("second", text=chain, directory=folder / "second", upstream=tmp_path / "high")
+
+
+def test_neither_chunks_nor_the_number_of_cases_change_a_case(folder, cases, tmp_path):
+    some = run(load_campaign(folder / "second", cases=17), tmp_path / "some", chunk=5, workers=2).cases()
+    pd.testing.assert_frame_equal(some.set_index("case_id"), cases[1].iloc[:17], check_exact=True)
+
+
+def test_a_campaign_that_is_not_flown_yet_is_flown_first_beside_the_run(folder, cases, tmp_path):
+    text = (folder / "second" / "campaign.toml").read_text().replace("../runs/first", "../first/campaign.toml")
+    chain = load_campaign("second", text=text, directory=folder / "second")
+    run(chain, tmp_path / "both")
+    pd.testing.assert_frame_equal(
+        pd.read_parquet(tmp_path / "both" / "cases").set_index("case_id"), cases[1], check_exact=True
+    )
+    assert open_store(tmp_path / "both-first").n_cases == 40
+    with pytest.raises(StoreError, match="takes its inputs from another run"):
+        extend(tmp_path / "both", 80)
+    fails_with(2, call("extend", tmp_path / "both", "--cases", 80), "takes its inputs from another run")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (('from = "../runs/first"', 'from = "../runs/none"'), "is neither a run nor a campaign that can be flown"),
+        (('height_km = "top_m"', 'heigth_km = "top_m"'), 'is not a parameter of throw; did you mean "height_km"?'),
+        (('height_km = "top_m"', 'height_km = "to_m"'), '"to_m" is no column of numbers of that run'),
+        (('height_km = "top_m"', 'height_km = "fall_s"'), '"fall_s" is in s, which does not fit km'),
+        (('height_km = "top_m"', ""), "no result of that run has the name of a parameter of throw"),
+        (('design = "mc"', 'design = "grid"'), 'its design "mc" does not go with "grid"'),
+        (('design = "mc"', 'design = "table"'), 'write design = "mc" to disperse more'),
+        (("[inputs]", "[parameters]\nheight_km = 1\n[inputs]"), "comes from the run of first; leave it out here"),
+        (("seed = 2", "seed = 2\ncases = 41"), "41 is not allowed; the run upstream has 40 cases"),
+    ],
+)
+def test_what_does_not_fit_is_said_with_its_place(folder, change, message):
+    text = (folder / "second" / "campaign.toml").read_text()
+    assert change[0] in text
+    with pytest.raises(CampaignError) as caught:
+        load_campaign("second", text=text.replace(*change), directory=folder / "second")
+    assert message in str(caught.value)
+
+
+# ---- where [inputs] may lead
+
+
+def with_files(folder, **contents):
+    """Change files of a run directory, for which its journal vouches afterwards."""
+    events = list(scan((folder / "journal.jsonl").read_bytes()).entries)
+    for name, content in contents.items():
+        (folder / name.replace("_", ".")).write_bytes(content)
+        events[0].facts[name.split("_")[0]] = sha256(content).hexdigest()
+    events[0].facts["companions"].pop("upstream.parquet", None)
+    lines = [encode(number, one.at, one.event, one.facts) for number, one in enumerate(events, start=1)]
+    (folder / "journal.jsonl").write_bytes(b"".join(lines))
+
+
+@pytest.fixture
+def theirs(folder, tmp_path):
+    """The second run of the chain, as somebody else might send it."""
+    return shutil.copytree(folder / "runs" / "second", tmp_path / "run")
+
+
+def trap(folder, mark):
+    """A campaign elsewhere, whose model leaves a mark."""
+    folder.mkdir()
+    (folder / "model.py").write_text(
+        f"import pathlib; pathlib.Path({str(mark)!r}).touch()\n"
+        + MODEL.replace("HEIGHT", "height").replace("RESULT", "top")
+    )
+    (folder / "campaign.toml").write_text(FIRST)
+    return folder
+
+
+USES = (resume, rerun, lambda folder: replay(folder, 3), lambda folder: open_run(folder).case(3).replay(),
+        lambda folder: load_campaign(folder / "campaign.toml"))  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["a run", "a campaign"])
+def test_the_campaign_file_of_a_run_leads_to_no_other_run_and_no_other_campaign(theirs, folder, tmp_path, kind):
+    mark = tmp_path / "marked"
+    outside = folder / "runs" / "first" if kind == "a run" else trap(tmp_path / "trap", mark)
+    text = (theirs / "campaign.toml").read_text().replace("../runs/first", str(outside))
+    manifest = json.loads((theirs / "manifest.json").read_bytes())
+    manifest["upstream"] = None
+    with_files(theirs, campaign_toml=text.encode(), manifest_json=json.dumps(manifest).encode())
+    (theirs / "upstream.parquet").unlink()
+    for use in USES:
+        with pytest.raises(EngineError, match=r"upstream\.parquet: No such file"):
+            use(theirs)
+    assert not mark.exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights")
+@pytest.mark.parametrize("target", ["run", "copy"])
+def test_a_link_in_place_of_the_copy_is_not_followed(theirs, folder, tmp_path, target):
+    shutil.copy(theirs / "upstream.parquet", tmp_path / "copy")
+    (theirs / "upstream.parquet").unlink()
+    (theirs / "upstream.parquet").symlink_to(tmp_path / "copy" if target == "copy" else folder / "runs" / "first")
+    with_files(theirs)
+    for use in USES:
+        with pytest.raises(EngineError, match=r"upstream\.parquet: "):
+            use(theirs)
+
+
+def test_the_campaign_file_of_a_run_is_read_with_the_copy_that_the_run_keeps(theirs):
+    """From wherever it lies: the run upstream is nowhere near."""
+    assert not (theirs.parent / "runs").exists()
+    assert load_campaign(theirs / "campaign.toml").upstream.rows.n_cases == 40

@@ -1,0 +1,213 @@
+"""The line of a model at which a number stopped being finite, as `check` and `replay` name it."""
+
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mistaken_campaign import campaign_with
+from small_run import ENVIRONMENT
+
+import mc_engine
+from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.flight.chunks import NOMINAL_NOISE
+from mc_engine.flight.contract import breaches
+from mc_engine.flight.contract_flight import faults
+from mc_engine.flight.flight import fly, fly_interpreted
+from mc_engine.flight.lost_numbers import first_lost
+from mc_engine.runner import runner
+from mc_engine.status import STATUS_NAME
+
+ROCKET = Path(mc_engine.__file__).parent / "documentation" / "tutorial" / "sounding_rocket"
+DRAG = "    drag = 0.5 * rho * m.drag_area * sqrt(ux * ux + uz * uz)\n"
+BY_MACH = """    speed = sqrt(ux * ux + uz * uz)
+    mach = sqrt(speed - {slowest}) / 340.0
+    factor, _ = over_mach(o.tables, 0.0, mach)
+    drag = 0.5 * rho * m.drag_area * speed * factor
+"""
+TABLES = '''def tables(o):
+    """Factor of the drag by Mach number."""
+    return mach_table([(0.0, 1.0, 0.0), (1.0, 1.6, 0.0), (5.0, 1.0, 0.0)])
+
+
+MODEL = Model(
+    tables=tables,
+'''
+BY_TABLE = (
+    ("from mc_engine.physics.atmosphere", "from mc_engine.physics.aerodynamics import mach_table, over_mach\nfrom "
+     "mc_engine.physics.atmosphere"),
+    ("MODEL = Model(\n", TABLES),
+)  # fmt: skip
+SHORT = ("until=2000.0", "until=8.0")
+ADAPTIVE = ("FixedStep(step=0.05, until=8.0)", "AdaptiveStep(until=8.0, rtol=1e-8, control_period=0.5)")
+ADAPTED = ("FixedStep, Model", "AdaptiveStep, Model")
+
+
+def rocket(folder, *edits):
+    """The tutorial's rocket with each (text, other text) of its model exchanged, and the line of the last edit."""
+    shutil.copytree(ROCKET, folder, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
+    text = (folder / "model.py").read_text()
+    for old, new in edits:
+        assert old in text, old
+        text = text.replace(old, new)
+    (folder / "model.py").write_text(text)
+    return load_campaign(folder / "campaign.toml", cases=8)
+
+
+def line_of(folder, text, file="model.py"):
+    source = (folder / file).read_text()
+    return 1 + source[: source.index(text)].count("\n")
+
+
+def lost(campaign):
+    """The sentence on the nominal case."""
+    return first_lost(campaign.model, campaign.nominal, NOMINAL_NOISE, campaign.seed, "the nominal case")
+
+
+def only(sentences):
+    assert len(sentences) == 1, sentences
+    assert "\n" not in sentences[0]
+    return sentences[0]
+
+
+def test_check_names_the_line_of_a_mach_number_that_no_slow_rocket_has(tmp_path):
+    campaign = rocket(tmp_path, *BY_TABLE, (DRAG, BY_MACH.format(slowest=200.0)))
+    line = line_of(tmp_path, "    mach = ")
+    assert only(breaches(campaign)).startswith(
+        f"model.py, line {line}: `mach = sqrt(speed - 200.0) / 340.0`: the square root of -176.3"
+    )
+
+
+def test_check_and_replay_name_the_line_of_a_number_that_is_lost_in_flight(tmp_path):
+    model = tmp_path / "rocket"
+    slowest = "10.0 * t * t"
+    campaign = rocket(model, *BY_TABLE, (DRAG, BY_MACH.format(slowest=slowest)), SHORT)
+    assert breaches(campaign) == []
+    sentence = (
+        f"model.py, line {line_of(model, '    mach = ')}: `mach = sqrt(speed - {slowest}) / 340.0`: the square root"
+    )
+    found = only(faults(campaign))
+    assert found.startswith(sentence)
+    assert re.search(r"; \d of the first 8 cases end not-finite$", found)
+    done = mc_engine_says(tmp_path, "run", "rocket", "--cases", "8", "--no-report", "--out", "run")
+    case = int(mc_engine.open_store(tmp_path / "run").cases().query("status == 'not-finite'")["case_id"].iloc[0])
+    replayed = mc_engine_says(tmp_path, "replay", "run", str(case))
+    assert replayed[2].startswith(sentence)
+    assert f"case {case})" in replayed[2]
+    assert replayed[3] == f"case {case}: every stored number has the same bits"
+    assert done[0].startswith("run ")
+
+
+def mc_engine_says(folder, *words):
+    done = subprocess.run(
+        [sys.executable, "-m", "mc_engine", *words], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+HEATING = "from mc_engine.physics.heating import sutton_graves\n"
+PUSH = "    force = m.burning * thrust_of(p)\n"
+HELD, SWITCHED = "    return Memory(nozzle, m.burning", "    return s, Memory(m.nozzle"
+LOST = {
+    "in a helper of another file": (
+        [("from figures import", "from guidance import lag\nfrom figures import"),
+         ("    turn = force", "    swivel = swivel + lag(t)\n    turn = force")],
+        "    swivel = swivel + lag(t)",
+        "guidance.py, line 6: `return 0.1 * log(1.0 - t)`: the logarithm of",
+    ),
+    "in the engine's physics": (
+        [(PUSH, f"{PUSH}    force = force + 0.0 * sutton_graves(1.0 - t, 9.0, 1.0)\n"),
+         ("from mc_engine.physics.constants", f"{HEATING}from mc_engine.physics.constants")],
+        "    force = force + ",
+        "in heating.py, line 17, the square root of -",
+    ),
+    "by a division": (
+        [("import cos, exp", "import cos, exp, floor"),
+         (PUSH, "    lever = floor(t) - 1.0\n    force = m.burning / lever\n")],
+        "    force = m.burning / lever",
+        "`force = m.burning / lever`: 1 / 0 is infinite (t = ",
+    ),
+    "in the control, and used later": (
+        [(HELD, f"    nozzle = nozzle + acos(1.5 * t)\n{HELD}"),
+         ("import cos, exp", "import acos, cos, exp")],
+        "    nozzle = nozzle + acos(1.5 * t)",
+        "the arc cosine of 1.",
+    ),
+    "in the function of an event": (
+        [("s.altitude - MAIN_ALTITUDE, s.altitude)", "s.altitude - MAIN_ALTITUDE, sqrt(3.01 - t))")],
+        "    return Events(",
+        "the square root of -",
+    ),
+    "in what an event does": (
+        [("until=8.0", "until=30.0"), (SWITCHED, f"    area = area + log(17.0 - t)\n{SWITCHED}"),
+         ("import cos, exp,", "import cos, exp, log,")],
+        "    area = area + log(17.0 - t)",
+        "the logarithm of -",
+    ),
+}  # fmt: skip
+GUIDANCE = "from mc_engine.lanes import log, physics\n\n\n@physics\ndef lag(t):\n    return 0.1 * log(1.0 - t)\n"
+
+
+@pytest.mark.parametrize("clock", ["fixed", "adaptive"])
+@pytest.mark.parametrize("where", LOST)
+def test_the_place_is_the_first_one_wherever_the_number_was_lost(where, clock, tmp_path):
+    edits, text, sentence = LOST[where]
+    (tmp_path / "guidance.py").write_text(GUIDANCE)
+    clocks = [SHORT, ADAPTIVE, ADAPTED] if clock == "adaptive" else [SHORT]
+    if clock == "adaptive":
+        edits = [
+            (old.replace("until=8.0", "until=8.0,"), new.replace("until=30.0", "until=30.0,")) for old, new in edits
+        ]
+    found = lost(rocket(tmp_path, *clocks, *edits))
+    assert sentence in found
+    assert f"model.py, line {line_of(tmp_path, text)}" in found
+
+
+def test_a_parameter_that_prepare_loses_is_named(tmp_path):
+    prepare = (
+        "def prepare(inputs, settings, refusals):\n    return {**vars(inputs), 'wind': inputs.wind * float('nan')}\n"
+    )
+    campaign = rocket(tmp_path, SHORT, ("MODEL = Model(\n", f"{prepare}\n\nMODEL = Model(\n    prepare=prepare,\n"))
+    assert lost(campaign) == '"wind" of the kernel_parameters is nan (the nominal case)'
+
+
+def test_a_metric_that_evaluate_loses_is_named_though_the_case_is_ok(tmp_path):
+    campaign = campaign_with(tmp_path / "minimal", ("t, best.speed)", "t, sqrt(-best.speed))"))
+    found = runner.replay(runner.run(replace(campaign, cases=3), tmp_path / "run").path, 2).lost
+    line = line_of(tmp_path / "minimal", "    return Metrics(")
+    assert found.startswith(f'"top_speed_m_s": model.py, line {line}: `return Metrics(')
+    assert "the square root of -" in found
+
+
+def test_an_interpreted_flight_that_takes_too_long_says_how_far_it_came(tmp_path):
+    campaign = rocket(tmp_path)
+    found = first_lost(campaign.model, campaign.nominal, 0, 1, "case 0", seconds=0.2)
+    assert "given up after 0 s, at t = " in found
+    assert found.endswith("it was finite until then")
+
+
+WHOLE = [
+    pytest.param(name, marks=pytest.mark.slow)
+    for name in ("deorbit", "reentry", "geo_injection", "flexible_satellite/pwpf")
+]
+
+
+@pytest.mark.parametrize("name", ["minimal", "rocket", *WHOLE])
+def test_an_interpreted_flight_has_the_bits_of_the_kernel(name, tmp_path):
+    campaign = rocket(tmp_path, SHORT) if name == "rocket" else load_campaign(name)
+    inputs = full_inputs(campaign, {key: value[0] for key, value in case_table(campaign, np.array([3])).items()})
+    flown = fly(campaign.model, inputs, np.array([3]), campaign.seed, folder=campaign.directory, width=1)
+    (time, status, states, metrics), _ = fly_interpreted(campaign.model, inputs, 3, campaign.seed, 120.0)
+    assert flown["status"][0] == STATUS_NAME[int(status[0])]
+    assert flown["end_time_s"][0] == time[0]
+    for field, row in zip(campaign.model.states, states, strict=True):
+        assert flown[f"end_{field.name}"][0] == row[0] / field.si_factor, field.name
+    if flown["status"][0] == "ok":
+        for field, row in zip(campaign.model.metrics, metrics, strict=True):
+            np.testing.assert_equal(flown[field.name][0], row[0] / field.si_factor, err_msg=field.name)

@@ -1,0 +1,154 @@
+"""Deliberate mistakes in the smallest model: each gets one sentence with its place, none a compiler's page."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from mistaken_campaign import campaign_with, line_of
+from small_run import ENVIRONMENT
+
+from mc_engine.campaign.loading import list_campaigns, load_campaign
+from mc_engine.errors import CampaignError
+from mc_engine.flight.contract import breaches
+from mc_engine.flight.contract_flight import faults
+
+ACCELERATION = "g = -MU_EARTH / (r2 * sqrt(r2))"
+
+
+def only(sentences):
+    assert len(sentences) == 1, sentences
+    assert "\n" not in sentences[0]
+    return sentences[0]
+
+
+def test_an_unknown_unit_is_named_with_the_nearest(tmp_path):
+    with pytest.raises(CampaignError) as error:
+        campaign_with(tmp_path, ('Field("altitude_km", "km"', 'Field("altitude_km", "kilometres"'))
+    line = line_of(tmp_path, "MODEL = Model(")
+    assert f'model.py, line {line}: "altitude_km" has the unit "kilometres"; did you mean "km"?' in str(error.value)
+
+
+NOISE = (
+    "def prepare(inputs, settings, refusals):\n    return {**vars(inputs), 'burn_dv': BURN}\n\n\n@physics\ndef initial"
+)
+FLOWN = {
+    "metric never set": (
+        [("t, best.speed)", "t, best.speed / 0.0 * 0.0)")],
+        'the metric "top_speed_m_s" is not a number in any of the 32 cases',
+    ),
+    "metric that is infinite": (
+        [("t, best.speed)", "t, best.speed / 0.0)")],
+        'the metric "top_speed_m_s" is infinite in all of the 32 cases that flew',
+    ),
+    "metric that is constant": (
+        [("t, best.speed)", "t, 7.5)")],
+        'the metric "top_speed_m_s" is 7.5 whatever happens; let `evaluate` work it out',
+    ),
+    "dispersion that moves nothing": (
+        [("cos(p.pitch_error)", "1.0"), ("sin(p.pitch_error)", "0.0")],
+        'dispersion "pitch_error_deg" moves no metric',
+    ),
+    "event never crossing": (
+        [("Events(s.x * s.vx + s.y * s.vy)", "Events(1e12 + s.x * s.vx + s.y * s.vy)")],
+        'no stopping event crosses zero before the time limit, of "apogee"',
+    ),
+    "non-deterministic": (
+        [
+            ("from mc_engine.lanes", "import numpy as np\n\nfrom mc_engine.lanes"),
+            ("@physics\ndef initial", NOISE.replace("BURN", "inputs.burn_dv + np.random.rand(inputs.burn_dv.size)")),
+            ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+        ],
+        "when the same cases fly a second time; a case must depend on its inputs and case_id alone",
+    ),
+    "depends on the company": (
+        [
+            ("@physics\ndef initial", NOISE.replace("BURN", "inputs.burn_dv - inputs.magnitude_error.mean()")),
+            ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+        ],
+        "when it flies among other cases",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", FLOWN)
+def test_a_mistake_that_shows_in_flight_is_one_sentence(mistake, tmp_path):
+    edits, sentence = FLOWN[mistake]
+    campaign = campaign_with(tmp_path, *edits)
+    assert breaches(campaign) == []
+    assert sentence in only(faults(campaign))
+
+
+def test_a_switching_event_that_never_fires_is_missed_unless_it_is_declared_rare(tmp_path):
+    edits = [
+        ('"apogee")', '"apogee moon")'),
+        ("    return Events(s.x * s.vx + s.y * s.vy)", "    return Events(s.x * s.vx + s.y * s.vy, s.x - 3.8e8)"),
+        ("    initial=initial", "    switch=switch,\n    initial=initial"),
+        (
+            "@physics\ndef observe",
+            "@physics\ndef switch(t, s, m, p, o, hit):\n    return s, m\n\n\n@physics\ndef observe",
+        ),
+    ]
+    stop = 'Event("apogee", "falling", "stop")'
+    rare = [*edits, (stop, f'{stop}, Event("moon", "rising", "switch", rare=True)')]
+    assert faults(campaign_with(tmp_path / "rare", *rare)) == []
+    missed = only(
+        faults(campaign_with(tmp_path / "missed", *edits, (stop, f'{stop}, Event("moon", "rising", "switch")')))
+    )
+    assert 'the event "moon" crosses zero in none of 32 cases, its function stays below it' in missed
+
+
+PREPARE = "def prepare(inputs, settings, refusals):\n    {}\n    return vars(inputs)\n\n\n@physics\ndef initial"
+
+
+def with_prepare(body):
+    return ("@physics\ndef initial", PREPARE.format(body)), (
+        "    initial=initial",
+        "    prepare=prepare,\n    initial=initial",
+    )
+
+
+def test_a_design_that_breaks_is_a_problem_of_the_campaign_with_its_line(tmp_path):
+    with pytest.raises(CampaignError, match=r"campaign\.model: .*") as error:
+        campaign_with(tmp_path, *with_prepare("1 / 0"))
+    assert f"model.py, line {line_of(tmp_path, '1 / 0')}: ZeroDivisionError: division by zero" in str(error.value)
+
+
+def check(folder, *options, **environment):
+    return subprocess.run(
+        [sys.executable, "-m", "mc_engine", "check", str(folder), *options],
+        capture_output=True, text=True, env={**ENVIRONMENT, **environment}, check=False,
+    )  # fmt: skip
+
+
+def test_check_leaves_with_two_and_the_sentence(tmp_path):
+    campaign_with(tmp_path, (ACCELERATION, f"{ACCELERATION} if r2 > 1.0 else 0.0"))
+    done = check(tmp_path)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.splitlines()[0] == "model.py: 1 problem"
+    assert f"model.py, line {line_of(tmp_path, '    g = -MU')}: `{ACCELERATION} if r2" in done.stderr
+    assert "use where(condition, a, b)" in done.stderr
+
+
+def test_a_model_that_kills_its_process_is_a_sentence_unless_only_the_file_is_read(tmp_path):
+    kill = "import os\n    if inputs.burn_dv.size > 3:\n        os._exit(9)"
+    campaign_with(tmp_path, *with_prepare(kill))
+    done = check(tmp_path)
+    assert done.returncode == 2
+    assert "killed its process: exit status 9" in done.stderr
+    assert check(tmp_path, "--no-model").returncode == 0
+
+
+@pytest.mark.parametrize("name", [one.name for one in list_campaigns()])
+def test_shipped_campaigns_keep_the_contract(name):
+    campaign = load_campaign(name)
+    assert breaches(campaign) == []
+    assert faults(campaign) == []
+
+
+def test_the_process_of_its_own_prints_the_sentences_last():
+    done = subprocess.run(
+        [sys.executable, "-m", "mc_engine.flight.contract_flight", "minimal"],
+        capture_output=True, text=True, env=ENVIRONMENT, check=True,
+    )  # fmt: skip
+    assert json.loads(done.stdout.splitlines()[-1]) == []

@@ -1,0 +1,119 @@
+"""A model that contradicts itself is refused when it is made, in one sentence."""
+
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from small_run import ENVIRONMENT
+
+from mc_engine.errors import ModelError
+from mc_engine.model import Event, Extremum, Field, Parameter, load_model
+
+WAVE_FOLDER = Path(__file__).resolve().parents[1] / "lanes" / "adaptive"
+WAVE = load_model("wave.py", WAVE_FOLDER)
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"parameters": (Parameter("a_m", "m", "", 0.0), Parameter("a_s", "s", "", 0.0))}, 'two inputs .* called "a"'),
+        ({"metrics": (Field("top_m", "m", ""), Field("top_m", "m", ""))}, 'two columns .* called "top_m"'),
+        ({"extrema": (Extremum("top", "depth_m"),)}, 'extremum "top": there is no quantity "depth_m"'),
+        ({"events": None}, "no function `events`"),
+        ({"event_list": (Event("rise", "rising", "switch"),), "switch": None}, "no function `switch`"),
+    ],
+)
+def test_a_model_that_contradicts_itself_is_refused(change, sentence):
+    with pytest.raises(ModelError, match=sentence):
+        replace(WAVE, **change)
+
+
+def test_a_unit_that_is_not_known_is_named():
+    with pytest.raises(ModelError, match=r'"depth_m" has the unit "metre"'):
+        replace(WAVE, metrics=(Field("depth_m", "metre", ""),))
+
+
+def model_file(folder, helper):
+    (folder / "helper.py").write_text(helper)
+    model = Path(WAVE_FOLDER / "wave.py").read_text()
+    (folder / "model.py").write_text(
+        f"from helper import TITLE\n\n{model}\nobject.__setattr__(MODEL, 'title', TITLE)\n"
+    )
+
+
+def test_a_model_imports_the_files_beside_it_and_sees_their_edits(tmp_path):
+    for title in ("first", "second"):
+        model_file(tmp_path, f"TITLE = '{title}'\n")
+        assert load_model("model.py", tmp_path).title == title
+    other = tmp_path / "other"
+    other.mkdir()
+    model_file(other, "TITLE = 'another campaign'\n")
+    assert load_model("model.py", other).title == "another campaign"
+
+
+@pytest.mark.parametrize(
+    ("helper", "sentence"),
+    [
+        ("TITLE = = 2\n", "helper.py, line 1: SyntaxError: invalid syntax"),
+        ("import sys\nsys.exit(3)\n", "helper.py, line 2: ends the program; a model only defines MODEL"),
+        ("def f():\n    return 1 / 0\nTITLE = f()\n", "helper.py, line 2: ZeroDivisionError: division by zero"),
+        ("import no_such_package\n", "helper.py, line 1: ModuleNotFoundError: No module named 'no_such_package'"),
+    ],
+)
+def test_an_error_of_the_model_s_own_code_is_a_sentence_with_its_place(tmp_path, monkeypatch, helper, sentence):
+    model_file(tmp_path, helper)
+    with pytest.raises(ModelError) as from_file:
+        load_model("model.py", tmp_path)
+    assert str(from_file.value) == sentence
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "faulty_module.py").write_text(f"{helper}MODEL = None\n")
+    with pytest.raises(ModelError) as from_module:
+        load_model("faulty_module")
+    assert str(from_module.value) in (
+        sentence.replace("helper.py", "faulty_module.py"),
+        '"faulty_module" needs the package "no_such_package", which is not installed',
+    )
+
+
+@pytest.mark.parametrize(
+    ("reference", "sentence"),
+    [
+        ("this", '"this" is a module of Python itself'),
+        ("trap", '"trap" has no MODEL; end it with MODEL = Model'),
+        ("trap_package.inner", '"trap_package.inner" has no MODEL'),
+        ("trap_package.nothing", 'there is no module "trap_package.nothing"'),
+        ("trap.inner", 'there is no module "trap.inner"'),
+    ],
+)
+def test_a_module_that_defines_no_model_is_not_imported(reference, sentence, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    trap = f"open({str(tmp_path / 'sprung')!r}, 'w')\n"
+    (tmp_path / "trap.py").write_text(trap)
+    (tmp_path / "trap_package").mkdir()
+    (tmp_path / "trap_package" / "__init__.py").write_text(trap)
+    (tmp_path / "trap_package" / "inner.py").write_text(trap)
+    with pytest.raises(ModelError, match=re.escape(sentence)):
+        load_model(reference)
+    assert not (tmp_path / "sprung").exists()
+    assert reference not in sys.modules
+
+
+def test_a_model_in_a_package_of_the_user_s_own_is_found(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "own_package").mkdir()
+    (tmp_path / "own_package" / "__init__.py").write_text("")
+    (tmp_path / "own_package" / "wave.py").write_text((WAVE_FOLDER / "wave.py").read_text())
+    (tmp_path / "own_package" / "names.py").write_text("from own_package.wave import MODEL\n")
+    assert load_model("own_package.wave").name == load_model("own_package.names").name == WAVE.name
+
+
+def test_the_working_folder_of_python_m_holds_no_models(tmp_path):
+    (tmp_path / "evil.py").write_text("open('sprung', 'w')\nMODEL = None\n")
+    (tmp_path / "campaign.toml").write_text('[campaign]\nmodel = "evil"\ncases = 1\ndesign = "mc"\nseed = 1\n')
+    command = [sys.executable, "-m", "mc_engine", "check", "campaign.toml"]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert 'there is no module "evil"' in done.stderr
+    assert not (tmp_path / "sprung").exists()

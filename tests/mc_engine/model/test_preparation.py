@@ -1,0 +1,89 @@
+"""Mistakes in the use of what `prepare` is handed, and in what it returns: a sentence with the line and the fix."""
+
+import numpy as np
+import pytest
+from mistaken_campaign import campaign_with, line_of
+
+from mc_engine.errors import EngineError
+from mc_engine.flight.contract import breaches
+from mc_engine.flight.flight import prepare
+
+PREPARE = (
+    "import numpy as np\n\n\ndef prepare(inputs, settings, refusals):\n    more = {{}}\n    {}\n"
+    "    return {{**vars(inputs), **more}}\n\n\n@physics\ndef initial"
+)
+SETTING = 'Setting("limit_s", "s", "a limit", 10.0),'
+
+
+def campaign(folder, line):
+    """The smallest campaign with a `prepare` that has this line, and with a setting."""
+    return campaign_with(
+        folder,
+        ("@physics\ndef initial", PREPARE.format(line)),
+        ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+        ("    settings=()", f"    settings=({SETTING})"),
+        ("Model, Parameter", "Model, Parameter, Setting"),
+    )
+
+
+USE = (
+    "`inputs` and `settings` have attributes in SI, without unit, such as inputs.altitude, and vars(inputs) is a "
+    "dictionary of them; each holds the numbers of many cases: use NumPy, np.where(condition, a, b), & and |; "
+    'cases are refused by refusals.add(mask, "why")'
+)
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ('r = inputs["altitude"]', USE),
+        ('inputs["altitude"] = 1.0', USE),
+        ("more = {**inputs}", USE),
+        ("r = inputs.altitud", f"no attribute 'altitud'; did you mean \"altitude\"?; {USE}"),
+        ("r = inputs.altitude_km", f"no attribute 'altitude_km'; did you mean \"altitude\"?; {USE}"),
+        ("r = settings.altitude", f"no attribute 'altitude'; known is \"limit\"; {USE}"),
+        ('r = vars(inputs)["burn_dv_m_s"]', f"KeyError: 'burn_dv_m_s'; {USE}"),
+        ("refusals.append(inputs.altitude < 0.0)", f"no attribute 'append'; {USE}"),
+        ("refusals.add(inputs.altitude < 0.0)", f"missing 1 required positional argument: 'sentence'; {USE}"),
+        ("r = 1.0 if inputs.altitude > 0.0 else 2.0", USE),
+        ("import math; r = math.sqrt(inputs.altitude)", USE),
+        ('more["altitude"] = inputs.altitude + 0j', '`prepare` gives "altitude" as complex numbers; it must be a num'),
+        ('more["altitude"] = inputs.altitude[:1]', '`prepare` gives "altitude" as shape (1,); it must be a number for'),
+        ('more["altitude"] = None', '`prepare` gives "altitude" as NoneType; it must be a number for each of 3 cases'),
+        ('more["altitude"] = ["low"] * 3', '`prepare` gives "altitude" as an array of str96; it must be'),
+        ('more["altitude"] = [[1.0], [1.0, 2.0]]', '`prepare` gives "altitude" as list; it must be a number for'),
+    ],
+)
+def test_a_mistake_in_the_preparation_of_cases_is_a_sentence_with_its_fix(tmp_path, line, sentence):
+    try:
+        (found,) = breaches(campaign(tmp_path, line))
+    except EngineError as error:  # with one case alone, when the file is loaded
+        found = str(error).splitlines()[-1].strip().removeprefix("campaign.model: ")
+    assert sentence in found
+    assert "\n" not in found
+    place = "def prepare" if line.startswith("more[") else line
+    assert found.startswith(f"model.py, line {line_of(tmp_path, place)}: `prepare`")
+
+
+def test_one_number_counts_for_all_cases_and_an_array_has_one_for_each(tmp_path):
+    one = campaign(tmp_path, 'more = {"altitude": 4e5, "burn_dv": inputs.burn_dv + np.arange(5.0)}')
+    altitude, burn, *_ = prepare(one.model, one.nominal, 5).parameters
+    assert altitude.tolist() == [4e5] * 5
+    assert np.diff(burn).tolist() == [1.0] * 4
+
+
+def test_an_error_of_the_models_own_stays_what_it_is(tmp_path):
+    with pytest.raises(EngineError, match=r"model\.py, line \d+: `prepare`: KeyError: 7"):
+        campaign(tmp_path, "{}[7]")
+
+
+def test_a_preparation_that_would_have_to_be_awaited_is_a_sentence(tmp_path):
+    with pytest.raises(EngineError, match=r"model\.py, line \d+: `prepare` is an async def; write def"):
+        campaign_with(
+            tmp_path,
+            (
+                "@physics\ndef initial",
+                "async def prepare(i, s, refusals):\n    return vars(i)\n\n\n@physics\ndef initial",
+            ),
+            ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+        )

@@ -1,0 +1,232 @@
+"""Promises of the runner, on the smallest campaign."""
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pandas as pd
+import pytest
+from small_run import ENVIRONMENT
+
+from mc_engine import load_campaign, open_store
+from mc_engine.campaign.loading import SHIPPED
+from mc_engine.errors import ModelError, RunInterrupted, StoreError
+from mc_engine.runner import runner
+from mc_engine.store.verification import damage
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """2000 cases of the smallest campaign, flown by two threads."""
+    return runner.run(load_campaign("minimal", cases=2000), tmp_path_factory.mktemp("flown") / "run", workers=2)
+
+
+def table_bytes(store):
+    """All columns of all cases as bytes, numbers with every bit."""
+    frame = store.cases()
+    return {name: frame[name].to_numpy().tobytes() if frame[name].dtype.kind in "fi" else list(frame[name])
+            for name in frame}  # fmt: skip
+
+
+@pytest.mark.parametrize(("workers", "chunk"), [(1, 64), (2, 1), (2, 7), (1, 1000)])
+def test_the_table_is_the_same_whatever_the_chunks_and_threads(flown, tmp_path, workers, chunk):
+    cases = 60 if chunk == 1 else 2000
+    again = runner.run(load_campaign("minimal", cases=cases), tmp_path / "run", workers=workers, chunk=chunk)
+    ours, first = table_bytes(again), flown.cases().head(cases)
+    assert len(again.cases()) == cases
+    for name, content in ours.items():
+        column = first[name].to_numpy()
+        assert content == (column.tobytes() if column.dtype.kind in "fi" else list(column)), name
+
+
+def test_1000_cases_extended_to_2000_are_a_fresh_2000(flown, tmp_path):
+    runner.run(load_campaign("minimal", cases=1000), tmp_path / "run")
+    extended = runner.extend(tmp_path / "run", 2000)
+    assert table_bytes(extended) == table_bytes(flown)
+    assert extended.n_cases == 2000
+
+
+def test_a_design_that_cannot_grow_is_not_extended(tmp_path):
+    runner.run(load_campaign("deorbit/demonstration"), tmp_path / "run")
+    with pytest.raises(StoreError, match='"grid" cannot be extended; mc, sobol, saltelli, morris can'):
+        runner.extend(tmp_path / "run", 100)
+
+
+def test_an_interrupted_run_is_completed_to_the_same_table(tmp_path):
+    campaign = load_campaign("minimal", cases=20_000)
+    sent, before = [], signal.getsignal(signal.SIGINT)
+
+    def interrupt(done, total, failed):
+        if done >= 500 and not sent:
+            sent.append(done)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(RunInterrupted, match=r"mc-engine resume .*run"):
+        runner.run(campaign, tmp_path / "run", progress=interrupt, chunk=50)
+    cut = open_store(tmp_path / "run")
+    assert 500 <= len(cut.cases()) < 20_000
+    assert signal.getsignal(signal.SIGINT) is before
+    whole = runner.resume(tmp_path / "run")
+    assert table_bytes(whole) == table_bytes(runner.run(campaign, tmp_path / "fresh"))
+    assert damage(whole.path) == []
+
+
+def test_ctrl_c_on_the_command_line_exits_with_4_and_resume_completes_it(tmp_path):
+    command = [sys.executable, "-m", "mc_engine"]
+    process = subprocess.Popen(
+        [*command, "run", "minimal", "--cases", "3000000", "--out", "run", "--no-report"],
+        cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 120.0
+    while not list((tmp_path / "run" / "cases").glob("part-*.parquet")) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 4, errors
+    assert "mc-engine resume run" in errors
+    assert "Traceback" not in errors
+    assert open_store(tmp_path / "run").missing()
+
+
+def test_a_run_that_was_moved_stands_alone(flown, tmp_path):
+    moved = tmp_path / "elsewhere"
+    shutil.copytree(flown.path, moved)
+    replay = runner.replay(moved, 3)
+    assert replay.equal
+    assert damage(runner.extend(moved, 2100).path) == []
+
+
+def test_replays_have_the_bits_of_the_run_and_a_history_that_ends_with_the_case(flown):
+    rng = np.random.default_rng(3)
+    for case in rng.integers(0, 2000, 20):
+        replay = runner.replay(flown.path, int(case))
+        assert replay.equal, replay.differences
+        assert replay.history["t_s"].iloc[-1] == replay.row["end_time_s"]
+        assert replay.history["altitude_km"].iloc[-1] == pytest.approx(replay.row["apogee_altitude_km"], rel=1e-13)
+
+
+def test_a_replay_names_every_number_with_other_bits(flown, monkeypatch):
+    stored = flown.row(5)
+    other = {**stored, "apogee_time_s": np.nextafter(stored["apogee_time_s"], np.inf)}
+    monkeypatch.setattr(type(flown), "row", lambda store, case: other)
+    replay = runner.replay(flown.path, 5)
+    assert not replay.equal
+    assert len(replay.differences) == 1
+    assert "apogee_time_s" in replay.differences[0]
+
+
+def test_changed_sources_refuse_to_continue_a_run(flown, tmp_path):
+    moved = tmp_path / "edited"
+    shutil.copytree(flown.path, moved)
+    model = moved / "model.py"
+    model.write_text(model.read_text().replace("burn_dv * (1.0", "burn_dv * (1.1"))
+    for act in (lambda: runner.resume(moved), lambda: runner.replay(moved, 0), lambda: runner.extend(moved, 3000)):
+        with pytest.raises(StoreError, match=r"flown by other sources|model\.py: damaged or edited"):
+            act()
+
+
+def test_histories_hold_the_nominal_and_the_first_cases(flown):
+    histories = flown.histories()
+    assert sorted(histories["case_id"].unique()) == [-1, 0, 1, 2]
+    assert flown.nominal()["apogee_altitude_km"] == pytest.approx(
+        histories.loc[histories["case_id"] == -1, "altitude_km"].iloc[-1], rel=1e-13
+    )
+
+
+def test_the_worst_cases_keep_their_histories(tmp_path):
+    text = load_campaign("minimal").text.replace(
+        "histories = { nominal = true, first = 3 }",
+        'histories = { nominal = false, worst = { metric = "apogee_altitude_km", count = 2, side = "smallest" } }',
+    )
+    folder = load_campaign("minimal").directory
+    store = runner.run(load_campaign("small", text=text, directory=folder, cases=300), tmp_path / "run")
+    lowest = store.cases().nsmallest(2, "apogee_altitude_km")["case_id"]
+    assert list(dict.fromkeys(store.histories()["case_id"])) == list(lowest)
+
+
+def test_the_worst_cases_of_a_requirement_with_two_limits_have_the_smallest_margin(tmp_path):
+    """As measured from the nearer limit, whichever end that is."""
+    small = load_campaign("minimal")
+    text = small.text.replace(
+        "histories = { nominal = true, first = 3 }",
+        'histories = { nominal = false, worst = { metric = "apogee_altitude_km", count = 4 } }',
+    )
+    text += '[requirement.band]\nmetric = "apogee_altitude_km"\nat_least = 780.0\nat_most = 9000.0\n'
+    store = runner.run(load_campaign("small", text=text, directory=small.directory, cases=300), tmp_path / "run")
+    altitude = store.cases().set_index("case_id")["apogee_altitude_km"]
+    margin = np.minimum(9000.0 - altitude, altitude - 780.0)
+    assert list(dict.fromkeys(store.histories()["case_id"])) == list(margin.nsmallest(4).index)
+    assert margin.nsmallest(4).index[0] == altitude.idxmin()
+
+
+def test_a_failed_case_keeps_its_row_and_its_inputs_and_the_others_are_untouched(flown, tmp_path):
+    """A burn that leaves the Earth for good never meets an apogee: no-stop, and NaN metrics, in that row alone."""
+    (tmp_path / "cases.csv").write_text("magnitude_error_pct,pitch_error_deg\n0,0\n4000,0\n1,0.5\n")
+    shutil.copy(load_campaign("minimal").directory / "model.py", tmp_path)
+    (tmp_path / "campaign.toml").write_text('[campaign]\nmodel = "model.py"\ndesign = "table"\ntable = "cases.csv"\n')
+    store = runner.run(load_campaign(tmp_path), tmp_path / "run")
+    frame = store.cases()
+    assert list(frame["status"]) == ["ok", "no-stop", "ok"]
+    assert frame["magnitude_error_pct"].iloc[1] == 4000.0
+    assert np.isnan(frame["apogee_altitude_km"].iloc[1])
+    assert np.isfinite(frame.filter(like="end_").iloc[1].to_numpy(dtype=float)).all()
+    assert frame["apogee_altitude_km"].iloc[[0, 2]].notna().all()
+
+
+def test_the_campaign_as_run_and_its_files_stand_in_the_run_directory(flown):
+    assert (flown.path / "campaign.toml").read_text() == load_campaign("minimal").text
+    assert (flown.path / "model.py").read_bytes() == (load_campaign("minimal").directory / "model.py").read_bytes()
+    manifest = json.loads((flown.path / "manifest.json").read_text())
+    assert manifest["campaign"]["cases"] == 2000
+    text = json.dumps(manifest)
+    assert str(flown.path.parent) not in text
+    assert os.path.expanduser("~") + "/" not in text
+    assert {note.event for note in flown.notes()} >= {"started", "finished"}
+
+
+def test_pandas_reads_the_cases_without_the_engine(flown):
+    plain = pd.read_parquet(flown.path / "cases")
+    assert len(plain) == 2000
+    assert set(plain.columns) == set(flown.cases().columns)
+
+
+def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
+    source = (load_campaign("minimal").directory / "model.py").read_text()
+    source = source.replace("    initial=initial,", "    prepare=prepare,\n    initial=initial,")
+    broken = "def prepare(i, o, refusals):\n    return {**vars(i), 'altitude': 1 / (i.altitude.size < 4)}\n\n\n"
+    source = source.replace("MODEL = Model(", f"{broken}MODEL = Model(")
+    (tmp_path / "model.py").write_text(source)
+    (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
+    with pytest.raises(ModelError, match=r"cases \d+ to \d+ cannot be flown: model.py, line \d+: ZeroDivisionError"):
+        runner.run(load_campaign(tmp_path, cases=100), tmp_path / "run")
+
+
+@pytest.mark.parametrize("slip", ["s.y // 2.0", "s.y**0.5"])
+def test_physics_that_does_not_compile_is_named_with_its_line(tmp_path, slip):
+    line = rf"cannot be flown: model.py, line 27: `r2 = s.x \* s.x \+ {re.escape(slip)}`: "
+    source = (load_campaign("minimal").directory / "model.py").read_text()
+    source = source.replace("s.x * s.x + s.y * s.y\n    g", f"s.x * s.x + {slip}\n    g")
+    (tmp_path / "model.py").write_text(source)
+    (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
+    with pytest.raises(ModelError, match=f"{line}.*calls of .*floor, pow.*; `mc-engine check` tells more"):
+        runner.run(load_campaign(tmp_path), tmp_path / "run")
+
+
+def test_histories_have_about_as_many_rows_as_asked_for(tmp_path):
+    text = (
+        SHIPPED.joinpath("minimal/campaign.toml")
+        .read_text(encoding="utf-8")
+        .replace("first = 3", "first = 3, rows = 20")
+    )
+    campaign = load_campaign("few.toml", text=text, directory=SHIPPED / "minimal", cases=10)
+    histories = runner.run(campaign, tmp_path / "run", workers=2).histories()
+    assert list(dict.fromkeys(histories["case_id"])) == [-1, 0, 1, 2]
+    assert histories.groupby("case_id").size().between(4, 24).all()
+    whole = runner.run(load_campaign("minimal", cases=10), tmp_path / "whole", workers=1).histories()
+    assert len(whole) > 4 * len(histories)

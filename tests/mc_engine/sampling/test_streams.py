@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mc_engine.sampling.streams import SEED_CONTRACT, stream, uniforms
+
+SEEDS = st.integers(0, 2**63 - 1)
+NAMES = st.text(min_size=1, max_size=20)
+CONTRACT_DRAWS = [0.39567765469958927, 0.8556476477968407, 0.6190736563696156]
+CASES = st.lists(st.integers(0, 2**62), max_size=20)
+
+
+@given(seed=SEEDS, name=NAMES, cases=CASES)
+def test_each_uniform_is_the_first_number_of_its_stream_bit_for_bit(seed, name, cases):
+    draws = uniforms(seed, name, np.array(cases, dtype=np.int64))
+    assert draws.tolist() == [stream(seed, name, case).random() for case in cases]
+
+
+def test_the_seed_contract_is_one_and_these_are_its_numbers():
+    # Written down once; another number here is another seed contract, and stored runs cannot be repeated.
+    assert SEED_CONTRACT == 1
+    assert uniforms(20160421, "ve_pct", np.arange(3)).tolist() == CONTRACT_DRAWS
+
+
+def test_a_block_boundary_leaves_no_trace():
+    cases = np.arange(3 * 8192 + 5)
+    whole = uniforms(7, "dv", cases)
+    pieces = np.concatenate([uniforms(7, "dv", piece) for piece in np.array_split(cases, 11)])
+    assert whole.tobytes() == pieces.tobytes()
+
+
+def test_the_order_in_which_cases_are_asked_for_does_not_matter():
+    cases = np.random.default_rng(3).permutation(10_000)
+    assert uniforms(7, "dv", cases).tobytes() == uniforms(7, "dv", np.arange(10_000))[cases].tobytes()
+
+
+@pytest.mark.parametrize(("seed", "name"), [(1, "a"), (0, "b"), (2, "a")])
+def test_another_seed_or_another_name_is_another_stream(seed, name):
+    ours, theirs = uniforms(0, "a", np.arange(1000)), uniforms(seed, name, np.arange(1000))
+    assert np.abs(np.corrcoef(ours, theirs)[0, 1]) < 0.1  # three sigma of 1000 independent pairs
+    assert not np.isin(ours, theirs).any()
+
+
+def test_a_million_draws_are_uniform():
+    from scipy.stats import kstest
+
+    draws = uniforms(5, "u", np.arange(1_000_000))
+    assert 0.0 <= draws.min() < 1e-5
+    assert 1.0 - 1e-5 < draws.max() < 1.0
+    assert kstest(draws, "uniform").pvalue > 0.001

@@ -1,0 +1,374 @@
+import json
+import os
+import time
+from hashlib import sha256
+from itertools import pairwise
+
+import duckdb
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from small_run import COLUMNS, MANIFEST, TEXT, block, created, filled, row
+
+from mc_engine.durable_file import temporary_name
+from mc_engine.errors import StoreError
+from mc_engine.store import parts
+from mc_engine.store.journal import Journal
+from mc_engine.store.opening import open_store
+from mc_engine.store.run_files import is_run_directory
+from mc_engine.store.store import Column, create_store
+from mc_engine.store.verification import damage
+
+# ---- a store gives back what was put in
+
+
+@settings(max_examples=25, deadline=None)
+@given(cuts=st.sets(st.integers(1, 39)), order=st.randoms(use_true_random=False))
+def test_the_table_is_the_same_however_the_cases_were_cut_and_ordered(tmp_path_factory, cuts, order):
+    store = create_store(tmp_path_factory.mktemp("any") / "run", MANIFEST, TEXT, COLUMNS)
+    edges = [0, *sorted(cuts), 40]
+    ranges = list(pairwise(edges))
+    order.shuffle(ranges)
+    for first, stop in ranges:
+        store.append(first, stop - first, block(first, stop - first))
+    table = open_store(store.path).cases()
+    expected = block(0, 40)
+    assert table["case_id"].tolist() == list(range(40))
+    for name in ("ve_pct", "propellant_kg", "end_x_km"):
+        assert table[name].to_numpy().tobytes() == np.asarray(expected[name], float).tobytes()
+    for name in ("control", "j2", "reason"):
+        assert table[name].tolist() == expected[name].tolist()
+    assert store.committed() == [(0, 40)]
+    assert store.missing(45) == [(40, 45)]
+
+
+def test_status_is_stored_in_words_whether_given_in_codes_or_words(store):
+    store.append(0, 10, block(0, 10))
+    store.append(10, 10, {**block(10, 10), "status": ["ok"] * 9 + ["refused"]})
+    assert store.cases()["status"].tolist() == ["ok"] * 3 + ["no-stop"] + ["ok"] * 15 + ["refused"]
+    assert open_store(store.path).status_counts() == {"ok": 18, "no-stop": 1, "refused": 1}
+
+
+def test_a_missing_reason_is_an_empty_word(store):
+    store.append(0, 2, {**block(0, 2), "reason": np.array([None, "too heavy"], dtype=object)})
+    assert store.cases()["reason"].tolist() == ["", "too heavy"]
+
+
+def test_the_table_carries_units_and_meanings(store):
+    table = filled(store).cases()
+    assert table.attrs["units"]["propellant_kg"] == "kg"
+    assert table.attrs["descriptions"]["ve_pct"] == "error of the speed change"
+    assert table.attrs["roles"]["end_x_km"] == "state"
+    assert list(table.attrs["units"]) == list(table.columns) == list(store.units)
+
+
+def test_some_columns_can_be_read_in_the_order_asked_for(store):
+    table = filled(store).cases(["propellant_kg", "case_id"])
+    assert list(table.columns) == ["propellant_kg", "case_id"]
+    assert table.attrs["units"] == {"propellant_kg": "kg", "case_id": ""}
+
+
+def test_an_unknown_column_is_refused_with_those_there_are(store):
+    with pytest.raises(StoreError, match=r'no column "fuel".*propellant_kg'):
+        filled(store).cases(["fuel"])
+
+
+def test_an_empty_store_gives_a_table_without_rows_and_with_every_column(store):
+    table = store.cases()
+    assert len(table) == 0
+    assert list(table.columns) == ["case_id", "status", "reason", *(column.name for column in COLUMNS)]
+    assert table["propellant_kg"].dtype == np.float64
+    assert table.attrs["units"]["ve_pct"] == "%"
+    assert store.committed() == []
+    assert store.missing() == [(0, 40)]
+    assert store.status_counts() == {}
+    assert store.nominal() == {}
+    assert list(store.histories().columns) == ["case_id", "t_s", "force_n"]
+
+
+def test_plain_pandas_reads_the_cases_with_their_units(store):
+    table = pd.read_parquet(filled(store).path / "cases")
+    pd.testing.assert_frame_equal(table, store.cases())
+    assert table.attrs["units"]["propellant_kg"] == "kg"
+
+
+def test_duckdb_reads_the_cases(store):
+    run = filled(store).path
+    query = f"SELECT count(*), sum(ve_pct), count(DISTINCT status) FROM '{run}/cases/*.parquet' WHERE case_id < 20"
+    count, total, words = duckdb.sql(query).fetchall()[0]
+    assert (count, words) == (20, 2)
+    assert total == pytest.approx(block(0, 20)["ve_pct"].sum(), rel=1e-12)
+
+
+def test_a_part_written_half_is_seen_by_neither_pandas_nor_duckdb(store):
+    run = filled(store).path
+    (run / temporary_name(f"cases/{parts.part_name(40, 10)}")).write_bytes(b"PAR1 and no more")
+    assert len(pd.read_parquet(run / "cases")) == 40
+    assert duckdb.sql(f"SELECT count(*) FROM '{run}/cases/*.parquet'").fetchall() == [(40,)]
+
+
+def test_every_field_on_disk_has_unit_role_and_description(store):
+    path = next((filled(store).path / "cases").glob("part-*"))
+    schema = pq.read_schema(path)
+    assert schema.field("propellant_kg").metadata == {
+        b"unit": b"kg",
+        b"role": b"metric",
+        b"description": b"propellant used",
+    }
+    assert all(set(field.metadata) == {b"unit", b"role", b"description"} for field in schema)
+    assert len({pq.read_schema(part).serialize().to_pybytes() for part in path.parent.iterdir()}) == 1
+
+
+def test_numbers_are_written_without_dictionaries_and_words_with(store):
+    metadata = pq.read_metadata(next((filled(store).path / "cases").glob("part-*")))
+    chunks = [metadata.row_group(0).column(i) for i in range(metadata.num_columns)]
+    encodings = {chunk.path_in_schema: chunk.encodings for chunk in chunks}
+    assert not any("DICTIONARY" in name for name in encodings["propellant_kg"])
+    assert any("DICTIONARY" in name for name in encodings["status"])
+
+
+def test_the_same_columns_give_the_same_bytes(tmp_path):
+    digests = []
+    for name in ("one", "two"):
+        run = filled(create_store(tmp_path / name, MANIFEST, TEXT, COLUMNS)).path
+        files = sorted((run / "cases").iterdir())
+        digests.append([(file.name, sha256(file.read_bytes()).hexdigest()) for file in files])
+    assert len(digests[0]) == 4
+    assert digests[0] == digests[1]
+
+
+def test_strided_and_read_only_arrays_are_stored_like_any_other(store):
+    square = np.arange(80.0).reshape(40, 2)
+    square.flags.writeable = False
+    store.append(0, 40, {**block(0, 40), "ve_pct": square[:, 1]})
+    assert store.cases()["ve_pct"].tolist() == square[:, 1].tolist()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"ve_pct": np.zeros(9)}, r'"ve_pct" has shape \(9,\), not \(10,\)'),
+        ({"fuel_kg": np.zeros(10)}, '"fuel_kg" is not one of this run'),
+        ({"propellant_kg": None}, '"propellant_kg" is missing'),
+        ({"propellant_kg": ["a lot"] * 10}, '"propellant_kg" is no number'),
+        ({"status": np.full(10, 99)}, '"status" is no word'),
+        ({"case_id": np.arange(1, 11)}, "case_id does not count from 0 to 9"),
+    ],
+)
+def test_columns_that_do_not_fit_are_refused_by_name_and_leave_nothing(store, change, message):
+    columns = {name: values for name, values in {**block(0, 10), **change}.items() if values is not None}
+    with pytest.raises(StoreError, match=message):
+        store.append(0, 10, columns)
+    assert store.committed() == []
+    assert list((store.path / "cases").iterdir()) == []
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 10), (5, 10), (39, 1), (8, 40)])
+def test_a_case_is_never_committed_twice(store, first, count):
+    filled(store)
+    others = {**block(first, count), "ve_pct": np.full(count, 99.0)}
+    with pytest.raises(StoreError, match="committed already"):
+        store.append(first, count, others)
+    assert damage(store.path) == []  # refused before a committed file was written over
+    assert store.cases()["ve_pct"].tolist() == block(0, 40)["ve_pct"].tolist()
+
+
+def test_ranges_committed_out_of_order_leave_the_gaps_missing(store):
+    store.append(30, 5, block(30, 5))
+    store.append(10, 10, block(10, 10))
+    store.append(35, 2, block(35, 2))
+    assert store.committed() == [(10, 20), (30, 37)]
+    assert store.missing() == [(0, 10), (20, 30), (37, 40)]
+    assert store.missing(range(15, 32)) == [(20, 30)]
+    assert store.missing(range(31, 36)) == []
+    assert store.missing(0) == []
+
+
+# ---- nominal, histories, notes
+
+
+def test_the_nominal_is_kept_apart_as_case_minus_one(store):
+    given = row(7)
+    store.write_nominal(given)
+    nominal = open_store(store.path).nominal()
+    assert nominal["case_id"] == -1
+    assert nominal["status"] == "ok"
+    assert nominal["ve_pct"] == given["ve_pct"]
+    assert len(store.cases()) == 0
+    assert pd.read_parquet(store.path / "nominal.parquet")["propellant_kg"].tolist() == [given["propellant_kg"]]
+
+
+def test_a_nominal_written_again_replaces_the_first(store):
+    for case in (7, 8):
+        store.write_nominal(row(case))
+    assert open_store(store.path).nominal()["ve_pct"] == block(8, 1)["ve_pct"][0]
+    assert damage(store.path) == []
+
+
+def test_a_kill_while_the_nominal_is_replaced_leaves_no_nominal_rather_than_damage(store, monkeypatch):
+    store.write_nominal(row(7))
+    append = Journal.append
+
+    def killed(journal, event, *facts):
+        if event == "nominal":
+            raise KeyboardInterrupt
+        return append(journal, event, *facts)
+
+    monkeypatch.setattr(Journal, "append", killed)
+    with pytest.raises(KeyboardInterrupt):
+        store.write_nominal(row(8))
+    assert open_store(store.path).nominal() == {}
+
+
+def test_histories_come_back_with_units_and_replace_those_kept_before(store):
+    for scale in (1.0, 2.0):
+        store.write_histories({"case_id": [3, 3, 9], "t_s": [0.0, 1.0, 0.0], "force_n": np.array([1, 2, 3]) * scale})
+    histories = open_store(store.path).histories()
+    assert histories["force_n"].tolist() == [2.0, 4.0, 6.0]
+    assert histories["case_id"].tolist() == [3, 3, 9]
+    assert histories.attrs["units"] == {"case_id": "", "t_s": "s", "force_n": "N"}
+    pd.testing.assert_frame_equal(pd.read_parquet(store.path / "history"), histories)
+    store.write_histories(histories)
+    pd.testing.assert_frame_equal(store.histories(), histories)
+
+
+def test_an_extension_changes_how_many_cases_are_wanted(store):
+    assert store.n_cases == 40
+    store.note("extended", cases=60)
+    assert open_store(store.path).n_cases == 60
+    assert store.missing() == [(0, 60)]
+
+
+def test_notes_come_back_in_order_with_their_facts(store):
+    store.note("started", cores=2)
+    store.note("timing", seconds=1.5)
+    assert [entry.event for entry in open_store(store.path).notes()] == ["created", "started", "timing"]
+    assert store.notes("timing")[0].facts == {"seconds": 1.5}
+
+
+def test_manifest_and_campaign_come_back_as_given(store):
+    again = open_store(store.path)
+    assert again.campaign_text == TEXT
+    assert (store.path / "campaign.toml").read_text(encoding="utf-8") == TEXT
+    assert again.manifest["quantities"] == MANIFEST["quantities"]
+    assert [column["name"] for column in again.manifest["columns"]] == list(again.units)
+    assert json.loads((store.path / "manifest.json").read_text(encoding="utf-8")) == again.manifest
+
+
+# ---- creation
+
+
+def test_a_directory_that_holds_a_run_is_refused_and_kept(store):
+    filled(store)
+    with pytest.raises(StoreError, match=rf"{store.path}: holds a run already"):
+        create_store(store.path, MANIFEST, "other", COLUMNS)
+    assert len(open_store(store.path).cases()) == 40
+
+
+@pytest.mark.parametrize("name", ["campaign.toml", "notes.txt", "manifest.json"])
+def test_a_directory_with_someones_files_is_refused_and_untouched(run, name):
+    run.mkdir()
+    (run / name).write_text("mine")
+    with pytest.raises(StoreError, match="is not empty and holds no run"):
+        created(run)
+    assert [path.name for path in run.iterdir()] == [name]
+    assert (run / name).read_text() == "mine"
+
+
+def killed_at(n):
+    calls = iter(range(1000))
+
+    def write(root, name, content):
+        if next(calls) == n:
+            raise KeyboardInterrupt
+        parts.write_inside(root, name, content)
+
+    return write
+
+
+def test_a_creation_that_was_killed_anywhere_can_be_made_again(tmp_path, monkeypatch):
+    reached = 0
+    while True:
+        run = tmp_path / f"run-{reached}"
+        with monkeypatch.context() as patch:
+            patch.setattr("mc_engine.store.store.disk.write_inside", killed_at(reached))
+            try:
+                created(run)
+                break
+            except KeyboardInterrupt:
+                reached += 1
+        assert damage(created(run).path) == []
+    assert reached == 3
+
+
+def test_a_folder_without_a_run_is_named_in_the_refusal(tmp_path):
+    with pytest.raises(StoreError, match=rf"{tmp_path}: is no run directory"):
+        open_store(tmp_path)
+    with pytest.raises(StoreError, match="nowhere: there is no such folder"):
+        open_store(tmp_path / "nowhere")
+    assert not is_run_directory(tmp_path)
+
+
+def test_a_run_of_a_newer_engine_is_refused(run):
+    create = {**MANIFEST, "format": 2}
+    with pytest.raises(StoreError, match="newer engine"):
+        create_store(run, create, TEXT, COLUMNS)
+
+
+# ---- speed
+
+
+@pytest.fixture
+def wide(run):
+    columns = [Column(f"metric_{i}", "", "metric", "a number") for i in range(40)]
+    store = create_store(run, MANIFEST, TEXT, columns)
+    rng = np.random.default_rng(1)
+    arrays = {column.name: rng.normal(size=5000) for column in columns}
+    return store, {**arrays, "status": np.zeros(5000, int), "reason": np.full(5000, "", object)}
+
+
+def shortest(act, repeats=7):
+    """Shortest of some times [s] that `act` takes; it gets the number of the repeat."""
+    times = []
+    for repeat in range(repeats):
+        begin = time.perf_counter()
+        act(repeat)
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+@pytest.mark.benchmark
+def test_reading_a_store_costs_at_most_four_times_what_pandas_takes_for_the_same_files(wide):
+    """The digest of every part is checked on the way."""
+    store, arrays = wide
+    store.append(0, 5000, arrays)
+    store.append(5000, 5000, arrays)
+    ours = shortest(lambda _: store.cases())
+    assert len(store.cases()) == 10_000
+    assert ours < 4.0 * shortest(lambda _: pd.read_parquet(store.path / "cases"))
+
+
+@pytest.mark.benchmark
+def test_storing_costs_at_most_four_times_a_synced_file_of_the_same_table(wide, tmp_path):
+    """A part and its line in the journal are two synced files and a synced folder."""
+    store, arrays = wide
+
+    def plain(repeat):
+        path = tmp_path / f"{repeat}.parquet"
+        pd.DataFrame(arrays).to_parquet(path, compression="zstd")
+        with path.open("rb+") as file:
+            os.fsync(file.fileno())
+
+    with store.lock():
+        ours = shortest(lambda repeat: store.append(5000 * repeat, 5000, arrays))
+    assert ours < 4.0 * shortest(plain)
+
+
+def test_columns_come_in_the_order_asked_for_each_once(store):
+    filled(store)
+    names = list(store.units)
+    asked = [names[3], names[1], names[3]]
+    assert store.cases(columns=asked).columns.tolist() == [names[3], names[1]]

@@ -1,0 +1,99 @@
+"""URLs of object stores: what is incomplete is refused before anything is flown, and nothing secret is said."""
+
+import pytest
+from cart import call
+from small_run import created, filled
+
+from mc_engine import load_campaign
+from mc_engine.errors import CampaignError, EngineError
+from mc_engine.store.object_store import Publisher, fetch, publish
+from mc_engine.store.urls import is_url, store_url
+
+pytest.importorskip("fsspec")
+
+INCOMPLETE = {
+    "s3://": "names no bucket",
+    "S3://": "names no bucket",
+    "gs://": "names no bucket",
+    "s3:///x": "names no bucket",
+    "s3:/x": "is no URL",
+    "://x": "is no URL",
+    "memory://": "names no bucket or path",
+    "file://": "names no absolute path",
+    "file:///": "names no absolute path",
+    "file://relative/x": "names no absolute path",
+    "nosuch://bucket/x": '"nosuch" is no object store',
+    "simplecache::s3://bucket/x": "is no URL",
+    " s3://bucket/x": "is no URL",
+    "s3://bucket/a b": "has a space",
+    "s3:// /x": "has a space",
+    "s3://bucket/\u202ex": "that cannot be seen",
+    "s3://bucket/\x1b[2J": "that cannot be seen",
+    "s3://bucket/\nx": "that cannot be seen",
+    "s3://bucket/../x": '".." in its path',
+    "s3://..": '".." in its path',
+    "file:///home/../x": '".." in its path',
+    "s3://bucket//x": "an empty part",
+}
+SECRET = ("s3://key:hidden@bucket/x", "s3://key:hid/den@bucket/x", "s3://hidden@bucket/x", "ftp://me:hidden@host/x",
+          "s3://bucket/x?token=hidden", "https://host/x#hidden", "s3:/key:hidden@bucket/x")  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "url"),
+    [
+        ("s3://bucket", "s3://bucket"),
+        ("S3://bucket/runs/x/", "s3://bucket/runs/x"),
+        ("memory://runs", "memory://runs"),
+        ("file:///runs/x", "file:///runs/x"),
+        ("abfs://container@account/x", "abfs://container@account/x"),
+        ("sftp://me@host:22/x", "sftp://me@host:22/x"),
+    ],
+)
+def test_a_complete_url_is_taken_as_it_is(text, url):
+    assert (store_url(text), store_url(url), is_url(text)) == (url, url, True)
+
+
+@pytest.mark.parametrize("path", ["runs/x", "./s3", "/tmp/x", "C:/runs", "C:\\runs", "a:b", ".", "x.toml"])
+def test_a_path_is_no_url(path):
+    assert not is_url(path)
+
+
+@pytest.mark.parametrize("text", INCOMPLETE)
+def test_an_incomplete_url_ends_with_2_before_anything_is_flown_or_written(here, text):
+    filled(created(here / "run"))
+    commands = (["publish", "run", text], ["run", "cart", "--publish", text], ["resume", "run", "--publish", text],
+                ["extend", "run", "--cases", 50, "--publish", text], ["fetch", text, "back"], ["status", text],
+                ["report", text], ["compare", "run", text], ["run", "cart", "--out", text])  # fmt: skip
+    before = sorted(here.rglob("*"))
+    for words in commands if is_url(text) else commands[:5]:
+        done = call(*words)
+        assert done.exit_code == 2, (words, done.output)
+        assert INCOMPLETE[text] in done.stderr
+        assert done.stderr.count("\n") == 1 + text.count("\n")
+    assert sorted(here.rglob("*")) == before
+
+
+@pytest.mark.parametrize("text", INCOMPLETE)
+def test_the_engine_called_from_python_refuses_them_too(here, text):
+    run = filled(created(here / "run")).path
+    for use in (lambda: publish(run, text), lambda: fetch(text, here / "back"), lambda: Publisher(run, text)):
+        with pytest.raises(EngineError):
+            use()
+    assert sorted(path.name for path in here.iterdir()) == ["cart", "run"]
+
+
+@pytest.mark.parametrize("text", SECRET)
+def test_credentials_in_a_url_are_refused_and_never_said(here, text):
+    filled(created(here / "run"))
+    commands = (["publish", "run", text], ["run", "cart", "--publish", text], ["fetch", text, "back"], ["status", text],
+                ["report", text], ["run", "cart", "--out", text], ["replay", text, "3"], ["run", text], ["check", text],
+                ["export", text])  # fmt: skip
+    for words in commands:
+        done = call(*words)
+        assert done.exit_code == 2, (words, done.output)
+        assert "hid" not in done.output
+        assert "***" in done.output
+    with pytest.raises(CampaignError) as caught:
+        load_campaign(text)
+    assert "hid" not in str(caught.value)

@@ -1,0 +1,115 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_run import block, filled, row
+
+from mc_engine.errors import StoreError
+from mc_engine.store import parts, verification
+from mc_engine.store.opening import open_store
+from mc_engine.store.verification import damage
+
+
+def test_an_intact_run_has_no_damage(store):
+    filled(store)
+    store.write_nominal(row(7))
+    store.write_histories({"case_id": [3], "t_s": [0.0], "force_n": [1.0]})
+    assert damage(store.path) == []
+
+
+def everything(store):
+    filled(store)
+    store.write_nominal(row(7))
+    store.write_histories({"case_id": [3], "t_s": [0.0], "force_n": [1.0]})
+    return [path for path in sorted(store.path.rglob("*")) if path.is_file() and path.name != ".lock"]
+
+
+def test_verify_reports_every_cut_and_every_flipped_bit_of_every_file_by_name(store):
+    rng = np.random.default_rng(9)
+    for path in everything(store):
+        name = path.relative_to(store.path).as_posix()
+        whole = path.read_bytes()
+        cuts = [whole[:at] for at in rng.integers(0, len(whole), 10)]
+        flips = []
+        for at in rng.integers(0, 8 * len(whole), 40):
+            flipped = bytearray(whole)
+            flipped[at // 8] ^= 1 << (at % 8)
+            flips.append(bytes(flipped))
+        for content in cuts + flips:
+            path.write_bytes(content)
+            assert any(name in problem for problem in verification.damage(store.path)), name
+        path.write_bytes(whole)
+    assert verification.damage(store.path) == []
+
+
+def test_no_damaged_part_is_ever_read_as_a_table(store):
+    rng = np.random.default_rng(10)
+    filled(store)
+    for path in sorted((store.path / "cases").iterdir()):
+        whole = path.read_bytes()
+        for at in rng.integers(0, 8 * len(whole), 25):
+            flipped = bytearray(whole)
+            flipped[at // 8] ^= 1 << (at % 8)
+            path.write_bytes(bytes(flipped))
+            with pytest.raises(StoreError, match=path.name):
+                store.cases()
+        path.write_bytes(whole)
+
+
+def test_verify_reports_all_damage_at_once(store):
+    files = everything(store)
+    for path in files:
+        if path.parent.name == "cases":
+            path.write_bytes(path.read_bytes()[:-1])
+    (store.path / "manifest.json").write_text("{")
+    journal = store.path / "journal.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join([lines[0], b"?\n", *lines[2:]]))
+    text = "\n".join(verification.damage(store.path))
+    assert "journal.jsonl, line 2: damaged" in text
+    assert "manifest.json: damaged" in text
+    assert text.count("bytes where") == 3  # of four: the line of the first is lost
+    assert "part-0000000000-0000000009.parquet: has no line" in text
+
+
+def test_verify_names_a_part_that_is_gone(store):
+    filled(store)
+    path = store.path / "cases" / parts.part_name(10, 10)
+    path.unlink()
+    assert damage(store.path) == [f"cases/{path.name}: No such file or directory"]
+    with pytest.raises(StoreError, match=path.name):
+        store.cases()
+
+
+def test_verify_finds_a_part_whose_rows_are_not_those_of_the_journal(store):
+    store.append(0, 10, block(0, 10))
+    part = store.parts[0]
+    store.withdraw(part)
+    claim = replace(part, file="cases/part-0000000010-0000000020.parquet", first=10, rows=11, status={"ok": 11})
+    with store.lock():
+        (store.path / claim.file).write_bytes(block_bytes(store))
+        store.commit(claim)
+    assert damage(store.path) == [f"{claim.file}: is no part of this run, it has other rows or columns"]
+
+
+def block_bytes(store):
+    """The bytes of the part of the first ten cases."""
+    arrays = {**block(0, 10), "case_id": np.arange(10)}
+    return parts.parquet_bytes(parts.arrow_table(store.columns, arrays, 10, store.path))
+
+
+def test_verify_finds_a_part_with_other_columns(store):
+    with store.lock():
+        other = parts.write_part(
+            store.path, store.columns[:4], 0, 10, {k: block(0, 10)[k] for k in ("status", "reason", "ve_pct")}
+        )
+        store.commit(other)
+    assert any("is no part of this run, it has other rows or columns" in problem for problem in damage(store.path))
+
+
+@pytest.mark.parametrize("name", ["manifest.json", "campaign.toml"])
+def test_an_edited_manifest_or_campaign_is_refused_by_name(store, name):
+    with open(store.path / name, "a") as file:
+        file.write("\n")
+    with pytest.raises(StoreError, match=rf"{name}: damaged or edited"):
+        _ = open_store(store.path).campaign_text

@@ -1,0 +1,95 @@
+"""Candidates flown side by side: the same as each alone, nominal or over the same dispersed cases."""
+
+import os
+import time
+
+import numpy as np
+import pytest
+from apogee_tuning import apogee_and_speed, apogee_campaign
+
+from mc_engine.campaign.cases import case_table
+from mc_engine.flight.chunks import fly_cases
+from mc_engine.flight.kernel import build_kernel
+from mc_engine.studies.candidates import cases_per_candidate, commonest_failure, fly_candidates, quantile_rank
+
+CHOICES = np.array([[300.0, 100.0], [250.0, 60.0], [600.0, 200.0], [400.0, 150.0], [200.0, 50.0]])
+ROBUST = '\n[tuning.constraint.most]\nmetric = "apogee_altitude_km"\nquantile = {}\n{} = 700.0\n'
+
+
+def scores_of(campaign, choices=CHOICES, workers=1):
+    return fly_candidates(campaign, campaign.tuning, choices, workers)
+
+
+def test_the_nominal_case_of_a_candidate_is_what_vis_viva_says():
+    apogee, speed = apogee_and_speed(*CHOICES.T)
+    scores = scores_of(apogee_campaign())
+    np.testing.assert_allclose(scores.objectives, np.column_stack([apogee, speed]), rtol=1e-6)
+    assert scores.failed.tolist() == [0] * 5
+    assert scores.violation.tolist() == [0.0] * 5
+
+
+def test_candidates_fly_alike_alone_together_and_by_two_threads():
+    campaign = apogee_campaign(ROBUST.format(0.8, "at_least"))
+    together = scores_of(campaign)
+    for scores in (scores_of(campaign, workers=2), *(scores_of(campaign, CHOICES[k : k + 1]) for k in range(5))):
+        rows = [row for row in together.limited.tolist() if row in scores.limited.tolist()]
+        assert rows == scores.limited.tolist()
+    assert cases_per_candidate(campaign, campaign.tuning) == 11
+
+
+def test_threads_that_find_no_kernel_yet_do_not_write_it_together(tmp_path, monkeypatch):
+    replace = os.replace
+
+    def slowly(source, target):
+        time.sleep(0.3)
+        replace(source, target)
+
+    monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path))
+    monkeypatch.setattr("mc_engine.flight.kernel.os.replace", slowly)
+    build_kernel.cache_clear()
+    choices = np.tile(CHOICES, (8, 1))
+    assert scores_of(apogee_campaign(), choices, workers=2).failed.tolist() == [0] * 40
+
+
+@pytest.mark.parametrize(("limit", "rank"), [("at_least", 2), ("at_most", 1)])
+def test_a_quantile_is_an_order_statistic_of_the_campaigns_own_cases(limit, rank):
+    """0.2 of 10 cases: the third smallest where small is bad, the second where large is."""
+    campaign = apogee_campaign(ROBUST.format(0.2, limit))
+    flown = fly_cases(campaign, np.arange(10))["apogee_altitude_km"]  # the untuned choice, 300 km and 100 m/s
+    scores = scores_of(campaign, CHOICES[:1])
+    assert scores.limited[0, 0] == np.sort(flown)[rank]
+    assert len(np.unique(case_table(campaign, np.arange(10))["magnitude_error_pct"])) == 10
+
+
+def test_quantiles_never_take_the_better_case_of_two():
+    assert [quantile_rank(q, 20, True) for q in (0.05, 0.5, 0.51, 0.95, 0.999)] == [0, 9, 10, 18, 19]
+    assert [quantile_rank(q, 20, False) for q in (0.001, 0.05, 0.5, 0.51, 0.95)] == [0, 1, 10, 10, 19]
+
+
+def test_the_violation_is_the_excess_in_shares_of_the_limits():
+    limits = '\n[tuning.constraint.band]\nmetric = "apogee_altitude_km"\nat_least = 500.0\nat_most = 700.0\n'
+    scores = scores_of(apogee_campaign(limits))
+    apogee = scores.limited[:, 0]
+    expected = np.maximum(0.0, np.maximum((apogee - 700.0) / 700.0, (500.0 - apogee) / 500.0))
+    np.testing.assert_allclose(scores.violation, expected, rtol=1e-12)
+    assert (scores.violation == 0.0).any()
+    assert (scores.violation > 0.0).any()
+
+
+def test_a_candidate_that_cannot_fly_has_no_number_and_an_infinite_violation():
+    campaign = apogee_campaign(ROBUST.format(0.8, "at_least"))
+    refused = np.array([[100.0, 100.0]])  # below the altitudes that the model accepts
+    scores = scores_of(campaign, np.vstack([CHOICES[:1], refused]))
+    assert np.isnan(scores.objectives[1]).all()
+    assert np.isnan(scores.limited[1]).all()
+    assert np.isinf(scores.violation[1])
+    assert scores.failed.tolist() == [0, 11]
+    assert scores.reasons.tolist() == ["", "refused: altitude_km is outside 150 to 2000 km"]
+
+
+def test_the_commonest_of_several_failures_is_told():
+    status, reason = ["refused", "no-stop", "refused", "refused"], ["late", "", "early", "early"]
+    assert commonest_failure(status, reason) == "refused: early"
+    assert commonest_failure(status[:2], reason[:2]) == "refused: late"
+    assert commonest_failure(status[1:2], reason[1:2]).startswith("no-stop: the flight reached its time limit")
+    assert commonest_failure([], []) == ""

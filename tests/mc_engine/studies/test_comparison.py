@@ -1,0 +1,152 @@
+"""`mc-engine compare`: pairing, what changed, the answer and its exit status."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import typer
+from cart import call, fails_with
+from comparable_runs import COLUMNS, TEXT, run
+
+from mc_engine.command_line.commands import app
+from mc_engine.studies.comparison import ALPHA, TOLERANCE, compare_runs, pair_cases
+from mc_engine.studies.comparison_lines import comparison_lines
+
+
+def compared(a, b, **options):
+    return compare_runs(a, b, ("a", "b"), **options)
+
+
+def test_the_same_run_again_is_no_change(tmp_path):
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b"))
+    assert found.pairing.paired
+    assert not found.changed
+    assert all(one.same for one in found.metrics)
+    assert (found.code, found.campaign, found.diff) == ((), (), ())
+    assert "no significant change" in list(comparison_lines(found))[-1]
+
+
+def test_a_shift_is_found_in_the_metric_that_moved_alone(tmp_path):
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", shift=0.4, noise=2))
+    assert [one.metric for one in found.shifted] == ["propellant_kg"]
+    assert (found.spread, found.worse_verdicts) == ((), ())
+    assert found.shifted[0].shift.value == pytest.approx(0.4, abs=0.15)
+    assert found.changed
+
+
+def test_other_inputs_are_compared_unpaired_and_said(tmp_path):
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", seed=2, noise=2))
+    assert not found.pairing.paired
+    assert found.pairing.reason == "not paired: the same case numbers have other inputs (ve_pct)"
+    assert not found.changed
+    assert [(one.what, one.before, one.after) for one in found.campaign] == [("seed", "1", "2")]
+
+
+def test_a_longer_run_is_paired_on_the_cases_of_the_shorter(tmp_path):
+    found = compared(run(tmp_path / "a", n=300), run(tmp_path / "b", n=400))
+    assert found.pairing.paired
+    assert [rows.size for rows in found.pairing.rows] == [300, 300]
+    assert "100 cases that only one run has" in found.pairing.reason
+    assert not found.changed
+
+
+def test_runs_that_disperse_other_inputs_are_not_paired(tmp_path):
+    one = [column for column in COLUMNS if column.name != "mode"]
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", columns=one))
+    assert found.pairing.reason == "not paired: only one of the runs disperses mode"
+
+
+def test_pairs_need_half_of_the_smaller_run(tmp_path):
+    a, b = run(tmp_path / "a", n=20).cases(), run(tmp_path / "b", n=20).cases()
+    for same, paired in ((20, True), (10, True), (9, False), (0, False)):
+        other = b.copy()
+        other.loc[same:, "ve_pct"] += 1.0
+        assert pair_cases((a, other), (["ve_pct", "mode"], ["mode", "ve_pct"])).paired == paired
+
+
+def test_failed_cases_are_a_share_that_changed(tmp_path):
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", failed=40))
+    assert [one.name for one in found.moved_shares] == ["completed", "fuel"]
+    assert (found.shares[0].lost, found.shares[0].gained) == (40, 0)
+    assert found.metrics[0].n_used == (360, 360)
+
+
+def test_a_requirement_that_stands_worse_on_the_same_cases_is_a_change(tmp_path):
+    found = compared(run(tmp_path / "a", limit=3.0), run(tmp_path / "b", limit=0.5))
+    assert [(one.name, one.before, one.after) for one in found.worse_verdicts] == [("fuel", "pass", "fail")]
+    assert found.moved_shares == ()  # counted by the limits of B in both
+    assert found.changed
+    better = compared(run(tmp_path / "c", limit=0.5), run(tmp_path / "d", limit=3.0))
+    assert not better.changed
+
+
+def test_metrics_of_one_run_alone_or_in_another_unit_are_named(tmp_path):
+    fewer = [column for column in COLUMNS if column.name != "pulses"]
+    metres = [c if c.name != "range_m" else type(c)("range_m", "km", "metric", "far") for c in fewer]
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", columns=metres))
+    assert found.left_out == ("pulses: only in A", "range_m: in m in A, in km in B")
+    assert [one.metric for one in found.metrics] == ["propellant_kg"]
+
+
+def test_what_changed_in_code_and_campaign_is_told(tmp_path):
+    changes = {
+        "engine": "0.2.0",
+        "model": {"name": "m", "digest": "9c2e" * 16},
+        "provenance": {
+            "python": "3.11.7",
+            "packages": {"numpy": "2.4.0"},
+            "git": {"commit": "0123" * 10, "dirty": True},
+        },
+        "inputs": [{"name": "ve_pct", "distribution": "normal, 3σ = 4 %", "bounds": "", "nominal": 0.0}],
+    }
+    text = TEXT.replace("seed = 1", "seed = 1\nnote = 'new'")
+    found = compared(run(tmp_path / "a"), run(tmp_path / "b", text=text, **changes))
+    assert [one.what for one in found.code] == ["engine", "model sources", "git", "package numpy"]
+    assert found.code[2].after == "012301230123 with uncommitted changes"
+    assert [(one.what, one.after) for one in found.campaign] == [("dispersion ve_pct", "normal, 3σ = 4 %")]
+    assert "+note = 'new'" in found.diff
+    assert not found.changed
+
+
+@pytest.mark.parametrize("n", [1, 2])
+def test_a_case_or_two_are_compared_without_a_test(tmp_path, n):
+    found = compared(run(tmp_path / "a", n=n), run(tmp_path / "b", n=n, shift=1.0, noise=2))
+    assert all(np.isnan(one.shift_p) for one in found.metrics)
+    assert not found.shifted
+    assert list(comparison_lines(found))
+
+
+def test_all_failed_is_compared_without_a_warning(tmp_path):
+    found = compared(run(tmp_path / "a", n=30, failed=30), run(tmp_path / "b", n=30, failed=30))
+    assert not found.changed
+    assert list(comparison_lines(found))
+
+
+def test_the_verb_answers_with_its_exit_status(tmp_path):
+    run(tmp_path / "a")
+    run(tmp_path / "b")
+    run(tmp_path / "c", shift=0.4, noise=2)
+    same = call("compare", tmp_path / "a", tmp_path / "b")
+    assert same.exit_code == 0
+    assert "paired: 400 cases" in same.output
+    assert "the same in both runs: propellant_kg, range_m, pulses" in same.output
+    changed = call("compare", tmp_path / "a", tmp_path / "c")
+    assert changed.exit_code == 1
+    assert "changed: shift of propellant_kg" in changed.output
+    assert call("compare", tmp_path / "a", tmp_path / "c", "--alpha", "1e-30").exit_code == 0
+    assert call("compare", tmp_path / "a", tmp_path / "c", "--tolerance", "100").exit_code == 0
+
+
+def test_the_verb_takes_what_the_function_takes_where_nothing_is_said():
+    options = {option.name: option.default for option in typer.main.get_command(app).commands["compare"].params}
+    assert (options["alpha"], options["tolerance"]) == (ALPHA, TOLERANCE)
+
+
+def test_slips_of_usage_are_said(tmp_path):
+    run(tmp_path / "a")
+    run(tmp_path / "other", columns=[replace(one, unit="in") for one in COLUMNS])
+    fails_with(2, call("compare", tmp_path / "a", tmp_path / "other"), "have no metric of the same name and unit")
+    fails_with(2, call("compare", tmp_path / "a", tmp_path / "none"), "there is no such folder")
+    fails_with(2, call("compare", tmp_path / "a", tmp_path), "is no run directory")
+    fails_with(2, call("compare", tmp_path / "a", tmp_path / "a", "--report", "x.txt"), "must end in .html or .pdf")
+    fails_with(2, call("compare", tmp_path / "a", tmp_path / "a", "--alpha", "2"), "must lie between 0 and 1")

@@ -1,0 +1,215 @@
+"""Rare events of campaigns: against plain cases and a closed form, from the command line, and what is refused."""
+
+import math
+import signal
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import integrate, optimize, stats
+from typer.testing import CliRunner
+
+from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.loading import SHIPPED, load_campaign
+from mc_engine.command_line.commands import app
+from mc_engine.errors import CampaignError, RunInterrupted, StoreError
+from mc_engine.flight.flight import fly
+from mc_engine.physics.constants import EQUATORIAL_RADIUS, MU_EARTH
+from mc_engine.sampling.correlation import normal_correlation
+from mc_engine.sampling.distributions import Constant, Discrete, Empirical, Normal
+from mc_engine.studies.limit_state import FIRST_NOISE, LimitState, chosen_requirement
+from mc_engine.studies.rare_event import estimate_rare_event
+from mc_engine.studies.rare_event_folder import open_rare_event
+from mc_engine.studies.rare_event_lines import outcome_lines
+
+MINIMAL = SHIPPED / "minimal"
+
+
+def minimal(at_least=645.8, text=""):
+    """The smallest campaign with another limit: a thousandth of its cases is below 645.8 km."""
+    toml = (MINIMAL / "campaign.toml").read_text().replace("at_least = 600.0", f"at_least = {at_least}") + text
+    return load_campaign("minimal", text=toml, directory=MINIMAL)
+
+
+def apogee_km(magnitude_pct, pitch_deg):
+    """Altitude of the apogee by the conic section; Curtis, Orbital Mechanics, 3rd ed., eq. (2.50) and (2.71)."""
+    r, dv, pitch = EQUATORIAL_RADIUS + 300e3, 100.0 * (1.0 + 0.01 * magnitude_pct), math.radians(pitch_deg)
+    radial, along = dv * math.sin(pitch), math.sqrt(MU_EARTH / r) + dv * math.cos(pitch)
+    energy = 0.5 * (radial**2 + along**2) - MU_EARTH / r
+    eccentricity = math.sqrt(1.0 + 2.0 * energy * (r * along) ** 2 / MU_EARTH**2)
+    return (-MU_EARTH / (2.0 * energy) * (1.0 + eccentricity) - EQUATORIAL_RADIUS) / 1000.0
+
+
+def probability_below(limit_km):
+    """Normal size of the burn (sigma 1 %), uniform pitch within 2 degrees: one integral over the pitch."""
+
+    def at(pitch):
+        size = optimize.brentq(lambda pct: apogee_km(pct, pitch) - limit_km, -50.0, 50.0, xtol=1e-10)
+        return stats.norm.cdf(size)
+
+    return integrate.quad(at, -2.0, 2.0, epsrel=1e-6)[0] / 4.0
+
+
+@pytest.fixture(scope="module")
+def estimate(tmp_path_factory):
+    return estimate_rare_event(minimal(), out=tmp_path_factory.mktemp("rare") / "out", workers=1)
+
+
+def test_plain_cases_of_the_campaign_agree(estimate):
+    campaign, n = minimal(), 200_000
+    ids = np.arange(n)
+    flown = fly(
+        campaign.model, full_inputs(campaign, case_table(campaign, ids)), ids, campaign.seed, folder=campaign.directory
+    )
+    share = np.mean(flown["apogee_altitude_km"] < 645.8)
+    result, three_sigma = estimate.result, 3.0 * math.sqrt(1e-3 / n)
+    assert result["lower"] - three_sigma <= share <= result["upper"] + three_sigma
+    assert share == pytest.approx(probability_below(645.8), abs=three_sigma)
+
+
+@pytest.mark.parametrize("method", ["subset", "cross-entropy"])
+def test_a_millionth_on_the_model_itself_is_that_of_the_integral(tmp_path, method):
+    result = estimate_rare_event(minimal(639.9), out=tmp_path / "out", method=method, workers=1).result
+    p = probability_below(639.9)
+    assert 5e-7 < p < 2e-6
+    assert result["lower"] <= p <= result["upper"]
+    assert result["cases"] < 0.1 / p
+    size = next(one for one in result["inputs"] if one["name"] == "magnitude_error_pct")
+    assert size["likeliest"] == pytest.approx(size["likeliest_sigma"], rel=1e-6)  # sigma is 1 %
+    assert size["likeliest_sigma"] < -4.0
+
+
+def test_the_directory_holds_every_case_with_what_it_came_to(estimate):
+    cases, result = estimate.cases, estimate.result
+    assert cases.attrs["units"]["apogee_altitude_km"] == "km"
+    assert len(cases) == result["cases"]
+    assert (cases["failed"] == (cases["apogee_altitude_km"] < 645.8)).all()
+    assert cases.loc[cases["failed"], "weight"].sum() == pytest.approx(result["probability"], rel=1e-12)
+    row = cases[cases["failed"]].iloc[0]
+    again = apogee_km(row["magnitude_error_pct"], row["pitch_error_deg"])
+    assert again == pytest.approx(row["apogee_altitude_km"], abs=0.01)
+    np.testing.assert_allclose(cases["margin"], cases["apogee_altitude_km"] - 645.8, atol=1e-9)
+
+
+def test_the_result_does_not_depend_on_the_threads(estimate, tmp_path):
+    again = estimate_rare_event(minimal(), out=tmp_path / "out", workers=2)
+    assert again.result == estimate.result
+    assert again.cases.equals(estimate.cases)
+
+
+def test_a_damaged_table_is_refused(estimate, tmp_path):
+    for file in estimate.path.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    table = tmp_path / "cases.parquet"
+    table.write_bytes(table.read_bytes()[:-1] + b"x")
+    with pytest.raises(StoreError, match="damaged"):
+        open_rare_event(tmp_path)
+
+
+def test_inputs_have_the_distributions_and_correlations_of_the_campaign():
+    text = '\n[[correlation]]\nbetween = ["magnitude_error_pct", "pitch_error_deg"]\nrank = 0.6\n'
+    campaign = minimal(text=text)
+    limit = LimitState(campaign, campaign.requirements[0])
+    u = np.random.default_rng(1).standard_normal((20_000, 2))
+    inputs, plain = limit.inputs(u), case_table(campaign, np.arange(20_000))
+    for name in limit.names:
+        assert stats.ks_2samp(inputs[name], plain[name]).pvalue > 0.01
+    assert stats.spearmanr(*inputs.values()).statistic == pytest.approx(0.6, abs=0.02)
+    pearson = np.corrcoef(limit.sigmas(u).T)[0, 1]
+    assert pearson == pytest.approx(float(normal_correlation(0.6)), abs=0.02)
+
+
+def test_a_case_without_a_number_has_failed_and_one_at_its_limit_has_not():
+    campaign = minimal()
+    u = np.array([[0.0, 0.0], [-99.0, 0.0]])
+    first = LimitState(campaign, campaign.requirements[0])
+    first(u[:1], np.array([0]))
+    at = minimal(float(first.metric[0][0]))
+    assert LimitState(at, at.requirements[0])(u[:1], np.array([0]))[0] > 0.0
+    size, pitch = campaign.dispersions
+    never = replace(campaign, dispersions=(replace(size, distribution=Normal(0.0, 20.0)), pitch))
+    lost = LimitState(never, never.requirements[0])
+    assert np.isneginf(lost(u, np.array([0, 1]))[1])  # less than nothing is no burn: refused
+    assert lost.status[0][1] == "refused"
+
+
+def test_noise_of_the_cases_is_apart_from_that_of_the_campaign():
+    assert FIRST_NOISE > 1_000_000_000_000
+    assert float(FIRST_NOISE + 1) == FIRST_NOISE + 1  # kernels hold case numbers as float64
+
+
+def with_pitch(campaign, distribution):
+    """The campaign with another distribution of its second input."""
+    size, pitch = campaign.dispersions
+    return replace(campaign, dispersions=(size, replace(pitch, distribution=distribution)))
+
+
+@pytest.mark.parametrize(
+    ("campaign", "said"),
+    [
+        (with_pitch(minimal(), Discrete((-1.0, 1.0), (0.5, 0.5))), "dispersion.pitch_error_deg: has no values between"),
+        (with_pitch(minimal(), Empirical((-1.0, 0.0, 2.0))), "dispersion.pitch_error_deg: measured values say nothing"),
+        (replace(minimal(), design="grid"), 'campaign.design: "grid" gives its cases no probabilities; use "?mc'),
+        (replace(minimal(), dispersions=()), "dispersion: nothing is dispersed"),
+        (replace(minimal(), first=minimal()), "inputs.from: takes inputs from another run"),
+    ],
+)
+def test_inputs_that_cannot_be_led_to_failure_are_refused_in_a_sentence(campaign, said):
+    with pytest.raises(CampaignError, match=said) as refused:
+        LimitState(campaign, campaign.requirements[0])
+    assert len(refused.value.problems) == 1
+
+
+def test_a_constant_input_stays_where_it_is():
+    campaign = with_pitch(minimal(), Constant(1.5))
+    limit = LimitState(campaign, campaign.requirements[0])
+    assert limit.names == ["magnitude_error_pct"]
+    np.testing.assert_array_equal(limit.inputs(np.zeros((3, 1)))["pitch_error_deg"], 1.5)
+
+
+def command(*arguments):
+    return CliRunner().invoke(app, ["rare", *map(str, arguments)])
+
+
+def test_the_command_line_says_probability_interval_cost_and_failures(tmp_path):
+    done = command(MINIMAL, "--cases-per-level", 1000, "--out", tmp_path / "out", "--no-report", "--workers", 1)
+    assert done.exit_code == 0, done.output
+    assert "below" in done.output or "of not meeting it" in done.output
+    record = open_rare_event(tmp_path / "out")
+    for line in outcome_lines(record.result):
+        assert line in done.output
+    status = CliRunner().invoke(app, ["status", str(tmp_path / "out")])
+    assert "requirement  apogee: apogee_altitude_km at least 600 km" in status.output
+    assert CliRunner().invoke(app, ["verify", str(tmp_path / "out")]).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--method", "magic"], "subset or cross-entropy"),
+        (["--requirement", "apoge"], 'did you mean "apogee"?'),
+        (["--cases-per-level", "20"], "are too few"),
+    ],
+)
+def test_a_slip_on_the_command_line_is_one_sentence(tmp_path, arguments, said):
+    done = command(MINIMAL, "--out", tmp_path / "out", *arguments)
+    assert done.exit_code == 2
+    assert said in done.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_interruption_is_a_sentence_and_stores_nothing(tmp_path):
+    def interrupt(flown, failed):
+        if flown:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(RunInterrupted, match="nothing is stored"):
+        estimate_rare_event(minimal(), out=tmp_path / "out", workers=1, progress=interrupt)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_campaign_has_to_say_what_failure_is():
+    campaign = load_campaign("deorbit")
+    with pytest.raises(CampaignError, match="there are several"):
+        chosen_requirement(campaign, None)
+    assert chosen_requirement(campaign, "fuel").metric == "propellant_kg"

@@ -1,0 +1,282 @@
+"""A search from the file to its directory, on a front in closed form."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from apogee_tuning import CHOICE, apogee_and_speed, apogee_campaign
+from cart import call, fails_with
+
+from mc_engine import load_campaign, open_tuning, tune
+from mc_engine.campaign.loading import SHIPPED
+from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
+from mc_engine.store import counted_files
+from mc_engine.store.verification import damage
+from mc_engine.studies.tuning import Generation, dominated_shares, is_stalled
+from mc_engine.studies.tuning_folder import infeasibility
+
+UNREACHABLE = '\n[tuning.constraint.high]\nmetric = "apogee_altitude_km"\nat_least = 5000.0\n'
+
+
+@pytest.fixture(autouse=True)
+def search():
+    pytest.importorskip("pymoo")
+
+
+@pytest.fixture(scope="module")
+def tuned(tmp_path_factory):
+    pytest.importorskip("pymoo")
+    return tune(apogee_campaign(), tmp_path_factory.mktemp("tuned") / "out", seed=1, generations=25, population=24)
+
+
+def test_the_front_is_the_highest_circular_orbit_with_all_sizes_of_the_burn(tuned):
+    """For a speed after the burn the apogee grows with the altitude of the burn."""
+    front = tuned.front
+    assert len(front) > 20
+    assert front["altitude_km"].median() > 598.0
+    assert front["burn_dv_m_s"].min() < 52.0
+    assert front["burn_dv_m_s"].max() > 195.0
+    apogee, speed = apogee_and_speed(front["altitude_km"], front["burn_dv_m_s"])
+    np.testing.assert_allclose(front["apogee"], apogee, rtol=1e-6)
+    np.testing.assert_allclose(front["speed"], speed, rtol=1e-6)
+
+
+def test_no_candidate_beats_one_of_the_front(tuned):
+    every = tuned.evaluations
+    for row in tuned.front.itertuples():
+        better = (every["apogee"] >= row.apogee) & (every["speed"] <= row.speed)
+        assert (every[better][["apogee", "speed"]].to_numpy() == [row.apogee, row.speed]).all()
+
+
+def test_the_search_makes_progress_and_says_so(tuned):
+    generations = tuned.generations
+    assert (np.diff(generations["dominated_share"]) >= 0.0).all()
+    assert generations["dominated_share"].iloc[-1] > generations["dominated_share"].iloc[0] > 0.0
+    assert generations["evaluations"].iloc[-1] == len(tuned.evaluations) == 24 * 25
+
+
+def test_the_same_seed_finds_the_same_bits_whatever_the_threads_and_another_seed_another_way(tmp_path):
+    found = [
+        tune(apogee_campaign(), tmp_path / str(k), seed=seed, workers=workers)
+        for k, (seed, workers) in enumerate([(3, 1), (3, 2), (4, 1)])
+    ]
+    first, second, other = (one.path.joinpath("evaluations.parquet").read_bytes() for one in found)
+    assert first == second
+    assert first != other
+
+
+def test_the_directory_holds_tables_with_units_the_text_and_what_was_searched(tuned):
+    path = tuned.path
+    assert pd.read_parquet(path / "front.parquet").attrs["units"]["apogee"] == "km"
+    assert "[tuning.objective.apogee]" in (path / "tuning.toml").read_text()
+    plan = open_tuning(path).manifest["tuning"]
+    assert (plan["seed"], plan["population"], plan["flown"], plan["end"]) == (1, 24, 25, "all generations")
+    assert tuned.manifest["campaign"]["digest"] == apogee_campaign().digest
+
+
+def test_a_changed_byte_is_found(tmp_path):
+    path = tune(apogee_campaign(), tmp_path / "out").path
+    content = bytearray((path / "front.parquet").read_bytes())
+    content[50] ^= 1
+    (path / "front.parquet").write_bytes(content)
+    with pytest.raises(StoreError, match=r"front\.parquet: damaged"):
+        open_tuning(path)
+
+
+def test_without_a_feasible_candidate_the_front_is_empty_and_the_least_violation_is_told(tmp_path):
+    record = tune(apogee_campaign(UNREACHABLE), tmp_path / "out")
+    assert not record.feasible
+    assert not record.evaluations["feasible"].any()
+    highest = record.evaluations["high"].max()
+    assert record.evaluations["violation"].min() == pytest.approx((5000.0 - highest) / 5000.0)
+    assert f"high {highest:.4g} km where at least 5000 is allowed" in infeasibility(record)
+
+
+def test_a_robust_tuning_leaves_room_for_the_dispersed_burn(tmp_path):
+    """The tenth-worst of a hundred burns, uniform in ±10 %, must reach what the nominal one reaches otherwise."""
+    choice = CHOICE.replace('goal = "maximise"', 'goal = "maximise"\nquantile = 0.1')
+    record = tune(apogee_campaign(choice=choice, cases=100), tmp_path / "out", seed=1)
+    nominal, _ = apogee_and_speed(record.front["altitude_km"], record.front["burn_dv_m_s"])
+    low, _ = apogee_and_speed(record.front["altitude_km"], 0.9 * record.front["burn_dv_m_s"])
+    assert (record.front["apogee"] < nominal).all()
+    assert (record.front["apogee"] > low).all()
+
+
+NARROW = """
+[tuning.parameter.burn_dv_m_s]
+lower = 199.99999999999997
+upper = 200.0
+
+[tuning.objective.apogee]
+metric = "apogee_altitude_km"
+"""
+
+
+def test_a_search_without_a_new_candidate_ends_there_and_keeps_what_it_has(tmp_path):
+    """Between two neighbouring numbers there are two candidates."""
+    record = tune(apogee_campaign(choice=NARROW), tmp_path / "out", seed=1)
+    assert record.manifest["tuning"]["end"] == "no new candidate"
+    assert record.manifest["tuning"]["flown"] == record.generations["generation"].iloc[-1] + 1 < 6
+    assert record.evaluations["burn_dv_m_s"].between(199.99999999999997, 200.0).all()
+    assert len(record.front) == 1
+
+
+def test_the_same_when_children_never_differ_from_their_parents(tmp_path):
+    text = apogee_campaign().text.replace("generations = 6", "generations = 6\ncrossover = 0.0\nmutation = 1e-9")
+    record = tune(load_campaign("apogee.toml", text=text, directory=SHIPPED / "minimal"), tmp_path / "out", seed=1)
+    assert record.manifest["tuning"]["end"] == "no new candidate"
+    assert len(record.evaluations) == 12
+
+
+KILLED = """
+import os, signal, sys
+sys.path[:0] = {paths!r}
+from pathlib import Path
+from apogee_tuning import apogee_campaign
+from mc_engine import tune
+
+def progress(done, total, failed):
+    if done >= 36:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+tune(apogee_campaign(), Path({out!r}), seed=1, workers=1, progress=progress)
+"""
+
+
+def test_a_killed_search_leaves_the_generations_that_were_flown(tmp_path):
+    paths, out = [str(Path(__file__).parents[1]), str(SHIPPED.parent)], tmp_path / "out"
+    killed = subprocess.run([sys.executable, "-c", KILLED.format(paths=paths, out=str(out))], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    record = open_tuning(out)
+    assert record.manifest["tuning"]["end"] == "not ended"
+    assert len(record.evaluations) == 36
+    whole = tune(apogee_campaign(), tmp_path / "whole", seed=1, workers=1)
+    pd.testing.assert_frame_equal(record.evaluations, whole.evaluations.iloc[:36])
+    assert sorted(path.name for path in whole.path.iterdir()) == [
+        "evaluations.parquet", "front.parquet", "generations.parquet", "journal.jsonl", "tuning.json",
+        "tuning.toml",
+    ]  # fmt: skip
+
+
+def test_a_search_killed_while_it_writes_still_has_the_generation_before(tmp_path, monkeypatch):
+    """Whichever step of its second generation is the last one: the old files count before its line, the new after."""
+    steps, done = ("write_synced", "append_synced", "publish"), []
+
+    def watched(name, genuine):
+        def call(*arguments):
+            done.append(name)
+            if len(done) == stop:
+                raise SystemExit  # which nothing tidies up behind, as after a kill
+            genuine(*arguments)
+
+        return call
+
+    for name in steps:
+        monkeypatch.setattr(counted_files, name, watched(name, getattr(counted_files, name)))
+    found = {}
+    for stop in range(11, 22):  # the first generation takes five files and their names
+        done.clear()
+        with pytest.raises(SystemExit):
+            tune(apogee_campaign(), tmp_path / str(stop), seed=1)
+        record = open_tuning(tmp_path / str(stop))
+        found[stop] = (done[-1], len(record.evaluations), record.manifest["tuning"]["flown"])
+        assert damage(tmp_path / str(stop)) == []
+    before = [("write_synced", 12, 1)] * 5 + [("append_synced", 12, 1)]
+    assert list(found.values()) == before + [("publish", 24, 2)] * 5
+
+
+def test_a_search_in_which_nothing_flies_to_its_end_says_why(tmp_path):
+    escape = CHOICE.replace("lower = 50.0\nupper = 200.0", "lower = 4000.0\nupper = 5000.0")
+    record = tune(apogee_campaign(choice=escape), tmp_path / "out", seed=1, generations=1)
+    assert not record.feasible
+    assert infeasibility(record) == (
+        "no feasible point among 12 candidates; none of them has a number for every metric, most often (12 candidates) "
+        "no-stop: the flight reached its time limit before the event that should end it"
+    )
+
+
+def test_ctrl_c_keeps_the_generations_flown(tmp_path):
+    def progress(done, total, failed):
+        if done >= 24:
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(RunInterrupted, match="after 2 of 6 generations"):
+        tune(apogee_campaign(), tmp_path / "out", progress=progress)
+    record = open_tuning(tmp_path / "out")
+    assert record.manifest["tuning"]["end"] == "interrupted"
+    assert len(record.evaluations) == 24
+
+
+def test_a_campaign_without_a_tuning_is_refused(tmp_path):
+    with pytest.raises(CampaignError, match="nothing says what is to be tuned"):
+        tune(load_campaign("minimal"), tmp_path / "out")
+
+
+def test_an_occupied_folder_is_refused_before_anything_is_flown(tmp_path):
+    (tmp_path / "mine").write_text("mine")
+    with pytest.raises(StoreError, match="is not empty"):
+        tune(apogee_campaign(), tmp_path)
+
+
+def test_without_pymoo_there_is_a_sentence(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pymoo.algorithms.moo.nsga2", None)
+    with pytest.raises(EngineError, match="needs pymoo, which is not installed"):
+        tune(apogee_campaign(), tmp_path / "out")
+
+
+# ---- when to stop
+
+
+def generation(front, least=0.0):
+    return Generation(np.empty((0, 2)), None, np.array(front, dtype=float).reshape(-1, 2), least)
+
+
+def test_a_search_stalls_when_neither_front_nor_violation_get_better():
+    same = [generation([[1.0, 2.0], [2.0, 1.0]])] * 4
+    assert is_stalled(same, 3)
+    assert not is_stalled(same, 4)
+    assert not is_stalled([*same, generation([[1.0, 2.0], [1.5, 1.5], [2.0, 1.0]])], 3)
+    assert not is_stalled([generation([], 3.0), generation([], 2.0)], 1)
+    assert is_stalled([generation([], 3.0), generation([], 3.0)], 1)
+    assert is_stalled([generation([], np.inf), generation([], np.inf)], 1)
+    assert not is_stalled([generation([], 3.0), generation([[1.0, 2.0]])], 1)
+
+
+def test_a_search_with_patience_ends_by_itself(tmp_path):
+    text = apogee_campaign().text.replace("generations = 6", "generations = 400\npatience = 3")
+    record = tune(load_campaign("apogee.toml", text=text, directory=SHIPPED / "minimal"), tmp_path / "out", seed=1)
+    assert record.manifest["tuning"]["flown"] < 200
+    assert record.manifest["tuning"]["end"] == "no progress in 3 generations"
+
+
+def test_a_front_that_dominates_more_has_the_larger_share():
+    shares = dominated_shares([np.empty((0, 2)), np.array([[2.0, 2.0]]), np.array([[1.0, 2.0], [2.0, 1.0]])])
+    assert shares[0] == 0.0 < shares[1] < shares[2] <= 1.0
+
+
+# ---- the command line
+
+
+def test_tune_writes_the_result_and_says_what_it_found(tmp_path):
+    (tmp_path / "model.py").write_bytes((SHIPPED / "minimal" / "model.py").read_bytes())
+    (tmp_path / "apogee.toml").write_text(apogee_campaign().text)
+    result = call("tune", tmp_path / "apogee.toml", "--out", tmp_path / "out", "--generations", 3, "--seed", 2)
+    assert result.exit_code == 0, result.output
+    assert "36 in 3 generations" in result.stdout
+    assert (tmp_path / "out" / "report.html").read_bytes().startswith(b"<!doctype html>")
+    assert (tmp_path / "out" / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert call("report", tmp_path / "out", "--format", "html").exit_code == 0
+    fails_with(2, call("tune", tmp_path / "apogee.toml", "--out", tmp_path / "out"), "is not empty")
+    assert call("status", tmp_path / "out").stdout.splitlines()[2:] == result.stdout.splitlines()[1:-2]
+    assert "every byte is as it was written" in call("verify", tmp_path / "out").stdout
+    (tmp_path / "out" / "tuning.toml").write_text("another question")
+    fails_with(5, call("verify", tmp_path / "out"), "tuning.toml: damaged")
+    fails_with(5, call("status", tmp_path / "out"), "tuning.toml: damaged")
+
+
+def test_tune_without_a_tuning_gets_a_sentence():
+    fails_with(2, call("tune", "minimal", "--out", "nowhere-to-be-made"), "what is to be tuned")
