@@ -1,12 +1,11 @@
 """The compiled kernel of a model: assembled from its physics and the engine's loop, cached on disk.
 
-numba caches a function beside the file that it stands in and watches that file alone.  So every kernel gets
-a small file of its own, in a folder named by a digest of everything the kernel is made of: the engine's and
-the model's sources, the compiler's versions and the processor.  A changed source is a new folder.
+numba caches a function beside the file that defines it and watches that file alone.  So every kernel gets a small
+file of its own, in a folder named by the digest of what the kernel is compiled from (`mc_engine.flight.kernel_key`).
+Models that compile to the same code share a kernel, wherever they lie.
 """
 
 import os
-import platform
 import stat
 import sys
 import tempfile
@@ -17,6 +16,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from mc_engine.errors import DiskError
+from mc_engine.flight.kernel_key import Recorder, kernel_key
 from mc_engine.flight.kernel_parts import Functions, parts_of
 from mc_engine.model.fields import AdaptiveStep
 from mc_engine.model.imports import new_module
@@ -35,7 +35,7 @@ _ENGINE = (
     "status.py",
 )
 
-_FIXED = '''"""Kernel of {reference}, {width} cases at a time.  Written by the engine; edit the model instead."""
+_FIXED = '''"""A kernel for {width} cases at a time.  Written by the engine; edit the model instead."""
 
 from mc_engine.flight.kernel_parts import Functions
 from mc_engine.lanes.compiler import compile_kernel
@@ -51,7 +51,7 @@ def kernel(parameters, settings, key, cases, n_steps, h, control_every, time, st
     grid, kinds, out = (n_steps, h, control_every), (HAS_EVENTS, MUST_STOP), (time, status, state, metrics)
     return fly(f, Parameters, Settings, {width}, parameters, settings, key, cases, grid, kinds, out, history, stride)
 '''
-_ADAPTIVE = '''"""Kernel of {reference}, {width} cases at a time.  Written by the engine; edit the model instead."""
+_ADAPTIVE = '''"""A kernel for {width} cases at a time.  Written by the engine; edit the model instead."""
 
 import numpy as np
 
@@ -78,7 +78,10 @@ def kernel(
 
 
 def source_digest(model: Model, folder: Path | None) -> str:
-    """SHA-256 over the engine's compiled sources and the model's, in a fixed order.  folder : see `sources_of`."""
+    """SHA-256 of the text of the engine's compiled sources and the model's, in a fixed order: what a run records.
+
+    folder : see `sources_of`.
+    """
     engine = Path(__file__).parents[1]
     files = [*sorted(engine.glob("lanes/*.py")), *sorted(engine.glob("physics/*.py"))]
     files += [engine / name for name in _ENGINE]
@@ -148,16 +151,13 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
 
     folder : see `sources_of`.  The first call compiles or loads from the cache.
     """
-    import llvmlite
-    import numba
-
     module = sources_of(model, folder).module
-    versions = f"{numba.__version__} {llvmlite.__version__} {platform.machine()} {sys.version_info[:2]} {_processor()}"
-    what = f"{module.__name__} {source_digest(model, folder)} {versions} {module.__file__} {model.watching}"
-    digest = sha256(what.encode()).hexdigest()
-    path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
     template = _ADAPTIVE if isinstance(model.clock, AdaptiveStep) else _FIXED
-    text = template.format(reference=model.reference, width=width, names=", ".join(Functions._fields)).encode()
+    digest, is_complete = kernel_key(parts_of(module.MODEL, model.watching, Recorder()), template)
+    if not is_complete:
+        digest = sha256(f"{digest} {source_digest(model, folder)} {module.__name__} {module.__file__}".encode()).hexdigest()
+    path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
+    text = template.format(width=width, names=", ".join(Functions._fields)).encode()
     _write(path, text)
     name, parts = f"mc_engine_kernel_{digest[:20]}_w{width}", parts_of(module.MODEL, model.watching)
     return new_module(name, path, text, PARTS=parts).kernel
@@ -178,9 +178,3 @@ def _write(path: Path, text: bytes) -> None:
     except OSError as error:
         raise DiskError(f"{path.parent}: {error.strerror or error}; compiled kernels are kept there, name another "
                         "folder in MC_ENGINE_CACHE") from error  # fmt: skip
-
-
-def _processor() -> str:
-    from llvmlite import binding
-
-    return str(binding.get_host_cpu_name())

@@ -59,12 +59,15 @@ def settings_class(model: Model) -> type:
     return namedtuple("Settings", [*names, TABLES] if model.tables else names)
 
 
-def parts_of(model: Model, watching: bool) -> Parts:
-    """Functions, tuple classes and flags of the model that a kernel is for; `watching` : of its events."""
+def parts_of(model: Model, watching: bool, makers: Any = None) -> Parts:
+    """Functions, tuple classes and flags of the model that a kernel is for.
+
+    watching : of the model's events, see `mc_engine.model.event_watch`.  makers : see `functions_of`.
+    """
     model = watching_events(model) if watching else model
     actions = [event.action for event in model.event_list]
     settings = settings_class(model)
-    return Parts(functions_of(model), model.kernel_parameters, settings, bool(actions), "stop" in actions)
+    return Parts(functions_of(model, makers), model.kernel_parameters, settings, bool(actions), "stop" in actions)
 
 
 def functions_of(model: Model, makers: Any = None) -> Functions:
