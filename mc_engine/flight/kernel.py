@@ -26,6 +26,7 @@ WIDTH = 8  # one register of eight doubles
 _FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
 _ENGINE = (
     "flight/kernel.py",
+    "flight/kernel_key.py",
     "flight/kernel_parts.py",
     "model/event_watch.py",
     "model/fields.py",
@@ -155,7 +156,8 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
     template = _ADAPTIVE if isinstance(model.clock, AdaptiveStep) else _FIXED
     digest, is_complete = kernel_key(parts_of(module.MODEL, model.watching, Recorder()), template)
     if not is_complete:
-        digest = sha256(f"{digest} {source_digest(model, folder)} {module.__name__} {module.__file__}".encode()).hexdigest()
+        what = f"{digest} {source_digest(model, folder)} {module.__name__} {module.__file__}"
+        digest = sha256(what.encode()).hexdigest()
     path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
     text = template.format(width=width, names=", ".join(Functions._fields)).encode()
     _write(path, text)

@@ -182,13 +182,12 @@ def _name_of(value: Any) -> str | None:
 
     The object must be what the name leads to: a decorator may give a user's function the name of another.
     """
+    module: Any = "numpy" if isinstance(value, np.ufunc) else getattr(value, "__module__", None)
+    name: Any = getattr(value, "__qualname__", None) or getattr(value, "__name__", None)
     if isinstance(value, ModuleType):
         module, name = value.__name__, ""
-    else:
-        module = "numpy" if isinstance(value, np.ufunc) else getattr(value, "__module__", None)
-        if isinstance(value, BuiltinFunctionType) and isinstance(value.__self__, ModuleType):
-            module = value.__self__.__name__
-        name = getattr(value, "__qualname__", None) or getattr(value, "__name__", None)
+    elif isinstance(value, BuiltinFunctionType) and isinstance(value.__self__, ModuleType):
+        module = value.__self__.__name__
     if not isinstance(module, str) or not isinstance(name, str):
         return None
     if not any(module == known or module.startswith(f"{known}.") for known in _KNOWN_BY_NAME):

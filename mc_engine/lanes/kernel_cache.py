@@ -61,7 +61,6 @@ class KernelCache(FunctionCache):
         except OSError as error:
             _refused(self.cache_path, error)
 
-
     @contextmanager
     def compiling(self, sig: Any, target_context: Any) -> Iterator[None]:
         """Hold a kernel's lock unless it is on disk: of processes that ask together one compiles, the others load."""
