@@ -198,7 +198,7 @@ def fly_nominal(campaign: Campaign) -> dict[str, Any]:
     ids = np.array([NOMINAL_NOISE])
     with naming_faults(campaign.model_reference, "the nominal case"):
         flight = fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
-    dispersed = {one.name: inputs[one.name] for one in campaign.dispersions}
+    dispersed = {dispersion.name: inputs[dispersion.name] for dispersion in campaign.dispersions}
     if campaign.upstream is not None:
         dispersed |= campaign.upstream.nominal_row()
     return {**dispersed, **{name: column[0] for name, column in flight.items()}}

@@ -15,7 +15,7 @@ import numpy as np
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import EngineError, ModelError
 from mc_engine.flight.nominal_inputs import nominal_inputs
-from mc_engine.flight.repeatability import numbers
+from mc_engine.flight.repeatability import model_digests
 from mc_engine.model.faults import MORE
 from mc_engine.model.reading import is_shipped, source_faults
 from mc_engine.model.trial import run_through
@@ -31,9 +31,9 @@ def breaches(campaign: Campaign) -> list[str]:
 
 def refuse_breaches(campaign: Campaign) -> None:
     """ModelError with the first breach, before anything of a campaign is flown or written."""
-    found = _trial_faults(campaign) if is_shipped(campaign.model) else breaches(campaign)
-    if found:
-        raise ModelError(f"{found[0]}{MORE}")
+    sentences = _trial_faults(campaign) if is_shipped(campaign.model) else breaches(campaign)
+    if sentences:
+        raise ModelError(f"{sentences[0]}{MORE}")
 
 
 def _trial_faults(campaign: Campaign) -> list[str]:
@@ -49,8 +49,8 @@ def _trial_faults(campaign: Campaign) -> list[str]:
 
 def flight_faults(campaign: Campaign, file: str) -> list[str]:
     """What `mc_engine.flight.contract_flight` finds in a process of its own, which the model may kill or hang."""
-    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, json.dumps(numbers(campaign))]
-    path = os.pathsep.join(one or os.getcwd() for one in sys.path)  # the same packages as here
+    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, json.dumps(model_digests(campaign))]
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the same packages as here
     other = {"PYTHONHASHSEED": "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0", "TZ": "UTC-14"}
     environment = {**os.environ, **SAFE_PATH, **other, "PYTHONPATH": path}
     try:
@@ -61,4 +61,4 @@ def flight_faults(campaign: Campaign, file: str) -> list[str]:
     if done.returncode or not done.stdout:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
         return [f"a flight of a few cases killed its process: {last}"]
-    return [str(one) for one in json.loads(done.stdout.splitlines()[-1])]
+    return [str(sentence) for sentence in json.loads(done.stdout.splitlines()[-1])]

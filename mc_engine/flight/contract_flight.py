@@ -24,7 +24,7 @@ from mc_engine.flight.chunks import NOMINAL_NOISE
 from mc_engine.flight.flight import fly, grid_of
 from mc_engine.flight.lost_numbers import first_lost
 from mc_engine.flight.nominal_inputs import nominal_inputs
-from mc_engine.flight.repeatability import influences, note_environment, numbers
+from mc_engine.flight.repeatability import influences, model_digests, note_environment
 from mc_engine.model.event_watch import watching_events
 from mc_engine.model.faults import MORE, fault_of
 from mc_engine.model.fields import AdaptiveStep, FixedStep
@@ -55,11 +55,11 @@ def faults(campaign: Campaign) -> list[str]:
     inputs = full_inputs(campaign, case_table(campaign, ids))
     try:
         nominal = _fly_nominal(campaign)
-        with _landing_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
-            flown = _fly(campaign, inputs, ids)
+        with _ending_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
+            flown = _results(campaign, inputs, ids)
         lost = _not_finite(campaign, inputs, ids, flown, nominal)
-        found = [*(lost or _failed(campaign, flown)), *_other_bits(campaign, inputs, ids, flown)]
-        return found or [
+        faults_of_flight = [*(lost or _none_completing(campaign, flown)), *_other_bits(campaign, inputs, ids, flown)]
+        return faults_of_flight or [
             *_never_set(campaign, flown),
             *_always_the_same(campaign, flown),
             *_moving_nothing(campaign, inputs, ids),
@@ -77,16 +77,16 @@ def _fly_nominal(campaign: Campaign) -> Columns:
     clock, inputs, ids = campaign.model.clock, nominal_row(campaign), np.array([NOMINAL_NOISE])
     one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
     fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
-    with _landing_within(LONGEST_S, "the nominal case has", campaign):
-        return _fly(campaign, inputs, ids)
+    with _ending_within(LONGEST_S, "the nominal case has", campaign):
+        return _results(campaign, inputs, ids)
 
 
 @contextmanager
-def _landing_within(seconds: float, who: str, campaign: Campaign) -> Iterator[None]:
+def _ending_within(seconds: float, who: str, campaign: Campaign) -> Iterator[None]:
     """A kernel cannot be broken off: where the block takes longer, the process ends with a sentence."""
 
     def give_up() -> None:
-        _answer([f"{who} not landed after {seconds:.0f} s: {_length(campaign)}"])
+        _print_sentences([f"{who} not landed after {seconds:.0f} s: {_length(campaign)}"])
         os._exit(0)
 
     timer = threading.Timer(seconds, give_up)
@@ -110,11 +110,11 @@ def _length(campaign: Campaign) -> str:
     return f"its clock allows {what}; {fix}{stops}, or leave the flight out with `mc-engine check --no-model`"
 
 
-def _fly(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
+def _results(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
     return fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
 
 
-def _failed(campaign: Campaign, flown: Columns) -> Iterator[str]:
+def _none_completing(campaign: Campaign, flown: Columns) -> Iterator[str]:
     """One sentence if no case at all reached its end."""
     status = flown["status"]
     if (status == STATUS_NAME[OK]).any():
@@ -143,14 +143,14 @@ def _not_finite(
             return []
         row = {name: value[bad[0]] if np.ndim(value) else value for name, value in inputs.items()}
         own = row, int(ids[bad[0]]), f"case {ids[bad[0]]}"
-    found = first_lost(campaign.model, own[0], own[1], campaign.seed, own[2])
-    return [f"{found}; {bad.size} of the first {ids.size} cases end {word}"] if found else []
+    sentence = first_lost(campaign.model, own[0], own[1], campaign.seed, own[2])
+    return [f"{sentence}; {bad.size} of the first {ids.size} cases end {word}"] if sentence else []
 
 
 def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
     """One sentence if the same cases come out differently a second time, or among other cases."""
     why = "a case must depend on its inputs and case_id alone: no global state, clock or numpy.random"
-    again = _difference(flown, _fly(campaign, inputs, ids))
+    again = _first_difference(flown, _results(campaign, inputs, ids))
     if again is not None:
         yield f'case {ids[again[0]]} has another "{again[1]}" when the same cases fly a second time; {why}'
         return
@@ -158,7 +158,8 @@ def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, 
     for part in parts:
         if part.size:
             own = {name: value[part] if np.ndim(value) else value for name, value in inputs.items()}
-            alone = _difference({name: values[part] for name, values in flown.items()}, _fly(campaign, own, ids[part]))
+            among_all = {name: values[part] for name, values in flown.items()}
+            alone = _first_difference(among_all, _results(campaign, own, ids[part]))
             if alone is not None:
                 yield (
                     f'case {ids[part[alone[0]]]} has another "{alone[1]}" when it flies among other cases; {why}, '
@@ -167,7 +168,7 @@ def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, 
                 return
 
 
-def _difference(a: Columns, b: Columns) -> tuple[int, str] | None:
+def _first_difference(a: Columns, b: Columns) -> tuple[int, str] | None:
     """Place and column of the first number with other bits, None if there is none."""
     for name, values in a.items():
         same = values == b[name]
@@ -198,7 +199,7 @@ def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
     """
     ok = flown["status"] == STATUS_NAME[OK]
     model = campaign.model
-    same = [one for one in model.metrics if not one.sometimes and np.unique(flown[one.name][ok]).size == 1]
+    same = [metric for metric in model.metrics if not metric.sometimes and np.unique(flown[metric.name][ok]).size == 1]
     fixed = fixed_metrics(model, *nominal_inputs(campaign)) if same else {}
     for metric in same:
         if metric.name in fixed:
@@ -211,31 +212,32 @@ def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
 
 def _moving_nothing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
     """Dispersions whose values all give the same metrics: of the nominal case and of some dispersed ones."""
-    idle = [one for one in campaign.dispersions if not _moves(campaign, one, campaign.nominal)]
-    for one in idle:
+    idle = [dispersion for dispersion in campaign.dispersions if not _moves(campaign, dispersion, campaign.nominal)]
+    for dispersion in idle:
         rows = [{k: v[i] if np.ndim(v) else v for k, v in inputs.items()} for i in range(min(_PARTNERS, ids.size))]
-        if not any(_moves(campaign, one, row) for row in rows):
-            yield f'dispersion "{one.name}" moves no metric; use it in the physics, or leave it out of the campaign'
+        if not any(_moves(campaign, dispersion, row) for row in rows):
+            name = dispersion.name
+            yield f'dispersion "{name}" moves no metric; use it in the physics, or leave it out of the campaign'
 
 
-def _moves(campaign: Campaign, one: Dispersion, others: Mapping[str, Any]) -> bool:
+def _moves(campaign: Campaign, dispersion: Dispersion, others: Mapping[str, Any]) -> bool:
     """Whether some values of a dispersion give different results; one that has but one value does."""
-    places = _places(campaign, one)
+    places = _trial_values(campaign, dispersion)
     if np.unique(places).size == 1:
         return True
-    flown = _fly(campaign, {**others, one.name: places}, np.zeros(len(places), dtype=np.int64))
+    flown = _results(campaign, {**others, dispersion.name: places}, np.zeros(len(places), dtype=np.int64))
     names = ["status", *(metric.name for metric in campaign.model.metrics)]
     rows = [{name: flown[name][[i]] for name in names} for i in range(len(places))]
-    return any(_difference(rows[0], row) is not None for row in rows[1:])
+    return any(_first_difference(rows[0], row) is not None for row in rows[1:])
 
 
-def _places(campaign: Campaign, one: Dispersion) -> np.ndarray:
+def _trial_values(campaign: Campaign, dispersion: Dispersion) -> np.ndarray:
     if campaign.upstream is None and campaign.design != "table":
-        if one.levels:
-            return column(one.levels)
-        assert one.distribution is not None  # a loaded campaign has one for every random design
-        return quantiles(one.distribution, _PLACES)
-    values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[one.name]
+        if dispersion.levels:
+            return column(dispersion.levels)
+        assert dispersion.distribution is not None  # a loaded campaign has one for every random design
+        return quantiles(dispersion.distribution, _PLACES)
+    values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[dispersion.name]
     return np.sort(values)[[0, 3 * values.size // 4, -1]]
 
 
@@ -260,15 +262,15 @@ def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarr
 def main() -> None:
     """Print the sentences on the campaign named on the command line as a JSON list.
 
-    Behind the name may stand the `numbers` of another process, as JSON.
+    Behind the name may stand the digests of another process, as JSON.
     """
     note_environment()
     campaign = load_campaign(sys.argv[1])
-    there = numbers(campaign)
-    _answer(influences(json.loads(sys.argv[2]) if sys.argv[2:] else there, there) or faults(campaign))
+    there = model_digests(campaign)
+    _print_sentences(influences(json.loads(sys.argv[2]) if sys.argv[2:] else there, there) or faults(campaign))
 
 
-def _answer(sentences: list[str]) -> None:
+def _print_sentences(sentences: list[str]) -> None:
     print(json.dumps(sentences), flush=True)
 
 

@@ -160,12 +160,12 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
         digest = sha256(what.encode()).hexdigest()
     path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
     text = template.format(width=width, names=", ".join(Functions._fields)).encode()
-    _write(path, text)
+    _write_source(path, text)
     name, parts = f"mc_engine_kernel_{digest[:20]}_w{width}", parts_of(module.MODEL, model.watching)
     return new_module(name, path, text, PARTS=parts).kernel
 
 
-def _write(path: Path, text: bytes) -> None:
+def _write_source(path: Path, text: bytes) -> None:
     """Write the source of a kernel, unless it is there; DiskError with the folder's variable where the disk refuses.
 
     It is for numba, which keeps its files beside one, and for people: what runs is `text`.

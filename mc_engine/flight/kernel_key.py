@@ -137,7 +137,7 @@ class _Walk:
         constants = list(code.co_consts)
         if _has_docstring(code):
             constants[0] = None
-        described = [self.code(one) if isinstance(one, CodeType) else self.value(one) for one in constants]
+        described = [self.code(item) if isinstance(item, CodeType) else self.value(item) for item in constants]
         arguments = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags & _PASSED_BY_CALLER
         names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
         return code.co_code, code.co_exceptiontable, described, arguments, names

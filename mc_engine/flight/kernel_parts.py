@@ -100,7 +100,8 @@ def _picks(model: Model, makers: Any) -> list[Any]:
     first_peak = n_events if isinstance(model.clock, AdaptiveStep) else 0
     best_picks, best_class = _tracked(model.extrema, peaks, lasts, first_peak, first_peak + len(peak_picks))
     smooth = [1.0 if e.smooth else 0.0 for e in peaks] or [0.0]
-    kinds = [*[EVENT] * n_events, *(PEAK if one else CORNER for one in smooth), *([LAST] * len(lasts) or [CORNER])]
+    extremum_kinds = [PEAK if is_smooth else CORNER for is_smooth in smooth] + ([LAST] * len(lasts) or [CORNER])
+    kinds = [EVENT] * n_events + extremum_kinds
     signs = [DIRECTIONS[e.direction] for e in model.event_list] or [-1.0]
     if isinstance(model.clock, AdaptiveStep):  # its events, peaks and last times are tracked as one
         signs += [-1.0] * (len(kinds) - n_events)

@@ -23,47 +23,48 @@ _WHY = "a case must depend on its inputs and case_id alone: no clock, random num
 _read: dict[str, str] = {}  # by environment variable: where the model reads it
 
 
-def numbers(campaign: Campaign) -> dict[str, str]:
+def model_digests(campaign: Campaign) -> dict[str, str]:
     """Digests of what the kernel of a campaign is made of, and of what its nominal case begins with, by name."""
     model = campaign.model
     p, o = nominal_inputs(campaign)
-    found = {f'"{name}" of the nominal case, from `prepare`,': value for name, value in zip(p._fields, p, strict=True)}
-    found |= {f"the setting `{name}`": value for name, value in zip(o._fields, o, strict=True)}
-    found |= {f"`{name}` of the clock": value for name, value in vars(model.clock).items()}
-    found |= {f"`{name}`": value for name, value in vars(model).items() if isinstance(value, PhysicsFunction)}
+    values = {f'"{name}" of the nominal case, from `prepare`,': value for name, value in zip(p._fields, p, strict=True)}
+    values |= {f"the setting `{name}`": value for name, value in zip(o._fields, o, strict=True)}
+    values |= {f"`{name}` of the clock": value for name, value in vars(model.clock).items()}
+    values |= {f"`{name}`": value for name, value in vars(model).items() if isinstance(value, PhysicsFunction)}
     seen: set[Any] = set()
-    return {key: digest for name, value in found.items() for key, digest in _digests(name, value, seen)}
+    return {key: digest for name, value in values.items() for key, digest in _digests_of(name, value, seen)}
 
 
-def _digests(name: str, value: Any, seen: set[Any]) -> Iterator[tuple[str, str]]:
+def _digests_of(name: str, value: Any, seen: set[Any]) -> Iterator[tuple[str, str]]:
     """Of all numbers and texts in a value; in a function, of those that it names outside of it."""
     inside: dict[str, Any] = {}
     if isinstance(value, tuple | list):
-        inside = {f"{name}[{i}]": one for i, one in enumerate(value)}
+        inside = {f"{name}[{i}]": item for i, item in enumerate(value)}
     elif isinstance(value, np.ndarray | np.generic | int | float | str):
         content = value.tobytes() if hasattr(value, "tobytes") else repr(value).encode()
         yield name, blake2b(content, digest_size=8).hexdigest()
     elif isinstance(value, PhysicsFunction | type) and value not in seen:
         seen.add(value)
-        inside = _named(name, value)
-    for key, one in inside.items():
-        yield from _digests(key, one, seen)
+        inside = _named_outside(name, value)
+    for key, item in inside.items():
+        yield from _digests_of(key, item, seen)
 
 
-def _named(name: str, value: PhysicsFunction | type) -> dict[str, Any]:
+def _named_outside(name: str, value: PhysicsFunction | type) -> dict[str, Any]:
     if isinstance(value, type):
-        return {f"{name}.{key}": one for key, one in vars(value).items() if not key.startswith("_")}
+        return {f"{name}.{key}": item for key, item in vars(value).items() if not key.startswith("_")}
     function = inspect.unwrap(value.function)
     outside = inspect.getclosurevars(function)
     file = Path(function.__code__.co_filename).name
-    return {f"`{key}` in {file}": one for key, one in {**outside.globals, **outside.nonlocals}.items()}
+    return {f"`{key}` in {file}": item for key, item in {**outside.globals, **outside.nonlocals}.items()}
 
 
 def influences(here: dict[str, str], there: dict[str, str]) -> list[str]:
     """Sentences on numbers that differ between two processes, and on what the model reads of the environment."""
-    found = [f"{name} differs between two processes; {_WHY}" for name in here if there.get(name, "") != here[name]]
+    different = [name for name in here if there.get(name, "") != here[name]]
     reads = [f'{place} reads the environment variable "{key}"; make it a setting' for key, place in _read.items()]
-    return [*reads, *found[:1]]  # what one cause changes is one mistake
+    # what one cause changes is one mistake
+    return [*reads, *(f"{name} differs between two processes; {_WHY}" for name in different[:1])]
 
 
 def note_environment() -> None:

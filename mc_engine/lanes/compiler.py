@@ -8,6 +8,7 @@ from numba import config, njit
 from mc_engine.errors import ModelError
 from mc_engine.lanes import lowering as _lowering  # registers the lane type and its functions
 from mc_engine.lanes import namespaces as _namespaces  # registers classes that hold constants
+from mc_engine.lanes import records as _records  # registers records of plain numbers and lanes
 from mc_engine.lanes.kernel_cache import keep_on_disk
 from mc_engine.lanes.linked import LinkedCompiler
 
@@ -27,6 +28,7 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise ModelError("the environment has NUMBA_DISABLE_JIT, with which no kernel can be compiled; unset it")
 assert _lowering
 assert _namespaces
+assert _records
 
 
 def compile_inline(function: Callable[..., Any]) -> Any:

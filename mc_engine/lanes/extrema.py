@@ -8,6 +8,12 @@ from mc_engine.lanes.physics_function import physics
 
 
 @physics
+def first_time(value, t):
+    """The time t of an extremum whose first value this is."""
+    return t
+
+
+@physics
 def crest(v0, v1, v2, best):
     """Mask: the middle one of three neighbouring values tops both and may top the best so far, or is not a number."""
     return not ((v1 < v0) | (v1 < v2) | (v1 + abs(v1 - v0) + abs(v1 - v2) <= best))

@@ -32,7 +32,7 @@ class _KernelData(CompileResultCacheImpl):
         No compiled code reads them, and each would import the model's module under the name that it had then.
         """
         *data, environments = super().reduce(result)
-        return (*data, tuple(one for one in environments if one.consts))
+        return (*data, tuple(environment for environment in environments if environment.consts))
 
 
 class KernelCache(FunctionCache):

@@ -123,11 +123,11 @@ def map_fields(typingctx, function, *args):
 @intrinsic
 def joined(typingctx, *tuples):
     """One plain tuple of the fields of all tuples."""
-    result = _tuple_type([field for one in tuples for field in one])
+    result = _tuple_type([field for fields in tuples for field in fields])
 
     def codegen(context, builder, sig, args):
         given = [_item(builder, args[0], i) for i in range(len(tuples))]
-        fields = [_item(builder, one, i) for one, ty in zip(given, tuples, strict=True) for i in range(len(ty))]
+        fields = [_item(builder, fields, i) for fields, ty in zip(given, tuples, strict=True) for i in range(len(ty))]
         return _pack(context, builder, result, fields)
 
     return result(types.StarArgTuple.from_types(tuples)), codegen

@@ -177,8 +177,8 @@ class _Packages(MetaPathFinder):
 
 def find_elsewhere(asking: Any, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
     """What the first finder but the one that asks says of a module."""
-    others = (one for one in sys.meta_path if one is not asking and hasattr(one, "find_spec"))
-    return next((spec for one in others if (spec := one.find_spec(fullname, path)) is not None), None)
+    others = (finder for finder in sys.meta_path if finder is not asking and hasattr(finder, "find_spec"))
+    return next((spec for finder in others if (spec := finder.find_spec(fullname, path)) is not None), None)
 
 
 def find_unimported(reference: str) -> ModuleSpec | None:

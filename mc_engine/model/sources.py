@@ -84,26 +84,26 @@ def sources_of_file(path: Path) -> Sources:
 def _data_in(folder: Path, sources: Iterable[bytes]) -> dict[Path, bytes]:
     """Contents of the files that calls of `Model` in these sources name as their data; those that cannot be read are
     left out."""
-    found = {}
+    contents = {}
     for name in sorted({name for source in sources for name in data_names(source)}):
         with suppress(FileFault):
             path = resolve_beside(folder, name)
             if (content := _content(path)) is not None:
-                found[path] = content
-    return found
+                contents[path] = content
+    return contents
 
 
 def sources_beside(file: Path) -> dict[Path, bytes]:
     """Sources of a model that is a file: all beside it, and the folders beside it that they import, whole."""
-    found = {**_contents(file.parent.glob("*.py")), file: file.read_bytes()}
+    contents = {**_contents(file.parent.glob("*.py")), file: file.read_bytes()}
     waiting, seen = [file], set[str]()
     while waiting:
-        for root in {name.split(".")[0] for name in imported_names(found[waiting.pop()])} - seen - {""}:
+        for root in {name.split(".")[0] for name in imported_names(contents[waiting.pop()])} - seen - {""}:
             seen.add(root)
             package = _contents((file.parent / root).rglob("*.py"))
-            found |= package
-            waiting += [*package, *([beside] if (beside := file.parent / f"{root}.py") in found else [])]
-    return dict(sorted(found.items()))
+            contents |= package
+            waiting += [*package, *([beside] if (beside := file.parent / f"{root}.py") in contents else [])]
+    return dict(sorted(contents.items()))
 
 
 def _contents(paths: Iterable[Path]) -> dict[Path, bytes]:
@@ -131,26 +131,26 @@ def sources_of_module(name: str, folder: Path) -> Sources:
     home = Path(module.__file__)
     inside_package = home.name == "__init__.py" or "." in name
     beside = home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py")
-    found = {path: PACKAGES.read(root, path) for path in beside if path.is_file()}
+    contents = {path: PACKAGES.read(root, path) for path in beside if path.is_file()}
     waiting, seen = [name], {name}
     while waiting:
-        for reached in _imports(waiting.pop()):
+        for reached in _modules_imported_by(waiting.pop()):
             if reached not in seen and _decides(reached, name):
                 seen.add(reached)
                 waiting.append(reached)
-                found[Path(str(sys.modules[reached].__file__))] = _source(reached)
+                contents[Path(str(sys.modules[reached].__file__))] = _text_of_module(reached)
     base = home.parents[name.count(".") + (home.name == "__init__.py")]
-    return Sources(module, base, folder, found, data)
+    return Sources(module, base, folder, contents, data)
 
 
-def _imports(name: str) -> list[str]:
+def _modules_imported_by(name: str) -> list[str]:
     """Modules, by name, that a loaded one imports."""
     module = sys.modules[name]
     package = module.__name__ if hasattr(module, "__path__") else module.__name__.rpartition(".")[0]
-    return [one for one in imported_names(_source(name), package) if one in sys.modules]
+    return [imported for imported in imported_names(_text_of_module(name), package) if imported in sys.modules]
 
 
-def _source(name: str) -> bytes:
+def _text_of_module(name: str) -> bytes:
     """What a loaded module was made of."""
     module = sys.modules[name]
     loader = getattr(module, "__loader__", None)

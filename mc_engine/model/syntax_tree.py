@@ -39,7 +39,7 @@ def imported_names(source: bytes, package: str = "") -> frozenset[str]:
         tree = parse(source)
     except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: nested too deep
         return frozenset()
-    return frozenset(name for node in ast.walk(tree) for name in _names(node, package))
+    return frozenset(name for node in ast.walk(tree) for name in _names_imported_by(node, package))
 
 
 @lru_cache(maxsize=512)
@@ -56,7 +56,7 @@ def data_names(source: bytes) -> frozenset[str]:
     return frozenset(text for text in texts if isinstance(text, str))
 
 
-def _names(node: ast.AST, package: str) -> Iterator[str]:
+def _names_imported_by(node: ast.AST, package: str) -> Iterator[str]:
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
     elif isinstance(node, ast.ImportFrom):
