@@ -1,6 +1,6 @@
-"""Chunks of cases: drawn, flown and written by one worker, be it a thread, a process or another machine.
+"""Chunks of consecutive cases: drawn, flown and stored by one worker, which is a thread, a process or a remote machine.
 
-What a case comes to depends on (campaign, sources, seed, case_id): chunks and workers are bookkeeping.
+A case's result depends on (campaign, sources, seed, case_id) alone, so neither chunk size nor workers change it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,7 @@
-"""What a model must keep, checked without compiling: each breach a sentence with its place and the fix.
+"""Checks of a model's contract that need no compilation.  Each breach is one sentence with its location and the fix.
 
-`mc_engine.model.reading` reads, `mc_engine.model.trial` runs the physics at the start of the nominal case.
-`mc_engine.flight.contract_flight` goes on with what only a flight can show.
+`mc_engine.model.reading` checks the source, `mc_engine.model.trial` runs the physics at the start of the nominal case.
+`mc_engine.flight.contract_flight` checks what only a flight can show.
 """
 
 import json

@@ -1,8 +1,8 @@
-"""What only a flight shows of a model's contract: a few cases of the campaign, flown several times over.
+"""Checks of a model's contract by flying a few cases of its campaign several times.
 
-Results must be there, must be the same again and independent of the other cases in the batch, and every declared input,
-metric and event must matter.  `python -m mc_engine.flight.contract_flight FILE` prints the sentences as JSON; `check`
-calls it as a process of its own, which a model may kill or hang.
+Results must exist and repeat, must be independent of the other cases in the batch, and every declared input, metric and
+event must have an effect.  `python -m mc_engine.flight.contract_flight FILE` prints the sentences as JSON; `check` runs
+it as a process of its own, which the model may kill or hang.
 """
 
 import json

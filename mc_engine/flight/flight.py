@@ -1,4 +1,4 @@
-"""From the inputs of some cases to their results: units, design, kernel, units again."""
+"""Flight of cases: converts inputs to SI, calls the model's `prepare`, runs the kernel, converts the results back."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""The engine's own loops run by Python on the Numbers of one case: the same flight, which knows what broke it.
+"""The engine's integration loops run by Python on one case, to find the operation that made a number infinite or NaN.
 
-The loops are those that kernels are compiled of.  Only their intrinsics, which exist inside kernels alone, have a
-second meaning here, under the same names.
+The loops are the ones that kernels are compiled from.  Their intrinsics exist in compiled code only, so each has an
+interpreted twin of the same name here.
 """
 
 import functools

@@ -1,4 +1,4 @@
-"""What a kernel needs of its model: the physics, completed by what the model leaves out, and picks of fields."""
+"""What a kernel takes from its model: the physics, defaults for functions left out, and selections of fields."""
 
 from collections import namedtuple
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Where a number of a model stopped being finite, in a sentence: file, line, source, and the numbers there."""
+"""The first operation of a flight whose result is infinite or NaN, as a sentence: file, line, source and operands."""
 
 import math
 from collections.abc import Mapping

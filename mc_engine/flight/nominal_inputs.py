@@ -1,4 +1,4 @@
-"""The nominal case as a model's physics sees it, tried before anything flies."""
+"""The inputs of the nominal case as the model's physics receives them, checked before anything flies."""
 
 from typing import Any
 

@@ -1,6 +1,6 @@
-"""What of a model differs in another process: it depends on the clock, random numbers, hashes or the environment.
+"""Finds values of a model that differ between processes: they depend on the clock, randomness or the environment.
 
-`check` takes the same numbers in two processes, at two times, with other seeds for hashes and in other time zones.
+`check` computes the same digests in two processes, at two times, with different hash seeds and time zones.
 """
 
 import inspect

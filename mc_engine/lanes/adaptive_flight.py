@@ -1,8 +1,11 @@
-"""Adaptive flight in lanes: every lane steps, meets events and ends by itself, then takes the next case.
+"""Adaptive flight in lanes: each lane steps, locates events and ends independently, then takes the next case.
 
-A lane is always in one of three ways: it steps; it closes in on an event, looking at shorter and shorter parts of
-the step that went over it; or it shortens a step that may have touched zero and come back.  A round of the loop is
-one attempt of every lane, so no lane waits for the events of another.
+A round of the loop is one attempt of every lane, so no lane waits for the events of another.
+
+state       attempt                        next state
+stepping    a full step                    stepping; closing if it passed an event; shortening if it may have met zero
+closing     a part of the step's length    closing; stepping once the event is located to tolerance
+shortening  a step to the likely zero      stepping; closing if it passed an event
 
 An event is a zero of a sense (see `adaptive_step`); peaks are zeros of rates, so they are as exact as events.
 """

@@ -1,4 +1,4 @@
-"""The one place where compiler flags stand."""
+"""Compiler flags and decorators: the only module that sets options of numba."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,8 +1,8 @@
-"""Machine code of kernels on disk, which is a convenience: where it cannot be read or kept, kernels are compiled again.
+"""Compiled kernels on disk.  A file that cannot be read or written costs a compilation and ends no flight.
 
-A file holds one compiled kernel behind a digest of it, and nothing of it is used before the digest is checked: damaged
-machine code would crash, or fly other numbers.  The name of a file is made of all that it is compiled for, so that
-processes that compile the same write the same file, each at once and whole.
+Each file holds one compiled kernel and its digest, which is checked before loading: damaged machine code may crash or
+give wrong numbers.  The file's name contains all that the kernel was compiled for.  Files are replaced as a whole, and a
+lock per file keeps two processes from compiling the same kernel.
 """
 
 import logging

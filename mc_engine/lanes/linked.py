@@ -1,9 +1,9 @@
-"""The compilation of functions that exist only inside kernels: to LLVM's language and no further.
+"""A numba pipeline for functions that are used inside kernels only: it stops at LLVM's intermediate language.
 
-numba makes every function it compiles ready to run, optimised and in machine code, and then does the same again for
-the function that it becomes part of.  A kernel's parts are never run by themselves; left raw, they are optimised once,
-with all of the kernel around them.  That halves the time of compilation; results keep their bits, flights their speed.
-The steps replaced are numba's internal ones: they stand in this file alone.
+numba optimises each function and generates its machine code, then does so again for the function that it is inlined
+into.  A kernel's parts are never called by themselves, so they are optimised once, with the kernel around them.  This
+halves the time of compilation and changes neither results nor speed.  It replaces internal steps of numba, in this
+file alone.
 """
 
 from typing import Any

@@ -1,8 +1,8 @@
-"""A float for interpreted flights: it computes as kernels do, and knows where it stopped being finite.
+"""Floats for interpreted flights: they compute as kernels do and record which operation gave an infinity or NaN.
 
-1/0 is infinite, as in kernels.  A result that is infinite or not a number has an `Origin`: the operation that made it
-of finite numbers, and where.  All that is computed of it later has the same one, so that the number which breaks a
-flight tells of the first mistake.
+1/0 is infinite, as in kernels.  A result that is infinite or NaN has an `Origin`: the operation on finite numbers that
+gave it, and its source line.  Results computed from it keep the same origin, so that the number that ends a flight
+identifies the first faulty operation.
 """
 
 import functools

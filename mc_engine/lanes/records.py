@@ -1,7 +1,7 @@
-"""Records of one class that hold plain numbers in one place and lanes in another are one type to the compiler.
+"""Named tuples that hold plain numbers in one place and lanes in another: the compiler treats them as one type.
 
-Physics may hand back `State(s.v, 0.0)` in one branch and `State(s.v, s.x)` in the other, or begin a loop with a record
-of plain numbers.  numba unifies numbers and plain tuples in this way, but no named tuples.  Registered on import.
+Physics may return `State(s.v, 0.0)` in one branch and `State(s.v, s.x)` in the other, or begin a loop with a record of
+plain numbers.  numba itself unifies numbers and plain tuples in this way, but not named tuples.  Registered on import.
 """
 
 from typing import Any

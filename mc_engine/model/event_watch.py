@@ -1,4 +1,4 @@
-"""A model whose flights tell how far each event's function reached, in place of the model's own results."""
+"""A variant of a model whose metrics are the extremes of its event functions, to check that each event can occur."""
 
 from dataclasses import replace
 

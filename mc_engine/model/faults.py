@@ -1,7 +1,7 @@
 """Errors in a model's own code as one sentence each, with the file, the line and the usual fix.
 
-Errors of physics also show the source line and end with what physics may contain: arrays of cases and the compiler
-complain in words of their own, which no user has written.
+For errors in physics the sentence adds the source line and what physics may contain, since the messages of NumPy and of
+the compiler do not mention the user's code.
 """
 
 import linecache

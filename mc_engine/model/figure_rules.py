@@ -1,4 +1,4 @@
-"""What the figures of a model must keep before it flies: types of fields, names of what the model has."""
+"""Validation of a model's figures: types of their fields, and names that the model declares."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING

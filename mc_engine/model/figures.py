@@ -1,8 +1,8 @@
-"""Figures that a model asks of every report, as data: what to draw, not how.
+"""Figures that a model requests of every report, as data: what to draw, not how.
 
-The run's manifest keeps them, so that a report can be made years later without the model.  Columns are those of the
-table of cases: inputs, metrics, `end_` states; a figure over an input that a run does not disperse is left out of its
-report.  Where `upstream` is True, x and y may be columns of the run that a campaign takes its inputs from.
+The run's manifest stores them, so that a report can be made later without the model.  Columns are those of the case
+table: inputs, metrics, `end_` states; a figure over an input that a run does not disperse is left out of its report.
+With `upstream` True, x and y may be columns of the run that the campaign takes its inputs from.
 """
 
 from dataclasses import asdict, dataclass, field

@@ -1,7 +1,7 @@
-"""Import of models, and of the sources beside them or in their packages, from contents that are read once.
+"""Import of a model and of the modules in its folder or package, from file contents that are read exactly once.
 
-The code that runs is compiled from the bytes that the digest is made of and that a run directory keeps.  Bytecode files
-are neither read nor written: Python would take one for a source's own by its size and the second of its last change.
+The code that runs is compiled from the same bytes that are digested and that the run directory keeps.  Bytecode files
+are not used: Python matches them to a source by its size and its time of change in seconds only.
 """
 
 import linecache

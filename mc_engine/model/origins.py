@@ -1,4 +1,4 @@
-"""Where a number stopped being finite, in words: operation, place in the model's source, and the numbers there."""
+"""Describes where a number became infinite or NaN: operation, location in the model's source, and operands."""
 
 import math
 from pathlib import Path

@@ -1,7 +1,7 @@
-"""What physics may contain, and what else a model's physics contains, read without running it: each breach a sentence.
+"""Checks the source of a model's physics against the list of what physics may contain; each breach is one sentence.
 
-Read are the model's functions and all the physics that they call, down to the engine's own.  `_SYNTAX`, `_VALUES` and
-`_BUILTINS` are the list; the trial finds by running what the source alone does not show.
+It reads the model's functions and all physics that they call, down to the engine's own.  `_SYNTAX`, `_VALUES` and
+`_BUILTINS` are the list; `mc_engine.model.trial` finds by running what the source alone does not show.
 """
 
 import ast

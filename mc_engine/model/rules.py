@@ -1,4 +1,4 @@
-"""What a model's own record must keep before it flies: names, units, words of events, numbers of the clock."""
+"""Validation of a model's record before it flies: names, units, options of events, numbers of the clock."""
 
 import json
 from collections.abc import Iterable

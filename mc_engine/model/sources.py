@@ -1,7 +1,7 @@
 """The source files that decide a model's numbers: those of its package or folder, and what they import.
 
-More than the model may need; an edit of a file that it does not need costs a compilation, no wrong number.  Each file
-is read once: its content is what runs, what the digest is of, and what a run directory keeps.
+The list may hold files that the model does not need.  Each file is read once: the same content runs, is digested, and is
+kept in the run directory.
 """
 
 import sys

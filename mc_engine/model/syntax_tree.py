@@ -1,4 +1,4 @@
-"""Python sources as syntax trees."""
+"""Syntax trees of Python sources, and the names that a source imports."""
 
 import ast
 import linecache

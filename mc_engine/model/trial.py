@@ -1,8 +1,7 @@
-"""A model's physics run through once, interpreted, on the numbers of a few cases: what it gives must be what the model
-declares.
+"""Interpreted run of a model's physics on a few cases: its results must have the fields that the model declares.
 
-The numbers are arrays, as the lanes will hand them over, so that what takes one number only is found here.  A kernel
-trusts the counts that the model declares: nothing is flown that has not passed.
+The inputs are arrays, as lanes hand them over, so that code for a single number is found here.  A kernel relies on
+the declared counts, so a model that has not passed is not flown.
 """
 
 import dis
