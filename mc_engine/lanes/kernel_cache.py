@@ -1,8 +1,8 @@
 """Compiled kernels on disk.  A file that cannot be read or written costs a compilation and ends no flight.
 
 Each file holds one compiled kernel and its digest, which is checked before loading: damaged machine code may crash or
-give wrong numbers.  The file's name contains all that the kernel was compiled for.  Files are replaced as a whole; a lock
-per file keeps two processes from compiling the same kernel.
+give wrong numbers.  The file's name contains all that the kernel was compiled for.  Files are replaced as a whole.
+A lock per file keeps two processes from compiling the same kernel.
 """
 
 import logging
