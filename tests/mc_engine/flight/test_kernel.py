@@ -247,7 +247,7 @@ from mc_engine.flight.flight import fly
 from mc_engine.model import load_model
 
 model = load_model("model.py", Path("case"))
-inputs = {one.name: one.default for one in model.parameters}
+inputs = {item.name: item.default for item in model.parameters}
 assert fly(model, inputs, np.zeros(1, dtype=int), 1, folder=Path("case"), width=1)["status"][0] == "ok"
 """
     for place in ("here", "there"):
