@@ -74,7 +74,10 @@ class KernelCache(FunctionCache):
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Hold the system's lock on a file, which ends with its process.  Where the system has none, go on without."""
+    """Hold the system's lock on a file, which ends with its process.  Where the system has none, go on without.
+
+    The file is deleted at the end: who waits for it finds the kernel on disk when the lock is theirs.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         file = path.open("ab")
@@ -87,6 +90,8 @@ def _locked(path: Path) -> Iterator[None]:
         try:
             yield
         finally:
+            with suppress(OSError):
+                path.unlink()
             with suppress(OSError, AttributeError):  # closing alone would leave it to a child that was forked meanwhile
                 fcntl.flock(file, fcntl.LOCK_UN)
 
