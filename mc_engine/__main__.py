@@ -15,11 +15,11 @@ def _forget_working_folder() -> None:
 
 def main() -> None:
     """Run the command line of this process; does not return."""
-    from mc_engine.interruption import listen
+    from mc_engine.interruption import install_handlers
     from mc_engine.text import clean_streams
     from mc_engine.unforeseen import UNFORESEEN, catch_all, refuse_small_memory, unforeseen
 
-    listen()  # to Ctrl-C also while the rest is loaded
+    install_handlers()  # to Ctrl-C also while the rest is loaded
     for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(library, "1")  # its threads wait for each other longer than the small matrices here take
     catch_all()

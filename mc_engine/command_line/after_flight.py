@@ -1,13 +1,14 @@
-"""The commands that read a run: report, status, verify."""
+"""The commands on a run that is there: report, status, summary, verify, export, publish, fetch."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mc_engine.command_line.app import (
     DAMAGED,
     USAGE,
+    RunFolder,
     RunPlace,
     app,
     beginning,
@@ -15,15 +16,24 @@ from mc_engine.command_line.app import (
     existing_run,
     exit_status,
     leave,
+    new_file,
+    object_store,
     ranges,
     run_at,
     write_reports,
 )
-from mc_engine.command_line.object_stores import echo_publication
 from mc_engine.interruption import advise
 from mc_engine.shell_words import shell_word
+from mc_engine.store.urls import is_url, store_url
+from mc_engine.suggestions import hint
+
+if TYPE_CHECKING:
+    from mc_engine.store.store import Store
 
 REPORT_FORMATS = ("html", "pdf", "md", "json")
+EXPORT_FORMATS = ("csv", "oem")
+_OEM_COLUMNS = 6
+Url = Annotated[str, typer.Argument(metavar="URL", help="Such as s3://bucket/runs/deorbit.", parser=object_store)]
 
 
 @app.command()
@@ -144,3 +154,103 @@ def verify(place: RunPlace) -> None:
     if problems:
         leave(DAMAGED, f"{place}: {counted(problems, 'problem')}; {'; '.join(remedies(place, problems))}")
     typer.echo(f"{place}: every byte is as it was written")
+
+
+@app.command()
+@exit_status()
+def export(
+    place: RunPlace,
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            help="csv, or oem (CCSDS ephemerides, a point a case).",
+            autocompletion=beginning(EXPORT_FORMATS),
+        ),
+    ] = "csv",
+    columns: Annotated[
+        str | None,
+        typer.Option(help="Columns with commas between; for oem those of x, y, z and their rates."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write; by default end_states.csv or .oem in RUN.", parser=new_file),
+    ] = None,
+    epoch: Annotated[
+        str | None, typer.Option(help="For oem: start of the flights in UTC; by default the setting epoch_utc.")
+    ] = None,
+    frame: Annotated[str | None, typer.Option(help="For oem: reference frame of the columns, such as EME2000.")] = None,
+    centre: Annotated[str, typer.Option(help="For oem: the body at the origin.")] = "EARTH",
+) -> None:
+    """Write where the cases ended, for other tools."""
+    if kind not in EXPORT_FORMATS:
+        leave(USAGE, f'--format "{kind}" is not known; {" or ".join(EXPORT_FORMATS)}')
+    if out is None and is_url(place):
+        leave(USAGE, f"--out is missing: {store_url(place)} is a URL; name a file here")
+    store = existing_run(run_at(place))
+    path = out if out is not None else store.path / f"end_states.{kind}"
+    if not path.parent.is_dir():
+        leave(USAGE, f"--out {path}: there is no folder {path.parent}")
+    from mc_engine.studies.end_states import end_columns, write_csv
+
+    names = [name.strip() for name in columns.split(",")] if columns else end_columns(store)
+    for name in names:
+        if name not in store.units:
+            leave(USAGE, f'--columns: there is no column "{name}"{hint(name, store.units)}')
+    if kind == "csv":
+        typer.echo(f"{path}: {write_csv(store, names, path):,} cases")
+        return
+    _write_oem(store, names if columns else [], path, epoch, frame, centre)
+
+
+def _write_oem(store: "Store", names: list[str], path: Path, epoch: str | None, frame: str | None, centre: str) -> None:
+    from mc_engine.errors import StoreError
+    from mc_engine.studies.end_states import write_oem
+
+    if len(names) != _OEM_COLUMNS:
+        leave(USAGE, f"--columns: {len(names)} given; an OEM needs the six of x, y, z and their rates")
+    if frame is None:
+        leave(USAGE, "--frame is missing: the reference frame of the columns, such as EME2000 or ICRF")
+    start = epoch or _epoch_of(store)
+    if start is None:
+        leave(USAGE, "--epoch is missing: the start of the flights in UTC, such as 2026-01-31T12:00:00")
+    try:
+        written, cases = write_oem(store, names, path, start, frame, centre)
+    except StoreError as error:
+        leave(USAGE, str(error))
+    typer.echo(f"{path}: {written:,} of {cases:,} cases, those that completed")
+
+
+def _epoch_of(store: "Store") -> str | None:
+    """The campaign's own epoch, where its model has the setting."""
+    records: list[dict[str, Any]] = store.manifest.get("settings", [])
+    return next((str(record["value"]) for record in records if record["name"] == "epoch_utc"), None)
+
+
+@app.command()
+@exit_status()
+def publish(folder: RunFolder, url: Url) -> None:
+    """Copy a run to an object store; only what is missing there or differs travels (needs fsspec, s3fs)."""
+    advise(lambda: f"interrupted; `mc-engine publish {shell_word(folder)} {shell_word(url)}` sends the rest")
+    existing_run(folder)
+    echo_publication(folder, url)
+
+
+def echo_publication(folder: Path, url: str) -> None:
+    """Publish the run, and say what was sent."""
+    from mc_engine.store.object_store import publish
+
+    done = publish(folder, url)
+    files = counted(done.sent, "file")
+    typer.echo(f"published    {done.url}: {files}, {done.sent_bytes:,} bytes; {done.kept} were there")
+
+
+@app.command()
+@exit_status()
+def fetch(
+    url: Url, folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the copy is to be.", parser=new_file)]
+) -> None:
+    """Copy a run from an object store to a new directory; the checksum of every part is verified."""
+    from mc_engine.store.object_store import fetch
+
+    typer.echo(f"run          {fetch(url, folder)}")

@@ -20,7 +20,7 @@ import typer
 from typer.core import TyperGroup
 
 from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError
-from mc_engine.interruption import INTERRUPTED, last_words, under_way
+from mc_engine.interruption import INTERRUPTED, interruption_message, under_way
 from mc_engine.numbers_in_text import LARGEST_WHOLE, is_real, is_whole
 from mc_engine.shell_words import shell_word
 from mc_engine.store.run_folder import NO_TEXT, readable
@@ -167,7 +167,7 @@ def exit_status() -> Iterator[None]:
     except EngineError as error:  # of the campaign, the model, or a package that is missing
         leave(USAGE, str(error))
     except KeyboardInterrupt:
-        leave(INTERRUPTED, last_words())
+        leave(INTERRUPTED, interruption_message())
     except OSError as error:
         if error.errno == errno.ENOMEM:
             leave(UNFORESEEN, unforeseen(error))

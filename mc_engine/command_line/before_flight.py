@@ -1,4 +1,4 @@
-"""The commands that fly nothing: init, check, plan, sample, list, schema."""
+"""The commands before a flight: init, check, plan, sample, list, schema, units."""
 
 import json
 import shutil
@@ -188,3 +188,18 @@ def schema() -> None:
     from mc_engine.campaign.loading import schema as campaign_schema
 
     typer.echo(json.dumps(campaign_schema(), indent=2, ensure_ascii=False))
+
+
+@app.command()
+@exit_status()
+def units() -> None:
+    """All units that a model or a campaign file can name, by what they measure; the first of each is that of SI."""
+    from mc_engine.units import UNITS, by_quantity, other_endings
+
+    groups = by_quantity()
+    width = max(len(quantity) for quantity in groups)
+    for quantity, names in groups.items():
+        typer.echo(f"{quantity:<{width}}  {', '.join(names)}")
+    others = ", ".join(f"{suffix} for {unit}" for unit, suffix in other_endings().items())
+    typer.echo(f"\n{len(UNITS)} units; a column's name ends in its unit: {UNITS['N m'].suffix} for N m")
+    typer.echo(f"Two end otherwise: {others}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mc_engine.command_line.after_flight import echo_publication
 from mc_engine.command_line.app import (
     DAMAGED,
     NOT_MET,
@@ -35,13 +36,11 @@ from mc_engine.command_line.app import (
     write_reports,
 )
 from mc_engine.command_line.next_step import after_flight, is_complete
-from mc_engine.command_line.object_stores import echo_publication
-from mc_engine.interruption import advise, heed
+from mc_engine.interruption import advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
 
 if TYPE_CHECKING:
-    from mc_engine.runner.backends import Backend
     from mc_engine.runner.shards import Shard
     from mc_engine.store.store import Store
 
@@ -97,31 +96,39 @@ def run(
     campaign = load_campaign(file, cases=cases, seed=seed, upstream=upstream)
     path = out if out is not None else default_folder(campaign.name)
     refuse_occupied_folder(path)
-    crew = _crew(path, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
+    options = _worker_options(path, workers, backend, scheduler, case_seconds, memory, patience, publish)
     kept = _kept(path, publish)
     if until is None:
         piece = _shard(shard)
-        store = _fly(lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **crew), kept)
+        store = _fly(lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **options), kept)
     else:
         from mc_engine.runner.stopping import fly_until_decided, refuse_undecidable
 
         refuse_undecidable(campaign)
-        store = _fly(lambda _, note: fly_until_decided(campaign, path, progress=note, **crew), kept)
+        store = _fly(lambda _, note: fly_until_decided(campaign, path, progress=note, **options), kept)
     _finish(store, no_report, judge, max_failed, publish, file)
 
 
-def _backend(
-    name: str, scheduler: str | None, case_seconds: float | None, memory: int | None, patience: float | None
-) -> "Backend":
+def _worker_options(
+    folder: Path,
+    workers: int | None,
+    backend: str,
+    scheduler: str | None,
+    case_seconds: float | None,
+    memory: int | None,
+    patience: float | None,
+    url: str | None = None,
+    rerun: bool = False,
+) -> dict[str, Any]:
+    """The runner's arguments on workers, from the options of a command.
+
+    From here on the message of an interruption names the command that continues the run in `folder`.
+    """
     from mc_engine.runner.backends import Backend
 
-    return Backend(name, scheduler, case_seconds, memory, patience)
-
-
-def _crew(folder: Path, workers: int | None, backend: "Backend", url: str | None = None, rerun: bool = False) -> Any:
-    """The arguments of a flight that say who flies it; from here on an interruption names the command that goes on."""
-    advise(lambda: after_flight(folder, backend.options(), url, rerun))
-    return {"workers": workers, "backend": backend}
+    chosen = Backend(backend, scheduler, case_seconds, memory, patience)
+    advise(lambda: after_flight(folder, chosen.options(), url, rerun))
+    return {"workers": workers, "backend": chosen}
 
 
 def _shard(text: str | None) -> "Shard | None":
@@ -168,7 +175,7 @@ def _fly(fly: Callable[[Any, Any], "Store"], kept: AbstractContextManager[Any] |
         if not progress.stream.isatty():
             typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
         store = fly(runner, progress)
-    heed()  # a signal after the last case finds nothing more to land
+    raise_if_signalled()  # a signal after the last case finds nothing more to land
     return store
 
 
@@ -241,8 +248,8 @@ def resume(
     publish: Publish = None,
 ) -> None:
     """Complete a run that was interrupted."""
-    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
-    crew["repair"] = repair
+    options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, publish)
+    options["repair"] = repair
     _refuse_publication(publish)
     if repair:
         from mc_engine.store.repair import mend_journal
@@ -255,9 +262,9 @@ def resume(
     if looks:
         from mc_engine.runner.stopping import carry_on
 
-        store = _fly(lambda _, note: carry_on(folder, progress=note, **crew), _kept(folder, publish))
+        store = _fly(lambda _, note: carry_on(folder, progress=note, **options), _kept(folder, publish))
     else:
-        store = _fly(lambda runner, note: runner.resume(folder, progress=note, **crew), _kept(folder, publish))
+        store = _fly(lambda runner, note: runner.resume(folder, progress=note, **options), _kept(folder, publish))
     _finish(store, no_report, url=publish)
 
 
@@ -292,8 +299,8 @@ def extend(
     store = existing_run(folder)
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
         leave(USAGE, f"{folder}: {sentence}")
-    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
-    store = _fly(lambda runner, note: runner.extend(folder, cases, progress=note, **crew), _kept(folder, publish))
+    options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, publish)
+    store = _fly(lambda runner, note: runner.extend(folder, cases, progress=note, **options), _kept(folder, publish))
     _finish(store, no_report, url=publish)
 
 
@@ -319,8 +326,8 @@ def rerun(
     if not store.status_counts().keys() - {"ok"}:
         typer.echo(f"{folder}: no case failed; there is nothing to fly again")
         return
-    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), rerun=True)
-    _finish(_fly(lambda runner, progress: runner.rerun(folder, progress=progress, **crew)), no_report)
+    options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, rerun=True)
+    _finish(_fly(lambda runner, progress: runner.rerun(folder, progress=progress, **options)), no_report)
 
 
 @app.command()

@@ -49,14 +49,14 @@ class Lost:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)  # an order is itself alone, not another one of the same words
-class Order:
-    """What a worker is asked for: the part of the cases first .. stop - 1.
+@dataclass(frozen=True, eq=False)  # compared by identity: two tasks may name the same cases
+class Task:
+    """One unit of work for a worker: fly the cases first .. stop - 1 and write their part.
 
     lost : cases that are not flown; their rows hold their inputs and the reason.
-    base : a part in which only the cases that failed are flown anew.  failed : these cases.
-    suspected : a worker has died of it; it is flown in small batches, with a note of each.
-    alone : cases that are flown first, one by one: one of them may be what the worker died of.
+    base : an existing part of which only the failed cases are flown again.  failed : these cases.
+    suspected : a worker died while it ran this task; it now flies small batches and records each of them.
+    alone : cases that fly first and one by one, because one of them may have killed the worker.
     """
 
     first: int
@@ -73,32 +73,32 @@ class Order:
         cases = cases[~np.isin(cases, [lost.case_id for lost in self.lost])]
         return cases[np.argsort(~np.isin(cases, self.alone), kind="stable")]
 
-    def suspecting(self, cases: np.ndarray) -> "Order":
-        """The same order, in which these cases fly alone, too."""
+    def isolating(self, cases: np.ndarray) -> "Task":
+        """A copy of the task, marked as suspected, in which these cases fly alone as well."""
         alone = {*self.alone, *cases.tolist()} - {lost.case_id for lost in self.lost}
         return replace(self, suspected=True, alone=tuple(sorted(alone)))
 
-    def without(self, lost: Lost) -> "Order":
-        """The same order, in which this case is not flown."""
+    def without(self, lost: Lost) -> "Task":
+        """A copy of the task in which this case is not flown."""
         return replace(self, lost=(*self.lost, lost))
 
 
-def carry_out(
-    campaign: Campaign, columns: Sequence[Column], run: Path, order: Order, guard: Guard | None = None
+def run_task(
+    campaign: Campaign, columns: Sequence[Column], run: Path, task: Task, guard: Guard | None = None
 ) -> Written:
-    """Fly an order and write its part aside in `run`.
+    """Fly the cases of a task and write their part under a temporary name in `run`.
 
     guard : entered with the cases of each batch; batches are then no larger than the kernel is wide.
     """
-    flown = order.flown()
+    flown = task.flown()
     batch = None if guard is None else usual_width(campaign.model)
-    flights = [fly_cases(campaign, flown, batch, guard or _unguarded, len(order.alone))] if flown.size else []
+    flights = [fly_cases(campaign, flown, batch, guard or _unguarded, len(task.alone))] if flown.size else []
     names = [column.name for column in columns]
     arrays: Mapping[str, Any] = {**flights[0], "case_id": flown} if flights else {}
-    if order.lost or order.alone or order.base is not None:
-        arrays = _gathered(names, [arrays, _lost_rows(campaign, order.lost, names), _base_rows(run, order, flown)])
-    file = revised_name(order.base.file) if order.base else None
-    return write_aside(run, columns, order.first, order.stop - order.first, arrays, file)
+    if task.lost or task.alone or task.base is not None:
+        arrays = _gathered(names, [arrays, _lost_rows(campaign, task.lost, names), _base_rows(run, task, flown)])
+    file = revised_name(task.base.file) if task.base else None
+    return write_aside(run, columns, task.first, task.stop - task.first, arrays, file)
 
 
 def _unguarded(cases: np.ndarray) -> AbstractContextManager[None]:
@@ -139,7 +139,7 @@ def fly_in_threads(
     """
     from joblib import Parallel, delayed
 
-    def task(rows: slice) -> Columns:
+    def fly_rows(rows: slice) -> Columns:
         piece = full_inputs(campaign, {name: values[rows] for name, values in inputs.items()})
         flown = fly(campaign.model, piece, noise[rows], campaign.seed, folder=campaign.directory)
         return {name: flown[name] for name in wanted}
@@ -149,9 +149,9 @@ def fly_in_threads(
     size = width * -(-len(noise) // (width * workers))
     pieces = [slice(first, first + size) for first in range(0, len(noise), size)]
     if len(pieces) == 1:
-        return task(pieces[0])
-    landed: Any = Parallel(n_jobs=workers, backend="threading")(delayed(task)(piece) for piece in pieces)
-    return {name: np.concatenate([columns[name] for columns in landed]) for name in wanted}
+        return fly_rows(pieces[0])
+    tables: Any = Parallel(n_jobs=workers, backend="threading")(delayed(fly_rows)(piece) for piece in pieces)
+    return {name: np.concatenate([columns[name] for columns in tables]) for name in wanted}
 
 
 def name_upstream(campaign: Campaign, case_ids: np.ndarray, flight: Columns) -> None:
@@ -175,12 +175,12 @@ def _lost_rows(campaign: Campaign, lost: Sequence[Lost], names: Sequence[str]) -
     return {name: known.get(name, np.full(ids.size, np.nan)) for name in names}
 
 
-def _base_rows(run: Path, order: Order, flown: np.ndarray) -> Mapping[str, Any]:
+def _base_rows(run: Path, task: Task, flown: np.ndarray) -> Mapping[str, Any]:
     """The rows of the part that stand: neither flown anew nor lost."""
-    if order.base is None:
+    if task.base is None:
         return {}
-    table = read_part(run, order.base)
-    anew = np.concatenate([flown, [lost.case_id for lost in order.lost]])
+    table = read_part(run, task.base)
+    anew = np.concatenate([flown, [lost.case_id for lost in task.lost]])
     stand = ~np.isin(table["case_id"].to_numpy(), anew)
     return {name: table[name].to_numpy(zero_copy_only=False)[stand] for name in table.column_names}
 
@@ -188,8 +188,8 @@ def _base_rows(run: Path, order: Order, flown: np.ndarray) -> Mapping[str, Any]:
 def _gathered(names: Sequence[str], tables: Sequence[Mapping[str, Any]]) -> Columns:
     """Rows of several tables as one, by case_id."""
     filled = [table for table in tables if table]
-    order = np.argsort(np.concatenate([table["case_id"] for table in filled]))
-    return {name: np.concatenate([table[name] for table in filled])[order] for name in names}
+    by_case = np.argsort(np.concatenate([table["case_id"] for table in filled]))
+    return {name: np.concatenate([table[name] for table in filled])[by_case] for name in names}
 
 
 def fly_nominal(campaign: Campaign) -> dict[str, Any]:
@@ -204,13 +204,13 @@ def fly_nominal(campaign: Campaign) -> dict[str, Any]:
     return {**dispersed, **{name: column[0] for name, column in flight.items()}}
 
 
-def rerun_orders(run: Path, counted: Sequence[Part]) -> list[Order]:
-    """An order for every part with cases that did not complete."""
-    orders = []
+def rerun_tasks(run: Path, counted: Sequence[Part]) -> list[Task]:
+    """One task for every part that has cases which did not complete."""
+    tasks = []
     for part in counted:
         if set(part.status) - {STATUS_NAME[OK]}:
             table = read_part(run, part, CASE_COLUMNS[:2])
             failed = table["status"].to_numpy(zero_copy_only=False) != STATUS_NAME[OK]
             cases = tuple(int(case) for case in table["case_id"].to_numpy()[failed])
-            orders.append(Order(part.first, part.stop, base=part, failed=cases))
-    return orders
+            tasks.append(Task(part.first, part.stop, base=part, failed=cases))
+    return tasks

@@ -55,7 +55,7 @@ def faults(campaign: Campaign) -> list[str]:
     inputs = full_inputs(campaign, case_table(campaign, ids))
     try:
         nominal = _fly_nominal(campaign)
-        with _landing_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
+        with _completed_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
             flown = _fly(campaign, inputs, ids)
         lost = _not_finite(campaign, inputs, ids, flown, nominal)
         found = [*(lost or _failed(campaign, flown)), *_other_bits(campaign, inputs, ids, flown)]
@@ -73,20 +73,20 @@ def faults(campaign: Campaign) -> list[str]:
 
 def _fly_nominal(campaign: Campaign) -> Columns:
     """Fly the nominal case, after a single step of it that compiles the kernel; end the process with a sentence if it
-    does not land."""
+    is not completed."""
     clock, inputs, ids = campaign.model.clock, nominal_row(campaign), np.array([NOMINAL_NOISE])
     one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
     fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
-    with _landing_within(LONGEST_S, "the nominal case has", campaign):
+    with _completed_within(LONGEST_S, "the nominal case has", campaign):
         return _fly(campaign, inputs, ids)
 
 
 @contextmanager
-def _landing_within(seconds: float, who: str, campaign: Campaign) -> Iterator[None]:
+def _completed_within(seconds: float, who: str, campaign: Campaign) -> Iterator[None]:
     """A kernel cannot be broken off: where the block takes longer, the process ends with a sentence."""
 
     def give_up() -> None:
-        _answer([f"{who} not landed after {seconds:.0f} s: {_length(campaign)}"])
+        _answer([f"{who} not completed after {seconds:.0f} s: {_length(campaign)}"])
         os._exit(0)
 
     timer = threading.Timer(seconds, give_up)

@@ -8,13 +8,12 @@ from trapped import campaign_folder, files_of, trapped
 
 from mc_engine import load_campaign
 from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
-from mc_engine.flight.chunks import Order
-from mc_engine.runner import cluster_pool as cluster_crew
-from mc_engine.runner import runner
+from mc_engine.flight.chunks import Task
+from mc_engine.runner import cluster_pool, runner
 from mc_engine.runner.backends import Backend
-from mc_engine.runner.pools import ThreadCrew
+from mc_engine.runner.pools import ThreadWorkerPool
 from mc_engine.runner.shards import Shard
-from mc_engine.runner.worker_process import Site, perform
+from mc_engine.runner.worker_process import WorkerSetup, run_in_worker
 from mc_engine.store.verification import damage
 
 CASES, CHUNK = 1500, 100
@@ -216,7 +215,7 @@ def test_a_grid_without_a_seed_can_be_resumed_and_replayed(tmp_path):
 
 @pytest.mark.parametrize("address", ["no such:x", "tcp://127.0.0.1:1"])
 def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign, tmp_path, monkeypatch, address):
-    monkeypatch.setattr(cluster_crew, "START_S", 0.5)
+    monkeypatch.setattr(cluster_pool, "START_S", 0.5)
     with pytest.raises(RunInterrupted, match=r"there is no scheduler: .*`mc-engine resume .*--backend dask"):
         runner.run(campaign, tmp_path / "run", chunk=CHUNK, backend=Backend("dask", address))
     assert runner.resume(tmp_path / "run").status_counts() == {"ok": CASES}
@@ -224,17 +223,17 @@ def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign
 
 def test_a_worker_of_other_sources_is_refused(campaign, whole):
     """A machine with another engine would write other numbers: it says so, and writes none."""
-    site = Site(str(whole.path), str(campaign.directory), CASES)
+    setup = WorkerSetup(str(whole.path), str(campaign.directory), CASES)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mc_engine.runner.flown_campaign.sampling_digest", lambda: "another")
         with pytest.raises(StoreError, match="was flown by other sources"):
-            perform(site, Order(0, 10))
-    assert perform(site, Order(0, 10)).part.rows == 10
+            run_in_worker(setup, Task(0, 10))
+    assert run_in_worker(setup, Task(0, 10)).part.rows == 10
 
 
 def test_threads_by_the_hundred_thousand_are_as_many_as_a_system_has_room_for(tmp_path):
-    crew = ThreadCrew(lambda order: None, 100_000)
+    pool = ThreadWorkerPool(lambda task: None, 100_000)
     try:
-        assert 2 < crew.room() < 10_000
+        assert 2 < pool.room() < 10_000
     finally:
-        crew.close(at_once=True)
+        pool.close(at_once=True)

@@ -12,11 +12,11 @@ from distributed import LocalCluster
 from trapped import ENVIRONMENT, campaign_folder, files_of, trapped
 
 from mc_engine.errors import RunInterrupted
-from mc_engine.flight.chunks import Order
+from mc_engine.flight.chunks import Task
 from mc_engine.runner import runner
 from mc_engine.runner.backends import Backend
 from mc_engine.runner.dispatch import DRAIN_S, Dispatch
-from mc_engine.runner.workers import Crew, Landing
+from mc_engine.runner.workers import Result, WorkerPool
 from mc_engine.store.parts import Part, Written
 from mc_engine.store.verification import damage
 
@@ -96,7 +96,7 @@ def ended(process, within_s):
 def test_one_signal_ends_a_run_that_has_no_worker(tmp_path):
     with LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as cluster:
         process = waiting(tmp_path, cluster.scheduler_address)
-        time.sleep(3.0)  # its order lies with the scheduler
+        time.sleep(3.0)  # its task lies with the scheduler
         process.send_signal(signal.SIGTERM)
         errors = ended(process, DRAIN_S + 20.0)
     again = f"`mc-engine resume {tmp_path / 'run'} --backend dask --scheduler {cluster.scheduler_address}`"
@@ -168,10 +168,10 @@ def test_killers_on_workers_with_two_threads_are_found_and_their_neighbours_are_
     assert run.status_counts() == {"ok": 197, "worker-died": 3}
 
 
-class OneProcess(Crew):
-    """A pretended crew of two threads in one process, which dies of any killer, with all that is under way.
+class OneProcess(WorkerPool):
+    """A simulated pool of two threads in one process that dies of any killer, with all that is under way.
 
-    unbegun : of orders that are under way, the second only waits, and so leaves no note.
+    unbegun : of tasks that are under way, the second only waits, and so leaves no note.
     """
 
     def __init__(self, folder, killers, unbegun):
@@ -183,32 +183,32 @@ class OneProcess(Crew):
     def room(self):
         return 2
 
-    def begin(self, order):
-        self.under_way.append(order)
+    def begin(self, task):
+        self.under_way.append(task)
 
     def next(self, patience_s):
-        if self._landed.empty():
+        if self._results.empty():
             self._fly()
         return super().next(0.0)
 
     def _fly(self):
         """All that is under way dies together, or the first of it lands."""
         flying = self.under_way[:1] if self._unbegun else self.under_way
-        dies = any(self._killers & set(order.flown().tolist()) for order in flying)
-        for order in flying if dies else ():
-            if order.suspected:
-                first, last = self._in_flight(order)
+        dies = any(self._killers & set(task.flown().tolist()) for task in flying)
+        for task in flying if dies else ():
+            if task.suspected:
+                first, last = self._in_flight(task)
                 (self._folder / "cases" / f".in_flight-{first}-{last}.tmp").touch()
         fallen = self.under_way if dies else self.under_way[:1]
-        for order in fallen:
-            written = Written(Part("", order.first, order.stop - order.first, 0, "", {}), "")
-            self._landed.put(Landing(order, died=True) if dies else Landing(order, written))
-        self.under_way = [order for order in self.under_way if order not in fallen]
+        for task in fallen:
+            written = Written(Part("", task.first, task.stop - task.first, 0, "", {}), "")
+            self._results.put(Result(task, died=True) if dies else Result(task, written))
+        self.under_way = [task for task in self.under_way if task not in fallen]
 
-    def _in_flight(self, order):
+    def _in_flight(self, task):
         """First and last case of what is flown at a time when a killer is among it, or at first."""
-        cases = order.flown().tolist()
-        pieces = [[case] for case in cases[: len(order.alone)]] + [cases[len(order.alone) :]]
+        cases = task.flown().tolist()
+        pieces = [[case] for case in cases[: len(task.alone)]] + [cases[len(task.alone) :]]
         piece = next((piece for piece in pieces if self._killers & set(piece)), pieces[0])
         return min(piece), max(piece)
 
@@ -221,7 +221,7 @@ def test_cases_beside_a_killer_in_the_same_process_are_not_blamed(tmp_path, unbe
     (tmp_path / "cases").mkdir()
     killers = {3, 4, 40, 70}
     dispatch = Dispatch(OneProcess(tmp_path, killers, unbegun), tmp_path)
-    orders = [Order(first, first + 20) for first in range(0, 100, 20)]
-    landed = [order for order, _ in dispatch.receipts(orders, lambda: False)]
-    assert sorted(order.first for order in landed) == [0, 20, 40, 60, 80]
-    assert sorted(lost.case_id for order in landed for lost in order.lost) == sorted(killers)
+    tasks = [Task(first, first + 20) for first in range(0, 100, 20)]
+    finished = [task for task, _ in dispatch.receipts(tasks, lambda: False)]
+    assert sorted(task.first for task in finished) == [0, 20, 40, 60, 80]
+    assert sorted(lost.case_id for task in finished for lost in task.lost) == sorted(killers)

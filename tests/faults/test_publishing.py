@@ -160,8 +160,8 @@ def test_a_fetch_leaves_another_that_is_at_work_alone(run, away, tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="there are no such signals")
 def test_a_fetch_that_is_stopped_leaves_nothing_behind(run, away, tmp_path):
     publish(run, f"file://{away}")
-    script = KILLED.replace("object_store.fetch(", "from mc_engine.interruption import listen, under_way\nlisten()\n"
-                            "with under_way(): object_store.fetch(")  # fmt: skip
+    handled = "from mc_engine.interruption import install_handlers, under_way\ninstall_handlers()\n"
+    script = KILLED.replace("object_store.fetch(", f"{handled}with under_way(): object_store.fetch(")
     command = [sys.executable, "-c", script, f"file://{away}", str(tmp_path / "back")]
     process = begun(command)
     time.sleep(0.1)

@@ -12,7 +12,7 @@ from small_run import ENVIRONMENT
 
 from mc_engine import load_campaign
 from mc_engine.command_line.next_step import after_flight, after_search, is_complete
-from mc_engine.interruption import LANDING, NOTHING_BEGUN, ONCE_MORE
+from mc_engine.interruption import COMPLETING, NOTHING_BEGUN, ONCE_MORE
 from mc_engine.runner import runner
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
@@ -106,7 +106,7 @@ def test_two_signals_end_a_kernel_that_python_cannot_interrupt(tmp_path):
     done = command(KERNEL, "return lambda: work(0.5, 1.0)", "run", "minimal", "--out", run)
     rest = f"interrupted; what was committed is safe, `mc-engine resume {run}` flies the rest"
     assert done.returncode == 4
-    assert done.stderr.splitlines()[-2:] == [LANDING, rest]
+    assert done.stderr.splitlines()[-2:] == [COMPLETING, rest]
 
 
 def test_one_signal_ends_a_kernel_of_a_command_that_keeps_nothing(tmp_path):
@@ -134,7 +134,7 @@ def test_a_signal_after_all_was_said_changes_nothing(tmp_path):
 
 
 def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun():
-    """The first module of it that is loaded after `listen` never comes to its end."""
+    """The first module of it that is loaded after `install_handlers` never comes to its end."""
     script = (
         "import os, signal, sys, time\n"
         "class Finder:\n"
@@ -151,7 +151,7 @@ def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun()
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
 def test_last_words_that_nobody_can_be_told_leave_the_exit_status_as_it_is():
-    script = "import os, signal\nfrom mc_engine.interruption import listen\nlisten()\n"
+    script = "import os, signal\nfrom mc_engine.interruption import install_handlers\ninstall_handlers()\n"
     script += "os.kill(os.getpid(), signal.SIGTERM)\nsignal.pause()\n"
     with open("/dev/full", "w") as full:
         done = subprocess.run([sys.executable, "-c", script], stderr=full, env=ENVIRONMENT, timeout=60)

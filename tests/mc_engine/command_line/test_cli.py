@@ -21,18 +21,18 @@ def calls(monkeypatch):
     """The calls that reach runner and reports, which are stand-ins here; `calls.fail` is raised in flight."""
     seen = SimpleNamespace(runner=[], reports=[], fail=None, equal=True)
 
-    def run(campaign, out=None, *, progress=None, workers=None, chunk=None, **crew):
+    def run(campaign, out=None, *, progress=None, workers=None, chunk=None, **options):
         seen.runner.append(("run", campaign.cases, campaign.seed, workers))
         if seen.fail is not None:
             raise seen.fail
         progress(40, 40, 4)
         return small_store(out)
 
-    def resume(path, *, progress=None, workers=None, **crew):
+    def resume(path, *, progress=None, workers=None, **options):
         seen.runner.append(("resume", str(path), workers))
         return open_store(path)
 
-    def extend(path, cases, *, progress=None, workers=None, **crew):
+    def extend(path, cases, *, progress=None, workers=None, **options):
         seen.runner.append(("extend", str(path), cases))
         store = open_store(path)
         store.note("extended", cases=cases)
