@@ -27,7 +27,7 @@ _NO_CODE = "Runs no code of a campaign or run, whoever made it."
 
 
 def _name(command: CommandInfo) -> str:
-    return command.name or getattr(command.callback, "__name__", "")
+    return str(command.name or getattr(command.callback, "__name__", ""))
 
 
 app.registered_commands.sort(key=lambda command: _IN_ORDER.index(_name(command)))
