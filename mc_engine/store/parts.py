@@ -222,25 +222,30 @@ def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: d
 
 
 def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) -> pa.Table:
-    """The table of a part, all it has or these columns; StoreError naming the file if a byte of it changed.
+    """The table of a part, with all its columns or with these.
 
-    The same where the bytes are those that were written, and the table is not what receipt and columns say.
+    StoreError that names the file if a byte of it changed, if a column is missing, or if rows or columns are others
+    than the receipt and `columns` say.
     """
-    path, more = run / part.file, f"{_SEE} {shell_word(run)}` names all damage"
+    path, advice = run / part.file, f"{_SEE} {shell_word(run)}` names all damage"
     try:
         content = read_inside(run, part.file, part.bytes + 1)
     except DiskError:
         raise
     except StoreError as error:
-        raise StoreError(f"{error}{more}") from None
+        raise StoreError(f"{error}{advice}") from None
     if problem := content_problem(content, part):
-        raise StoreError(f"{path}: {problem}{more}")
+        raise StoreError(f"{path}: {problem}{advice}")
+    names = None if columns is None else [column.name for column in columns]
     try:
-        table = parquet_table(content, None if columns is None else [column.name for column in columns])
+        table = parquet_table(content, names)
     except ValueError as error:
-        raise StoreError(f"{path}: {error}{more}") from None
+        raise StoreError(f"{path}: {error}{advice}") from None
+    if missing := [name for name in names or () if name not in table.column_names]:
+        named = "; ".join(f'the column "{name}" is missing' for name in missing)
+        raise StoreError(f"{path}: {named}{advice}")
     if table.num_rows != part.rows or not (columns is None or table.schema.equals(arrow_schema(columns))):
-        raise StoreError(f"{path}: is no part of this run, it has other rows or columns{more}")
+        raise StoreError(f"{path}: is no part of this run, it has other rows or columns{advice}")
     return table
 
 

@@ -81,11 +81,11 @@ def same(table):
 NO_PART = "is no part of this run, it has other rows or columns"
 NO_HISTORIES = "its columns are not those of histories"
 FALSE = {
-    "a column less": ("part", without("impact_speed_m_s"), {}, NO_PART),
+    "a column less": ("part", without("impact_speed_m_s"), {}, 'the column "impact_speed_m_s" is missing'),
     "a column twice": ("part", twice("case_id"), {}, NO_PART),
     "a row less": ("part", lambda table: table.slice(1), {}, NO_PART),
     "nominal of no rows": ("nominal", lambda table: table.slice(0, 0), {}, NO_PART),
-    "nominal of other columns": ("nominal", lambda table: pa.table({"a": [1]}), {}, NO_PART),
+    "nominal of other columns": ("nominal", lambda table: pa.table({"a": [1]}), {}, 'the column "case_id" is missing'),
     "histories of no case": ("history", without("case_id"), {}, NO_HISTORIES),
     "histories of more": ("history", lambda t: t.append_column("x_m", t["t_s"]), {}, NO_HISTORIES),
 }
