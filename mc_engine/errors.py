@@ -1,12 +1,12 @@
-"""Everything the engine raises on purpose.
+"""The errors that the engine raises on purpose.
 
 EngineError
-  CampaignError     the campaign file, or a number in it, is wrong; lists every problem, not the first
-  ModelError        the model behind the campaign does not keep its contract
+  CampaignError     the campaign file, or a number in it, is wrong; lists every problem, not only the first
+  ModelError        the model of the campaign breaks its contract
   StoreError        the run directory is damaged, busy, or belongs to another campaign
-    DiskError       the disk refused: full, forbidden or broken; what was committed before is safe
-  RunInterrupted    the run was stopped from outside; what was committed is safe and `resume` completes it
-  WorkersLost       there is nobody to fly cases: workers that cannot be reached, or die whatever they do
+    DiskError       the disk is full, write-protected or broken; committed cases are safe
+  RunInterrupted    the run was stopped; committed cases are safe, and `resume` completes the run
+  WorkersLost       the workers cannot be reached, or die repeatedly
 """
 
 from collections.abc import Sequence
@@ -14,20 +14,20 @@ from dataclasses import dataclass
 
 from mc_engine.text import clean
 
-_LONGEST = 2000  # letters of one sentence
-MOST_SHOWN = 100  # problems of one campaign file; a reader mends the first ones first
+_LONGEST = 2000  # characters of one problem
+MOST_SHOWN = 100  # problems of one campaign file
 
 
 class EngineError(Exception):
     """Base of all errors that the engine raises on purpose; its text is one or more plain sentences."""
 
     def __str__(self) -> str:
-        return clean(super().__str__())  # for those who call the engine from Python, and print it
+        return clean(super().__str__())  # callers in Python may print it to a terminal
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake: where it stands (dotted place in the campaign file) and what to do about it."""
+    """One mistake: its place in the campaign file (dotted keys), and what to do about it."""
 
     place: str
     message: str

@@ -69,10 +69,10 @@ def report(
         if folder != Path(named):
             published[folder] = named
         paths.append(existing_run(folder).path if kind_of(folder) in (RUN, None) else folder)
-    more: dict[str, Any] = {} if template is None else {"template": template, "beside": paths}
+    options: dict[str, Any] = {} if template is None else {"template": template, "beside": paths}
     for path in paths:
-        for written in write_reports(path, ("html", "pdf") if kind is None else (kind,), **more):
-            typer.echo(f"{published[path]}/{written.name}" if path in published else str(written))
+        for file in write_reports(path, ("html", "pdf") if kind is None else (kind,), **options):
+            typer.echo(f"{published[path]}/{file.name}" if path in published else str(file))
         if path in published:
             echo_publication(path, published[path])
 
@@ -131,8 +131,8 @@ def summary(
         if name not in known:
             leave(USAGE, f'--metric "{name}" is no metric of this run; it has {", ".join(known) or "none"}')
     random = store.manifest["campaign"].get("design", "mc") in SAMPLING_DESIGNS
-    for name, found in summaries(store, metric or None).items():
-        typer.echo("\n".join(summary_lines(name, found, store.units[name], random)))
+    for name, statistics in summaries(store, metric or None).items():
+        typer.echo("\n".join(summary_lines(name, statistics, store.units[name], random)))
     if random:
         typer.echo("in brackets: distribution-free limits, each holding with 95 % for independent cases")
 
@@ -147,10 +147,10 @@ def verify(place: RunPlace) -> None:
     folder = run_at(place)
     if kind_of(folder) is None:
         existing_run(folder)
-    found = damages(folder)
-    problems = [one for one in found if one.mended_by != RESUME]
-    for one in found:
-        typer.echo(f"{place}/{one.what}" + f"; {RESUME}" * (one.mended_by == RESUME), err=True)
+    items = damages(folder)
+    problems = [item for item in items if item.mended_by != RESUME]
+    for item in items:
+        typer.echo(f"{place}/{item.what}" + f"; {RESUME}" * (item.mended_by == RESUME), err=True)
     if problems:
         leave(DAMAGED, f"{place}: {counted(problems, 'problem')}; {'; '.join(remedies(place, problems))}")
     typer.echo(f"{place}: every byte is as it was written")
@@ -222,7 +222,7 @@ def _write_oem(store: "Store", names: list[str], path: Path, epoch: str | None, 
 
 
 def _epoch_of(store: "Store") -> str | None:
-    """The campaign's own epoch, where its model has the setting."""
+    """The campaign's epoch, if its model has the setting epoch_utc."""
     records: list[dict[str, Any]] = store.manifest.get("settings", [])
     return next((str(record["value"]) for record in records if record["name"] == "epoch_utc"), None)
 
@@ -237,7 +237,7 @@ def publish(folder: RunFolder, url: Url) -> None:
 
 
 def echo_publication(folder: Path, url: str) -> None:
-    """Publish the run, and say what was sent."""
+    """Publish the run, and print what was sent."""
     from mc_engine.store.object_store import publish
 
     done = publish(folder, url)

@@ -64,15 +64,13 @@ def check(
     from mc_engine.runner.flown_campaign import refuse_undeclared_data
 
     campaign = load_campaign(file)
-    found = breaches(campaign) if model else []
-    if model and not found:
+    problems = breaches(campaign) if model else []
+    if model and not problems:
         refuse_undeclared_data(campaign)
-        found = flight_faults(campaign, file)
-    if found:
-        leave(
-            USAGE,
-            "\n".join([f"{campaign.model_reference}: {counted(found, 'problem')}", *(f"  {one}" for one in found)]),
-        )
+        problems = flight_faults(campaign, file)
+    if problems:
+        heading = f"{campaign.model_reference}: {counted(problems, 'problem')}"
+        leave(USAGE, "\n".join([heading, *(f"  {problem}" for problem in problems)]))
     typer.echo(
         f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}, "
         f"{counted(campaign.dispersions, 'dispersion')}, {counted(campaign.correlations, 'correlation')}, "
@@ -133,7 +131,7 @@ def _plan_share(share: float, confidence: float, failures: Sequence[int], two_si
     from mc_engine.studies.plan import interval_lines, plan_row, table_lines
 
     typer.echo(f"share {share:.10g} with confidence {confidence:.10g}\n")
-    for line in table_lines([plan_row(share, confidence, one) for one in failures], share, confidence):
+    for line in table_lines([plan_row(share, confidence, n_failed) for n_failed in failures], share, confidence):
         typer.echo(line)
     for line in ["", *interval_lines(share, confidence)] if two_sided else []:
         typer.echo(line)

@@ -97,15 +97,17 @@ def run(
     path = out if out is not None else default_folder(campaign.name)
     refuse_occupied_folder(path)
     options = _worker_options(path, workers, backend, scheduler, case_seconds, memory, patience, publish)
-    kept = _kept(path, publish)
+    publisher = _publisher(path, publish)
     if until is None:
         piece = _shard(shard)
-        store = _fly(lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **options), kept)
+        store = _with_progress(
+            lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **options), publisher
+        )
     else:
         from mc_engine.runner.stopping import fly_until_decided, refuse_undecidable
 
         refuse_undecidable(campaign)
-        store = _fly(lambda _, note: fly_until_decided(campaign, path, progress=note, **options), kept)
+        store = _with_progress(lambda _, note: fly_until_decided(campaign, path, progress=note, **options), publisher)
     _finish(store, no_report, judge, max_failed, publish, file)
 
 
@@ -151,15 +153,15 @@ def _refuse_with_shard(shard: str | None, others: dict[str, Any]) -> None:
 
 
 def _refuse_publication(url: str | None) -> None:
-    """A URL where nothing can be listed is told before a long flight."""
+    """End the command if the URL cannot be listed; called before a long flight."""
     if url is not None:
         from mc_engine.store.object_store import refuse_unreachable
 
         refuse_unreachable(url)
 
 
-def _kept(path: Path, url: str | None) -> AbstractContextManager[Any]:
-    """Keeps a copy of the run in `path` up to date at `url`, where there is one to be."""
+def _publisher(path: Path, url: str | None) -> AbstractContextManager[Any]:
+    """Keeps a copy of the run in `path` at `url` up to date, if a URL is given."""
     if url is None:
         return nullcontext()
     from mc_engine.store.object_store import Publisher
@@ -167,15 +169,16 @@ def _kept(path: Path, url: str | None) -> AbstractContextManager[Any]:
     return Publisher(path, url)
 
 
-def _fly(fly: Callable[[Any, Any], "Store"], kept: AbstractContextManager[Any] | None = None) -> "Store":
+def _with_progress(fly: Callable[[Any, Any], "Store"], publisher: AbstractContextManager[Any] | None = None) -> "Store":
+    """What `fly(runner, progress)` returns, with the progress shown and the run published during the flight."""
     from mc_engine.runner import runner
     from mc_engine.runner.progress import Progress
 
-    with Progress() as progress, kept or nullcontext():
+    with Progress() as progress, publisher or nullcontext():
         if not progress.stream.isatty():
             typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
         store = fly(runner, progress)
-    raise_if_signalled()  # a signal after the last case finds nothing more to land
+    raise_if_signalled()  # by a signal after the last case, which has stopped nothing
     return store
 
 
@@ -187,7 +190,7 @@ def _finish(
     url: str | None = None,
     campaign: str | None = None,
 ) -> None:
-    """What every flight ends with: reports, a summary, and an exit status where one was asked for."""
+    """Write the reports, print the summary, and set the exit status that --judge and --max-failed ask for."""
     from mc_engine.runner.summary import case_line, failed_cases, first_not_finite, judgement, look_line, verdict_line
 
     if store.manifest.get("shard"):
@@ -262,9 +265,11 @@ def resume(
     if looks:
         from mc_engine.runner.stopping import carry_on
 
-        store = _fly(lambda _, note: carry_on(folder, progress=note, **options), _kept(folder, publish))
+        store = _with_progress(lambda _, note: carry_on(folder, progress=note, **options), _publisher(folder, publish))
     else:
-        store = _fly(lambda runner, note: runner.resume(folder, progress=note, **options), _kept(folder, publish))
+        store = _with_progress(
+            lambda runner, note: runner.resume(folder, progress=note, **options), _publisher(folder, publish)
+        )
     _finish(store, no_report, url=publish)
 
 
@@ -300,7 +305,9 @@ def extend(
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
         leave(USAGE, f"{folder}: {sentence}")
     options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, publish)
-    store = _fly(lambda runner, note: runner.extend(folder, cases, progress=note, **options), _kept(folder, publish))
+    store = _with_progress(
+        lambda runner, note: runner.extend(folder, cases, progress=note, **options), _publisher(folder, publish)
+    )
     _finish(store, no_report, url=publish)
 
 
@@ -327,7 +334,7 @@ def rerun(
         typer.echo(f"{folder}: no case failed; there is nothing to fly again")
         return
     options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, rerun=True)
-    _finish(_fly(lambda runner, progress: runner.rerun(folder, progress=progress, **options)), no_report)
+    _finish(_with_progress(lambda runner, progress: runner.rerun(folder, progress=progress, **options)), no_report)
 
 
 @app.command()
@@ -348,11 +355,13 @@ def merge(
         existing_run(shard)
     refuse_occupied_folder(out)
     advise(lambda: after_flight(out))
-    store = _fly(lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk))
+    store = _with_progress(
+        lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk)
+    )
     _finish(store, no_report)
 
 
-# so that -1 is told to be no case, and not no option
+# then the message for -1 is that it is no case, instead of no option
 @app.command(context_settings={"ignore_unknown_options": True})
 @exit_status()
 def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:

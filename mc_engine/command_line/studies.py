@@ -87,10 +87,10 @@ def tune(
 
 
 def _requirements_beginning(ctx: typer.Context, incomplete: str) -> list[str]:
-    """What the shell offers for a requirement: those of the campaign that stands on the line already."""
+    """Shell completion of a requirement: those of the campaign that is given before it."""
     from mc_engine.campaign.search import requirement_names
 
-    # an option that still lacks its word leaves the argument before it unread
+    # while the option has no value, typer has not parsed the argument before it
     file = ctx.params.get("file") or next(iter(ctx.args), "")
     return [name for name in requirement_names(file) if name.startswith(incomplete)]
 
@@ -127,37 +127,37 @@ def rare(
     if method not in METHODS:
         leave(USAGE, f'--method "{method}" is not known; {" or ".join(METHODS)}')
     campaign = load_campaign(file, seed=seed)
-    _refuse_to_choose(campaign.requirements, requirement)
+    _refuse_ambiguity(campaign.requirements, requirement)
     chosen_requirement(campaign, requirement)
     refuse_unmappable(campaign)
     path = out if out is not None else default_folder(f"{campaign.name}-rare")
     refuse_occupied_folder(path)
     advise(lambda: after_search(path, "rare.json", "the estimate is"))
     typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
-    found = estimate_rare_event(
+    estimate = estimate_rare_event(
         campaign,
         requirement,
         path,
         method=method,
         cases_per_level=cases_per_level,
         workers=workers,
-        progress=_Teller(),
+        progress=_ProgressLines(),
     )
     raise_if_signalled()
-    for line in (f"rare event   {path}", *outcome_lines(found.result)):
+    for line in (f"rare event   {path}", *outcome_lines(estimate.result)):
         typer.echo(line)
     for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
         typer.echo(f"report       {report_path}")
 
 
-def _refuse_to_choose(requirements: Sequence["Requirement"], name: str | None) -> None:
+def _refuse_ambiguity(requirements: Sequence["Requirement"], name: str | None) -> None:
     if name is None and len(requirements) > 1:
-        names = ", ".join(one.name for one in requirements)
+        names = ", ".join(requirement.name for requirement in requirements)
         leave(USAGE, f"--requirement is missing: the campaign has several; choose one of {names}")
 
 
-class _Teller:
-    """A line now and then: how many levels there will be is not known, so there is no remaining time."""
+class _ProgressLines:
+    """Prints a line every few seconds.  The number of levels is unknown, and so is the remaining time."""
 
     def __init__(self) -> None:
         self._last = time.monotonic()
@@ -200,14 +200,13 @@ def compare(
     from mc_engine.studies.comparison import compare_runs
     from mc_engine.studies.comparison_lines import comparison_lines
 
-    found = compare_runs(a, b, (before, after), alpha=alpha, tolerance=tolerance)
-    for line in comparison_lines(found):
+    comparison = compare_runs(a, b, (before, after), alpha=alpha, tolerance=tolerance)
+    for line in comparison_lines(comparison):
         typer.echo(line)
     for path in report or []:
-        # As for the reports of a run: imported only where they are asked for.
-        importlib.import_module("reports.compare").write_comparison(found, path, (a, b))
+        importlib.import_module("reports.compare").write_comparison(comparison, path, (a, b))
         typer.echo(str(path))
-    if found.changed:
+    if comparison.changed:
         raise typer.Exit(CHANGED)
 
 

@@ -1,7 +1,7 @@
-"""Flying campaigns into stores: run, resume, extend, rerun, replay.
+"""Running of campaigns: run, resume, extend, rerun, merge, replay.
 
-A chunk is drawn, flown and written by one worker, and counted by the calling process alone.  What a case comes to
-depends on (campaign, sources, seed, case_id): chunks, workers and backends are bookkeeping.
+A worker draws, flies and writes a chunk of cases; the calling process commits it.  The result of a case depends only on
+campaign, sources, seed and case_id, and not on chunks, workers or backend.
 """
 
 import re
@@ -41,9 +41,10 @@ THREADS = Backend()
 
 @dataclass(frozen=True)
 class Replay:
-    """One case flown again.  `differences` names each stored number that came out with other bits.
+    """One case flown again.  differences : each stored number that is not reproduced to the bit; `equal` if none.
 
-    lost : what made the state or a metric not finite: file, line and values; empty where all are.
+    history, row : the case's time history, and its stored row.
+    lost : the place in the model where the state or a metric became not finite, with values; empty if all are finite.
     """
 
     equal: bool
@@ -63,14 +64,14 @@ def run(
     backend: Backend | str = THREADS,
     shard: Shard | None = None,
 ) -> Store:
-    """Fly a campaign into the new directory `out` (default: runs/<campaign>-<time>).
+    """Run a campaign and store every case in the new directory `out` (by default runs/<campaign>-<time>).
 
-    workers : threads or processes, all cores by default.  chunk : cases that a worker flies at a time.
-    backend : who flies, see `mc_engine.runner.pools`.  shard : only these cases; `mc_engine.runner.shards.merge` joins
-    shards.
-    A campaign that takes inputs from one that has yet to be flown has it flown first, beside `out`.
-    Raises StoreError if `out` is occupied or a URL, RunInterrupted on Ctrl-C; the store then holds whole chunks, and
-    `resume` completes it.
+    workers : number of threads or processes, by default one per core.  chunk : cases that a worker flies at a time.
+    backend : a Backend or its name, "threading", "loky" or "dask".  shard : only its cases; `merge` joins the shards.
+    progress : called with the cases done, in all and failed.
+    If the campaign takes inputs from a run that does not exist yet, that run is made first, next to `out`.
+    Returns the complete Store.  Raises CampaignError or ModelError (invalid campaign or model), StoreError (`out` is
+    occupied or a URL), RunInterrupted (Ctrl-C or a full disk; complete chunks are kept, and `resume` continues).
     """
     if out is not None and is_url(out):
         raise StoreError(f"{out}: is a URL; fly into a folder, and give that and the URL to object_store.publish")
@@ -87,7 +88,7 @@ def run(
 
 
 def _after_first(campaign: Campaign, path: Path, session: Session) -> Campaign:
-    """The campaign with the run that it takes inputs from, flown or completed beside `path` where it is not there."""
+    """The campaign with its upstream run, which is first made or completed next to `path` if necessary."""
     if campaign.first is None:
         return campaign
     name = re.sub(r"[^\w.-]+", "-", campaign.first.name)
@@ -127,7 +128,7 @@ def resume(
 ) -> Store:
     """Complete the run in `path`; StoreError if the sources have changed since it began.
 
-    repair : what is damaged is flown again, see `mc_engine.store.repair`.
+    repair : fly damaged parts again, see `mc_engine.store.repair`.  All other arguments as for `run`.
     """
     if repair:
         mend_journal(Path(path))
@@ -144,14 +145,15 @@ def extend(
     chunk: int | None = None,
     backend: Backend | str = THREADS,
 ) -> Store:
-    """Give the run in `path` as many cases in all; the cases are those of a longer campaign.
+    """Extend the run in `path` to `cases` cases; they are the same as in a run that began with so many.
 
-    StoreError if the design cannot grow or has as many cases already, CampaignError if its blocks do not fit so many.
+    StoreError if the design cannot be extended or has as many cases already; CampaignError if the number is no whole
+    number of the design's blocks.  All other arguments as for `run`.
     """
     store = open_store(path)
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
         raise StoreError(f"{path}: {sentence}")
-    campaign = campaign_of(store)  # refuses changed sources before anything is written
+    campaign = campaign_of(store)  # first of all, since it refuses changed sources
     if sentence := block_problem(campaign.design, len(campaign.dispersions), cases):
         raise CampaignError(campaign.name, [Problem("cases", sentence)])
     store.note("extended", cases=cases)
@@ -165,9 +167,9 @@ def rerun(
     workers: int | None = None,
     backend: Backend | str = THREADS,
 ) -> Store:
-    """Fly the cases of a complete run again that did not complete, as after their worker died.
+    """Fly the failed cases of a complete run again, for example after their worker was killed.
 
-    All other rows stay.  A case that failed by its own physics fails again, with the same bits.
+    All other rows stay.  A case that failed because of its physics fails again, with the same bits.
     """
     store = open_store(path)
     return fly_failed(store, campaign_of(store), session_of(progress, workers, None, backend))
@@ -181,17 +183,20 @@ def merge(
     workers: int | None = None,
     chunk: int | None = None,
 ) -> Store:
-    """Make the run directory `out` of the run directories of all shards; see `mc_engine.runner.shards`."""
+    """Join the run directories of all shards of a campaign in the new run directory `out`.
+
+    StoreError if cases are missing, or if the shards are not of one campaign; see `mc_engine.runner.shards`.
+    """
     store, campaign = merge_shards(Path(out), [Path(shard) for shard in shards], chunk)
     return complete(store, campaign, session_of(progress, workers, chunk, THREADS))
 
 
 def replay(path: str | Path, case_id: int) -> Replay:
-    """Fly one case of a run alone, through the plain float64 build, and compare every stored number bit for bit."""
+    """Fly one case of a run alone, by the scalar kernel, and compare every stored number bit for bit."""
     store = open_store(path)
     campaign = campaign_of(store)
     table = case_table(campaign, np.array([case_id]))
-    inputs = full_inputs(campaign, _scalars(table))
+    inputs = full_inputs(campaign, {name: column[0] for name, column in table.items()})
     flown = campaign.model, inputs, int(noise_ids(campaign, np.array([case_id]))[0]), campaign.seed
     flight, history = fly_history(*flown, folder=campaign.directory, width=1)
     name_upstream(campaign, np.array([case_id]), flight)
@@ -210,7 +215,3 @@ def _same_bits(stored: Any, value: Any) -> bool:
     if isinstance(value, float | np.floating):
         return np.float64(stored).tobytes() == np.float64(value).tobytes()
     return bool(stored == value)
-
-
-def _scalars(table: dict[str, np.ndarray]) -> dict[str, Any]:
-    return {name: column[0] for name, column in table.items()}

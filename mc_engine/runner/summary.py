@@ -1,4 +1,4 @@
-"""What a run amounts to, in a few lines for a terminal.  The reports say the rest."""
+"""Summary of a run in a few lines for a terminal: cases, verdicts on requirements, statistics of metrics."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -20,12 +20,12 @@ PARTS_AHEAD = 2
 
 
 def failed_cases(store: Store) -> int:
-    """How many committed cases did not complete."""
+    """Number of committed cases that did not complete."""
     return sum(count for word, count in store.status_counts().items() if word != STATUS_NAME[OK])
 
 
 def first_not_finite(store: Store) -> int | None:
-    """The first committed case that ended not-finite, if one did."""
+    """The first committed case with the status not-finite, or None."""
     for part in store.parts:
         if part.status.get(STATUS_NAME[NOT_FINITE]):
             table = read_part(store.path, part, CASE_COLUMNS[:2])
@@ -47,15 +47,17 @@ def verdicts(store: Store) -> "list[Verdict]":
 
 
 def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":
-    """The verdicts on all requirements of the run, and the joint one where there are several."""
+    """The verdicts on all requirements of the run, and the joint verdict if there are several."""
     requirements = store.manifest.get("requirements", [])
+    if not requirements:
+        return [], None
     metrics = list(dict.fromkeys(str(record["metric"]) for record in requirements))
-    found = streamed(store, metrics, requirements) if requirements else None
-    return ([], None) if found is None else (found.verdicts, found.joint)
+    statistics = streamed(store, metrics, requirements)
+    return statistics.verdicts, statistics.joint
 
 
 def look_line(store: Store) -> str:
-    """How the number of cases came about, where it was not fixed in advance; else empty."""
+    """How the number of cases was determined, if it was not fixed in advance; else empty."""
     from mc_engine.statistics import was_looked_at
 
     if not was_looked_at(store.manifest, store.n_cases):
@@ -85,9 +87,9 @@ def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
 
 
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":
-    """Summary of every metric, or of those named.
+    """Summary of every metric, or of those named; StoreError for a name that is no metric.
 
-    StoreError for a name that is no column.  A failed case has no number, whatever stands in its row.
+    A failed case has no value, whatever its row contains.
     """
     known = [column.name for column in store.columns if column.role == "metric"]
     names = known if metrics is None else list(metrics)
@@ -105,16 +107,16 @@ def streamed(
     probabilities: tuple[float, ...] | None = None,
     confidence: float = 0.90,
 ) -> "Streamed":
-    """Summaries and verdicts of a run of any size: it is read part by part, never whole.
+    """Summaries and verdicts of a run of any size, which is read part by part.
 
-    passes : gives the parts a pass; by default `metric_parts`.
+    passes : yields the metrics of each part, once for each pass; by default from `metric_parts`.
     """
     from mc_engine.statistics import was_looked_at
     from mc_engine.statistics.order_statistics import QUANTILES
     from mc_engine.statistics.streaming import stream
 
     return stream(
-        passes or (lambda names: (found for _, found in metric_parts(store, names))),
+        passes or (lambda names: (numbers for _, numbers in metric_parts(store, names))),
         metrics,
         requirements=requirements,
         design=store.manifest["campaign"].get("design", "mc"),
@@ -125,13 +127,13 @@ def streamed(
 
 
 def metric_parts(
-    store: Store, metrics: Sequence[str], more: Sequence[str] = ()
+    store: Store, metrics: Sequence[str], others: Sequence[str] = ()
 ) -> "Iterator[tuple[pa.Table, dict[str, np.ndarray]]]":
-    """All parts in order: a table of the columns named, and the metrics, NaN for cases that were not completed.
+    """All parts in order: a table with these columns, and the metrics, NaN for cases that did not complete.
 
-    While one part is in use, the next is read.
+    others : columns of the table besides the metrics and the status.  The next part is read in the background.
     """
-    columns = [column for column in store.columns if column.name in ("status", *metrics, *more)]
+    columns = [column for column in store.columns if column.name in ("status", *metrics, *others)]
     with ThreadPoolExecutor(1) as pool:
         ahead: list[Future[tuple[pa.Table, dict[str, np.ndarray]]]] = []
         for part in store.parts:
@@ -148,10 +150,10 @@ def _metrics_of(
     import numpy as np
     import pyarrow.compute as pc
 
-    whole = part.status == {STATUS_NAME[OK]: part.rows}  # the receipt says that no case failed: no word is read
-    table = read_part(store.path, part, [one for one in columns if not whole or one.name != "status"])
+    all_ok = part.status == {STATUS_NAME[OK]: part.rows}  # by the receipt, so that the status need not be read
+    table = read_part(store.path, part, [column for column in columns if not all_ok or column.name != "status"])
     numbers = {name: table[name].to_numpy().astype(np.float64, copy=False) for name in metrics}
-    if whole:
+    if all_ok:
         return table, numbers
     ok = pc.equal(table["status"], STATUS_NAME[OK]).to_numpy()
     return table, {name: np.where(ok, values, np.nan) for name, values in numbers.items()}

@@ -1,4 +1,4 @@
-"""Opening a run for reading, wherever it lies."""
+"""Opening of a run, in a directory or on an object store."""
 
 from pathlib import Path
 
@@ -7,5 +7,8 @@ from mc_engine.store.store import Store
 
 
 def open_store(path: str | Path) -> Store:
-    """The run in directory `path`, or a copy of the one at that URL, for reading; writing methods take the lock."""
+    """The run in the directory `path`, or a local copy of the run at that URL.
+
+    Reading takes no lock; the methods of the Store that write take the writer lock.  StoreError if it is no run.
+    """
     return Store(local_copy(path))

@@ -255,7 +255,7 @@ def test_verify_names_every_file_among_the_parts_that_does_not_count(run, name):
 def test_verify_names_a_nominal_case_whose_line_is_gone(run):
     content = (run / "journal.jsonl").read_bytes()
     written(run, [entry for entry in scan(content).entries if entry.event != "nominal"])
-    assert damage(run) == ["nominal.parquet: has no line in the journal and does not count"]
+    assert damage(run) == ["nominal.parquet: has no line in the journal and is not part of the run"]
 
 
 def test_every_cut_of_the_journal_between_two_lines_is_noticed(run):

@@ -194,7 +194,7 @@ def test_a_run_cut_short_while_it_was_made_is_begun_anew_in_the_same_folder(reco
     assert {"manifest.json", "campaign.toml"} < {path.name for path in after.iterdir()}
     done = engine("resume", after)
     assert done.returncode == 5
-    assert "has no journal.jsonl, and so no case that counts; `run` the campaign anew" in done.stderr
+    assert "has no journal.jsonl, and so no committed case; `run` the campaign anew" in done.stderr
     done = engine("run", campaign.directory, "--out", after, "--no-report")
     assert done.returncode == 0, done.stderr
     assert damage(after) == []

@@ -45,7 +45,7 @@ def test_what_a_kill_leaves_is_told_and_is_no_damage(killed, name):
 def test_a_part_without_a_line_is_damage_where_no_writer_was_killed(killed):
     (killed.path / ".lock").write_bytes(b"")
     leave(killed, STRAY)
-    assert damage(killed.path) == [f"{STRAY}: has no line in the journal and does not count"]
+    assert damage(killed.path) == [f"{STRAY}: has no line in the journal and is not part of the run"]
     assert call("verify", killed.path).exit_code == 5
 
 
@@ -60,4 +60,4 @@ def test_a_part_whose_line_is_damaged_is_damage_also_after_a_kill(killed):
     done = call("verify", killed.path)
     assert done.exit_code == 5
     assert f"journal.jsonl, line {len(lines) - 1}: damaged" in done.stderr
-    assert f"{STRAY}: has no line in the journal and does not count" in done.stderr
+    assert f"{STRAY}: has no line in the journal and is not part of the run" in done.stderr
