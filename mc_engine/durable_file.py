@@ -38,7 +38,7 @@ _HOLDS_FOLDERS = os.open in os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")  # 
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
+def disk_errors(path: Path) -> Iterator[None]:
     """Turn an OSError of the block into a DiskError whose text begins with `path`.
 
     If the file is missing or is a symbolic link, it becomes a StoreError, since the disk is not the cause.
@@ -98,7 +98,7 @@ def _parent(root: Path, name: str, shown: str | None = None, make: bool = False)
         *folders, last = inner_names(name)
     except ValueError as error:
         raise StoreError(f"{path}: {error}") from None
-    with naming(path), _held(root, folders, make) as folder:
+    with disk_errors(path), _held(root, folders, make) as folder:
         yield folder, last
 
 
@@ -271,7 +271,7 @@ def sync_file(root: Path, name: str) -> None:
 def make_folder(path: Path) -> None:
     """Create the folder `path`, as the user named it, with its parents, and sync the names that are new."""
     new = [folder for folder in (path, *path.parents) if not folder.exists()]
-    with naming(path):
+    with disk_errors(path):
         path.mkdir(parents=True, exist_ok=True)
     for folder in new:
         sync_folder(folder.parent)
@@ -285,7 +285,7 @@ def make_way(root: Path, name: str) -> None:
 
 def sync_folder(path: Path) -> None:
     """Make the names in the folder `path`, as the user named it, durable."""
-    with naming(path), _held(path) as folder:
+    with disk_errors(path), _held(path) as folder:
         _sync_names(folder)
 
 

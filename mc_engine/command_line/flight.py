@@ -191,7 +191,14 @@ def _finish(
     campaign: str | None = None,
 ) -> None:
     """Write the reports, print the summary, and set the exit status that --judge and --max-failed ask for."""
-    from mc_engine.runner.summary import case_line, failed_cases, first_not_finite, judgement, look_line, verdict_line
+    from mc_engine.runner.summary import (
+        analyses_line,
+        case_line,
+        failed_cases,
+        first_not_finite,
+        judgement,
+        verdict_line,
+    )
 
     if store.manifest.get("shard"):
         if url is not None:
@@ -201,8 +208,8 @@ def _finish(
     reports = [] if no_report else write_reports(store.path, ("html", "pdf"))
     typer.echo(f"run          {store.path}")
     typer.echo(f"cases        {case_line(store)}")
-    if looks := look_line(store):
-        typer.echo(f"looks        {looks}")
+    if analyses := analyses_line(store):
+        typer.echo(f"analyses     {analyses}")
     judged, joint = judgement(store)
     for verdict in (*judged, joint) if joint is not None else judged:
         typer.echo(f"requirement  {verdict_line(verdict, store.units)}")

@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
@@ -38,10 +38,10 @@ from mc_engine.store.store import Store, create_store
 class Session:
     """How to fly.  workers : threads or processes, by default one per core.  chunk : cases of a task, and of a part."""
 
-    progress: ProgressCall | None = None
-    workers: int = field(default_factory=lambda: os.cpu_count() or 1)
-    chunk: int | None = None
-    backend: Backend = field(default_factory=Backend)
+    progress: ProgressCall | None
+    workers: int
+    chunk: int | None
+    backend: Backend
 
 
 def session_of(
@@ -76,7 +76,7 @@ def _fly_missing(store: Store, campaign: Campaign, session: Session, repair: boo
         raise _interrupted(store)
     flown = time.perf_counter()
     _fly_histories(store, campaign, session, stop.is_set)
-    if campaign.sensitivity is not None and campaign.design != PICK_FREEZE and len(store.wanted) == store.n_cases:
+    if campaign.sensitivity is not None and campaign.design != PICK_FREEZE and len(store.expected) == store.n_cases:
         _fly_companion(store, campaign, session, repair, stop)
         if not store.notes("companion"):
             store.note("companion")
@@ -145,7 +145,7 @@ def _run_tasks(
     """Run the tasks in a worker pool, commit each part that is written, and report the progress."""
     counts = store.status_counts()
     done, failed = sum(counts.values()), _failed(counts)
-    total = len(store.wanted)
+    total = len(store.expected)
     report = session.progress or (lambda *_: None)
     report(done, total, failed)
     if not tasks or stopped():
@@ -174,14 +174,14 @@ def _failed(status: dict[str, int]) -> int:
 
 
 def _interrupted(store: Store) -> RunInterrupted:
-    done, total = sum(store.status_counts().values()), len(store.wanted)
+    done, total = sum(store.status_counts().values()), len(store.expected)
     store.note("interrupted", cases=done)
     return RunInterrupted(f"interrupted with {done:,} of {total:,} cases;")
 
 
 def _fly_histories(store: Store, campaign: Campaign, session: Session, stopped: Callable[[], bool]) -> None:
     """Fly the saved time histories.  A shard has none: the worst cases are known once all shards are merged."""
-    whole = len(store.wanted) == store.n_cases
+    whole = len(store.expected) == store.n_cases
     if whole and not write_histories(store, campaign, session.workers, stopped):
         raise _interrupted(store)
 
@@ -223,7 +223,7 @@ def _fly_nominal_if_needed(store: Store, campaign: Campaign, flying: bool) -> No
 def _missing_tasks(store: Store, session: Session) -> tuple[list[Task], int]:
     """Tasks for the missing cases, and the number of cases of a part."""
     missing = store.missing()
-    end = store.wanted.stop
+    end = store.expected.stop
     along = stretches(store.notes(), min(end, store.manifest["campaign"]["cases"]), end)
     cases = sum(stop - first for first, stop in missing)
     size = session.chunk or along[-1].chunk or chunk_size(cases, session.workers)

@@ -127,15 +127,15 @@ def _check_nothing_missing(stores: Sequence[Store]) -> None:
     if not missing:
         return
     commands = {store.path: f"mc-engine resume {shell_word(store.path)}" for store in stores if store.missing()}
-    unfinished = [_within(missing, store.wanted) for store in stores if store.missing()]
+    unfinished = [_within(missing, store.expected) for store in stores if store.missing()]
     lines = [f"`{command}`" for command, there in zip(commands.values(), unfinished, strict=True) if there]
     lines += _commands_of_absent(stores, missing)
     cases = ", ".join(f"{first} to {stop - 1}" for first, stop in missing)
     raise StoreError(f"cases {cases} are missing; fly them with " + ", ".join(lines))
 
 
-def _within(missing: Sequence[tuple[int, int]], wanted: range) -> bool:
-    return any(first < wanted.stop and wanted.start < stop for first, stop in missing)
+def _within(missing: Sequence[tuple[int, int]], expected: range) -> bool:
+    return any(first < expected.stop and expected.start < stop for first, stop in missing)
 
 
 def _commands_of_absent(stores: Sequence[Store], missing: Sequence[tuple[int, int]]) -> list[str]:

@@ -6,10 +6,8 @@ neither early stopping nor extension reduces the confidence.  Only for the desig
 independent cases.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import CampaignError, Problem
@@ -42,7 +40,7 @@ def fly_until_decided(
     looks = schedule(campaign)
     begun = replace(campaign, cases=looks[0], looks=looks)
     store = runner.run(begun, out, progress=progress, workers=workers, backend=backend)
-    return _by_looks(store, progress, workers, backend)
+    return _by_schedule(store, progress, workers, backend)
 
 
 def carry_on(
@@ -55,12 +53,12 @@ def carry_on(
 ) -> Store:
     """Complete a run: one by `fly_until_decided` until its requirements are decided, others to their last case."""
     store = runner.resume(path, progress=progress, workers=workers, backend=backend, repair=repair)
-    return _by_looks(store, progress, workers, backend)
+    return _by_schedule(store, progress, workers, backend)
 
 
-def _by_looks(store: Store, progress: ProgressCall | None, workers: int | None, backend: Backend | str) -> Store:
+def _by_schedule(store: Store, progress: ProgressCall | None, workers: int | None, backend: Backend | str) -> Store:
     while not decided(store):
-        later = [look for look in looks_of(store.manifest) if look > store.n_cases]
+        later = [int(look) for look in store.manifest.get("looks", []) if look > store.n_cases]
         if not later:
             break
         runner.extend(store.path, later[0], progress=progress, workers=workers, backend=backend)
@@ -97,11 +95,6 @@ def schedule(campaign: Campaign) -> tuple[int, ...]:
         looks.add(look)
         look = int(look * GROWTH)
     return tuple(sorted(look for look in looks if look <= most))
-
-
-def looks_of(manifest: Mapping[str, Any]) -> list[int]:
-    """The schedule of a run; empty if it has no interim analyses."""
-    return [int(look) for look in manifest.get("looks", [])]
 
 
 def decided(store: Store) -> bool:

@@ -41,11 +41,6 @@ def case_line(store: Store) -> str:
     return f"{sum(counts.values()):,} of {store.n_cases:,} cases" + (f": {words}" if words else "")
 
 
-def verdicts(store: Store) -> "list[Verdict]":
-    """Every requirement of the run, judged on the cases at hand."""
-    return judgement(store)[0]
-
-
 def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     """The verdicts on all requirements of the run, and the joint verdict if there are several."""
     requirements = store.manifest.get("requirements", [])
@@ -56,7 +51,7 @@ def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     return statistics.verdicts, statistics.joint
 
 
-def look_line(store: Store) -> str:
+def analyses_line(store: Store) -> str:
     """How the number of cases was determined, if it was not fixed in advance; else empty."""
     from mc_engine.statistics import was_looked_at
 
@@ -66,24 +61,24 @@ def look_line(store: Store) -> str:
     begun = store.manifest["campaign"]["cases"]
     if looks:
         scheduled = sum(look <= store.n_cases for look in looks)
-        times = "once" if scheduled == 1 else f"{scheduled} times"
-        story = f"judged {times} on the way, at {store.n_cases:,} cases last, of at most {looks[-1]:,}"
+        analyses = f"{scheduled} interim {'analysis' if scheduled == 1 else 'analyses'}"
+        history = f"{analyses}, the last at {store.n_cases:,} of at most {looks[-1]:,} cases"
     else:
-        story = f"extended from {begun:,} to {store.n_cases:,} cases"
-    return f"{story}; the verdicts hold at every number of cases at once"
+        history = f"extended from {begun:,} to {store.n_cases:,} cases"
+    return f"{history}; the verdicts hold at every number of cases at once"
 
 
 def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
-    """Such as "fuel: pass, propellant_kg ≤ 2.5 kg in 9,998 of 10,000 cases (wanted 99.73 % with 90 % confidence)"."""
+    """Such as "fuel: pass, mass_kg ≤ 2.5 kg in 9,998 of 10,000 cases (required: 99.73 % with 90 % confidence)"."""
     limits = [
         f"{sign} {limit:g} {units.get(verdict.metric, '')}".rstrip()
         for sign, limit in (("≤", verdict.at_most), ("≥", verdict.at_least))
         if limit is not None
     ]
-    wanted = f"wanted {100 * verdict.share:.6g} % with {100 * verdict.confidence:.6g} % confidence"
+    required = f"required: {100 * verdict.share:.6g} % with {100 * verdict.confidence:.6g} % confidence"
     inside = f"in {verdict.passed:,} of {verdict.tried:,} cases"
-    asked = f"{verdict.metric} {' and '.join(limits)}" if limits else "every limit kept"
-    return f"{verdict.name}: {verdict.outcome}, {asked} {inside} ({wanted})"
+    asked = f"{verdict.metric} {' and '.join(limits)}" if limits else "all limits met"
+    return f"{verdict.name}: {verdict.outcome}, {asked} {inside} ({required})"
 
 
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":

@@ -41,7 +41,7 @@ def count_finished(store: "Store") -> None:
     """Commit the complete parts that a killed writer left unrecorded.  The caller holds the lock."""
     for written in finished_parts(store.path):
         cases = (written.part.first, written.part.stop)
-        if store.missing(range(*cases)) == [cases] and cases[1] <= store.wanted.stop:
+        if store.missing(range(*cases)) == [cases] and cases[1] <= store.expected.stop:
             store.publish(written)
 
 

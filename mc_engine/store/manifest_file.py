@@ -253,7 +253,7 @@ def cases_in(manifest: dict[str, Any], n_cases: int) -> range:
 
 
 def columns_in(manifest: Mapping[str, Any]) -> tuple[Column, ...]:
-    """Columns of the case table, from a manifest that `parse_manifest` has checked."""
+    """Columns of a table, from a checked record with the member "columns", such as a manifest."""
     known = Column.__dataclass_fields__
     return tuple(
         Column(**{key: value for key, value in record.items() if key in known}) for record in manifest["columns"]

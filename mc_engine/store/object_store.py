@@ -22,7 +22,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Self
 
-from mc_engine.durable_file import is_temporary, make_folder, naming, read_file, sync_folder, write_durably
+from mc_engine.durable_file import disk_errors, is_temporary, make_folder, read_file, sync_folder, write_durably
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.extras import how_to_install
 from mc_engine.shell_words import shell_word
@@ -99,7 +99,7 @@ def fetch(url: str, folder: Path) -> Path:
         raise StoreError(f"{folder}: is not empty; choose another folder")
     with _scratch(folder) as scratch:
         _copy(url, scratch)
-        with naming(folder):
+        with disk_errors(folder):
             if folder.exists():
                 folder.rmdir()
             os.replace(scratch, folder)
@@ -112,7 +112,7 @@ def _scratch(folder: Path) -> Iterator[Path]:
     """A temporary folder next to `folder`; those that killed processes left there are removed."""
     prefix, suffix = f".{folder.name}.", ".tmp"
     make_folder(folder.parent)
-    with naming(folder):
+    with disk_errors(folder):
         others = [path for path in folder.parent.iterdir() if path.name.startswith(prefix) and path.suffix == suffix]
         own = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=folder.parent))
     for other in others:

@@ -176,12 +176,6 @@ def revised_name(file: str) -> str:
     return f"{stem}.r{int(revision or 0) + 1}.parquet"
 
 
-def write_part(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> Part:
-    """Write one range of cases durably into `run`/cases; it is committed once its receipt is in the journal."""
-    table = _part_table(run, columns, first, count, arrays)
-    return write_table(run, f"cases/{part_name(first, count)}", table, first, _status_counts(table))
-
-
 def write_aside(
     run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any], file: str | None = None
 ) -> Written:
@@ -195,10 +189,10 @@ def write_aside(
     table = _part_table(run, columns, first, count, arrays)
     content = parquet_bytes(table)
     file = file or f"cases/{part_name(first, count)}"
-    digest = sha256(content).hexdigest()
+    digest, status = sha256(content).hexdigest(), dict(sorted(Counter(table.column("status").to_pylist()).items()))
     temporary = temporary_name(f"{file}.{uuid.uuid4().hex[:8]}.{digest[:32]}")
     write_synced(run, temporary, content, file)
-    return Written(Part(file, first, count, len(content), digest, _status_counts(table)), temporary)
+    return Written(Part(file, first, count, len(content), digest, status), temporary)
 
 
 def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> pa.Table:
@@ -210,15 +204,11 @@ def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, ar
     return arrow_table(columns, {**arrays, "case_id": case_ids}, count, run)
 
 
-def _status_counts(table: pa.Table) -> dict[str, int]:
-    return dict(sorted(Counter(table.column("status").to_pylist()).items()))
-
-
-def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: dict[str, int] | None = None) -> Part:
-    """Write any table durably as `run`/`file`."""
+def write_table(run: Path, file: str, table: pa.Table, first: int = 0) -> Part:
+    """Write the table of the nominal case or of time histories durably as `run`/`file`."""
     content = parquet_bytes(table)
     write_inside(run, file, content)
-    return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), status or {})
+    return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), {})
 
 
 def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) -> pa.Table:

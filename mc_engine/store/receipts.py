@@ -160,21 +160,21 @@ class Receipts:
                 merged.append((part.first, part.stop))
         return merged
 
-    def missing(self, wanted: range) -> list[Range]:
-        """The ranges among the wanted cases that are not committed."""
-        return gaps(self.committed(), wanted)
+    def missing(self, expected: range) -> list[Range]:
+        """The ranges among the expected cases that are not committed."""
+        return gaps(self.committed(), expected)
 
     def all_parts(self) -> list[Part]:
         """Receipts of all committed files: parts of cases, nominal case, histories."""
         return [*self.parts, *(part for part in (self.nominal, self.histories) if part is not None)]
 
 
-def gaps(ranges: Iterable[Range], wanted: range) -> list[Range]:
-    """The ranges of wanted cases that are in none of `ranges`, which may overlap."""
-    between, begin = [], wanted.start
-    for first, stop in [*sorted(ranges), (wanted.stop, wanted.stop)]:
-        if min(first, wanted.stop) > begin:
-            between.append((begin, min(first, wanted.stop)))
+def gaps(ranges: Iterable[Range], expected: range) -> list[Range]:
+    """The ranges of expected cases that are in none of `ranges`, which may overlap."""
+    between, begin = [], expected.start
+    for first, stop in [*sorted(ranges), (expected.stop, expected.stop)]:
+        if min(first, expected.stop) > begin:
+            between.append((begin, min(first, expected.stop)))
         begin = max(begin, stop)
     return between
 

@@ -19,6 +19,7 @@ from mc_engine.durable_file import make_folder
 from mc_engine.errors import StoreError
 from mc_engine.store.counted_files import CountedFiles
 from mc_engine.store.journal import plain
+from mc_engine.store.manifest_file import columns_in
 from mc_engine.store.parts import Column, arrow_schema, arrow_table, attributes, parquet_bytes, parquet_table
 from mc_engine.store.result_records import FORMAT, TABLES, parse_result
 from mc_engine.store.run_files import JOURNAL, RARE_EVENT, STEMS, TUNING, kind_of
@@ -74,9 +75,7 @@ def read_result(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, pd.Dat
 
 
 def _result_table(path: Path, name: str, contents: Mapping[str, bytes], record: Mapping[str, Any]) -> pd.DataFrame:
-    known = Column.__dataclass_fields__
-    listed = record["tables"][name]["columns"]
-    columns = [Column(**{key: value for key, value in column.items() if key in known}) for column in listed]
+    columns = columns_in(record["tables"][name])
     try:
         table = parquet_table(contents[f"{name}.parquet"])
         if not table.schema.equals(arrow_schema(columns)):

@@ -77,7 +77,7 @@ def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
     companions : names of files that an interrupted attempt may have left there.
     """
     expected = _OURS_BEFORE_THE_JOURNAL | {Path(name).parts[0] for name in companions}
-    with disk.naming(path):
+    with disk.disk_errors(path):
         names = {entry.name for entry in path.iterdir()} if path.exists() else set()
     if JOURNAL in names and is_run_directory(path):
         raise StoreError(f"{path}: holds a run already; `resume` or `extend` it, or choose another folder")
@@ -167,7 +167,7 @@ class Store:
         return int(self._counted.cases or self.manifest["campaign"]["cases"])
 
     @property
-    def wanted(self) -> range:
+    def expected(self) -> range:
         """The cases that this directory holds when it is complete: all cases, or those of its shard."""
         return cases_in(self.manifest, self.n_cases)
 
@@ -176,9 +176,9 @@ class Store:
         return self._counted.committed()
 
     def missing(self, cases: int | range | None = None) -> list[Range]:
-        """The ranges that are not committed among `cases`: a number of first cases, a range, or None for `wanted`."""
-        wanted = self.wanted if cases is None else cases if isinstance(cases, range) else range(cases)
-        return self._counted.missing(wanted)
+        """The ranges that are not committed among `cases`: so many first ones, a range, or None for all expected."""
+        expected = self.expected if cases is None else cases if isinstance(cases, range) else range(cases)
+        return self._counted.missing(expected)
 
     def status_counts(self) -> dict[str, int]:
         """Number of committed cases by status, from the journal alone."""
@@ -205,9 +205,9 @@ class Store:
 
         `attrs["units"]`, `["descriptions"]` and `["roles"]` describe the columns.  StoreError if a part is damaged.
         """
-        wanted = self.columns if columns is None else tuple(self._column(name) for name in dict.fromkeys(columns))
-        tables = [parts.read_part(self.path, part, wanted) for part in self.parts]
-        return _data_frame(tables, wanted)
+        chosen = self.columns if columns is None else tuple(self._column(name) for name in dict.fromkeys(columns))
+        tables = [parts.read_part(self.path, part, chosen) for part in self.parts]
+        return _data_frame(tables, chosen)
 
     def _column(self, name: str) -> Column:
         if named := [column for column in self.columns if column.name == name]:
@@ -277,13 +277,9 @@ class Store:
         """
         with self.lock():
             self._refuse_overlap(first, count)
-            self.commit(parts.write_part(self.path, self.columns, first, count, columns))
-
-    def commit(self, part: Part) -> None:
-        """Commit a part that `parts.write_part` wrote into this directory."""
-        with self.lock():
-            self._refuse_overlap(part.first, part.rows)
-            self._record("part", asdict(part))
+            written = parts.write_aside(self.path, self.columns, first, count, columns)
+            self._rename(written)
+            self._record("part", asdict(written.part))
 
     def publish(self, written: Written) -> None:
         """Commit a part that a worker wrote by `parts.write_aside`; on return it survives a power cut."""

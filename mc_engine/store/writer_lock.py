@@ -20,7 +20,7 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import make_folder, naming, open_regular, read_short
+from mc_engine.durable_file import disk_errors, make_folder, open_regular, read_short
 from mc_engine.errors import StoreError
 from mc_engine.store.journal import utc_now
 from mc_engine.store.run_files import JOURNAL
@@ -66,7 +66,7 @@ class WriterLock:
         deadline = time.monotonic() + PATIENCE_S
         while True:
             try:
-                with naming(self.path):
+                with disk_errors(self.path):
                     return self._take()
             except _BusyError as error:
                 if time.monotonic() > deadline:
@@ -89,7 +89,7 @@ class WriterLock:
 
     def check(self) -> None:
         """StoreError if this object took the lock and has lost it since."""
-        with naming(self.path):
+        with disk_errors(self.path):
             if not self.held or self._is_ours():
                 return
         lost = f"was moved or removed, or its {self.path.name} was deleted or taken over"
@@ -159,7 +159,7 @@ def _system_locks(folder: Path, names: tuple[str, ...], held: ExitStack, flags: 
         creation = flags if name == names[0] else 0
         if not creation and not path.exists():
             continue
-        with naming(path):
+        with disk_errors(path):
             descriptor = open_regular(path, os.O_RDWR | creation)
         held.callback(_let_go, descriptor)
         try:

@@ -78,12 +78,13 @@ def test_a_part_is_synced_renamed_and_its_folder_synced_before_its_journal_line(
 
 def test_a_part_without_its_journal_line_is_ignored_and_then_removed(store):
     store.append(0, 10, block(0, 10))
-    stray = parts.write_part(store.path, store.columns, 10, 7, block(10, 7))
+    written = parts.write_aside(store.path, store.columns, 10, 7, block(10, 7))
+    (store.path / written.temporary).rename(store.path / written.part.file)
     again = open_store(store.path)
     assert again.committed() == [(0, 10)]
     assert len(again.cases()) == 10
     again.append(10, 10, block(10, 10))
-    assert not (store.path / stray.file).exists()
+    assert not (store.path / written.part.file).exists()
     assert len(pd.read_parquet(store.path / "cases")) == 20
 
 

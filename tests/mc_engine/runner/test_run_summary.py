@@ -3,14 +3,14 @@ import pytest
 from cart import small_store
 
 from mc_engine.errors import StoreError
-from mc_engine.runner.summary import case_line, failed_cases, summaries, summary_lines, verdict_line, verdicts
+from mc_engine.runner.summary import case_line, failed_cases, judgement, summaries, summary_lines, verdict_line
 from mc_engine.statistics import summarize
 from mc_engine.status import OK, STATUS_NAME
 
 
 def test_numbers_of_a_verdict_count_failed_cases_as_not_inside(tmp_path):
     store = small_store(tmp_path / "flown")
-    fuel, zero = verdicts(store)
+    fuel, zero = judgement(store)[0]
     assert (fuel.passed, fuel.tried) == (36, 40)
     assert zero.passed == 0
     assert failed_cases(store) == 4
@@ -24,8 +24,8 @@ def test_the_case_line_puts_the_commonest_status_first(tmp_path):
 
 def test_a_verdict_reads_as_a_sentence_with_its_unit(tmp_path):
     store = small_store(tmp_path / "flown")
-    line = verdict_line(verdicts(store)[0], store.units)
-    assert line == "fuel: pass, propellant_kg ≤ 100 kg in 36 of 40 cases (wanted 50 % with 90 % confidence)"
+    line = verdict_line(judgement(store)[0][0], store.units)
+    assert line == "fuel: pass, propellant_kg ≤ 100 kg in 36 of 40 cases (required: 50 % with 90 % confidence)"
 
 
 def test_a_run_read_part_by_part_has_the_summaries_of_its_whole_table(tmp_path):

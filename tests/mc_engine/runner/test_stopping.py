@@ -12,7 +12,7 @@ from mc_engine import load_campaign, open_store
 from mc_engine.errors import CampaignError, RunInterrupted
 from mc_engine.runner import runner
 from mc_engine.runner.stopping import carry_on, fly_until_decided, refuse_undecidable, schedule
-from mc_engine.runner.summary import judgement, look_line
+from mc_engine.runner.summary import analyses_line, judgement
 
 NO_PROGRESS = {"workers": 1}
 
@@ -43,7 +43,7 @@ def test_flying_ends_where_the_requirement_passes_and_the_manifest_holds_the_sch
     assert store.n_cases == len(store.cases()) == 74  # no failure shows 0.95 with 0.95 at any time from here on
     assert store.manifest["looks"] == [74, 100, 150, 225, 337, 505, 757, 1135, 1702, 2000]
     assert judgement(store)[0][0].outcome == "pass"
-    assert look_line(store).startswith("judged once on the way, at 74 cases last, of at most 2,000")
+    assert analyses_line(store).startswith("1 interim analysis, the last at 74 of at most 2,000 cases")
 
 
 def test_flying_ends_where_the_requirement_fails(tmp_path):
@@ -94,10 +94,10 @@ def test_a_decided_run_is_not_carried_on_and_one_extended_by_hand_keeps_its_limi
 def test_a_run_of_fixed_size_that_is_extended_is_judged_as_looked_at(tmp_path):
     store = runner.run(load_campaign("minimal", cases=60), tmp_path / "run", workers=1)
     assert not judgement(store)[0][0].looked
-    assert look_line(store) == ""
+    assert analyses_line(store) == ""
     extended = runner.extend(tmp_path / "run", 90, workers=1)
     assert judgement(extended)[0][0].looked
-    assert look_line(extended).startswith("extended from 60 to 90 cases")
+    assert analyses_line(extended).startswith("extended from 60 to 90 cases")
 
 
 @pytest.mark.parametrize("design", ["lhs", "sobol", "grid"])

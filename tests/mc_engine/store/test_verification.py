@@ -1,4 +1,4 @@
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -88,7 +88,7 @@ def test_verify_finds_a_part_whose_rows_are_not_those_of_the_journal(store):
     claim = replace(part, file="cases/part-0000000010-0000000020.parquet", first=10, rows=11, status={"ok": 11})
     with store.lock():
         (store.path / claim.file).write_bytes(block_bytes(store))
-        store.commit(claim)
+        store.note("part", **asdict(claim))
     assert damage(store.path) == [f"{claim.file}: is no part of this run, it has other rows or columns"]
 
 
@@ -100,10 +100,8 @@ def block_bytes(store):
 
 def test_verify_finds_a_part_with_other_columns(store):
     with store.lock():
-        other = parts.write_part(
-            store.path, store.columns[:4], 0, 10, {k: block(0, 10)[k] for k in ("status", "reason", "ve_pct")}
-        )
-        store.commit(other)
+        arrays = {name: block(0, 10)[name] for name in ("status", "reason", "ve_pct")}
+        store.publish(parts.write_aside(store.path, store.columns[:4], 0, 10, arrays))
     assert any(f'the column "{store.columns[4].name}" is missing' in problem for problem in damage(store.path))
 
 

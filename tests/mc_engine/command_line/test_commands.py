@@ -197,7 +197,7 @@ def test_run_flies_into_a_folder_named_by_campaign_and_time_and_says_where(here,
     assert folder.name.endswith("Z")
     assert f"runs/{folder.name}\n" in result.stdout
     assert "40 of 40 cases: 36 ok, 4 no-stop" in result.stdout
-    assert "fuel: pass, propellant_kg ≤ 100 kg in 36 of 40 cases (wanted 50 % with 90 % confidence)" in result.stdout
+    assert "fuel: pass, propellant_kg ≤ 100 kg in 36 of 40 cases (required: 50 % with 90 % confidence)" in result.stdout
     assert "zero: fail" in result.stdout
     assert f"runs/{folder.name}/report.html" in result.stdout
     assert calls.reports == [("html", "pdf")]
