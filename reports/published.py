@@ -6,12 +6,14 @@ A record of the manifest's `published`:
   published  the number or the words in the source
   unit       unit of both
   source     place in the source: table, figure, page (optional)
-  column     a column of the run that holds the same quantity, in the same unit, or
-  ours       a number (or words) that the campaign’s tests hold and no run computes; no report shows it
+  column     a column of the run that holds the same quantity, in the same unit (optional: no run computes the others)
   at         inputs of the case to compare with, {column: value}; without it, the nominal case (optional)
   tolerance  how far ours may lie from the printed number, from its digits (optional)
-  status     how sure the print is: "legible", "restored", "not reproduced", ... (optional)
+  status     how sure the print is: "legible", "restored", ... (optional)
   note       a sentence (optional)
+  reason     why the model is expected to differ from the print (optional)
+
+The outcome is that of `mc_engine.studies.published`: reached, close, improved, not reached or unknown.
 
 A number that the source gives of many cases has three more keys.  In a run that disperses the same inputs it stands in
 the table of `published_statistics`, beside the statistic of that run:
@@ -29,26 +31,32 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.statistics import Summary, summarize
+from mc_engine.studies.published import CLOSE, IMPROVED, NOT_REACHED, REACHED, UNKNOWN, WITH_REASON, outcome
 from reports.document import Cell, Column, Table
 from reports.flown import Flown
 from reports.numbers import count, counted, exact, number, with_unit
+
+TONES = {REACHED: "good", CLOSE: "good", IMPROVED: "good", NOT_REACHED: "open", UNKNOWN: ""}
 
 
 def published_blocks(flown: Flown) -> Iterator[Table | str]:
     """Published values beside those that this run computes; of the others, how many there are."""
     records = [record for record in flown.manifest.get("published", []) if own_statistic(flown, record) is None]
     computed = [(record, *our_value(flown, record)) for record in records]
-    rows = tuple(_row(record, ours, where) for record, ours, where in computed if ours is not None)
+    known = [{**record, "ours": ours} for record, ours, _ in computed if ours is not None]
+    places = [where for _, ours, where in computed if ours is not None]
+    rows = tuple(_row(record, where, outcome(record, known)) for record, where in zip(known, places, strict=True))
     columns = (
         Column("Quantity", "text", 2.4),
         Column("Published", "number", 1.6),
         Column("Computed", "number", 2.0),
         Column("Difference", "number", 1.7),
-        Column("Remark", "text", 2.5),
+        Column("Outcome", "text", 2.5),
     )
     note = (
-        "Computed: by the nominal case of this run, or by the case named. Difference: computed less published, marked "
-        "as inside or outside the tolerance where there is one."
+        "Computed: by the nominal case of this run, or by the case named. Difference: computed less published. "
+        "Reached: within the printed digits, or within the tolerance of the value; close: within 0.5 % of the print; "
+        "improved: by another computation than that of the source."
     )
     if rows:
         yield Table("Published and computed values", columns, rows, note)
@@ -56,19 +64,21 @@ def published_blocks(flown: Flown) -> Iterator[Table | str]:
     if left:
         yield (
             f"{counted(left, 'further published value')} of the model {'is' if left == 1 else 'are'} not computed by "
-            "the cases of this run; the campaign’s tests compare them."
+            "the cases of this run; the command published --compute computes them."
         )
 
 
-def _row(record: Mapping[str, Any], ours: Any, where: str) -> tuple[Cell, ...]:
+def _row(record: Mapping[str, Any], where: str, verdict: str) -> tuple[Cell, ...]:
     unit = str(record.get("unit", ""))
-    published = record.get("published", "")
+    published, ours = record.get("published", ""), record["ours"]
+    remark = record.get("reason", "") if verdict in WITH_REASON else record.get("note", "")
+    status = str(record.get("status", ""))
     return (
         Cell(str(record.get("quantity", "")), small=str(record.get("source", ""))),
-        Cell(_text(published, unit, exact), _as_number(published)),
+        Cell(_text(published, unit, exact), _as_number(published), small="" if status == "legible" else status),
         Cell(_text(ours, unit, lambda value: number(value, 8)), _as_number(ours), small=where),
-        _difference(ours, published, record.get("tolerance"), unit),
-        Cell(str(record.get("status", "")), small=str(record.get("note", ""))),
+        _difference(ours, published, unit),
+        Cell(verdict, small=str(remark), tone=TONES[verdict]),
     )
 
 
@@ -171,13 +181,8 @@ def _text(value: Any, unit: str, form: Callable[[float], str]) -> str:
     return with_unit(form(plain), unit)
 
 
-def _difference(ours: Any, published: Any, tolerance: Any, unit: str) -> Cell:
+def _difference(ours: Any, published: Any, unit: str) -> Cell:
     mine, printed = _as_number(ours), _as_number(published)
     if mine is None or printed is None or not np.isfinite(mine):
         return Cell("–")
-    gap = mine - printed
-    text = with_unit(number(gap, 3), unit)
-    if tolerance is None:
-        return Cell(text, gap)
-    inside = abs(gap) <= float(tolerance)
-    return Cell(text, gap, small="inside" if inside else "outside", tone="good" if inside else "open")
+    return Cell(with_unit(number(mine - printed, 3), unit), mine - printed)

@@ -34,7 +34,7 @@ def test_reports_know_of_the_engine_only_what_a_store_and_its_statistics_are():
         "runner": "summary",
         "statistics": "*",
         "store": "*",
-        "studies": "comparison rare_event_folder replay_files run_changes tuning_folder",
+        "studies": "comparison published rare_event_folder replay_files run_changes tuning_folder",
     }
     used = {tuple(name.split(".")[1:3]) for _, name in imported("reports") if name.startswith("mc_engine.")}
     for room, *module in used:

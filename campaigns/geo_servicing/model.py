@@ -114,7 +114,7 @@ def tables(o: Any) -> np.ndarray:
     rows = harmonics_table(int(o.gravity_degree), int(o.gravity_order)).ravel()
     plan = plan_table.no_plan()
     if o.phase == PHASING:
-        first, sun_moon = _nominal(o)
+        first, sun_moon = nominal_start(o)
         behind = np.concatenate([plan, rows, sun_moon.ravel()])
         inputs = np.concatenate([[getattr(o, one.symbol) for one in SETTINGS], list(vars(first).values()), behind])
         sources = source_digest(replace(MODEL, reference="campaigns.geo_servicing"), None)
@@ -122,7 +122,7 @@ def tables(o: Any) -> np.ndarray:
     return np.concatenate([plan, rows])
 
 
-def _nominal(o: Any) -> tuple[SimpleNamespace, np.ndarray]:
+def nominal_start(o: Any) -> tuple[SimpleNamespace, np.ndarray]:
     """(kernel parameters of the case without errors, nodes of Sun and Moon for it)."""
     inputs = SimpleNamespace(**{one.symbol: np.array([one.default * one.si_factor]) for one in PARAMETERS})
     settings = SimpleNamespace(**{one.symbol: np.array([getattr(o, one.symbol)]) for one in SETTINGS})

@@ -24,9 +24,9 @@ __all__ = ["RUNS_CODE", "RUNS_NO_CODE", "app"]
 # Every command is in one of them, and says so in its help; a test holds both, and the page on trust.
 RUNS_CODE = frozenset(
     ("check", "plan", "sample", "run", "resume", "extend", "rerun", "merge", "replay", "tune", "rare", "bench")
-)
+) | {"published"}  # with --compute
 RUNS_NO_CODE = frozenset(
-    ("init", "list", "schema", "units", "published", "report", "status", "summary", "verify", "compare", "export")
+    ("init", "list", "schema", "units", "report", "status", "summary", "verify", "compare", "export")
 ) | {"publish", "fetch"}
 _OF_CODE = "Runs code: the model of the campaign or run, with your rights; only for those that you trust."
 _OF_NO_CODE = "Runs no code of a campaign or run, whoever made it."

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from deorbit_flights import DEMONSTRATION, fly_cases, fly_grid, fly_one, history
+from deorbit_flights import fly_cases, fly_grid, fly_one, history
+
+from campaigns.deorbit.published import DEMONSTRATION
 
 # The published case, VE = -20 % and OE = +10 %, recomputed from the source's equations with its constants.
 # Relative tolerances of the digits that a figure can hold; times and overshoots in their own unit.
@@ -213,3 +215,38 @@ def test_cases_of_all_control_modes_may_be_flown_together():
     for word in words[:4]:
         for name, value in fly_one(control=word, **DEMONSTRATION).items():
             np.testing.assert_array_equal(together[name][words == word], np.array([value] * 3))
+
+
+def test_the_printed_largest_overshoot_is_compared_with_our_largest():
+    row = fly_one(**DEMONSTRATION)
+    assert max(row[f"overshoot_{name}_pct"] for name in ("a", "e", "omega")) == row["overshoot_omega_pct"]
+
+
+def test_the_peak_in_the_note_on_the_abstract_is_that_of_its_case():
+    assert fly_one(ve_pct=20.0, oe_pct=15.0)["peak_force_n"] == pytest.approx(147.0, abs=0.5)
+    assert fly_one(ve_pct=20.0, oe_pct=15.0, control="clipped")["settling_time_s"] == pytest.approx(642.0, abs=0.5)
+
+
+# The second table of the campaign's README: S [m/s], propellant [kg], largest error, error at entry [m], settled [s]
+MODES = [
+    ({}, 47.608, 1.954, 788.0, 0.113, 352.0),
+    ({"j2": True}, 54.711, 2.242, 780.0, 47.65, 478.0),
+    ({"j2": True, "j2_feedforward": True}, 54.196, 2.222, 788.0, 0.113, 352.0),
+    ({"drag": True}, 47.980, 1.969, 788.0, 7.66, np.nan),
+    ({"control": "clipped"}, 66.853, 2.733, 2340.0, 1.19, 490.0),
+    ({"control": "pulsed"}, 50.437, 2.069, 16_315.0, 16_315.0, np.nan),
+    ({"control": "pulsed", "pulse_feed": "closed_loop"}, 90.5, 3.68, 2362.0, 13.0, 547.0),
+    ({"control": "off"}, 0.0, 0.0, 38_110.0, 38_110.0, np.nan),
+]
+
+
+MODE_COLUMNS = ["correction_impulse_m_s", "propellant_kg", "max_position_error_m", "final_position_error_m"]
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda mode: " ".join(map(str, mode[0])) or "plain")
+def test_the_modes_of_the_readme_are_those_flown(mode):
+    others, *written = mode
+    row = fly_one(**DEMONSTRATION, **others)
+    for name, number in zip([*MODE_COLUMNS, "settling_time_s"], written, strict=True):
+        # three digits at least, as written
+        assert row[name] == pytest.approx(number, rel=1e-2 if number < 20.0 else 1e-3, abs=1e-12, nan_ok=True), name

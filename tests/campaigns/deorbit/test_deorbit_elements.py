@@ -2,13 +2,14 @@
 
 import numpy as np
 import pytest
-from deorbit_flights import DEMONSTRATION, NOMINAL, fly_one, history
+from deorbit_flights import NOMINAL, fly_one, history
 from deorbit_twin import Path
 from gauss_equations import Elements, gauss_rates
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 from campaigns.deorbit.elements import osculating
+from campaigns.deorbit.published import DEMONSTRATION
 
 MU = 3.986004418e14
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from deorbit_flights import DEMONSTRATION, MODEL, NOMINAL, PULSED, fly_cases, fly_one, history
+from deorbit_flights import MODEL, NOMINAL, fly_cases, fly_one, history
 
+from campaigns.deorbit.published import DEMONSTRATION, PULSED
 from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import load_campaign
 

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from deorbit_flights import PULSED, fly_one, pulses
+from deorbit_flights import fly_one
 
+from campaigns.deorbit.published import PULSED, pulses
 from mc_engine.flight.flight import fly
 from mc_engine.model import load_model
 from mc_engine.physics.pulse_modulators import lag_rate

@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
-from deorbit_flights import DEMONSTRATION, NOMINAL, SEED, fly_one
+from deorbit_flights import NOMINAL, SEED, fly_one
 from deorbit_twin import fly_twin
+
+from campaigns.deorbit.published import DEMONSTRATION
 
 # What a quarter-second step of the engine may leave: a ten-thousandth of a metre, and of a metre per second.
 # The clipped force has corners and the layered air has jumps, where the order of the steps is lost: they set the

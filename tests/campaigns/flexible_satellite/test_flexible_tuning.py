@@ -126,16 +126,3 @@ def test_thrusters_and_gains_together_beat_tables_8_and_9_within_table_5(seed, t
     assert len(found)
     assert (found["end_attitude"] <= 0.005).all()
     assert ((found["impulse"] <= 42.6) & (found["attitude"] <= 113.8)).any()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "table"), [("stage_1", 4), ("stage_2_unconstrained", 8), ("stage_3", 9)])
-def test_the_optima_beside_the_printed_ones_are_the_middles_of_our_fronts(name, table, tmp_path):
-    symbols = dict(
-        zip((*_MODULATOR, "kp", "kd", "ki"), ("K_m", "T_m", "U_off", "h", "T", "K_P", "K_D", "K_I"), strict=True)
-    )
-    front = search(name, tmp_path / "out").front
-    ours = {one["quantity"]: one["ours"] for one in stage(name).model.published}
-    for one in stage(name).tuning.parameters:
-        found = ours[f"{symbols[one.name]}, optimum of Table {table}"]
-        assert front[one.name].median() == pytest.approx(found, rel=1e-6)

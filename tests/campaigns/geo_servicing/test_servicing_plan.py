@@ -12,7 +12,7 @@ from campaigns.geo_servicing import drift_model as drift
 from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.bellman import best_corrections, planned_cost
 from campaigns.geo_servicing.inspection import correction
-from campaigns.geo_servicing.model import MODEL, _nominal
+from campaigns.geo_servicing.model import MODEL, nominal_start
 from campaigns.geo_servicing.planned_flight import Craft
 from mc_engine.errors import ModelError
 from mc_engine.flight.flight import settings_of
@@ -58,7 +58,7 @@ def craft_of(**inputs):
     """The craft that plans are made for, with the tables behind its plan."""
     codes = [one.code((NOMINAL | inputs)[one.name]) for one in MODEL.settings]
     o = settings_class(MODEL)(*codes, np.empty(0))
-    first, sun_moon = _nominal(o)
+    first, sun_moon = nominal_start(o)
     rows = harmonics_table(int(o.gravity_degree), int(o.gravity_order))
     return Craft(o, np.concatenate([plan_table.no_plan(), rows.ravel(), sun_moon.ravel()]), first)
 

@@ -1,11 +1,23 @@
-"""What became of a published value: the rule, number by number, and the verb that shows it."""
+"""What became of a published value: the rule, number by number, and the command that shows it."""
 
 import pytest
 from typer.testing import CliRunner
 
 from mc_engine.command_line.commands import app
 from mc_engine.errors import EngineError, ModelError
-from mc_engine.studies.published import NOT_REACHED, REACHED, UNKNOWN, half_a_unit, outcome, read_published, read_source
+from mc_engine.studies.published import (
+    CLOSE,
+    IMPROVED,
+    NOT_REACHED,
+    REACHED,
+    UNKNOWN,
+    differing,
+    half_a_unit,
+    outcome,
+    read_published,
+    read_source,
+    with_ours,
+)
 from mc_engine.studies.published_table import campaign_table, headline_table, written_into
 
 RECORD = {"quantity": "fuel", "published": 3.8, "unit": "kg", "ours": 3.84, "status": "legible"}
@@ -18,9 +30,9 @@ work = "Somebody 2001"
 quantity = "|dv|"
 published = 1.5e-7
 unit = "m/s"
-ours = -2.5e-7
+column = "dv_m_s"
 status = "restored"
-note = "half of it | is ours"
+reason = "half of it | is ours"
 headline = true
 
 [[published]]
@@ -28,15 +40,26 @@ quantity = "time"
 published = "below 80"
 unit = "s"
 source = "Table 2"
-ours = 79.5
+column = "time_s"
 at_most = 80.0
 status = "legible"
+
+[[published]]
+quantity = "fuel"
+published = 20.0
+unit = "kg"
+source = "Table 3"
+column = "fuel_kg"
+better = "less"
+status = "legible"
+reason = "of the optimum"
 
 [[published]]
 quantity = "gain"
 published = "lost"
 status = "lost"
 """
+LOCK = '[ours]\n"|dv|" = -2.5e-7\ntime = 79.5\nfuel = 19.0\n'
 
 
 @pytest.fixture
@@ -44,6 +67,7 @@ def file(tmp_path):
     path = tmp_path / "small" / "published.toml"
     path.parent.mkdir()
     path.write_text(TEXT)
+    path.with_name("published.lock.toml").write_text(LOCK)
     return path
 
 
@@ -61,11 +85,18 @@ def test_half_a_unit_is_of_the_last_digit_that_is_written(number, half):
         ({"ours": 3.86}, NOT_REACHED),
         ({"ours": 3.86, "tolerance": 0.1}, REACHED),
         ({"ours": 3.84, "tolerance": 0.01}, NOT_REACHED),
+        ({"ours": 3.815, "tolerance": 0.01}, CLOSE),
+        ({"ours": 3.785, "tolerance": 0.01}, CLOSE),
+        ({"ours": 3.6, "better": "less"}, IMPROVED),
+        ({"ours": 4.0, "better": "less"}, NOT_REACHED),
+        ({"ours": 4.0, "better": "more"}, IMPROVED),
+        ({"ours": 3.81, "better": "less"}, REACHED),
         ({"published": "zero", "ours": "zero"}, REACHED),
         ({"published": "zero", "ours": 1e-3}, NOT_REACHED),
         ({"published": "below 4", "at_most": 4.0}, REACHED),
         ({"published": "below 3", "at_most": 3.0}, NOT_REACHED),
-        ({"published": "2 to 3.8", "at_least": 2.0, "at_most": 3.8}, NOT_REACHED),
+        ({"published": "below 3.83", "at_most": 3.83}, CLOSE),
+        ({"published": "2 to 3.8", "at_least": 2.0, "at_most": 3.7}, NOT_REACHED),
         ({"published": "at least 4", "at_least": 4.0}, NOT_REACHED),
         ({"published": "lost", "status": "lost"}, UNKNOWN),
         ({"published": "curve lost", "status": "curve lost"}, UNKNOWN),
@@ -76,8 +107,14 @@ def test_the_outcome_follows_from_both_numbers_and_the_print(changes, expected):
     assert outcome(RECORD | changes) == expected
 
 
+@pytest.mark.parametrize(("other", "expected"), [(4.0, REACHED), (3.0, NOT_REACHED)])
+def test_a_record_may_have_to_lie_below_our_value_of_another(other, expected):
+    less = RECORD | {"published": "less than yesterday's", "below": "fuel of yesterday"}
+    assert outcome(less, [less, {"quantity": "fuel of yesterday", "ours": other}]) == expected
+
+
 def test_a_record_that_can_be_compared_needs_a_number_of_ours():
-    with pytest.raises(ModelError, match="'fuel' has no `ours`"):
+    with pytest.raises(ModelError, match="'fuel' has no computed value"):
         outcome({name: value for name, value in RECORD.items() if name != "ours"})
 
 
@@ -94,25 +131,41 @@ def test_the_farthest_of_many_cases_is_compared_by_its_distance_from_the_mean(ou
     assert outcome(farthest, [mean, deviation, other, farthest]) == expected
 
 
+@pytest.mark.parametrize(
+    ("sentence", "left"), [("half of it | is ours", "not reached"), ("of the optimum", "improved")]
+)
+def test_an_outcome_without_its_reason_is_an_error_that_names_the_record(file, sentence, left):
+    file.write_text(TEXT.replace(f'reason = "{sentence}"\n', ""))
+    with pytest.raises(ModelError, match=rf"small, published\.toml: '.*' is {left}; give its `reason`"):
+        with_ours(file)
+
+
 def test_the_source_is_that_of_the_file_or_the_name_of_its_folder(file):
     assert (read_source(file).campaign, read_source(file).work) == ("small", "Somebody 2001")
     file.write_text(TEXT.replace("[source]", "[other]"))
     assert (read_source(file).campaign, read_source(file).work) == ("small", "")
 
 
-def test_the_table_of_a_campaign_has_every_record_with_its_outcome(file):
+def test_the_table_of_a_campaign_has_every_record_with_its_outcome_and_what_is_improved_apart(file):
     table = campaign_table(file).splitlines()
-    assert table[0] == "small: Somebody 2001. 3 values: 1 reached, 1 not reached, 1 unknown."
+    counts = "4 values: 1 reached, 0 close, 1 improved, 1 not reached, 1 unknown."
+    assert table[0] == f"small: Somebody 2001. {counts}"
     assert table[4:] == [
         "| \\|dv\\| |  | 1.5e-7 m/s | −2.5e-7 m/s | **not reached**: half of it \\| is ours |",
         "| time | Table 2 | below 80 s | 79.5 s | reached |",
         "| gain |  | lost | – | unknown: lost |",
+        "",
+        "Improved by another computation than that of the source:",
+        "",
+        "| Quantity | Source | Published | Ours | Improved by | Outcome |",
+        "|---|---|---|---|---|---|",
+        "| fuel | Table 3 | 20 kg | 19 kg | 5 % | improved: of the optimum |",
     ]
 
 
 def test_the_short_table_counts_outcomes_and_shows_headlines(file):
     table = headline_table([file]).splitlines()
-    assert table[2] == "| [small](campaigns/small/README.md) | Somebody 2001 | 3 | 1 | 1 | 1 |"
+    assert table[2] == "| [small](campaigns/small/README.md) | Somebody 2001 | 4 | 1 | 0 | 1 | 1 | 1 |"
     assert [line for line in table[4:] if "small" in line] == [
         "| small | \\|dv\\| | 1.5e-7 m/s | −2.5e-7 m/s | **not reached**: half of it \\| is ours |"
     ]
@@ -128,13 +181,38 @@ def test_the_table_goes_between_its_marks_and_nowhere_else(tmp_path):
         written_into(page, "new")
 
 
-def test_an_unknown_key_is_named_with_its_record(file):
-    file.write_text(TEXT.replace("at_most", "atmost"))
-    with pytest.raises(ModelError, match="record 2: atmost"):
+@pytest.mark.parametrize(
+    ("edit", "wrong"),
+    [
+        (('at_most = 80.0', 'atmost = 80.0'), r"record 2 \('time'\): atmost"),
+        (('column = "time_s"', 'ours = 79.5'), r"record 2 \('time'\): ours"),
+        (('column = "time_s"\n', ''), r"record 2 \('time'\): has none of column, statistic, compute"),
+        (('column = "time_s"', 'column = "time_s"\ncompute = "a:b"'), "has column and compute of"),
+    ],
+)  # fmt: skip
+def test_a_record_with_an_unknown_key_or_without_a_way_to_compute_ours_is_named(file, edit, wrong):
+    file.write_text(TEXT.replace(*edit))
+    with pytest.raises(ModelError, match=wrong):
         read_published(file)
 
 
-def test_the_verb_shows_a_campaign_of_ones_own_and_writes_it_into_a_page(file, tmp_path):
+@pytest.mark.parametrize(
+    ("value", "same"), [(3.84, True), (3.840001, True), (3.8401, False), (None, False), ("3.84", False)]
+)
+def test_a_computed_value_differs_from_the_kept_one_where_the_shown_digits_do(value, same):
+    computed = {} if value is None else {"fuel": value}
+    assert differing([RECORD], computed, {"fuel": 3.84}) == ([] if same else ["fuel"])
+
+
+def test_a_search_may_differ_between_machines_by_what_its_record_says():
+    assert differing([RECORD | {"repeatable_to": 0.01}], {"fuel": 3.85}, {"fuel": 3.84}) == []
+
+
+def test_a_value_that_is_of_no_record_differs():
+    assert differing([RECORD], {"fuel": 3.84}, {"fuel": 3.84, "gone": 1.0}) == ["gone"]
+
+
+def test_the_command_shows_a_campaign_of_ones_own_and_writes_it_into_a_page(file, tmp_path):
     runner, page = CliRunner(), tmp_path / "page.md"
     assert "| gain |" in runner.invoke(app, ["published", str(file.parent)]).output
     page.write_text("<!-- published -->\n<!-- end -->\n")
@@ -153,3 +231,10 @@ def test_a_page_that_is_not_there_is_one_sentence(tmp_path):
     assert done.exit_code == 2
     assert done.output.count("\n") == 1
     assert "none.md" in done.output
+
+
+@pytest.mark.parametrize("words", [["--compute"], ["deorbit", "--update-lock"], ["deorbit", "--no-slow"]])
+def test_options_that_need_one_another_are_asked_for(words):
+    done = CliRunner().invoke(app, ["published", *words])
+    assert done.exit_code == 2
+    assert "--compute" in done.output
