@@ -119,10 +119,14 @@ class _Published(Record):
     source: str = ""
     status: str = ""
     note: str = ""
+    reason: str = ""
     column: str | None = None
-    ours: Value | None = None
     at: dict[str, Value] | None = None
     tolerance: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    better: Literal["less", "more"] | None = None
+    below: str | None = None
     statistic: str | None = None
     of: str = ""
     over: list[str] = []

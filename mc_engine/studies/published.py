@@ -48,7 +48,6 @@ import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +90,10 @@ def read_published(path: Path) -> tuple[dict[str, Any], ...]:
     records = _checked(path, first)
     for name in first.get("source", {}).get("continued_in", []):
         records += _checked(path.parent / name, _read(path.parent / name))
+    quantities = {record["quantity"] for record in records}
+    for record in records:
+        if record.get("below", record["quantity"]) not in quantities:
+            raise ModelError(f"{path.name}: {record['quantity']!r} is below {record['below']!r}, which is no record")
     return tuple(records)
 
 
@@ -144,7 +147,8 @@ def with_ours(path: Path, values: Mapping[str, Value] | None = None) -> tuple[di
 def outcome(record: Record, records: Iterable[Record] = ()) -> str:
     """How `ours` of a record compares with the print: one of OUTCOMES.
 
-    unknown      the source gives no number to compare with (its status says so: lost, curve lost, not printed)
+    unknown      the source gives no number to compare with (its status says so: lost, curve lost, not printed), or
+                 ours of the record that it must be `below` is not among `records`
     reached      a number: ours lies within `tolerance`, or half a unit of the last digit written;
                  words: ours lies within `at_least` and `at_most`, or below another of ours, or is the same words;
                  the farthest of many cases: as far from the mean, within 1.7 standard deviations (`records` has both)
@@ -154,7 +158,8 @@ def outcome(record: Record, records: Iterable[Record] = ()) -> str:
 
     ModelError if there is no number of ours.
     """
-    if record.get("status") in NO_NUMBER:
+    records = tuple(records)
+    if record.get("status") in NO_NUMBER or "below" in record and _ours_of(record["below"], records) is None:
         return UNKNOWN
     if "ours" not in record:
         raise ModelError(
@@ -163,7 +168,7 @@ def outcome(record: Record, records: Iterable[Record] = ()) -> str:
         )
     if _agrees(record, records):
         return REACHED
-    if "better" in record:
+    if "better" in record and not isinstance(record["published"], str):
         ahead = (record["ours"] < record["published"]) == (record["better"] == "less")
         return IMPROVED if ahead else NOT_REACHED
     return CLOSE if _is_close(record) else NOT_REACHED
@@ -174,7 +179,8 @@ def _agrees(record: Record, records: Iterable[Record]) -> bool:
     if isinstance(ours, str):
         return bool(ours == printed)
     if "below" in record:
-        return bool(ours < _ours_of(record["below"], records))
+        bound = _ours_of(record["below"], records)
+        return bound is not None and bool(ours < bound)
     if "at_least" in record or "at_most" in record:
         return bool(record.get("at_least", -float("inf")) <= ours <= record.get("at_most", float("inf")))
     if isinstance(printed, str):
@@ -184,9 +190,9 @@ def _agrees(record: Record, records: Iterable[Record]) -> bool:
     return bool(abs(ours - printed) <= record.get("tolerance", half_a_unit(printed)))
 
 
-def _ours_of(quantity: str, records: Iterable[Record]) -> float:
-    """Our value of another record; not a number where `records` has none, as in a run that does not compute it."""
-    return next((float(other["ours"]) for other in records if other["quantity"] == quantity and "ours" in other), nan)
+def _ours_of(quantity: str, records: Iterable[Record]) -> float | None:
+    """Our value of another record; None where `records` has none, as in a run that does not compute it."""
+    return next((float(other["ours"]) for other in records if other["quantity"] == quantity and "ours" in other), None)
 
 
 def _is_close(record: Record) -> bool:
@@ -203,7 +209,7 @@ _BOUNDS = ("at_least", "at_most")
 
 def half_a_unit(number: float) -> float:
     """Half a unit of the last digit of a number as it is written."""
-    written = Decimal(repr(number))
+    written = Decimal(repr(float(number)))
     exponent = 0 if written == written.to_integral_value() else int(written.as_tuple().exponent)
     return 0.5 * 10.0**exponent
 
@@ -234,6 +240,8 @@ def _as_far_from_the_mean(record: Record, records: Iterable[Record]) -> bool:
         for other in records
         if other.get("of") == record["of"] and other["over"] == record["over"]
     }
+    if not {"mean", "standard deviation"} <= same.keys():
+        return False
     mean, deviation = same["mean"], same["standard deviation"]["published"]
     distances = [abs(record[key] - mean[key]) for key in ("published", "ours")]
     return bool(abs(distances[0] - distances[1]) <= _BETWEEN_FARTHEST * deviation)

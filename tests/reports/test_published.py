@@ -41,13 +41,19 @@ def test_only_what_the_run_computes_has_a_row():
     run = synthetic_run(100, failed=0)
     run.manifest["published"] = [
         {"quantity": "not flown", "published": 3.8, "unit": "kg", "column": "propellant_kg", "at": {"ve_pct": 40.0}},
-        {"quantity": "a constant of the tests", "published": 7.8, "unit": "km/s", "ours": 7.8, "tolerance": 0.05},
-        {"quantity": "far", "published": 351.61, "tolerance": 0.05, **column},
-        {"quantity": "near", "published": 350.01, "tolerance": 0.05, **column},
-        {"quantity": "in words", "published": "about six minutes", **column},
+        {"quantity": "of a function", "published": 7.8, "unit": "km/s", "compute": "campaigns.a.published:f"},
+        {"quantity": "far", "published": 360.61, "reason": "a cause", "note": "a note", **column},
+        {"quantity": "close", "published": 351.61, "status": "restored", "reason": "a cause", **column},
+        {"quantity": "near", "published": 350.01, "tolerance": 0.05, "note": "a note", **column},
+        {"quantity": "better", "published": 400.0, "better": "less", **column},
+        {"quantity": "in words", "published": "about six minutes", "at_most": 360.0, **column},
+        {"quantity": "lost", "published": "lost", "status": "lost", **column},
     ]
     table, sentence = published_blocks(Flown(run, "run"))
-    assert [row[0].text for row in table.rows] == ["far", "near", "in words"]
-    assert [row[3].small for row in table.rows] == ["outside", "inside", ""]
-    assert table.rows[0][3].text == "−1.61\u202fs"
+    assert [row[0].text for row in table.rows] == ["far", "close", "near", "better", "in words", "lost"]
+    verdicts = ["not reached", "close", "reached", "improved", "reached", "unknown"]
+    assert [row[4].text for row in table.rows] == verdicts
+    assert [row[4].small for row in table.rows[:3]] == ["a cause", "a cause", "a note"]
+    assert table.rows[1][3].text == "−1.61\u202fs"
+    assert table.rows[1][1].small == "restored"
     assert sentence.startswith("2 further published values of the model are not computed by the cases of this run")

@@ -111,6 +111,13 @@ def test_the_outcome_follows_from_both_numbers_and_the_print(changes, expected):
 def test_a_record_may_have_to_lie_below_our_value_of_another(other, expected):
     less = RECORD | {"published": "less than yesterday's", "below": "fuel of yesterday"}
     assert outcome(less, [less, {"quantity": "fuel of yesterday", "ours": other}]) == expected
+    assert outcome(less, [less]) == UNKNOWN
+
+
+def test_a_record_below_no_record_is_named(file):
+    file.write_text(TEXT.replace("at_most = 80.0", 'below = "tine"'))
+    with pytest.raises(ModelError, match=r"published\.toml: 'time' is below 'tine', which is no record"):
+        read_published(file)
 
 
 def test_a_record_that_can_be_compared_needs_a_number_of_ours():
