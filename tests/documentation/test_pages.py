@@ -15,11 +15,13 @@ from mc_engine.documentation.website import HOME
 from mc_engine.flight.chunks import fly_nominal
 from mc_engine.flight.contract import breaches
 from mc_engine.status import STATUS_NAME
+from mc_engine.studies.published import read_published
 
 RECIPES = [
     HOME / "how_to" / f"{name}.md"
     for name in ("tables", "notebook", "correlated_covariances", "own_distributions", "prepare_and_end_cases")
 ]
+PUBLISHED = HOME / "how_to" / "published_results.md"
 HEAD = '[campaign]\nmodel = "{model}"\ncases = 1000\ndesign = "mc"\nseed = 1\n\n'
 
 
@@ -153,10 +155,24 @@ def test_the_prepared_campaign_keeps_the_contract_and_reaches_its_target(tmp_pat
 
 
 @parametrize(
-    [page for page in PAGES if page not in RECIPES and page.parent.name != "tutorial" and blocks(page, "toml")]
+    [
+        page
+        for page in PAGES
+        if page not in (*RECIPES, PUBLISHED) and page.parent.name != "tutorial" and blocks(page, "toml")
+    ]
 )
 def test_every_campaign_file_on_a_page_loads(page, tmp_path):
     check_campaigns(page, tmp_path)
+
+
+def test_the_records_of_the_page_on_published_results_are_read_and_show_each_way_to_compute(tmp_path):
+    path = tmp_path / "published.toml"
+    ((text, _),) = blocks(PUBLISHED, "toml")
+    path.write_text(text, encoding="utf-8")
+    records = read_published(path)
+    assert [next(way for way in ("column", "statistic", "compute") if way in record) for record in records] == [
+        "column", "statistic", "compute",
+    ]  # fmt: skip
 
 
 def check_campaigns(page, folder):
