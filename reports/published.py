@@ -112,11 +112,11 @@ def own_statistic(flown: Flown, record: Mapping[str, Any]) -> float | None:
 
 def published_law(flown: Flown, name: str) -> tuple[float, float] | None:
     """(mean, standard deviation) that the source prints of a metric for cases with this run's dispersions."""
-    found = {}
+    printed = {}
     for record in flown.manifest.get("published", []):
         if record.get("of") == name and own_statistic(flown, record) is not None:
-            found[record["statistic"]] = float(record["published"])
-    mean, deviation = found.get("mean"), found.get("standard deviation", 0.0)
+            printed[record["statistic"]] = float(record["published"])
+    mean, deviation = printed.get("mean"), printed.get("standard deviation", 0.0)
     return None if mean is None or deviation <= 0.0 else (mean, deviation)
 
 

@@ -32,7 +32,7 @@ def published(
         ),
     ] = None,
     compute: Annotated[
-        bool, typer.Option("--compute", help="Compute our values anew: runs code of the campaigns, takes minutes.")
+        bool, typer.Option("--compute", help="Compute our values anew; runs code of the campaigns.")
     ] = False,
     no_slow: Annotated[
         bool, typer.Option("--no-slow", help="With --compute: take the kept values of the slow records.")

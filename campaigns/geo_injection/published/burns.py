@@ -4,7 +4,7 @@ M. Alavipour, A. A. Nikkhah, J. Roshanian.  Each burn takes the least time from 
 at its ignition is what the printed propellant of the burns before it leaves.
 
 - The first burn is ignited on the node of the parking orbit; size, shape and inclination of the new orbit and its node
-  are given, its apse line is free (five end conditions with one for the place).
+  are given, its apse line is free.
 - A second burn at perigee is centred in time on the perigee of the printed orbit, which is on the node; the apse line
   of the new orbit is free.
 - The last burn, to the geostationary circle, begins where it lasts shortest about the apogee of the printed orbit,
