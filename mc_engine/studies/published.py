@@ -159,7 +159,7 @@ def outcome(record: Record, records: Iterable[Record] = ()) -> str:
     ModelError if there is no number of ours.
     """
     records = tuple(records)
-    if record.get("status") in NO_NUMBER or "below" in record and _ours_of(record["below"], records) is None:
+    if record.get("status") in NO_NUMBER or ("below" in record and _ours_of(record["below"], records) is None):
         return UNKNOWN
     if "ours" not in record:
         raise ModelError(
