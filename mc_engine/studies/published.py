@@ -1,5 +1,6 @@
-"""Published values of a model's source, in the table `published.toml` beside the model: what is printed, and how ours
-is computed.
+"""Published values of a model's source: the file `published.toml` beside the model, and the outcome of each record.
+
+The file says what is printed and how ours is computed.
 
 [source]
 campaign = "de-orbit"         # the campaign in two words
