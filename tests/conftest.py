@@ -1,15 +1,49 @@
-"""Settings for all tests: the same examples on every machine, and no clock on a single one.
+"""Settings for all tests: which of them are deep, the same examples on every machine, and no clock on a single one.
 
 At the end of every run, also of `pytest -q`, stands what the tests of faults have counted and measured: a test says it
 with `record_property(what, number)`, and the processes of `-n` hand it on with their reports.
 """
 
+import pytest
 from hypothesis import settings
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
-FAULTS = "tests/faults/"
+TESTS = "tests/"
+FAULTS = TESTS + "faults/"
+
+# Tests that take long and that a first change of the code seldom breaks, by how their names begin.  `pytest` leaves
+# them out, as it does all tests marked `benchmark`; `pytest -m deep` runs them, and so does continuous integration.
+DEEP = (
+    "benchmarks/",
+    "campaigns/geo_injection/test_geo_box.py",
+    "campaigns/geo_injection/test_geo_parking.py",
+    "documentation/test_examples.py",
+    "documentation/test_site.py",
+    "documentation/test_tutorial.py",
+    "faults/",
+    "mc_engine/statistics/test_coverage.py",
+    "mc_engine/statistics/test_rare_events.py",
+    "mc_engine/studies/test_rare_event.py",
+    "reports/test_browser.py",
+)
+# Of these, the ones that are always run: a killed run that is resumed, a flipped byte, a dead worker, hostile inputs.
+NOT_DEEP = (
+    "faults/test_damage.py::test_verify_names_every_file",
+    "faults/test_hostile_input.py",
+    "faults/test_killed_runs.py::test_a_killed_run",
+    "faults/test_worker_deaths.py::test_workers_killed",
+)
+
+
+@pytest.hookimpl(tryfirst=True)  # before pytest chooses among the tests by their markers
+def pytest_collection_modifyitems(items):
+    """Mark the deep tests."""
+    for item in items:
+        name = item.nodeid.removeprefix(TESTS)
+        if item.get_closest_marker("benchmark") or (name.startswith(DEEP) and not name.startswith(NOT_DEEP)):
+            item.add_marker("deep")
 
 
 def pytest_terminal_summary(terminalreporter):

@@ -21,19 +21,19 @@ from mc_engine.model import Model
 
 HEAD = '[campaign]\nmodel = "campaigns.deorbit"\ncases = 10\ndesign = "mc"\nseed = 1\n'
 SIZE = 249_000  # bytes, just within what is read at all
-SENTENCE_S = 1.0
+SENTENCE_S = 2.0  # of processor time; a quiet core takes a third of it
 
 
 def refused(text, directory=None):
-    """The sentences about a campaign text, which must come within a second of processor time."""
+    """The sentences about a campaign text, which must come soon."""
     load_campaign("deorbit")  # the model is imported once, and not on the clock
     gc.freeze()  # what other tests have left in this process is not searched for waste on the clock
     begin = time.thread_time()
     with pytest.raises(CampaignError) as caught:
         load_campaign("x.toml", text=text, directory=directory)
-    taken = time.thread_time() - begin
+    duration = time.thread_time() - begin
     gc.unfreeze()
-    assert taken < SENTENCE_S
+    assert duration < SENTENCE_S
     assert len(str(caught.value)) < 300_000
     assert all(letter.isprintable() or letter == "\n" for letter in str(caught.value))
     return str(caught.value)
@@ -67,7 +67,7 @@ def filled(unit):
         pytest.param("[parameters]\n[parameters]", id="section twice"),
     ],
 )
-def test_what_is_made_to_overwhelm_is_refused_within_a_second(body):
+def test_what_is_made_to_overwhelm_is_refused_within_two_seconds(body):
     assert refused(HEAD + body).startswith("x.toml: ")
 
 
@@ -75,17 +75,17 @@ def test_what_is_made_to_overwhelm_is_refused_within_a_second(body):
     "number", ["1e400", "-1e400", "nan", "inf", "-inf", "9" * 400, "-" + "9" * 400, "1e300", "1" + "0" * 60]
 )
 @pytest.mark.parametrize(
-    "place",
+    ("body", "place"),
     [
-        "[parameters]\nisp_s = {}",
-        '[dispersion.ve_pct]\ndist = "normal"\nsigma = {}',
-        '[dispersion.ve_pct]\ndist = "discrete"\nvalues = [1, {}]',
-        '[dispersion.ve_pct]\ndist = "constant"\nvalue = {}',
-        "[retention.histories]\nfirst = {}",
+        ("[parameters]\nisp_s = {}", "parameters.isp_s"),
+        ('[dispersion.ve_pct]\ndist = "normal"\nsigma = {}', "dispersion.ve_pct.sigma"),
+        ('[dispersion.ve_pct]\ndist = "discrete"\nvalues = [1, {}]', "dispersion.ve_pct.values 2"),
+        ('[dispersion.ve_pct]\ndist = "constant"\nvalue = {}', "dispersion.ve_pct.value"),
+        ("[retention.histories]\nfirst = {}", "retention.histories.first"),
     ],
 )
-def test_absurd_numbers_are_refused_wherever_they_stand(place, number):
-    refused(HEAD + place.format(number))
+def test_absurd_numbers_are_refused_wherever_they_stand(body, place, number):
+    assert refused(HEAD + body.format(number)).startswith(f"x.toml: 1 problem\n  {place}: ")
 
 
 @pytest.mark.parametrize("number", ["-1", "0", "1e400", "-0.0", "1e3", "9" * 30, "true"])
@@ -134,7 +134,7 @@ def test_letters_that_deceive_the_eye_or_steer_a_terminal_do_neither(name):
 
 
 @pytest.mark.parametrize("size", [250_001, 100_000_000])
-def test_a_file_of_any_size_is_refused_within_a_second(tmp_path, size, record_property):
+def test_a_file_of_any_size_is_refused_within_two_seconds(tmp_path, size, record_property):
     path = tmp_path / "campaign.toml"
     with open(path, "wb") as file:
         file.write(HEAD.encode())
@@ -142,8 +142,8 @@ def test_a_file_of_any_size_is_refused_within_a_second(tmp_path, size, record_pr
     begin = time.process_time()
     with pytest.raises(CampaignError, match="is larger than 250 kB"):
         load_campaign(path)
-    record_property("seconds", taken := time.process_time() - begin)
-    assert taken < SENTENCE_S
+    record_property("seconds", duration := time.process_time() - begin)
+    assert duration < SENTENCE_S
 
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-32", "cp037", "utf-16-le"])
@@ -183,7 +183,7 @@ def test_text_that_steers_a_terminal_or_fills_a_report_is_refused(head, place, t
 
 def test_a_note_may_have_lines_and_a_title_letters_of_any_language():
     text = f'{HEAD}title = "Wiedereintritt: größte Last, 再突入"\nnote = "one\\n\\ttwo"\n{FREE}'
-    assert [one.name for one in load_campaign("x.toml", text=text).requirements] == ["fuel"]
+    assert [requirement.name for requirement in load_campaign("x.toml", text=text).requirements] == ["fuel"]
 
 
 def test_campaigns_that_take_their_inputs_from_one_another_are_refused(tmp_path):
@@ -207,7 +207,7 @@ DANGERS = re.compile(r"\b(pickle|marshal|shelve|dill|cloudpickle|yaml)\b")
 
 def test_no_source_reads_pickles_or_turns_text_into_code():
     root = Path(mc_engine.__file__).resolve().parents[1]
-    found = []
+    dangerous = []
     for path in [*root.glob("mc_engine/**/*.py"), *root.glob("reports/**/*.py"), *root.glob("campaigns/**/*.py")]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import | ast.ImportFrom) else []
@@ -217,8 +217,8 @@ def test_no_source_reads_pickles_or_turns_text_into_code():
                 isinstance(node, ast.keyword) and node.arg == "allow_pickle" and ast.unparse(node.value) != "False"
             )
             if called in ("eval", "exec", "compile", "__import__") or allow_pickle or any(map(DANGERS.search, names)):
-                found.append(f"{path.relative_to(root)}, line {getattr(node, 'lineno', 0)}")
-    assert found == []
+                dangerous.append(f"{path.relative_to(root)}, line {getattr(node, 'lineno', 0)}")
+    assert dangerous == []
 
 
 # ---- CSV
