@@ -60,13 +60,6 @@ def put_manifest(run, content):
     vouch(run, manifest=sha256(content).hexdigest())
 
 
-def put_companion(run, name, content):
-    """The bytes as a file beside the campaign, with its digest in the journal."""
-    (run / name).write_bytes(content)
-    entries = scan((run / "journal.jsonl").read_bytes()).entries
-    vouch(run, companions={**entries[0].facts["companions"], name: sha256(content).hexdigest()})
-
-
 def vouch(run, **facts):
     entries = scan((run / "journal.jsonl").read_bytes()).entries
     entries[0].facts.update(facts)

@@ -147,12 +147,6 @@ def test_mutated_records_end_in_a_sentence_and_open_nothing_outside(tmp_path, ki
     check_mutations(RECORDS[kind][1](tmp_path), kind, 12, 3, opened)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", RECORDS)
-def test_three_hundred_mutated_records_end_in_a_sentence_and_open_nothing_outside(tmp_path, kind, opened):
-    check_mutations(RECORDS[kind][1](tmp_path), kind, 300, 4, opened)
-
-
 # ---- replays
 
 

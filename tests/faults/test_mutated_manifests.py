@@ -65,33 +65,3 @@ def test_mutated_manifests_are_answered_with_a_sentence(run, flown, count, recor
         put_manifest(run, content)
         counts[asked(READERS[k % len(READERS)], run, flown).exit_code] += 1
     record_property("exit statuses", " ".join(f"{status}: {n}" for status, n in sorted(counts.items())))
-
-
-DIRTY = {
-    "git of another type": lambda m: m["provenance"].update(git="clean"),
-    "git as a list": lambda m: m["provenance"].update(git=[1]),
-    "packages as a list": lambda m: m["provenance"].update(packages=["numpy"]),
-    "half a letter": lambda m: m["columns"][-1].update(description="\ud800"),
-    "half a letter in a name that is no member": lambda m: m.update({"\ud800": 1}),
-    "a figure without its columns": lambda m: m["figures"].append({"kind": "map", "x": "height_m"}),
-    "a figure of numbers": lambda m: m["figures"].append({"kind": "scatter", "x": 1, "y": 2, "title": 3}),
-    "published as numbers": lambda m: m["published"].append(7),
-    "a statistic without a number": lambda m: m["published"].append(
-        {"quantity": "q", "published": "x", "statistic": "mean", "of": "height_m", "over": []}
-    ),
-    "upstream as words": lambda m: m.update(upstream="elsewhere"),
-    "a number that is none": lambda m: m["parameters"].append({"name": "p", "value": float("nan")}),
-    "a requirement on no column": lambda m: m["requirements"][0].update(metric="9" * 400),
-    "an impossible confidence": lambda m: m["requirements"][0].update(confidence=1e-17),
-}
-
-
-@pytest.mark.parametrize("case", DIRTY)
-def test_every_member_of_a_manifest_has_its_type(run, flown, case):
-    record = json.loads((flown / "manifest.json").read_bytes())
-    DIRTY[case](record)
-    put_manifest(run, json.dumps(record).encode())
-    for verb in READERS:
-        done = asked(verb, run, flown)
-        assert done.exit_code == 5, (verb, done.output)
-        assert "manifest.json: " in done.output

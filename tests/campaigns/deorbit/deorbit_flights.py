@@ -15,7 +15,7 @@ PULSED = DEMONSTRATION | {"control": "pulsed"}
 def fly_cases(**inputs):
     """Columns of as many cases as the longest input has values, eight cases at a time."""
     n_cases = max((np.size(value) for value in inputs.values()), default=1)
-    return fly(MODEL, NOMINAL | inputs, np.arange(n_cases), SEED, width=8)
+    return fly(MODEL, NOMINAL | inputs, np.arange(n_cases), SEED)
 
 
 def fly_one(**inputs):
