@@ -17,23 +17,55 @@ FAULTS = TESTS + "faults/"
 # them out, as it does all tests marked `benchmark`; `pytest -m deep` runs them, and so does continuous integration.
 DEEP = (
     "benchmarks/",
+    "campaigns/flexible_satellite/test_flexible_modulator.py::test_cases_with_many_pulses",
+    "campaigns/flexible_satellite/test_flexible_tuning.py",
+    "campaigns/flexible_satellite/test_flexible_twin.py::test_every_width",
     "campaigns/geo_injection/test_geo_box.py",
+    "campaigns/geo_injection/test_geo_dispersed.py::test_the_nominal_replay",
+    "campaigns/geo_injection/test_geo_optimum.py",
     "campaigns/geo_injection/test_geo_parking.py",
+    "campaigns/geo_injection/test_geo_programs.py::test_a_kept_program",
+    "campaigns/geo_injection/test_geo_twins.py::test_a_case_has_the_same_bits",
+    "campaigns/geo_servicing/test_servicing_inspection.py::test_as_many_runs",
+    "campaigns/geo_servicing/test_servicing_inspection.py::test_the_first_burns",
+    "campaigns/geo_servicing/test_servicing_inspection.py::test_the_flight_burns_when",
+    "campaigns/geo_servicing/test_servicing_inspection.py::test_with_the_gain",
+    "campaigns/geo_servicing/test_servicing_motion.py::test_a_case_has_the_same_bits",
+    "campaigns/geo_servicing/test_servicing_motion.py::test_sunlight_and_shadow",
+    "campaigns/geo_servicing/test_servicing_motion.py::test_thirty_free_days",
+    "campaigns/geo_servicing/test_servicing_phasing.py::test_the_dispersed_campaign",
+    "campaigns/geo_servicing/test_servicing_plan.py::test_a_plan_can_end",
+    "campaigns/geo_servicing/test_servicing_plan.py::test_the_fast_plan",
+    "campaigns/geo_servicing/test_servicing_plan.py::test_two_corrections",
+    "campaigns/reentry/test_reentry_flight.py::test_sixty_dispersed_cases",
     "documentation/test_examples.py",
     "documentation/test_site.py",
     "documentation/test_tutorial.py",
     "faults/",
+    "mc_engine/flight/test_kernel.py",
+    "mc_engine/flight/test_lost_numbers.py",
+    "mc_engine/flight/test_model_contract.py",
+    "mc_engine/statistics/test_change_tests.py",
     "mc_engine/statistics/test_coverage.py",
     "mc_engine/statistics/test_rare_events.py",
     "mc_engine/studies/test_rare_event.py",
+    "mc_engine/test_files_beside.py",
     "reports/test_browser.py",
 )
-# Of these, the ones that are always run: a killed run that is resumed, a flipped byte, a dead worker, hostile inputs.
+# Of these, the ones that are always run.
 NOT_DEEP = (
-    "faults/test_damage.py::test_verify_names_every_file",
+    "faults/test_damage.py::test_verify_names_every_file",  # flipped bytes
     "faults/test_hostile_input.py",
-    "faults/test_killed_runs.py::test_a_killed_run",
+    "faults/test_killed_runs.py::test_a_killed_run",  # killed, and resumed
     "faults/test_worker_deaths.py::test_workers_killed",
+    "mc_engine/flight/test_model_contract.py::test_shipped_campaigns_keep_the_contract[deorbit",
+    "mc_engine/flight/test_model_contract.py::test_shipped_campaigns_keep_the_contract[minimal",
+    "mc_engine/statistics/test_change_tests.py::test_a_paired_share",
+    "mc_engine/statistics/test_change_tests.py::test_a_spread",
+    "mc_engine/statistics/test_change_tests.py::test_holm",
+    "mc_engine/statistics/test_change_tests.py::test_newcombes",
+    "mc_engine/statistics/test_change_tests.py::test_the_same_numbers",
+    "mc_engine/test_files_beside.py::test_declared_data_goes_with_the_run",
 )
 
 

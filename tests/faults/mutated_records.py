@@ -63,7 +63,7 @@ def put_manifest(run, content):
 def vouch(run, **facts):
     entries = scan((run / "journal.jsonl").read_bytes()).entries
     entries[0].facts.update(facts)
-    lines = [encode(number, one.at, one.event, one.facts) for number, one in enumerate(entries, start=1)]
+    lines = [encode(number, entry.at, entry.event, entry.facts) for number, entry in enumerate(entries, start=1)]
     (run / "journal.jsonl").write_bytes(b"".join(lines))
 
 

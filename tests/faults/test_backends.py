@@ -12,7 +12,6 @@ from mc_engine.flight.chunks import Order
 from mc_engine.runner import cluster_pool as cluster_crew
 from mc_engine.runner import runner
 from mc_engine.runner.backends import Backend
-from mc_engine.runner.pools import ThreadCrew
 from mc_engine.runner.shards import Shard
 from mc_engine.runner.worker_process import Site, perform
 from mc_engine.store.verification import damage
@@ -111,17 +110,6 @@ def test_missing_shards_are_named_with_the_commands_that_fly_them(campaign, tmp_
     assert not (tmp_path / "merged").exists()
 
 
-def test_the_absent_of_a_hundred_million_shards_are_named_at_once(tmp_path):
-    campaign = load_campaign("minimal", cases=500)
-    runner.run(campaign, tmp_path / "one", workers=1, shard=Shard(1, 10**8))
-    with pytest.raises(StoreError) as caught:
-        runner.merge(tmp_path / "merged", [tmp_path / "one"])
-    text = str(caught.value)
-    assert "cases 0 to 499 are missing" in text
-    assert "--shard 200000/100000000 --out DIR`" in text  # the first that has a case
-    assert text.endswith("and more")
-
-
 def test_shards_that_differ_or_are_of_another_campaign_are_not_merged(campaign, tmp_path):
     for number in (1, 2):
         runner.run(campaign, tmp_path / f"{number}", shard=Shard(number, 2))
@@ -193,20 +181,6 @@ def test_backends_that_cannot_be_are_told(arguments, words):
         Backend(*arguments)
 
 
-def test_a_damaged_part_is_flown_again_and_only_that(campaign, whole, tmp_path):
-    shutil.copytree(whole.path, tmp_path / "run")
-    victim, lost = (tmp_path / "run" / part.file for part in whole.parts[3:5])
-    victim.write_bytes(victim.read_bytes()[:-1] + b"?")
-    lost.unlink()
-    times = {path: path.stat().st_mtime_ns for path in (tmp_path / "run" / "cases").iterdir()}
-    store = runner.resume(tmp_path / "run", repair=True)
-    assert damage(store.path) == []
-    assert files_of(store.path) == files_of(whole.path)
-    assert store.cases().equals(whole.cases())
-    changed = {path.name for path, time in times.items() if path.stat().st_mtime_ns != time}
-    assert changed == {victim.name}
-
-
 def test_a_grid_without_a_seed_can_be_resumed_and_replayed(tmp_path):
     folder = campaign_folder(tmp_path / "stones", 50)
     text = (folder / "campaign.toml").read_text().replace("seed = 1\n", "")
@@ -232,9 +206,3 @@ def test_a_worker_of_other_sources_is_refused(campaign, whole):
     assert perform(site, Order(0, 10)).part.rows == 10
 
 
-def test_threads_by_the_hundred_thousand_are_as_many_as_a_system_has_room_for(tmp_path):
-    crew = ThreadCrew(lambda order: None, 100_000)
-    try:
-        assert 2 < crew.room() < 10_000
-    finally:
-        crew.close(at_once=True)

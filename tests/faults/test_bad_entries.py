@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 import sys
-from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -259,53 +258,3 @@ def chain(tmp_path_factory):
 
 
 # ---- many of them
-
-
-def bad_inputs(rng, folder, minimal):
-    """A command with one bad input of the kinds above, which no engine takes."""
-    shutil.rmtree(folder, ignore_errors=True)
-    shutil.copytree(minimal, folder)
-    campaign, text = folder / "campaign.toml", (minimal / "campaign.toml").read_text()
-    bad = ("nan", "inf", "-inf", "1e400", "1e-17", "-1", "0", "9" * 400, "[]", "{}", '""', "true", "1e308", '"x"')
-    kind = int(rng.integers(6))
-    if kind == 0:
-        lines = text.splitlines()
-        k = int(rng.choice([number for number, line in enumerate(lines) if "=" in line]))
-        key = lines[k].partition("=")[0]
-        lines[k] = f"{key}= {bad[rng.integers(len(bad))]}"
-        campaign.write_text("\n".join(lines))
-    elif kind == 1:
-        cells = ("1_0", "\u0661", "nan", "", "x", "1e999", "0x1", "\x00", '"', "1,2,3")
-        table = "burn_dv_m_s,pitch_error_deg\n1,1\n" + f"2,{cells[rng.integers(len(cells))]}\n"
-        (folder / "cases.csv").write_text(table)
-        campaign.write_text('[campaign]\nmodel = "model.py"\ndesign = "table"\ntable = "cases.csv"\n')
-    elif kind == 2:
-        made = list(PARQUETS.values())[rng.integers(len(PARQUETS))]
-        parquet(folder / "cases.parquet", made, ("burn_dv_m_s", "burn_dv_m_s"))
-        campaign.write_text('[campaign]\nmodel = "model.py"\ndesign = "table"\ntable = "cases.parquet"\n')
-    elif kind == 3:
-        content = bytearray(campaign.read_bytes())
-        for _ in range(20):
-            content[rng.integers(len(content))] = rng.integers(256)
-        campaign.write_bytes(bytes(content))
-    elif kind == 4:
-        model = (folder / "model.py").read_text()
-        odd = ("\\ud800", "\\x00", "\\x1b[2J")[rng.integers(3)]
-        (folder / "model.py").write_text(model.replace("size of the burn", f"size{odd}"))
-    else:
-        option = ("--cases", "--seed", "--workers", "--max-failed", "--memory", "--case-seconds")[rng.integers(6)]
-        number = ("nan", "inf", "-1", "9" * 30, "1_0", "\u0661", "x", "1e3e3")[rng.integers(8)]
-        return ("run", folder, "--backend", "loky", "--out", folder / "run", option, number)
-    return ("check", "--no-model", folder)
-
-
-@pytest.mark.parametrize("count", [40, pytest.param(200, marks=pytest.mark.slow)])
-def test_mutated_bad_inputs_never_exit_with_1(tmp_path, minimal, count, record_property):
-    rng = np.random.default_rng(count)
-    statuses = Counter()
-    for _ in range(count):
-        done = call(*bad_inputs(rng, tmp_path / "c", minimal))
-        assert_answered(done, 0, 2, 5, 6)  # 0 where what was meant to be bad is not
-        statuses[done.exit_code] += 1
-    record_property("exit statuses", " ".join(f"{status}: {n}" for status, n in sorted(statuses.items())))
-    assert statuses[2] > 0.6 * count

@@ -62,15 +62,9 @@ def check_all_damage_is_named(run, cuts, flips, seed):
     return tried
 
 
-def test_verify_names_every_file_that_was_cut_or_has_a_flipped_bit(run, record_property):
-    record_property("damages", check_all_damage_is_named(run, cuts=3, flips=8, seed=1))
-
-
-@pytest.mark.slow
-def test_verify_names_all_of_fifty_cuts_and_two_hundred_flips_in_each_file(run, record_property):
-    tried = check_all_damage_is_named(run, cuts=50, flips=200, seed=2)
-    record_property("damages", tried)
-    print(f"{tried} of {tried} cuts and flipped bits were named by verify, in {len(files_of(run))} files")
+@pytest.mark.parametrize(("cuts", "flips"), [(3, 8), pytest.param(50, 200, marks=pytest.mark.slow)])
+def test_verify_names_every_file_that_was_cut_or_has_a_flipped_bit(run, cuts, flips, record_property):
+    record_property("damages", check_all_damage_is_named(run, cuts, flips, seed=1))
 
 
 def test_a_torn_last_line_loads_and_a_torn_middle_line_is_refused_with_its_number(run):

@@ -40,8 +40,8 @@ def run(flown, tmp_path):
 
 def asked(verb, run, flown):
     """What the command line says of the run, and that it opened nothing that the manifest names outside of it."""
-    more = OPTIONS.get(verb, (flown,) if verb == "compare" else ("--out", run.parent / "out.csv"))
-    arguments = (verb, run, *(more if verb in (*OPTIONS, "compare", "export") else ()))
+    options = OPTIONS.get(verb, (flown,) if verb == "compare" else ("--out", run.parent / "out.csv"))
+    arguments = (verb, run, *(options if verb in (*OPTIONS, "compare", "export") else ()))
     opened.clear()
     watching[0] = True
     done = call(*arguments)

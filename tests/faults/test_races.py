@@ -131,16 +131,9 @@ def check_races(folder, count, seed, broken=()):
     return waited
 
 
-def test_of_two_runs_in_one_directory_one_is_refused_and_the_other_is_whole(tmp_path, record_property):
-    waited = check_races(tmp_path, 5, seed=1)
-    record_property("races", len(waited))
-    record_property("seconds till the second was refused", waited)
-    assert max(waited) < 1.0
-
-
-@pytest.mark.slow
-def test_a_hundred_races_corrupt_nothing(tmp_path, record_property):
-    waited = check_races(tmp_path, 100, seed=2)
+@pytest.mark.parametrize("count", [5, pytest.param(100, marks=pytest.mark.slow)])
+def test_of_two_runs_in_one_directory_one_is_refused_and_the_other_is_whole(tmp_path, count, record_property):
+    waited = check_races(tmp_path, count, seed=1)
     record_property("races", len(waited))
     record_property("seconds till the second was refused", waited)
     assert max(waited) < 1.0
@@ -228,26 +221,19 @@ def delete_lock(run):
     (run / ".lock").unlink(missing_ok=True)
 
 
-def test_of_three_at_once_one_writes_without_locks_of_the_system(long_run, tmp_path, record_property):
-    told = check_three_at_once(long_run, tmp_path, 2, locks=False)
+SOME = [2, pytest.param(20, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("count", SOME)
+def test_of_three_at_once_one_writes_without_locks_of_the_system(long_run, tmp_path, count, record_property):
+    told = check_three_at_once(long_run, tmp_path, count, locks=False)
     record_property("racers refused", len(told))
     words = ("is writing here", "is about to begin here", "holds a run already")
-    assert all(any(one in said for one in words) for said in told), told
+    assert all(any(word in said for word in words) for said in told), told
 
 
-@pytest.mark.slow
-def test_of_three_at_once_one_writes_without_locks_of_the_system_twenty_times(long_run, tmp_path, record_property):
-    record_property("racers refused", len(check_three_at_once(long_run, tmp_path, 20, locks=False)))
-
-
-def test_a_lock_deleted_in_flight_lets_nobody_in(long_run, tmp_path, record_property):
-    told = check_three_at_once(long_run, tmp_path, 2, locks=True, meanwhile=delete_lock)
+@pytest.mark.parametrize("count", SOME)
+def test_a_lock_deleted_in_flight_lets_nobody_in(long_run, tmp_path, count, record_property):
+    told = check_three_at_once(long_run, tmp_path, count, locks=True, meanwhile=delete_lock)
     record_property("racers refused", len(told))
     assert all("is writing here" in said for said in told), told
-
-
-@pytest.mark.slow
-def test_a_lock_deleted_in_flight_lets_nobody_in_twenty_times(long_run, tmp_path, record_property):
-    record_property(
-        "racers refused", len(check_three_at_once(long_run, tmp_path, 20, locks=True, meanwhile=delete_lock))
-    )

@@ -13,7 +13,7 @@ PULSED = DEMONSTRATION | {"control": "pulsed"}
 
 
 def fly_cases(**inputs):
-    """Columns of as many cases as the longest input has values, eight cases at a time."""
+    """Columns of as many cases as the longest input has values."""
     n_cases = max((np.size(value) for value in inputs.values()), default=1)
     return fly(MODEL, NOMINAL | inputs, np.arange(n_cases), SEED)
 

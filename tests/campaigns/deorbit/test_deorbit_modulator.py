@@ -51,7 +51,7 @@ def trains():
     inputs["on_n"][1:] = draw.uniform(8.0, 12.0, 23)
     inputs["off_n"][1:] = draw.uniform(3.0, 7.0, 23)
     inputs["time_constant_s"][1:] = draw.uniform(1.0, 3.0, 23)
-    return inputs, fly(model, inputs, np.arange(24), 1, folder=FOLDER, width=8)
+    return inputs, fly(model, inputs, np.arange(24), 1, folder=FOLDER)
 
 
 def test_flown_by_the_engine_the_textbook_case_switches_on_time(trains):

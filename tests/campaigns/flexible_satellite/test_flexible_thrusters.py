@@ -22,30 +22,6 @@ def seen():
     return history(rows=60_000, **TABLE_8)
 
 
-def test_table_8_comes_out_as_recomputed(table_8):
-    assert table_8[SETTLED] == pytest.approx(168.0, abs=4.0)
-    assert table_8["peak_modal_displacement"] == pytest.approx(0.038, rel=0.1)
-    assert table_8[IMPULSE] == pytest.approx(50.4, rel=0.02)
-    assert table_8[ATTITUDE] == pytest.approx(133.8, rel=0.02)
-
-
-def test_a_pulse_of_table_8_has_the_printed_torque_of_0_535(seen):
-    torques = np.abs([seen[f"torque_{axis}_n_m"] for axis in AXES])
-    assert torques.max() == 0.535
-
-
-def test_table_4_comes_out_as_recomputed():
-    row = fly_one(**TABLE_4)
-    assert row[IMPULSE] == pytest.approx(50.25, rel=0.02)
-    assert row[ATTITUDE] == pytest.approx(135.0, rel=0.02)
-    assert row[SETTLED] == pytest.approx(170.0, abs=4.0)
-
-
-def test_table_9_comes_out_as_recomputed(table_9):
-    assert table_9[IMPULSE] == pytest.approx(42.6, rel=0.02)
-    assert table_9[ATTITUDE] == pytest.approx(113.8, rel=0.02)
-
-
 def test_table_9_is_better_than_table_8_in_both_objectives_and_fires_less_as_the_source_says(table_8, table_9):
     assert table_9[IMPULSE] < 0.9 * table_8[IMPULSE]
     assert table_9[ATTITUDE] < 0.9 * table_8[ATTITUDE]
@@ -61,33 +37,6 @@ def test_the_printed_k_p_of_table_9_cannot_be_right(table_8):
     assert printed[ATTITUDE] > 2.0 * table_8[ATTITUDE]
     other = fly_one(**TABLE_9 | {"kp": 6.2})
     assert (other[IMPULSE], other[ATTITUDE]) < (table_8[IMPULSE], table_8[ATTITUDE])
-
-
-def test_only_the_small_integral_gain_comes_near_the_bound_of_table_5(table_9):
-    """Without thrusters 0.0054; the limit cycle of pairing B adds a hundredth."""
-    assert fly_one(**TABLE_9 | {"actuator": "ideal"})["q_vector_norm"] == pytest.approx(0.0054, abs=1e-4)
-    assert table_9["q_vector_norm"] == pytest.approx(0.015, abs=0.003)
-    assert table_9["eta_norm"] < 0.005
-
-
-@pytest.mark.parametrize("table", [TABLE_8, TABLE_9], ids=["Table 8", "Table 9"])
-def test_modes_and_rate_stay_below_their_printed_bounds(table):
-    row = fly_one(**table)
-    assert row["peak_modal_displacement"] < 0.08
-    assert row["peak_rate_rad_s"] < 0.1
-
-
-def test_with_thrusters_the_attitude_is_reached_later_than_the_printed_150_s(table_8):
-    """Suspected cause: "after 150 s" is read off a curve; the other two pairings settle at 61 s."""
-    assert table_8[SETTLED] == pytest.approx(168.35, abs=0.5)
-    assert fly_one()[SETTLED] < table_8[SETTLED]  # "with thrusters it takes longer": this holds
-
-
-@pytest.mark.parametrize(("step", "size"), [(0.005, 0.0100), (0.0025, 0.0050), (0.001, 0.0041)])
-def test_what_is_left_at_the_end_is_a_place_on_a_limit_cycle_that_moves_with_the_sample(step, size):
-    """Table 9 with pairing A: 0.004, as recomputed in the digest, with samples of 1 ms alone."""
-    row = fly_one(**TABLE_9 | {"step_s": step}, pwpf_pairing="A")
-    assert row["q_vector_norm"] == pytest.approx(size, abs=5e-5)
 
 
 # pairing, settled [s], largest modal displacement: recomputed in the digest
@@ -142,10 +91,6 @@ def test_the_bookkeeping_agrees_with_the_history(table_8, seen):
         assert counted[-1] == table_8[f"pulse_count_{axis}"]
         # pauses are longer than a sample, so each pulse is a train of samples of its own
         assert table_8[f"pulse_count_{axis}"] == np.sum(firing[1:] & ~firing[:-1])
-
-
-def test_the_shortest_pulse_is_that_of_equation_19_to_a_fifth_of_a_percent(table_8):
-    assert table_8["min_pulse_s"] == pytest.approx(0.020582, rel=3e-3)
 
 
 def test_a_dead_thruster_pair_fires_without_effect():

@@ -50,6 +50,9 @@ def random_case(number):
         ("torque_limit_n_m", 0.3, 1.0), ("rate_limit_rad_s", 0.02, 0.2), ("dbar_n_m", 0.0, 1e-3),
         ("switching_rate_gain", 0.0, 0.1), ("switching_attitude_gain_1_s", 0.0, 0.1),
         ("thrust_level", 0.8, 1.2), ("valve_delay_s", 0.0, 0.02), ("arm_m", 0.3, 0.7), ("isp_s", 150.0, 250.0),
+        ("delta_p", 1.5, 3.0), ("delta_i", 3.0, 8.0), ("delta_d", 5.0, 12.0),
+        ("pwpf_gain", 6.0, 9.0), ("pwpf_time_constant_s", 0.5, 0.9), ("pwpf_u_off", 0.1, 0.15),
+        ("pwpf_hysteresis", 0.2, 0.3),
     ]:  # fmt: skip
         case[name] = draw.uniform(low, high)
     case |= {f"initial_q{k}": value for k, value in enumerate(draw.normal(size=4))}
@@ -69,6 +72,13 @@ def test_a_random_case_with_an_ideal_actuator_flies_like_its_slow_twin(number):
 @pytest.mark.parametrize("number", range(4, 7))
 def test_a_random_case_with_thrusters_flies_like_its_slow_twin(number):
     assert gaps(random_case(number) | PULSED) == {}
+
+
+def test_the_random_cases_disperse_every_parameter_but_noise():
+    case = random_case(0)
+    alike = {f"inertia_{axis}_kg_m2" for axis in "xyz"}  # as their factors
+    names = {parameter.name for parameter in MODEL.parameters} - alike
+    assert {name for name in names if "noise" not in name} <= set(case)
 
 
 def test_the_random_cases_are_of_every_kind():

@@ -160,8 +160,6 @@ def test_with_the_gain_of_the_ideal_case_one_trial_in_eight_leaves_the_sources_b
     chi1 = np.full(1000, 0.85)
     share = held(fly_cases(**INSPECTION | GOOD_FIXES | EXECUTION, chi1=chi1)).mean()
     assert share == pytest.approx(0.88, abs=0.03)
-    (record,) = [one for one in MODEL.published if "keep the steady range" in one["quantity"]]
-    assert 100.0 * share == pytest.approx(record["ours"], abs=0.05)
     assert held(fly_cases(**INSPECTION | GOOD_FIXES, chi1=chi1)).mean() == pytest.approx(0.845, abs=0.035)
 
 
@@ -180,8 +178,8 @@ def test_single_fixes_with_the_printed_errors_hold_nothing():
 def test_fixes_of_both_craft_err_as_one_relative_fix_of_their_root_sum_square():
     both = {"nav_position_m": 0.06, "target_nav_position_m": 0.08, "nav_velocity_m_s": 6e-6} | FIVE_DAYS
     row = fly_one(**INSPECTION | {"navigation": "raw"} | both | {"target_nav_velocity_m_s": 8e-6})
-    one = fly_one(**INSPECTION | GOOD_FIXES | FIVE_DAYS)
-    assert row["delta_v_m_s"] == pytest.approx(one["delta_v_m_s"], rel=1e-9)
+    relative_fix = fly_one(**INSPECTION | GOOD_FIXES | FIVE_DAYS)
+    assert row["delta_v_m_s"] == pytest.approx(relative_fix["delta_v_m_s"], rel=1e-9)
     assert row["delta_v_m_s"] != fly_one(**INSPECTION | {"navigation": "raw"} | both)["delta_v_m_s"]
 
 

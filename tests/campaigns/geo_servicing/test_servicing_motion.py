@@ -127,15 +127,14 @@ def test_a_flight_finds_sun_and_moon_until_its_end_whenever_it_begins(duration):
     assert (row["end_x_m"] == longer["end_x_m"][:-1]).all()
 
 
-@pytest.mark.parametrize("width", [1, 16])
-def test_lanes_do_not_matter(width):
+def test_a_case_has_the_same_bits_whatever_the_width():
     inputs = {
         "phase": "inspection",
         "duration_days": 3.0,
         "epoch_utc": "2019-12-11T00:00:00",
         "thrust_noise_pct": np.full(5, 0.5),
     }
-    wide, other = fly_cases(**inputs), fly_cases(**inputs, width=width)
+    wide, other = fly_cases(**inputs), fly_cases(**inputs, width=1)
     for name in ("end_x_m", "end_vy_m_s", "min_range_m", "delta_v_m_s"):
         assert (wide[name] == other[name]).all()
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reentry_flights import EXACT, PLANAR, TEXTBOOK, ballistic, fly_cases, fly_one, history
+from reentry_flights import EXACT, PLANAR, TEXTBOOK, assert_same_bits_alone, ballistic, fly_cases, fly_one, history
 from reentry_twin import standard_density
 
 DISPERSED = {"entry_speed_error_m_s": 5.0, "entry_flight_path_angle_error_deg": 0.05, "density_deviation": 1.0}
@@ -127,11 +127,7 @@ def test_the_timer_ends_a_flight_and_the_time_limit_is_no_end():
 
 def test_sixty_dispersed_cases_have_the_bits_of_each_alone_one_case_at_a_time():
     inputs = dispersed(60, 4) | {"bank_error_deg": np.linspace(-3.0, 3.0, 60)}
-    together = fly_cases(**inputs)
-    for i in range(0, 60, 7):
-        alone = fly_cases(width=1, ids=np.array([i]), **{name: values[i] for name, values in inputs.items()})
-        for name, column in together.items():
-            assert column[i : i + 1].tolist() == alone[name].tolist() or np.isnan(column[i]), name
+    assert_same_bits_alone(fly_cases(**inputs), range(0, 60, 7), width=1, each=inputs)
 
 
 def test_a_ballistic_case_has_the_same_bits_beside_lifting_ones():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reentry_flights import MU, PLANAR, RADIUS, fly_cases, fly_one, history, plan_of
+from reentry_flights import MU, PLANAR, RADIUS, assert_same_bits_alone, fly_cases, fly_one, history, plan_of
 from reentry_twin import standard_density
 from scipy.integrate import solve_ivp
 
@@ -114,7 +114,5 @@ def test_vehicles_may_be_mixed_and_have_the_bits_of_each_alone():
     names = np.array(["apollo", "given", "sample_return", "apollo", "soyuz"] * 4, dtype=object)
     angle = np.linspace(-3.0, -2.0, 20)
     together = fly_cases(**PLANAR, vehicle=names, entry_flight_path_angle_deg=angle)
-    for i in range(5):
-        alone = fly_cases(width=1, ids=np.array([i]), **PLANAR, vehicle=names[i], entry_flight_path_angle_deg=angle[i])
-        for name, column in together.items():
-            assert column[i : i + 1].tolist() == alone[name].tolist() or np.isnan(column[i]), name
+    each = {"vehicle": names, "entry_flight_path_angle_deg": angle}
+    assert_same_bits_alone(together, range(5), each=each, **PLANAR)

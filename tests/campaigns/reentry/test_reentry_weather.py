@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reentry_flights import MU, NOMINAL, PLANAR, RADIUS, fly_cases, fly_one, history
+from reentry_flights import MU, NOMINAL, PLANAR, RADIUS, assert_same_bits_alone, fly_cases, fly_one, history
 from reentry_twin import standard_density
 from scipy.integrate import solve_ivp
 
@@ -29,15 +29,17 @@ draws = st.floats(1e-9, 1.0 - 1e-9)
 @pytest.fixture(scope="module")
 def nodes():
     """float64[N, NODES, 3] of full size, without a mean wind."""
-    one = np.ones(N)
-    return weather_nodes(np.random.default_rng(76).uniform(size=N), one, one, 0.0 * one)[:, :DEPTH].reshape(N, NODES, 3)
+    unity = np.ones(N)
+    return weather_nodes(np.random.default_rng(76).uniform(size=N), unity, unity, 0.0 * unity)[:, :DEPTH].reshape(
+        N, NODES, 3
+    )
 
 
 @pytest.fixture(scope="module")
 def depths():
     """float64[N] of the same cases."""
-    one = np.ones(N)
-    return weather_nodes(np.random.default_rng(76).uniform(size=N), one, one, 0.0 * one)[:, DEPTH]
+    unity = np.ones(N)
+    return weather_nodes(np.random.default_rng(76).uniform(size=N), unity, unity, 0.0 * unity)[:, DEPTH]
 
 
 def test_deviates_are_standard_normal_and_independent():
@@ -62,8 +64,8 @@ def test_each_altitude_has_the_size_of_its_profile(nodes, depths, field, column)
 
 def test_no_altitude_is_favoured_by_the_nodes(depths):
     """Extremes of the air lie at nodes; they are spread evenly over altitude from case to case."""
-    one = np.ones(600)
-    table = weather_nodes(np.random.default_rng(5).uniform(size=600), one, one, one)
+    unity = np.ones(600)
+    table = weather_nodes(np.random.default_rng(5).uniform(size=600), unity, unity, unity)
     above = np.arange(40e3, 48e3, 50.0)
     profiles = np.array([[weather_at(h, 0.0, row).density for h in above] for row in table])
     peak = profiles.argmax(axis=1)
@@ -75,31 +77,31 @@ def test_no_altitude_is_favoured_by_the_nodes(depths):
 
 def test_the_correlation_over_altitude_is_the_mean_of_the_two_scales(nodes):
     for apart in (1, 3, 8):
-        found = np.corrcoef(nodes[:, 30, 0], nodes[:, 30 + apart, 0])[0, 1]
+        nodes_of_case = np.corrcoef(nodes[:, 30, 0], nodes[:, 30 + apart, 0])[0, 1]
         distance = apart * SPACING
         expected = 0.5 * (np.exp(-distance / SMALL_SCALE) + np.exp(-distance / LARGE_SCALE))
-        assert found == pytest.approx(expected, abs=0.06)
+        assert nodes_of_case == pytest.approx(expected, abs=0.06)
 
 
 def test_density_and_winds_are_independent(nodes):
-    for one, other in ((0, 1), (0, 2), (1, 2)):
-        assert abs(np.corrcoef(nodes[:, 25, one], nodes[:, 25, other])[0, 1]) < 0.07
+    for unity, other in ((0, 1), (0, 2), (1, 2)):
+        assert abs(np.corrcoef(nodes[:, 25, unity], nodes[:, 25, other])[0, 1]) < 0.07
 
 
 def test_zero_names_the_mean_air():
-    one = np.ones(2)
-    table = weather_nodes(np.array([0.0, 0.5]), one, one, one)
-    found = table[:, :DEPTH].reshape(2, NODES, 3)
+    unity = np.ones(2)
+    table = weather_nodes(np.array([0.0, 0.5]), unity, unity, unity)
+    nodes_of_case = table[:, :DEPTH].reshape(2, NODES, 3)
     assert table[0, DEPTH] == 0.0
-    assert np.abs(found[0, :, [0, 2]]).max() == 0.0
-    assert found[0, :, 1].tolist() == standard_profile(3, node_altitudes(np.zeros(1))[0]).tolist()
-    assert np.abs(found[1, :, 0]).max() > 0.0
+    assert np.abs(nodes_of_case[0, :, [0, 2]]).max() == 0.0
+    assert nodes_of_case[0, :, 1].tolist() == standard_profile(3, node_altitudes(np.zeros(1))[0]).tolist()
+    assert np.abs(nodes_of_case[1, :, 0]).max() > 0.0
 
 
 @given(draw=draws, h=st.floats(-1e3, 140e3))
 def test_values_meet_the_nodes_and_slopes_are_derivatives(draw, h):
-    one = np.ones(1)
-    table = weather_nodes(np.array([draw]), one, one, one)[0]
+    unity = np.ones(1)
+    table = weather_nodes(np.array([draw]), unity, unity, unity)[0]
     altitudes = node_altitudes(table[DEPTH:])[0]
     k = int(np.clip(h / SPACING + table[DEPTH], 0, NODES - 2))
     at_node = weather_at(float(altitudes[k]), 0.0, table)
@@ -205,21 +207,11 @@ def test_weather_of_size_zero_is_no_weather():
 
 
 def test_the_air_of_a_case_hangs_on_its_number_alone():
-    """Not on its place in the chunk, the width of the build, its neighbours, or the law."""
+    """Not on its place in the chunk, its neighbours, or the law."""
     draw = np.random.default_rng(3).uniform(size=21)
     together = fly_cases(**PLANAR, weather=True, weather_draw=draw, guidance="law1", plan="given")
-    for i in (0, 10, 20):
-        alone = fly_cases(
-            width=1,
-            ids=np.array([i]),
-            **PLANAR,
-            weather=True,
-            weather_draw=draw[i : i + 1],
-            guidance="law1",
-            plan="given",
-        )
-        for name, column in together.items():
-            assert column[i : i + 1].tolist() == alone[name].tolist() or np.isnan(column[i]), name
+    law_1 = {"weather": True, "guidance": "law1", "plan": "given"}
+    assert_same_bits_alone(together, (0, 10, 20), each={"weather_draw": draw}, **PLANAR, **law_1)
     mixed = fly_cases(
         **PLANAR, weather=True, weather_draw=draw, plan="given",
         guidance=np.array(["law1", "none", "law2r"] * 7, dtype=object),

