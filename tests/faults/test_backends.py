@@ -204,5 +204,3 @@ def test_a_worker_of_other_sources_is_refused(campaign, whole):
         with pytest.raises(StoreError, match="was flown by other sources"):
             perform(site, Order(0, 10))
     assert perform(site, Order(0, 10)).part.rows == 10
-
-

@@ -82,14 +82,6 @@ def test_what_lies_on_s3_already_does_not_travel_again(s3, run):
     assert publish(run, f"{s3}/again").sent == ("journal.jsonl", "report.html", "derived.jsonl")
 
 
-def test_the_verbs_take_a_run_to_s3_and_report_on_it_there(s3, run, tmp_path):
-    for verb in (["publish", run, f"{s3}/verbs"], ["fetch", f"{s3}/verbs", tmp_path / "back"]):
-        answer = CliRunner().invoke(app, [str(word) for word in verb])
-        assert answer.exit_code == 0, answer.output
-    assert digests(tmp_path / "back") == digests(run)
-    assert len(open_store(f"{s3}/verbs").cases()) == 40
-
-
 def test_a_run_that_flies_keeps_its_copy_on_s3_and_a_report_on_it_is_written_there(s3, tmp_path):
     stones(tmp_path, 60)
     answer = run_verb("run", tmp_path / "campaign.toml", "--out", tmp_path / "run", "--publish", f"{s3}/flown")
@@ -195,16 +187,6 @@ def test_an_upload_that_breaks_off_anywhere_is_completed_and_never_loads_wrong(m
                 fetch(url, tmp_path / "none")
         assert len(publish(run, url).sent) == len(whole) - stop
         assert digests(fetch(url, tmp_path / f"back-{stop}")) == whole
-
-
-def test_a_copy_of_a_run_that_still_flies_holds_what_was_committed(memory, tmp_path):
-    store = created(tmp_path / "run")
-    for first in range(0, 40, 10):
-        store.append(first, 10, block(first, 10))
-        with open(store.path / "journal.jsonl", "ab") as journal:
-            journal.write(b'{"n": 99, torn')
-        publish(store.path, memory)
-        assert len(open_store(memory).cases()) == first + 10
 
 
 def test_a_part_that_no_longer_counts_is_removed_up_there(memory, run):
