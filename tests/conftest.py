@@ -30,6 +30,7 @@ DEEP = (
     "mc_engine/flight/test_kernel.py",
     "mc_engine/flight/test_lost_numbers.py",
     "mc_engine/flight/test_model_contract.py",
+    "mc_engine/lanes/test_adaptive_flight.py::test_every_width",
     "mc_engine/statistics/test_change_tests.py",
     "mc_engine/statistics/test_coverage.py",
     "mc_engine/statistics/test_rare_events.py",
