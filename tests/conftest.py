@@ -34,14 +34,15 @@ DEEP = (
     "mc_engine/statistics/test_change_tests.py",
     "mc_engine/statistics/test_coverage.py",
     "mc_engine/statistics/test_rare_events.py",
+    "mc_engine/store/test_writer_lock.py::test_two_runs_that_start",
     "mc_engine/studies/test_rare_event.py",
+    "mc_engine/test_contributions.py::test_flights_broken_off",
     "mc_engine/test_files_beside.py",
+    "mc_engine/test_interruption.py::test_a_signal_while",
     "reports/test_browser.py",
 )
-# Of these, the ones that are always run: each campaign against its twin, one fault of each kind, the smallest models.
+# Of these, the ones that are always run: re-entry against its twins, one fault of each kind, the smallest models.
 NOT_DEEP = (
-    "campaigns/geo_injection/test_geo_twins.py::test_all_errors",
-    "campaigns/geo_servicing/test_servicing_motion.py::test_the_sources_burns",
     "campaigns/reentry/test_reentry_twins.py",
     "faults/test_damage.py::test_verify_names_every_file",
     "faults/test_hostile_input.py",
@@ -54,7 +55,6 @@ NOT_DEEP = (
     "mc_engine/statistics/test_change_tests.py::test_holm",
     "mc_engine/statistics/test_change_tests.py::test_newcombes",
     "mc_engine/statistics/test_change_tests.py::test_the_same_numbers",
-    "mc_engine/test_files_beside.py::test_declared_data_goes_with_the_run",
 )
 
 
