@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from reports.drawings import NOMINAL, history_drawing, is_constant
-from reports.figures import Histories, HistoryLine, paper
-from reports.flown import Flown, Run
-from reports.pdf import render_picture
+from reports.drawing import paper
+from reports.drawing.pictures import render_picture
+from reports.figures import Histories, HistoryLine
+from reports.run.flown import Flown, Run
+from reports.sections.figure_blocks import NOMINAL, history_drawing, is_constant
 
 LARGEST = 1e100  # of any unit: what a flight that is lost holds beyond it, no axis can have ticks for
 

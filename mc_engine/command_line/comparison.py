@@ -48,7 +48,7 @@ def compare(
         typer.echo(line)
     for path in report or []:
         # As for the reports of a run: imported only where they are asked for.
-        importlib.import_module("reports.compare").write_comparison(found, path, (a, b))
+        importlib.import_module("reports.studies.comparison").write_comparison(found, path, (a, b))
         typer.echo(str(path))
     if found.changed:
         raise typer.Exit(CHANGED)

@@ -9,7 +9,7 @@ _HEAD = "# Words of a report\n\nThe same as in the last section of every report.
 
 def page() -> str:
     """A definition per word."""
-    glossary = importlib.import_module("reports.glossary").GLOSSARY  # the engine itself imports no reports
+    glossary = importlib.import_module("reports.document.glossary").GLOSSARY  # the engine itself imports no reports
     return (
         "\n\n".join([_HEAD, *(f"{escaped(word)}\n: {escaped(meaning)}" for word, meaning in glossary.entries)]) + "\n"
     )

@@ -1,4 +1,4 @@
-"""The kinds of figures: data in, panels of marks out; `screen` and `paper` draw them."""
+"""The kinds of figures: data in, panels of marks out; `reports.drawing` draws them."""
 
 from reports.figures.corridors import CorridorDrawing, LimitLine
 from reports.figures.distributions import DistributionPanel, Distributions

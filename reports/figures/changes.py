@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.figures.marks import Axis, Limit, Panels, Plot, Points
-from reports.figures.palette import BLUE, INK, VERMILION
-from reports.numbers import number
+from reports.drawing.marks import Axis, Limit, Panels, Plot, Points
+from reports.drawing.palette import BLUE, INK, VERMILION
+from reports.text.numbers import number
 
 MARKS = ((BLUE, "circle"), (VERMILION, "diamond"))  # by whether the change is significant
 

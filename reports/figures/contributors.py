@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reports.figures.marks import Axis, Bar, Mark, Plot, Points
-from reports.figures.palette import BLUE, INK, SKY
-from reports.numbers import number
+from reports.drawing.marks import Axis, Bar, Mark, Plot, Points
+from reports.drawing.palette import BLUE, INK, SKY
+from reports.text.numbers import number
 
 ROW, AROUND = 20.0, 34.0  # pixels of a row, and of what stands above and below the rows
 

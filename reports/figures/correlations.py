@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reports.figures.marks import Axis, Bar, Plot
-from reports.figures.palette import BLUE, VERMILION, blended
+from reports.drawing.marks import Axis, Bar, Plot
+from reports.drawing.palette import BLUE, VERMILION, blended
 
 LIGHT = 0.6  # a cell of a weaker correlation is light, and takes black numbers
 

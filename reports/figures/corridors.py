@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Line, Plot, Points, nominal_ring, region
-from reports.figures.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILION
-from reports.numbers import count
+from reports.drawing.marks import Axis, Drawing, Line, Plot, Points, nominal_ring, region
+from reports.drawing.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILION
+from reports.text.numbers import count
 
 INSIDE = 0  # the class of the cases inside all limits
 COLOURS = (BLUE, VERMILION, ORANGE, PURPLE, GREEN, SKY, MUTED)

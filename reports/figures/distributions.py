@@ -8,9 +8,9 @@ from textwrap import fill
 import numpy as np
 
 from mc_engine.statistics import Quantile, Summary
-from reports.figures.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
-from reports.figures.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
-from reports.numbers import count, interval, number, percent
+from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
+from reports.drawing.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
+from reports.text.numbers import count, interval, number, percent
 
 FEWEST_BINS, MOST_BINS = 8, 48
 CENTRAL = (0.005, 0.995)  # what a histogram must show well

@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Line, Mark, Plot, Points, joined, nominal_ring, region
-from reports.figures.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PURPLE, VERMILION
-from reports.numbers import count
+from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, joined, nominal_ring, region
+from reports.drawing.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PURPLE, VERMILION
+from reports.text.numbers import count
 
 EAST, NORTH = "east of the mean [km]", "north of the mean [km]"
 WIDE = 3.0  # width over height of the map of the surroundings

@@ -5,9 +5,9 @@ from itertools import combinations
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Line, Plot, Points, nominal_ring
-from reports.figures.palette import BLUE, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
-from reports.numbers import count, number
+from reports.drawing.marks import Axis, Drawing, Line, Plot, Points, nominal_ring
+from reports.drawing.palette import BLUE, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
+from reports.text.numbers import count, number
 
 MOST_PANELS = 6
 MARGIN = 0.06  # of the shown range

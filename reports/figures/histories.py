@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Limit, Line, Mark, Plot, between
-from reports.figures.palette import BLUE, DASHES, INK, LINES, MUTED, SKY, VERMILION
-from reports.numbers import count, number, percent
+from reports.drawing.marks import Axis, Drawing, Limit, Line, Mark, Plot, between
+from reports.drawing.palette import BLUE, DASHES, INK, LINES, MUTED, SKY, VERMILION
+from reports.text.numbers import count, number, percent
 
 SAMPLES = 400  # on the screen and on paper; extremes between them are kept
 OUTER, INNER = 0.25, 0.45  # opacity of the wider and of the narrower band

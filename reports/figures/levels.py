@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Line, Plot, Points
-from reports.figures.palette import BLUE, MUTED, ORANGE, PAPER, SKY
-from reports.numbers import count, number
+from reports.drawing.marks import Axis, Drawing, Line, Plot, Points
+from reports.drawing.palette import BLUE, MUTED, ORANGE, PAPER, SKY
+from reports.text.numbers import count, number
 
 SPREAD = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # probabilities of what is drawn
 LOGARITHMIC = 30.0  # medians this far apart are drawn on a logarithmic axis

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mc_engine.statistics import SurfaceMap
-from reports.figures.marks import Axis, Drawing, Field, Plot, Points, nominal_ring
-from reports.figures.palette import VERMILION
-from reports.figures.ticks import covering
-from reports.numbers import count, number, with_unit
+from reports.drawing.marks import Axis, Drawing, Field, Plot, Points, nominal_ring
+from reports.drawing.palette import VERMILION
+from reports.drawing.ticks import covering
+from reports.text.numbers import count, number, with_unit
 
 LEVELS = 12
 DOT = "#1b1b1b"  # on the field, whose colours do not follow the page's

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.figures.marks import Axis, Bar, Drawing, Limit, Mark, Plot, Points
-from reports.figures.palette import BLUE, GREEN, INK, MUTED, VERMILION
-from reports.numbers import SPACE, number
+from reports.drawing.marks import Axis, Bar, Drawing, Limit, Mark, Plot, Points
+from reports.drawing.palette import BLUE, GREEN, INK, MUTED, VERMILION
+from reports.text.numbers import SPACE, number
 
 MOST = 1.0  # of the width of the limits, either way; margins beyond are drawn at the edge
 THICK = 0.3  # half of a bar

@@ -3,9 +3,9 @@
 import numpy as np
 from scipy.special import betaincinv, ndtri
 
-from reports.figures.marks import Axis, Limit, Line, Mark, Plot, Points, between
-from reports.figures.palette import BLUE, INK, SKY, VERMILION
-from reports.numbers import number, percent
+from reports.drawing.marks import Axis, Limit, Line, Mark, Plot, Points, between
+from reports.drawing.palette import BLUE, INK, SKY, VERMILION
+from reports.text.numbers import number, percent
 
 MOST_POINTS = 160  # the outermost ones whole, the others evenly along the axis
 OUTERMOST = 20  # on either side

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reports.drawing.marks import Axis, Band, Drawing, Line, Plot
+from reports.drawing.palette import SKY
 from reports.figures.histories import HistoryLine, band_name, band_pairs, case_lines
-from reports.figures.marks import Axis, Band, Drawing, Line, Plot
-from reports.figures.palette import SKY
 
 SAMPLES = 400
 

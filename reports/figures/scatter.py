@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Line, Plot, Points, nominal_ring, region
-from reports.figures.palette import BLUE, DASHES, GREEN, INK, PAPER, PURPLE, VERMILION
-from reports.numbers import count
+from reports.drawing.marks import Axis, Drawing, Line, Plot, Points, nominal_ring, region
+from reports.drawing.palette import BLUE, DASHES, GREEN, INK, PAPER, PURPLE, VERMILION
+from reports.text.numbers import count
 
 # Colour and shape of what is inside, outside and failed: apart in grey and for the colour-blind, too.
 MARKS = ((BLUE, "circle"), (VERMILION, "diamond"), (INK, "triangle-up"))

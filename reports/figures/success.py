@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mc_engine.statistics.drivers import SuccessCurve
-from reports.figures.marks import Axis, Limit, Line, Panels, Plot, Points, joined
-from reports.figures.palette import BLUE, MUTED, VERMILION
-from reports.numbers import count, number, percent
+from reports.drawing.marks import Axis, Limit, Line, Panels, Plot, Points, joined
+from reports.drawing.palette import BLUE, MUTED, VERMILION
+from reports.text.numbers import count, number, percent
 
 
 @dataclass(frozen=True)

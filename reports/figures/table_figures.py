@@ -18,12 +18,13 @@ import pandas as pd
 from mc_engine.errors import EngineError
 from mc_engine.statistics import map_metric, summarize
 from mc_engine.status import OK, STATUS_NAME
-from reports.figures import paper
+from reports.drawing import paper
+from reports.drawing.marks import Drawing
+from reports.drawing.pictures import render_picture
 from reports.figures.distributions import DistributionPanel, Distributions
 from reports.figures.maps import MapDrawing
-from reports.figures.marks import Drawing
 from reports.figures.scatter import ScatterDrawing
-from reports.numbers import axis_label, count, words
+from reports.text.numbers import axis_label, count, words
 
 OUTER = (0.00135, 0.99865)  # quantiles drawn beside the median
 POINTS_ON_MAP = 2000
@@ -44,8 +45,6 @@ class Picture:
 
     def savefig(self, file: str | Path) -> None:
         """Write it as SVG, PDF or PNG, as the file's ending says; EngineError for another."""
-        from reports.pdf import render_picture
-
         kind = Path(file).suffix.removeprefix(".").lower()
         if kind == "svg":
             Path(file).write_bytes(self.svg.encode())

@@ -230,7 +230,7 @@ def test_half_a_letter_in_a_text_of_the_model_is_refused(tmp_path, minimal, plac
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a clock is shifted by the loader of Linux")
 def test_a_clock_before_1970_makes_no_pdf_and_says_so(monkeypatch):
     from mc_engine.errors import EngineError
-    from reports import pdf
+    from reports.formats import pdf
 
     monkeypatch.setattr(pdf.time, "time", lambda: -1.0)
     with pytest.raises(EngineError, match="the clock of this computer stands before 1970"):

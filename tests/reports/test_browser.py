@@ -7,7 +7,7 @@ from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_html
-from reports.document import FigureBlock, blocks_of
+from reports.document.blocks import FigureBlock, blocks_of
 
 pytestmark = pytest.mark.skipif(not INSTALLED, reason="needs the Debian package chromium")
 COUNT = "document.getElementById('selection-count').textContent"

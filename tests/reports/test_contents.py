@@ -13,7 +13,7 @@ from mc_engine.model.figures import (
     to_record,
 )
 from reports.contents import build
-from reports.document import FigureBlock, Table, blocks_of
+from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.figures import MapDrawing
 
 RUN = "deorbit-20260421-101500"

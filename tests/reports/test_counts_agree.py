@@ -19,11 +19,11 @@ from mc_engine.campaign.search import list_campaigns
 from mc_engine.runner.runner import run
 from reports import render_html, render_pdf
 from reports.contents import build
-from reports.data import render_json, schema
-from reports.document import Table, blocks_of
-from reports.markdown import code, render_markdown
-from reports.markdown_text import escaped
-from reports.numbers import words
+from reports.document.blocks import Table, blocks_of
+from reports.formats.json_data import render_json, schema
+from reports.formats.markdown import code, render_markdown
+from reports.text.markdown_text import escaped
+from reports.text.numbers import words
 
 QUICK = ("reentry", "minimal")
 CASES = 120

@@ -12,21 +12,21 @@ from scipy import stats
 from synthetic_run import synthetic_run
 
 from mc_engine.statistics.geodesy import LocalPlane
-from reports.coastlines import coastlines, nearest_coast
-from reports.companion_section import sigma_contribution
 from reports.contents import build
-from reports.contributions import Contributor
-from reports.contributor_figures import strongest
-from reports.diagnostics import rank_correlations
-from reports.document import FigureBlock, Table, blocks_of
+from reports.contributors.companion import sigma_contribution
+from reports.contributors.tornado_figure import strongest
+from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.drawing.marks import Bar, Limit, Line, Points
 from reports.figures import FootprintDrawing, Histories
-from reports.figures.marks import Bar, Limit, Line, Points
 from reports.figures.probability_plots import plotting_positions, probability_plot, shown_ranks
-from reports.flown import Flown
-from reports.history_bands import OUTER, history_bands, outer_percentile
-from reports.history_limits import history_limits
-from reports.numbers import number
+from reports.footprint.coastlines import coastlines, nearest_coast
 from reports.replays import replay_drawing, replay_picture
+from reports.run.contributions import Contributor
+from reports.run.flown import Flown
+from reports.run.history_bands import OUTER, history_bands, outer_percentile
+from reports.run.history_limits import history_limits
+from reports.sections.diagnostics import rank_correlations
+from reports.text.numbers import number
 
 TIMES = np.linspace(0.0, 10.0, 101)
 

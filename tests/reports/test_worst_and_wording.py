@@ -13,10 +13,11 @@ from mc_engine.statistics.contributors import contributors
 from mc_engine.statistics.maps import explained_share
 from mc_engine.statistics.worst import Limits, limits_on
 from reports.contents import build
-from reports.document import FigureBlock, Table, blocks_of
-from reports.drawings import FEWEST_SHOWN
-from reports.figures import MapDrawing, ScatterDrawing, screen
-from reports.numbers import column_texts
+from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.drawing import screen
+from reports.figures import MapDrawing, ScatterDrawing
+from reports.sections.figure_blocks import FEWEST_SHOWN
+from reports.text.numbers import column_texts
 
 METRIC = "correction_impulse_m_s"  # here: an error of either sign
 

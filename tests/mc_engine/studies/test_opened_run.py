@@ -5,7 +5,7 @@ import mc_engine
 from mc_engine import load_campaign, open_run
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.runner import runner
-from reports.figures.marks import Bar
+from reports.drawing.marks import Bar
 from reports.figures.table_figures import fuel_map, histogram, scatter
 
 

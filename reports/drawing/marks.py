@@ -1,0 +1,356 @@
+"""What figures are made of: panels of marks.  `screen` and `paper` draw them; nothing here knows either.
+
+A drawing says once what is to be seen, in the units of its axes; sizes and widths are pixels on the screen, and paper
+scales them.  Colours with an @ are the page's own.  A mark's `key` is its text in the figure's key, said once.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from reports.drawing.palette import KEY_MARK, field_colour
+from reports.text.numbers import number
+
+MARGIN = 0.04  # of an axis, beyond the marks on it
+
+
+@dataclass(frozen=True)
+class Key:
+    """One entry of a figure's key.  mark: "line", "dash", "dot", "band", "bar", "field", "point" or "ring".
+
+    sign : the shape of a point, as of `Points`.
+    """
+
+    mark: str
+    colour: str
+    text: str
+    sign: str = "circle"
+
+
+@dataclass(frozen=True)
+class Points:
+    """x, y : float64[n].  sign : "circle", "ring", "diamond", "x", "square", "triangle-up", "cross" or "star".
+
+    name : of them all.  texts : of each of them, in place of its coordinates.  x_ends, y_ends : ends of intervals.
+    cases : their case numbers, so that a reader can choose them; columns : names of the columns of cases that x and y
+    are, and of one that `texts` tell, so that a page with all cases finds those that are not drawn; of x alone where y
+    is the rank.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    colour: str
+    name: str = ""
+    sign: str = "circle"
+    size: float = 4.0
+    opacity: float = 1.0
+    edge: str = ""
+    texts: Sequence[str] = ()
+    cases: np.ndarray | None = None
+    columns: tuple[str, ...] | None = None
+    x_ends: tuple[np.ndarray, np.ndarray] | None = None
+    y_ends: tuple[np.ndarray, np.ndarray] | None = None
+    key: str = ""
+
+
+@dataclass(frozen=True)
+class Line:
+    """Through x, y : float64[n], lifted where they are not numbers.  step : "hv", "vh" or none.
+
+    name : what it is; text : in place of the coordinates under the pointer.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    colour: str
+    name: str = ""
+    dash: str = "solid"
+    width: float = 1.8
+    opacity: float = 1.0
+    step: str = ""
+    text: str = ""
+    key: str = ""
+
+    @property
+    def corners(self) -> tuple[np.ndarray, np.ndarray]:
+        """The points with those of the steps between them."""
+        x, y = np.asarray(self.x, dtype=np.float64), np.asarray(self.y, dtype=np.float64)
+        if not self.step:
+            return x, y
+        x, y = np.repeat(x, 2), np.repeat(y, 2)
+        return (x[1:], y[:-1]) if self.step == "hv" else (x[:-1], y[1:])
+
+
+@dataclass(frozen=True)
+class Band:
+    """A filled region: closed outlines in x, y : float64[n], not-a-numbers between; holes run the other way round."""
+
+    x: np.ndarray
+    y: np.ndarray
+    colour: str
+    opacity: float = 0.3
+    name: str = ""
+    edge: str = ""
+    key: str = ""
+
+
+@dataclass(frozen=True)
+class Bar:
+    """Boxes from (left, bottom) to (right, top), each float64[n]; colour : one for all, or one each.
+
+    texts : of each box, for the pointer; labels : written in it, in `ink`, one for all or one each.
+    column : of the cases that the boxes count, from left to right.
+    """
+
+    left: np.ndarray
+    right: np.ndarray
+    bottom: np.ndarray
+    top: np.ndarray
+    colour: str | Sequence[str]
+    opacity: float = 0.6
+    texts: Sequence[str] = ()
+    labels: Sequence[str] = ()
+    ink: str | Sequence[str] = "@ink"
+    key: str = ""
+    column: str = ""
+
+
+@dataclass(frozen=True)
+class Field:
+    """Filled contours of z : float64[n_y, n_x] at the nodes x, y, blank where it is not a number.  label : of z."""
+
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    levels: np.ndarray
+    label: str
+    key: str = ""
+
+    @property
+    def layers(self) -> list[tuple[float, float, np.ndarray]]:
+        """(lower level, upper level, outlines float64[n, 2] with not-a-numbers between) of what lies between two."""
+        import contourpy
+
+        generator: Any = contourpy.contour_generator(
+            self.x, self.y, np.ma.masked_invalid(self.z), fill_type=contourpy.FillType.OuterOffset
+        )
+        found = []
+        for low, high in pairwise(self.levels.tolist()):
+            points, offsets = generator.filled(low, high)
+            rings = [p[a:b] for p, o in zip(points, offsets, strict=True) for a, b in pairwise(o)]
+            if rings:
+                found.append((low, high, joined(rings)))
+        return found
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A straight line across the panel where x, or y, is `at`; `near` : whether the axis must reach it."""
+
+    at: float
+    axis: str
+    colour: str
+    name: str = ""
+    dash: str = "solid"
+    width: float = 1.8
+    near: bool = True
+    key: str = ""
+
+
+Mark = Points | Line | Band | Bar | Field | Limit
+_ACROSS = ("x", "left", "right")  # members of marks that are places on the axis of x, and on that of y
+_UP = ("y", "bottom", "top")
+
+
+def extent(mark: Mark) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """All numbers of a mark on either axis."""
+    if isinstance(mark, Limit):
+        at = [np.array([mark.at])] if mark.near else []
+        return (at, []) if mark.axis == "x" else ([], at)
+    x, y = ([getattr(mark, name) for name in names if hasattr(mark, name)] for names in (_ACROSS, _UP))
+    if isinstance(mark, Points):
+        x, y = [*x, *(mark.x_ends or ())], [*y, *(mark.y_ends or ())]
+    return x, y
+
+
+@dataclass(frozen=True)
+class Axis:
+    """label : beside it; name : what it measures, where there is no label.  reach : its ends, in their order.
+
+    ticks : places and words of its own ticks; most : of other ones; whole : at whole numbers only; zero : reaches 0;
+    top : ticks stand above.  Without a margin it ends at the outermost mark.
+    """
+
+    label: str = ""
+    name: str = ""
+    reach: tuple[float, float] | None = None
+    log: bool = False
+    ticks: tuple[tuple[float, str], ...] | None = None
+    most: int = 6
+    whole: bool = False
+    zero: bool = False
+    grid: bool = True
+    top: bool = False
+    margin: float = MARGIN
+
+    def ends(self, values: Iterable[np.ndarray]) -> tuple[float, float]:
+        """Both ends of the axis over marks with these values."""
+        if self.reach is not None:
+            return self.reach
+        found = [np.asarray(one, dtype=np.float64).ravel() for one in values]
+        seen = np.concatenate([*found, np.zeros(int(self.zero))]) if found else np.zeros(1)
+        seen = seen[np.isfinite(seen) & (seen > 0.0)] if self.log else seen[np.isfinite(seen)]
+        if not seen.size:
+            return (1.0, 10.0) if self.log else (0.0, 1.0)
+        low, high = float(seen.min()), float(seen.max())
+        if self.log:
+            room = (high / low) ** self.margin if high > low else 1.5
+            return low / room, high * room
+        room = self.margin * (high - low)
+        if high - low <= 1e-12 * max(abs(low), abs(high)):
+            room = 0.05 * abs(high) or 1.0
+        return low - (0.0 if self.zero and low == 0.0 else room), high + (0.0 if self.zero and high == 0.0 else room)
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Marks from back to front over two axes; height : pixels on the screen; equal : one scale for both axes."""
+
+    marks: tuple[Mark, ...]
+    x: Axis
+    y: Axis
+    title: str = ""
+    height: float = 270.0
+    equal: bool = False
+
+    @property
+    def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Ends of both axes."""
+        extents = [extent(mark) for mark in self.marks]
+        return self.x.ends(one for x, _ in extents for one in x), self.y.ends(one for _, y in extents for one in y)
+
+    @property
+    def spans(self) -> str:
+        """What its points and lines reach over, in words."""
+        extents = [extent(mark) for mark in self.marks if isinstance(mark, Points | Line)]
+        told = []
+        for axis, values in (
+            (self.y, [one for _, y in extents for one in y]),
+            (self.x, [one for x, _ in extents for one in x]),
+        ):
+            seen = np.concatenate([np.asarray(one, dtype=np.float64).ravel() for one in values] or [np.empty(0)])
+            seen = seen[np.isfinite(seen)]
+            if seen.size:
+                told.append(
+                    f"{axis.name or axis.label} {number(float(seen.min()), 4)} to {number(float(seen.max()), 4)}"
+                )
+        return " against ".join(told)
+
+    @property
+    def field(self) -> Field | None:
+        return next((mark for mark in self.marks if isinstance(mark, Field)), None)
+
+
+class Drawing(ABC):
+    """A figure: its panels, what their marks mean, and all of it in words.
+
+    across : most panels in a row on paper;  form : the kind of the figure, for those who do not see it.
+    """
+
+    across: int = 2
+    form: str = "Figure"
+
+    def __init_subclass__(cls) -> None:
+        """The panels are made once: the page, the paper, the key and the words ask for them."""
+        super().__init_subclass__()
+        if isinstance(own := cls.__dict__.get("plots"), property) and own.fget is not None:
+            made_once = cached_property(own.fget)
+            made_once.__set_name__(cls, "plots")
+            cls.plots = made_once  # type: ignore[assignment,method-assign]
+
+    @property
+    def key(self) -> tuple[Key, ...]:
+        """What the marks mean, each said once, in the order of the panels."""
+        entries = {mark.key: mark for plot in self.plots for mark in plot.marks if mark.key}
+        return tuple(_entry(mark) for mark in entries.values())
+
+    @property
+    def alternative(self) -> str:
+        """The figure in words, for those who do not see it."""
+        spans = [f"{plot.title}: " * bool(plot.title and plot.title != plot.y.name) + plot.spans for plot in self.plots]
+        return f"{self.form}. {'; '.join(spans)}. {'; '.join(entry.text for entry in self.key)}."
+
+    @property
+    def places(self) -> Mapping[str, tuple[str, np.ndarray, np.ndarray]]:
+        """Numbers of cases that only this figure has, as columns of its points: by name, a label, cases and values."""
+        return {}
+
+    @property
+    @abstractmethod
+    def plots(self) -> tuple[Plot, ...]:
+        """The panels in reading order."""
+
+
+@dataclass(frozen=True)
+class Panels(Drawing):
+    """A figure of panels that were made where its numbers are.  words : all of it; without them, what marks reach."""
+
+    made: tuple[Plot, ...]
+    words: str = ""
+    across: int = 2
+    form: str = "Figure"
+
+    @property
+    def plots(self) -> tuple[Plot, ...]:
+        return self.made
+
+    @property
+    def alternative(self) -> str:
+        return self.words or super().alternative
+
+
+def _entry(mark: Mark) -> Key:
+    """A mark's entry in the key."""
+    if isinstance(mark, Points):
+        return Key("ring" if mark.sign == "ring" else "point", mark.colour, mark.key, mark.sign)
+    if isinstance(mark, Line | Limit):
+        return Key(KEY_MARK[mark.dash] if mark.width < 5.0 else "bar", mark.colour, mark.key)
+    if isinstance(mark, Field) or not isinstance(mark.colour, str):
+        return Key("field", field_colour(0.5), mark.key)
+    return Key("bar" if mark.opacity > 0.4 else "band", mark.colour, mark.key)
+
+
+def between(
+    x: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str, opacity: float, name: str = "", key: str = ""
+) -> Band:
+    """The band from `low` to `high` over x, each float64[n]; in pieces where they are not numbers."""
+    good = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
+    pieces = [
+        rows for rows in np.split(np.arange(x.size), np.flatnonzero(np.diff(good)) + 1) if rows.size and good[rows[0]]
+    ]
+    rings = [np.column_stack([np.r_[x[k], x[k][::-1]], np.r_[low[k], high[k][::-1]]]) for k in pieces]
+    line = joined(rings) if rings else np.empty((0, 2))
+    return Band(line[:, 0], line[:, 1], colour, opacity, name, key=key)
+
+
+def joined(outlines: Sequence[np.ndarray]) -> np.ndarray:
+    """Curves float64[k, 2] behind each other, a not-a-number between two, at which the pen is lifted."""
+    parts = [part for outline in outlines for part in (outline, np.full((1, 2), np.nan))]
+    return np.concatenate(parts[:-1])
+
+
+def nominal_ring(place: tuple[float, float], colour: str, name: str = "nominal", edge: str = "") -> Points:
+    """A ring about one place; with an edge colour inside, it hides what lies under it."""
+    x, y = (np.array([value], dtype=np.float64) for value in place)
+    return Points(x, y, colour, name, "ring", 12.0, edge=edge, key=name)
+
+
+def region(outlines: Sequence[np.ndarray], colour: str, dash: str, text: str, key: str = "") -> Line:
+    """The edge of a region or where a limit runs: curves float64[k, 2]; `text` shows under the pointer."""
+    line = joined(outlines)
+    return Line(line[:, 0], line[:, 1], colour, dash=dash, text=text, key=key or text)
