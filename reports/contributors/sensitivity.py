@@ -9,7 +9,8 @@ from mc_engine.statistics.drivers import FALSE_DISCOVERIES, FEWEST, Driver, fail
 from reports.contributors.companion import companion_blocks, no_contributors
 from reports.contributors.designed_indices import designed_blocks
 from reports.document.blocks import Cell, Column, FigureBlock, Table
-from reports.figures.success import SuccessPanel, success_figure
+from reports.drawing.marks import Drawing
+from reports.figures.statistics import success_panel
 from reports.run.flown import Flown
 from reports.run.outcomes import failures
 from reports.text.numbers import count, number, percent
@@ -115,9 +116,10 @@ def _success_figure(
         passed = ~failed[one.requirement]
         curve = success_along(inputs[one.inputs[0]], passed, flown.stated.confidence)
         if curve is not None:
-            panels.append(SuccessPanel(one.requirement, flown.axis(one.inputs[0]), curve, float(passed.mean())))
+            label, overall = flown.axis(one.inputs[0]), float(passed.mean())
+            panels.append(success_panel(one.requirement, label, curve, overall, flown.stated.confidence))
     return FigureBlock(
         f"Success probability along the inputs that separate failed from passed cases, {count(flown.n_held)} cases.",
-        success_figure(panels, flown.stated.confidence),
+        Drawing("Success probability in bins of single inputs", tuple(panels)),
         "half",
     )

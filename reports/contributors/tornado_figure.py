@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from reports.document.blocks import FigureBlock
-from reports.drawing.marks import Panels
-from reports.figures.contributors import tornado
+from reports.drawing.marks import Drawing
+from reports.figures.rows import tornado
 from reports.run.contributions import UNEXPLAINED, Contributor
 from reports.run.flown import Flown
 from reports.text.numbers import number, percent
@@ -32,7 +32,7 @@ def contributor_figure(
         effects = [f"{name} {number(one.size, 2)}" for name, one in zip(names[:3], rows, strict=False)]
         told.append(f"{words}: {', '.join(effects)}")
     caption = f"Total and first-order effects of the contributors to each metric, {source}."
-    return FigureBlock(caption, Panels(tuple(panels), f"Tornado diagrams. {'; '.join(told)}."), "half")
+    return FigureBlock(caption, Drawing("Tornado diagrams", tuple(panels), words="; ".join(told)), "half")
 
 
 def name_of(flown: Flown, one: str) -> str:

@@ -4,9 +4,8 @@ A drawing says once what is to be seen, in the units of its axes; sizes and widt
 scales them.  Colours with an @ are the page's own.  A mark's `key` is its text in the figure's key, said once.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -17,6 +16,7 @@ from reports.drawing.palette import KEY_MARK, field_colour
 from reports.text.numbers import number
 
 MARGIN = 0.04  # of an axis, beyond the marks on it
+MOST_TOLD = 8  # texts of a mark that are told to those who do not see it
 
 
 @dataclass(frozen=True)
@@ -178,6 +178,12 @@ def extent(mark: Mark) -> tuple[list[np.ndarray], list[np.ndarray]]:
     return x, y
 
 
+def finite(values: Iterable[Any]) -> np.ndarray:
+    """float64[n]: all numbers of these arrays that are finite."""
+    every = np.concatenate([np.empty(0), *(np.asarray(part, dtype=np.float64).ravel() for part in values)])
+    return every[np.isfinite(every)]
+
+
 @dataclass(frozen=True)
 class Axis:
     """label : beside it; name : what it measures, where there is no label.  reach : its ends, in their order.
@@ -202,9 +208,8 @@ class Axis:
         """Both ends of the axis over marks with these values."""
         if self.reach is not None:
             return self.reach
-        found = [np.asarray(one, dtype=np.float64).ravel() for one in values]
-        seen = np.concatenate([*found, np.zeros(int(self.zero))]) if found else np.zeros(1)
-        seen = seen[np.isfinite(seen) & (seen > 0.0)] if self.log else seen[np.isfinite(seen)]
+        seen = finite([*values, np.zeros(int(self.zero))])
+        seen = seen[seen > 0.0] if self.log else seen
         if not seen.size:
             return (1.0, 10.0) if self.log else (0.0, 1.0)
         low, high = float(seen.min()), float(seen.max())
@@ -217,9 +222,17 @@ class Axis:
         return low - (0.0 if self.zero and low == 0.0 else room), high + (0.0 if self.zero and high == 0.0 else room)
 
 
+def rows_axis(names: Sequence[str], grid: bool = False) -> Axis:
+    """An upright axis with a row for each name, the first on top."""
+    return Axis(reach=(len(names) - 0.5, -0.5), ticks=tuple(enumerate(names)), grid=grid)
+
+
 @dataclass(frozen=True)
 class Plot:
-    """Marks from back to front over two axes; height : pixels on the screen; equal : one scale for both axes."""
+    """Marks from back to front over two axes; height : pixels on the screen; equal : one scale for both axes.
+
+    quantity : the name of the history quantity that it shows, if it shows one.
+    """
 
     marks: tuple[Mark, ...]
     x: Axis
@@ -227,53 +240,55 @@ class Plot:
     title: str = ""
     height: float = 270.0
     equal: bool = False
+    quantity: str = ""
 
-    @property
+    @cached_property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Ends of both axes."""
         extents = [extent(mark) for mark in self.marks]
-        return self.x.ends(one for x, _ in extents for one in x), self.y.ends(one for _, y in extents for one in y)
+        return self.x.ends(a for x, _ in extents for a in x), self.y.ends(a for _, y in extents for a in y)
 
     @property
-    def spans(self) -> str:
-        """What its points and lines reach over, in words."""
-        extents = [extent(mark) for mark in self.marks if isinstance(mark, Points | Line)]
-        told = []
-        for axis, values in (
-            (self.y, [one for _, y in extents for one in y]),
-            (self.x, [one for x, _ in extents for one in x]),
-        ):
-            seen = np.concatenate([np.asarray(one, dtype=np.float64).ravel() for one in values] or [np.empty(0)])
-            seen = seen[np.isfinite(seen)]
-            if seen.size:
-                told.append(
-                    f"{axis.name or axis.label} {number(float(seen.min()), 4)} to {number(float(seen.max()), 4)}"
-                )
-        return " against ".join(told)
+    def words(self) -> str:
+        """What it shows, for those who do not see it: the texts of its few points, else its ranges, and its limits."""
+        listed = [mark.texts for mark in self.marks if isinstance(mark, Points) and len(mark.texts) <= MOST_TOLD]
+        said = [text for texts in listed for text in texts] or [self._ranges()]
+        said += [mark.name for mark in self.marks if isinstance(mark, Limit)]
+        title = f"{self.title}: " if self.title not in ("", self.y.name) else ""
+        return title + "; ".join(filter(None, dict.fromkeys(said)))
+
+    def _ranges(self) -> str:
+        """What the marks reach over on both axes, and the field in them."""
+        extents = [extent(mark) for mark in self.marks if not isinstance(mark, Limit | Band)]
+        ranges = [
+            (self.y.name or self.y.label, [a for _, y in extents for a in y]),
+            (self.x.name or self.x.label, [a for x, _ in extents for a in x]),
+        ]
+        ranges += [(field.label, [field.z]) for field in filter(None, [self.field])]
+        seen = [(label, finite(values)) for label, values in ranges]
+        told = [f"{label} {number(one.min(), 4)} to {number(one.max(), 4)}" for label, one in seen if one.size]
+        return " against ".join(told[:2]) + "".join(f", {text}" for text in told[2:])
 
     @property
     def field(self) -> Field | None:
         return next((mark for mark in self.marks if isinstance(mark, Field)), None)
 
 
-class Drawing(ABC):
-    """A figure: its panels, what their marks mean, and all of it in words.
+@dataclass(frozen=True)
+class Drawing:
+    """A figure.  form : its kind, for those who do not see it; plots : its panels in reading order.
 
-    across : most panels in a row on paper;  form : the kind of the figure, for those who do not see it.
+    across : most panels in a row on paper;  words : all of it, in place of those of its panels.
+    places : numbers of cases that only this figure has, as columns of its points: by name, a label, cases and values.
     """
 
+    form: str
+    plots: tuple[Plot, ...]
     across: int = 2
-    form: str = "Figure"
+    words: str = ""
+    places: Mapping[str, tuple[str, np.ndarray, np.ndarray]] = field(default_factory=dict)
 
-    def __init_subclass__(cls) -> None:
-        """The panels are made once: the page, the paper, the key and the words ask for them."""
-        super().__init_subclass__()
-        if isinstance(own := cls.__dict__.get("plots"), property) and own.fget is not None:
-            made_once = cached_property(own.fget)
-            made_once.__set_name__(cls, "plots")
-            cls.plots = made_once  # type: ignore[assignment,method-assign]
-
-    @property
+    @cached_property
     def key(self) -> tuple[Key, ...]:
         """What the marks mean, each said once, in the order of the panels."""
         entries = {mark.key: mark for plot in self.plots for mark in plot.marks if mark.key}
@@ -282,36 +297,15 @@ class Drawing(ABC):
     @property
     def alternative(self) -> str:
         """The figure in words, for those who do not see it."""
-        spans = [f"{plot.title}: " * bool(plot.title and plot.title != plot.y.name) + plot.spans for plot in self.plots]
-        return f"{self.form}. {'; '.join(spans)}. {'; '.join(entry.text for entry in self.key)}."
+        panels = "; ".join(plot.words for plot in self.plots)
+        key = "".join(f"; {entry.text}" for entry in self.key if entry.text not in panels)
+        return f"{self.form}. {self.words or panels + key}."
 
     @property
-    def places(self) -> Mapping[str, tuple[str, np.ndarray, np.ndarray]]:
-        """Numbers of cases that only this figure has, as columns of its points: by name, a label, cases and values."""
-        return {}
-
-    @property
-    @abstractmethod
-    def plots(self) -> tuple[Plot, ...]:
-        """The panels in reading order."""
-
-
-@dataclass(frozen=True)
-class Panels(Drawing):
-    """A figure of panels that were made where its numbers are.  words : all of it; without them, what marks reach."""
-
-    made: tuple[Plot, ...]
-    words: str = ""
-    across: int = 2
-    form: str = "Figure"
-
-    @property
-    def plots(self) -> tuple[Plot, ...]:
-        return self.made
-
-    @property
-    def alternative(self) -> str:
-        return self.words or super().alternative
+    def cases(self) -> list[np.ndarray]:
+        """Numbers of the cases that are drawn as points."""
+        marks = [mark for plot in self.plots for mark in plot.marks]
+        return [mark.cases for mark in marks if isinstance(mark, Points) and mark.cases is not None]
 
 
 def _entry(mark: Mark) -> Key:
@@ -348,9 +342,3 @@ def nominal_ring(place: tuple[float, float], colour: str, name: str = "nominal",
     """A ring about one place; with an edge colour inside, it hides what lies under it."""
     x, y = (np.array([value], dtype=np.float64) for value in place)
     return Points(x, y, colour, name, "ring", 12.0, edge=edge, key=name)
-
-
-def region(outlines: Sequence[np.ndarray], colour: str, dash: str, text: str, key: str = "") -> Line:
-    """The edge of a region or where a limit runs: curves float64[k, 2]; `text` shows under the pointer."""
-    line = joined(outlines)
-    return Line(line[:, 0], line[:, 1], colour, dash=dash, text=text, key=key or text)

@@ -19,11 +19,11 @@ from mc_engine.errors import EngineError
 from mc_engine.statistics import map_metric, summarize
 from mc_engine.status import OK, STATUS_NAME
 from reports.drawing import paper
-from reports.drawing.marks import Drawing
+from reports.drawing.marks import Drawing, Points
 from reports.drawing.pictures import render_picture
-from reports.figures.distributions import DistributionPanel, Distributions
-from reports.figures.maps import MapDrawing
-from reports.figures.scatter import ScatterDrawing
+from reports.figures import distributions
+from reports.figures.clouds import case_scatter
+from reports.figures.maps import metric_map
 from reports.text.numbers import axis_label, count, words
 
 OUTER = (0.00135, 0.99865)  # quantiles drawn beside the median
@@ -63,8 +63,8 @@ def histogram(table: pd.DataFrame, column: str) -> Picture:
     finite = values[np.isfinite(values)]
     _refuse_few(finite.size, 2, column)
     used = f"{count(finite.size)} of {count(values.size)} cases"
-    panel = DistributionPanel(used, _label(table, column), finite, summarize(values), None, ())
-    return Picture(Distributions((panel,), OUTER, False))
+    plot = distributions.histogram(finite, _label(table, column), summarize(values), OUTER, title=used)
+    return Picture(distributions.histograms([plot]))
 
 
 def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
@@ -72,19 +72,10 @@ def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
     a, b = _values(table, x), _values(table, y)
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b))
     _refuse_few(used.size, 1, f"{x} and {y}")
-    drawing = ScatterDrawing(
-        x=a[used],
-        y=b[used],
-        case_ids=_case_ids(table)[used],
-        x_label=_label(table, x),
-        y_label=_label(table, y),
-        n_used=int(used.size),
-        n_tried=len(table),
-        nominal=None,
-        outcome=np.zeros(used.size, dtype=np.int8),
-        outcomes=(("cases with both numbers", int(used.size)),),
-    )
-    return Picture(drawing)
+    cloud = Points(a[used], b[used], "", cases=_case_ids(table)[used])
+    classes = [("cases with both numbers", int(used.size))]
+    axes = _label(table, x), _label(table, y)
+    return Picture(case_scatter(cloud, np.zeros(used.size, dtype=np.int8), classes, axes, len(table)))
 
 
 def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:
@@ -99,19 +90,11 @@ def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:
         raise EngineError(f"{metric}: too few cases over {x} and {y} for a map; draw a scatter instead")
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b) & np.isfinite(c))
     shown = used[np.linspace(0, used.size - 1, min(used.size, POINTS_ON_MAP)).astype(np.int64)]
-    drawing = MapDrawing(
-        surface=surface,
-        x_label=_label(table, x),
-        y_label=_label(table, y),
-        metric_label=_label(table, metric),
-        unit=_unit(table, metric),
-        points=np.column_stack([a[shown], b[shown]]),
-        case_ids=_case_ids(table)[shown],
-        point_values=c[shown],
-        n_points=int(used.size),
-        nominal=None,
+    labels = _label(table, x), _label(table, y), _label(table, metric)
+    points, unit = np.column_stack([a[shown], b[shown]]), _unit(table, metric)
+    return Picture(
+        metric_map(surface, points, c[shown], _case_ids(table)[shown], labels, unit, n_points=int(used.size))
     )
-    return Picture(drawing)
 
 
 def _values(table: pd.DataFrame, column: str) -> np.ndarray:

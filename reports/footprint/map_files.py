@@ -28,7 +28,7 @@ class Mark:
 
 
 @dataclass(frozen=True)
-class Outline:
+class MapOutline:
     """A closed curve, degrees.  kind : "ellipse" or "region"; facts : what is known of it, by name."""
 
     kind: str
@@ -49,7 +49,7 @@ class Places:
     latitude: np.ndarray
     longitude: np.ndarray
     marks: tuple[Mark, ...]
-    outlines: tuple[Outline, ...]
+    outlines: tuple[MapOutline, ...]
 
 
 def cut_at_date_line(latitude: np.ndarray, longitude: np.ndarray) -> list[Line]:

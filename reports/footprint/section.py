@@ -10,10 +10,18 @@ from mc_engine.statistics import clopper_pearson, summarize
 from mc_engine.statistics.footprint import Footprint
 from mc_engine.statistics.regions import DensityRegion, Ellipse, next_case_scale
 from reports.document.blocks import Attachment, Cell, Column, FigureBlock, Table
-from reports.figures import FootprintCurve, FootprintDrawing
+from reports.drawing.marks import Drawing
+from reports.figures.clouds import Outline
+from reports.figures.footprints import (
+    footprint_drawing,
+    footprint_places,
+    footprint_plot,
+    footprint_views,
+    surroundings,
+)
 from reports.footprint.coastlines import coastlines, nearest_coast
 from reports.footprint.landings import TARGET, Landing, height_limit, landing_of, on_earth
-from reports.footprint.map_files import Mark, Outline, Places, geojson, kml
+from reports.footprint.map_files import MapOutline, Mark, Places, geojson, kml
 from reports.run.flown import Flown
 from reports.sections.figure_blocks import thinned_rows
 from reports.text.numbers import count, counted, interval, number, percent
@@ -90,45 +98,32 @@ def _place_words(latitude: float, longitude: float) -> str:
     return f"{abs(latitude):.4f}° {north}, {abs(longitude):.4f}° {east}"
 
 
-def _drawing(flown: Flown, landing: Landing) -> FootprintDrawing:
-    points = landing.found.points
+def _drawing(flown: Flown, landing: Landing) -> Drawing:
+    points = landing.found.points / 1000.0
     ends = [int(pick(points[:, k])) for k in (0, 1) for pick in (np.argmin, np.argmax)]
     shown = thinned_rows(np.arange(landing.rows.size), np.array(ends))
     rows = landing.rows[shown]
-    names = tuple(
-        f"case {case}: {_place_words(north, east)}"
-        for case, north, east in zip(
-            flown.case_ids[rows], landing.latitude[rows], _half_turn(landing.longitude[rows]), strict=True
-        )
-    )
-    aim = landing.aim
-    here = None if aim is None else landing.at(aim)
-    curves = (*_curves(landing.found), *_circles(flown, landing))
-    coasts, around, reach = _coasts(landing, curves) if on_earth(flown, landing.figure) else ((), (), 0.0)
-    return FootprintDrawing(
-        points=points[shown] / 1000.0,
-        names=names,
-        curves=curves,
-        n_used=int(landing.rows.size),
-        n_tried=flown.n_held,
-        aim=(aim.name, (float(here[0]), float(here[1]))) if aim is not None and here is not None else None,
-        long_axis=_long_axis(landing.found),
-        case_ids=flown.case_ids[rows],
-        everywhere=points / 1000.0,
-        every_case=flown.case_ids[landing.rows],
-        coasts=coasts,
-        around=around,
-        around_reach=reach,
-    )
+    places = zip(flown.case_ids[rows], landing.latitude[rows], _half_turn(landing.longitude[rows]), strict=True)
+    names = [f"case {case}: {_place_words(north, east)}" for case, north, east in places]
+    aim = None if landing.aim is None else (landing.aim.name, landing.at(landing.aim))
+    outlines = (*_outlines(landing.found), *_circles(flown, landing))
+    coasts, around, reach = _coasts(landing, outlines) if on_earth(flown, landing.figure) else ([], [], 0.0)
+    views, counts = footprint_views(_long_axis(landing.found)), (int(landing.rows.size), flown.n_held)
+    plots = [
+        footprint_plot(view, points[shown], names, flown.case_ids[rows], counts, outlines, aim, coasts)
+        for view in views
+    ]
+    plots += [surroundings(around, reach)] if around else []
+    return footprint_drawing(plots, footprint_places(views, points, flown.case_ids[landing.rows]))
 
 
-def _circles(flown: Flown, landing: Landing) -> Iterator[FootprintCurve]:
+def _circles(flown: Flown, landing: Landing) -> Iterator[Outline]:
     """The circular error probable, and the limit of a requirement on the distance from the target."""
     centre, distances = landing.centre, landing.distances(landing.centre)
     if flown.random and landing.rows.size > 2:
         radius = float(np.nanmedian(distances))
         text = f"CEP {number(radius, 3)} km: the circle about the {centre.name} that holds 50 % of the cases"
-        yield FootprintCurve("CEP", text, (_circle(landing.at(centre), radius),))
+        yield Outline("CEP", text, (_circle(landing.at(centre), radius),))
     for verdict in flown.verdicts if centre.name == TARGET else ():
         scale = KILOMETRES.get(flown.unit(verdict.metric))
         if scale is None or verdict.at_most is None:
@@ -137,7 +132,7 @@ def _circles(flown: Flown, landing: Landing) -> Iterator[FootprintCurve]:
         if np.nanmax(np.abs(misses - distances) / distances, initial=0.0) < SAME_DISTANCE:
             radius = scale * verdict.at_most
             text = f"required: {flown.words(verdict.metric)} at most {number(radius)} km"
-            yield FootprintCurve("target", text, (_circle(landing.at(centre), radius),))
+            yield Outline("target", text, (_circle(landing.at(centre), radius),))
 
 
 def _circle(middle: np.ndarray, radius: float) -> np.ndarray:
@@ -145,19 +140,17 @@ def _circle(middle: np.ndarray, radius: float) -> np.ndarray:
     return middle + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def _coasts(
-    landing: Landing, curves: Iterable[FootprintCurve]
-) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...], float]:
+def _coasts(landing: Landing, outlines: Iterable[Outline]) -> tuple[list[np.ndarray], list[np.ndarray], float]:
     """The coasts on the map, or else those of a wider one, and how many km it reaches to the north."""
     plane = landing.found.plane
-    places = [landing.found.points / 1000.0, *(one for curve in curves for one in curve.outlines)]
+    places = [landing.found.points / 1000.0, *(curve for outline in outlines for curve in outline.curves)]
     places += [landing.at(landing.aim)[None, :]] if landing.aim else []
     ends = np.abs(np.concatenate(places)).max(axis=0)
     on_map = coastlines(plane, 3000.0 * float(ends.max()))
     if any((np.abs(line) < ends).all(axis=1).any() for line in on_map):
-        return tuple(on_map), (), 0.0
+        return on_map, [], 0.0
     reach = max(WIDER * nearest_coast(plane), LEAST_AROUND)
-    return (), tuple(coastlines(plane, AROUND * reach)), reach / 1000.0
+    return [], coastlines(plane, AROUND * reach), reach / 1000.0
 
 
 def _long_axis(found: Footprint) -> float | None:
@@ -172,15 +165,13 @@ def _half_turn(longitude: np.ndarray) -> np.ndarray:
     return (longitude + 180.0) % 360.0 - 180.0
 
 
-def _curves(found: Footprint) -> Iterator[FootprintCurve]:
+def _outlines(found: Footprint) -> Iterator[Outline]:
     for ellipse in found.ellipses:
         text = f"{_name(ellipse)}, holds {percent(ellipse.inside / ellipse.n, 1)} of the cases"
-        yield FootprintCurve("ellipse", text, (ellipse.outline() / 1000.0,))
+        yield Outline("ellipse", text, (ellipse.outline() / 1000.0,))
     for region in found.regions:
         if region.content == DRAWN_REGION:
-            yield FootprintCurve(
-                "region", f"{_name(region)}, distribution-free", tuple(o / 1000.0 for o in region.outlines)
-            )
+            yield Outline("region", f"{_name(region)}, distribution-free", tuple(o / 1000.0 for o in region.outlines))
 
 
 def _name(region: Ellipse | DensityRegion) -> str:
@@ -313,11 +304,11 @@ def _places(flown: Flown, landing: Landing) -> Places:
         latitude=landing.latitude[rows],
         longitude=_half_turn(landing.longitude[rows]),
         marks=tuple(marks),
-        outlines=tuple(_outlines(landing.found)),
+        outlines=tuple(_map_outlines(landing.found)),
     )
 
 
-def _outlines(found: Footprint) -> Iterator[Outline]:
+def _map_outlines(found: Footprint) -> Iterator[MapOutline]:
     for region in found.all_regions:
         curves = (region.outline(),) if isinstance(region, Ellipse) else region.outlines
         kind = "ellipse" if isinstance(region, Ellipse) else "region"
@@ -330,4 +321,4 @@ def _outlines(found: Footprint) -> Iterator[Outline]:
             facts["confidence"] = region.confidence
         for curve in curves:
             latitude, longitude = found.plane.places(curve)
-            yield Outline(kind, _name(region), facts, latitude, longitude)
+            yield MapOutline(kind, _name(region), facts, latitude, longitude)

@@ -13,9 +13,8 @@ from markupsafe import Markup
 from reports.document.blocks import CaseData, Document, FigureBlock, blocks_of
 from reports.drawing import screen
 from reports.drawing.marks import Axis, Band, Limit, Line, Plot
-from reports.figures import Histories
+from reports.figures.clouds import outcome_cloud
 from reports.figures.histories import MEDIAN
-from reports.figures.scatter import outcome_cloud
 
 SCRIPTS = ("tables.js", "figures.js", "cases.js", "histories.js")
 
@@ -135,9 +134,9 @@ def _behind(document: Document) -> dict[str, list[dict[str, Any]]]:
     """Envelopes, medians and limits of history quantities, which a single case's curve is drawn over."""
     found: dict[str, list[dict[str, Any]]] = {}
     for block in blocks_of(document, FigureBlock):
-        if isinstance(block.drawing, Histories):
-            for name, plot in zip(block.drawing.labels, block.drawing.plots, strict=True):
-                marks = [mark for mark in plot.marks if isinstance(mark, Band | Limit)
-                         or (isinstance(mark, Line) and mark.name.startswith(MEDIAN))]  # fmt: skip
-                found.setdefault(name, [trace for mark in marks for trace in screen.traced(mark, plot)])
+        for plot in block.drawing.plots:
+            marks = [mark for mark in plot.marks if isinstance(mark, Band | Limit)
+                     or (isinstance(mark, Line) and mark.name.startswith(MEDIAN))]  # fmt: skip
+            if plot.quantity:
+                found.setdefault(plot.quantity, [trace for mark in marks for trace in screen.traced(mark, plot)])
     return found

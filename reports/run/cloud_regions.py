@@ -9,7 +9,7 @@ import numpy as np
 
 from mc_engine.statistics.moments import in_units, near_one
 from mc_engine.statistics.regions import covariance_ellipses, density_regions
-from reports.figures.scatter import CloudRegion
+from reports.figures.clouds import Outline
 from reports.run.flown import Flown, Stated
 from reports.text.numbers import count, percent
 
@@ -18,7 +18,7 @@ FEWEST = 20  # cases, and different numbers of each metric
 THINNEST = 1e-6  # standard deviations
 
 
-def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.ndarray) -> tuple[CloudRegion, ...]:
+def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.ndarray) -> tuple[Outline, ...]:
     """Regions of finite values float64[n]; none unless both columns are metrics of cases that were drawn at random."""
     metrics = {fact.name for fact in flown.with_role("metric")}
     distinct = (np.unique(values).size for values in (x, y))
@@ -38,7 +38,7 @@ def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.nda
 
 def _regions(
     points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray], ranges: np.ndarray, stated: Stated
-) -> Iterator[CloudRegion]:
+) -> Iterator[Outline]:
     """Regions of standardised points.  ranges : float64[2, 2], lowest and highest possible x and y.
 
     A normal distribution whose ellipse reaches what is impossible is not that of these metrics: no ellipse then.
@@ -48,10 +48,10 @@ def _regions(
     if all((ranges[0] <= outline).all() and (outline <= ranges[1]).all() for _, outline in ellipses):
         for one, outline in ellipses:
             held = f"holds {count(one.inside)} of {n} cases, {percent(one.inside / one.n, 1)}"
-            yield CloudRegion(True, f"{percent(one.content, 3)} ellipse of a normal distribution: {held}", (outline,))
+            yield Outline("ellipse", f"{percent(one.content, 3)} ellipse of a normal distribution: {held}", (outline,))
     for region in density_regions(points, contents[1:], stated.confidence, THINNEST):
         text = (
             f"distribution-free region, at least {percent(region.content, 3)} with {percent(region.confidence)} "
             f"confidence: holds {count(region.inside)} of {n} cases"
         )
-        yield CloudRegion(False, text, tuple(np.clip(placed(outline), *ranges) for outline in region.outlines))
+        yield Outline("region", text, tuple(np.clip(placed(outline), *ranges) for outline in region.outlines))

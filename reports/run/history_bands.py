@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from reports.figures import HistoryBand
+from reports.figures.histories import Envelope
 
 FEWEST_CASES = 20  # of a band
 INSTANTS = 300
@@ -32,7 +32,7 @@ def fair_cases(case_ids: Sequence[int]) -> list[int]:
     return [case for place, case in enumerate(kept) if case == place]
 
 
-def history_bands(histories: pd.DataFrame, case_ids: Sequence[int], names: Sequence[str]) -> dict[str, HistoryBand]:
+def history_envelopes(histories: pd.DataFrame, case_ids: Sequence[int], names: Sequence[str]) -> dict[str, Envelope]:
     """Envelopes of the quantities over these cases; none if the cases are too few.
 
     Between its own rows a flight is a straight line; after its end it counts no more.  Where so few still fly that they
@@ -55,7 +55,7 @@ def _grid(times: list[np.ndarray]) -> np.ndarray:
     return np.linspace(min(one[0] for one in times), max(one[-1] for one in times), INSTANTS)
 
 
-def _band(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -> HistoryBand:
+def _band(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -> Envelope:
     rows = [np.interp(grid, t, y, right=np.nan) for t, y in zip(times, values, strict=True)]
     table = np.sort(np.array(rows), axis=0)  # flights that have ended last, as not-a-numbers
     flying = np.count_nonzero(np.isfinite(table), axis=0)
@@ -70,4 +70,4 @@ def _band(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -
         below, above = table[low, columns], table[high, columns]
         supported = (flying * min(probability, 1.0 - probability) >= 1.0) | (probability in (0.0, 1.0))
         curves[probability] = np.where(supported, below + (place - low) * (above - below), np.nan)
-    return HistoryBand(grid[used], curves, len(times))
+    return Envelope(grid[used], curves, len(times))

@@ -12,7 +12,7 @@ from mc_engine.statistics.convergence import (
     running_quantile,
 )
 from reports.document.blocks import Cell, Column, FigureBlock, Table
-from reports.drawing.marks import Axis, Line, Panels, Plot, between
+from reports.drawing.marks import Axis, Drawing, Line, Plot, between
 from reports.drawing.palette import BLUE, SKY
 from reports.run.flown import Flown
 from reports.text.numbers import count, interval, number, percent, percentile
@@ -31,7 +31,7 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         drawn = list(told)[:MOST_DRAWN]
         panels = tuple(_panel(flown, name, run) for name in drawn for run in told[name])
         caption = f"Mean and outer percentile of the key metrics against the number of cases{flown.sample_words}"
-        yield FigureBlock(caption, Panels(panels, across=4, form="Running estimates"), "half")
+        yield FigureBlock(caption, Drawing("Running estimates", panels, 4), "half")
         yield _table(flown, told)
     silent = [name for name in runs if name not in told]
     if silent:

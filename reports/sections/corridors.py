@@ -9,7 +9,8 @@ import numpy as np
 from mc_engine.model.figures import CorridorFigure
 from mc_engine.statistics import SurfaceMap, Verdict, map_metric
 from reports.document.blocks import FigureBlock, Table
-from reports.figures import CorridorDrawing, LimitLine
+from reports.drawing.marks import Points
+from reports.figures.clouds import LIMIT_SETS, Outline, case_scatter
 from reports.run.flown import Flown
 from reports.run.outcomes import inside, inside_words
 from reports.sections.figure_blocks import nominal_point, thinned_rows
@@ -18,7 +19,7 @@ from reports.text.numbers import count
 
 FEWEST_BEYOND = 12  # cases on either side of a limit that is drawn
 TOLD_RIGHT = 0.75  # share of the cases beyond a limit that its line must put there
-MOST_CLASSES = 7  # colours that can be told apart, "inside" among them
+MOST_CLASSES = len(LIMIT_SETS)  # with a colour, "inside" among them
 
 
 def corridor_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
@@ -41,25 +42,23 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     words, member = _classes([verdict.name for verdict in verdicts], violated, inside_words(flown, verdicts))
     # every violation stays in the picture, as far as there is room
     rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
-    drawing = CorridorDrawing(
-        x=x[rows],
-        y=y[rows],
-        case_ids=flown.case_ids[rows],
-        member=member[rows],
-        classes=tuple((word, int(np.count_nonzero(member[used] == k))) for k, word in enumerate(words)),
-        limits=tuple(_limit_lines(flown, figure, verdicts, violated)),
-        x_label=flown.axis(figure.x),
-        y_label=flown.axis(figure.y),
-        n_used=int(used.size),
-        n_tried=flown.n_held,
-        nominal=nominal_point(flown, figure.x, figure.y),
-        columns=(figure.x, figure.y),
-    )
-    if not drawing.limits and not violated.any():
+    limits = tuple(_limit_lines(flown, figure, verdicts, violated))
+    if not limits and not violated.any():
         return f"{figure.title}: not drawn; all cases are {inside_words(flown, verdicts)}."
+    drawing = case_scatter(
+        Points(x[rows], y[rows], "", cases=flown.case_ids[rows], columns=(figure.x, figure.y)),
+        member[rows],
+        [(word, int(np.count_nonzero(member[used] == k))) for k, word in enumerate(words)],
+        (flown.axis(figure.x), flown.axis(figure.y)),
+        flown.n_held,
+        styles=LIMIT_SETS,
+        nominal=nominal_point(flown, figure.x, figure.y),
+        outlines=limits,
+        form="Cases by the limits that they violate",
+    )
     missing = flown.n_held - used.size
     lost = f" {count(missing)} of {count(flown.n_held)} cases have no values to draw." if missing else ""
-    said = "" if drawing.limits else " No limit is drawn: none of them is decided by the two columns alone."
+    said = "" if limits else " No limit is drawn: none of them is decided by the two columns alone."
     return FigureBlock(f"{figure.title}.{said}{lost}", drawing, "wide")
 
 
@@ -85,7 +84,7 @@ def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[l
 
 def _limit_lines(
     flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray
-) -> Iterator[LimitLine]:
+) -> Iterator[Outline]:
     """Where the surface of a metric over the two columns is at its limit, if the two columns decide it.
 
     Of a count, such as that of exits, the surface between two cases means nothing.
@@ -101,7 +100,8 @@ def _limit_lines(
             curves = [] if limit is None else generator.lines(limit)
             if curves:
                 text = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
-                yield LimitLine(text, tuple(np.asarray(curve) for curve in curves))
+                words = f"{text}, in the mean over the other inputs"
+                yield Outline("limit", words, tuple(np.asarray(curve) for curve in curves))
 
 
 def _continuous(values: np.ndarray) -> bool:

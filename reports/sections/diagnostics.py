@@ -6,9 +6,8 @@ import numpy as np
 
 from mc_engine.statistics.input_columns import average_ranks
 from reports.document.blocks import FigureBlock
-from reports.drawing.marks import Panels
-from reports.figures.correlations import correlation_matrix
-from reports.figures.probability_plots import probability_plot
+from reports.drawing.marks import Drawing
+from reports.figures.statistics import correlation_matrix, probability_plot
 from reports.run.flown import Flown
 from reports.text.numbers import count, number
 
@@ -42,7 +41,7 @@ def correlation_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
         "Spearman’s rank correlations of the key metrics and of the inputs that contribute most to them. Below "
         f"{chance:.2f} in size, a correlation of {count(fewest)} cases is within chance (3 standard errors).{picked}"
     )
-    drawn = Panels((correlation_matrix(words, rho),), f"Correlation matrix. The strongest: {strongest}.", across=1)
+    drawn = Drawing("Correlation matrix", (correlation_matrix(words, rho),), 1, f"The strongest: {strongest}")
     yield FigureBlock(caption, drawn, "matrix")
 
 
@@ -87,7 +86,7 @@ def normal_probability_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
         "band are beyond chance at their rank. γ₁: skewness, γ₂: excess kurtosis, both 0 of a normal distribution. "
         "Extrapolation by σ holds only where the points follow the line."
     )
-    yield FigureBlock(caption, Panels(tuple(panels), across=4, form="Normal probability plots"), "small")
+    yield FigureBlock(caption, Drawing("Normal probability plots", tuple(panels), 4), "small")
 
 
 def _shape(values: np.ndarray) -> str:

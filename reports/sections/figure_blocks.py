@@ -1,7 +1,7 @@
 """The figures of a run: picks the data, bounds how much of it is drawn, and says what was left out."""
 
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import combinations
 from math import ceil
 
@@ -12,11 +12,15 @@ from mc_engine.statistics import map_metric
 from mc_engine.statistics.maps import FEWEST, LEAST_EXPLAINED, explained_share
 from mc_engine.statistics.summary import nearly_equal
 from reports.document.blocks import FigureBlock
-from reports.figures import DistributionPanel, Distributions, Histories, HistoryLine, MapDrawing, ScatterDrawing
+from reports.drawing.marks import Drawing, Plot, Points
+from reports.figures.clouds import Outline, case_scatter
+from reports.figures.distributions import histogram, histograms
+from reports.figures.histories import Envelope, HistoryLine, history_figure, history_plot
+from reports.figures.maps import metric_map
 from reports.run.cloud_regions import cloud_regions
 from reports.run.default_figures import history_figures, scatter_figures
 from reports.run.flown import Flown
-from reports.run.history_bands import FEWEST_CASES, OUTER, fair_cases, history_bands, outer_percentile
+from reports.run.history_bands import FEWEST_CASES, OUTER, fair_cases, history_envelopes, outer_percentile
 from reports.run.history_limits import history_limits
 from reports.run.outcomes import case_outcomes, outcome_names
 from reports.sections.case_tables import FEW_CASES, input_words
@@ -85,15 +89,14 @@ def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
                   f"{count(used.size)} cases are too few, or they lie on a line")  # fmt: skip
         return f"{figure.title}: not drawn; {few if used.size < FEWEST else unsure}."
     rows = thinned_rows(used, flown.rows(flown.worst(figure.metric, WORST_RANKS)["case_id"]))
-    drawing = MapDrawing(
-        surface=surface,
-        x_label=flown.axis(figure.x),
-        y_label=flown.axis(figure.y),
-        metric_label=flown.axis(figure.metric),
-        unit=flown.unit(figure.metric),
-        points=np.column_stack([x[rows], y[rows]]),
-        case_ids=flown.case_ids[rows],
-        point_values=z[rows],
+    labels = flown.axis(figure.x), flown.axis(figure.y), flown.axis(figure.metric)
+    drawing = metric_map(
+        surface,
+        np.column_stack([x[rows], y[rows]]),
+        z[rows],
+        flown.case_ids[rows],
+        labels,
+        flown.unit(figure.metric),
         n_points=int(used.size),
         nominal=nominal_point(flown, figure.x, figure.y),
         columns=(figure.x, figure.y, figure.metric),
@@ -147,27 +150,29 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
     if not used.size:
         reason = flown.absence(figure.x, figure.y) or f"no case has both {figure.x} and {figure.y}"
         return f"{figure.title}: not drawn; {reason}."
-    ends = [int(used[pick(values[used])]) for values in (x, y) for pick in (np.argmin, np.argmax)]
-    outcome = case_outcomes(flown)
-    rows = np.union1d(thinned_by_outcome(used, outcome), ends)
     regions = cloud_regions(flown, (figure.x, figure.y), x[used], y[used])
-    drawing = ScatterDrawing(
-        x=x[rows],
-        y=y[rows],
-        case_ids=flown.case_ids[rows],
-        x_label=flown.axis(figure.x),
-        y_label=flown.axis(figure.y),
-        n_used=int(used.size),
-        n_tried=flown.n_held,
-        nominal=nominal_point(flown, figure.x, figure.y),
-        outcome=outcome[rows],
-        outcomes=tuple(zip(outcome_names(flown), np.bincount(outcome[used], minlength=3).tolist(), strict=True)),
-        columns=(figure.x, figure.y),
-        regions=regions,
+    drawing = outcome_scatter(flown, figure.x, figure.y, regions)
+    impossible = bool(regions) and not any(region.kind == "ellipse" for region in regions)
+    left_out = ". No normal ellipse is shown: it would leave the physical range of these metrics" if impossible else ""
+    return FigureBlock(f"{figure.title}{left_out}.", drawing, "wide")
+
+
+def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Outline] = ()) -> Drawing:
+    """The cases over two columns by their outcome, thinned; those at the ends of both columns among them."""
+    x, y, outcome = flown.values(x_name), flown.values(y_name), case_outcomes(flown)
+    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    ends = [int(used[pick(values[used])]) for values in (x, y) for pick in (np.argmin, np.argmax)] if used.size else []
+    rows = np.union1d(thinned_by_outcome(used, outcome), ends).astype(np.int64)
+    counts = np.bincount(outcome[used], minlength=3).tolist()
+    return case_scatter(
+        Points(x[rows], y[rows], "", cases=flown.case_ids[rows], columns=(x_name, y_name)),
+        outcome[rows],
+        tuple(zip(outcome_names(flown), counts, strict=True)),
+        (flown.axis(x_name), flown.axis(y_name)),
+        flown.n_held,
+        nominal=nominal_point(flown, x_name, y_name),
+        outlines=regions,
     )
-    impossible = bool(regions) and not any(one.elliptic for one in regions)
-    said = ". No normal ellipse is shown: it would leave the physical range of these metrics" if impossible else ""
-    return FigureBlock(f"{figure.title}{said}.", drawing, "wide")
 
 
 def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
@@ -201,17 +206,16 @@ def _distribution_figures(flown: Flown, names: list[str], title: str, height: fl
     pages = -(-len(names) // MOST_PANELS)
     for page in range(pages):
         group = names[len(names) * page // pages : len(names) * (page + 1) // pages]
-        panels = tuple(_distribution_panel(flown, name) for name in group)
+        plots = [_distribution_plot(flown, name, height) for name in group]
         part = f" ({page + 1} of {pages})" if pages > 1 else ""
-        drawing = Distributions(panels, flown.stated.outer, flown.random, height)
-        yield FigureBlock(f"{title}{part}, {_used(flown)}", drawing, "small")
+        yield FigureBlock(f"{title}{part}, {_used(flown)}", histograms(plots), "small")
 
 
 def _used(flown: Flown) -> str:
     return f"{counted(flown.n_tried, 'case')}, fewer where a panel says so."
 
 
-def _distribution_panel(flown: Flown, name: str) -> DistributionPanel:
+def _distribution_plot(flown: Flown, name: str, height: float) -> Plot:
     values, summary = flown.values(name), flown.summaries[name]
     limits = {
         limit
@@ -221,19 +225,22 @@ def _distribution_panel(flown: Flown, name: str) -> DistributionPanel:
         if limit is not None
     }
     used = "" if summary.n_used == summary.n_tried else f"{count(summary.n_used)} of {count(summary.n_tried)} cases"
-    return DistributionPanel(
+    return histogram(
+        values[np.isfinite(values)],
+        flown.axis(name),
+        summary,
+        flown.stated.outer,
         title=used,
-        label=flown.axis(name),
-        values=values[np.isfinite(values)],
-        summary=summary,
         nominal=flown.nominal_value(name),
-        limits=tuple(sorted(limits)),
-        law=_law(flown, name),
+        limits=sorted(limits),
+        normal=_printed_normal(flown, name),
         column=name,
+        with_intervals=flown.random,
+        height=height,
     )
 
 
-def _law(flown: Flown, name: str) -> tuple[float, float] | None:
+def _printed_normal(flown: Flown, name: str) -> tuple[float, float] | None:
     """Mean and standard deviation that the source prints, in the unit chosen for the metric."""
     law = published_law(flown.own, name)
     return None if law is None else (flown.told(name, law[0]), flown.told(name, law[1]))
@@ -252,42 +259,53 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     missing = [name for name in asked if name not in saved]
     constant = [name for name in asked if name in saved and is_constant(flown.histories[name].to_numpy())]
     drawn = [name for name in asked if name not in missing and name not in constant]
-    whole = history_drawing(flown, drawn)
-    yield from _envelope_words(flown, whole)
+    histories = saved_histories(flown, drawn)
+    yield from _envelope_words(flown, histories.envelopes)
     for figure in wanted:
-        names = [name for name in figure.quantities if name in drawn]
-        if names:
-            labels = {name: whole.labels[name] for name in names}
-            yield FigureBlock(figure.title, replace(whole, labels=labels), "half")
+        plots = [histories.plot(flown, name) for name in figure.quantities if name in drawn]
+        if plots:
+            yield FigureBlock(figure.title, history_figure(plots), "half")
     if constant:
         yield f"Not drawn, constant in every saved case: {', '.join(constant)}."
     if missing:
         yield f"Not drawn, the histories have no such quantity: {', '.join(missing)}."
 
 
-def history_drawing(
+@dataclass(frozen=True)
+class SavedHistories:
+    """What is drawn of the saved cases: their lines, envelopes by quantity, and limits by quantity with their words."""
+
+    lines: tuple[HistoryLine, ...]
+    envelopes: dict[str, Envelope]
+    limits: dict[str, tuple[tuple[float, str], ...]]
+
+    def plot(self, flown: Flown, name: str) -> Plot:
+        """The panel of one quantity."""
+        label, time = flown.axis(name), axis_label("time", flown.unit("t_s"))
+        return history_plot(name, label, time, self.lines, self.envelopes.get(name), self.limits.get(name, ()))
+
+
+def saved_histories(
     flown: Flown, names: list[str], cases: dict[int, tuple[str, int | None]] | None = None
-) -> Histories:
-    """Quantities with their envelopes and limits; cases : name and rank of the lines, by default those worth a line."""
-    labels = {name: flown.axis(name) for name in names}
+) -> SavedHistories:
+    """Of these quantities; cases : name and rank of the lines, by default those worth a line."""
     if not len(flown.histories):
-        return Histories((), labels)
+        return SavedHistories((), {}, {})
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
-    bands = history_bands(flown.histories, fair, names)
+    envelopes = history_envelopes(flown.histories, fair, names)
     if cases is None:
         cases = {
             case: (label, rank)
             for case, (label, rank) in history_cases(flown).items()
-            if not bands or (rank is not None and rank <= COLOURED_OVER_BANDS)
+            if not envelopes or (rank is not None and rank <= COLOURED_OVER_BANDS)
         }
     lines = tuple(history_line(flown, case, label, rank, names) for case, (label, rank) in cases.items())
-    limits, time = history_limits(flown, names), axis_label("time", flown.unit("t_s"))
-    return Histories(lines, labels, bands, limits, time)
+    return SavedHistories(lines, envelopes, history_limits(flown, names))
 
 
-def _envelope_words(flown: Flown, drawn: Histories) -> Iterator[str]:
+def _envelope_words(flown: Flown, envelopes: dict[str, Envelope]) -> Iterator[str]:
     """What the envelopes and limits of all history figures are."""
-    sizes = {band.n_cases for band in drawn.bands.values()}
+    sizes = {envelope.n_cases for envelope in envelopes.values()}
     if sizes:
         n = sizes.pop()
         outer = outer_percentile(n)

@@ -8,8 +8,8 @@ from pandas.api.types import infer_dtype
 from mc_engine.statistics import summarize
 from mc_engine.statistics.paired import matching_rows, paired_difference
 from reports.document.blocks import Cell, Column, FigureBlock, Table
-from reports.figures import LevelPanel, LevelsDrawing
-from reports.figures.levels import SPREAD
+from reports.drawing.marks import Drawing, Plot
+from reports.figures.rows import SPREAD, level_panel
 from reports.run.flown import Flown
 from reports.text.numbers import axis_label, count, interval, number, percent
 
@@ -49,10 +49,10 @@ def _compared(flown: Flown, name: str, levels: list[str]) -> Iterator[FigureBloc
         yield f"{flown.words(name)}: no metric differs between its levels."
         return
     rows = [np.flatnonzero(choice == level) for level in levels]
-    panels = tuple(_panel(flown, metric, rows) for metric in metrics)
+    plots = tuple(_panel(flown, metric, levels, rows) for metric in metrics)
     yield FigureBlock(
         f"Metrics by {flown.words(name)}. {_pairs_said(flown, matched)}",
-        LevelsDrawing(flown.words(name), tuple(levels), panels),
+        Drawing(f"Metrics by {flown.words(name)}", plots),
         "half",
     )
     for metric in metrics[:TABLES]:
@@ -75,7 +75,7 @@ def _pairs_said(flown: Flown, matched: np.ndarray) -> str:
     )
 
 
-def _panel(flown: Flown, metric: str, rows: list[np.ndarray]) -> LevelPanel:
+def _panel(flown: Flown, metric: str, levels: list[str], rows: list[np.ndarray]) -> Plot:
     values = flown.values(metric)
     quantiles, used = np.full((len(rows), len(SPREAD)), np.nan), []
     for place, group in enumerate(rows):
@@ -83,7 +83,7 @@ def _panel(flown: Flown, metric: str, rows: list[np.ndarray]) -> LevelPanel:
         used.append(int(numbers.size))
         if numbers.size:
             quantiles[place] = np.quantile(numbers, SPREAD)
-    return LevelPanel(axis_label(flown.words(metric), flown.unit(metric)), quantiles, tuple(used))
+    return level_panel(axis_label(flown.words(metric), flown.unit(metric)), levels, quantiles, used)
 
 
 def _level_table(

@@ -7,7 +7,7 @@ import pandas as pd
 
 from mc_engine.model.figures import ProfileFigure
 from reports.document.blocks import FigureBlock
-from reports.figures import ProfileBand, ProfileDrawing
+from reports.figures.histories import Envelope, profile_figure
 from reports.run.flown import Flown
 from reports.run.history_bands import FEWEST_CASES, envelope_probabilities, fair_cases
 from reports.sections.figure_blocks import COLOURED_OVER_BANDS, history_cases, history_line
@@ -40,7 +40,8 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
         for case, (label, rank) in history_cases(flown).items()
         if not bands or (rank is not None and rank <= COLOURED_OVER_BANDS)
     )
-    drawing = ProfileDrawing(lines, figure.x, figure.y, flown.axis(figure.x), flown.axis(figure.y), *bands[:2])
+    labels = flown.axis(figure.x), flown.axis(figure.y)
+    drawing = profile_figure((figure.x, figure.y), labels, lines, bands[:2])
     said = (
         _band_words(flown, figure, found)
         if isinstance(found, tuple)
@@ -51,7 +52,7 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
     return FigureBlock(f"{figure.title}.{said}", drawing, "wide")
 
 
-def _band_words(flown: Flown, figure: ProfileFigure, bands: tuple[ProfileBand, ...]) -> str:
+def _band_words(flown: Flown, figure: ProfileFigure, bands: tuple[Envelope, ...]) -> str:
     x, y = flown.words(figure.x), flown.words(figure.y)
     ways = " and ".join("up" if band.rising else "down" for band in bands)
     again = "climbs" if not bands[0].rising else "descends"
@@ -62,7 +63,7 @@ def _band_words(flown: Flown, figure: ProfileFigure, bands: tuple[ProfileBand, .
     )
 
 
-def profile_bands(histories: pd.DataFrame, case_ids: Sequence[int], x: str, y: str) -> tuple[ProfileBand, ...] | str:
+def profile_bands(histories: pd.DataFrame, case_ids: Sequence[int], x: str, y: str) -> tuple[Envelope, ...] | str:
     """Quantiles of x where each flight first comes to a level of y; or the sentence that says why there are none.
 
     Flights that begin by descending have a band over the way down; those that climb first one over the way up, and one
@@ -107,7 +108,7 @@ def _legs(y: np.ndarray, least: float) -> list[int]:
     return legs
 
 
-def _band(flights: list[np.ndarray], levels: np.ndarray, rising: bool) -> ProfileBand | None:
+def _band(flights: list[np.ndarray], levels: np.ndarray, rising: bool) -> Envelope | None:
     """Quantiles of x at the levels of y on the first way up, or down, to each; None for too few flights."""
     way = -1.0 if rising else 1.0
     asked = np.sort(way * levels)
@@ -116,7 +117,7 @@ def _band(flights: list[np.ndarray], levels: np.ndarray, rising: bool) -> Profil
     if np.count_nonzero(used) < 2:
         return None
     curves = {p: np.nanquantile(table[:, used], p, axis=0) for p in envelope_probabilities(len(flights))}
-    return ProfileBand(levels[used], curves, len(flights), rising)
+    return Envelope(levels[used], curves, len(flights), rising)
 
 
 def first_descent(x: np.ndarray, y: np.ndarray, levels: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from mc_engine.statistics import Verdict
 from mc_engine.statistics.worst import Limits
 from reports.document.blocks import Cell, Column, FigureBlock, Table
-from reports.figures.margins import MarginDrawing, MarginRow
+from reports.figures.rows import MarginRow, margin_figure
 from reports.run.flown import Flown
 from reports.sections.tables import TONES, limit_text
 from reports.text.numbers import SPACE, count, number, percent, with_unit
@@ -19,11 +19,11 @@ def requirement_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str | Non
         yield "The campaign file sets no requirement; [requirement.NAME] with a metric and a limit adds one."
         return
     yield requirement_table(flown)
-    yield margin_figure(flown)
+    yield margin_block(flown)
     yield risk_table(flown)
 
 
-def margin_figure(flown: Flown) -> FigureBlock | None:
+def margin_block(flown: Flown) -> FigureBlock | None:
     """Margins of all requirements on one axis; None where no case has a number."""
     rows, left_out = [], []
     for verdict in flown.own.verdicts:
@@ -42,7 +42,7 @@ def margin_figure(flown: Flown) -> FigureBlock | None:
         "of a single one. Margins beyond 100 % are drawn at the edge."
         + f" Not drawn, the limit is 0: {', '.join(left_out)}."
         * bool(left_out),
-        MarginDrawing(tuple(rows)),
+        margin_figure(rows),
     )
 
 

@@ -13,11 +13,10 @@ import pandas as pd
 
 from mc_engine.studies.replay_files import read_replay, replayed_cases
 from reports.document.blocks import Block, CaseColumn, CaseData, FigureBlock, Section
-from reports.figures import ScatterDrawing
 from reports.figures.histories import thinned
 from reports.run.flown import ColumnFacts, Flown
 from reports.run.outcomes import INSIDE, case_outcomes, outcome_names, outcome_sentence
-from reports.sections.figure_blocks import is_constant, nominal_point, thinned_by_outcome, thinned_rows
+from reports.sections.figure_blocks import is_constant, outcome_scatter, thinned_rows
 from reports.text.numbers import axis_label
 
 ANCHOR = "cases"
@@ -39,27 +38,7 @@ def case_blocks(flown: Flown) -> Iterator[Block | str]:
     if axes is None:
         yield "Cases are not drawn by their outcome: fewer than two inputs or metrics differ between them."
         return
-    yield _outcome_figure(flown, *axes)
-
-
-def _outcome_figure(flown: Flown, x_name: str, y_name: str) -> FigureBlock:
-    x, y, outcome = flown.values(x_name), flown.values(y_name), case_outcomes(flown)
-    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
-    rows = thinned_by_outcome(used, outcome)
-    drawing = ScatterDrawing(
-        x=x[rows],
-        y=y[rows],
-        case_ids=flown.case_ids[rows],
-        x_label=flown.axis(x_name),
-        y_label=flown.axis(y_name),
-        n_used=int(used.size),
-        n_tried=flown.n_held,
-        nominal=nominal_point(flown, x_name, y_name),
-        outcome=outcome[rows],
-        outcomes=tuple(zip(outcome_names(flown), np.bincount(outcome[used], minlength=3).tolist(), strict=True)),
-        columns=(x_name, y_name),
-    )
-    return FigureBlock(f"Cases by outcome: {outcome_sentence(flown)}.", drawing, "wide")
+    yield FigureBlock(f"Cases by outcome: {outcome_sentence(flown)}.", outcome_scatter(flown, *axes), "wide")
 
 
 def case_axes(flown: Flown) -> tuple[str, str] | None:
@@ -169,9 +148,7 @@ def _drawn_cases(sections: Iterable[Section]) -> Iterator[np.ndarray]:
     """Numbers of the cases that the figures draw as points."""
     for section in sections:
         for block in section.blocks:
-            ids = getattr(block.drawing, "case_ids", None) if isinstance(block, FigureBlock) else None
-            if ids is not None:
-                yield ids
+            yield from block.drawing.cases if isinstance(block, FigureBlock) else ()
 
 
 # ---- histories

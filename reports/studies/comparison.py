@@ -22,7 +22,8 @@ from reports.document.blocks import (
     as_blocks,
     numbered,
 )
-from reports.figures.changes import ChangePanel, change_figure
+from reports.drawing.marks import Drawing
+from reports.figures.rows import change_panel
 from reports.formats.html import render_html
 from reports.formats.pdf import render_pdf
 from reports.run.flown import Flown, Run
@@ -184,12 +185,6 @@ def _figure(found: Comparison, moved: list[MetricChange]) -> FigureBlock:
     shown = moved[:MOST_ROWS]
     reach = _reach([abs(one.shift_in_sigma.value) for one in shown])
     far = [one for one in shown if abs(one.shift_in_sigma.value) > reach]
-    panels = (
-        _panel("Shift [σ of run A]", [UNKNOWN if one in far else one.shift_in_sigma for one in shown],
-               [one.shift_adjusted <= found.alpha for one in shown], 0.0),
-        _panel("Spread, run B over run A", [one.ratio for one in shown],
-               [one.spread_adjusted <= found.alpha for one in shown], 1.0),
-    )  # fmt: skip
     names = tuple(words(one.metric, found.units[one.metric]) for one in shown)
     caption = "How far each metric moved and how much its spread changed from run A to run B"
     if len(shown) < len(moved):
@@ -199,7 +194,15 @@ def _figure(found: Comparison, moved: list[MetricChange]) -> FigureBlock:
             f"{words(one.metric, found.units[one.metric])} {number(one.shift_in_sigma.value, 3)} σ" for one in far
         )
         caption += f". Shifts beyond the axis, not drawn: {', '.join(values)}"
-    return FigureBlock(f"{caption}.", change_figure(names, panels, percent(CONFIDENCE)), "half")
+    shifts = [UNKNOWN if one in far else one.shift_in_sigma for one in shown]
+    shifted, spread = (np.array([getattr(one, p) <= found.alpha for one in shown], dtype=bool)
+                       for p in ("shift_adjusted", "spread_adjusted"))  # fmt: skip
+    ratios, interval = [one.ratio for one in shown], percent(CONFIDENCE)
+    plots = (
+        change_panel("Shift [σ of run A]", names, _ends(shifts), shifted, 0.0, interval),
+        change_panel("Spread, run B over run A", names, _ends(ratios), spread, 1.0, interval),
+    )
+    return FigureBlock(f"{caption}.", Drawing("Changes from run A to run B", plots), "half")
 
 
 def _reach(shifts: list[float]) -> float:
@@ -208,11 +211,9 @@ def _reach(shifts: list[float]) -> float:
     return max(WIDEST * float(np.quantile(known, 0.5, method="lower")), FEW_SIGMA) if known.size else FEW_SIGMA
 
 
-def _panel(title: str, estimates: list[Estimate], significant: list[bool], none: float) -> ChangePanel:
-    value, lower, upper = (
-        np.array([getattr(one, end) for one in estimates], dtype=np.float64) for end in ("value", "lower", "upper")
-    )
-    return ChangePanel(title, value, lower, upper, np.array(significant, dtype=bool), none)
+def _ends(estimates: list[Estimate]) -> np.ndarray:
+    """float64[n, 3]: values and both ends of their intervals."""
+    return np.array([(one.value, one.lower, one.upper) for one in estimates], dtype=np.float64).reshape(-1, 3)
 
 
 def _metric_table(found: Comparison, moved: list[MetricChange]) -> Table:

@@ -7,11 +7,11 @@ import numpy as np
 from mc_engine.model.figures import FootprintFigure, HistoryFigure
 from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
 from reports.document.blocks import FigureBlock
-from reports.drawing.marks import Axis, Band, Line, Panels, Plot, Points, between
+from reports.drawing.marks import Axis, Band, Drawing, Line, Plot, Points, between
 from reports.drawing.palette import BLUE, VERMILION
 from reports.footprint.landings import landed, planet_of
 from reports.run.flown import Flown
-from reports.run.history_bands import fair_cases, history_bands
+from reports.run.history_bands import fair_cases, history_envelopes
 from reports.text.numbers import count
 
 MOST_PANELS = 9
@@ -30,19 +30,19 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
     panels = tuple(panel for name in metrics[:MOST_PANELS] if (panel := _distribution(runs, name)) is not None)
     if panels:
         caption = "Distributions of the metrics that changed, the largest change first."
-        yield FigureBlock(caption, Panels(panels, across=3, form=FORM), "small")
+        yield FigureBlock(caption, Drawing(FORM, panels, 3), "small")
     drawn = dict(_histories(runs))
     panels = tuple(one for one in drawn.values() if one is not None)[:MOST_PANELS]
     if panels:
         caption = "Time histories of both runs: of the saved cases, or the nominal case where fewer than 20 are saved."
-        yield FigureBlock(caption, Panels(panels, across=3, form=FORM), "half")
+        yield FigureBlock(caption, Drawing(FORM, panels, 3), "half")
     if noise := [name for name, one in drawn.items() if one is None]:
         yield f"Not drawn, rounding errors only in both nominal cases: {', '.join(noise)}."
     for figure in (one for one in runs[1].figures if isinstance(one, FootprintFigure)):
         footprint = _footprint(runs, figure)
         if footprint is not None:
             caption = f"{figure.title}, both runs. {_thinned_words(runs)}"
-            yield FigureBlock(caption, Panels((footprint,), form=FORM), "wide")
+            yield FigureBlock(caption, Drawing(FORM, (footprint,)), "wide")
 
 
 def _distribution(runs: tuple[Flown, Flown], name: str) -> Plot | None:
@@ -77,11 +77,11 @@ def _histories(runs: tuple[Flown, Flown]) -> Iterator[tuple[str, Plot | None]]:
 def _history_marks(run: int, flown: Flown, name: str) -> Iterator[Band | Line]:
     """The band and the median of the first cases; the nominal case where too few are saved."""
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
-    band = history_bands(flown.histories, fair, [name]).get(name)
+    band = history_envelopes(flown.histories, fair, [name]).get(name)
     if band is not None:
         key = f"{NAMES[run]}: smallest to largest"
-        yield between(band.t, band.curves[0.0], band.curves[1.0], COLOURS[run], 0.2, key=key)
-        yield _line(run, band.t, band.curves[0.5], "median")
+        yield between(band.at, band.curves[0.0], band.curves[1.0], COLOURS[run], 0.2, key=key)
+        yield _line(run, band.at, band.curves[0.5], "median")
         return
     rows = flown.histories[flown.histories["case_id"] == -1].sort_values("t_s")
     if len(rows):

@@ -20,7 +20,7 @@ from reports.document.blocks import (
     as_blocks,
     numbered,
 )
-from reports.drawing.marks import Axis, Limit, Line, Mark, Panels, Plot, Points, nominal_ring
+from reports.drawing.marks import Axis, Drawing, Limit, Line, Mark, Plot, Points, nominal_ring
 from reports.drawing.palette import BLUE, INK, PAPER, SKY, VERMILION
 from reports.sections.provenance import origin_table
 from reports.sections.tables import dispersed_table
@@ -212,7 +212,7 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
         "dispersions draw them; their weights give their probabilities."
     )
     plot = Plot(tuple(marks), x_axis, y_axis, height=420.0)
-    return FigureBlock(caption, Panels((plot,), form="Failed cases over two inputs"), "wide")
+    return FigureBlock(caption, Drawing("Failed cases over two inputs", (plot,)), "wide")
 
 
 def _input_table(result: dict[str, Any]) -> Table:
@@ -245,7 +245,7 @@ def _levels(result: dict[str, Any]) -> tuple[Block, ...]:
     return (Text((_level_words(chains),)), *found) if result["method"] != "plain" else tuple(found)
 
 
-def _tail(result: dict[str, Any], shown: list[dict[str, Any]]) -> Panels:
+def _tail(result: dict[str, Any], shown: list[dict[str, Any]]) -> Drawing:
     """The probability of each level over its margin, down to the limit."""
     margin, probability = (np.array([one[key] for one in shown]) for key in ("margin", "probability"))
     p, lower, upper = (np.array([result[key]]) for key in ("probability", "lower", "upper"))
@@ -260,9 +260,10 @@ def _tail(result: dict[str, Any], shown: list[dict[str, Any]]) -> Panels:
     x = Axis(axis_label("margin", result["metric"]["unit"]), reach=Axis().ends([margin, np.zeros(1)])[::-1])
     words = (
         f"The probability falls over {margin.size} levels as the margin falls to zero, where it is "
-        f"{number(p[0], 4)}, interval {number(lower[0], 4)} to {number(upper[0], 4)}."
+        f"{number(p[0], 4)}, interval {number(lower[0], 4)} to {number(upper[0], 4)}"
     )
-    return Panels((Plot(marks, x, Axis("P(smaller margin)", log=True), height=340.0),), words)
+    plot = Plot(marks, x, Axis("P(smaller margin)", log=True), height=340.0)
+    return Drawing("Probability over the margin", (plot,), words=words)
 
 
 def _level_words(chains: bool) -> str:

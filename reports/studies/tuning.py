@@ -7,9 +7,9 @@ import numpy as np
 
 from mc_engine.studies.tuning_folder import UNFINISHED, TuningRecord, infeasibility
 from reports.document.blocks import Block, Card, Document, FigureBlock, Section, Table, Terms, Text, as_blocks, numbered
-from reports.drawing.marks import Axis, Line, Panels, Plot
+from reports.drawing.marks import Axis, Drawing, Line, Plot
 from reports.drawing.palette import BLUE
-from reports.figures import FrontDrawing
+from reports.figures.fronts import Candidates, candidates_beyond, front_figure
 from reports.sections.figure_blocks import POINTS_SHOWN, thinned_rows
 from reports.studies.tuned import Tuned, inside, limit_words, quantile_words
 from reports.studies.tuning_tables import (
@@ -169,18 +169,19 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
     others = every[finite & ~every["candidate"].isin(tuned.best["candidate"])]
     parts = [others[others["feasible"]], others[~others["feasible"]]]
     shown = [part[names].to_numpy()[thinned_rows(np.arange(len(part)), np.empty(0, int))] for part in parts]
-    drawing = FrontDrawing(
-        labels=tuple(tuned.label(name) for name in names),
-        feasible=shown[0],
-        infeasible=shown[1],
-        front=tuned.best[names].to_numpy(),
+    feasible = int(every["feasible"].sum())
+    drawing = front_figure(
+        [tuned.label(name) for name in names],
+        Candidates(shown[0], feasible),
+        Candidates(shown[1], len(every) - feasible),
+        tuned.best[names].to_numpy(),
+        [(one["name"], [one["values"][name] for name in names]) for one in tuned.plan["published"]],
         relaxed=not tuned.record.feasible,
-        n_feasible=int(every["feasible"].sum()),
-        n_infeasible=int((~every["feasible"]).sum()),
-        published=tuple((one["name"], tuple(one["values"][name] for name in names)) for one in tuned.plan["published"]),
+        first_small=tuned.plan["objectives"][0]["goal"] == "minimise",
     )
+    beyond = candidates_beyond(drawing.plots[0])
     caption = "Every candidate and the front" if tuned.record.feasible else "Every candidate; none is inside all limits"
-    outside = f". {count(drawing.n_outside)} candidates lie beyond the axes" if drawing.n_outside else ""
+    outside = f". {count(beyond)} candidates lie beyond the axes" if beyond else ""
     thinner = (
         f". At most {count(POINTS_SHOWN)} of each kind are drawn" if any(len(p) > POINTS_SHOWN for p in parts) else ""
     )
@@ -221,4 +222,4 @@ def _convergence(tuned: Tuned) -> tuple[Block, ...]:
         )
         for label, y in curves.items()
     )
-    return (Text((text,)), FigureBlock("Progress of the search", Panels(panels, form="Progress of the search"), "half"))
+    return (Text((text,)), FigureBlock("Progress of the search", Drawing("Progress of the search", panels), "half"))

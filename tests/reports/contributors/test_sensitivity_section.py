@@ -94,7 +94,7 @@ def drawable(found):
 def test_both_drawings_hold_what_the_table_says(drawn):
     drawable(drawn)
     words = block(drawn, FigureBlock, "Success probability").drawing.alternative
-    assert words.startswith("Success probability in bins of single inputs. force along ")
+    assert words.startswith("Success probability in bins of single inputs. force: ")
 
 
 @pytest.mark.parametrize("cases", [0, 1, 2, 60])

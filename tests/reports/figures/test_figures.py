@@ -4,13 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from figure_marks import FORMS
 from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document.blocks import FigureBlock, blocks_of
 from reports.drawing import paper, screen
 from reports.drawing.marks import Points
-from reports.figures import MapDrawing
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
 
@@ -80,7 +80,7 @@ def test_numbers_that_differ_by_little_stay_different_on_the_screen():
 
 def test_dollar_signs_in_names_are_no_mathematics():
     drawn = [block.drawing for block in blocks_of(build(_with_name("cost $x$ of $\\nosuch$"), "run"), FigureBlock)]
-    labelled = [one for one in drawn if isinstance(one, MapDrawing) and "$x$" in one.x_label]
+    labelled = [one for one in drawn if one.form == FORMS["map"] and "$x$" in one.plots[0].x.label]
     assert labelled
     for one in labelled:
         assert "<svg" in paper.svg(one)

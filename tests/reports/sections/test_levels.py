@@ -9,7 +9,8 @@ from landing_run import landing_run
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table
 from reports.drawing import paper, screen
-from reports.figures import LevelPanel, LevelsDrawing
+from reports.drawing.marks import Points
+from reports.figures.rows import level_panel
 
 LAWS = ("none", "one", "two")
 
@@ -43,11 +44,13 @@ def test_the_figure_holds_the_quantiles_of_each_level():
     run = flown()
     figure, _ = choices(build(run, "run"))
     drawing = figure.drawing
-    assert isinstance(drawing, LevelsDrawing)
     assert "200 sets of cases differ in it alone" in figure.caption
-    panel = next(one for one in drawing.panels if one.label == "peak load [g]")
-    expected = run.table[run.table["law"] == "two"]["peak_load_g"].quantile([0.05, 0.5, 0.95])
-    assert panel.quantiles[2, [1, 3, 5]] == pytest.approx(expected.to_numpy(), rel=1e-12)
+    panel = next(one for one in drawing.plots if one.title == "peak load [g]")
+    values = run.table[run.table["law"] == "two"]["peak_load_g"]
+    (medians,) = [mark for mark in panel.marks if isinstance(mark, Points)]
+    (spread,) = [mark for mark in panel.marks if mark.key == "5 % to 95 %" and mark.y[0] == 2]
+    assert spread.x == pytest.approx(values.quantile([0.05, 0.95]).to_numpy(), rel=1e-12)
+    assert medians.x[2] == pytest.approx(values.median(), rel=1e-12)
     json.dumps(screen.specifications(drawing), allow_nan=False)
     assert "<svg" in paper.svg(drawing)
 
@@ -92,6 +95,6 @@ def test_one_level_or_numbers_are_no_choice():
 
 def test_levels_far_apart_stand_on_a_logarithmic_axis():
     apart = np.outer([1.0, 100.0], np.linspace(1.0, 2.0, 7))
-    assert LevelPanel("miss", apart, (9, 9)).logarithmic
-    assert not LevelPanel("miss", apart - 2.0, (9, 9)).logarithmic
-    assert not LevelPanel("miss", apart[:1], (9,)).logarithmic
+    assert level_panel("miss", ["a", "b"], apart, (9, 9)).x.log
+    assert not level_panel("miss", ["a", "b"], apart - 2.0, (9, 9)).x.log
+    assert not level_panel("miss", ["a"], apart[:1], (9,)).x.log

@@ -5,19 +5,20 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
+from figure_marks import FORMS, marks_of
 from landing_run import descents, landing_run
 
 from reports.contents import build
 from reports.document.blocks import FigureBlock
 from reports.drawing import paper, screen
-from reports.figures import ProfileDrawing
-from reports.figures.profiles import thinned_curve
+from reports.drawing.marks import Band, Line
+from reports.figures.histories import thinned_curve
 from reports.sections.profiles import first_descent, profile_bands
 
 
 def profile(document):
     section = next(one for one in document.sections if one.anchor == "histories")
-    return next(b for b in section.blocks if isinstance(b, FigureBlock) and isinstance(b.drawing, ProfileDrawing))
+    return next(b for b in section.blocks if isinstance(b, FigureBlock) and b.drawing.form == FORMS["profile"])
 
 
 def test_the_first_way_down_to_a_level_counts():
@@ -37,8 +38,8 @@ def test_a_flight_of_one_row_or_of_none_meets_no_level():
 
 def test_the_band_is_the_quantile_of_the_speeds_at_each_altitude():
     (band,) = profile_bands(descents(41), list(range(41)), "speed_m_s", "altitude_km")
-    place = int(np.argmin(np.abs(band.levels - 90.0)))
-    share = 1.0 - 0.9 * 0.4 * (120.0 - band.levels[place]) / 60.0
+    place = int(np.argmin(np.abs(band.at - 90.0)))
+    share = 1.0 - 0.9 * 0.4 * (120.0 - band.at[place]) / 60.0
     speeds = (7000.0 + 10.0 * np.arange(41)) * share
     for probability, curve in band.curves.items():
         assert curve[place] == pytest.approx(np.quantile(speeds, probability), rel=1e-9)
@@ -70,8 +71,8 @@ def test_flights_that_climb_first_have_bands_of_the_way_up_and_of_the_way_down()
     )
     assert [band.rising for band in found] == [True, False]
     for band, sign in zip(found, (-1.0, 1.0), strict=True):
-        place = int(np.argmin(np.abs(band.levels - 0.5)))
-        s = 0.5 * (1.0 + sign * np.sqrt(1.0 - band.levels[place]))
+        place = int(np.argmin(np.abs(band.at - 0.5)))
+        s = 0.5 * (1.0 + sign * np.sqrt(1.0 - band.at[place]))
         assert band.curves[0.5][place] == pytest.approx(1.15 * s, rel=1e-3)
         assert band.curves[0.95][place] == pytest.approx(np.quantile(1.0 + 0.01 * np.arange(31), 0.95) * s, rel=1e-3)
 
@@ -79,7 +80,7 @@ def test_flights_that_climb_first_have_bands_of_the_way_up_and_of_the_way_down()
 def test_an_ascent_has_a_band_of_the_way_up_alone():
     (band,) = profile_bands(flights(31, lambda s, k: (s + k, s**2)), range(31), "x_m", "y_m")
     assert band.rising
-    assert band.curves[0.5] == pytest.approx(15.0 + np.sqrt(band.levels), abs=0.02)
+    assert band.curves[0.5] == pytest.approx(15.0 + np.sqrt(band.at), abs=0.02)
 
 
 @pytest.mark.parametrize("turns", [1, 4])
@@ -94,9 +95,9 @@ def test_closed_curves_have_no_band(turns):
 
 def test_too_few_flights_have_lines_and_no_band():
     block = profile(build(landing_run(60, flights=5), "run"))
-    assert block.drawing.band is None
+    assert not marks_of(block.drawing, Band)
     assert "Bands need 20 saved cases" in block.caption
-    assert len(block.drawing.lines) == 6
+    assert len(marks_of(block.drawing, Line)) == 6
 
 
 def test_histories_without_the_quantity_or_without_numbers_are_said():

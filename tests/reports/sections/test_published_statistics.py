@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic_run import synthetic_run
 
-from reports.figures.distributions import bin_edges, law_curve
+from reports.drawing.marks import Bar, Line
 from reports.run.flown import Flown
 from reports.sections.figure_blocks import distribution_blocks
 from reports.sections.published import own_statistic, published_blocks, published_law
@@ -78,17 +78,19 @@ def test_inputs_that_are_shared_and_agree_are_compared():
     assert len(list(statistics_tables(flown(record("mean", 1.0, at={"control": "continuous", "isp_s": 246.0}))))) == 1
 
 
-def test_a_printed_mean_and_deviation_are_drawn_as_a_normal_law_over_the_cases(fuel):
+def test_a_printed_mean_and_deviation_are_drawn_as_a_normal_distribution_over_the_cases(fuel):
     """The curve holds as many cases as the bars, and its middle and width are the printed ones."""
     run = flown(record("mean", 3.0), record("standard deviation", 0.5))
-    panel = next(p for block in distribution_blocks(run) for p in block.drawing.panels if p.law)
-    edges = bin_edges(panel.values)
-    x, y = law_curve(panel, edges)
-    shares = y / (panel.values.size * (edges[1] - edges[0]))
+    plots = [plot for block in distribution_blocks(run) for plot in block.drawing.plots]
+    (plot,) = [one for one in plots if any(isinstance(mark, Line) for mark in one.marks)]
+    (curve,) = [mark for mark in plot.marks if isinstance(mark, Line)]
+    (bars,) = [mark for mark in plot.marks if isinstance(mark, Bar) and mark.key == "cases"]
+    x, y = curve.x, curve.y
+    shares = y / (bars.top.sum() * (bars.right[0] - bars.left[0]))
     assert np.trapezoid(shares, x) == pytest.approx(1.0, abs=1e-3)
     assert np.trapezoid(shares * x, x) == pytest.approx(3.0, abs=1e-3)
     assert np.trapezoid(shares * (x - 3.0) ** 2, x) == pytest.approx(0.25, rel=1e-2)
-    assert panel.values.size == np.isfinite(fuel["propellant_kg"]).sum()
+    assert bars.top.sum() == np.isfinite(fuel["propellant_kg"]).sum()
 
 
 @pytest.mark.parametrize("records", [[record("mean", 3.0)], [record("standard deviation", 0.5)], []])

@@ -7,7 +7,7 @@ from synthetic_run import synthetic_run
 from reports.contents import build
 from reports.run.flown import Flown
 from reports.sections.headline import verdict_cards, warnings
-from reports.sections.requirement_tables import margin_figure, requirement_table, risk_table
+from reports.sections.requirement_tables import margin_block, requirement_table, risk_table
 from reports.sections.tables import quantile_table
 
 FUEL = {"name": "fuel", "metric": "propellant_kg", "at_most": 2.5, "at_least": None, "share": 0.9973, "confidence": 0.9}
@@ -124,6 +124,6 @@ def test_margins_of_a_limit_of_zero_have_no_width():
     cells = [row[3].small for row in requirement_table(one).rows]
     assert cells[0] == ""
     assert cells[1].endswith("\u202f%)")
-    figure = margin_figure(one)
-    assert [row.name for row in figure.drawing.rows] == ["force"]
+    figure = margin_block(one)
+    assert [text.split(",")[0] for _, text in figure.drawing.plots[0].y.ticks] == ["force"]
     assert figure.caption.endswith("Not drawn, the limit is 0: spare.")

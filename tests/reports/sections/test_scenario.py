@@ -1,11 +1,12 @@
 """What a report says was flown; and what it draws where the model asks for no figure."""
 
+import pytest
+from figure_marks import FORMS, marks_of
 from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table
-from reports.figures import Histories, ScatterDrawing
-from reports.figures.margins import MarginDrawing
+from reports.drawing.marks import Points
 
 
 def section(run, anchor):
@@ -39,12 +40,11 @@ def test_assumptions_are_what_the_campaign_file_sets_and_the_rest_is_in_the_appe
 def test_without_figures_of_its_own_a_model_gets_histories_and_scatters_of_what_matters():
     run = synthetic_run(200, failed=0, figures=[])
     histories = [one for one in section(run, "histories").blocks if isinstance(one, FigureBlock)]
-    assert isinstance(histories[0].drawing, Histories)
-    assert set(histories[0].drawing.labels) == {
+    assert {plot.quantity for plot in histories[0].drawing.plots} == {
         "semi_major_axis_error_km", "eccentricity_error", "force_n", "position_error_m",
     }  # fmt: skip
     scatters = [one for one in section(run, "scatter").blocks if isinstance(one, FigureBlock)]
-    assert [one.drawing.columns for one in scatters if isinstance(one.drawing, ScatterDrawing)] == [
+    assert [marks_of(one.drawing, Points)[0].columns for one in scatters if one.drawing.form == FORMS["scatter"]] == [
         ("ve_pct", "propellant_kg"), ("ve_pct", "peak_force_n"), ("ve_pct", "settling_time_s"),
     ]  # fmt: skip
 
@@ -53,13 +53,14 @@ def test_the_margin_figure_has_a_row_a_requirement_with_bound_and_worst_case():
     run = synthetic_run(3000, failed=0)
     document = build(run, "run")
     drawing = next(one.drawing for one in document.sections[0].blocks if isinstance(one, FigureBlock))
-    assert isinstance(drawing, MarginDrawing)
-    fuel = next(row for row in drawing.rows if row.name == "fuel")
-    assert fuel.worst == 1.0 - run.table["propellant_kg"].max() / 2.5
-    demonstrated = next(one for one in document.data["requirements"] if one.name == "fuel")
-    assert fuel.demonstrated == demonstrated.margin / 2.5
-    assert len(drawing.rows) == 3
+    assert drawing.form == FORMS["margins"]
     (plot,) = drawing.plots
+    assert [text.split(",")[0] for _, text in plot.y.ticks].index("fuel") == 0
+    worst, demonstrated_bound = (marks_of(drawing, Points, words)[0] for words in ("worst", "demonstrated"))
+    assert worst.x[0] == pytest.approx(100.0 * (1.0 - run.table["propellant_kg"].max() / 2.5))
+    demonstrated = next(one for one in document.data["requirements"] if one.name == "fuel")
+    assert demonstrated_bound.x[0] == pytest.approx(100.0 * demonstrated.margin / 2.5)
+    assert len(plot.y.ticks) == 3
     low, high = plot.x.reach
     assert low >= -105.0
     assert high <= 105.0

@@ -10,7 +10,7 @@ from synthetic_run import synthetic_run
 from mc_engine.errors import StoreError
 from mc_engine.studies.comparison import compare_runs
 from reports.document.blocks import FigureBlock, Table, blocks_of
-from reports.figures.changes import ratio_ticks
+from reports.figures.rows import ratio_ticks
 from reports.formats.html import render_html
 from reports.studies.comparison import build_comparison, write_comparison
 

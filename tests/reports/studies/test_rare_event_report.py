@@ -13,7 +13,6 @@ from mc_engine.store.run_files import RARE_EVENT
 from mc_engine.studies.rare_event_folder import open_rare_event
 from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.drawing import screen
-from reports.drawing.marks import Panels
 from reports.studies.rare_events import build_rare_event
 
 MANIFEST = {
@@ -84,7 +83,6 @@ def test_levels_and_failed_inputs_are_listed_and_drawn(tmp_path):
     assert [row[1] for row in table(document, "Levels")] == ["all", "1.4", "0.6", "0.2", "0.05"]
     assert table(document, "Failed cases by input") == [["a_pct [%]", "4.3", "0.2", "27"]]
     (figure,) = blocks_of(document, FigureBlock)
-    assert isinstance(figure.drawing, Panels)
     _, levels, *_ = figure.drawing.plots[0].marks
     np.testing.assert_array_equal(levels.y, [0.1, 1e-2, 1e-3, 1e-4])
     point = screen.specifications(figure.drawing)[0]["data"][-1]

@@ -4,13 +4,14 @@ import json
 
 import numpy as np
 import pytest
+from figure_marks import drawings, marks_of
 from synthetic_tuning import synthetic_tuning
 
 import reports
 from mc_engine.studies.tuning_folder import UNFINISHED
 from reports.document.blocks import FigureBlock, Table, blocks_of
 from reports.drawing import paper, screen
-from reports.figures import FrontDrawing
+from reports.drawing.marks import Points
 from reports.formats.html import render_html
 from reports.formats.pdf import render_pdf
 from reports.studies.tuning import build_tuning
@@ -37,16 +38,18 @@ def table(document, caption):
 
 
 def front_of(document):
-    return next(block.drawing for block in blocks_of(document, FigureBlock) if isinstance(block.drawing, FrontDrawing))
+    return drawings(document, "front")[0]
 
 
 def test_the_front_is_drawn_with_every_candidate_and_the_published_points(record, document):
     drawing = front_of(document)
-    np.testing.assert_array_equal(drawing.front, record.front[["cost", "error"]])
-    assert drawing.n_feasible + drawing.n_infeasible == 300
-    assert [name for name, _ in drawing.published] == ["Table 8", "Table 9"]
+    (front,) = marks_of(drawing, Points, "front")
+    np.testing.assert_array_equal(np.column_stack([front.x, front.y]), record.front[["cost", "error"]])
+    keys = [entry.text for entry in drawing.key]
+    assert sum(int(text.split()[0]) for text in keys if "candidates" in text and text[0].isdigit()) == 300
+    assert {"Table 8", "Table 9"} <= set(keys)
     assert any("front: " in entry.text for entry in drawing.key)
-    low, high = drawing.reach(0)
+    low, high = drawing.plots[0].x.reach
     assert low < -0.9 < 0.9 < high
 
 
@@ -73,8 +76,7 @@ def test_infeasibility_is_stated_with_the_least_violation_and_never_hidden(infea
     assert infeasible.verdicts[0].answer == "out of reach"
     assert infeasible.verdicts[0].tone == "bad"
     drawing = front_of(infeasible)
-    assert drawing.relaxed
-    assert drawing.n_feasible == 0
+    assert not any("feasible candidates" in entry.text for entry in drawing.key)
     assert any("constraints are left out" in entry.text for entry in drawing.key)
     assert len(table(infeasible, "The least violation found").rows) == 1
     assert table(infeasible, "Published points").rows[0][-2].small == "outside a constraint"
