@@ -113,6 +113,7 @@ def summary(
 ) -> None:
     """Moments and quantiles of the metrics of a run of any size, read part by part."""
     from mc_engine.runner.summary import summaries, summary_lines
+    from mc_engine.section import ReportSection
     from mc_engine.statistics import SAMPLING_DESIGNS
 
     store = existing_run(run_at(place))
@@ -124,7 +125,8 @@ def summary(
     for name, found in summaries(store, metric or None).items():
         typer.echo("\n".join(summary_lines(name, found, store.units[name], random)))
     if random:
-        typer.echo("in brackets: distribution-free limits, each holding with 95 % for independent cases")
+        each = 100.0 * ReportSection(**store.manifest.get("report", {})).confidence
+        typer.echo(f"in brackets: distribution-free limits, each holding with {each:.6g} % for independent cases")
 
 
 @app.command()

@@ -5,6 +5,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import StoreError
+from mc_engine.section import ReportSection
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, read_part
 from mc_engine.store.store import Store
@@ -85,7 +86,7 @@ def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
 
 
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":
-    """Summary of every metric, or of those named.
+    """Summary of every metric, or of those named; each bound of a quantile holds with the confidence of [report].
 
     StoreError for a name that is no column.  A failed case has no number, whatever stands in its row.
     """
@@ -94,7 +95,8 @@ def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, 
     for name in names:
         if name not in known:
             raise StoreError(f'{store.path}: there is no metric "{name}"; there are {", ".join(known) or "none"}')
-    return streamed(store, names).summaries
+    confidence = ReportSection(**store.manifest.get("report", {})).confidence
+    return streamed(store, names, confidence=2.0 * confidence - 1.0).summaries
 
 
 def streamed(

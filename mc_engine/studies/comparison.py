@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.errors import EngineError
+from mc_engine.section import ReportSection
 from mc_engine.statistics.change_tests import MetricChange, ShareChange, holm, metric_change, share_change
 from mc_engine.statistics.requirements import (
     FAIL,
@@ -30,7 +31,6 @@ from mc_engine.studies.run_changes import Difference, campaign_diff, campaign_di
 
 ALPHA = 0.003  # one false alarm in some 300 comparisons; 0.3 sigma is still found with 1000 cases and dozens of metrics
 TOLERANCE = 1e-6  # standard deviations: smaller differences of a pair are rounding
-CONFIDENCE = 0.95
 FLOWN = "completed"
 _RANK = {PASS: 0, NOT_DEMONSTRABLE: 1, FAIL: 2}
 
@@ -91,6 +91,7 @@ class VerdictChange:
 class Comparison:
     """Run A (before) and run B (after).  cases, ok : by run, all cases, and those flown to their end.
 
+    confidence : of every interval, that of B's [report].
     metrics in the order of B's columns; units by metric; left_out : metrics that are not compared, and why.
     """
 
@@ -102,6 +103,7 @@ class Comparison:
     pairing: Pairing
     alpha: float
     tolerance: float
+    confidence: float
     metrics: tuple[MetricChange, ...]
     shares: tuple[ShareChange, ...]
     verdicts: tuple[VerdictChange, ...]
@@ -159,14 +161,15 @@ def compare_runs(
         for table, flown in zip(tables, ok, strict=True)
     ]
     first, second = pairing.rows
+    confidence = ReportSection(**manifests[1].get("report", {})).confidence
     changes = [
         metric_change(name, values[0][name][first], values[1][name][second], paired=pairing.paired,
-                      confidence=CONFIDENCE, tolerance=tolerance)
+                      confidence=confidence, tolerance=tolerance)
         for name in metrics
     ]  # fmt: skip
     counted = {FLOWN: ok, **_inside(manifests[1], values, ok)}
     shares = [
-        share_change(name, one[first], other[second], paired=pairing.paired, confidence=CONFIDENCE)
+        share_change(name, one[first], other[second], paired=pairing.paired, confidence=confidence)
         for name, (one, other) in counted.items()
     ]
     adjusted = iter(holm(_p_values(changes, shares)).tolist())
@@ -179,6 +182,7 @@ def compare_runs(
         pairing=pairing,
         alpha=alpha,
         tolerance=tolerance,
+        confidence=confidence,
         metrics=tuple(replace(one, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for one in changes),
         shares=tuple(replace(one, adjusted=next(adjusted)) for one in shares),
         verdicts=_verdicts(manifests, tables, ok),

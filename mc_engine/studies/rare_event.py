@@ -49,7 +49,8 @@ def estimate_rare_event(
     """Estimate the probability of not meeting a requirement and leave the result in the new directory `out`.
 
     requirement : its name; the only one by default.  method : one of METHODS.  progress : called with the numbers of
-    cases flown and failed.  Raises RunInterrupted on Ctrl-C; nothing is stored then.
+    cases flown and failed.  The interval holds with the confidence of the campaign's [report].  Raises RunInterrupted
+    on Ctrl-C; nothing is stored then.
     """
     path = Path(out) if out is not None else default_folder(f"{campaign.name}-rare")
     one = chosen_requirement(campaign, requirement)
@@ -68,8 +69,9 @@ def estimate_rare_event(
         limit = LimitState(campaign, one, workers, watch)
         try:
             found = METHODS[method](
-                limit, len(limit.names), cases_per_level=cases_per_level, seed=campaign.seed, noise=True
-            )
+                limit, len(limit.names), cases_per_level=cases_per_level, seed=campaign.seed, noise=True,
+                confidence=campaign.report.confidence,
+            )  # fmt: skip
         except ValueError as error:
             raise CampaignError(campaign.name, [Problem("--cases-per-level", str(error))]) from None
         columns, arrays = _case_table(limit, found)

@@ -33,7 +33,7 @@ def probability_words(result: dict[str, Any]) -> str:
     allowed = 1.0 - result["requirement"]["share"]
     if not result["probability"]:
         return f"below {result['upper']:.2g}; no case failed (the requirement allows {allowed:.3g})"
-    interval = f"{result['confidence']:.0%} interval {result['lower']:.3g} to {result['upper']:.3g}"
+    interval = f"{100.0 * result['confidence']:.6g} % interval {result['lower']:.3g} to {result['upper']:.3g}"
     return (
         f"{result['probability']:.3g} of not meeting it, {interval}, by {METHOD_WORDS[result['method']]}; the "
         f"requirement allows {allowed:.3g}, so it is {standing(result)}"

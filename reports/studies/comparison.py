@@ -7,7 +7,7 @@ import numpy as np
 
 from mc_engine.durable_file import write_durably
 from mc_engine.statistics.change_tests import UNKNOWN, Estimate, MetricChange, ShareChange, finite
-from mc_engine.studies.comparison import CONFIDENCE, Comparison, VerdictChange
+from mc_engine.studies.comparison import Comparison, VerdictChange
 from mc_engine.studies.run_changes import Difference
 from reports.document.blocks import (
     Block,
@@ -58,7 +58,10 @@ GLOSSARY = Terms(
             "test. They are distribution-free. Each size and interval of a metric is of the quantity that its test is "
             "of: the interval excludes no change exactly where the test, by itself, finds one.",
         ),
-        ("intervals", f"They hold with {percent(CONFIDENCE)} each, one by one; they are not widened for their number."),
+        (
+            "intervals",
+            "They hold with the confidence of run B’s [report], one by one; they are not widened for their number.",
+        ),
     )
 )
 
@@ -197,7 +200,7 @@ def _figure(found: Comparison, moved: list[MetricChange]) -> FigureBlock:
     shifts = [UNKNOWN if one in far else one.shift_in_sigma for one in shown]
     shifted, spread = (np.array([getattr(one, p) <= found.alpha for one in shown], dtype=bool)
                        for p in ("shift_adjusted", "spread_adjusted"))  # fmt: skip
-    ratios, interval = [one.ratio for one in shown], percent(CONFIDENCE)
+    ratios, interval = [one.ratio for one in shown], percent(found.confidence)
     plots = (
         change_panel("Shift [σ of run A]", names, _ends(shifts), shifted, 0.0, interval),
         change_panel("Spread, run B over run A", names, _ends(ratios), spread, 1.0, interval),
@@ -227,8 +230,8 @@ def _metric_table(found: Comparison, moved: list[MetricChange]) -> Table:
         Column("Adjusted p", "number", 1.3),
     )
     note = (
-        f"The largest change first. Small: the {percent(CONFIDENCE)} interval of the quantity that the test is of; "
-        "cases used of cases flown. σ: standard deviation of run A."
+        f"The largest change first. Small: the {percent(found.confidence)} interval of the quantity that the test is "
+        "of; cases used of cases flown. σ: standard deviation of run A."
     )
     return Table("Metrics of both runs", columns, tuple(_metric_row(found, one) for one in moved), note)
 

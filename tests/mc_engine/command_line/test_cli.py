@@ -352,7 +352,7 @@ def test_summary_tells_the_metrics_asked_for_and_refuses_others(here):
     small_store(here / "flown")
     text = call("summary", "flown", "--metric", "propellant_kg").stdout
     assert text.startswith("propellant_kg [kg]: 36 of 40 cases have a number\n  mean ")
-    assert text.endswith("each holding with 95 % for independent cases\n")
+    assert text.endswith("each holding with 90 % for independent cases\n")
     fails_with(
         2, call("summary", "flown", "--metric", "fuel"), '"fuel" is no metric of this run; it has', "propellant_kg"
     )

@@ -35,7 +35,7 @@ def test_a_run_read_part_by_part_has_the_summaries_of_its_whole_table(tmp_path):
     found = summaries(store)
     assert list(found) == [column.name for column in store.columns if column.role == "metric"]
     for name, summary in found.items():
-        assert summary == summarize(np.where(ok, table[name], np.nan))
+        assert summary == summarize(np.where(ok, table[name], np.nan), confidence=0.8)
     assert (found["propellant_kg"].n_used, found["propellant_kg"].n_tried) == (36, 40)
 
 

@@ -17,6 +17,7 @@ from mc_engine.flight.flight import fly
 from mc_engine.physics.constants import EQUATORIAL_RADIUS, MU_EARTH
 from mc_engine.sampling.correlation import normal_correlation
 from mc_engine.sampling.distributions import Constant, Discrete, Empirical, Normal
+from mc_engine.section import ReportSection
 from mc_engine.studies.limit_state import FIRST_NOISE, LimitState, chosen_requirement
 from mc_engine.studies.rare_event import estimate_rare_event
 from mc_engine.studies.rare_event_folder import open_rare_event
@@ -95,6 +96,14 @@ def test_the_result_does_not_depend_on_the_threads(estimate, tmp_path):
     again = estimate_rare_event(minimal(), out=tmp_path / "out", workers=2)
     assert again.result == estimate.result
     assert again.cases.equals(estimate.cases)
+
+
+def test_the_interval_holds_with_the_confidence_of_the_campaigns_report(estimate, tmp_path):
+    assert estimate.result["confidence"] == minimal().report.confidence == 0.9
+    surer = replace(minimal(), report=ReportSection(confidence=0.99))
+    other = estimate_rare_event(surer, out=tmp_path / "out", workers=1).result
+    assert other["probability"] == estimate.result["probability"]
+    assert other["lower"] < estimate.result["lower"] < estimate.result["upper"] < other["upper"]
 
 
 def test_a_damaged_table_is_refused(estimate, tmp_path):

@@ -1,6 +1,7 @@
 """One probability and one confidence in all of a report: [report] of the campaign file, else 99.73 % with 90 %."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,11 +10,13 @@ from synthetic_run import synthetic_run
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.errors import CampaignError
 from mc_engine.runner.manifest import manifest_of
+from mc_engine.studies.comparison import compare_runs
 from reports.contents import build
 from reports.document.blocks import Table, blocks_of
 from reports.formats.json_data import render_json
 from reports.formats.markdown import render_markdown
 from reports.run.flown import Flown
+from reports.studies.comparison import build_comparison
 
 CAMPAIGN = """
 [campaign]
@@ -77,3 +80,19 @@ def test_the_bound_of_a_percentile_is_the_tolerance_limit_that_the_matrix_shows(
         assert bound == verdict.demonstrated
         values = np.sort(flown.values(verdict.metric))
         assert bound in values  # an order statistic
+
+
+def test_a_comparison_states_its_intervals_with_the_confidence_of_the_second_run():
+    runs = [synthetic_run(400, failed=0, seed=seed) for seed in (1, 2)]
+    runs[1].table["peak_force_n"] += 8.0
+    reach = []
+    for confidence in (0.9, 0.99):
+        runs[1].manifest["report"] = {"probability": 0.9973, "confidence": confidence}
+        compared = compare_runs(
+            *(SimpleNamespace(manifest=run.manifest, campaign_text="", cases=run.cases) for run in runs), ("a", "b")
+        )
+        force = next(one.shift for one in compared.metrics if one.metric == "peak_force_n")
+        reach.append(force.upper - force.lower)
+        text = render_markdown(build_comparison(compared)).decode().replace("\u202f", " ")
+        assert f"the {100.0 * confidence:.0f} % interval of the quantity" in text
+    assert reach[0] < reach[1]
