@@ -98,11 +98,11 @@ def _document(path: Path, template: Path | None, beside: Sequence[Path]) -> Docu
         return document
     facts = run_facts(Flown(run, name), document.title)
     others = {other.resolve(): other for other in beside}
-    runs = [facts if other == path.resolve() else _facts(other) for other in others] or [facts]
+    runs = [facts if other == path.resolve() else _facts_of(other) for other in others] or [facts]
     return with_own_sections(document, template, facts, runs)
 
 
-def _facts(path: Path) -> RunFacts:
+def _facts_of(path: Path) -> RunFacts:
     if (kind := kind_of(path)) in (TUNING, RARE_EVENT):
         raise TemplateError(f"{path}: is a {kind}; a template speaks of runs")
     flown = Flown(open_store(path), readable(path.name))

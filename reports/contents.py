@@ -90,8 +90,8 @@ def _appendices(flown: Flown) -> Iterator[Section]:
     yield _section("reading", "Glossary", (GLOSSARY,), "appendix")
 
 
-def _section(anchor: str, title: str, found: Found, kind: str = "chapter") -> Section:
-    return Section(anchor, title, as_blocks(found), kind)
+def _section(anchor: str, title: str, said: Found, kind: str = "chapter") -> Section:
+    return Section(anchor, title, as_blocks(said), kind)
 
 
 def _kept(sections: list[Section]) -> Iterator[Section]:

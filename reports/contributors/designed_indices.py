@@ -32,14 +32,14 @@ def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureB
     if flown.verdicts or flown.every.completed < flown.n_tried:
         names[ALL_LIMITS] = inside_words(flown)
         metrics[ALL_LIMITS] = inside(flown).astype(np.float64)
-    found = designed_indices(flown.design, flown.case_ids, inputs, metrics, flown.stated.confidence)
+    indices = designed_indices(flown.design, flown.case_ids, inputs, metrics, flown.stated.confidence)
     main = "total" if flown.design == "saltelli" else "mu_star"
-    shown = np.flatnonzero(np.isfinite(found.values[main]).any(axis=0))
-    silent = [names[name] for k, name in enumerate(found.metrics) if k not in shown]
+    shown = np.flatnonzero(np.isfinite(indices.values[main]).any(axis=0))
+    silent = [names[name] for k, name in enumerate(indices.metrics) if k not in shown]
     if shown.size and flown.design == "saltelli":
-        yield _figure(flown, found, shown, names)
+        yield _index_figure(flown, indices, shown, names)
     if shown.size:
-        yield _table(flown, found, shown, names, main)
+        yield _index_table(flown, indices, shown, names, main)
     if silent:
         yield (
             f"No indices for {', '.join(silent)}: the same in all cases that have it, or fewer than {FEWEST_BLOCKS} "
@@ -48,25 +48,25 @@ def designed_blocks(flown: Flown, inputs: Mapping[str, Any]) -> Iterator[FigureB
     yield "Fractions of the cases of this design estimate no probabilities: its cases are not independent random draws."
 
 
-def _figure(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:
-    by_metric = [(names[found.metrics[k]], _contributors(found, int(k))) for k in shown]
-    source = f"from {count(int(found.n_used[shown].min()))} of {count(found.n_tried)} blocks of the design"
+def _index_figure(flown: Flown, indices: DesignedIndices, shown: np.ndarray, names: Mapping[str, str]) -> FigureBlock:
+    by_metric = [(names[indices.metrics[k]], _contributors(indices, int(k))) for k in shown]
+    source = f"from {count(int(indices.n_used[shown].min()))} of {count(indices.n_tried)} blocks of the design"
     return contributor_figure(flown, by_metric, source)
 
 
-def _contributors(found: DesignedIndices, k: int) -> list[Contributor]:
+def _contributors(indices: DesignedIndices, k: int) -> list[Contributor]:
     def known(index: str, row: int) -> tuple[float, tuple[float, float]]:
-        value, reach = float(found.values[index][row, k]), float(found.reach[index][row, k])
+        value, reach = float(indices.values[index][row, k]), float(indices.reach[index][row, k])
         return value, (value - reach, value + reach)
 
     rows = []
-    for row, name in enumerate(found.inputs):
+    for row, name in enumerate(indices.inputs):
         (first, first_interval), (total, total_interval) = known("first_order", row), known("total", row)
-        rows.append(Contributor(found.metrics[k], name, first, total, first_interval, total_interval))
+        rows.append(Contributor(indices.metrics[k], name, first, total, first_interval, total_interval))
     return rows
 
 
-def _table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str], main: str) -> Table:
+def _index_table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str], main: str) -> Table:
     indices = list(found.values)
     columns = (
         Column("Metric", "text", 2.2, grouped=True),
@@ -102,11 +102,11 @@ def _cell(value: float, reach: float) -> Cell:
     return Cell(text, float(value), f"± {number(reach, 2)}" if np.isfinite(reach) else "")
 
 
-def _saltelli_note(found: DesignedIndices, confidence: str) -> str:
+def _saltelli_note(indices: DesignedIndices, confidence: str) -> str:
     return (
         f"± half the {confidence} interval (bootstrap over blocks; analysis by SALib). First-order index: "
         "fraction of the variance due to this input alone; total index: fraction due to it and its interactions. A "
-        f"block is {len(found.inputs) + 2} cases; one with a case that has no number is left out whole. Random draws "
+        f"block is {len(indices.inputs) + 2} cases; one with a case that has no number is left out whole. Random draws "
         "in flight count into every total index."
     )
 

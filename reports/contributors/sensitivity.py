@@ -34,8 +34,10 @@ def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         )
         return
     failed = failures(flown)
-    found = flown.contributions
-    yield from no_contributors(flown, flown.key_metrics) if found is None else companion_blocks(flown, found)
+    contributions = flown.contributions
+    yield from (
+        no_contributors(flown, flown.key_metrics) if contributions is None else companion_blocks(flown, contributions)
+    )
     if failed:
         yield from _driver_blocks(flown, inputs, failed)
 
@@ -46,23 +48,30 @@ def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
 def _driver_blocks(
     flown: Flown, inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]
 ) -> Iterator[FigureBlock | Table | str]:
-    found = failure_drivers(inputs, failed)
-    told = [*found.singles, *found.pairs]
+    drivers = failure_drivers(inputs, failed)
+    told = [*drivers.singles, *drivers.pairs]
     if told:
-        yield _driver_table(flown, found.singles, found.pairs, failed, found.singles_tested, found.pairs_tested)
-    elif found.singles_tested:
+        yield _driver_table(
+            flown,
+            drivers.singles,
+            drivers.pairs,
+            failed,
+            drivers.singles_tested,
+            drivers.pairs_tested,
+        )
+    elif drivers.singles_tested:
         yield (
             f"No input, and no pair of inputs, separates failed from passed cases beyond chance "
-            f"({count(found.singles_tested)} tests of single inputs, {count(found.pairs_tested)} of pairs, at a "
+            f"({count(drivers.singles_tested)} tests of single inputs, {count(drivers.pairs_tested)} of pairs, at a "
             f"false-discovery rate of {percent(FALSE_DISCOVERIES)})."
         )
-    if found.undecided:
+    if drivers.undecided:
         yield (
             f"Not tested for contributors to failures, fewer than {FEWEST} cases failed or fewer than {FEWEST} passed: "
-            f"{', '.join(found.undecided)}."
+            f"{', '.join(drivers.undecided)}."
         )
-    if found.singles:
-        yield _success_figure(flown, found.singles[:MOST_PANELS], inputs, failed)
+    if drivers.singles:
+        yield _success_figure(flown, drivers.singles[:MOST_PANELS], inputs, failed)
 
 
 def _driver_table(
@@ -82,7 +91,7 @@ def _driver_table(
         Column("Failed in that cell", "number", 1.5),
     )
     told = [*singles[:MOST_DRIVERS], *pairs[:MOST_DRIVERS]]
-    rows = tuple(_driver_row(flown, one, failed) for one in told)
+    rows = tuple(_driver_row(flown, driver, failed) for driver in told)
     left_out = len(singles) + len(pairs) - len(told)
     note = (
         f"{count(singles_tested)} tests of single inputs and {count(pairs_tested)} of pairs; false-discovery rate of "
@@ -112,12 +121,12 @@ def _success_figure(
     flown: Flown, drivers: tuple[Driver, ...], inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]
 ) -> FigureBlock:
     panels = []
-    for one in drivers:
-        passed = ~failed[one.requirement]
-        curve = success_along(inputs[one.inputs[0]], passed, flown.stated.confidence)
+    for driver in drivers:
+        passed = ~failed[driver.requirement]
+        curve = success_along(inputs[driver.inputs[0]], passed, flown.stated.confidence)
         if curve is not None:
-            label, overall = flown.axis(one.inputs[0]), float(passed.mean())
-            panels.append(success_panel(one.requirement, label, curve, overall, flown.stated.confidence))
+            label, overall = flown.axis(driver.inputs[0]), float(passed.mean())
+            panels.append(success_panel(driver.requirement, label, curve, overall, flown.stated.confidence))
     return FigureBlock(
         f"Success probability along the inputs that separate failed from passed cases, {count(flown.n_held)} cases.",
         Drawing("Success probability in bins of single inputs", tuple(panels)),

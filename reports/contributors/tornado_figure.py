@@ -25,32 +25,43 @@ def contributor_figure(
     interval = f"{percent(flown.stated.confidence)} confidence"
     for words, found in list(by_metric)[:MOST_METRICS]:
         rows = strongest(found)
-        names = [name_of(flown, one.input) for one in rows]
-        total = _values((one.total, one.total_interval) for one in rows)
-        first = _values((one.first, one.first_interval) for one in rows)
+        names = [name_of(flown, row.input) for row in rows]
+        total = _effect_array((row.total, row.total_interval) for row in rows)
+        first = _effect_array((row.first, row.first_interval) for row in rows)
         panels.append(tornado(words, names, total, first, interval))
-        effects = [f"{name} {number(one.size, 2)}" for name, one in zip(names[:3], rows, strict=False)]
+        effects = [f"{name} {number(row.size, 2)}" for name, row in zip(names[:3], rows, strict=False)]
         told.append(f"{words}: {', '.join(effects)}")
     caption = f"Total and first-order effects of the contributors to each metric, {source}."
     return FigureBlock(caption, Drawing("Tornado diagrams", tuple(panels), words="; ".join(told)), "half")
 
 
-def name_of(flown: Flown, one: str) -> str:
+def name_of(flown: Flown, contributor: str) -> str:
     """A contributor in words: an input, a group of inputs, or the random draws."""
-    if one == UNEXPLAINED:
+    if contributor == UNEXPLAINED:
         return f"{UNEXPLAINED} by the inputs"
-    return flown.words(one) if one in flown.columns else one
+    return flown.words(contributor) if contributor in flown.columns else contributor
 
 
-def strongest(found: Sequence[Contributor]) -> list[Contributor]:
+def strongest(contributors: Sequence[Contributor]) -> list[Contributor]:
     """The first one, others whose effect is surely more than nothing, and what is unexplained."""
-    named = sorted((one for one in found if one.input != UNEXPLAINED), key=lambda one: -one.size)
-    sure = [one for one in named[1:STRONGEST] if one.size >= SMALL and max(map(surely, intervals(one)))]
-    return [*named[:1], *sure, *(one for one in found if one.input == UNEXPLAINED and one.size >= LEFT)]
+    named = sorted(
+        (contributor for contributor in contributors if contributor.input != UNEXPLAINED),
+        key=lambda contributor: -contributor.size,
+    )
+    sure = [
+        contributor
+        for contributor in named[1:STRONGEST]
+        if contributor.size >= SMALL and max(map(surely, intervals(contributor)))
+    ]
+    return [
+        *named[:1],
+        *sure,
+        *(contributor for contributor in contributors if contributor.input == UNEXPLAINED and contributor.size >= LEFT),
+    ]
 
 
-def intervals(one: Contributor) -> tuple[tuple[float, float] | None, ...]:
-    return one.first_interval, one.total_interval
+def intervals(contributor: Contributor) -> tuple[tuple[float, float] | None, ...]:
+    return contributor.first_interval, contributor.total_interval
 
 
 def surely(interval: tuple[float, float] | None) -> bool:
@@ -58,6 +69,6 @@ def surely(interval: tuple[float, float] | None) -> bool:
     return interval is not None and interval[0] > 0.0
 
 
-def _values(found: Iterable[tuple[float | None, tuple[float, float] | None]]) -> np.ndarray:
+def _effect_array(effects: Iterable[tuple[float | None, tuple[float, float] | None]]) -> np.ndarray:
     """float64[n, 3]: values and ends of their intervals, NaN for what is not known."""
-    return np.array([(value, *(ends or (None, None))) for value, ends in found], dtype=np.float64)
+    return np.array([(value, *(ends or (None, None))) for value, ends in effects], dtype=np.float64)

@@ -170,8 +170,8 @@ class Document:
     data: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            object.__setattr__(self, one.name, _cleaned(getattr(self, one.name)))
+        for member in fields(self):
+            object.__setattr__(self, member.name, _cleaned(getattr(self, member.name)))
 
 
 def _cleaned(value: Any) -> Any:
@@ -181,13 +181,13 @@ def _cleaned(value: Any) -> Any:
     if isinstance(value, float | int):  # of which there may be a hundred thousand
         return value
     if isinstance(value, dict):
-        return {_cleaned(name): _cleaned(one) for name, one in value.items()}
+        return {_cleaned(name): _cleaned(item) for name, item in value.items()}
     if isinstance(value, tuple | list):
-        items = [_cleaned(one) for one in value]
+        items = [_cleaned(item) for item in value]
         same = all(new is old for new, old in zip(items, value, strict=True))
         return value if same else type(value)(items)
     if is_dataclass(value) and not isinstance(value, type):
-        held = {one.name: getattr(value, one.name) for one in fields(value)}
+        held = {member.name: getattr(value, member.name) for member in fields(value)}
         changed = {name: new for name, old in held.items() if (new := _cleaned(old)) is not old}
         return replace(value, **changed) if changed else value
     return value
@@ -210,9 +210,9 @@ def numbered(document: Document) -> Document:
     return replace(document, sections=tuple(sections))
 
 
-def as_blocks(found: Found) -> tuple[Block, ...]:
+def as_blocks(said: Found) -> tuple[Block, ...]:
     """Blocks without the absent ones; a sentence becomes a paragraph."""
-    return tuple(Text((item,)) if isinstance(item, str) else item for item in found if item is not None)
+    return tuple(Text((item,)) if isinstance(item, str) else item for item in said if item is not None)
 
 
 def blocks_of(document: Document, kind: type) -> Iterator[Any]:

@@ -54,8 +54,8 @@ def spans(table: Table) -> list[int]:
     """How many rows the first cell of each row stands for, 0 where that of a row above does."""
     cells = [row[0] for row in table.rows]
     starts = [k for k, cell in enumerate(cells) if not (table.columns[0].grouped and k and cell == cells[k - 1])]
-    found = dict(zip(starts, np.diff([*starts, len(cells)]).tolist(), strict=True))
-    return [found.get(k, 0) for k in range(len(cells))]
+    lengths = dict(zip(starts, np.diff([*starts, len(cells)]).tolist(), strict=True))
+    return [lengths.get(k, 0) for k in range(len(cells))]
 
 
 def _lines(size: np.ndarray, width: np.ndarray | float) -> np.ndarray:

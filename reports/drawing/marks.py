@@ -139,13 +139,13 @@ class Field:
         generator: Any = contourpy.contour_generator(
             self.x, self.y, np.ma.masked_invalid(self.z), fill_type=contourpy.FillType.OuterOffset
         )
-        found = []
+        layers = []
         for low, high in pairwise(self.levels.tolist()):
             points, offsets = generator.filled(low, high)
             rings = [p[a:b] for p, o in zip(points, offsets, strict=True) for a, b in pairwise(o)]
             if rings:
-                found.append((low, high, joined(rings)))
-        return found
+                layers.append((low, high, joined(rings)))
+        return layers
 
 
 @dataclass(frozen=True)
@@ -266,7 +266,11 @@ class Plot:
         ]
         ranges += [(field.label, [field.z]) for field in filter(None, [self.field])]
         seen = [(label, finite(values)) for label, values in ranges]
-        told = [f"{label} {number(one.min(), 4)} to {number(one.max(), 4)}" for label, one in seen if one.size]
+        told = [
+            f"{label} {number(numbers.min(), 4)} to {number(numbers.max(), 4)}"
+            for label, numbers in seen
+            if numbers.size
+        ]
         return " against ".join(told[:2]) + "".join(f", {text}" for text in told[2:])
 
     @property

@@ -28,14 +28,14 @@ Ends = tuple[float, float]
 
 def svg(drawing: Drawing) -> str:
     """The figure, transparent, without a date: the same bytes for the same figure."""
-    parts = list(_rows(drawing, WIDTH))
+    parts = list(_panel_rows(drawing, WIDTH))
     return _picture([line for body, _ in parts for line in body], 0.0, parts[-1][1], WIDTH)
 
 
 def strips(drawing: Drawing, width: float = WIDTH) -> list[str]:
     """The same in one picture a row of panels, so that a figure can go over two pages; its key is in the first."""
     found, top = [], 0.0
-    for body, bottom in _rows(drawing, width):
+    for body, bottom in _panel_rows(drawing, width):
         found.append(_picture(body, top, bottom, width))
         top = bottom
     return found
@@ -49,7 +49,7 @@ def _picture(body: list[str], top: float, bottom: float, width: float) -> str:
     )
 
 
-def _rows(drawing: Drawing, whole: float) -> Iterator[tuple[list[str], float]]:
+def _panel_rows(drawing: Drawing, whole: float) -> Iterator[tuple[list[str], float]]:
     """Each row of panels, the key above the first, and where it ends."""
     body, top = _key(drawing.key, whole)
     clip = 0
@@ -126,10 +126,10 @@ def _ticks(axis: Axis, ends: tuple[float, float], room: float, upright: bool) ->
         slot = room / max(len(own), 1) - 4.0
         wrap = 0.34 * WIDTH if upright else slot
         texts = [lettering.wrapped(text, wrap, TYPE, 4) for _, text in own]
-        found = _Ticks([place for place, _ in own], texts)
-        if upright or found.widest <= slot:
-            return found
-        return _Ticks(found.places, [lettering.wrapped(text, 90.0, TYPE, 2) for _, text in own], turned=True)
+        wrapped = _Ticks([place for place, _ in own], texts)
+        if upright or wrapped.widest <= slot:
+            return wrapped
+        return _Ticks(wrapped.places, [lettering.wrapped(text, 90.0, TYPE, 2) for _, text in own], turned=True)
     for most in range(axis.most, 0, -1):
         places = log_ticks(*ends, most) if axis.log else nice_ticks(*ends, most, axis.whole)
         words, power = (log_numerals(places), "") if axis.log else numerals(places)

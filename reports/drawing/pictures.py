@@ -17,5 +17,5 @@ def render_picture(svg: str, kind: Any) -> bytes:
 
 def fonts() -> str:
     """The folder of the DejaVu typefaces, which come with matplotlib; found without importing it."""
-    found = find_spec("matplotlib")
-    return str(Path(str(found and found.origin)).parent / "mpl-data" / "fonts" / "ttf")
+    package = find_spec("matplotlib")
+    return str(Path(str(package and package.origin)).parent / "mpl-data" / "fonts" / "ttf")

@@ -15,7 +15,7 @@ def nice_step(low: float, high: float, most: int, whole: bool = False) -> float:
     if not rough > 0.0 or not isfinite(rough):
         return 1.0
     power = 10.0 ** floor(log10(rough))
-    step = next(power * one for one in STEPS if power * one >= rough * (1.0 - 1e-9))
+    step = next(power * step for step in STEPS if power * step >= rough * (1.0 - 1e-9))
     return float(max(ceil(step), 1)) if whole else step
 
 
@@ -36,12 +36,12 @@ def covering(low: float, high: float, most: int) -> list[float]:
 def log_ticks(low: float, high: float, most: int = 8) -> list[float]:
     """1, 2 and 5 times powers of ten between low and high; of more than `most` of them the powers alone, or fewer."""
     powers = range(floor(log10(low)) - 1, ceil(log10(high)) + 1)
-    found = [float(f"{step}e{power}") for power in powers for step in (1, 2, 5)]
-    found = [one for one in found if low * (1 - 1e-9) <= one <= high * (1 + 1e-9)]
-    if len(found) > most:
-        found = [one for one in found if f"{one:e}"[0] == "1"]
-        found = found[:: ceil(len(found) / most)]
-    return found
+    places = [float(f"{step}e{power}") for power in powers for step in (1, 2, 5)]
+    places = [place for place in places if low * (1 - 1e-9) <= place <= high * (1 + 1e-9)]
+    if len(places) > most:
+        places = [place for place in places if f"{place:e}"[0] == "1"]
+        places = places[:: ceil(len(places) / most)]
+    return places
 
 
 def numerals(places: list[float]) -> tuple[list[str], str]:
@@ -53,10 +53,10 @@ def numerals(places: list[float]) -> tuple[list[str], str]:
     shown = [place / 10.0**power for place in places]
     gaps = [b - a for a, b in pairwise(shown)]
     decimals = 0
-    while decimals < 9 and any(abs(one - round(one, decimals)) > 1e-4 * (gaps[0] if gaps else 1.0) for one in shown):
+    while decimals < 9 and any(abs(item - round(item, decimals)) > 1e-4 * (gaps[0] if gaps else 1.0) for item in shown):
         decimals += 1
     texts = [
-        f"{one + 0.0:,.{decimals}f}".replace("-", "−").replace(",", SPACE if largest >= 1e4 else "") for one in shown
+        f"{item + 0.0:,.{decimals}f}".replace("-", "−").replace(",", SPACE if largest >= 1e4 else "") for item in shown
     ]
     return texts, f"×10{str(power).translate(_SUPERSCRIPT)}" if power else ""
 

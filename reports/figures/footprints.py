@@ -62,7 +62,7 @@ def footprint_plot(
     shown = "all shown" if len(points) == counts[0] else f"{count(len(points))} shown"
     key = f"{count(counts[0])} of {count(counts[1])} cases, {shown}"
     x, y = view.turned(points).T
-    turned = [replace(one, curves=tuple(map(view.turned, one.curves))) for one in outlines]
+    turned = [replace(outline, curves=tuple(map(view.turned, outline.curves))) for outline in outlines]
     marks: list[Mark] = [
         Points(x, y, BLUE, opacity=0.5, texts=names, cases=case_ids, columns=view.columns, key=key),
         *outline_lines(turned),
@@ -70,7 +70,7 @@ def footprint_plot(
     ]
     if aim:
         marks.append(nominal_ring(tuple(view.turned(aim[1][None, :])[0]), INK, aim[0]))
-    spans = np.ptp(np.concatenate([points, *(curve for one in outlines for curve in one.curves)]), axis=0)
+    spans = np.ptp(np.concatenate([points, *(curve for outline in outlines for curve in outline.curves)]), axis=0)
     flatness = float(np.clip(spans[1] / max(spans[0], 1e-9), 0.25, 0.75))
     height = 60.0 + 720.0 * flatness if view.equal else 380.0
     title = "" if view.equal else "Along and across, each with a scale of its own"

@@ -47,9 +47,9 @@ def front_figure(
     plots = []
     for i, k in pairs:
         marks: list[Mark] = []
-        for one, tint, words in clouds:
-            key = f"{count(one.number)} {words}" if one.number else ""
-            marks.append(Points(one.shown[:, i], one.shown[:, k], tint, words, opacity=0.45, key=key))
+        for candidates, tint, words in clouds:
+            key = f"{count(candidates.number)} {words}" if candidates.number else ""
+            marks.append(Points(candidates.shown[:, i], candidates.shown[:, k], tint, words, opacity=0.45, key=key))
         x, y = front[:, i], front[:, k]
         if len(pairs) == 1:
             marks.append(Line(x, y, colour, "front", width=1.6, step="hv" if first_small else "vh"))

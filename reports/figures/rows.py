@@ -46,7 +46,12 @@ def margin_figure(rows: Sequence[MarginRow]) -> Drawing:
         marks.append(Points(_drawn_margin(row.worst), y, INK, "worst case", "x", 8.0, texts=(text,), key="worst case"))
     marks.append(Limit(0.0, "x", VERMILION, "limit", key="limit"))
     names = [row.name if row.demonstrated is None else f"{row.name}, {_percent(row.demonstrated)}" for row in rows]
-    reached = [float(_drawn_margin(one)[0]) for row in rows for one in (row.demonstrated, row.worst) if one is not None]
+    reached = [
+        float(_drawn_margin(margin)[0])
+        for row in rows
+        for margin in (row.demonstrated, row.worst)
+        if margin is not None
+    ]
     x_axis = Axis("margin over width of the limits [%]", reach=(min(*reached, 0.0) - 5.0, max(*reached, 0.0) + 5.0))
     plot = Plot(tuple(marks), x_axis, rows_axis(names), height=70.0 + 26.0 * len(rows))
     return Drawing("Margins relative to the width of the limits", (plot,), 1)

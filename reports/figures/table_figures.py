@@ -59,22 +59,22 @@ def histogram(table: pd.DataFrame, column: str) -> Picture:
 
     EngineError if there is no such column of numbers, or fewer than two cases have one.
     """
-    values = _values(table, column)
+    values = _numbers(table, column)
     finite = values[np.isfinite(values)]
     _refuse_few(finite.size, 2, column)
     used = f"{count(finite.size)} of {count(values.size)} cases"
-    plot = distributions.histogram(finite, _label(table, column), summarize(values), OUTER, title=used)
+    plot = distributions.histogram(finite, _column_label(table, column), summarize(values), OUTER, title=used)
     return Picture(distributions.histograms([plot]))
 
 
 def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
     """One column against another, a point a case.  EngineError as for `histogram`."""
-    a, b = _values(table, x), _values(table, y)
+    a, b = _numbers(table, x), _numbers(table, y)
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b))
     _refuse_few(used.size, 1, f"{x} and {y}")
     cloud = Points(a[used], b[used], "", cases=_case_ids(table)[used])
     classes = [("cases with both numbers", int(used.size))]
-    axes = _label(table, x), _label(table, y)
+    axes = _column_label(table, x), _column_label(table, y)
     return Picture(case_scatter(cloud, np.zeros(used.size, dtype=np.int8), classes, axes, len(table)))
 
 
@@ -84,20 +84,20 @@ def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:
     Blank where the cases do not support a surface; see `mc_engine.statistics.map_metric`.  EngineError where the cases
     are too few, or lie on a line.
     """
-    a, b, c = (_values(table, name) for name in (x, y, metric))
+    a, b, c = (_numbers(table, name) for name in (x, y, metric))
     surface = map_metric(a, b, c)
     if surface is None or not np.isfinite(surface.value).any():
         raise EngineError(f"{metric}: too few cases over {x} and {y} for a map; draw a scatter instead")
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b) & np.isfinite(c))
     shown = used[np.linspace(0, used.size - 1, min(used.size, POINTS_ON_MAP)).astype(np.int64)]
-    labels = _label(table, x), _label(table, y), _label(table, metric)
-    points, unit = np.column_stack([a[shown], b[shown]]), _unit(table, metric)
+    labels = _column_label(table, x), _column_label(table, y), _column_label(table, metric)
+    points, unit = np.column_stack([a[shown], b[shown]]), _column_unit(table, metric)
     return Picture(
         metric_map(surface, points, c[shown], _case_ids(table)[shown], labels, unit, n_points=int(used.size))
     )
 
 
-def _values(table: pd.DataFrame, column: str) -> np.ndarray:
+def _numbers(table: pd.DataFrame, column: str) -> np.ndarray:
     """float64[n]: the column, NaN where a case has no number."""
     if column not in table:
         raise EngineError(f'the table has no column "{column}"; it has {", ".join(map(str, table.columns))}')
@@ -113,12 +113,12 @@ def _refuse_few(n_used: int, needed: int, what: str) -> None:
         raise EngineError(f"{what}: {n_used} cases have a number; the figure needs {needed}")
 
 
-def _unit(table: pd.DataFrame, column: str) -> str:
+def _column_unit(table: pd.DataFrame, column: str) -> str:
     return str(table.attrs.get("units", {}).get(column, ""))
 
 
-def _label(table: pd.DataFrame, column: str) -> str:
-    unit = _unit(table, column)
+def _column_label(table: pd.DataFrame, column: str) -> str:
+    unit = _column_unit(table, column)
     return axis_label(words(column, unit), unit)
 
 

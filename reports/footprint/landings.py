@@ -66,12 +66,12 @@ def landing_of(flown: Flown, figure: FootprintFigure) -> Landing | str:
         high = f"; {count(above)} ended above {height_limit(flown, figure)}" if above else ""
         return f"{figure.title}: not drawn; none of {count(flown.n_held)} cases has an impact point{high}."
     ellipsoid = ELLIPSOIDS.get(planet_of(flown, figure), WGS84)
-    found = footprint(latitude[rows], longitude[rows], ellipsoid, flown.random)
-    if found is None:
+    measured = footprint(latitude[rows], longitude[rows], ellipsoid, flown.random)
+    if measured is None:
         return f"{figure.title}: not drawn; the {count(rows.size)} impact points lie too far apart for one figure."
-    if found.reach < 1.0 and rows.size > 1:
+    if measured.reach < 1.0 and rows.size > 1:
         return f"{figure.title}: not drawn; all {count(rows.size)} impact points lie within one metre."
-    return Landing(figure, latitude, longitude, rows, above, found, _aim(flown, figure))
+    return Landing(figure, latitude, longitude, rows, above, measured, _aim(flown, figure))
 
 
 def landed(flown: Flown, figure: FootprintFigure) -> tuple[np.ndarray, np.ndarray]:

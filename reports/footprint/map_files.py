@@ -77,7 +77,7 @@ def _degrees(value: float) -> float:
 def geojson(places: Places) -> bytes:
     """A FeatureCollection: a point per case and named place, a (multi-)line per outline."""
     head = {"type": "FeatureCollection", "title": places.title, "description": places.note}
-    features = ",\n".join(json.dumps(one, ensure_ascii=False, allow_nan=False) for one in _features(places))
+    features = ",\n".join(json.dumps(feature, ensure_ascii=False, allow_nan=False) for feature in _features(places))
     text = json.dumps(head, ensure_ascii=False)[:-1] + ', "features": [\n' + features + "\n]}\n"
     return text.encode("utf-8", errors="backslashreplace")  # a lone surrogate, as JSON writes it
 

@@ -49,15 +49,15 @@ class FootprintContents:
 def footprint_contents(flown: Flown) -> FootprintContents:
     """All footprints that the model asks for; a sentence in place of one that cannot be drawn."""
     contents = FootprintContents()
-    for place, figure in enumerate(one for one in flown.figures if isinstance(one, FootprintFigure)):
+    for place, figure in enumerate(kind for kind in flown.figures if isinstance(kind, FootprintFigure)):
         landing = landing_of(flown, figure)
         if isinstance(landing, str):
             contents.blocks.append(landing)
             continue
         stem = "footprint" if place == 0 else f"footprint-{place + 1}"
-        contents.blocks.extend(_blocks(flown, landing, stem))
+        contents.blocks.extend(_landing_blocks(flown, landing, stem))
         if on_earth(flown, figure):
-            places = _places(flown, landing)
+            places = _map_places(flown, landing)
             contents.files.append(Attachment(f"{stem}.kml", kml(places)))
             contents.files.append(Attachment(f"{stem}.geojson", geojson(places)))
     return contents
@@ -66,8 +66,8 @@ def footprint_contents(flown: Flown) -> FootprintContents:
 # ---- figure and tables
 
 
-def _blocks(flown: Flown, landing: Landing, stem: str) -> Iterator[FigureBlock | Table | str]:
-    yield FigureBlock(_caption(flown, landing), _drawing(flown, landing), "wide")
+def _landing_blocks(flown: Flown, landing: Landing, stem: str) -> Iterator[FigureBlock | Table | str]:
+    yield FigureBlock(_caption(flown, landing), _footprint_drawing(flown, landing), "wide")
     if landing.found.ellipses:
         yield _region_table(flown, landing)
     else:
@@ -98,7 +98,7 @@ def _place_words(latitude: float, longitude: float) -> str:
     return f"{abs(latitude):.4f}° {north}, {abs(longitude):.4f}° {east}"
 
 
-def _drawing(flown: Flown, landing: Landing) -> Drawing:
+def _footprint_drawing(flown: Flown, landing: Landing) -> Drawing:
     points = landing.found.points / 1000.0
     ends = [int(pick(points[:, k])) for k in (0, 1) for pick in (np.argmin, np.argmax)]
     shown = thinned_rows(np.arange(landing.rows.size), np.array(ends))
@@ -153,11 +153,11 @@ def _coasts(landing: Landing, outlines: Iterable[Outline]) -> tuple[list[np.ndar
     return [], coastlines(plane, AROUND * reach), reach / 1000.0
 
 
-def _long_axis(found: Footprint) -> float | None:
+def _long_axis(footprint: Footprint) -> float | None:
     """Direction of a cloud at least LONG times as long as wide, else None."""
-    if not found.ellipses or found.ellipses[0].semi_axes[0] < LONG * found.ellipses[0].semi_axes[1]:
+    if not footprint.ellipses or footprint.ellipses[0].semi_axes[0] < LONG * footprint.ellipses[0].semi_axes[1]:
         return None
-    return found.ellipses[0].direction
+    return footprint.ellipses[0].direction
 
 
 def _half_turn(longitude: np.ndarray) -> np.ndarray:
@@ -165,11 +165,11 @@ def _half_turn(longitude: np.ndarray) -> np.ndarray:
     return (longitude + 180.0) % 360.0 - 180.0
 
 
-def _outlines(found: Footprint) -> Iterator[Outline]:
-    for ellipse in found.ellipses:
+def _outlines(footprint: Footprint) -> Iterator[Outline]:
+    for ellipse in footprint.ellipses:
         text = f"{_name(ellipse)}, holds {percent(ellipse.inside / ellipse.n, 1)} of the cases"
         yield Outline("ellipse", text, (ellipse.outline() / 1000.0,))
-    for region in found.regions:
+    for region in footprint.regions:
         if region.content == DRAWN_REGION:
             yield Outline("region", f"{_name(region)}, distribution-free", tuple(o / 1000.0 for o in region.outlines))
 
@@ -181,7 +181,7 @@ def _name(region: Ellipse | DensityRegion) -> str:
 
 def _region_table(flown: Flown, landing: Landing) -> Table:
     """Contents stated and shares really inside."""
-    found = landing.found
+    regions = landing.found
     columns = (
         Column("Region", "text", 2.0),
         Column("Stated content", "number", 1.7),
@@ -190,16 +190,16 @@ def _region_table(flown: Flown, landing: Landing) -> Table:
         Column("Semi-axes [km]", "number", 1.6),
         Column("Long axis [° from north]", "number", 1.2),
     )
-    rows = tuple(_region_row(region, flown.stated.confidence) for region in found.all_regions)
-    n = found.ellipses[0].n
+    rows = tuple(_region_row(region, flown.stated.confidence) for region in regions.all_regions)
+    n = regions.ellipses[0].n
     bigger = f"; the next case lies with 99 % in one of k = {next_case_scale(0.99, n):.3f}" if n > 3 else ""
     note = (
         "Ellipses: covariance of the cases in the plane about the mean impact point, scaled by k = √(−2 ln(1 − P)) for "
         f"the content P of a normal distribution of known covariance{bigger}. Fraction inside: counted, with its "
         f"{percent(flown.stated.confidence)} Clopper–Pearson interval; where that excludes the stated content, the "
         "distribution is not normal. Lengths are geodesics through the mean impact point, the farthest case "
-        f"{number(found.reach / 1000.0, 3)} km from it; across them the plane stretches by at most "
-        f"{percent(found.plane.stretch(found.reach), 3)}."
+        f"{number(regions.reach / 1000.0, 3)} km from it; across them the plane stretches by at most "
+        f"{percent(regions.plane.stretch(regions.reach), 3)}."
     )
     return Table(
         f"Regions of the {count(landing.rows.size)} of {count(flown.n_held)} cases that came down", columns, rows, note
@@ -287,7 +287,7 @@ def _distance_row(flown: Flown, landing: Landing, place: Mark) -> tuple[Cell, ..
 # ---- the files
 
 
-def _places(flown: Flown, landing: Landing) -> Places:
+def _map_places(flown: Flown, landing: Landing) -> Places:
     rows = landing.rows
     if rows.size > PLACES_IN_A_FILE:
         rows = rows[np.linspace(0, rows.size - 1, PLACES_IN_A_FILE).astype(np.int64)]
@@ -308,8 +308,8 @@ def _places(flown: Flown, landing: Landing) -> Places:
     )
 
 
-def _map_outlines(found: Footprint) -> Iterator[MapOutline]:
-    for region in found.all_regions:
+def _map_outlines(footprint: Footprint) -> Iterator[MapOutline]:
+    for region in footprint.all_regions:
         curves = (region.outline(),) if isinstance(region, Ellipse) else region.outlines
         kind = "ellipse" if isinstance(region, Ellipse) else "region"
         facts: dict[str, float | int] = {
@@ -320,5 +320,5 @@ def _map_outlines(found: Footprint) -> Iterator[MapOutline]:
         if isinstance(region, DensityRegion):
             facts["confidence"] = region.confidence
         for curve in curves:
-            latitude, longitude = found.plane.places(curve)
+            latitude, longitude = footprint.plane.places(curve)
             yield MapOutline(kind, _name(region), facts, latitude, longitude)

@@ -112,8 +112,8 @@ def case_record(document: Document) -> dict[str, Any] | None:
         "ids": screen.typed(cases.ids, "f8") if (np.diff(cases.ids) > 1).any() else [int(cases.ids[0]), cases.ids.size],
         "outcome": screen.typed(cases.outcome, "u1"),
         "outcomes": cases.outcomes,
-        "columns": [{"name": column.name, "label": column.label, "role": column.role, "values": _values(column.values)}
-                    for column in cases.columns],
+        "columns": [{"name": column.name, "label": column.label, "role": column.role,
+                     "values": _column_values(column.values)} for column in cases.columns],
         "axes": cases.axes,
         "clouds": [trace for cloud in clouds for trace in screen.traced(cloud, Plot((), Axis(), Axis()))],
         "quantities": [{"name": name, "label": label} for name, label in cases.quantities.items()],
@@ -121,16 +121,16 @@ def case_record(document: Document) -> dict[str, Any] | None:
             str(case): {name: [screen.packed(t), screen.packed(y)] for name, (t, y) in curves.items()}
             for case, curves in cases.histories.items()
         },
-        "behind": _behind(document),
+        "behind": _history_backgrounds(document),
         "panel": screen.history_panel(cases.time),
     }  # fmt: skip
 
 
-def _values(values: np.ndarray | tuple[str, ...]) -> Any:
+def _column_values(values: np.ndarray | tuple[str, ...]) -> Any:
     return screen.column(values) if isinstance(values, np.ndarray) else values
 
 
-def _behind(document: Document) -> dict[str, list[dict[str, Any]]]:
+def _history_backgrounds(document: Document) -> dict[str, list[dict[str, Any]]]:
     """Envelopes, medians and limits of history quantities, which a single case's curve is drawn over."""
     found: dict[str, list[dict[str, Any]]] = {}
     for block in blocks_of(document, FigureBlock):

@@ -159,7 +159,8 @@ def render_json(document: Document) -> bytes:
         campaign=dict(document.facts),
         warnings=list(document.warnings),
         sections=[
-            SectionRecord(title=one.title, blocks=[_block(block) for block in one.blocks]) for one in document.sections
+            SectionRecord(title=section.title, blocks=[_block_record(block) for block in section.blocks])
+            for section in document.sections
         ],
         **numbers,
     )
@@ -168,46 +169,46 @@ def render_json(document: Document) -> bytes:
 
 def run_data(flown: Flown) -> dict[str, Any]:
     """The numbers of a run's report, by the fields of ReportRecord."""
-    found = flown.contributions
+    contributions = flown.contributions
     return {
         "probability": flown.stated.probability,
         "confidence": flown.stated.confidence,
-        "counts": _counts(flown),
-        "requirements": [_requirement(flown, one) for one in flown.verdicts],
-        "metrics": [_metric(flown, name, summary) for name, summary in flown.summaries.items()],
-        "contributors": [] if found is None else [_contributor(one) for one in found.rows()],
-        "contributor_flights": 0 if found is None else found.flights,
-        "worst": [one for verdict in flown.verdicts for one in _worst(flown, verdict)],
+        "counts": _counts_record(flown),
+        "requirements": [_requirement_record(flown, one) for one in flown.verdicts],
+        "metrics": [_metric_record(flown, name, summary) for name, summary in flown.summaries.items()],
+        "contributors": [] if contributions is None else [_contributor_record(row) for row in contributions.rows()],
+        "contributor_flights": 0 if contributions is None else contributions.flights,
+        "worst": [one for verdict in flown.verdicts for one in _worst_records(flown, verdict)],
     }
 
 
-def _counts(flown: Flown) -> Counts:
+def _counts_record(flown: Flown) -> Counts:
     inside = flown.every.inside_all
     return Counts(cases=flown.n_wanted, flown=flown.n_tried, completed=flown.every.completed, inside_all_limits=inside)
 
 
-def _requirement(flown: Flown, one: Verdict) -> RequirementRecord:
+def _requirement_record(flown: Flown, verdict: Verdict) -> RequirementRecord:
     return RequirementRecord(
-        name=one.name,
-        metric=one.metric,
-        unit=flown.unit(one.metric),
-        at_most=one.at_most,
-        at_least=one.at_least,
-        required_probability=one.share,
-        confidence=one.confidence,
-        passed=one.passed,
-        tried=one.tried,
-        without_number=one.no_number,
-        observed_probability=one.estimate,
-        demonstrated_probability=one.lower,
-        demonstrated=_finite(one.demonstrated),
-        enclosed=one.enclosed,
-        margin=_finite(one.margin),
-        verdict=one.outcome,
+        name=verdict.name,
+        metric=verdict.metric,
+        unit=flown.unit(verdict.metric),
+        at_most=verdict.at_most,
+        at_least=verdict.at_least,
+        required_probability=verdict.share,
+        confidence=verdict.confidence,
+        passed=verdict.passed,
+        tried=verdict.tried,
+        without_number=verdict.no_number,
+        observed_probability=verdict.estimate,
+        demonstrated_probability=verdict.lower,
+        demonstrated=_finite(verdict.demonstrated),
+        enclosed=verdict.enclosed,
+        margin=_finite(verdict.margin),
+        verdict=verdict.outcome,
     )
 
 
-def _metric(flown: Flown, name: str, summary: Summary) -> MetricRecord:
+def _metric_record(flown: Flown, name: str, summary: Summary) -> MetricRecord:
     facts = flown.columns[name]
     return MetricRecord(
         name=name,
@@ -221,31 +222,33 @@ def _metric(flown: Flown, name: str, summary: Summary) -> MetricRecord:
         minimum=summary.minimum,
         maximum=summary.maximum,
         quantiles=[
-            QuantileRecord(probability=one.probability, value=one.value, lower=one.lower, upper=one.upper)
-            for one in summary.quantiles
+            QuantileRecord(
+                probability=quantile.probability, value=quantile.value, lower=quantile.lower, upper=quantile.upper
+            )
+            for quantile in summary.quantiles
         ],
     )
 
 
-def _contributor(one: Any) -> ContributorRecord:
+def _contributor_record(contributor: Any) -> ContributorRecord:
     return ContributorRecord(
-        metric=one.metric,
-        input=one.input,
-        first=one.first,
-        total=one.total,
-        first_interval=one.first_interval,
-        total_interval=one.total_interval,
+        metric=contributor.metric,
+        input=contributor.input,
+        first=contributor.first,
+        total=contributor.total,
+        first_interval=contributor.first_interval,
+        total_interval=contributor.total_interval,
     )
 
 
-def _worst(flown: Flown, verdict: Verdict) -> list[WorstRecord]:
+def _worst_records(flown: Flown, verdict: Verdict) -> list[WorstRecord]:
     limits = Limits(verdict.at_most, verdict.at_least)
-    found = flown.every.worst(verdict.metric, WORST, limits)
-    values = found[verdict.metric].to_numpy(dtype=np.float64)
+    worst = flown.every.worst(verdict.metric, WORST, limits)
+    values = worst[verdict.metric].to_numpy(dtype=np.float64)
     margins = limits.margins(values) * limits.width
     return [
         WorstRecord(requirement=verdict.name, case_id=int(case), value=float(value), margin=float(margin))
-        for case, value, margin in zip(found["case_id"], values, margins, strict=True)
+        for case, value, margin in zip(worst["case_id"], values, margins, strict=True)
     ]
 
 
@@ -253,7 +256,7 @@ def _finite(value: float | None) -> float | None:
     return float(value) if value is not None and np.isfinite(value) else None
 
 
-def _block(block: Any) -> TextRecord:
+def _block_record(block: Any) -> TextRecord:
     if isinstance(block, Table):
         rows = [[f"{cell.text} ({cell.small})" if cell.small else cell.text for cell in row] for row in block.rows]
         note = [block.note] if block.note else []

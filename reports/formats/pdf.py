@@ -26,7 +26,7 @@ def render_pdf(document: Document) -> bytes:
     """
     if time.time() < 0.0:  # typst asks for it, and panics
         raise EngineError("the clock of this computer stands before 1970, with which no PDF is made; set it")
-    content = json.dumps(_plain(document), ensure_ascii=False, allow_nan=False)
+    content = json.dumps(_plain_document(document), ensure_ascii=False, allow_nan=False)
     with as_file(files("reports").joinpath("templates")) as templates:
         return typst.compile(
             str(templates / "report.typ"),
@@ -38,7 +38,7 @@ def render_pdf(document: Document) -> bytes:
         )
 
 
-def _plain(document: Document) -> dict[str, Any]:
+def _plain_document(document: Document) -> dict[str, Any]:
     """The document as plain data, figures as SVG."""
     return {
         "kind": document.kind,
@@ -56,30 +56,30 @@ def _plain(document: Document) -> dict[str, Any]:
                 "anchor": section.anchor,
                 "kind": section.kind,
                 "number": section.number,
-                "blocks": list(_blocks(section.blocks)),
+                "blocks": list(_plain_blocks(section.blocks)),
             }
             for section in document.sections
         ],
     }
 
 
-def _blocks(blocks: Sequence[Block]) -> Iterator[dict[str, Any]]:
+def _plain_blocks(blocks: Sequence[Block]) -> Iterator[dict[str, Any]]:
     """The blocks as plain data; two figures of one panel come side by side."""
     rest = list(blocks)
     while rest:
         block = rest.pop(0)
         if _lone(block) and rest and _lone(rest[0]):
             half = 0.5 * (paper.WIDTH - paper.GAP)
-            yield {"kind": "pair", "figures": [_block(block, half), _block(rest.pop(0), half)]}
+            yield {"kind": "pair", "figures": [_plain_block(block, half), _plain_block(rest.pop(0), half)]}
         else:
-            yield _block(block)
+            yield _plain_block(block)
 
 
 def _lone(block: Block) -> bool:
     return isinstance(block, FigureBlock) and len(block.drawing.plots) == 1 and not block.drawing.plots[0].x.ticks
 
 
-def _block(block: Block, width: float = paper.WIDTH) -> dict[str, Any]:
+def _plain_block(block: Block, width: float = paper.WIDTH) -> dict[str, Any]:
     if isinstance(block, FigureBlock):
         drawing = block.drawing
         strips = paper.strips(drawing, width)

@@ -63,7 +63,7 @@ class HeldCases:
         self.n_wanted = int(run.n_cases)
         self.confidence, self.probabilities = confidence, probabilities
         self.requirements: list[dict[str, Any]] = run.manifest.get("requirements", [])
-        self._roles = {str(one["name"]): str(one.get("role", "")) for one in run.manifest.get("columns", [])}
+        self._roles = {str(column["name"]): str(column.get("role", "")) for column in run.manifest.get("columns", [])}
 
     # ---- the table at hand
 
@@ -197,8 +197,8 @@ class StreamedCases(HeldCases):
         return self._found.summaries
 
     def _summary(self, metric: str, probabilities: tuple[float, ...]) -> Summary:
-        found = streamed(self._run, [metric], probabilities=probabilities, confidence=self.confidence)
-        return found.summaries[metric]
+        summed = streamed(self._run, [metric], probabilities=probabilities, confidence=self.confidence)
+        return summed.summaries[metric]
 
     def ends(self, name: str) -> tuple[float, float] | None:
         return self._first.ends.get(name)
@@ -216,12 +216,12 @@ class StreamedCases(HeldCases):
         return pd.DataFrame([self._rows[case] for case in case_ids], columns=self.table.columns)
 
     def first_values(self, metric: str, most: int) -> np.ndarray:
-        found: list[np.ndarray] = []
+        summed: list[np.ndarray] = []
         for _, values in metric_parts(self._run, [metric]):
-            found.append(values[metric])
-            if sum(one.size for one in found) >= most:
+            summed.append(values[metric])
+            if sum(part.size for part in summed) >= most:
                 break
-        return np.concatenate(found)[:most]
+        return np.concatenate(summed)[:most]
 
     def has(self, case: int) -> bool:
         return any(first <= case < stop for first, stop in self._run.committed())
@@ -237,9 +237,12 @@ class _FirstPass:
         self.failed: list[int] = []
         self.ends: dict[str, tuple[float, float]] = {}
         asked = {(name, limits_on(name, requirements)) for name in metrics}
-        asked |= {(str(one["metric"]), limits_on(str(one["metric"]), [one])) for one in requirements}
-        self.worst = {one: WorstSoFar(MOST_SINGLE, one[1]) for one in asked}
-        self._inputs = [one.name for one in run.columns if one.role == "dispersion" and one.kind != "word"]
+        asked |= {
+            (str(requirement["metric"]), limits_on(str(requirement["metric"]), [requirement]))
+            for requirement in requirements
+        }
+        self.worst = {pair: WorstSoFar(MOST_SINGLE, pair[1]) for pair in asked}
+        self._inputs = [column.name for column in run.columns if column.role == "dispersion" and column.kind != "word"]
         self._rows = self._sampled_rows()
         self._sampled: list[pa.Table] = []
 
@@ -277,9 +280,9 @@ class _FirstPass:
             failed = table.filter(pc.not_equal(table["status"], STATUS_NAME[OK]))
             left = MOST_SINGLE - len(self.failed)
             self.failed += failed["case_id"].slice(0, left).to_pylist()
-            for found in pc.value_counts(failed["reason"]).to_pylist():
-                if found["values"]:
-                    self.reasons[found["values"]] += found["counts"]
+            for summed in pc.value_counts(failed["reason"]).to_pylist():
+                if summed["values"]:
+                    self.reasons[summed["values"]] += summed["counts"]
         first, stop = np.searchsorted(self._rows, [row, row + part.rows])
         taken = table.take(self._rows[first:stop] - row)
         if "status" not in table.column_names:
@@ -289,4 +292,4 @@ class _FirstPass:
     def sample(self) -> pd.DataFrame:
         """The cases that figures are drawn of."""
         names = [column.name for column in self.run.columns]
-        return pa.concat_tables([one.select(names) for one in self._sampled]).to_pandas()
+        return pa.concat_tables([part.select(names) for part in self._sampled]).to_pandas()

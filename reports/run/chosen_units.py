@@ -59,7 +59,7 @@ _LADDER = {unit: ladder for ladder in _LADDERS for unit in ladder}
 
 def chosen_unit(unit: str, numbers: Iterable[float | None]) -> str:
     """The unit for these numbers in `unit`: `unit` itself unless the largest of them is awkward in it."""
-    largest = max((abs(one) for one in numbers if one and isfinite(one)), default=0.0)
+    largest = max((abs(number) for number in numbers if number and isfinite(number)), default=0.0)
     if unit not in _LADDER or not largest or COMFORTABLE[0] <= largest < COMFORTABLE[1]:
         return unit
 
@@ -95,7 +95,7 @@ class ShownRun(Flown):
         sizes = [*self._own.limits(name), self._own.nominal_value(name)]
         tables = [self._own.histories]
         if name in self._own.summaries:
-            sizes += [one.value for one in self._own.summaries[name].quantiles]
+            sizes += [quantile.value for quantile in self._own.summaries[name].quantiles]
         else:
             tables.append(self._own.cases)
         for table in tables:
@@ -134,24 +134,26 @@ class ShownRun(Flown):
 
     @cached_property
     def summaries(self) -> dict[str, Summary]:
-        return {name: self._told_summary(name, one) for name, one in self._own.summaries.items()}
+        return {name: self._told_summary(name, summary) for name, summary in self._own.summaries.items()}
 
-    def _told_summary(self, name: str, one: Summary) -> Summary:
-        numbers = {key: self.told(name, getattr(one, key)) for key in ("mean", "sd", "minimum", "maximum")}
+    def _told_summary(self, name: str, summary: Summary) -> Summary:
+        numbers = {key: self.told(name, getattr(summary, key)) for key in ("mean", "sd", "minimum", "maximum")}
         quantiles = [
             replace(each, **{key: self.told(name, getattr(each, key)) for key in ("value", "lower", "upper")})
-            for each in one.quantiles
+            for each in summary.quantiles
         ]
-        return replace(one, **numbers, quantiles=tuple(quantiles))
+        return replace(summary, **numbers, quantiles=tuple(quantiles))
 
     @cached_property
     def _judgement(self) -> tuple[list[Verdict], Verdict | None]:
-        return [self._told_verdict(one) for one in self._own.verdicts], self._own.joint
+        return [self._told_verdict(verdict) for verdict in self._own.verdicts], self._own.joint
 
-    def _told_verdict(self, one: Verdict) -> Verdict:
-        numbers = {key: self.told(one.metric, getattr(one, key)) for key in ("at_most", "at_least", "demonstrated")}
-        enclosed = one.enclosed and tuple(self.told(one.metric, end) for end in one.enclosed)
-        return replace(one, **numbers, enclosed=enclosed)
+    def _told_verdict(self, verdict: Verdict) -> Verdict:
+        numbers = {
+            key: self.told(verdict.metric, getattr(verdict, key)) for key in ("at_most", "at_least", "demonstrated")
+        }
+        enclosed = verdict.enclosed and tuple(self.told(verdict.metric, end) for end in verdict.enclosed)
+        return replace(verdict, **numbers, enclosed=enclosed)
 
     def limits(self, metric: str) -> Limits:
         return Limits(*(self.told(metric, end) for end in self._own.limits(metric)))

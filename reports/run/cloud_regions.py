@@ -44,11 +44,13 @@ def _regions(
     A normal distribution whose ellipse reaches what is impossible is not that of these metrics: no ellipse then.
     """
     n, contents = count(len(points)), (MIDDLE, stated.probability)
-    ellipses = [(one, placed(one.outline())) for one in covariance_ellipses(points, contents, THINNEST)]
+    ellipses = [(ellipse, placed(ellipse.outline())) for ellipse in covariance_ellipses(points, contents, THINNEST)]
     if all((ranges[0] <= outline).all() and (outline <= ranges[1]).all() for _, outline in ellipses):
-        for one, outline in ellipses:
-            held = f"holds {count(one.inside)} of {n} cases, {percent(one.inside / one.n, 1)}"
-            yield Outline("ellipse", f"{percent(one.content, 3)} ellipse of a normal distribution: {held}", (outline,))
+        for ellipse, outline in ellipses:
+            held = f"holds {count(ellipse.inside)} of {n} cases, {percent(ellipse.inside / ellipse.n, 1)}"
+            yield Outline(
+                "ellipse", f"{percent(ellipse.content, 3)} ellipse of a normal distribution: {held}", (outline,)
+            )
     for region in density_regions(points, contents[1:], stated.confidence, THINNEST):
         text = (
             f"distribution-free region, at least {percent(region.content, 3)} with {percent(region.confidence)} "

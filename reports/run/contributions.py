@@ -66,8 +66,8 @@ class Contributions:
 
     def rows(self) -> Iterator[Contributor]:
         """All contributors, metric by metric."""
-        for found in self.by_metric.values():
-            yield from found
+        for indices in self.by_metric.values():
+            yield from indices
 
 
 def contributions(flown: "Flown") -> Contributions | None:
@@ -92,34 +92,34 @@ def _of_companion(flown: "Flown", store: Store, metrics: list[str]) -> Contribut
     layout = layout_of(record)
     cases = store.cases(["case_id", *metrics])
     values = {name: cases[name].to_numpy(dtype=np.float64) for name in metrics}
-    found = pick_freeze(layout, cases["case_id"].to_numpy(), values)
-    shares = (found.first, found.first_error, found.total, found.total_error)
+    indices = pick_freeze(layout, cases["case_id"].to_numpy(), values)
+    shares = (indices.first, indices.first_error, indices.total, indices.total_error)
     by_metric = {
-        metric: _ranked(flown, metric, layout.groups, *(one[:, k] for one in shares))
+        metric: _ranked(flown, metric, layout.groups, *(share[:, k] for share in shares))
         for k, metric in enumerate(metrics)
     }
-    used = {metric: int(n) for metric, n in zip(metrics, found.n_used, strict=True)}
+    used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
     members = {group["name"]: list(group["members"]) for group in record["groups"]}
-    return Contributions(by_metric, len(cases), used, found.n_tried, members)
+    return Contributions(by_metric, len(cases), used, indices.n_tried, members)
 
 
 def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
     if not flown.inputs:
         return None
     rows = np.arange(flown.n_held)[:: -(-flown.n_held // MOST_ROWS)]
-    found = sensitivity(
+    indices = sensitivity(
         {name: values[rows] for name, values in flown.inputs.items()},
         {name: flown.values(name)[rows] for name in metrics},
     )
-    shares = (found.first_order, found.first_order_error, found.total, found.total_error)
+    shares = (indices.first_order, indices.first_order_error, indices.total, indices.total_error)
     by_metric = {}
     for k, metric in enumerate(metrics):
-        ranked = _ranked(flown, metric, found.inputs, *(one[:, k] for one in shares))
-        left = _number(found.unexplained[k]) if ranked else None
+        ranked = _ranked(flown, metric, indices.inputs, *(share[:, k] for share in shares))
+        left = _number(indices.unexplained[k]) if ranked else None
         rest = [] if left is None else [Contributor(metric, UNEXPLAINED, left, left, None, None)]
         by_metric[metric] = (*ranked, *rest)
-    used = {metric: int(n) for metric, n in zip(metrics, found.n_used, strict=True)}
-    return Contributions(by_metric, 0, used, found.n_tried, {}, found)
+    used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
+    return Contributions(by_metric, 0, used, indices.n_tried, {}, indices)
 
 
 def _ranked(
@@ -144,7 +144,7 @@ def _ranked(
         for name, a, da, b, db in zip(names, first, first_error, total, total_error, strict=True)
         if np.isfinite(a) or np.isfinite(b)
     ]
-    return tuple(sorted(rows, key=lambda one: -one.size))
+    return tuple(sorted(rows, key=lambda contributor: -contributor.size))
 
 
 def _number(value: float) -> float | None:

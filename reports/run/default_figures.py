@@ -29,8 +29,8 @@ def _suggested(flown: Flown) -> Iterator[ScatterFigure]:
     for metric in flown.key_metrics:
         if flown.summaries[metric].constant or not flown.summaries[metric].n_used:
             continue
-        for one in flown.contributors(metric):
-            if np.isfinite(flown.values(one.name)).any():
-                title = f"{flown.words(metric)} over its strongest contributor, {flown.words(one.name)}"
-                yield ScatterFigure(one.name, metric, title[:1].upper() + title[1:])
+        for contributor in flown.contributors(metric):
+            if np.isfinite(flown.values(contributor.name)).any():
+                title = f"{flown.words(metric)} over its strongest contributor, {flown.words(contributor.name)}"
+                yield ScatterFigure(contributor.name, metric, title[:1].upper() + title[1:])
                 break

@@ -183,8 +183,8 @@ class Flown:
 
     def rows(self, case_ids: np.ndarray | pd.Series) -> np.ndarray:
         """Rows of the table at hand for these cases, in their order, without those that it does not hold."""
-        found = pd.Index(self.case_ids).get_indexer(np.asarray(case_ids, dtype=np.int64))
-        return found[found >= 0]
+        place = pd.Index(self.case_ids).get_indexer(np.asarray(case_ids, dtype=np.int64))
+        return place[place >= 0]
 
     def values(self, name: str) -> np.ndarray:
         """float64[n_held] of a column; NaN for words, for a missing column, and for metrics of failed cases."""
@@ -263,11 +263,13 @@ class Flown:
 
     def _flown_contributors(self, metric: str) -> list[Contributor]:
         """The same from the flights beside the run, by total effect; empty without them."""
-        found = self.contributions
-        if found is None or not found.flights:
+        contributions = self.contributions
+        if contributions is None or not contributions.flights:
             return []
-        rows, inputs = found.by_metric.get(metric, ()), self.inputs
-        return [Contributor(name, one.size) for one in rows for name in found.members[one.input] if name in inputs]
+        rows, inputs = contributions.by_metric.get(metric, ()), self.inputs
+        return [
+            Contributor(name, row.size) for row in rows for name in contributions.members[row.input] if name in inputs
+        ]
 
     @cached_property
     def contributions(self) -> Contributions | None:

@@ -43,19 +43,19 @@ def history_envelopes(histories: pd.DataFrame, case_ids: Sequence[int], names: S
     chosen = histories[histories["case_id"].isin(case_ids)].sort_values(["case_id", "t_s"], kind="stable")
     starts = np.flatnonzero(np.diff(chosen["case_id"].to_numpy(), prepend=-2))
     times = np.split(chosen["t_s"].to_numpy(), starts[1:])
-    grid = _grid(times)
-    return {name: _band(grid, times, np.split(chosen[name].to_numpy(), starts[1:])) for name in names}
+    grid = _instants(times)
+    return {name: _envelope(grid, times, np.split(chosen[name].to_numpy(), starts[1:])) for name in names}
 
 
-def _grid(times: list[np.ndarray]) -> np.ndarray:
+def _instants(times: list[np.ndarray]) -> np.ndarray:
     """Instants to look at: those of the first case if all share them, else even ones to the end of the longest."""
     first = times[0]
-    if all(one.size == first.size and (one == first).all() for one in times):
+    if all(time.size == first.size and (time == first).all() for time in times):
         return first[np.unique(np.linspace(0, first.size - 1, min(first.size, INSTANTS)).round().astype(int))]
-    return np.linspace(min(one[0] for one in times), max(one[-1] for one in times), INSTANTS)
+    return np.linspace(min(time[0] for time in times), max(time[-1] for time in times), INSTANTS)
 
 
-def _band(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -> Envelope:
+def _envelope(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -> Envelope:
     rows = [np.interp(grid, t, y, right=np.nan) for t, y in zip(times, values, strict=True)]
     table = np.sort(np.array(rows), axis=0)  # flights that have ended last, as not-a-numbers
     flying = np.count_nonzero(np.isfinite(table), axis=0)

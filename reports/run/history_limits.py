@@ -24,11 +24,11 @@ def history_limits(flown: Flown, quantities: list[str]) -> dict[str, tuple[tuple
     for verdict in flown.own.verdicts:
         for name in quantities:
             if verdict.metric and _is_extreme(flown.own, verdict.metric, name):
-                found[name] = (*found.get(name, ()), *_limits(flown, verdict, name))
+                found[name] = (*found.get(name, ()), *_limit_lines(flown, verdict, name))
     return found
 
 
-def _limits(flown: Flown, verdict: Verdict, quantity: str) -> Iterator[tuple[float, str]]:
+def _limit_lines(flown: Flown, verdict: Verdict, quantity: str) -> Iterator[tuple[float, str]]:
     for sign, own in (("≤", verdict.at_most), ("≥", verdict.at_least)):
         if own is not None:
             at = flown.told(quantity, own)

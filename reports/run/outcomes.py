@@ -21,7 +21,7 @@ ALL_LIMITS, COMPLETED = "inside all limits", "completed"
 def inside(flown: Flown, verdicts: Sequence[Verdict] | None = None) -> np.ndarray:
     """bool[n_held]: completed, and inside the limits of these requirements, of all without any named."""
     own, names = flown.own, None if verdicts is None else {verdict.name for verdict in verdicts}
-    asked = [vars(one) for one in own.verdicts if names is None or one.name in names]
+    asked = [vars(verdict) for verdict in own.verdicts if names is None or verdict.name in names]
     return inside_all(asked, own.values, own.ok)
 
 
@@ -31,13 +31,13 @@ def inside_words(flown: Flown, verdicts: Sequence[Verdict] | None = None) -> str
         return COMPLETED
     if verdicts is None or len(verdicts) == len(flown.verdicts):
         return ALL_LIMITS
-    return f"inside the limit{'s' if len(verdicts) > 1 else ''} of {', '.join(one.name for one in verdicts)}"
+    return f"inside the limit{'s' if len(verdicts) > 1 else ''} of {', '.join(verdict.name for verdict in verdicts)}"
 
 
 def failures(flown: Flown) -> Mapping[str, np.ndarray]:
     """bool[n_held] by requirement: not inside it; and, if cases failed, not completed."""
-    found = {verdict.name: ~inside(flown, [verdict]) for verdict in flown.verdicts}
-    return found if flown.ok.all() else {**found, COMPLETED: ~flown.ok}
+    violations = {verdict.name: ~inside(flown, [verdict]) for verdict in flown.verdicts}
+    return violations if flown.ok.all() else {**violations, COMPLETED: ~flown.ok}
 
 
 def case_outcomes(flown: Flown) -> np.ndarray:

@@ -64,7 +64,7 @@ def input_words(flown: Flown, row: int) -> str:
 def worst_tables(flown: Flown) -> Iterator[Table]:
     """The worst cases of the metrics that matter, those of requirements not met first; then the first failed cases."""
     passed = {verdict.metric: verdict.outcome == "pass" for verdict in flown.verdicts}
-    for metric in sorted(flown.key_metrics, key=lambda one: passed.get(one, True))[:WORST_METRICS]:
+    for metric in sorted(flown.key_metrics, key=lambda name: passed.get(name, True))[:WORST_METRICS]:
         cases = flown.worst(metric, WORST)
         if len(cases) and not flown.summaries[metric].constant:
             yield _case_table(flown, _worst_words(flown, metric), metric, cases)
@@ -88,9 +88,9 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
     Without a metric the inputs are those that contribute most to being inside all limits.
     """
     inside_of = inside(flown).astype(np.float64)
-    found = flown.contributors(metric) if metric else contributors(flown.inputs, inside_of)
-    found = found or [Contributor(name, np.nan) for name in flown.inputs]
-    shown = [flown.columns[one.name] for one in found[:INPUTS_SHOWN]]
+    ranked = flown.contributors(metric) if metric else contributors(flown.inputs, inside_of)
+    ranked = ranked or [Contributor(name, np.nan) for name in flown.inputs]
+    shown = [flown.columns[contributor.name] for contributor in ranked[:INPUTS_SHOWN]]
     columns = [Column("Case", "number", 0.9)]
     cells = [[Cell(count(int(case)), int(case), case=int(case)) for case in cases["case_id"]]]
     if metric is None:
@@ -108,13 +108,13 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
         cells.append(_input_cells(cases[fact.name]))
     columns.append(Column("Command to replay", "code", 3.6))
     cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in cases["case_id"]])
-    return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, found, len(shown)))
+    return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, ranked, len(shown)))
 
 
-def _inputs_said(flown: Flown, found: list[Contributor], shown: int) -> str:
+def _inputs_said(flown: Flown, ranked: list[Contributor], shown: int) -> str:
     """Which inputs the columns are of, where nothing is known of their contributions."""
     n = len(flown.with_role("dispersion"))
-    return f"The first {shown} of {n} inputs." if shown < n and not np.isfinite(found[0].share) else ""
+    return f"The first {shown} of {n} inputs." if shown < n and not np.isfinite(ranked[0].share) else ""
 
 
 def _input_cells(column: pd.Series) -> list[Cell]:

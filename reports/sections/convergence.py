@@ -25,14 +25,14 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     """A figure and a table; nothing for cases that are no random sample, a sentence for too few."""
     if not flown.random or not flown.n_tried:
         return
-    runs = {name: _runs(flown, name) for name in flown.key_metrics[:MOST_METRICS]}
+    runs = {name: _running_estimates(flown, name) for name in flown.key_metrics[:MOST_METRICS]}
     told = {name: pair for name, pair in runs.items() if pair}
     if told:
         drawn = list(told)[:MOST_DRAWN]
-        panels = tuple(_panel(flown, name, run) for name in drawn for run in told[name])
+        panels = tuple(_estimate_panel(flown, name, run) for name in drawn for run in told[name])
         caption = f"Mean and outer percentile of the key metrics against the number of cases{flown.sample_words}"
         yield FigureBlock(caption, Drawing("Running estimates", panels, 4), "half")
-        yield _table(flown, told)
+        yield _convergence_table(flown, told)
     silent = [name for name in runs if name not in told]
     if silent:
         yield (
@@ -41,9 +41,9 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         )
 
 
-def _panel(flown: Flown, name: str, run: RunningEstimate) -> Plot:
+def _estimate_panel(flown: Flown, name: str, run: RunningEstimate) -> Plot:
     """One estimate and its bounds over the number of cases."""
-    what, interval = _what(run), f"{percent(flown.stated.confidence)} confidence bounds"
+    what, interval = _estimate_words(run), f"{percent(flown.stated.confidence)} confidence bounds"
     band_key = f"{interval}, where the cases are enough for both ends"
     key = "from the first so many cases, in the order of their numbers"
     marks = (
@@ -53,21 +53,21 @@ def _panel(flown: Flown, name: str, run: RunningEstimate) -> Plot:
     return Plot(marks, Axis("cases", log=True, margin=0.0), Axis(flown.axis(name), most=5), what, 230.0)
 
 
-def _runs(flown: Flown, name: str) -> tuple[RunningEstimate, ...]:
+def _running_estimates(flown: Flown, name: str) -> tuple[RunningEstimate, ...]:
     if flown.summaries[name].constant:
         return ()
     values = flown.values(name)
     outer = flown.stated.probability if flown.largest_is_worst(name) else flown.stated.low
     bounds = flown.stated.two_sided
-    found = running_mean(values, bounds), running_quantile(values, outer, bounds)
-    return tuple(run for run in found if run is not None)
+    estimates = running_mean(values, bounds), running_quantile(values, outer, bounds)
+    return tuple(run for run in estimates if run is not None)
 
 
-def _what(run: RunningEstimate) -> str:
+def _estimate_words(run: RunningEstimate) -> str:
     return "mean" if run.probability is None else percentile(run.probability)
 
 
-def _table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
+def _convergence_table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
     columns = (
         Column("Metric", "text", 2.6, grouped=True),
         Column("Estimate", "text", 1.5),
@@ -77,7 +77,7 @@ def _table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
         Column("Halves differ by chance", "number", 1.3),
         Column("Converged", "text", 1.5),
     )
-    rows = tuple(_row(flown, name, run) for name, pair in told.items() for run in pair)
+    rows = tuple(_estimate_row(flown, name, run) for name, pair in told.items() for run in pair)
     note = (
         f"Converged: the {percent(flown.stated.confidence)} bounds of the estimate lie no farther from it than "
         f"{number(CLOSE_MEAN)} standard deviations of the metric for a mean, {number(CLOSE_QUANTILE)} for a percentile "
@@ -90,14 +90,14 @@ def _table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
     return Table(f"Convergence of the estimates{flown.sample_words}", columns, rows, note)
 
 
-def _row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, ...]:
+def _estimate_row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, ...]:
     sd = flown.summaries[name].sd
     half = int(abs(run.cases - run.n_tried / 2).argmin())
     low, high = (float(end[-1]) if end[-1] == end[-1] else None for end in (run.lower, run.upper))
     reach = "open end" if run.reach is None else f"{number(run.reach, 2)} σ"
     return (
         Cell(flown.axis(name)),
-        Cell(_what(run), small=f"{count(run.n_used)} of {count(run.n_tried)} cases"),
+        Cell(_estimate_words(run), small=f"{count(run.n_used)} of {count(run.n_tried)} cases"),
         Cell(
             number(float(run.estimate[half]), scale=sd),
             float(run.estimate[half]),
@@ -106,20 +106,20 @@ def _row(flown: Flown, name: str, run: RunningEstimate) -> tuple[Cell, ...]:
         Cell(number(float(run.estimate[-1]), scale=sd), float(run.estimate[-1]), interval(low, high, sd)),
         Cell(reach, run.reach),
         Cell(percent(run.halves_p), run.halves_p),
-        _verdict(run),
+        _converged_cell(run),
     )
 
 
-def _verdict(run: RunningEstimate) -> Cell:
+def _converged_cell(run: RunningEstimate) -> Cell:
     if run.settled:
         return Cell("converged", tone="good")
     if run.reach is not None and run.reach <= run.close:
         return Cell("no", small="the halves differ", tone="bad")
-    wanted = f"needs about {count(_rounded(run.cases_wanted))} cases" if run.cases_wanted else "needs more cases"
+    wanted = f"needs about {count(_two_digits_up(run.cases_wanted))} cases" if run.cases_wanted else "needs more cases"
     return Cell("not yet", small=wanted, tone="open")
 
 
-def _rounded(cases: int) -> int:
+def _two_digits_up(cases: int) -> int:
     """Two digits, upwards: the estimate of the need is rough itself."""
     step = 10 ** max(len(str(cases)) - 2, 0)
     return -(-cases // step) * step

@@ -99,8 +99,8 @@ def _inputs(flown: Flown, metrics: list[str]) -> list[str]:
     """The inputs that contribute most to any of these metrics."""
     size: dict[str, float] = {}
     for metric in metrics[:MOST_METRICS]:
-        for one in flown.contributors(metric):
-            size[one.name] = max(size.get(one.name, 0.0), one.share)
+        for contributor in flown.contributors(metric):
+            size[contributor.name] = max(size.get(contributor.name, 0.0), contributor.share)
     return sorted(size, key=lambda name: -size[name])[:MOST_INPUTS]
 
 

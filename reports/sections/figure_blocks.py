@@ -55,7 +55,7 @@ def thinned_by_outcome(rows: np.ndarray, outcome: np.ndarray, most: int = POINTS
     An outcome of up to FEWEST_SHOWN cases is drawn whole.
     """
     share = min(1.0, most / max(rows.size, 1))
-    groups = [rows[outcome[rows] == one] for one in np.unique(outcome[rows])]
+    groups = [rows[outcome[rows] == kind] for kind in np.unique(outcome[rows])]
     kept = [max(round(share * group.size), min(FEWEST_SHOWN, group.size)) for group in groups]
     chosen = [group[np.linspace(0, group.size - 1, n).astype(np.int64)] for group, n in zip(groups, kept, strict=True)]
     return np.sort(np.concatenate(chosen)) if chosen else rows
@@ -64,7 +64,7 @@ def thinned_by_outcome(rows: np.ndarray, outcome: np.ndarray, most: int = POINTS
 def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     """The model's maps; a sentence in place of one that cannot be drawn, one for all over inputs not dispersed."""
     elsewhere = []
-    for figure in (one for one in flown.figures if isinstance(one, MapFigure)):
+    for figure in (drawn for drawn in flown.figures if isinstance(drawn, MapFigure)):
         absent = flown.absence(figure.x, figure.y)
         if not absent:
             yield _map_block(flown, figure)
@@ -108,7 +108,11 @@ def _too_little_explained(flown: Flown, figure: MapFigure, share: float) -> str:
     """How little the two inputs explain, and which two explain most."""
     x, y = flown.words(figure.x), flown.words(figure.y)
     said = f"{x} and {y} together explain {percent(max(share, 0.0), 0)} of the variance of {flown.words(figure.metric)}"
-    names = [one.name for one in flown.contributors(figure.metric) if np.isfinite(flown.values(one.name)).any()]
+    names = [
+        contributor.name
+        for contributor in flown.contributors(figure.metric)
+        if np.isfinite(flown.values(contributor.name)).any()
+    ]
     values = flown.values(figure.metric)
     pairs = {
         (a, b): explained_share(flown.values(a), flown.values(b), values)
@@ -199,7 +203,9 @@ def other_distributions(flown: Flown) -> Iterator[FigureBlock]:
 def _drawable(flown: Flown) -> tuple[list[str], list[str]]:
     """Metrics with a distribution: those that matter, and the others."""
     names = [name for name, item in flown.summaries.items() if item.n_used >= FEWEST_VALUES and not item.constant]
-    return [name for name in flown.key_metrics if name in names], [one for one in names if one not in flown.key_metrics]
+    return [name for name in flown.key_metrics if name in names], [
+        name for name in names if name not in flown.key_metrics
+    ]
 
 
 def _distribution_figures(flown: Flown, names: list[str], title: str, height: float = 240.0) -> Iterator[FigureBlock]:

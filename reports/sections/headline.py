@@ -44,7 +44,7 @@ def _because(flown: Flown, verdict: Verdict) -> str:
             "no case was flown" if not verdict.tried else "the cases of this design are not a random sample"
         )
     if verdict.outcome == "fail" and verdict.upper >= verdict.share:  # the joint one, for another's failing
-        failing = [one.name for one in flown.verdicts if one.shared_outcome == "fail"]
+        failing = [verdict.name for verdict in flown.verdicts if verdict.shared_outcome == "fail"]
         return f"{lost}; {' and '.join(failing)} {'fails' if len(failing) == 1 else 'fail'} with confidence shared"
     if verdict.outcome == "fail":
         return f"{lost}; the true probability is at most {percent(verdict.upper)}"
@@ -86,10 +86,10 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         rest.append(f"{'largest' if large else 'smallest'} {number(end, 4, spread)}")
         rest += [f"{percentile(probability)} {number(tail.value, 4, spread)}"] if tail and flown.random else []
         shown, where = number(end, 4, spread), "in the cases flown"
-        for one in flown.verdicts:  # what the verification matrix says is demonstrated, in the same digits
-            if one.metric == name and one.demonstrated is not None:
-                shown = number(one.demonstrated)
-                where = f"in {percent(one.share, 3)} of cases, {percent(one.confidence)} confidence"
+        for verdict in flown.verdicts:  # what the verification matrix says is demonstrated, in the same digits
+            if verdict.metric == name and verdict.demonstrated is not None:
+                shown = number(verdict.demonstrated)
+                where = f"in {percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
                 break
         answer = f"at {'most' if large else 'least'} {with_unit(shown, unit)} {where}"
         yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
@@ -99,10 +99,10 @@ def _tails(flown: Flown, summary: Summary, probabilities: tuple[float, ...]) -> 
     """Outer percentiles with their confidence bounds, those that the cases are enough for."""
     each = percent(flown.stated.confidence)
     for probability in probabilities if flown.random else ():
-        found, upper = summary.at(probability), probability > 0.5
-        bound = None if found is None else (found.upper if upper else found.lower)
-        if found is not None and bound is not None:
-            value, limit = (number(one, 4, summary.spread) for one in (found.value, bound))
+        quantile, upper = summary.at(probability), probability > 0.5
+        bound = None if quantile is None else (quantile.upper if upper else quantile.lower)
+        if quantile is not None and bound is not None:
+            value, limit = (number(end, 4, summary.spread) for end in (quantile.value, bound))
             side = "upper" if upper else "lower"
             yield f"{percentile(probability)} {value}, {each} {side} confidence bound {limit}"
 
@@ -126,33 +126,35 @@ def _same(flown: Flown, name: str, used: str) -> tuple[str, str]:
 
 def warnings(flown: Flown) -> tuple[str, ...]:
     """What a reader must know before using any number below."""
-    found = []
+    sentences = []
     missing = flown.n_wanted - flown.n_tried
     if missing > 0:
-        found.append(
+        sentences.append(
             f"The run is not complete: {count(missing)} of {count(flown.n_wanted)} cases are missing; "
             f"mc-engine resume {shell_word(flown.name)} flies them."
         )
     if flown.n_tried and not flown.every.completed:
-        found.append(f"All {count(flown.n_tried)} cases failed: no metric has a number.")
+        sentences.append(f"All {count(flown.n_tried)} cases failed: no metric has a number.")
     elif failed := flown.n_tried - flown.every.completed:
-        found.append(f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement.")
+        sentences.append(
+            f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement."
+        )
     if flown.looked and flown.n_tried and flown.verdicts:
-        found.append(_how_looked_at(flown))
+        sentences.append(_how_looked_at(flown))
     if flown.n_tried == 0:
-        found.append("No case was flown.")
+        sentences.append("No case was flown.")
     if flown.sampled:
-        found.append(
+        sentences.append(
             f"Requirements, statistics, percentiles, worst and failed cases are those of all "
             f"{count(flown.n_tried)} cases. Figures, convergence, contributors and regions show {count(flown.n_held)} "
             "of them, one picked at random from each of equal stretches of the case numbers."
         )
     if not flown.random:
-        found.append(
+        sentences.append(
             f"The design is “{flown.design}”: its cases are chosen, not drawn at random. Fractions and percentiles "
             "below describe these cases and do not estimate probabilities."
         )
-    return tuple(found)
+    return tuple(sentences)
 
 
 def _how_looked_at(flown: Flown) -> str:

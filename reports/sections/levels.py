@@ -49,7 +49,7 @@ def _compared(flown: Flown, name: str, levels: list[str]) -> Iterator[FigureBloc
         yield f"{flown.words(name)}: no metric differs between its levels."
         return
     rows = [np.flatnonzero(choice == level) for level in levels]
-    plots = tuple(_panel(flown, metric, levels, rows) for metric in metrics)
+    plots = tuple(_metric_panel(flown, metric, levels, rows) for metric in metrics)
     yield FigureBlock(
         f"Metrics by {flown.words(name)}. {_pairs_said(flown, matched)}",
         Drawing(f"Metrics by {flown.words(name)}", plots),
@@ -75,7 +75,7 @@ def _pairs_said(flown: Flown, matched: np.ndarray) -> str:
     )
 
 
-def _panel(flown: Flown, metric: str, levels: list[str], rows: list[np.ndarray]) -> Plot:
+def _metric_panel(flown: Flown, metric: str, levels: list[str], rows: list[np.ndarray]) -> Plot:
     values = flown.values(metric)
     quantiles, used = np.full((len(rows), len(SPREAD)), np.nan), []
     for place, group in enumerate(rows):
@@ -106,7 +106,7 @@ def _level_table(
             Cell(
                 number(item.value, 4, summary.spread),
                 item.value,
-                _limits(flown, item.lower, item.upper, summary.spread),
+                _bounds(flown, item.lower, item.upper, summary.spread),
             )
             for item in summary.quantiles
         ] or [Cell("–"), Cell("–")]
@@ -115,10 +115,12 @@ def _level_table(
         against = _difference_cells(flown, values, matched, place)
         body.append((Cell(level), used, *cells, largest, *against))
     title = f"{axis_label(flown.words(metric), flown.unit(metric))} by {flown.words(name)}"
-    return Table(title[:1].upper() + title[1:], columns, tuple(body), _note(flown, levels[0], bool(len(matched))))
+    return Table(
+        title[:1].upper() + title[1:], columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched)))
+    )
 
 
-def _limits(flown: Flown, lower: float | None, upper: float | None, scale: float | None) -> str:
+def _bounds(flown: Flown, lower: float | None, upper: float | None, scale: float | None) -> str:
     return interval(lower, upper, scale) if flown.random else ""
 
 
@@ -126,29 +128,34 @@ def _difference_cells(flown: Flown, values: np.ndarray, matched: np.ndarray, pla
     """The paired difference of a level to the first one, and in how many pairs it is negative."""
     if place == 0 or not len(matched):
         return Cell("–"), Cell("–")
-    found = paired_difference(values[matched[:, place]], values[matched[:, 0]], flown.stated.confidence)
-    if found.median is None or found.smaller_share is None or found.smallest is None or found.largest is None:
-        return Cell("–", small=f"0 of {count(found.n_tried)} pairs"), Cell("–")
-    if _drawn(flown):
-        small = interval(found.median.lower, found.median.upper)
-        bounds = f"[{percent(found.smaller_share[0], 1)}, {percent(found.smaller_share[1], 1)}]"
+    difference = paired_difference(values[matched[:, place]], values[matched[:, 0]], flown.stated.confidence)
+    if (
+        difference.median is None
+        or difference.smaller_share is None
+        or difference.smallest is None
+        or difference.largest is None
+    ):
+        return Cell("–", small=f"0 of {count(difference.n_tried)} pairs"), Cell("–")
+    if _pairs_are_draws(flown):
+        small = interval(difference.median.lower, difference.median.upper)
+        bounds = f"[{percent(difference.smaller_share[0], 1)}, {percent(difference.smaller_share[1], 1)}]"
     else:
-        small, bounds = f"{number(found.smallest, 4)} to {number(found.largest, 4)}", ""
-    share = found.smaller / found.n_used
-    words = f"{count(found.smaller)} of {count(found.n_used)}"
-    return Cell(number(found.median.value, 4), found.median.value, small), Cell(words, share, bounds)
+        small, bounds = f"{number(difference.smallest, 4)} to {number(difference.largest, 4)}", ""
+    share = difference.smaller / difference.n_used
+    words = f"{count(difference.smaller)} of {count(difference.n_used)}"
+    return Cell(number(difference.median.value, 4), difference.median.value, small), Cell(words, share, bounds)
 
 
-def _drawn(flown: Flown) -> bool:
+def _pairs_are_draws(flown: Flown) -> bool:
     """Whether pairs may be taken as independent draws: a table's rows are the user's own, mostly drawn elsewhere."""
     return flown.random or flown.design == "table"
 
 
-def _note(flown: Flown, first: str, paired: bool) -> str:
+def _pairing_note(flown: Flown, first: str, paired: bool) -> str:
     if not paired:
         return "No pairs: the levels were flown on different cases."
     note = f"Differences of pairs of cases that differ in nothing else, to “{first}”. "
-    if not _drawn(flown):
+    if not _pairs_are_draws(flown):
         return (
             note + "Below the median: smallest to largest difference; the cases were chosen, so there is no interval."
         )

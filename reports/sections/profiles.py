@@ -33,8 +33,8 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
     if not np.isfinite(flown.histories[names].to_numpy(dtype=np.float64)).all(axis=1).any():
         return f"{figure.title}: not drawn; no saved case has both {figure.x} and {figure.y}."
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
-    found = profile_bands(flown.histories, fair, figure.x, figure.y)
-    bands = found if isinstance(found, tuple) else ()
+    bands_or_reason = profile_bands(flown.histories, fair, figure.x, figure.y)
+    bands = bands_or_reason if isinstance(bands_or_reason, tuple) else ()
     lines = tuple(
         history_line(flown, case, label, rank, names)
         for case, (label, rank) in history_cases(flown).items()
@@ -43,9 +43,9 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
     labels = flown.axis(figure.x), flown.axis(figure.y)
     drawing = profile_figure((figure.x, figure.y), labels, lines, bands[:2])
     said = (
-        _band_words(flown, figure, found)
-        if isinstance(found, tuple)
-        else f" {found.replace(figure.y, flown.words(figure.y))}."
+        _band_words(flown, figure, bands_or_reason)
+        if isinstance(bands_or_reason, tuple)
+        else f" {bands_or_reason.replace(figure.y, flown.words(figure.y))}."
         if flown.random
         else ""
     )
@@ -80,16 +80,18 @@ def profile_bands(histories: pd.DataFrame, case_ids: Sequence[int], x: str, y: s
     if not len(table) or ends[0][1] == ends[1][1]:
         return f"No bands: {y} is the same in all of these cases"
     legs = [_legs(flight[:, 1], LEAST_LEG * (ends[1][1] - ends[0][1])) for flight in flights]
-    closed = [np.abs(one[-1] - one[0]) < CLOSED * (ends[1] - ends[0]) for one in flights]
-    n_legs = float(np.median([len(one) for one in legs]))
-    if n_legs > MOST_LEGS or (n_legs > 1 and np.mean([one.all() for one in closed]) > 0.5):
-        return f"No bands: {y} does not run one way along these curves, they are closed or oscillate"
-    rising = sum(one[0] > 0 for one in legs if one) > 0.5 * len(legs)
+    closed = [np.abs(flight[-1] - flight[0]) < CLOSED * (ends[1] - ends[0]) for flight in flights]
+    n_legs = float(np.median([len(leg) for leg in legs]))
+    if n_legs > MOST_LEGS or (n_legs > 1 and np.mean([flight.all() for flight in closed]) > 0.5):
+        return f"No bands: {y} does not run flight way along these curves, they are closed or oscillate"
+    rising = sum(leg[0] > 0 for leg in legs if leg) > 0.5 * len(legs)
     levels = np.linspace(ends[0][1], ends[1][1], LEVELS)
-    found = [_band(flights, levels, rising)]
+    candidates = [_first_passage_envelope(flights, levels, rising)]
     if rising and n_legs == 2:
-        found.append(_band([one[int(np.argmax(one[:, 1])) :] for one in flights], levels, False))
-    bands = tuple(band for band in found if band is not None)
+        candidates.append(
+            _first_passage_envelope([flight[int(np.argmax(flight[:, 1])) :] for flight in flights], levels, False)
+        )
+    bands = tuple(band for band in candidates if band is not None)
     return bands or f"No bands: no level of {y} is reached by {FEWEST_CASES} of these cases"
 
 
@@ -108,7 +110,7 @@ def _legs(y: np.ndarray, least: float) -> list[int]:
     return legs
 
 
-def _band(flights: list[np.ndarray], levels: np.ndarray, rising: bool) -> Envelope | None:
+def _first_passage_envelope(flights: list[np.ndarray], levels: np.ndarray, rising: bool) -> Envelope | None:
     """Quantiles of x at the levels of y on the first way up, or down, to each; None for too few flights."""
     way = -1.0 if rising else 1.0
     asked = np.sort(way * levels)

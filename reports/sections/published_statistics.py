@@ -19,10 +19,10 @@ def statistics_tables(flown: Flown) -> Iterator[Table]:
             place = str(record.get("source", "")).split(",")[0]
             found.setdefault(place, {}).setdefault(record["of"], {})[record["statistic"]] = record
     for place, rows in found.items():
-        yield _table(flown, place, rows)
+        yield _source_table(flown, place, rows)
 
 
-def _table(flown: Flown, place: str, rows: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Table:
+def _source_table(flown: Flown, place: str, rows: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Table:
     used = [name for name in STATISTICS if any(name in row for row in rows.values())]
     columns = [Column("Quantity", "name", 2.0)]
     for name in used:
@@ -31,7 +31,7 @@ def _table(flown: Flown, place: str, rows: Mapping[str, Mapping[str, Mapping[str
     for of, row in rows.items():
         cells = [Cell(axis_label(of, flown.unit(of)))]
         for name in used:
-            cells += _pair(flown, row[name]) if name in row else [Cell("–"), Cell("–")]
+            cells += _published_and_computed(flown, row[name]) if name in row else [Cell("–"), Cell("–")]
         body.append(tuple(cells))
     note = (
         f"Computed: {count(flown.every.completed)} cases of this run, with its own dispersions; for the farthest as "
@@ -40,7 +40,7 @@ def _table(flown: Flown, place: str, rows: Mapping[str, Mapping[str, Mapping[str
     return Table(f"{place} compared with this run", tuple(columns), tuple(body), note)
 
 
-def _pair(flown: Flown, record: Mapping[str, Any]) -> list[Cell]:
+def _published_and_computed(flown: Flown, record: Mapping[str, Any]) -> list[Cell]:
     """The printed number, with what was done to it, and ours, marked as inside its tolerance or not."""
     published, ours = float(record["published"]), own_statistic(flown, record)
     assert ours is not None  # only such records come here

@@ -46,7 +46,7 @@ def timeline_table(flown: Flown) -> Table | None:
     if not times:
         return None
     rows = []
-    for name in sorted(times, key=lambda one: _seconds(flown, one)):
+    for name in sorted(times, key=lambda event: _seconds(flown, event)):
         summary, event = flown.summaries[name], times[name]
         spread = "–" if summary.sd is None else number(0.0 if summary.constant else summary.sd, 3)
         rows.append(

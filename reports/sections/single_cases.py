@@ -50,9 +50,9 @@ def case_axes(flown: Flown) -> tuple[str, str] | None:
     metrics = [name for name in flown.key_metrics if _differs(flown.values(name))]
     lost = case_outcomes(flown) != INSIDE
     if lost.any() and not lost.all():
-        inputs.sort(key=lambda name: -_told(flown.values(name), lost))
+        inputs.sort(key=lambda name: -_outcome_variance(flown.values(name), lost))
     elif metrics:
-        size = {one.name: one.share for one in flown.contributors(metrics[0])}
+        size = {contributor.name: contributor.share for contributor in flown.contributors(metrics[0])}
         inputs.sort(key=lambda name: -size.get(name, 0.0))
     names = [*inputs, *metrics][:2]
     return (names[0], names[1]) if len(names) == 2 else None
@@ -63,7 +63,7 @@ def _differs(values: np.ndarray) -> bool:
     return finite.size > 0 and bool(finite.min() < finite.max())
 
 
-def _told(values: np.ndarray, lost: np.ndarray) -> float:
+def _outcome_variance(values: np.ndarray, lost: np.ndarray) -> float:
     """Variance of the share of lost cases over bins of equally many values: also where both ends are lost."""
     finite = np.isfinite(values)
     order = np.argsort(values[finite], kind="stable")
@@ -83,15 +83,15 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
     key = [*flown.with_role("dispersion"), *(flown.columns[name] for name in flown.key_metrics[:MOST_METRICS])]
     most = MOST_NUMBERS // flown.n_tried
     everything = most >= len(key)
-    facts = _facts(flown, min(most, len(key) + MOST_METRICS) if everything else len(key))
+    facts = _shown_columns(flown, min(most, len(key) + MOST_METRICS) if everything else len(key))
     histories, left_out = case_histories(flown)
-    rows = np.arange(flown.n_held) if everything else _rows(flown, sections, histories, max(1, len(facts)))
+    rows = np.arange(flown.n_held) if everything else _held_rows(flown, sections, histories, max(1, len(facts)))
     return CaseData(
         n_tried=flown.n_tried,
         ids=flown.case_ids[rows],
         outcome=case_outcomes(flown)[rows],
         outcomes=outcome_names(flown),
-        columns=tuple(_column(flown, fact, rows) for fact in facts) + tuple(_places(flown, sections, rows)),
+        columns=tuple(_column(flown, fact, rows) for fact in facts) + tuple(_place_columns(flown, sections, rows)),
         axes=case_axes(flown),
         time=axis_label("time", flown.unit("t_s")),
         quantities={name: _quantity_label(flown, name) for name in _quantities(flown, histories)},
@@ -100,7 +100,7 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
     )
 
 
-def _facts(flown: Flown, most: int) -> list[ColumnFacts]:
+def _shown_columns(flown: Flown, most: int) -> list[ColumnFacts]:
     """All inputs, then the metrics, those that matter first, together at most so many."""
     inputs = [fact.name for fact in flown.with_role("dispersion")]
     metrics = [fact.name for fact in flown.with_role("metric")]
@@ -121,7 +121,7 @@ def _column(flown: Flown, fact: ColumnFacts, rows: np.ndarray) -> CaseColumn:
     return CaseColumn(fact.name, label, fact.role, flown.values(fact.name)[rows])
 
 
-def _places(flown: Flown, sections: Iterable[Section], rows: np.ndarray) -> Iterator[CaseColumn]:
+def _place_columns(flown: Flown, sections: Iterable[Section], rows: np.ndarray) -> Iterator[CaseColumn]:
     """Numbers that figures alone have of the cases, such as where they came down on a map."""
     for section in sections:
         for block in section.blocks:
@@ -132,7 +132,7 @@ def _places(flown: Flown, sections: Iterable[Section], rows: np.ndarray) -> Iter
                 yield CaseColumn(name, label, "place", np.where(row >= 0, values[row], np.nan))
 
 
-def _rows(flown: Flown, sections: Iterable[Section], histories: Iterable[int], columns: int) -> np.ndarray:
+def _held_rows(flown: Flown, sections: Iterable[Section], histories: Iterable[int], columns: int) -> np.ndarray:
     """Row numbers of the cases that a page holds that cannot hold all, in the order of the table."""
     most = min(MOST_CASES, max(MOST_NUMBERS // columns, 1))
     place = pd.Index(flown.case_ids)

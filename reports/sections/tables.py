@@ -73,7 +73,7 @@ def shape_cell(summary: Summary) -> Cell:
 
 def quantile_table(flown: Flown) -> Table | None:
     """The quantiles of every metric with their intervals; None if no metric has one."""
-    drawn = {name: one for name, one in flown.summaries.items() if one.quantiles and not one.constant}
+    drawn = {name: summary for name, summary in flown.summaries.items() if summary.quantiles and not summary.constant}
     if not drawn:
         return None
     shown = (flown.stated.outer[0], 0.5, flown.stated.outer[1])
@@ -131,11 +131,11 @@ def status_table(flown: Flown) -> Table:
 
 
 def _reasons(flown: Flown) -> list[tuple[str, int]]:
-    found = [(f"reason: {reason}", cases) for reason, cases in flown.every.reasons.items()]
-    if len(found) > REASONS_SHOWN:
-        rest = found[REASONS_SHOWN - 1 :]
-        found = [*found[: REASONS_SHOWN - 1], (f"{len(rest)} other reasons", sum(cases for _, cases in rest))]
-    return found
+    reasons = [(f"reason: {reason}", cases) for reason, cases in flown.every.reasons.items()]
+    if len(reasons) > REASONS_SHOWN:
+        rest = reasons[REASONS_SHOWN - 1 :]
+        reasons = [*reasons[: REASONS_SHOWN - 1], (f"{len(rest)} other reasons", sum(cases for _, cases in rest))]
+    return reasons
 
 
 def _status_row(word: str, cases: int, tried: int, text: str) -> tuple[Cell, ...]:
@@ -166,11 +166,11 @@ def dispersed_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table
     columns = (Column("Input", "name", 2.4), Column("Distribution", "text", 2.6), Column("Source", "text", 3.0))
     rows = tuple(
         (
-            Cell(axis_label(one["name"], one["unit"]), small=one["description"]),
-            Cell(", ".join(filter(None, (one["distribution"], one.get("bounds", ""))))),
-            Cell(one["source"] or "not stated"),
+            Cell(axis_label(record["name"], record["unit"]), small=record["description"]),
+            Cell(", ".join(filter(None, (record["distribution"], record.get("bounds", ""))))),
+            Cell(record["source"] or "not stated"),
         )
-        for one in records
+        for record in records
     )
     return Table(caption, columns, rows)
 

@@ -66,42 +66,44 @@ GLOSSARY = Terms(
 )
 
 
-def write_comparison(found: Comparison, path: Path, runs: tuple[Run, Run] | None = None) -> Path:
+def write_comparison(comparison: Comparison, path: Path, runs: tuple[Run, Run] | None = None) -> Path:
     """Write the comparison to `path`, a page if it ends in .html, else a PDF; the file appears whole or not at all.
 
     runs : A and B, whose distributions, histories and footprints are laid over one another.
     """
-    document = build_comparison(found, runs)
+    document = build_comparison(comparison, runs)
     content = render_html(document) if path.suffix == ".html" else render_pdf(document)
     write_durably(path, content)
     return path
 
 
-def build_comparison(found: Comparison, runs: tuple[Run, Run] | None = None) -> Document:
+def build_comparison(comparison: Comparison, runs: tuple[Run, Run] | None = None) -> Document:
     """The comparison as a document: requirements first, then metrics, then what was edited in code and campaign."""
     overlays: tuple[Block, ...] = ()
     if runs is not None:
-        pair = Flown(runs[0], found.names[0]), Flown(runs[1], found.names[1])
-        overlays = as_blocks(overlay_blocks(pair, [one.metric for one in _ranked(found)]))
+        pair = Flown(runs[0], comparison.names[0]), Flown(runs[1], comparison.names[1])
+        overlays = as_blocks(overlay_blocks(pair, [change.metric for change in _ranked(comparison)]))
     sections = (
-        Section("requirements", "Requirements", as_blocks([_verdict_table(found), _share_table(found)])),
-        Section("metrics", "Metrics", as_blocks(_metric_blocks(found))),
+        Section("requirements", "Requirements", as_blocks([_verdict_table(comparison), _share_table(comparison)])),
+        Section("metrics", "Metrics", as_blocks(_metric_blocks(comparison))),
         Section("overlays", "Both runs over one another", overlays),
-        Section("code", "Changes in the code", as_blocks([_difference_block("Code", found.code)])),
-        Section("campaign", "Changes in the campaign", as_blocks(_campaign_blocks(found))),
+        Section("code", "Changes in the code", as_blocks([_difference_block("Code", comparison.code)])),
+        Section("campaign", "Changes in the campaign", as_blocks(_campaign_blocks(comparison))),
         Section("reading", "Glossary", (GLOSSARY,)),
     )
     return numbered(
         Document(
             kind="Comparison of two runs",
             question="Changes",
-            title=found.titles[1] if found.titles[0] == found.titles[1] else " and ".join(found.titles),
-            subtitle=_sentence(found),
-            created=found.created[1],
-            facts=_facts(found),
-            verdicts=tuple(_cards(found)),
+            title=comparison.titles[1]
+            if comparison.titles[0] == comparison.titles[1]
+            else " and ".join(comparison.titles),
+            subtitle=_change_sentence(comparison),
+            created=comparison.created[1],
+            facts=_run_facts(comparison),
+            verdicts=tuple(_change_cards(comparison)),
             costs=(),
-            warnings=_warnings(found),
+            warnings=_comparison_warnings(comparison),
             sections=tuple(section for section in sections if section.blocks),
         )
     )
@@ -110,50 +112,58 @@ def build_comparison(found: Comparison, runs: tuple[Run, Run] | None = None) -> 
 # ---- the headline
 
 
-def _sentence(found: Comparison) -> str:
-    chance = f"{count(found.n_tests)} tests; at most {percent(found.alpha)} chance of any false alarm"
-    what = "Significant changes from run A to run B" if found.changed else "No significant change from run A to run B"
-    turned = [f"{one.name}: {one.words}" for one in found.verdicts if one.before != one.after]
+def _change_sentence(comparison: Comparison) -> str:
+    chance = f"{count(comparison.n_tests)} tests; at most {percent(comparison.alpha)} chance of any false alarm"
+    what = (
+        "Significant changes from run A to run B" if comparison.changed else "No significant change from run A to run B"
+    )
+    turned = [f"{verdict.name}: {verdict.words}" for verdict in comparison.verdicts if verdict.before != verdict.after]
     verdicts = f"Requirements: {'; '.join(turned)}. " if turned else ""
     return f"{verdicts}{what} ({chance})."
 
 
-def _facts(found: Comparison) -> tuple[tuple[str, str], ...]:
-    reason = found.pairing.reason
+def _run_facts(comparison: Comparison) -> tuple[tuple[str, str], ...]:
+    reason = comparison.pairing.reason
     facts = []
-    for letter, name, cases, ok, created in zip("AB", found.names, found.cases, found.ok, found.created, strict=True):
+    for letter, name, cases, ok, created in zip(
+        "AB", comparison.names, comparison.cases, comparison.ok, comparison.created, strict=True
+    ):
         flown = f"{count(cases)} cases, {count(ok)} completed"
         facts.append((f"Run {letter}", f"{name}: {flown}, {created[:16].replace('T', ' ')}".rstrip(", ")))
     return (*facts, ("Cases", f"{reason[:1].upper()}{reason[1:]}"))
 
 
-def _cards(found: Comparison) -> Iterator[Card]:
-    for verdict in found.verdicts:
+def _change_cards(comparison: Comparison) -> Iterator[Card]:
+    for verdict in comparison.verdicts:
         if verdict.before != verdict.after:
             yield Card(verdict.name, verdict.words, verdict.inside_words(count), _tone(verdict) or "open")
-    same = [one for one in found.verdicts if one.before == one.after]
+    same = [verdict for verdict in comparison.verdicts if verdict.before == verdict.after]
     if same:
-        detail = "; ".join(f"{one.name}: {one.words}, {one.inside_words(count)}".rstrip(", ") for one in same)
-        yield Card("Other requirements" if len(same) < len(found.verdicts) else "Requirements", "same verdicts", detail)
-    total = len(found.metrics)
-    for label, moved, what in (("Shift", found.shifted, "mean"), ("Spread", found.spread, "spread")):
-        ranked = sorted(moved, key=lambda one: -one.effect)
-        names = ", ".join(words(one.metric, found.units[one.metric]) for one in ranked[:4])
+        detail = "; ".join(
+            f"{verdict.name}: {verdict.words}, {verdict.inside_words(count)}".rstrip(", ") for verdict in same
+        )
+        yield Card(
+            "Other requirements" if len(same) < len(comparison.verdicts) else "Requirements", "same verdicts", detail
+        )
+    total = len(comparison.metrics)
+    for label, moved, what in (("Shift", comparison.shifted, "mean"), ("Spread", comparison.spread, "spread")):
+        ranked = sorted(moved, key=lambda change: -change.effect)
+        names = ", ".join(words(change.metric, comparison.units[change.metric]) for change in ranked[:4])
         more = f" and {len(moved) - 4} more" if len(moved) > 4 else ""
         detail = (
             f"of {count(total)} metrics: {names}{more}" if moved else f"the {what} of none of {count(total)} metrics"
         )
         yield Card(label, f"{count(len(moved))} changed" if moved else "no change", detail, "bad" if moved else "good")
-    shares = found.moved_shares
-    detail = ", ".join(one.name for one in shares) or f"none of {count(len(found.shares))} fractions of cases"
+    shares = comparison.moved_shares
+    detail = ", ".join(share.name for share in shares) or f"none of {count(len(comparison.shares))} fractions of cases"
     yield Card(
         "Fractions of cases", f"{len(shares)} changed" if shares else "no change", detail, "bad" if shares else "good"
     )
 
 
-def _warnings(found: Comparison) -> tuple[str, ...]:
-    sentences = [f"Not compared: {sentence}." for sentence in found.left_out]
-    if not found.pairing.paired and any(one.worse for one in found.verdicts):
+def _comparison_warnings(comparison: Comparison) -> tuple[str, ...]:
+    sentences = [f"Not compared: {sentence}." for sentence in comparison.left_out]
+    if not comparison.pairing.paired and any(verdict.worse for verdict in comparison.verdicts):
         sentences.append("The runs flew other cases: chance alone may have changed the verdict of a requirement.")
     return tuple(sentences)
 
@@ -161,46 +171,50 @@ def _warnings(found: Comparison) -> tuple[str, ...]:
 # ---- metrics
 
 
-def _metric_blocks(found: Comparison) -> Iterator[FigureBlock | Table | str]:
-    if not found.metrics:
+def _metric_blocks(comparison: Comparison) -> Iterator[FigureBlock | Table | str]:
+    if not comparison.metrics:
         yield "The runs have no metric in common."
         return
-    moved = _ranked(found)
-    drawn = [one for one in moved if finite(one.shift_in_sigma) or finite(one.ratio)]
+    moved = _ranked(comparison)
+    drawn = [change for change in moved if finite(change.shift_in_sigma) or finite(change.ratio)]
     if drawn:
-        yield _figure(found, drawn)
+        yield _change_figure(comparison, drawn)
     if moved:
-        yield _metric_table(found, moved)
-    same = [one.metric for one in found.metrics if one.same]
+        yield _metric_table(comparison, moved)
+    same = [metric.metric for metric in comparison.metrics if metric.same]
     if same:
         yield f"The same in both runs: {', '.join(same)}."
-    absent = [one.metric for one in found.metrics if not one.same and not finite(one.shift)]
+    absent = [metric.metric for metric in comparison.metrics if not metric.same and not finite(metric.shift)]
     if absent:
         yield f"Without a number in one of the runs: {', '.join(absent)}."
 
 
-def _ranked(found: Comparison) -> list[MetricChange]:
+def _ranked(comparison: Comparison) -> list[MetricChange]:
     """The metrics that differ, the largest effect first."""
-    return sorted((one for one in found.metrics if not one.same and finite(one.shift)), key=lambda one: -one.effect)
+    return sorted(
+        (metric for metric in comparison.metrics if not metric.same and finite(metric.shift)),
+        key=lambda change: -change.effect,
+    )
 
 
-def _figure(found: Comparison, moved: list[MetricChange]) -> FigureBlock:
+def _change_figure(comparison: Comparison, moved: list[MetricChange]) -> FigureBlock:
     shown = moved[:MOST_ROWS]
-    reach = _reach([abs(one.shift_in_sigma.value) for one in shown])
-    far = [one for one in shown if abs(one.shift_in_sigma.value) > reach]
-    names = tuple(words(one.metric, found.units[one.metric]) for one in shown)
+    reach = _reach([abs(item.shift_in_sigma.value) for item in shown])
+    far = [item for item in shown if abs(item.shift_in_sigma.value) > reach]
+    names = tuple(words(item.metric, comparison.units[item.metric]) for item in shown)
     caption = "How far each metric moved and how much its spread changed from run A to run B"
     if len(shown) < len(moved):
         caption += f"; the {len(shown)} of {len(moved)} metrics with the largest changes"
     if far:
         values = (
-            f"{words(one.metric, found.units[one.metric])} {number(one.shift_in_sigma.value, 3)} σ" for one in far
+            f"{words(change.metric, comparison.units[change.metric])} {number(change.shift_in_sigma.value, 3)} σ"
+            for change in far
         )
         caption += f". Shifts beyond the axis, not drawn: {', '.join(values)}"
-    shifts = [UNKNOWN if one in far else one.shift_in_sigma for one in shown]
-    shifted, spread = (np.array([getattr(one, p) <= found.alpha for one in shown], dtype=bool)
+    shifts = [UNKNOWN if item in far else item.shift_in_sigma for item in shown]
+    shifted, spread = (np.array([getattr(item, p) <= comparison.alpha for item in shown], dtype=bool)
                        for p in ("shift_adjusted", "spread_adjusted"))  # fmt: skip
-    ratios, interval = [one.ratio for one in shown], percent(found.confidence)
+    ratios, interval = [item.ratio for item in shown], percent(comparison.confidence)
     plots = (
         change_panel("Shift [σ of run A]", names, _ends(shifts), shifted, 0.0, interval),
         change_panel("Spread, run B over run A", names, _ends(ratios), spread, 1.0, interval),
@@ -210,16 +224,18 @@ def _figure(found: Comparison, moved: list[MetricChange]) -> FigureBlock:
 
 def _reach(shifts: list[float]) -> float:
     """The largest shift that the axis holds: of those that are far beyond most others, none would be read off."""
-    known = np.sort([one for one in shifts if np.isfinite(one)])
+    known = np.sort([shift for shift in shifts if np.isfinite(shift)])
     return max(WIDEST * float(np.quantile(known, 0.5, method="lower")), FEW_SIGMA) if known.size else FEW_SIGMA
 
 
 def _ends(estimates: list[Estimate]) -> np.ndarray:
     """float64[n, 3]: values and both ends of their intervals."""
-    return np.array([(one.value, one.lower, one.upper) for one in estimates], dtype=np.float64).reshape(-1, 3)
+    return np.array(
+        [(estimate.value, estimate.lower, estimate.upper) for estimate in estimates], dtype=np.float64
+    ).reshape(-1, 3)
 
 
-def _metric_table(found: Comparison, moved: list[MetricChange]) -> Table:
+def _metric_table(comparison: Comparison, moved: list[MetricChange]) -> Table:
     columns = (
         Column("Metric", "text", 2.6),
         Column("Mean A", "number", 1.4),
@@ -230,41 +246,41 @@ def _metric_table(found: Comparison, moved: list[MetricChange]) -> Table:
         Column("Adjusted p", "number", 1.3),
     )
     note = (
-        f"The largest change first. Small: the {percent(found.confidence)} interval of the quantity that the test is "
-        "of; cases used of cases flown. σ: standard deviation of run A."
+        f"The largest change first. Small: the {percent(comparison.confidence)} interval of the quantity that the test "
+        "is of; cases used of cases flown. σ: standard deviation of run A."
     )
-    return Table("Metrics of both runs", columns, tuple(_metric_row(found, one) for one in moved), note)
+    return Table("Metrics of both runs", columns, tuple(_metric_row(comparison, change) for change in moved), note)
 
 
-def _metric_row(found: Comparison, one: MetricChange) -> tuple[Cell, ...]:
-    unit = found.units[one.metric]
-    used = " and ".join(f"{count(k)} / {count(n)}" for k, n in zip(one.n_used, one.n_tried, strict=True))
-    if one.differing is not None:
-        used = f"{count(one.differing)} of {count(one.n_used[0])} pairs differ"
-        lost = one.n_tried[0] - one.n_used[0]
+def _metric_row(comparison: Comparison, change: MetricChange) -> tuple[Cell, ...]:
+    unit = comparison.units[change.metric]
+    used = " and ".join(f"{count(k)} / {count(n)}" for k, n in zip(change.n_used, change.n_tried, strict=True))
+    if change.differing is not None:
+        used = f"{count(change.differing)} of {count(change.n_used[0])} pairs differ"
+        lost = change.n_tried[0] - change.n_used[0]
         used += f", {count(lost)} without a number" if lost else ""
     return (
-        Cell(with_unit(words(one.metric, unit), f"[{unit}]" if unit else ""), small=used),
-        *(_number(value, one.deviation[0]) for value in one.mean),
-        _estimate(one.shift_in_sigma),
-        _p(one.shift_adjusted, found.alpha),
-        _estimate(one.ratio),
-        _p(one.spread_adjusted, found.alpha),
+        Cell(with_unit(words(change.metric, unit), f"[{unit}]" if unit else ""), small=used),
+        *(_number_cell(value, change.deviation[0]) for value in change.mean),
+        _estimate_cell(change.shift_in_sigma),
+        _p_value_cell(change.shift_adjusted, comparison.alpha),
+        _estimate_cell(change.ratio),
+        _p_value_cell(change.spread_adjusted, comparison.alpha),
     )
 
 
-def _number(value: float, scale: float) -> Cell:
+def _number_cell(value: float, scale: float) -> Cell:
     return Cell(number(value, scale=scale), value) if np.isfinite(value) else Cell("–")
 
 
-def _estimate(one: Estimate) -> Cell:
-    if not finite(one):
+def _estimate_cell(estimate: Estimate) -> Cell:
+    if not finite(estimate):
         return Cell("–")
-    ends = f"[{number(one.lower, 3)}, {number(one.upper, 3)}]"
-    return Cell(number(one.value, 3), one.value, ends)
+    ends = f"[{number(estimate.lower, 3)}, {number(estimate.upper, 3)}]"
+    return Cell(number(estimate.value, 3), estimate.value, ends)
 
 
-def _p(value: float, alpha: float) -> Cell:
+def _p_value_cell(value: float, alpha: float) -> Cell:
     if not np.isfinite(value):
         return Cell("no test")
     text = number(value, 2) if value >= LEAST_P else f"< {number(LEAST_P, 2)}"
@@ -274,7 +290,7 @@ def _p(value: float, alpha: float) -> Cell:
 # ---- shares and requirements
 
 
-def _share_table(found: Comparison) -> Table:
+def _share_table(comparison: Comparison) -> Table:
     columns = (
         Column("Cases", "text", 2.0),
         Column("Run A", "number", 1.5),
@@ -286,41 +302,46 @@ def _share_table(found: Comparison) -> Table:
     return Table(
         "Fractions of the cases in both runs",
         columns,
-        tuple(_share_row(one, found.alpha) for one in found.shares),
+        tuple(_share_row(share, comparison.alpha) for share in comparison.shares),
         note,
     )
 
 
-def _share_row(one: ShareChange, alpha: float) -> tuple[Cell, ...]:
+def _share_row(change: ShareChange, alpha: float) -> tuple[Cell, ...]:
     runs = [
         Cell(percent(k / n) if n else "–", k / n if n else None, f"{count(k)} / {count(n)}")
-        for k, n in zip(one.counted, one.tried, strict=True)
+        for k, n in zip(change.counted, change.tried, strict=True)
     ]
-    pairs = f"{count(one.lost)} lost, {count(one.gained or 0)} gained" if one.lost is not None else ""
-    return Cell(one.name, small=pairs), *runs, _estimate(one.difference), _p(one.adjusted, alpha)
+    pairs = f"{count(change.lost)} lost, {count(change.gained or 0)} gained" if change.lost is not None else ""
+    return (
+        Cell(change.name, small=pairs),
+        *runs,
+        _estimate_cell(change.difference),
+        _p_value_cell(change.adjusted, alpha),
+    )
 
 
-def _verdict_table(found: Comparison) -> Table | None:
-    if not found.verdicts:
+def _verdict_table(comparison: Comparison) -> Table | None:
+    if not comparison.verdicts:
         return None
     columns = (Column("Requirement", "text", 2.0), Column("Run A", "text", 1.6), Column("Run B", "text", 1.6),
                Column("Change", "text", 3.4))  # fmt: skip
     rows = tuple(
         (
-            Cell(one.name),
-            Cell(one.before or "not required"),
-            Cell(one.after or "not required", tone=_tone(one)),
-            Cell(one.words, small=one.inside_words(count)),
+            Cell(verdict.name),
+            Cell(verdict.before or "not required"),
+            Cell(verdict.after or "not required", tone=_tone(verdict)),
+            Cell(verdict.words, small=verdict.inside_words(count)),
         )
-        for one in found.verdicts
+        for verdict in comparison.verdicts
     )
     return Table("Verdicts, each by its own run’s requirement", columns, rows)
 
 
-def _tone(one: VerdictChange) -> str:
-    if one.worse:
+def _tone(change: VerdictChange) -> str:
+    if change.worse:
         return "bad"
-    return "good" if one.after == "pass" else ""
+    return "good" if change.after == "pass" else ""
 
 
 # ---- code and campaign
@@ -330,14 +351,17 @@ def _difference_block(what: str, differences: tuple[Difference, ...]) -> Table |
     if not differences:
         return f"{what}: the same in both runs."
     columns = (Column("What", "text", 1.6), Column("Run A", "code", 2.4), Column("Run B", "code", 2.4))
-    rows = tuple((Cell(one.what), Cell(one.before or "–"), Cell(one.after or "–")) for one in differences)
+    rows = tuple(
+        (Cell(difference.what), Cell(difference.before or "–"), Cell(difference.after or "–"))
+        for difference in differences
+    )
     return Table(f"{what}: what is not the same", columns, rows)
 
 
-def _campaign_blocks(found: Comparison) -> Iterator[Table | str]:
-    yield _difference_block("Campaign", found.campaign)
-    if found.diff:
-        rows = tuple((Cell(line[:1]), Cell(line[1:])) for line in found.diff if not line.startswith("@@"))
+def _campaign_blocks(comparison: Comparison) -> Iterator[Table | str]:
+    yield _difference_block("Campaign", comparison.campaign)
+    if comparison.diff:
+        rows = tuple((Cell(line[:1]), Cell(line[1:])) for line in comparison.diff if not line.startswith("@@"))
         columns = (Column("", "code", 0.3), Column("Line of campaign.toml", "code", 6.0))
         note = "−: a line of run A alone; +: a line of run B alone; others are in both."
         yield Table("The two campaign files", columns, rows, note)

@@ -32,13 +32,13 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
         caption = "Distributions of the metrics that changed, the largest change first."
         yield FigureBlock(caption, Drawing(FORM, panels, 3), "small")
     drawn = dict(_histories(runs))
-    panels = tuple(one for one in drawn.values() if one is not None)[:MOST_PANELS]
+    panels = tuple(item for item in drawn.values() if item is not None)[:MOST_PANELS]
     if panels:
         caption = "Time histories of both runs: of the saved cases, or the nominal case where fewer than 20 are saved."
         yield FigureBlock(caption, Drawing(FORM, panels, 3), "half")
     if noise := [name for name, one in drawn.items() if one is None]:
         yield f"Not drawn, rounding errors only in both nominal cases: {', '.join(noise)}."
-    for figure in (one for one in runs[1].figures if isinstance(one, FootprintFigure)):
+    for figure in (drawn for drawn in runs[1].figures if isinstance(drawn, FootprintFigure)):
         footprint = _footprint(runs, figure)
         if footprint is not None:
             caption = f"{figure.title}, both runs. {_thinned_words(runs)}"
@@ -47,23 +47,25 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
 
 def _distribution(runs: tuple[Flown, Flown], name: str) -> Plot | None:
     """Outlines of two histograms over common bins."""
-    values = [one[np.isfinite(one)] for one in (run.values(name) for run in runs)]
-    if min(one.size for one in values) == 0:
+    values = [numbers[np.isfinite(numbers)] for numbers in (run.values(name) for run in runs)]
+    if min(value.size for value in values) == 0:
         return None
-    low, high = (pick([np.quantile(one, tail) for one in values]) for pick, tail in zip((min, max), TAILS, strict=True))
+    low, high = (
+        pick([np.quantile(value, tail) for value in values]) for pick, tail in zip((min, max), TAILS, strict=True)
+    )
     if not low < high:
         return None
     edges = np.linspace(low, high, BINS + 1)
     marks = []
-    for run, one in enumerate(values):
-        height = np.histogram(one, edges)[0] / one.size
+    for run, value in enumerate(values):
+        height = np.histogram(value, edges)[0] / value.size
         marks.append(_line(run, np.repeat(edges, 2), np.r_[0.0, np.repeat(height, 2), 0.0], BINNED))
     return Plot(tuple(marks), Axis(runs[1].axis(name)), Axis("fraction of the cases"), height=HEIGHT)
 
 
 def _histories(runs: tuple[Flown, Flown]) -> Iterator[tuple[str, Plot | None]]:
     """By quantity its panel, None where both curves are nothing beside those of the saved cases."""
-    wanted = [name for one in runs[1].figures if isinstance(one, HistoryFigure) for name in one.quantities]
+    wanted = [name for figure in runs[1].figures if isinstance(figure, HistoryFigure) for name in figure.quantities]
     for name in dict.fromkeys(wanted):
         if all(len(run.histories) and name in run.histories.columns for run in runs):
             marks = [mark for run, flown in enumerate(runs) for mark in _history_marks(run, flown, name)]

@@ -84,18 +84,18 @@ def build_rare_event(record: RareEventRecord, name: str) -> Document:
         Document(
             kind="Rare-event report",
             title=str(campaign.get("title") or name),
-            subtitle=_sentence(result),
+            subtitle=_estimate_sentence(result),
             created=str(record.record.get("created_utc", "")),
-            facts=_facts(record),
-            verdicts=(_verdict(result),),
-            costs=tuple(_costs(result)),
+            facts=_estimate_facts(record),
+            verdicts=(_verdict_card(result),),
+            costs=tuple(_cost_cards(result)),
             warnings=tuple(result["remarks"]),
             sections=sections,
         )
     )
 
 
-def _sentence(result: dict[str, Any]) -> str:
+def _estimate_sentence(result: dict[str, Any]) -> str:
     event = f"P({_event(result)})"
     if not result["probability"]:
         return f"No case failed: {event} < {number(result['upper'], 3)}. Requirement {_judged(result)[0]}."
@@ -104,10 +104,10 @@ def _sentence(result: dict[str, Any]) -> str:
 
 def _event(result: dict[str, Any]) -> str:
     """What the probability is of: the metric beyond a limit."""
-    one, unit = result["requirement"], result["metric"]["unit"]
-    name = words(one["metric"], unit)
-    found = [("<", one["at_least"]), (">", one["at_most"])]
-    return " or ".join(f"{name} {sign} {with_unit(exact(limit), unit)}" for sign, limit in found if limit is not None)
+    requirement, unit = result["requirement"], result["metric"]["unit"]
+    name = words(requirement["metric"], unit)
+    limits = [("<", requirement["at_least"]), (">", requirement["at_most"])]
+    return " or ".join(f"{name} {sign} {with_unit(exact(limit), unit)}" for sign, limit in limits if limit is not None)
 
 
 def _interval(result: dict[str, Any]) -> str:
@@ -123,7 +123,7 @@ def _judged(result: dict[str, Any]) -> tuple[str, str]:
     return ("not met", "bad") if result["lower"] > allowed else ("open", "open")
 
 
-def _facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
+def _estimate_facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
     result, campaign = record.result, record.record["campaign"]
     return (
         ("Campaign", str(campaign["name"])),
@@ -135,7 +135,7 @@ def _facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _verdict(result: dict[str, Any]) -> Card:
+def _verdict_card(result: dict[str, Any]) -> Card:
     allowed = 1.0 - result["requirement"]["share"]
     source = f" Source: {result['requirement']['source']}." if result["requirement"]["source"] else ""
     answer, tone = _judged(result)
@@ -148,7 +148,7 @@ def _verdict(result: dict[str, Any]) -> Card:
     )
 
 
-def _costs(result: dict[str, Any]) -> Iterator[Card]:
+def _cost_cards(result: dict[str, Any]) -> Iterator[Card]:
     error = result["relative_error"]
     yield Card(
         label="standard error",
@@ -181,17 +181,17 @@ def _failures(record: RareEventRecord) -> Iterator[FigureBlock | Table | str | N
 
 def _main_inputs(result: dict[str, Any]) -> list[dict[str, Any]]:
     """The inputs, the one whose failed cases lie farthest from its median first."""
-    return sorted(result["inputs"], key=lambda one: -abs(one["likeliest_sigma"]))
+    return sorted(result["inputs"], key=lambda entry: -abs(entry["likeliest_sigma"]))
 
 
 def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
     """The failed cases over their two main inputs, with the cases drawn from the dispersions beneath."""
-    cases, shown = record.cases, [one for one in _main_inputs(record.result) if one["name"] in record.cases][:2]
+    cases, shown = record.cases, [entry for entry in _main_inputs(record.result) if entry["name"] in record.cases][:2]
     if len(shown) < 2 or not record.result["failed"] or "failed" not in cases:
         return None
     failed = cases["failed"].to_numpy(dtype=bool)
     drawn = ~failed & (cases["level"].to_numpy() == 0)
-    x, y = (cases[one["name"]].to_numpy(dtype=np.float64) for one in shown)
+    x, y = (cases[item["name"]].to_numpy(dtype=np.float64) for item in shown)
     marks: list[Mark] = []
     for rows, colour, sign, what in (
         (np.flatnonzero(drawn), SKY, "circle", "cases drawn from the dispersions, not failed"),
@@ -205,7 +205,9 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
         if shown[0].get(what) is not None:
             name = "likeliest failed case" if what == "likeliest" else "the likeliest across"
             marks.append(nominal_ring((shown[0][what], shown[1][what]), colour, name, PAPER))
-    axes = (Axis(axis_label(named(words(one["name"], one["unit"]), one["description"]), one["unit"])) for one in shown)
+    axes = (
+        Axis(axis_label(named(words(item["name"], item["unit"]), item["description"]), item["unit"])) for item in shown
+    )
     x_axis, y_axis = axes
     caption = (
         "Failed cases over the two inputs in which they lie farthest from the median. They are denser than the "
@@ -225,29 +227,31 @@ def _input_table(result: dict[str, Any]) -> Table:
     ]
     columns += [Column("Across", "number", 1.5)] if across else []
     rows = []
-    for one in _main_inputs(result):
-        label = Cell(axis_label(one["name"], one["unit"]), small=one["description"])
-        cells = [Cell(number(one[key], 3), one[key]) for key in ("mean_sigma", "spread_sigma")]
+    for entry in _main_inputs(result):
+        label = Cell(axis_label(entry["name"], entry["unit"]), small=entry["description"])
+        cells = [Cell(number(entry[key], 3), entry[key]) for key in ("mean_sigma", "spread_sigma")]
         for what in ("likeliest", "across")[: 1 + across]:
-            sigma = one[f"{what}_sigma"]
-            cells.append(Cell(number(one[what], 5), one[what], small=f"{number(sigma, 3)}{SPACE}σ"))
+            sigma = entry[f"{what}_sigma"]
+            cells.append(Cell(number(entry[what], 5), entry[what], small=f"{number(sigma, 3)}{SPACE}σ"))
         rows.append((label, *cells))
     note = "Weighted mean and spread of the failed cases; the input farthest from its median first."
     return Table("Failed cases by input", tuple(columns), tuple(rows), note)
 
 
 def _levels(result: dict[str, Any]) -> tuple[Block, ...]:
-    shown = [one for one in result["levels"] if one["margin"] is not None]
-    found: list[Block] = [_level_table(result)]
+    shown = [level for level in result["levels"] if level["margin"] is not None]
+    limits: list[Block] = [_level_table(result)]
     if shown and result["probability"] and result["method"] != "plain":
-        found.append(FigureBlock("Probability over the margin to the limit, level by level.", _tail(result, shown)))
+        limits.append(
+            FigureBlock("Probability over the margin to the limit, level by level.", _probability_figure(result, shown))
+        )
     chains = result["method"] == "subset"
-    return (Text((_level_words(chains),)), *found) if result["method"] != "plain" else tuple(found)
+    return (Text((_level_words(chains),)), *limits) if result["method"] != "plain" else tuple(limits)
 
 
-def _tail(result: dict[str, Any], shown: list[dict[str, Any]]) -> Drawing:
+def _probability_figure(result: dict[str, Any], shown: list[dict[str, Any]]) -> Drawing:
     """The probability of each level over its margin, down to the limit."""
-    margin, probability = (np.array([one[key] for one in shown]) for key in ("margin", "probability"))
+    margin, probability = (np.array([item[key] for item in shown]) for key in ("margin", "probability"))
     p, lower, upper = (np.array([result[key]]) for key in ("probability", "lower", "upper"))
     marks = (
         Limit(0.0, "x", INK, "limit", width=1.0),
@@ -290,13 +294,13 @@ def _level_table(result: dict[str, Any]) -> Table:
     rows = [
         (
             Cell(str(k), k),
-            Cell("all" if one["margin"] is None else number(one["margin"], 4), one["margin"]),
-            Cell(number(one["probability"], 4), one["probability"]),
-            Cell(str(one["runs"]), one["runs"]),
-            Cell(count(one["cases"]), one["cases"]),
-            Cell(percent(one["accepted"], 0), one["accepted"]),
+            Cell("all" if level["margin"] is None else number(level["margin"], 4), level["margin"]),
+            Cell(number(level["probability"], 4), level["probability"]),
+            Cell(str(level["runs"]), level["runs"]),
+            Cell(count(level["cases"]), level["cases"]),
+            Cell(percent(level["accepted"], 0), level["accepted"]),
         )
-        for k, one in enumerate(result["levels"])
+        for k, level in enumerate(result["levels"])
     ]
     return Table("Levels", columns, tuple(rows))
 

@@ -25,30 +25,30 @@ class Tuned:
 
     @cached_property
     def objectives(self) -> list[str]:
-        return [one["name"] for one in self.plan["objectives"]]
+        return [objective["name"] for objective in self.plan["objectives"]]
 
     @cached_property
     def constraints(self) -> list[str]:
-        return [one["name"] for one in self.plan["constraints"]]
+        return [constraint["name"] for constraint in self.plan["constraints"]]
 
     @cached_property
     def parameters(self) -> list[str]:
-        return [one["name"] for one in self.plan["parameters"]]
+        return [parameter["name"] for parameter in self.plan["parameters"]]
 
     @cached_property
     def signs(self) -> np.ndarray:
         """1 for an objective that is to be small, -1 for one to be large."""
-        return np.array([1.0 if one["goal"] == "minimise" else -1.0 for one in self.plan["objectives"]])
+        return np.array([1.0 if objective["goal"] == "minimise" else -1.0 for objective in self.plan["objectives"]])
 
     @cached_property
     def best(self) -> pd.DataFrame:
         """The front; without a feasible candidate, what would be the front if there were no constraints."""
         if self.record.feasible:
             return self.front
-        found = self.evaluations[np.isfinite(self.evaluations[self.objectives]).all(axis=1)]
-        values = self.signs * found[self.objectives].to_numpy()
+        complete = self.evaluations[np.isfinite(self.evaluations[self.objectives]).all(axis=1)]
+        values = self.signs * complete[self.objectives].to_numpy()
         beaten = [((values <= row).all(axis=1) & (values < row).any(axis=1)).any() for row in values]
-        return found[~np.array(beaten, dtype=bool)].sort_values(self.objectives[0], kind="stable")
+        return complete[~np.array(beaten, dtype=bool)].sort_values(self.objectives[0], kind="stable")
 
     def label(self, name: str) -> str:
         return axis_label(words(name, self.units[name]), self.units[name])
@@ -57,18 +57,20 @@ class Tuned:
         return with_unit(number(value, digits), self.units[name])
 
 
-def inside(values: np.ndarray, one: Mapping[str, Any]) -> np.ndarray:
-    low, high = one["at_least"], one["at_most"]
+def inside(values: np.ndarray, constraint: Mapping[str, Any]) -> np.ndarray:
+    low, high = constraint["at_least"], constraint["at_most"]
     return (values >= (-np.inf if low is None else low)) & (values <= (np.inf if high is None else high))
 
 
-def limit_words(tuned: Tuned, one: Mapping[str, Any]) -> str:
-    limits = [("at most", one.get("at_most")), ("at least", one.get("at_least"))]
+def limit_words(tuned: Tuned, constraint: Mapping[str, Any]) -> str:
+    limits = [("at most", constraint.get("at_most")), ("at least", constraint.get("at_least"))]
     texts = [
-        f"{word} {with_unit(exact(limit), tuned.units[one['name']])}" for word, limit in limits if limit is not None
+        f"{word} {with_unit(exact(limit), tuned.units[constraint['name']])}"
+        for word, limit in limits
+        if limit is not None
     ]
-    return f"{one['metric']} {' and '.join(texts)}{quantile_words(one)}"
+    return f"{constraint['metric']} {' and '.join(texts)}{quantile_words(constraint)}"
 
 
-def quantile_words(one: Mapping[str, Any]) -> str:
-    return "" if one["quantile"] is None else f" ({percent(one['quantile'])} quantile)"
+def quantile_words(measure: Mapping[str, Any]) -> str:
+    return "" if measure["quantile"] is None else f" ({percent(measure['quantile'])} quantile)"

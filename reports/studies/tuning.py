@@ -53,9 +53,9 @@ def build_tuning(record: TuningRecord, name: str) -> Document:
     tuned = Tuned(record, name)
     campaign = tuned.manifest["campaign"]
     sections = (
-        Section("front", "The front", as_blocks(_front(tuned))),
+        Section("front", "The front", as_blocks(_front_blocks(tuned))),
         Section("published", "Validation against published results", as_blocks([published_table(tuned)])),
-        Section("convergence", "Convergence of the search", _convergence(tuned)),
+        Section("convergence", "Convergence of the search", _progress_blocks(tuned)),
         Section("question", "Problem", (parameter_table(tuned), measure_table(tuned))),
         Section("inputs", "Other inputs", as_blocks(input_tables(tuned))),
         Section("provenance", "Provenance", (provenance_table(tuned),)),
@@ -65,12 +65,12 @@ def build_tuning(record: TuningRecord, name: str) -> Document:
         Document(
             kind="Tuning report",
             title=str(campaign.get("title") or name),
-            subtitle=_sentence(tuned),
+            subtitle=_front_sentence(tuned),
             created=str(tuned.manifest.get("created_utc", "")),
-            facts=_facts(tuned),
+            facts=_search_facts(tuned),
             verdicts=tuple(_constraint_cards(tuned)),
             costs=tuple(_objective_cards(tuned)),
-            warnings=tuple(_warnings(tuned)),
+            warnings=tuple(_search_warnings(tuned)),
             sections=tuple(section for section in sections if section.blocks),
         )
     )
@@ -79,7 +79,7 @@ def build_tuning(record: TuningRecord, name: str) -> Document:
 # ---- the headline
 
 
-def _sentence(tuned: Tuned) -> str:
+def _front_sentence(tuned: Tuned) -> str:
     if tuned.record.feasible:
         n = len(tuned.front)
         return f"{count(n)} candidate{'s are' if n > 1 else ' is'} inside all limits and not beaten by any other."
@@ -88,7 +88,7 @@ def _sentence(tuned: Tuned) -> str:
     return f"{sentence[:1].upper()}{sentence[1:]}."
 
 
-def _facts(tuned: Tuned) -> tuple[tuple[str, str], ...]:
+def _search_facts(tuned: Tuned) -> tuple[tuple[str, str], ...]:
     plan, campaign = tuned.plan, tuned.manifest["campaign"]
     cases = int(plan["cases"])
     return (
@@ -102,37 +102,37 @@ def _facts(tuned: Tuned) -> tuple[tuple[str, str], ...]:
 
 
 def _constraint_cards(tuned: Tuned) -> Iterator[Card]:
-    for one in tuned.plan["constraints"]:
-        values = tuned.evaluations[one["name"]].to_numpy()
-        met = int(np.count_nonzero(inside(values, one)))
+    for constraint in tuned.plan["constraints"]:
+        values = tuned.evaluations[constraint["name"]].to_numpy()
+        met = int(np.count_nonzero(inside(values, constraint)))
         numbers = values[np.isfinite(values)]
-        side = "largest" if one["at_most"] is None else "smallest"
+        side = "largest" if constraint["at_most"] is None else "smallest"
         near = (numbers.max() if side == "largest" else numbers.min()) if numbers.size else np.nan
         yield Card(
-            label=one["name"],
+            label=constraint["name"],
             answer="within reach" if met else "out of reach",
-            detail=f"{limit_words(tuned, one)}: {count(met)} of {count(len(values))} candidates; "
-            f"the {side} found is {tuned.with_unit(one['name'], float(near))}.",
+            detail=f"{limit_words(tuned, constraint)}: {count(met)} of {count(len(values))} candidates; "
+            f"the {side} found is {tuned.with_unit(constraint['name'], float(near))}.",
             tone="good" if met else "bad",
         )
 
 
 def _objective_cards(tuned: Tuned) -> Iterator[Card]:
-    for one in tuned.plan["objectives"]:
-        values = tuned.best[one["name"]].to_numpy()
+    for objective in tuned.plan["objectives"]:
+        values = tuned.best[objective["name"]].to_numpy()
         if not values.size:
-            yield Card(one["name"], "no number", "no candidate has one", "open")
+            yield Card(objective["name"], "no number", "no candidate has one", "open")
             continue
-        ends = [tuned.with_unit(one["name"], float(end)) for end in (values.min(), values.max())]
-        best, other = ends if one["goal"] == "minimise" else ends[::-1]
+        ends = [tuned.with_unit(objective["name"], float(end)) for end in (values.min(), values.max())]
+        best, other = ends if objective["goal"] == "minimise" else ends[::-1]
         yield Card(
-            label=f"{one['name']}, to be {'small' if one['goal'] == 'minimise' else 'large'}",
+            label=f"{objective['name']}, to be {'small' if objective['goal'] == 'minimise' else 'large'}",
             answer=best if tuned.record.feasible else f"{best} without constraints",
-            detail=f"{one['metric']}{quantile_words(one)}; up to {other} at the other end of the front.",
+            detail=f"{objective['metric']}{quantile_words(objective)}; up to {other} at the other end of the front.",
         )
 
 
-def _warnings(tuned: Tuned) -> Iterator[str]:
+def _search_warnings(tuned: Tuned) -> Iterator[str]:
     if not tuned.record.feasible:
         yield "There is no front: no candidate is inside all limits. What is drawn and listed leaves them out."
     failed = int((tuned.evaluations["failed_cases"] > 0).sum())
@@ -150,7 +150,7 @@ def _warnings(tuned: Tuned) -> Iterator[str]:
 # ---- the front
 
 
-def _front(tuned: Tuned) -> Iterator[FigureBlock | Table | str | None]:
+def _front_blocks(tuned: Tuned) -> Iterator[FigureBlock | Table | str | None]:
     if not len(tuned.best):
         yield "No candidate has a number for every metric; nothing can be drawn."
         return
@@ -175,7 +175,7 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
         Candidates(shown[0], feasible),
         Candidates(shown[1], len(every) - feasible),
         tuned.best[names].to_numpy(),
-        [(one["name"], [one["values"][name] for name in names]) for one in tuned.plan["published"]],
+        [(point["name"], [point["values"][name] for name in names]) for point in tuned.plan["published"]],
         relaxed=not tuned.record.feasible,
         first_small=tuned.plan["objectives"][0]["goal"] == "minimise",
     )
@@ -191,7 +191,7 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
 # ---- the search and the question
 
 
-def _convergence(tuned: Tuned) -> tuple[Block, ...]:
+def _progress_blocks(tuned: Tuned) -> tuple[Block, ...]:
     frame, plan = tuned.record.generations, tuned.plan
     shares = frame["dominated_share"].to_numpy()
     curves = {}

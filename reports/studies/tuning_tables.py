@@ -45,7 +45,7 @@ def _candidate_table(tuned: Tuned, rows: pd.DataFrame, caption: str, note: str) 
         Column("Candidate", "number", 1.1),
         *(Column(tuned.label(name), "number", 1.6 if name in tuned.constraints else 1.2) for name in names),
     )
-    limits = {one["name"]: one for one in tuned.plan["constraints"]}
+    limits = {constraint["name"]: constraint for constraint in tuned.plan["constraints"]}
     body = []
     for _, row in rows.iterrows():
         cells = [Cell(count(int(row["candidate"])), int(row["candidate"]))]
@@ -59,17 +59,16 @@ def _candidate_table(tuned: Tuned, rows: pd.DataFrame, caption: str, note: str) 
 
 def held_by_bounds(tuned: Tuned) -> list[str]:
     held = []
-    for one in tuned.plan["parameters"]:
-        spare = SPARE * (one["upper"] - one["lower"])
-        values = tuned.best[one["name"]]
-        if (values <= one["lower"] + spare).all():
-            held.append(
-                f"{one['name']} at its lower one, {with_unit(number(one['lower'], 4), tuned.units[one['name']])}"
-            )
-        if (values >= one["upper"] - spare).all():
-            held.append(
-                f"{one['name']} at its upper one, {with_unit(number(one['upper'], 4), tuned.units[one['name']])}"
-            )
+    for parameter in tuned.plan["parameters"]:
+        spare = SPARE * (parameter["upper"] - parameter["lower"])
+        name, values = parameter["name"], tuned.best[parameter["name"]]
+        for side, near in (
+            ("lower", values <= parameter["lower"] + spare),
+            ("upper", values >= parameter["upper"] - spare),
+        ):
+            if near.all():
+                bound = with_unit(number(parameter[side], 4), tuned.units[name])
+                held.append(f"{name} at its {side} one, {bound}")
     return held
 
 
@@ -86,8 +85,8 @@ def published_table(tuned: Tuned) -> Table | None:
     )
     best = tuned.best[tuned.objectives].to_numpy()
     rows = []
-    for one in tuned.plan["published"]:
-        point = np.array([one["values"][name] for name in tuned.objectives])
+    for record in tuned.plan["published"]:
+        point = np.array([record["values"][name] for name in tuned.objectives])
         # the candidate whose worst shortfall against the point, in shares of it, is smallest
         shortfall = (tuned.signs * (best - point) / np.where(point == 0.0, 1.0, np.abs(point))).max(axis=1)
         ours = best[int(shortfall.argmin())]
@@ -96,7 +95,7 @@ def published_table(tuned: Tuned) -> Table | None:
         limits = "" if tuned.record.feasible else "outside a constraint"
         cells = [Cell(number(value, 5), float(value)) for value in (*point, *ours)]
         verdict = Cell(words_, small=limits, tone="good" if good and not limits else "open")
-        rows.append((Cell(one["name"]), *cells, verdict, Cell(one["source"])))
+        rows.append((Cell(record["name"]), *cells, verdict, Cell(record["source"])))
     note = "Computed: the candidate of the front that falls least short of the point in its worst objective."
     return Table("Published points compared with the front", columns, tuple(rows), note)
 
@@ -111,14 +110,14 @@ def parameter_table(tuned: Tuned) -> Table:
         Column("Source of the range", "text", 2.4),
     )
     rows = []
-    for one in tuned.plan["parameters"]:
-        name = one["name"]
+    for parameter in tuned.plan["parameters"]:
+        name = parameter["name"]
         values = tuned.best[name]
         on_front = f"{number(float(values.min()), 4)} to {number(float(values.max()), 4)}" if len(values) else "–"
-        cells = [Cell(exact(one[key]), float(one[key])) for key in ("lower", "upper")]
+        cells = [Cell(exact(parameter[key]), float(parameter[key])) for key in ("lower", "upper")]
         label = Cell(axis_label(name, tuned.units[name]), small=tuned.descriptions[name])
-        nominal = Cell(exact(one["nominal"]), float(one["nominal"]))
-        rows.append((label, *cells, Cell(on_front), nominal, Cell(one["source"] or "not stated")))
+        nominal = Cell(exact(parameter["nominal"]), float(parameter["nominal"]))
+        rows.append((label, *cells, Cell(on_front), nominal, Cell(parameter["source"] or "not stated")))
     return Table("Tuned parameters", columns, tuple(rows))
 
 
@@ -131,32 +130,32 @@ def measure_table(tuned: Tuned) -> Table:
         Column("Source", "text", 1.8),
     )
     rows = [
-        (Cell(one["name"]), Cell("objective"), _metric_cell(tuned, one), Cell(one["goal"]), Cell(""))
-        for one in tuned.plan["objectives"]
+        (Cell(objective["name"]), Cell("objective"), _metric_cell(tuned, objective), Cell(objective["goal"]), Cell(""))
+        for objective in tuned.plan["objectives"]
     ]
     rows += [
         (
-            Cell(one["name"]),
+            Cell(constraint["name"]),
             Cell("constraint"),
-            _metric_cell(tuned, one),
-            Cell(limit_words(tuned, one).removeprefix(f"{one['metric']} ")),
-            Cell(one["source"]),
+            _metric_cell(tuned, constraint),
+            Cell(limit_words(tuned, constraint).removeprefix(f"{constraint['metric']} ")),
+            Cell(constraint["source"]),
         )
-        for one in tuned.plan["constraints"]
+        for constraint in tuned.plan["constraints"]
     ]
     return Table("Objectives and constraints", columns, tuple(rows))
 
 
-def _metric_cell(tuned: Tuned, one: Mapping[str, Any]) -> Cell:
-    return Cell(axis_label(one["metric"], tuned.units[one["name"]]), small=tuned.descriptions[one["name"]])
+def _metric_cell(tuned: Tuned, measure: Mapping[str, Any]) -> Cell:
+    return Cell(axis_label(measure["metric"], tuned.units[measure["name"]]), small=tuned.descriptions[measure["name"]])
 
 
 def input_tables(tuned: Tuned) -> Iterator[Table | str | None]:
     records = tuned.manifest.get("inputs", [])
     if records and int(tuned.plan["cases"]) > 1:
         yield dispersed_table(records, "Dispersed inputs of the cases that every candidate flies")
-    fixed = [one for key in ("settings", "parameters") for one in tuned.manifest.get(key, [])]
-    fixed = [one for one in fixed if one["name"] not in tuned.parameters]
+    fixed = [record for key in ("settings", "parameters") for record in tuned.manifest.get(key, [])]
+    fixed = [record for record in fixed if record["name"] not in tuned.parameters]
     yield value_table(fixed, "Settings and parameters common to all candidates")
 
 

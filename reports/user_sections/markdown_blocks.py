@@ -63,15 +63,15 @@ class _Reader:
         elif token.type in ("fence", "code_block"):
             yield Text((token.content.rstrip("\n"),), "code")
         elif token.type == "table_open":
-            yield _table(inside, self._caption)
+            yield _pipe_table(inside, self._caption)
             self._caption = ""
         elif texts:  # a quotation
             yield Text(tuple(texts))
 
     def _paragraph(self, text: str) -> Iterator[Block]:
-        found = self.placed(text)
-        if found is not None:
-            yield from found
+        blocks = self.placed(text)
+        if blocks is not None:
+            yield from blocks
         elif text.startswith(CAPTION):
             self._caption = text.removeprefix(CAPTION).strip()
         elif text:
@@ -106,7 +106,7 @@ def _flat(token: Token) -> str:
     return "".join(parts).strip()
 
 
-def _table(tokens: Sequence[Token], caption: str) -> Table:
+def _pipe_table(tokens: Sequence[Token], caption: str) -> Table:
     """A pipe table; a column that is aligned right holds numbers."""
     columns: list[Column] = []
     rows: list[list[Cell]] = []

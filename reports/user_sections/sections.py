@@ -76,8 +76,12 @@ class MetricFacts:
         """The quantile and its limits, each holding with the report's confidence."""
         if not 0.0 < probability < 1.0:
             raise ValueError(f"quantile({probability}): a probability lies between 0 and 1")
-        found = self._summary(probability).at(probability)
-        return QuantileFacts(found.value, found.lower, found.upper) if found else QuantileFacts(None, None, None)
+        estimate = self._summary(probability).at(probability)
+        return (
+            QuantileFacts(estimate.value, estimate.lower, estimate.upper)
+            if estimate
+            else QuantileFacts(None, None, None)
+        )
 
 
 @dataclass(frozen=True)
@@ -151,8 +155,8 @@ def with_own_sections(document: Document, template: Path, run: RunFacts, runs: S
     chosen = [named[word][name] for word, name in filled["placed"]]
 
     def placed(text: str) -> list[Block] | None:
-        found = _PLACE.findall(text)
-        return [chosen[int(index)] for index in found] if found else None
+        indices = _PLACE.findall(text)
+        return [chosen[int(index)] for index in indices] if indices else None
 
     try:
         own = sections_of(filled["text"], placed, ANCHOR)
@@ -166,7 +170,7 @@ def _filled_in(
 ) -> dict[str, Any]:
     """The text that the template comes to, from a process that has bounds; see `template_process`."""
     facts = [run, *runs]
-    request = {"source": source, "run": 0, "runs": [_plain(one) for one in facts], "known": known}
+    request = {"source": source, "run": 0, "runs": [_plain(facts_of_run) for facts_of_run in facts], "known": known}
     # Nothing is imported from the folder of the process, or of the program: -P, and the paths of this one.
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     command = [sys.executable, "-P", "-W", "ignore", template_process.__file__]
@@ -185,8 +189,8 @@ def _filled_in(
                 answer = json.loads(process.stdout.readline())
                 if "quantile" in answer:
                     index, metric, probability = answer["quantile"]
-                    found = facts[index].metrics[metric].quantile(probability)
-                    words = json.dumps([found.value, found.lower, found.upper])
+                    quantile = facts[index].metrics[metric].quantile(probability)
+                    words = json.dumps([quantile.value, quantile.lower, quantile.upper])
         except (OSError, ValueError):  # its end came before that of the template
             answer = {"fault": f"takes more than {LONGEST_S:.0f} s, or than its memory", "line": None}
         finally:
@@ -200,10 +204,14 @@ def _filled_in(
 
 def _plain(run: RunFacts) -> dict[str, Any]:
     """The facts as plain data; of a metric all but its other quantiles."""
-    facts = {one.name: getattr(run, one.name) for one in fields(run)}
-    metrics = {name: {key: value for key, value in vars(one).items() if key != "_summary"}
-               for name, one in run.metrics.items()}  # fmt: skip
-    return {**facts, "metrics": metrics, "requirements": {name: asdict(one) for name, one in run.requirements.items()}}
+    facts = {member.name: getattr(run, member.name) for member in fields(run)}
+    metrics = {name: {key: value for key, value in vars(metric).items() if key != "_summary"}
+               for name, metric in run.metrics.items()}  # fmt: skip
+    return {
+        **facts,
+        "metrics": metrics,
+        "requirements": {name: asdict(verdict) for name, verdict in run.requirements.items()},
+    }
 
 
 def _named(document: Document, kind: type) -> dict[str, Block]:

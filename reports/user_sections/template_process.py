@@ -37,10 +37,10 @@ class _Runs:
         self.placed: list[tuple[str, str]] = []
 
     def _run(self, index: int, facts: dict[str, Any]) -> SimpleNamespace:
-        metrics = {name: SimpleNamespace(**one) for name, one in facts["metrics"].items()}
-        for name, one in metrics.items():
-            one.quantile = lambda probability, name=name: _quantile(index, name, probability)
-        verdicts = {name: SimpleNamespace(**one) for name, one in facts["requirements"].items()}
+        metrics = {name: SimpleNamespace(**metric) for name, metric in facts["metrics"].items()}
+        for name, metric in metrics.items():
+            metric.quantile = lambda probability, name=name: _quantile(index, name, probability)
+        verdicts = {name: SimpleNamespace(**verdict) for name, verdict in facts["requirements"].items()}
         return SimpleNamespace(**{**facts, "metrics": metrics, "requirements": verdicts})
 
     def table(self, name: str) -> _Place:
