@@ -66,7 +66,7 @@ def _effect_table(flown: Flown, contributions: Contributions, shown: list[str]) 
 
 
 def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> Iterator[str]:
-    """What the effects rest on where that is not all, σ of the metric, and the root sum square of the contributions."""
+    """Cases used where not all are, σ of the metric, and the root sum square of the 1σ contributions."""
     if contributions.n_used[metric] != contributions.n_tried or contributions.trends is not None:
         used, tried = count(contributions.n_used[metric]), count(contributions.n_tried)
         yield f"{used} / {tried} {'cases' if contributions.trends else 'blocks'}"

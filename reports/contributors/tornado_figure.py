@@ -43,7 +43,7 @@ def name_of(flown: Flown, contributor: str) -> str:
 
 
 def strongest(contributors: Sequence[Contributor]) -> list[Contributor]:
-    """The first one, others whose effect is surely more than nothing, and what is unexplained."""
+    """The largest contributor, others whose interval excludes zero, and the unexplained fraction."""
     named = sorted(
         (contributor for contributor in contributors if contributor.input != UNEXPLAINED),
         key=lambda contributor: -contributor.size,
@@ -65,7 +65,7 @@ def intervals(contributor: Contributor) -> tuple[tuple[float, float] | None, ...
 
 
 def surely(interval: tuple[float, float] | None) -> bool:
-    """Whether an effect with this interval is more than noise."""
+    """Whether the interval of an effect excludes zero."""
     return interval is not None and interval[0] > 0.0
 
 

@@ -1,4 +1,4 @@
-"""How wide the columns of a printed table are: so that its rows take as few lines as can be."""
+"""Widths of the columns of a printed table, chosen so that its rows take as few lines as possible."""
 
 import re
 
@@ -20,7 +20,7 @@ SLACK = 1.06  # of a text over its lines: a line seldom ends at the edge
 
 
 def widths(table: Table) -> list[float]:
-    """Points of each column, together as wide as the page: what the longest words leave goes where it saves lines."""
+    """Width of each column in points, together that of the page: first for the longest words, then where it saves lines."""
     shape = (len(table.rows) + 1, len(table.columns), 2)  # the head is a row, and a cell has its text and a small one
     size, least = np.zeros(shape), np.zeros(len(table.columns))
     room = [1.0, *(max(0.5 * rows, 1.0) if rows else np.inf for rows in spans(table))]  # of all rows of a cell
@@ -72,6 +72,6 @@ def _saved(lines: np.ndarray, size: np.ndarray, width: float, k: int) -> float:
 
 
 def _scale(column: Column, text: str) -> float:
-    """Of a text in the letters of its column over one in the type of the page."""
+    """Ratio of a column's type width to that of the page's body text."""
     plain = lettering.width(text, TYPE)
     return len(text) * MONO * TYPE / plain if column.kind in ("code", "name") and plain else 1.0

@@ -1,4 +1,4 @@
-"""How to read the report: the words it uses, and what its numbers can and cannot carry."""
+"""Definitions of the terms of a report, with what its numbers mean and do not mean."""
 
 from reports.document.blocks import Terms
 

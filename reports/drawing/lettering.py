@@ -1,4 +1,4 @@
-"""Text on paper before it is set: how wide it will be in DejaVu Sans, and where it breaks."""
+"""Widths and line breaks of text in DejaVu Sans, estimated before the typesetter sets it."""
 
 import re
 from xml.sax.saxutils import escape
@@ -17,7 +17,7 @@ _NO_XML = re.compile(r"[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]"
 
 
 def width(text: str, size: float, bold: bool = False) -> float:
-    """Points from the begin to the end of one line."""
+    """Width of one line in points."""
     return sum(_WIDTHS.get(sign, _OTHER) for sign in text) * size / 100.0 * (_BOLD if bold else 1.0)
 
 

@@ -1,4 +1,4 @@
-"""What figures are made of: panels of marks.  `screen` and `paper` draw them; nothing here knows either.
+"""What figures are made of: panels of marks.  `screen` and `paper` draw them; this module depends on neither.
 
 A drawing says once what is to be seen, in the units of its axes; sizes and widths are pixels on the screen, and paper
 scales them.  Colours with an @ are the page's own.  A mark's `key` is its text in the figure's key, said once.
@@ -60,7 +60,7 @@ class Points:
 
 @dataclass(frozen=True)
 class Line:
-    """Through x, y : float64[n], lifted where they are not numbers.  step : "hv", "vh" or none.
+    """Through x, y : float64[n], interrupted at NaN.  step : "hv", "vh" or none.
 
     name : what it is; text : in place of the coordinates under the pointer.
     """
@@ -78,7 +78,7 @@ class Line:
 
     @property
     def corners(self) -> tuple[np.ndarray, np.ndarray]:
-        """The points with those of the steps between them."""
+        """The points of the line, with the corners of its steps."""
         x, y = np.asarray(self.x, dtype=np.float64), np.asarray(self.y, dtype=np.float64)
         if not self.step:
             return x, y
@@ -88,7 +88,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Band:
-    """A filled region: closed outlines in x, y : float64[n], not-a-numbers between; holes run the other way round."""
+    """A filled region: closed outlines in x, y : float64[n], separated by NaN; holes run the other way round."""
 
     x: np.ndarray
     y: np.ndarray
@@ -133,7 +133,7 @@ class Field:
 
     @property
     def layers(self) -> list[tuple[float, float, np.ndarray]]:
-        """(lower level, upper level, outlines float64[n, 2] with not-a-numbers between) of what lies between two."""
+        """(lower level, upper level, outlines float64[n, 2] separated by NaN) of the region between each two levels."""
         import contourpy
 
         generator: Any = contourpy.contour_generator(
@@ -337,12 +337,12 @@ def between(
 
 
 def joined(outlines: Sequence[np.ndarray]) -> np.ndarray:
-    """Curves float64[k, 2] behind each other, a not-a-number between two, at which the pen is lifted."""
+    """Curves float64[k, 2] in one array, separated by rows of NaN, at which a line is interrupted."""
     parts = [part for outline in outlines for part in (outline, np.full((1, 2), np.nan))]
     return np.concatenate(parts[:-1])
 
 
 def nominal_ring(place: tuple[float, float], colour: str, name: str = "nominal", edge: str = "") -> Points:
-    """A ring about one place; with an edge colour inside, it hides what lies under it."""
+    """A ring around one point; with `edge`, its inside is filled with that colour."""
     x, y = (np.array([value], dtype=np.float64) for value in place)
     return Points(x, y, colour, name, "ring", 12.0, edge=edge, key=name)

@@ -1,4 +1,4 @@
-"""Figures on paper: panels of marks laid out on the width of the page, as SVG whose text stays text.
+"""Figures for PDF and Markdown: panels of marks laid out on the width of the page as SVG with searchable text.
 
 All lengths are points.  The typesetter sets the text in the typeface of the page; `lettering` knows how wide it gets.
 """
@@ -27,13 +27,13 @@ Ends = tuple[float, float]
 
 
 def svg(drawing: Drawing) -> str:
-    """The figure, transparent, without a date: the same bytes for the same figure."""
+    """The figure as SVG on a transparent ground; the same figure gives the same bytes."""
     parts = list(_panel_rows(drawing, WIDTH))
     return _picture([line for body, _ in parts for line in body], 0.0, parts[-1][1], WIDTH)
 
 
 def strips(drawing: Drawing, width: float = WIDTH) -> list[str]:
-    """The same in one picture a row of panels, so that a figure can go over two pages; its key is in the first."""
+    """One SVG for each row of panels, so that a figure can continue on the next page; the first holds the key."""
     found, top = [], 0.0
     for body, bottom in _panel_rows(drawing, width):
         found.append(_picture(body, top, bottom, width))
@@ -50,7 +50,7 @@ def _picture(body: list[str], top: float, bottom: float, width: float) -> str:
 
 
 def _panel_rows(drawing: Drawing, whole: float) -> Iterator[tuple[list[str], float]]:
-    """Each row of panels, the key above the first, and where it ends."""
+    """SVG elements of each row of panels and the y of its lower edge; the first row has the key above it."""
     body, top = _key(drawing.key, whole)
     clip = 0
     for row in rows_of(drawing.plots, drawing.across):
@@ -74,7 +74,7 @@ def rows_of(plots: tuple[Plot, ...], across: int) -> list[tuple[Plot, ...]]:
 
 
 def _key(key: tuple[Key, ...], whole: float) -> tuple[list[str], float]:
-    """The key in rows above the panels, and where it ends."""
+    """SVG elements of the key, and the y of its lower edge."""
     found, x, y = [], 0.0, LINE
     for entry in key:
         lines = lettering.wrapped(entry.text, whole - SWATCH - 4.0, TYPE)
@@ -119,7 +119,7 @@ class _Ticks:
 
 
 def _ticks(axis: Axis, ends: tuple[float, float], room: float, upright: bool) -> _Ticks:
-    """As many ticks as the room has place for, on an axis of that length."""
+    """The ticks of an axis of length `room` points, as many as fit without overlap."""
     if axis.ticks is not None:
         low, high = min(ends), max(ends)
         own = [(place, text) for place, text in axis.ticks if low <= place <= high]
@@ -140,7 +140,7 @@ def _ticks(axis: Axis, ends: tuple[float, float], room: float, upright: bool) ->
 
 
 class _Box:
-    """One panel at its place: first how much its words take, then all of it."""
+    """One panel: computes the space that its texts take, then draws itself."""
 
     def __init__(self, plot: Plot, left: float, top: float, width: float):
         self.plot, self.left, self.top, self.right = plot, left, top, left + width
@@ -273,7 +273,7 @@ class _Scale:
 
 
 def _equal(x: Ends, y: Ends, width: float, height: float) -> tuple[Ends, Ends]:
-    """Both ranges with the same length of the page for a unit, the one that is too short made longer."""
+    """Axis ranges with one scale for both axes; the range that is too short is extended on both sides."""
     unit = max(abs(x[1] - x[0]) / width, abs(y[1] - y[0]) / height)
     ends = []
     for (low, high), length in ((x, width), (y, height)):

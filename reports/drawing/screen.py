@@ -86,7 +86,7 @@ def history_panel(time: str) -> dict[str, Any]:
 
 @singledispatch
 def traced(mark: object, plot: Plot) -> Iterator[dict[str, Any]]:
-    """The mark as traces."""
+    """The traces of plotly.js that draw the mark."""
     raise NotImplementedError(type(mark))
 
 
@@ -118,7 +118,7 @@ def _intervals(mark: Points, values: np.ndarray, ends: tuple[np.ndarray, np.ndar
 
 
 def _pointed(plot: Plot, first: str = "", text: bool = False) -> str:
-    """What shows under the pointer: the names of both axes with their units, and the numbers."""
+    """Template of the hover text: the names of both axes with their units, and the numbers."""
     lines = [plain(axis.name or axis.label) for axis in (plot.x, plot.y)]
     numbers = [f"{name + ': ' if name else ''}%{{{axis}:.5g}}" for name, axis in zip(lines, "xy", strict=True)]
     told = [*[first] * bool(first), *([] if text and not first else numbers), *["%{text}"] * text]
@@ -194,14 +194,14 @@ def _field(mark: Field, plot: Plot) -> Iterator[dict[str, Any]]:
 
 
 def _faint(colour: str, opacity: float) -> str:
-    """A page's own colour stays as it is: the page gives it."""
+    """The colour with an opacity, as CSS; page colours (with an @) are left to the page."""
     if opacity >= 1.0 or not colour.startswith("#"):
         return colour
     return f"rgba({','.join(str(int(colour[k : k + 2], 16)) for k in (1, 3, 5))},{opacity:g})"
 
 
 def _axis(axis: Axis, ends: tuple[float, float], **more: Any) -> dict[str, Any]:
-    """Grid in the page's grid colour, line and ticks in its muted one."""
+    """The layout of one axis, in the colours of the page."""
     own = axis.ticks
     if own is None and axis.log:
         own = tuple((tick, number(tick, 3)) for tick in log_ticks(min(ends), max(ends)))
@@ -241,7 +241,7 @@ def _layout(plot: Plot) -> dict[str, Any]:
 
 
 def _title(text: str) -> dict[str, Any]:
-    """Left above the axes, in as many lines as it takes."""
+    """A title above the axes, aligned left, wrapped to as many lines as needed."""
     from textwrap import wrap
 
     lines = [line for part in text.split("\n") for line in wrap(part, WRAP)]

@@ -24,7 +24,7 @@ ARMS = {"x": "m-.8-.8l1.6 1.6m0-1.6l-1.6 1.6", "cross": "m-.9 0h1.8m-.9-.9v1.8"}
 
 @dataclass(frozen=True)
 class Frame:
-    """Where a panel's axes stand on paper [points], and from which value to which they run."""
+    """The rectangle of a panel on paper [points], and the values at the ends of its axes."""
 
     left: float
     top: float
@@ -43,7 +43,7 @@ class Frame:
 
 
 def _part(values: np.ndarray | float, ends: tuple[float, float], log: bool) -> np.ndarray:
-    """0 at the axis' begin, 1 at its end; kept near the frame, beyond which readers of PDF lose digits."""
+    """Positions along an axis, 0 at its begin and 1 at its end, limited to ±20: PDF readers lose digits beyond."""
     with np.errstate(divide="ignore", invalid="ignore"):
         place: Callable[..., np.ndarray] = np.log10 if log else np.asarray
         low, high = place(np.asarray(ends, dtype=np.float64))

@@ -1,4 +1,4 @@
-"""Round places on an axis, and their numbers as text."""
+"""Round tick values of an axis, and their texts."""
 
 from itertools import pairwise
 from math import ceil, floor, isfinite, log10
@@ -20,7 +20,7 @@ def nice_step(low: float, high: float, most: int, whole: bool = False) -> float:
 
 
 def nice_ticks(low: float, high: float, most: int = 6, whole: bool = False) -> list[float]:
-    """Round places from low to high, in that order or the other, with at most so many steps between."""
+    """Round tick values between low and high, whichever is larger, with at most `most` steps."""
     low, high = min(low, high), max(low, high)
     step = nice_step(low, high, most, whole)
     first, last = ceil(low / step - 1e-6), floor(high / step + 1e-6)
@@ -28,7 +28,7 @@ def nice_ticks(low: float, high: float, most: int = 6, whole: bool = False) -> l
 
 
 def covering(low: float, high: float, most: int) -> list[float]:
-    """Round places, the first not above low, the last not below high."""
+    """Round values that cover low to high: the first is at most low, the last at least high."""
     step = nice_step(low, high, most)
     return [float(f"{k * step:.12g}") for k in range(floor(low / step + 1e-9), ceil(high / step - 1e-9) + 1)]
 

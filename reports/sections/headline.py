@@ -37,7 +37,7 @@ def _verdict_card(flown: Flown, verdict: Verdict) -> Card:
 
 
 def _because(flown: Flown, verdict: Verdict) -> str:
-    """What the counts show, as the end of a sentence."""
+    """The counts behind a verdict, as the end of a sentence."""
     lost = f", {count(verdict.no_number)} of the others without a number" if verdict.no_number else ""
     if verdict.lower is None or verdict.upper is None:
         return f"{lost}; " + (
@@ -117,7 +117,7 @@ def _of_limits(limits: Limits, unit: str) -> str:
 
 
 def _same(flown: Flown, name: str, used: str) -> tuple[str, str]:
-    """Answer and detail of a metric that does not differ from case to case."""
+    """Answer and detail of a metric that is the same in all cases."""
     summary, nominal = flown.summaries[name], flown.nominal_value(name)
     begun = f"nominal {number(nominal)}; " if nominal is not None else ""
     where = "in all cases" if summary.n_used == summary.n_tried else "in all cases with a number"

@@ -1,4 +1,4 @@
-"""Where the numbers come from: versions, digests, seed, machine kind and timing, enough to make them again."""
+"""Where the numbers come from: versions, digests, seed, machine kind and timing, enough to repeat the run."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
@@ -11,7 +11,7 @@ TIMED_EVENTS = ("timing", "finished")
 
 
 def provenance_table(flown: Flown) -> Table:
-    """That of a run."""
+    """The provenance of a run."""
     campaign = flown.campaign
     cases = f"{count(flown.n_tried)} / {count(flown.n_wanted)}"
     own = [("design", flown.design), ("seed", campaign.get("seed", "")), ("cases flown / required", cases)]
@@ -77,7 +77,7 @@ def manifest_timing(record: Any) -> dict[str, float]:
 
 
 def campaign_facts(flown: Flown) -> tuple[tuple[str, str], ...]:
-    """The line under the title."""
+    """The facts below the title: campaign, model, cases, design, date, engine."""
     campaign = flown.campaign
     facts = (
         ("Campaign", str(campaign.get("name", ""))),

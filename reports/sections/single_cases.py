@@ -1,4 +1,4 @@
-"""Single cases: the figure of all by their outcome, and what an interactive page needs to look any of them up.
+"""The figure of all cases by outcome, and the data with which an interactive page shows single cases.
 
 A page holds all cases as far as a budget of numbers reaches, so that what is chosen in a figure is counted in full.  Of
 more cases, it holds those that its figures draw, the worst ones and those that did not pass, and says how many.
@@ -122,7 +122,7 @@ def _column(flown: Flown, fact: ColumnFacts, rows: np.ndarray) -> CaseColumn:
 
 
 def _place_columns(flown: Flown, sections: Iterable[Section], rows: np.ndarray) -> Iterator[CaseColumn]:
-    """Numbers that figures alone have of the cases, such as where they came down on a map."""
+    """Columns that only figures have, such as the impact points on a map."""
     for section in sections:
         for block in section.blocks:
             for name, (label, cases, values) in (

@@ -108,7 +108,7 @@ def quantile_table(flown: Flown) -> Table | None:
 
 
 def _for_fixed(flown: Flown) -> str:
-    """What is to be said of such limits where the number of cases was decided on the way."""
+    """A restriction for bounds of a run whose number of cases was decided by interim analyses; else empty."""
     if not flown.looked:
         return ""
     return " for a number of cases fixed in advance (with interim analyses they hold somewhat less often)"

@@ -223,7 +223,7 @@ def _change_figure(comparison: Comparison, moved: list[MetricChange]) -> FigureB
 
 
 def _reach(shifts: list[float]) -> float:
-    """The largest shift that the axis holds: of those that are far beyond most others, none would be read off."""
+    """The largest shift on the axis; shifts far beyond most others are told in the caption instead."""
     known = np.sort([shift for shift in shifts if np.isfinite(shift)])
     return max(WIDEST * float(np.quantile(known, 0.5, method="lower")), FEW_SIGMA) if known.size else FEW_SIGMA
 

@@ -1,4 +1,4 @@
-"""Text that stands in Markdown as it is."""
+"""Escaping of text for Markdown."""
 
 import re
 

@@ -79,7 +79,7 @@ class _Reader:
 
 
 def _end(tokens: Sequence[Token], place: int) -> int:
-    """Behind the token that closes the one at `place`."""
+    """Index after the token that closes the one at `place`."""
     level = 0
     for index in range(place, len(tokens)):
         level += tokens[index].nesting
