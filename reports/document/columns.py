@@ -20,7 +20,7 @@ SLACK = 1.06  # of a text over its lines: a line seldom ends at the edge
 
 
 def widths(table: Table) -> list[float]:
-    """Width of each column in points, together that of the page: first for the longest words, then where it saves lines."""
+    """Width of each column in points, together that of the page: longest words first, then where it saves lines."""
     shape = (len(table.rows) + 1, len(table.columns), 2)  # the head is a row, and a cell has its text and a small one
     size, least = np.zeros(shape), np.zeros(len(table.columns))
     room = [1.0, *(max(0.5 * rows, 1.0) if rows else np.inf for rows in spans(table))]  # of all rows of a cell
