@@ -66,8 +66,10 @@ def _contributors(indices: DesignedIndices, k: int) -> list[Contributor]:
     return rows
 
 
-def _index_table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names: Mapping[str, str], main: str) -> Table:
-    indices = list(found.values)
+def _index_table(
+    flown: Flown, designed: DesignedIndices, shown: np.ndarray, names: Mapping[str, str], main: str
+) -> Table:
+    indices = list(designed.values)
     columns = (
         Column("Metric", "text", 2.2, grouped=True),
         Column("Input", "text", 2.4),
@@ -75,19 +77,19 @@ def _index_table(flown: Flown, found: DesignedIndices, shown: np.ndarray, names:
     )
     rows = []
     for k in shown:
-        name = found.metrics[k]
-        used = f"{count(int(found.n_used[k]))} / {count(found.n_tried)} {BLOCKS[found.design]}"
-        unit = flown.unit(name) if found.design == "morris" else ""
+        name = designed.metrics[k]
+        used = f"{count(int(designed.n_used[k]))} / {count(designed.n_tried)} {BLOCKS[designed.design]}"
+        unit = flown.unit(name) if designed.design == "morris" else ""
         metric = Cell(axis_label(names[name], unit), small=used)
-        for row in np.argsort(-found.values[main][:, k], kind="stable")[:MOST_INPUTS]:
-            cells = [_cell(found.values[index][row, k], found.reach[index][row, k]) for index in indices]
-            rows.append((metric, Cell(flown.words(found.inputs[row])), *cells))
-    if found.design == "saltelli":
+        for row in np.argsort(-designed.values[main][:, k], kind="stable")[:MOST_INPUTS]:
+            cells = [_cell(designed.values[index][row, k], designed.reach[index][row, k]) for index in indices]
+            rows.append((metric, Cell(flown.words(designed.inputs[row])), *cells))
+    if designed.design == "saltelli":
         return Table(
             "Sobol’ indices of Saltelli’s blocks",
             columns,
             tuple(rows),
-            _saltelli_note(found, percent(flown.stated.confidence)),
+            _saltelli_note(designed, percent(flown.stated.confidence)),
         )
     return Table(
         "Elementary effects of Morris’s trajectories",

@@ -23,8 +23,8 @@ def contributor_figure(
     """by_metric : words and contributors of each metric.  source : what the effects were estimated from."""
     panels, told = [], []
     interval = f"{percent(flown.stated.confidence)} confidence"
-    for words, found in list(by_metric)[:MOST_METRICS]:
-        rows = strongest(found)
+    for words, contributors in list(by_metric)[:MOST_METRICS]:
+        rows = strongest(contributors)
         names = [name_of(flown, row.input) for row in rows]
         total = _effect_array((row.total, row.total_interval) for row in rows)
         first = _effect_array((row.first, row.first_interval) for row in rows)

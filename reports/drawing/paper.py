@@ -34,11 +34,11 @@ def svg(drawing: Drawing) -> str:
 
 def strips(drawing: Drawing, width: float = WIDTH) -> list[str]:
     """One SVG for each row of panels, so that a figure can continue on the next page; the first holds the key."""
-    found, top = [], 0.0
+    pictures, top = [], 0.0
     for body, bottom in _panel_rows(drawing, width):
-        found.append(_picture(body, top, bottom, width))
+        pictures.append(_picture(body, top, bottom, width))
         top = bottom
-    return found
+    return pictures
 
 
 def _picture(body: list[str], top: float, bottom: float, width: float) -> str:
@@ -75,19 +75,19 @@ def rows_of(plots: tuple[Plot, ...], across: int) -> list[tuple[Plot, ...]]:
 
 def _key(key: tuple[Key, ...], whole: float) -> tuple[list[str], float]:
     """SVG elements of the key, and the y of its lower edge."""
-    found, x, y = [], 0.0, LINE
+    elements, x, y = [], 0.0, LINE
     for entry in key:
         lines = lettering.wrapped(entry.text, whole - SWATCH - 4.0, TYPE)
         long = max(lettering.width(line, TYPE) for line in lines)
         if x and x + SWATCH + long > whole:
             x, y = 0.0, y + LINE + 1.0
-        found += [
+        elements += [
             *_swatch(entry, x, y - 2.6),
             *(lettering.text(x + SWATCH, y + LINE * k, line) for k, line in enumerate(lines)),
         ]
         y += LINE * (len(lines) - 1)
         x += SWATCH + long + 12.0
-    return found, y + 7.0 if key else 0.0
+    return elements, y + 7.0 if key else 0.0
 
 
 def _swatch(entry: Key, x: float, y: float) -> Iterator[str]:
@@ -133,8 +133,8 @@ def _ticks(axis: Axis, ends: tuple[float, float], room: float, upright: bool) ->
     for most in range(axis.most, 0, -1):
         places = log_ticks(*ends, most) if axis.log else nice_ticks(*ends, most, axis.whole)
         words, power = (log_numerals(places), "") if axis.log else numerals(places)
-        taken = sum(2.2 * TYPE if upright else lettering.width(text, TYPE) + 9.0 for text in words)
-        if taken <= room or most == 1:
+        needed = sum(2.2 * TYPE if upright else lettering.width(text, TYPE) + 9.0 for text in words)
+        if needed <= room or most == 1:
             break
     return _Ticks(places, [[text] for text in words], power)
 
@@ -224,9 +224,9 @@ class _Box:
         for k, line in enumerate(self.y_label):
             yield lettering.text(self.left + 7.0 + LINE * k, middle, line, anchor="middle", turned=True)
         below = frame.bottom + (0.0 if self.plot.x.top else self.tick_room)
-        taken = lettering.width(self.x_ticks.power, TYPE) + 3.0 if self.x_ticks.power else 0.0
+        power_width = lettering.width(self.x_ticks.power, TYPE) + 3.0 if self.x_ticks.power else 0.0
         for k, line in enumerate(self.x_label):
-            farthest = frame.right - taken - 0.5 * lettering.width(line, TYPE)
+            farthest = frame.right - power_width - 0.5 * lettering.width(line, TYPE)
             x = min(0.5 * (frame.left + frame.right), farthest)
             yield lettering.text(x, below + LINE * (k + 1) - 2.4, line, anchor="middle")
         if self.x_ticks.power:

@@ -200,7 +200,7 @@ def _faint(colour: str, opacity: float) -> str:
     return f"rgba({','.join(str(int(colour[k : k + 2], 16)) for k in (1, 3, 5))},{opacity:g})"
 
 
-def _axis(axis: Axis, ends: tuple[float, float], **more: Any) -> dict[str, Any]:
+def _axis(axis: Axis, ends: tuple[float, float], **own_keys: Any) -> dict[str, Any]:
     """The layout of one axis, in the colours of the page."""
     own = axis.ticks
     if own is None and axis.log:
@@ -216,7 +216,7 @@ def _axis(axis: Axis, ends: tuple[float, float], **more: Any) -> dict[str, Any]:
         **({"side": "top"} if axis.top else {}),
         **({} if own is None else {"tickvals": [at for at, _ in own], "ticktext": [plain(text) for _, text in own]}),
         **({"tickformat": ",d"} if axis.whole and own is None else {}),
-        **more,
+        **own_keys,
     }  # fmt: skip
 
 

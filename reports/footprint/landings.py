@@ -26,20 +26,20 @@ class Landing:
     longitude: np.ndarray
     rows: np.ndarray
     above: int
-    found: Footprint
+    footprint: Footprint
     aim: Mark | None
 
     def distances(self, place: Mark) -> np.ndarray:
         """Kilometres of all cases from a place; NaN for those that did not come down."""
         distances = np.full(self.latitude.size, np.nan)
-        plane = LocalPlane(place.latitude, place.longitude, self.found.plane.ellipsoid)
+        plane = LocalPlane(place.latitude, place.longitude, self.footprint.plane.ellipsoid)
         points = plane.points(self.latitude[self.rows], self.longitude[self.rows])
         distances[self.rows] = np.hypot(points[:, 0], points[:, 1]) / 1000.0
         return distances
 
     @property
     def mean(self) -> Mark:
-        return Mark("mean impact point", self.found.plane.latitude, self.found.plane.longitude)
+        return Mark("mean impact point", self.footprint.plane.latitude, self.footprint.plane.longitude)
 
     @property
     def centre(self) -> Mark:
@@ -48,7 +48,7 @@ class Landing:
 
     def at(self, place: Mark) -> np.ndarray:
         """float64[2], km to the east and to the north of the mean impact point."""
-        point = self.found.plane.points(np.array([place.latitude]), np.array([place.longitude]))[0]
+        point = self.footprint.plane.points(np.array([place.latitude]), np.array([place.longitude]))[0]
         return np.asarray(point / 1000.0)
 
 

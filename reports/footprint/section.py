@@ -68,7 +68,7 @@ def footprint_contents(flown: Flown) -> FootprintContents:
 
 def _landing_blocks(flown: Flown, landing: Landing, stem: str) -> Iterator[FigureBlock | Table | str]:
     yield FigureBlock(_caption(flown, landing), _footprint_drawing(flown, landing), "wide")
-    if landing.found.ellipses:
+    if landing.footprint.ellipses:
         yield _region_table(flown, landing)
     else:
         yield _no_ellipses(flown, landing)
@@ -86,7 +86,7 @@ def _landing_blocks(flown: Flown, landing: Landing, stem: str) -> Iterator[Figur
 
 
 def _caption(flown: Flown, landing: Landing) -> str:
-    plane = landing.found.plane
+    plane = landing.footprint.plane
     above = f" {count(landing.above)} cases ended above {height_limit(flown, landing.figure)} and are left out." * bool(
         landing.above
     )
@@ -99,16 +99,16 @@ def _place_words(latitude: float, longitude: float) -> str:
 
 
 def _footprint_drawing(flown: Flown, landing: Landing) -> Drawing:
-    points = landing.found.points / 1000.0
+    points = landing.footprint.points / 1000.0
     ends = [int(pick(points[:, k])) for k in (0, 1) for pick in (np.argmin, np.argmax)]
     shown = thinned_rows(np.arange(landing.rows.size), np.array(ends))
     rows = landing.rows[shown]
     places = zip(flown.case_ids[rows], landing.latitude[rows], _half_turn(landing.longitude[rows]), strict=True)
     names = [f"case {case}: {_place_words(north, east)}" for case, north, east in places]
     aim = None if landing.aim is None else (landing.aim.name, landing.at(landing.aim))
-    outlines = (*_outlines(landing.found), *_circles(flown, landing))
+    outlines = (*_outlines(landing.footprint), *_circles(flown, landing))
     coasts, around, reach = _coasts(landing, outlines) if on_earth(flown, landing.figure) else ([], [], 0.0)
-    views, counts = footprint_views(_long_axis(landing.found)), (int(landing.rows.size), flown.n_held)
+    views, counts = footprint_views(_long_axis(landing.footprint)), (int(landing.rows.size), flown.n_held)
     plots = [
         footprint_plot(view, points[shown], names, flown.case_ids[rows], counts, outlines, aim, coasts)
         for view in views
@@ -142,8 +142,8 @@ def _circle(middle: np.ndarray, radius: float) -> np.ndarray:
 
 def _coasts(landing: Landing, outlines: Iterable[Outline]) -> tuple[list[np.ndarray], list[np.ndarray], float]:
     """The coasts on the map, or else those of a wider one, and how many km it reaches to the north."""
-    plane = landing.found.plane
-    places = [landing.found.points / 1000.0, *(curve for outline in outlines for curve in outline.curves)]
+    plane = landing.footprint.plane
+    places = [landing.footprint.points / 1000.0, *(curve for outline in outlines for curve in outline.curves)]
     places += [landing.at(landing.aim)[None, :]] if landing.aim else []
     ends = np.abs(np.concatenate(places)).max(axis=0)
     on_map = coastlines(plane, 3000.0 * float(ends.max()))
@@ -181,7 +181,7 @@ def _name(region: Ellipse | DensityRegion) -> str:
 
 def _region_table(flown: Flown, landing: Landing) -> Table:
     """Contents stated and shares really inside."""
-    regions = landing.found
+    regions = landing.footprint
     columns = (
         Column("Region", "text", 2.0),
         Column("Stated content", "number", 1.7),
@@ -304,7 +304,7 @@ def _map_places(flown: Flown, landing: Landing) -> Places:
         latitude=landing.latitude[rows],
         longitude=_half_turn(landing.longitude[rows]),
         marks=tuple(marks),
-        outlines=tuple(_map_outlines(landing.found)),
+        outlines=tuple(_map_outlines(landing.footprint)),
     )
 
 

@@ -132,11 +132,11 @@ def _column_values(values: np.ndarray | tuple[str, ...]) -> Any:
 
 def _history_backgrounds(document: Document) -> dict[str, list[dict[str, Any]]]:
     """Envelopes, medians and limits of history quantities, which a single case's curve is drawn over."""
-    found: dict[str, list[dict[str, Any]]] = {}
+    backgrounds: dict[str, list[dict[str, Any]]] = {}
     for block in blocks_of(document, FigureBlock):
         for plot in block.drawing.plots:
             marks = [mark for mark in plot.marks if isinstance(mark, Band | Limit)
                      or (isinstance(mark, Line) and mark.name.startswith(MEDIAN))]  # fmt: skip
             if plot.quantity:
-                found.setdefault(plot.quantity, [trace for mark in marks for trace in screen.traced(mark, plot)])
-    return found
+                backgrounds.setdefault(plot.quantity, [trace for mark in marks for trace in screen.traced(mark, plot)])
+    return backgrounds

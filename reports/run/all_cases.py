@@ -260,8 +260,8 @@ class _FirstPass:
             yield from (values for _, values in metric_parts(self.run, metrics))
             return
         parts, row = self.run.parts, 0
-        more = [column.name for column in self.run.columns if column.name != "status"]
-        for part, (table, values) in zip(parts, metric_parts(self.run, metrics, more), strict=True):
+        others = [column.name for column in self.run.columns if column.name != "status"]
+        for part, (table, values) in zip(parts, metric_parts(self.run, metrics, others), strict=True):
             self._note(part, table, values, row)
             row += part.rows
             yield values
@@ -284,10 +284,10 @@ class _FirstPass:
                 if summed["values"]:
                     self.reasons[summed["values"]] += summed["counts"]
         first, stop = np.searchsorted(self._rows, [row, row + part.rows])
-        taken = table.take(self._rows[first:stop] - row)
+        sample = table.take(self._rows[first:stop] - row)
         if "status" not in table.column_names:
-            taken = taken.append_column("status", pa.array([STATUS_NAME[OK]] * taken.num_rows, pa.string()))
-        self._sampled.append(taken)
+            sample = sample.append_column("status", pa.array([STATUS_NAME[OK]] * sample.num_rows, pa.string()))
+        self._sampled.append(sample)
 
     def sample(self) -> pd.DataFrame:
         """The cases that figures are drawn of."""

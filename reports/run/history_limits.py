@@ -20,12 +20,12 @@ APART = 0.01  # of the range of a history
 
 def history_limits(flown: Flown, quantities: list[str]) -> dict[str, tuple[tuple[float, str], ...]]:
     """Limits by quantity, with their words, of those requirements that bear on its extremes."""
-    found: dict[str, tuple[tuple[float, str], ...]] = {}
+    limits: dict[str, tuple[tuple[float, str], ...]] = {}
     for verdict in flown.own.verdicts:
         for name in quantities:
             if verdict.metric and _is_extreme(flown.own, verdict.metric, name):
-                found[name] = (*found.get(name, ()), *_limit_lines(flown, verdict, name))
-    return found
+                limits[name] = (*limits.get(name, ()), *_limit_lines(flown, verdict, name))
+    return limits
 
 
 def _limit_lines(flown: Flown, verdict: Verdict, quantity: str) -> Iterator[tuple[float, str]]:

@@ -68,8 +68,8 @@ def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[l
     violated : bool[n_requirements, n_held].  What is too rare for a colour of its own shares the last one.
     """
     code = (violated * (1 << np.arange(len(names)))[:, None]).sum(axis=0)
-    found, cases = np.unique(code[code > 0], return_counts=True)
-    ordered = found[np.lexsort((found, -cases))].tolist()
+    sets, cases = np.unique(code[code > 0], return_counts=True)
+    ordered = sets[np.lexsort((sets, -cases))].tolist()
     own = ordered if len(ordered) < MOST_CLASSES else ordered[: MOST_CLASSES - 2]
     words = [inside_all]
     member = np.zeros(code.size, dtype=np.int64)

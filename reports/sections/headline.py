@@ -48,8 +48,8 @@ def _because(flown: Flown, verdict: Verdict) -> str:
         return f"{lost}; {' and '.join(failing)} {'fails' if len(failing) == 1 else 'fail'} with confidence shared"
     if verdict.outcome == "fail":
         return f"{lost}; the true probability is at most {percent(verdict.upper)}"
-    more = f", {count(verdict.needed)} cases without a further failure would demonstrate it" if verdict.needed else ""
-    return f"{lost}; the true probability is at least {percent(verdict.lower)}{more}"
+    needed = f", {count(verdict.needed)} cases without a further failure would demonstrate it" if verdict.needed else ""
+    return f"{lost}; the true probability is at least {percent(verdict.lower)}{needed}"
 
 
 def cost_cards(flown: Flown) -> tuple[Card, ...]:

@@ -24,8 +24,8 @@ def front_table(tuned: Tuned) -> Table:
     caption = "The front" if tuned.record.feasible else "Best if the constraints are left out"
     if len(rows) < len(best):
         caption = f"{caption}: {count(len(rows))} of {count(len(best))} candidates, evenly along it"
-    more = len(tuned.parameters) - MOST_PARAMETERS
-    note = f"{more} more parameters are in front.parquet." if more > 0 else ""
+    left_out = len(tuned.parameters) - MOST_PARAMETERS
+    note = f"{left_out} more parameters are in front.parquet." if left_out > 0 else ""
     return _candidate_table(tuned, best.iloc[rows], caption, note)
 
 

@@ -12,5 +12,5 @@ _LINE_START = re.compile(r"^(\s*)([-+](?=[-\s]|$)|=(?=[=\s]|$)|\d+[.)](?=\s|$))"
 def escaped(text: str) -> str:
     """Text that no reader of Markdown takes for anything else, on one line."""
     line = _SPECIAL.sub(r"\\\1", SPACE.sub(" ", text).strip())
-    line = _ADDRESS.sub(lambda found: "\\" + found[0], _UNDERSCORE.sub(r"\\_", line))
-    return _LINE_START.sub(lambda found: f"{found[1]}{found[2][:-1]}\\{found[2][-1]}", line)
+    line = _ADDRESS.sub(lambda match: "\\" + match[0], _UNDERSCORE.sub(r"\\_", line))
+    return _LINE_START.sub(lambda match: f"{match[1]}{match[2][:-1]}\\{match[2][-1]}", line)

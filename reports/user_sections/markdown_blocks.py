@@ -31,7 +31,10 @@ def sections_of(source: str, placed: Placed, anchor: str) -> tuple[Section, ...]
             sections[-1][1].append(block)
         else:
             raise ValueError(f"line {blocks.line}: text stands before the first heading; begin with “# Title”")
-    return tuple(Section(f"{anchor}-{k}", title, tuple(found)) for k, (title, found) in enumerate(sections, start=1))
+    return tuple(
+        Section(f"{anchor}-{k}", title, tuple(blocks_of_section))
+        for k, (title, blocks_of_section) in enumerate(sections, start=1)
+    )
 
 
 class _Reader:

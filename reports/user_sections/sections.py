@@ -111,16 +111,16 @@ def run_facts(flown: Flown, title: str) -> RunFacts:
     metrics = {
         name: MetricFacts(
             unit=flown.unit(name),
-            n_used=found.n_used,
-            n_tried=found.n_tried,
+            n_used=summary.n_used,
+            n_tried=summary.n_tried,
             nominal=flown.nominal_value(name),
-            mean=found.mean,
-            sd=found.sd,
-            minimum=found.minimum,
-            maximum=found.maximum,
+            mean=summary.mean,
+            sd=summary.sd,
+            minimum=summary.minimum,
+            maximum=summary.maximum,
             _summary=partial(flown.every.summary, name),
         )
-        for name, found in flown.summaries.items()
+        for name, summary in flown.summaries.items()
     }
     return RunFacts(
         name=flown.name,
