@@ -12,8 +12,8 @@ from collections import namedtuple
 
 import numpy as np
 
-from campaigns.geo_injection.coast import kepler
-from campaigns.geo_injection.program import Program
+from campaigns.geo_injection.design.coast import kepler
+from campaigns.geo_injection.design.program import Program
 from campaigns.geo_injection.program_table import AIM, burn_row
 from mc_engine.lanes import atan2, exp, floor, look_up, maximum, physics, sincos, sqrt, where
 from mc_engine.physics.constants import MU_EARTH

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaigns.geo_injection.single_burn import Burn, Stage, circle, fly_shortest, rise_guess
+from campaigns.geo_injection.design.single_burn import Burn, Stage, circle, fly_shortest, rise_guess
 from mc_engine.physics.constants import MU_EARTH
 
 # The thrust turns over in the middle of the burn, within a hundredth of the canonical time.

@@ -8,12 +8,12 @@ import numpy as np
 
 from campaigns.geo_injection import dynamics, figures, outcome
 from campaigns.geo_injection.aiming import nominal_aim
-from campaigns.geo_injection.coast import kepler
-from campaigns.geo_injection.design import program_for
+from campaigns.geo_injection.design.coast import kepler
+from campaigns.geo_injection.design.program import Program
+from campaigns.geo_injection.design.programs import program_for
+from campaigns.geo_injection.design.sequence import Sequence, source_orbits
 from campaigns.geo_injection.inputs import METHODS, PARAMETERS, SETTINGS
-from campaigns.geo_injection.program import Program
 from campaigns.geo_injection.program_table import table_of
-from campaigns.geo_injection.sequence import Sequence, source_orbits
 from mc_engine.errors import ModelError
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.physics.frames import WGS84_RADIUS

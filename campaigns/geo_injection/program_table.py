@@ -4,7 +4,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from campaigns.geo_injection.program import DEGREE, Program
+from campaigns.geo_injection.design.program import DEGREE, Program
 from mc_engine.lanes import look_up, physics
 
 TERMS = 3 * (DEGREE + 1)

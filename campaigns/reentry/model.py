@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from campaigns.reentry import dynamics, figures, guidance, outcome, weather
+from campaigns.reentry import dynamics, figures, outcome, weather
 from campaigns.reentry.air import GAS_CONSTANT
 from campaigns.reentry.airframe import COEFFICIENTS, DETRA_KEMP_RIDDELL, airframe_of, airframe_rows
 from campaigns.reentry.entry_state import FLAT, Entry, World, entry_of, world_of
+from campaigns.reentry.guidance import laws
+from campaigns.reentry.guidance.plan import planned_entry, plans_of
+from campaigns.reentry.guidance.reference import stored_references
 from campaigns.reentry.inputs import PARAMETERS, SETTINGS
-from campaigns.reentry.plan import planned_entry, plans_of
 from campaigns.reentry.planets import of_planets
-from campaigns.reentry.reference import stored_references
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.studies.published import read_published
 
@@ -186,7 +187,7 @@ MODEL = Model(
     prepare=prepare,
     initial=dynamics.initial,
     start=dynamics.start,
-    control=guidance.control,
+    control=laws.control,
     tables=shared_tables,
     rhs=dynamics.rhs,
     events=dynamics.events,

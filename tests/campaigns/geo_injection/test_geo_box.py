@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from geo_sequences import MASS, elements, sequence
 
-from campaigns.geo_injection.continuation import optimum
-from campaigns.geo_injection.impulsive import propellant_share, two_impulses
-from campaigns.geo_injection.optimality import arcs
+from campaigns.geo_injection.design.continuation import optimum
+from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
+from campaigns.geo_injection.design.optimality import arcs
 from mc_engine.errors import ModelError
 
 STRONG = 9000.0  # N: from here on two burns are short enough to be the best that may be done

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from geo_sequences import MASS, elements, propellant_kg, seconds, sequence, solution
 
-from campaigns.geo_injection.continuation import optimum
-from campaigns.geo_injection.impulsive import propellant_share, two_impulses
-from campaigns.geo_injection.optimality import arcs, is_optimal
+from campaigns.geo_injection.design.continuation import optimum
+from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
+from campaigns.geo_injection.design.optimality import arcs, is_optimal
 from mc_engine.errors import ModelError
 
 HALF_A_KILOGRAM = 0.5

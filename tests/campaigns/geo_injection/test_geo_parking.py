@@ -9,11 +9,11 @@ from geo_impulses import least_speed
 from geo_sequences import MASS, elements, sequence
 from geo_twin import fly_twin
 
-from campaigns.geo_injection.continuation import optimum
-from campaigns.geo_injection.design import program_for
-from campaigns.geo_injection.impulsive import propellant_share, two_impulses
-from campaigns.geo_injection.optimal import first_states
-from campaigns.geo_injection.optimality import arcs
+from campaigns.geo_injection.design.continuation import optimum
+from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
+from campaigns.geo_injection.design.optimal import first_states
+from campaigns.geo_injection.design.optimality import arcs
+from campaigns.geo_injection.design.programs import program_for
 from mc_engine.errors import ModelError
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from geo_flights import MODEL, NOMINAL
 
-from campaigns.geo_injection import design
-from campaigns.geo_injection.kept_programs import SEQUENCES
+from campaigns.geo_injection.design import programs as design
+from campaigns.geo_injection.design.kept_programs import SEQUENCES
+from campaigns.geo_injection.design.program import from_text, to_text
 from campaigns.geo_injection.model import sequence_of
-from campaigns.geo_injection.program import from_text, to_text
 from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import list_campaigns, load_campaign
 from mc_engine.flight.flight import fly

@@ -10,8 +10,8 @@ from test_geo_single_burns import SOURCE, apogee_burn_s, burn_s, first_burn_s, i
 
 import campaigns.geo_injection
 from campaigns.geo_injection.avoidance import AVOIDANCE, analytic_guess, burn_of, converged
-from campaigns.geo_injection.design import program_for
-from campaigns.geo_injection.kept_programs import SEQUENCES
+from campaigns.geo_injection.design.kept_programs import SEQUENCES
+from campaigns.geo_injection.design.programs import program_for
 from mc_engine.studies.published import read_published
 
 FILE = Path(campaigns.geo_injection.__file__).with_name("published.toml")

@@ -8,8 +8,8 @@ import pytest
 from geo_sequences import FLOW, GEO, MASS, MU, PARKING, THRUST, sequence
 
 from campaigns.geo_injection.avoidance import AVOIDANCE, analytic_guess, converged
-from campaigns.geo_injection.single_burn import Stage, circle, fly_shortest, rise_guess
-from campaigns.geo_injection.staged import Orbit, rising, staged
+from campaigns.geo_injection.design.single_burn import Stage, circle, fly_shortest, rise_guess
+from campaigns.geo_injection.design.staged import Orbit, rising, staged
 
 SOURCE = {
     "planar, 2 burns": (2, 0.0, [(24_588, 0.7142, 0.0)]),
@@ -124,7 +124,7 @@ def test_staged_burns_make_one_continuous_flight_to_the_geostationary_circle(nam
 
 
 def _coasted(stage, after):
-    from campaigns.geo_injection.coast import coast
+    from campaigns.geo_injection.design.coast import coast
 
     wait = after.ignition - stage.ignition - stage.burn.duration
     return coast(np.append(stage.burn.end[:6], np.ones(6))[None], np.array([wait]))[0, :6]

@@ -7,11 +7,11 @@ from geo_flights import MODEL, NOMINAL, fly_cases, fly_one, history
 from geo_sequences import seconds, sequence
 from geo_twin import fly_twin
 
-from campaigns.geo_injection.coast import coast, kepler
-from campaigns.geo_injection.design import program_for
+from campaigns.geo_injection.design.coast import coast, kepler
+from campaigns.geo_injection.design.kept_programs import SEQUENCES
+from campaigns.geo_injection.design.powered_arc import fly_burns
+from campaigns.geo_injection.design.programs import program_for
 from campaigns.geo_injection.dynamics import direction, start
-from campaigns.geo_injection.kept_programs import SEQUENCES
-from campaigns.geo_injection.powered_arc import fly_burns
 
 ONE_METRE, TENTH_OF_A_MILLIMETRE_A_SECOND = 1.0, 1e-4
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from campaigns.reentry.airframe import airframe_of
 from campaigns.reentry.entry_state import entry_of, world_of
-from campaigns.reentry.plan import Plan, planned_entry, plans_of
+from campaigns.reentry.guidance.plan import Plan, planned_entry, plans_of
 from mc_engine.flight.flight import fly, fly_history
 from mc_engine.model import Refusals, load_model
 

@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from campaigns.reentry.autopilot import air_at, bank_command, pitch_gains
-from campaigns.reentry.autopilot_gains import STEEPEST, STEPS, bank_design, pitch_design, planned_profile
-from campaigns.reentry.bode_figure import bode_figure
-from campaigns.reentry.lead_compensator import Lead, crossover_of, design_lead, margins_of, short_period
+from campaigns.reentry.autopilot.bode_figure import bode_figure
+from campaigns.reentry.autopilot.gains import STEEPEST, STEPS, bank_design, pitch_design, planned_profile
+from campaigns.reentry.autopilot.lead_compensator import Lead, crossover_of, design_lead, margins_of, short_period
+from campaigns.reentry.autopilot.model import air_at, bank_command, pitch_gains
 from mc_engine.flight.flight import fly, fly_history, prepare, settings_of
 from mc_engine.model import load_model
 

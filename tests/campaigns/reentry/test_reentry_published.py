@@ -20,10 +20,10 @@ from reentry_flights import (
 )
 
 import campaigns.reentry
-from campaigns.reentry.apollo_final_phase import FLOWN
+from campaigns.reentry.autopilot.lead_compensator import design_lead, margins_of
 from campaigns.reentry.closed_forms import critical_roll_angle, glide_range, shallow_peak
 from campaigns.reentry.critical_trajectories import critical_periapses
-from campaigns.reentry.lead_compensator import design_lead, margins_of
+from campaigns.reentry.guidance.apollo_final_phase import FLOWN
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.physics.atmosphere import us76
 from mc_engine.statistics.binomial import lower_bound, smallest_sample

@@ -5,9 +5,9 @@ import pytest
 from reentry_flights import PLANAR, fly_one, history, plan_of
 from scipy.integrate import solve_ivp
 
-from campaigns.reentry import reference
-from campaigns.reentry.apollo_final_phase import FLOWN
-from campaigns.reentry.reference import (
+from campaigns.reentry.guidance import reference
+from campaigns.reentry.guidance.apollo_final_phase import FLOWN
+from campaigns.reentry.guidance.reference import (
     PROFILE_SET,
     RANGE_SET,
     Planner,
@@ -18,7 +18,7 @@ from campaigns.reentry.reference import (
     riccati_gains,
     steered_part,
 )
-from campaigns.reentry.reference_table import (
+from campaigns.reentry.guidance.reference_table import (
     LENGTH,
     RANGE,
     BySpeed,

@@ -7,7 +7,7 @@ from reentry_twin import standard_density
 from scipy.integrate import solve_ivp
 
 from campaigns.reentry.airframe import COEFFICIENTS
-from campaigns.reentry.reference import Planner, fly_reference
+from campaigns.reentry.guidance.reference import Planner, fly_reference
 from campaigns.reentry.vehicles import VEHICLES
 from mc_engine.physics.aerodynamics import over_mach
 

@@ -9,7 +9,7 @@ from collections import namedtuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from campaigns.geo_injection.coast import coast
+from campaigns.geo_injection.design.coast import coast
 
 # speed changes; inclination of the transfer orbit against the final one; semi-major axis; primer vector at the first
 # impulse and its rate

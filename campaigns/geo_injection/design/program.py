@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from campaigns.geo_injection.optimal import Solution
-from campaigns.geo_injection.sequence import DESIGN, Sequence
-from campaigns.geo_injection.staged import StagedBurn
+from campaigns.geo_injection.design.optimal import Solution
+from campaigns.geo_injection.design.sequence import DESIGN, Sequence
+from campaigns.geo_injection.design.staged import StagedBurn
 
 DEGREE = 11
 _LONGEST = 2.5  # canonical time of a segment: the fit is then good to 1e-7 rad
@@ -64,7 +64,7 @@ class Program:
 
 def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float) -> tuple[float, tuple[Segment, ...]]:
     """(largest error [rad], segments) of one burn from its canonical state at ignition."""
-    from campaigns.geo_injection.powered_arc import fly_burns  # imports numba
+    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
 
     problem = sequence.problem()
     count = max(1, int(np.ceil(duration / _LONGEST)))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from campaigns.geo_injection.coast import coast
+from campaigns.geo_injection.design.coast import coast
 
 SOLVED = 1e-11  # largest residual of a solution
 _STEP = 1e-6  # of the differences of the Jacobian, over unknowns of about one
@@ -72,7 +72,7 @@ class Solution:
 
 def switch_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     """States [n, 2 burns, 12] at the ignitions and cut-offs of n sets of unknowns [n, 6 + 2 burns]."""
-    from campaigns.geo_injection.powered_arc import fly_burns  # imports numba
+    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
 
     y = first_states(problem, unknowns)
     mass = np.ones(len(unknowns))

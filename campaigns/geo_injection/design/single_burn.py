@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from campaigns.geo_injection.coast import coast
-from campaigns.geo_injection.optimal import SOLVED, coast_hamiltonian
+from campaigns.geo_injection.design.coast import coast
+from campaigns.geo_injection.design.optimal import SOLVED, coast_hamiltonian
 from mc_engine.errors import ModelError
 
 Conditions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of place and velocity [n, 3], complex too: [n, m]
@@ -95,7 +95,7 @@ def orbit(a: float, e: float, inclination: float) -> Conditions:
 
 def _ends(stage: Stage, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States at ignition and cut-off of unknowns [n, ...]: primer vector, rate, duration, ignition, multipliers."""
-    from campaigns.geo_injection.powered_arc import fly_burns  # imports numba
+    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
 
     n = len(x)
     on_orbit = coast(np.concatenate([np.repeat(stage.reference[None], n, axis=0), np.ones((n, 6))], axis=1), x[:, 7])

@@ -1,13 +1,13 @@
 """The programs that are kept beside the campaign, in `programs/`: those of the source's sequences.
 
-`python -m campaigns.geo_injection.kept_programs` designs them again and writes them.
+`python -m campaigns.geo_injection.design.kept_programs` designs them again and writes them.
 """
 
 import numpy as np
 
-from campaigns.geo_injection.design import KEPT, new_design
-from campaigns.geo_injection.program import to_text
-from campaigns.geo_injection.sequence import Sequence, source_orbits
+from campaigns.geo_injection.design.program import to_text
+from campaigns.geo_injection.design.programs import KEPT, new_design
+from campaigns.geo_injection.design.sequence import Sequence, source_orbits
 from mc_engine.durable_file import make_folder, write_durably
 
 _ORBITS = 6_578_137.0, 42_164_137.0  # parking and final radius [m]

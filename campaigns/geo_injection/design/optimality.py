@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaigns.geo_injection.coast import coast
-from campaigns.geo_injection.optimal import Problem, Solution, coast_hamiltonian
+from campaigns.geo_injection.design.coast import coast
+from campaigns.geo_injection.design.optimal import Problem, Solution, coast_hamiltonian
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
@@ -27,7 +27,7 @@ class Arc:
 
 
 def _flown(problem: Problem, start: np.ndarray, mass: float, times: np.ndarray) -> np.ndarray:
-    from campaigns.geo_injection.powered_arc import fly_burns  # imports numba
+    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
 
     repeated = np.repeat(start[None], times.size, axis=0)
     return fly_burns(repeated, np.full(times.size, mass), times, problem.thrust, problem.flow)

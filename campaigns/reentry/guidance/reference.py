@@ -13,16 +13,16 @@ from typing import NamedTuple
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from campaigns.reentry import reference_table as table
 from campaigns.reentry.air import GAS_CONSTANT, sound_speed
-from campaigns.reentry.apollo_final_phase import influence_rows
 from campaigns.reentry.entry_state import ELLIPSOID
+from campaigns.reentry.guidance import reference_table as table
+from campaigns.reentry.guidance.apollo_final_phase import influence_rows
+from campaigns.reentry.guidance.plan import Plan
+from campaigns.reentry.guidance.reference_table import FELT, LAST_SPEED, STEERED
+from campaigns.reentry.guidance.vinh import gravity, rates
 from campaigns.reentry.inputs import GUIDANCE
-from campaigns.reentry.plan import Plan
 from campaigns.reentry.planets import PLANETS
-from campaigns.reentry.reference_table import FELT, LAST_SPEED, STEERED
 from campaigns.reentry.vehicles import VEHICLES
-from campaigns.reentry.vinh import gravity, rates
 from mc_engine.errors import ModelError
 from mc_engine.model import Refusals
 from mc_engine.physics.aerodynamics import axial_coefficient

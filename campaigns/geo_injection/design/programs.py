@@ -7,16 +7,16 @@ from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 
-from campaigns.geo_injection.continuation import optimum
-from campaigns.geo_injection.optimality import is_optimal
-from campaigns.geo_injection.program import Program, from_text, of_solution, of_stages, to_text
-from campaigns.geo_injection.sequence import Sequence
-from campaigns.geo_injection.staged import staged
+from campaigns.geo_injection.design.continuation import optimum
+from campaigns.geo_injection.design.optimality import is_optimal
+from campaigns.geo_injection.design.program import Program, from_text, of_solution, of_stages, to_text
+from campaigns.geo_injection.design.sequence import Sequence
+from campaigns.geo_injection.design.staged import staged
 from mc_engine.durable_file import make_folder, write_durably
 from mc_engine.errors import StoreError
 from mc_engine.flight.kernel import cache_folder
 
-KEPT = Path(__file__).with_name("programs")
+KEPT = Path(__file__).parents[1] / "programs"
 
 
 def new_design(sequence: Sequence) -> Program:

@@ -4,8 +4,8 @@ primer vector is as long at the end of the coast after it as at its start.  Cano
 
 import numpy as np
 
-from campaigns.geo_injection.coast import coast
-from campaigns.geo_injection.optimal import Problem, first_burn, first_states, local_axes, solve, switch_states
+from campaigns.geo_injection.design.coast import coast
+from campaigns.geo_injection.design.optimal import Problem, first_burn, first_states, local_axes, solve, switch_states
 
 _SHORT = 0.05  # first length of an added burn, and how it grows, over the burn that it relieves
 

@@ -8,11 +8,10 @@ command the vertical share u = cos(bank) of the lift; roll relative to the verti
 
 from collections import namedtuple
 
-from campaigns.reentry.apollo_final_phase import OVERCONTROL, REFERENCE_LIFT_TO_DRAG
 from campaigns.reentry.bank import followed, lateral_miss, side_of
 from campaigns.reentry.dynamics import Memory, exposure_of, place_of, speed2
-from campaigns.reentry.inputs import GUIDANCE
-from campaigns.reentry.reference_table import (
+from campaigns.reentry.guidance.apollo_final_phase import OVERCONTROL, REFERENCE_LIFT_TO_DRAG
+from campaigns.reentry.guidance.reference_table import (
     FELT,
     LAST_SPEED,
     STEERED,
@@ -22,6 +21,7 @@ from campaigns.reentry.reference_table import (
     by_speed,
     clocked_range,
 )
+from campaigns.reentry.inputs import GUIDANCE
 from mc_engine.lanes import acos, any_lane, asin, atan2, log, maximum, minimum, physics, sqrt, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.aerodynamics import axial_coefficient

@@ -1,4 +1,4 @@
-"""Bode diagram of the autopilot's pitch loop: `python -m campaigns.reentry.bode_figure bode.png`."""
+"""Bode diagram of the autopilot's pitch loop: `python -m campaigns.reentry.autopilot.bode_figure bode.png`."""
 
 import sys
 from typing import Any
@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from campaigns.reentry.autopilot import MODEL
-from campaigns.reentry.autopilot_gains import pitch_design
-from campaigns.reentry.lead_compensator import Lead, Response, margins_of
+from campaigns.reentry.autopilot.gains import pitch_design
+from campaigns.reentry.autopilot.lead_compensator import Lead, Response, margins_of
+from campaigns.reentry.autopilot.model import MODEL
 
 
 def bode_figure(loops: dict[str, tuple[Response, Response]]) -> Any:

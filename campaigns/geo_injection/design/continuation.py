@@ -11,9 +11,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from campaigns.geo_injection.added_burn import with_burn_ahead
-from campaigns.geo_injection.impulsive import propellant_share, two_impulses
-from campaigns.geo_injection.optimal import FIRST_PLACE, Instead, Problem, Solution, local_axes, solve, switch_states
+from campaigns.geo_injection.design.added_burn import with_burn_ahead
+from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
+from campaigns.geo_injection.design.optimal import (
+    FIRST_PLACE,
+    Instead,
+    Problem,
+    Solution,
+    local_axes,
+    solve,
+    switch_states,
+)
 from mc_engine.errors import ModelError
 
 LARGE_THRUST = 5.0  # over the first weight: burns are then short arcs

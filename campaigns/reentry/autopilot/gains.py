@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from campaigns.reentry.lead_compensator import Lead, Response, design_lead, short_period
-from campaigns.reentry.plan import default_plan
-from campaigns.reentry.reference import Planner, fly_reference
+from campaigns.reentry.autopilot.lead_compensator import Lead, Response, design_lead, short_period
+from campaigns.reentry.guidance.plan import default_plan
+from campaigns.reentry.guidance.reference import Planner, fly_reference
 
 SECONDS, STEPS, STEEPEST = 900, 48, 24e3  # rows of the profile; rows of the schedule, up to this pressure [Pa]
 # header: last second of the profile; gain, zero and pole of the bank loop

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.reentry.autopilot_gains import (
+from campaigns.reentry.autopilot.gains import (
     BANK_GAIN,
     BANK_POLE,
     BANK_ZERO,

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from campaigns.geo_injection.coast import coast
-from campaigns.geo_injection.optimal import Problem, parking_orbit
-from campaigns.geo_injection.single_burn import Burn, Stage, circle, fly_shortest, orbit, rise_guess
+from campaigns.geo_injection.design.coast import coast
+from campaigns.geo_injection.design.optimal import Problem, parking_orbit
+from campaigns.geo_injection.design.single_burn import Burn, Stage, circle, fly_shortest, orbit, rise_guess
 from mc_engine.errors import ModelError
 
 

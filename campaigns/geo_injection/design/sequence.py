@@ -6,8 +6,8 @@ from hashlib import sha256
 
 import numpy as np
 
-from campaigns.geo_injection.optimal import Problem
-from campaigns.geo_injection.staged import Orbit
+from campaigns.geo_injection.design.optimal import Problem
+from campaigns.geo_injection.design.staged import Orbit
 from mc_engine.physics.constants import MU_EARTH
 
 DESIGN = 1  # of the design's method: another number, and programs designed before are not taken for its own
