@@ -1,6 +1,5 @@
 """The servicing model as the engine sees it: inputs, what each case starts from, tables, and the MODEL record."""
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,10 +11,8 @@ from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, R0
 from campaigns.geo_servicing.first_state import first_states
 from campaigns.geo_servicing.inputs import GEOMETRIES, NAVIGATION, PARAMETERS, SETTINGS
 from campaigns.geo_servicing.phasing_plan import plan_of
-from campaigns.geo_servicing.plan_cache import remembered
 from mc_engine.errors import ModelError
-from mc_engine.flight.kernel import source_digest
-from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
+from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals, kept_design
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.physics.geopotential import COLUMNS, harmonics_rows, harmonics_table
 from mc_engine.physics.sun_moon import COLUMNS as SUN_MOON
@@ -116,9 +113,7 @@ def tables(o: Any) -> np.ndarray:
     if o.phase == PHASING:
         first, sun_moon = _nominal(o)
         behind = np.concatenate([plan, rows, sun_moon.ravel()])
-        inputs = np.concatenate([[getattr(o, one.symbol) for one in SETTINGS], list(vars(first).values()), behind])
-        sources = source_digest(replace(MODEL, reference="campaigns.geo_servicing"), None)
-        plan = remembered(inputs, sources, lambda: plan_of(o, behind, first))
+        plan = kept_design(plan_of, o, behind, first)
     return np.concatenate([plan, rows])
 
 

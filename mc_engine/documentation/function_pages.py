@@ -12,7 +12,7 @@ SECTIONS = {
     "engine": (
         "Campaigns, runs and their results",
         "runner.runner campaign.loading campaign.search campaign.cases store.store store.opening studies.opened_run "
-        "model.fields model.record model.figures studies.tuning studies.tuning_folder studies.comparison "
+        "model.fields model.record model.figures model.designs studies.tuning studies.tuning_folder studies.comparison "
         "studies.rare_event errors status",
     ),
     "random": (

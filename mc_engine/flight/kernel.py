@@ -7,15 +7,14 @@ the model's sources, the compiler's versions and the processor.  A changed sourc
 
 import os
 import platform
-import stat
 import sys
-import tempfile
 import threading
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
+from mc_engine.cache_folder import cache_folder
 from mc_engine.errors import DiskError
 from mc_engine.flight.kernel_parts import Functions, parts_of
 from mc_engine.model.fields import AdaptiveStep
@@ -88,45 +87,6 @@ def source_digest(model: Model, folder: Path | None) -> str:
     for name, content in sources_of(model, folder).named():
         digest.update(f"{name}\n{len(content)}\n".encode() + content)
     return digest.hexdigest()
-
-
-def cache_folder() -> Path:
-    """Folder of compiled kernels: MC_ENGINE_CACHE, or the user's cache folder, or a temporary one."""
-    if chosen := os.environ.get("MC_ENGINE_CACHE"):
-        return Path(chosen)
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "mc-engine"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass  # a read-only home: kernels are then compiled once per temporary folder
-    return _own_temporary_folder()
-
-
-def _own_temporary_folder() -> Path:
-    """A temporary folder of this user alone, since what stands in it is run."""
-    user = os.getuid() if hasattr(os, "getuid") else 0  # Windows has a temporary folder for every user
-    folder = Path(tempfile.gettempdir()) / f"mc-engine-{user}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        about = folder.lstat()
-        if not hasattr(os, "getuid") or (about.st_uid == user and stat.S_ISDIR(about.st_mode)):
-            return folder
-    except OSError:
-        pass  # somebody else's file has the name
-    return _temporary_folder_of_this_process()
-
-
-@cache
-def _temporary_folder_of_this_process() -> Path:
-    return Path(tempfile.mkdtemp(prefix="mc-engine-"))
 
 
 def usual_width(model: Model) -> int:

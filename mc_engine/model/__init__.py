@@ -1,5 +1,6 @@
 """What a model is: the names that a model file imports."""
 
+from mc_engine.model.designs import kept_design
 from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedStep, Named, Parameter, Setting
 from mc_engine.model.figures import (
     CorridorFigure,
@@ -28,5 +29,6 @@ __all__ = [
     "Refusals",
     "ScatterFigure",
     "Setting",
+    "kept_design",
     "load_model",
 ]

@@ -8,7 +8,6 @@ import numpy as np
 from campaigns.geo_injection.design.program import to_text
 from campaigns.geo_injection.design.programs import KEPT, new_design
 from campaigns.geo_injection.design.sequence import Sequence, source_orbits
-from mc_engine.durable_file import make_folder, write_durably
 
 _ORBITS = 6_578_137.0, 42_164_137.0  # parking and final radius [m]
 _ENGINE = 20_000.0, 6.14, 22_170.0  # thrust [N], mass flow [kg/s], mass [kg]
@@ -33,9 +32,9 @@ SEQUENCES = {
 
 def write_all() -> None:
     """Design every sequence and write its file."""
-    make_folder(KEPT)
+    KEPT.mkdir(exist_ok=True)
     for name, sequence in SEQUENCES.items():
-        write_durably(KEPT / f"{name}.toml", to_text(new_design(sequence)).encode())
+        (KEPT / f"{name}.toml").write_text(to_text(new_design(sequence)), encoding="utf-8", newline="\n")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
 """What a burn program is designed for: the orbits, the engine and the method, in SI; and its canonical problem."""
 
-import json
 from dataclasses import asdict, dataclass
-from hashlib import sha256
 
 import numpy as np
 
@@ -10,7 +8,7 @@ from campaigns.geo_injection.design.optimal import Problem
 from campaigns.geo_injection.design.staged import Orbit
 from mc_engine.physics.constants import MU_EARTH
 
-DESIGN = 1  # of the design's method: another number, and programs designed before are not taken for its own
+DESIGN = 1  # of the method and the file: programs with another number are not taken for its own
 
 
 @dataclass(frozen=True)
@@ -83,10 +81,6 @@ class Sequence:
     def record(self) -> dict[str, object]:
         """The inputs as plain data."""
         return {**asdict(self), "between": [list(row) for row in self.between]}
-
-    def digest(self) -> str:
-        """SHA-256 over the inputs and the design's number."""
-        return sha256(json.dumps([DESIGN, self.record()], sort_keys=True).encode()).hexdigest()
 
 
 def source_orbits(burns: int, plane_change: float) -> tuple[tuple[float, float, float], ...]:
