@@ -46,7 +46,10 @@ BURNING = 1.0
 @physics
 def initial(p, o):
     """State just after the burn."""
-    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz, p.f_desired, 0.0, 0.0)
+    return State(
+        x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz,
+        f_desired=p.f_desired, impulse=0.0, filtered=0.0,
+    )  # fmt: skip
 
 
 @physics
@@ -69,8 +72,11 @@ def inverse(first, scale):
 def start(p, o):
     """Navigation errors are the constant ones until the first fix; the thruster is off."""
     a, e, omega = element_errors(initial(p, o), p)
-    scales = inverse(a, p.a), inverse(e, 1.0), inverse(omega, 1.0)
-    return Memory(p.bias_r, p.bias_t, p.bias_n, p.bias_vr, p.bias_vt, p.bias_vn, 0.0, 0.0, *scales)
+    return Memory(
+        r_r=p.bias_r, r_t=p.bias_t, r_n=p.bias_n, v_r=p.bias_vr, v_t=p.bias_vt, v_n=p.bias_vn,
+        on=0.0, pulses=0.0,
+        a_scale=inverse(a, p.a), e_scale=inverse(e, 1.0), omega_scale=inverse(omega, 1.0),
+    )  # fmt: skip
 
 
 @physics
@@ -84,7 +90,11 @@ def fix_position(t, s, m, p, o, draws):
         n5, n6 = normal_pair(draws, 2)
     r_r, r_t, r_n = p.bias_r + k * n1, p.bias_t + k * n2, p.bias_n + k * n3
     v_r, v_t, v_n = p.bias_vr + w * n4, p.bias_vt + w * n5, p.bias_vn + w * n6
-    return Memory(r_r, r_t, r_n, v_r, v_t, v_n, m.on, m.pulses, m.a_scale, m.e_scale, m.omega_scale)
+    return Memory(
+        r_r=r_r, r_t=r_t, r_n=r_n, v_r=v_r, v_t=v_t, v_n=v_n,
+        on=m.on, pulses=m.pulses,
+        a_scale=m.a_scale, e_scale=m.e_scale, omega_scale=m.omega_scale,
+    )  # fmt: skip
 
 
 @physics
@@ -99,22 +109,22 @@ def desired_motion(f, p):
     v_r, v_t = h * (p.e / p.p) * s, h * u  # (34)
     g = -MU_EARTH * (u * u)  # (35)
     return Desired(
-        r * rx,
-        r * ry,
-        r * rz,
-        v_r * rx + v_t * tx,
-        v_r * ry + v_t * ty,
-        v_r * rz + v_t * tz,
-        g * rx,
-        g * ry,
-        g * rz,
-        rx,
-        ry,
-        rz,
-        tx,
-        ty,
-        tz,
-        h * (u * u),  # (33)
+        x=r * rx,
+        y=r * ry,
+        z=r * rz,
+        vx=v_r * rx + v_t * tx,
+        vy=v_r * ry + v_t * ty,
+        vz=v_r * rz + v_t * tz,
+        ax=g * rx,
+        ay=g * ry,
+        az=g * rz,
+        rx=rx,
+        ry=ry,
+        rz=rz,
+        tx=tx,
+        ty=ty,
+        tz=tz,
+        rate=h * (u * u),  # (33)
     )
 
 
@@ -239,15 +249,15 @@ def rhs(t, s, m, p, o):
     else:
         filtered = 0.0 * size
     return State(
-        s.vx,
-        s.vy,
-        s.vz,
-        gx - d.ax + ax + k * fx,
-        gy - d.ay + ay + k * fy,
-        gz - d.az + az + k * fz,
-        d.rate,
-        force * inverse_mass,
-        filtered,
+        x=s.vx,
+        y=s.vy,
+        z=s.vz,
+        vx=gx - d.ax + ax + k * fx,
+        vy=gy - d.ay + ay + k * fy,
+        vz=gz - d.az + az + k * fz,
+        f_desired=d.rate,
+        impulse=force * inverse_mass,
+        filtered=filtered,
     )
 
 
@@ -265,7 +275,11 @@ def switch(t, s, m, p, o, hit):
     """The trigger turns: on counts a pulse."""
     on = where(hit.pulse_on > 0.5, 1.0, where(hit.pulse_off > 0.5, 0.0, m.on))
     pulses = m.pulses + where(hit.pulse_on > 0.5, 1.0, 0.0)
-    return s, Memory(m.r_r, m.r_t, m.r_n, m.v_r, m.v_t, m.v_n, on, pulses, m.a_scale, m.e_scale, m.omega_scale)
+    return s, Memory(
+        r_r=m.r_r, r_t=m.r_t, r_n=m.r_n, v_r=m.v_r, v_t=m.v_t, v_n=m.v_n,
+        on=on, pulses=pulses,
+        a_scale=m.a_scale, e_scale=m.e_scale, omega_scale=m.omega_scale,
+    )  # fmt: skip
 
 
 @physics

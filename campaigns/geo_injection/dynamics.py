@@ -14,15 +14,16 @@ from mc_engine.physics.constants import MU_EARTH
 from mc_engine.physics.gravity import point_mass
 
 State = namedtuple("State", "x y z vx vy vz mass")  # m, m/s, kg
-# phase; burn and segment, counted from 0; until: time at which the phase ends; segment_end; middle, rate: of the
-# steering's argument s; mass_ignited; sensed: speed change at which a burn is shut down; what re-aims the last burn
-# (its thrust direction, stretch of its duration); tangents of the pointing errors; burn-out times so far; steering
+# steering of the segment; phase; burn and segment, counted from 0; until: time at which the phase ends [s];
+# segment_end [s]; middle, rate: of the steering's argument s; mass_ignited [kg]; sensed: speed change at which a burn
+# is shut down [m/s]; what re-aims the last burn (its thrust direction, stretch of its duration); tangents of the
+# pointing errors; time of the last ignition and burn-out times so far [s]
 Memory = namedtuple(  # type: ignore[misc]
     "Memory",
     (
+        *TERM_NAMES,
         "phase", "burn", "segment", "until", "segment_end", "middle", "rate", "mass_ignited", "sensed",
         "aim_x", "aim_y", "aim_z", "stretch", "pitch", "yaw", "ignited", "burn_out_1", "burn_out_2",
-        *TERM_NAMES,
     ),
 )  # fmt: skip
 Parameters = namedtuple(
@@ -135,16 +136,22 @@ def _of_burn(burn, first, second, third):
 def _memory(phase, burn, segment, until, ignited, mass_ignited, sensed, aim, out_1, out_2, p, o):
     """Memory with the steering of the segment."""
     row = segment_row(o.tables, segment)
-    steering = steering_row(o.tables, segment)
+    c = steering_row(o.tables, segment)
     if o.guidance > OPEN_LOOP:
-        steering = turned(steering, aim, o)
+        c = turned(c, aim, o)
     half = 0.5 * row.length * aim.stretch
     after = ignited + row.start * aim.stretch
     end = where(row.more > 0.5, after + 2.0 * half, 1e300)
     pitch, yaw = _of_burn(burn, p.pitch_1, p.pitch_2, p.pitch_3), _of_burn(burn, p.yaw_1, p.yaw_2, p.yaw_3)
     return Memory(
-        phase, burn, segment, until, end, after + half, 1.0 / half, mass_ignited, sensed,
-        aim.x, aim.y, aim.z, aim.stretch, pitch, yaw, ignited, out_1, out_2, *steering,
+        x0=c[0], x1=c[1], x2=c[2], x3=c[3], x4=c[4], x5=c[5], x6=c[6], x7=c[7], x8=c[8], x9=c[9], x10=c[10], x11=c[11],
+        y0=c[12], y1=c[13], y2=c[14], y3=c[15], y4=c[16], y5=c[17], y6=c[18], y7=c[19], y8=c[20], y9=c[21], y10=c[22],
+        y11=c[23],
+        z0=c[24], z1=c[25], z2=c[26], z3=c[27], z4=c[28], z5=c[29], z6=c[30], z7=c[31], z8=c[32], z9=c[33], z10=c[34],
+        z11=c[35],
+        phase=phase, burn=burn, segment=segment, until=until, segment_end=end, middle=after + half, rate=1.0 / half,
+        mass_ignited=mass_ignited, sensed=sensed, aim_x=aim.x, aim_y=aim.y, aim_z=aim.z, stretch=aim.stretch,
+        pitch=pitch, yaw=yaw, ignited=ignited, burn_out_1=out_1, burn_out_2=out_2,
     )  # fmt: skip
 
 

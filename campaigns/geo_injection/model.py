@@ -41,10 +41,22 @@ def sequence_of(o: Any) -> Sequence:
         of_source = source_orbits(burns, abs(initial - final))
         between = tuple(_transfer(o, k, row) for k, row in enumerate(of_source, start=1))
     radius = WGS84_RADIUS + float(o.parking_altitude)
-    engine = float(o.thrust), float(o.mass_flow), float(o.initial_mass)
     e = float(o.parking_eccentricity)
     perigee = float(o.parking_argument_of_perigee) if e > 0.0 else 0.0  # a circle has none
-    return Sequence(method, burns, initial, final, radius, float(o.final_radius), *engine, between, e, perigee)
+    return Sequence(
+        method=method,
+        burns=burns,
+        initial_inclination=initial,
+        final_inclination=final,
+        parking_radius=radius,
+        final_radius=float(o.final_radius),
+        thrust=float(o.thrust),
+        mass_flow=float(o.mass_flow),
+        mass=float(o.initial_mass),
+        between=between,
+        parking_eccentricity=e,
+        parking_perigee=perigee,
+    )
 
 
 def _transfer(o: Any, k: int, of_source: tuple[float, float, float]) -> tuple[float, float, float]:

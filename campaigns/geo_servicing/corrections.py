@@ -27,6 +27,8 @@ from mc_engine.physics.sun_moon import ephemeris
 Events = namedtuple("Events", "due settle penumbra umbra")
 # push: commanded thrust ahead [N]; tilts: sines of the pointing errors outward and to the normal
 Burn = namedtuple("Burn", "dv length outward ahead across")
+# as the memory's end_... and day_...
+TransferEnd = namedtuple("TransferEnd", "time true mean drift e inclination sum day_mean day_drift")
 IGNITION, CUT_OFF, DECISION, DAY_LATER, NOTHING = 0.0, 1.0, 2.0, 3.0, 4.0
 NEVER = 1e15  # s
 FIRST_LOOK = 1.0  # s: the inspection decides first when the first fix is there
@@ -48,10 +50,12 @@ def start(p, o):
         due, mode = zero + maximum(o.observation, FIRST_LOOK), zero + DECISION
     gone = zero + MISSING
     return Memory(
-        due, mode, zero, zero, zero, zero, zero, zero, zero,
-        gone, gone, gone, gone, gone, gone, gone, gone, gone,
-        zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero,
-        zero, zero, zero, zero,
+        due=due, mode=mode, burns=zero, outward=zero, ahead=zero, across=zero, dv=zero, settled=zero, second=zero,
+        end_time=gone, end_true=gone, end_mean=gone, end_drift=gone, end_e=gone, end_inclination=gone, end_sum=gone,
+        day_mean=gone, day_drift=gone,
+        r=zero, s=zero, u=zero, w=zero, prr=zero, prs=zero, pru=zero, prw=zero, pss=zero, psu=zero, psw=zero, puu=zero,
+        puw=zero, pww=zero, after_r=zero, after_s=zero, after_u=zero,
+        after_w=zero, d1=zero, d2=zero, d3=zero,
     )  # fmt: skip
 
 
@@ -159,8 +163,9 @@ def learnt(m, p, o, cut):
 def fixed_anew(e, m, cut):
     """A fix of its own where `cut` holds: what is decided after a burn does not share the errors of its ignition."""
     return Estimate(
-        where(cut, m.after_r, e.r), where(cut, m.after_s, e.s), where(cut, m.after_u, e.u), where(cut, m.after_w, e.w),
-        e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww,
+        r=where(cut, m.after_r, e.r), s=where(cut, m.after_s, e.s), u=where(cut, m.after_u, e.u),
+        w=where(cut, m.after_w, e.w),
+        prr=e.prr, prs=e.prs, pru=e.pru, prw=e.prw, pss=e.pss, psu=e.psu, psw=e.psw, puu=e.puu, puw=e.puw, pww=e.pww,
     )  # fmt: skip
 
 
@@ -208,11 +213,15 @@ def switch(t, s, m, p, o, hit):
         across = where(ignite, burn.across, across)
     end = ended(t, s, m, p, over, day)
     return s, Memory(
-        due, mode, m.burns + where(cut, 1.0, 0.0),
-        where(cut, 0.0, outward), where(cut, 0.0, ahead), where(cut, 0.0, across), dv,
-        where(hit.settle > 0.5, 1.0, m.settled), second, *end,
-        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww,
-        m.after_r, m.after_s, m.after_u, m.after_w, m.d1, m.d2, m.d3,
+        due=due, mode=mode, burns=m.burns + where(cut, 1.0, 0.0),
+        outward=where(cut, 0.0, outward), ahead=where(cut, 0.0, ahead), across=where(cut, 0.0, across), dv=dv,
+        settled=where(hit.settle > 0.5, 1.0, m.settled), second=second,
+        end_time=end.time, end_true=end.true, end_mean=end.mean, end_drift=end.drift, end_e=end.e,
+        end_inclination=end.inclination, end_sum=end.sum,
+        day_mean=end.day_mean, day_drift=end.day_drift,
+        r=e.r, s=e.s, u=e.u, w=e.w, prr=e.prr, prs=e.prs, pru=e.pru, prw=e.prw, pss=e.pss, psu=e.psu, psw=e.psw,
+        puu=e.puu, puw=e.puw, pww=e.pww,
+        after_r=m.after_r, after_s=m.after_s, after_u=m.after_u, after_w=m.after_w, d1=m.d1, d2=m.d2, d3=m.d3,
     )  # fmt: skip
 
 
@@ -221,14 +230,14 @@ def ended(t, s, m, p, over, day):
     """What is kept of the transfer's end: at the last cut-off, and a sidereal day later."""
     true, mean, x = longitudes(t, s, p)
     e, tilt = sqrt(x.k * x.k + x.h * x.h), 2.0 * atan(sqrt(x.q * x.q + x.p * x.p))
-    return (
-        where(over, t, m.end_time),
-        where(over, true, m.end_true),
-        where(over, mean, m.end_mean),
-        where(over, drift_of(x.a), m.end_drift),
-        where(over, e, m.end_e),
-        where(over, tilt, m.end_inclination),
-        where(over, s.longitude_sum, m.end_sum),
-        where(day, (s.longitude_sum - m.end_sum) / SIDEREAL_DAY, m.day_mean),
-        where(day, mean - m.end_mean, m.day_drift),
+    return TransferEnd(
+        time=where(over, t, m.end_time),
+        true=where(over, true, m.end_true),
+        mean=where(over, mean, m.end_mean),
+        drift=where(over, drift_of(x.a), m.end_drift),
+        e=where(over, e, m.end_e),
+        inclination=where(over, tilt, m.end_inclination),
+        sum=where(over, s.longitude_sum, m.end_sum),
+        day_mean=where(day, (s.longitude_sum - m.end_sum) / SIDEREAL_DAY, m.day_mean),
+        day_drift=where(day, mean - m.end_mean, m.day_drift),
     )

@@ -59,7 +59,11 @@ PHASING, INSPECTION = 0.0, 1.0
 @physics
 def initial(p, o):
     """State at the epoch."""
-    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz, p.mass, p.tx, p.ty, p.tz, p.tvx, p.tvy, p.tvz, 0.0)
+    return State(
+        x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz, mass=p.mass,
+        tx=p.tx, ty=p.ty, tz=p.tz, tvx=p.tvx, tvy=p.tvy, tvz=p.tvz,
+        longitude_sum=0.0,
+    )  # fmt: skip
 
 
 @physics
@@ -127,10 +131,15 @@ def rhs(t, s, m, p, o):
         flow = -push(m) / p.exhaust
     if o.phase == INSPECTION:
         bx, by, bz = field(t, s.tx, s.ty, s.tz, sun, moon, p.target_light, p, o)
-        other, away = (s.tvx, s.tvy, s.tvz, bx, by, bz), zero
+        ux, uy, uz, away = s.tvx, s.tvy, s.tvz, zero
     else:
-        other, away = (zero, zero, zero, zero, zero, zero), true_deviation(t, s, p)
-    return State(s.vx, s.vy, s.vz, ax, ay, az, flow, *other, away)
+        ux, uy, uz, bx, by, bz = zero, zero, zero, zero, zero, zero
+        away = true_deviation(t, s, p)
+    return State(
+        x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az, mass=flow,
+        tx=ux, ty=uy, tz=uz, tvx=bx, tvy=by, tvz=bz,
+        longitude_sum=away,
+    )  # fmt: skip
 
 
 @physics

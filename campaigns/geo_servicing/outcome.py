@@ -125,24 +125,24 @@ def observe(t, s, m, p, o):
     pair = pair_of(s, m, p, o)
     settled = m.settled > 0.5
     return Quantities(
-        true,
-        mean,
-        drift,
-        period_error(drift),
-        sqrt(x.k * x.k + x.h * x.h),
-        inclination_of(x),
-        m.ahead,
-        p.exhaust * log(p.mass / s.mass),
-        pair.along,
-        pair.radial,
-        pair.range,
-        where(settled, pair.range, 0.0),
-        where(settled, -pair.range, -FAR),
-        where(settled, pair.along, float("nan")),
-        where(settled, pair.radial, float("nan")),
-        pair.drift,
-        pair.e,
-        m.burns,
+        longitude_deviation=true,
+        mean_longitude_deviation=mean,
+        drift_rate=drift,
+        period_error=period_error(drift),
+        eccentricity=sqrt(x.k * x.k + x.h * x.h),
+        inclination=inclination_of(x),
+        thrust=m.ahead,
+        delta_v=p.exhaust * log(p.mass / s.mass),
+        along_track=pair.along,
+        radial=pair.radial,
+        range=pair.range,
+        settled_range=where(settled, pair.range, 0.0),
+        settled_nearness=where(settled, -pair.range, -FAR),
+        settled_along_track=where(settled, pair.along, float("nan")),
+        settled_radial=where(settled, pair.radial, float("nan")),
+        relative_drift=pair.drift,
+        relative_eccentricity=pair.e,
+        corrections=m.burns,
     )
 
 
@@ -154,32 +154,43 @@ def evaluate(t, s, m, p, o, best, when):
     final_e = sqrt(x.k * x.k + x.h * x.h)
     pair = pair_of(s, m, p, o)
     phasing, two = o.phase == PHASING, o.phase == INSPECTION
-    end = (m.end_true, m.end_mean, m.end_drift, m.end_e, m.end_inclination)
+    end_true, end_mean, end_drift, end_e, end_inclination = (
+        m.end_true,
+        m.end_mean,
+        m.end_drift,
+        m.end_e,
+        m.end_inclination,
+    )
     if not phasing:  # no transfer: where the module is at the end of the flight
-        end = (true, mean, drift_of(x.a), final_e, inclination_of(x))
+        end_true, end_mean, end_drift, end_e, end_inclination = true, mean, drift_of(x.a), final_e, inclination_of(x)
     settled_near, settled_far = -best.settled_near, best.settled_far
     steady = (m.settled > 0.5) & (settled_near >= o.range_low) & (settled_far <= o.range_high)
+    steady = where(steady, 1.0, 0.0)
+    near, far, relative_e, relative_drift = best.near, best.far, pair.e, pair.drift
+    if not two:  # no second craft
+        near, far, relative_e, relative_drift = gone + true, gone + true, gone + true, gone + true
+        settled_near, settled_far, steady = gone + true, gone + true, gone + true
     return Metrics(
-        end[0],
-        end[1],
-        m.day_mean,
-        end[2],
-        m.day_drift,
-        period_error(end[2]),
-        period_error(m.day_drift),
-        end[3],
-        best.eccentricity,
-        end[4],
-        p.exhaust * log(p.mass / s.mass),
-        m.end_time,
-        m.burns,
-        true,
-        final_e,
-        best.near if two else gone + true,
-        best.far if two else gone + true,
-        settled_near if two else gone + true,
-        settled_far if two else gone + true,
-        pair.e if two else gone + true,
-        pair.drift if two else gone + true,
-        where(steady, 1.0, 0.0) if two else gone + true,
+        longitude_deviation=end_true,
+        mean_longitude_deviation=end_mean,
+        daily_mean_longitude_deviation=m.day_mean,
+        drift_rate=end_drift,
+        actual_drift_rate=m.day_drift,
+        period_error=period_error(end_drift),
+        actual_period_error=period_error(m.day_drift),
+        eccentricity=end_e,
+        peak_eccentricity=best.eccentricity,
+        inclination=end_inclination,
+        delta_v=p.exhaust * log(p.mass / s.mass),
+        transfer_time=m.end_time,
+        corrections=m.burns,
+        final_longitude_deviation=true,
+        final_eccentricity=final_e,
+        min_range=near,
+        max_range=far,
+        settled_min_range=settled_near,
+        settled_max_range=settled_far,
+        relative_eccentricity=relative_e,
+        relative_drift=relative_drift,
+        steady=steady,
     )

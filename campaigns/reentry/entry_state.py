@@ -123,19 +123,19 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
     position = radius * up
     # minus zero would fly to other bits than zero does
     return Entry(
-        np.where(world.flat, _flat_place(radius - world.polar_radius), position) + 0.0,
-        np.where(world.flat, _flat_velocity(components, heading), velocity) + 0.0,
-        place,
-        ahead,
-        np.cross(ahead, place, axis=0),
-        altitude,
-        np.sqrt((components**2).sum(axis=0)),
-        np.arctan2(components[2], np.hypot(components[0], components[1])),
-        heading,
-        planned_radius,
-        planned_latitude,
-        np.sqrt((planned**2).sum(axis=0)),
-        np.arctan2(planned[2], level),
+        position=np.where(world.flat, _flat_place(radius - world.polar_radius), position) + 0.0,
+        velocity=np.where(world.flat, _flat_velocity(components, heading), velocity) + 0.0,
+        place=place,
+        ahead=ahead,
+        right=np.cross(ahead, place, axis=0),
+        altitude=altitude,
+        speed=np.sqrt((components**2).sum(axis=0)),
+        path=np.arctan2(components[2], np.hypot(components[0], components[1])),
+        heading=heading,
+        radius=planned_radius,
+        latitude=planned_latitude,
+        planned_speed=np.sqrt((planned**2).sum(axis=0)),
+        planned_path=np.arctan2(planned[2], level),
     )
 
 

@@ -9,14 +9,19 @@ from campaigns.geo_injection.design.program import to_text
 from campaigns.geo_injection.design.programs import KEPT, new_design
 from campaigns.geo_injection.design.sequence import Sequence, source_orbits
 
-_ORBITS = 6_578_137.0, 42_164_137.0  # parking and final radius [m]
-_ENGINE = 20_000.0, 6.14, 22_170.0  # thrust [N], mass flow [kg/s], mass [kg]
+PARKING_RADIUS, FINAL_RADIUS = 6_578_137.0, 42_164_137.0  # m: eq. (12) of the source
+# N, kg/s, kg: the mass by eq. (12); thrust and mass flow are not printed and follow from tables 2 to 8
+THRUST, MASS_FLOW, MASS = 20_000.0, 6.14, 22_170.0
 
 
 def _sequence(burns: int, degrees: float, method: str = "optimal") -> Sequence:
     change = float(np.radians(degrees))
     between = source_orbits(burns, change) if method == "staged" else ()
-    return Sequence(method, burns, change, 0.0, *_ORBITS, *_ENGINE, between)
+    return Sequence(
+        method=method, burns=burns, initial_inclination=change, final_inclination=0.0,
+        parking_radius=PARKING_RADIUS, final_radius=FINAL_RADIUS, thrust=THRUST, mass_flow=MASS_FLOW, mass=MASS,
+        between=between,
+    )  # fmt: skip
 
 
 SEQUENCES = {

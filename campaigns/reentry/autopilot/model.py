@@ -70,7 +70,18 @@ def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -
 def initial(p, o):
     """At entry, compensators at rest."""
     zero = 0.0 * p.alpha
-    return State(p.alpha, p.alpha_rate, p.bank, zero, zero, zero, zero, zero, zero, zero)
+    return State(
+        alpha=p.alpha,
+        alpha_rate=p.alpha_rate,
+        bank=p.bank,
+        bank_rate=zero,
+        lead_alpha=zero,
+        lead_bank=zero,
+        alpha_square=zero,
+        bank_square=zero,
+        impulse=zero,
+        limited=zero,
+    )
 
 
 @physics
@@ -129,16 +140,16 @@ def rhs(t, s, m, p, o):
     pitch, roll, error, lead_alpha, lead_bank, limited = torques(t, s, p, o, pressure)
     air = pressure * (p.moment * (s.alpha - p.offset) + p.damping * s.alpha_rate / speed)
     return State(
-        s.alpha_rate,
-        air + pitch * p.inverse_pitch,
-        s.bank_rate,
-        pressure * p.roll_moment + roll * p.inverse_roll,
-        lead_alpha,
-        lead_bank,
-        s.alpha * s.alpha,
-        error * error,
-        abs(pitch) + abs(roll),
-        limited,
+        alpha=s.alpha_rate,
+        alpha_rate=air + pitch * p.inverse_pitch,
+        bank=s.bank_rate,
+        bank_rate=pressure * p.roll_moment + roll * p.inverse_roll,
+        lead_alpha=lead_alpha,
+        lead_bank=lead_bank,
+        alpha_square=s.alpha * s.alpha,
+        bank_square=error * error,
+        impulse=abs(pitch) + abs(roll),
+        limited=limited,
     )
 
 
@@ -156,15 +167,15 @@ def observe(t, s, m, p, o):
 def evaluate(t, s, m, p, o, best, when):
     """The metrics in the order of METRICS."""
     return Metrics(
-        best.alpha,
-        when.alpha,
-        when.late,
-        sqrt(s.alpha_square / t),
-        best.bank,
-        sqrt(s.bank_square / t),
-        s.impulse,
-        s.limited / t,
-        s.alpha,
+        peak_alpha=best.alpha,
+        peak_alpha_time=when.alpha,
+        late_alpha_time=when.late,
+        alpha_rms=sqrt(s.alpha_square / t),
+        peak_bank_error=best.bank,
+        bank_rms=sqrt(s.bank_square / t),
+        impulse=s.impulse,
+        limited=s.limited / t,
+        final_alpha=s.alpha,
     )
 
 

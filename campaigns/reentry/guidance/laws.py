@@ -57,15 +57,16 @@ def sensed(s, p, o, draws):
     if any_lane(p.accelerometer_noise > 0.0):
         wrong = wrong + p.accelerometer_noise * normal_pair(draws, 0)[0]
     return Sensed(
-        v + p.nav_speed,
-        altitude + p.nav_altitude,
-        asin(bounded(sine, 1.0)) + p.nav_path,
-        p.radius * atan2(ahead, up) + p.nav_range,
-        place.climb + p.nav_climb,
-        stretch * (pressure * axial_coefficient(force.drag, force.lift, p.cos_misaligned, p.sin_misaligned)) + wrong,
-        stretch * (pressure * force.sensed) + wrong,
-        force.total / force.axial,
-        force.total / force.drag,
+        speed=v + p.nav_speed,
+        altitude=altitude + p.nav_altitude,
+        path=asin(bounded(sine, 1.0)) + p.nav_path,
+        along=p.radius * atan2(ahead, up) + p.nav_range,
+        climb=place.climb + p.nav_climb,
+        drag=stretch * (pressure * axial_coefficient(force.drag, force.lift, p.cos_misaligned, p.sin_misaligned))
+        + wrong,
+        axial=stretch * (pressure * force.sensed) + wrong,
+        load_by_axial=force.total / force.axial,
+        load_by_drag=force.total / force.drag,
     )
 
 
@@ -169,15 +170,17 @@ def steer(t, s, m, p, o, draws):
     next_bank, next_rate = followed(bank, rate, command, p.bank_lag, p.bank_rate_limit, o.guidance_period)
     bank = where(p.bank_lag > 0.0, bank, next_bank)  # at once
     return Memory(
-        m.pressure, m.pressure_time, m.pressure_altitude, m.pressure_speed, m.pressure_total, m.pressure_axial,
-        m.flux, m.flux_time, m.flux_altitude, m.flux_speed,
-        m.low, m.low_time, m.cos_bank, m.sin_bank, m.rolls,
-        m.exits, m.exit_time, m.exit_speed, m.exit_angle, m.exit_inertial, m.exit_apoapsis,
-        t, bank, rate, next_bank, next_rate, side, active,
-        kept.lost, kept.range, kept.rate, kept.axial, kept.excess,
-        m.samples + where(working, 1.0, 0.0),
-        m.saturated + where(working & (share != inside), 1.0, 0.0),
-        m.reversals + where(side != m.side, 1.0, 0.0),
+        pressure=m.pressure, pressure_time=m.pressure_time, pressure_altitude=m.pressure_altitude,
+        pressure_speed=m.pressure_speed, pressure_total=m.pressure_total, pressure_axial=m.pressure_axial,
+        flux=m.flux, flux_time=m.flux_time, flux_altitude=m.flux_altitude, flux_speed=m.flux_speed,
+        low=m.low, low_time=m.low_time, cos_bank=m.cos_bank, sin_bank=m.sin_bank, rolls=m.rolls,
+        exits=m.exits, exit_time=m.exit_time, exit_speed=m.exit_speed, exit_angle=m.exit_angle,
+        exit_inertial=m.exit_inertial, exit_apoapsis=m.exit_apoapsis,
+        sampled=t, bank=bank, bank_rate=rate, next_bank=next_bank, next_rate=next_rate, side=side, active=active,
+        lost=kept.lost, reckoned=kept.range, range_rate=kept.rate, axial=kept.axial, excess=kept.excess,
+        samples=m.samples + where(working, 1.0, 0.0),
+        saturated=m.saturated + where(working & (share != inside), 1.0, 0.0),
+        reversals=m.reversals + where(side != m.side, 1.0, 0.0),
     )  # fmt: skip
 
 

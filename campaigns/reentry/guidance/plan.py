@@ -57,24 +57,26 @@ def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planne
     numbers = given & (settings.vehicle < 0.5)  # one of vehicles.py brings its own
     drag = airframe.area * airframe.drag_coefficient / airframe.mass
     return Plan(
-        _LAW[settings.guidance.astype(int)],
-        settings.planet,
-        settings.shape,
-        settings.gravity,
-        settings.rotating,
-        settings.atmosphere,
-        settings.vehicle,
-        world.radius,
-        planned.radius,
-        planned.latitude,
-        planned.planned_speed,
-        planned.planned_path,
-        planned.heading,
-        np.where(numbers, 1.0 / settings.plan_ballistic_coefficient, drag),
-        np.where(numbers, settings.plan_lift_to_drag, airframe.lift_coefficient / airframe.drag_coefficient),
-        np.where(numbers, settings.plan_trim_angle, airframe.trim),
-        np.cos(np.where(given, settings.plan_bank, i.bank)),
-        settings.plan_stop_altitude,
+        law=_LAW[settings.guidance.astype(int)],
+        planet=settings.planet,
+        shape=settings.shape,
+        gravity=settings.gravity,
+        rotating=settings.rotating,
+        atmosphere=settings.atmosphere,
+        vehicle=settings.vehicle,
+        ground=world.radius,
+        radius=planned.radius,
+        latitude=planned.latitude,
+        speed=planned.planned_speed,
+        path=planned.planned_path,
+        heading=planned.heading,
+        drag=np.where(numbers, 1.0 / settings.plan_ballistic_coefficient, drag),
+        lift_to_drag=np.where(
+            numbers, settings.plan_lift_to_drag, airframe.lift_coefficient / airframe.drag_coefficient
+        ),
+        trim=np.where(numbers, settings.plan_trim_angle, airframe.trim),
+        share=np.cos(np.where(given, settings.plan_bank, i.bank)),
+        end=settings.plan_stop_altitude,
     )
 
 

@@ -152,7 +152,18 @@ def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
     altitude, slope = planner.height(r, latitude)
     climb = six[0] - slope * np.sin(2.0 * latitude) * six[2]
     return Reference(
-        t, r, latitude, v, angle, heading, along, lost, altitude, climb, drag, planner.axial(r, latitude, v)
+        t=t,
+        r=r,
+        latitude=latitude,
+        speed=v,
+        path=angle,
+        heading=heading,
+        along=along,
+        lost=lost,
+        altitude=altitude,
+        climb=climb,
+        drag=drag,
+        axial=planner.axial(r, latitude, v),
     )
 
 
