@@ -121,12 +121,12 @@ def aimed(t, s, burn, o):
     """The aim of the last burn from the state s at which a coast begins."""
     row, zero = burn_row(o.tables, burn), 0.0 * burn
     size, angle = look_up(o.tables, AIM + 3.0 + zero), look_up(o.tables, AIM + 4.0 + zero)
-    one = impulse_at(s, angle, o.final_inclination, o.final_radius, look_up(o.tables, AIM + 5.0 + zero))
-    sensed = maximum(row.sensed + one.size - size, 1.0)
+    impulse = impulse_at(s, angle, o.final_inclination, o.final_radius, look_up(o.tables, AIM + 5.0 + zero))
+    sensed = maximum(row.sensed + impulse.size - size, 1.0)
     exhaust = o.thrust / o.mass_flow
     mass = row.end_mass + o.mass_flow * row.duration
     duration = mass / o.mass_flow * (1.0 - exp(-sensed / exhaust))
-    return Aim(one.x, one.y, one.z, duration / row.duration, sensed, t + one.wait - 0.5 * duration)
+    return Aim(impulse.x, impulse.y, impulse.z, duration / row.duration, sensed, t + impulse.wait - 0.5 * duration)
 
 
 @physics
@@ -175,5 +175,5 @@ def nominal_aim(program: Program) -> np.ndarray:
     wait = (last.ignition + 0.5 * last.duration - before.ignition - before.duration) / sequence.time_unit
     middle, _ = kepler(np.array([state[:3]]) / unit, np.array([state[3:]]) / speed, np.array([wait]))
     angle = float(np.arctan2(middle[0] @ np.array(q), middle[0] @ np.array(n)))
-    one = impulse_at(state, angle, tilt, sequence.final_radius, planar)
-    return np.array([one.x, one.y, one.z, one.size, angle, planar])
+    impulse = impulse_at(state, angle, tilt, sequence.final_radius, planar)
+    return np.array([impulse.x, impulse.y, impulse.z, impulse.size, angle, planar])

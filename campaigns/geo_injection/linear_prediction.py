@@ -47,7 +47,7 @@ def _report(name: str, n_cases: int = 4000) -> None:
     ids = np.arange(n_cases)
     drawn = case_table(campaign, ids)
     flown = fly(MODEL, {**campaign.nominal, **drawn}, ids, campaign.seed)
-    sigmas = {one.name: float(np.std(drawn[one.name], ddof=1)) for one in campaign.dispersions}
+    sigmas = {dispersion.name: float(np.std(drawn[dispersion.name], ddof=1)) for dispersion in campaign.dispersions}
     parts = contributions(campaign.nominal, sigmas)
     print(f"{name}: {n_cases} cases; change by one standard deviation of each dispersion")
     print(f"{'':28}" + "".join(f"{metric:>26}" for metric in SMOOTH))

@@ -92,8 +92,8 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
             refusals.add(same, str(error))
             continue
         part = SimpleNamespace(**{name: column[same] for name, column in vars(inputs).items()})
-        found, late = _rows(part, chosen, program)
-        for name, column in found.items():
+        columns, late = _rows(part, chosen, program)
+        for name, column in columns.items():
             rows.setdefault(name, np.zeros(same.size))[same] = column
         mask = np.zeros(same.size, dtype=bool)
         mask[same] = late
@@ -103,7 +103,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
 
 def _rows(i: SimpleNamespace, o: SimpleNamespace, program: Program) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """(kernel parameters, where ignitions overlap burns) of the cases of one sequence."""
-    sequence, one = program.sequence, np.ones_like(i.thrust_factor)
+    sequence = program.sequence
     place, velocity = _first_states(i, program)
     rows = {name: place[:, k] for k, name in enumerate("xyz")}
     rows |= {name: velocity[:, k] for k, name in enumerate(("vx", "vy", "vz"))}
@@ -117,7 +117,7 @@ def _rows(i: SimpleNamespace, o: SimpleNamespace, program: Program) -> tuple[dic
     for axis in "rtn":
         rows[f"known_{axis}"] = getattr(i, f"navigation_position_{axis}")
         rows[f"known_v{axis}"] = getattr(i, f"navigation_velocity_{axis}")
-    late = np.zeros(one.size, dtype=bool)
+    late = np.zeros(i.thrust_factor.size, dtype=bool)
     for k in (1, 2, 3):
         delay = getattr(i, f"ignition_delay_{k}")
         rows[f"delay_{k}"] = delay
@@ -143,9 +143,8 @@ def _first_states(i: SimpleNamespace, program: Program) -> tuple[np.ndarray, np.
     normal = np.cross(r, v)
     radial, normal = r / np.linalg.norm(r), normal / np.linalg.norm(normal)
     axes = np.stack([radial, np.cross(normal, radial), normal])
-    letters = "rtn"
-    place = r + np.stack([getattr(i, f"initial_position_{one}") for one in letters], axis=1) @ axes
-    velocity = v + np.stack([getattr(i, f"initial_velocity_{one}") for one in letters], axis=1) @ axes
+    place = r + np.stack([getattr(i, f"initial_position_{axis}") for axis in "rtn"], axis=1) @ axes
+    velocity = v + np.stack([getattr(i, f"initial_velocity_{axis}") for axis in "rtn"], axis=1) @ axes
     sequence = program.sequence
     scales = sequence.parking_radius, sequence.speed_unit
     moved = kepler(place / scales[0], velocity / scales[1], i.ignition_delay_1 / sequence.time_unit)

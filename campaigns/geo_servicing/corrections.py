@@ -175,11 +175,11 @@ def inspection_coast(s, m, e, cut, p, o):
     x = relative_orbit(s, e)
     if o.inspection_law == PAIRS:
         second = where(cut, 1.0 - m.second, 0.0)
-        coast, found = where(second > 0.5, 0.5, next_pair(x, p, o)), 1.0 + 0.0 * second
+        coast, burns = where(second > 0.5, 0.5, next_pair(x, p, o)), 1.0 + 0.0 * second
     else:
-        coast, found = next_coast(x, p, o)
+        coast, burns = next_coast(x, p, o)
         second = 0.0 * coast
-    return coast, found, second
+    return coast, burns, second
 
 
 @physics
@@ -201,9 +201,9 @@ def switch(t, s, m, p, o, hit):
     else:
         deciding = cut | decide
         if any_lane(deciding):
-            coast, found, second = inspection_coast(s, m, e, cut, p, o)
+            coast, fires, second = inspection_coast(s, m, e, cut, p, o)
             due = where(deciding, t + SIDEREAL_DAY * coast, due)
-            mode = where(deciding, where(found > 0.5, IGNITION, DECISION), mode)
+            mode = where(deciding, where(fires > 0.5, IGNITION, DECISION), mode)
             second = where(deciding, second, m.second)
     outward, ahead, across, dv = m.outward, m.ahead, m.across, m.dv
     if any_lane(ignite):

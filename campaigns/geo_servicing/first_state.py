@@ -62,7 +62,7 @@ def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
 
 def first_states(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals, two) -> dict[str, np.ndarray]:
     """Rows of the first state of both craft; two : bool[n], the inspection, in which the second flies."""
-    one = phasing_start(i, o, sidereal, refusals)
+    phasing = phasing_start(i, o, sidereal, refusals)
     module, target = craft_start(i, "module"), craft_start(i, "target")
-    rows = {axis: np.where(two, module[k], one[axis]) for k, axis in enumerate(_AXES)}
+    rows = {axis: np.where(two, module[k], phasing[axis]) for k, axis in enumerate(_AXES)}
     return rows | {f"t{axis}": np.where(two, target[k], 0.0) for k, axis in enumerate(_AXES)}

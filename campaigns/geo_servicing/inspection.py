@@ -31,15 +31,15 @@ def correction(y, v, t, chi1, chi2, weight, sigma):
 @physics
 def relative_orbit(s, m):
     """The module's motion about the target, as navigation tells it."""
-    one = navigated_elements(s, m)
-    other = equinoctial(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz, MU)
-    ahead = one.mean - other.mean
-    dk, dh = one.k - other.k, one.h - other.h
+    module = navigated_elements(s, m)
+    target = equinoctial(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz, MU)
+    ahead = module.mean - target.mean
+    dk, dh = module.k - target.k, module.h - target.h
     return Relative(
         R0 * (ahead - TURN * rint(ahead / TURN)),
-        -1.5 * TURN * R0 * (one.a - other.a) / other.a,
+        -1.5 * TURN * R0 * (module.a - target.a) / target.a,
         sqrt(dk * dk + dh * dh),
-        one.true - atan2(dh, dk),
+        module.true - atan2(dh, dk),
     )
 
 
@@ -71,8 +71,8 @@ def next_coast(x, p, o):
     wait_down, down = candidate(x, high, 1.0, p, o)  # u > 0: braking
     wait_up, up = candidate(x, 0.5 * TURN - high, -1.0, p, o)
     wait = minimum(where(down > 0.5, wait_down, 1e3), where(up > 0.5, wait_up, 1e3))
-    found = wait < 1e3
-    return where(found, wait, 1.0), where(found, 1.0, 0.0)
+    wanted = wait < 1e3
+    return where(wanted, wait, 1.0), where(wanted, 1.0, 0.0)
 
 
 @physics

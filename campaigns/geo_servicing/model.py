@@ -119,8 +119,8 @@ def tables(o: Any) -> np.ndarray:
 
 def _nominal(o: Any) -> tuple[SimpleNamespace, np.ndarray]:
     """(kernel parameters of the case without errors, nodes of Sun and Moon for it)."""
-    inputs = SimpleNamespace(**{one.symbol: np.array([one.default * one.si_factor]) for one in PARAMETERS})
-    settings = SimpleNamespace(**{one.symbol: np.array([getattr(o, one.symbol)]) for one in SETTINGS})
+    inputs = SimpleNamespace(**{item.symbol: np.array([item.default * item.si_factor]) for item in PARAMETERS})
+    settings = SimpleNamespace(**{item.symbol: np.array([getattr(o, item.symbol)]) for item in SETTINGS})
     # a plan may end after the flight
     settings.duration = np.maximum(settings.duration, settings.longest_transfer + 2.0 * _DAY)
     refusals = Refusals.none(1)

@@ -82,7 +82,7 @@ def plan_of(o: Any, tables: np.ndarray, first: Any) -> np.ndarray:
 
 def published_plan(craft: Craft) -> Plan:
     """The source's corrections as velocity changes of this craft."""
-    coasts, burns, signs = (np.array(one) for one in zip(*PUBLISHED, strict=True))
+    coasts, burns, signs = (np.array(column) for column in zip(*PUBLISHED, strict=True))
     return Plan(coasts, signs * craft.velocity_changes(burns))
 
 
@@ -157,17 +157,17 @@ def limits_of(o: Any) -> Limits:
     v = TURN * float(o.period_tolerance) / SIDEREAL_DAY
     y, e, sigma = float(o.longitude_tolerance), float(o.eccentricity_tolerance), max(float(o.assumed_thrust), 1e-6)
     last = np.radians(largest_last(np.degrees(y), np.degrees(v), e, sigma, 0.5))
-    first, least, longest = (float(one) / SIDEREAL_DAY for one in (o.first_coast, o.least_coast, o.longest_transfer))
+    first, least, longest = (float(time) / SIDEREAL_DAY for time in (o.first_coast, o.least_coast, o.longest_transfer))
     return Limits(y, v, e, first, least, longest, float(o.largest_last) or float(last))
 
 
 def _best(o: Any, craft: Craft, limits: Limits, lacking: Lacking, starts: list[Plan]) -> Plan:
     """The plan of least cost among those that the starts lead to."""
-    found = [_improved(o, craft, limits, lacking, start) for start in starts]
-    good = [one for one in found if one is not None]
-    if not good:
+    improved = [_improved(o, craft, limits, lacking, start) for start in starts]
+    feasible = [candidate for candidate in improved if candidate is not None]
+    if not feasible:
         raise ModelError("no phasing plan meets the limits on coasts, time, last correction and eccentricity")
-    return min(good, key=lambda pair: pair[0])[1]
+    return min(feasible, key=lambda pair: pair[0])[1]
 
 
 def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Plan) -> tuple[float, Plan] | None:
@@ -181,12 +181,12 @@ def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Pla
         return Plan(SIDEREAL_DAY * z[:n], z[n:])
 
     def cost(z):
-        one = plan(z)
-        _, b = steps(craft, one)
-        corrections = gains_of(craft, one, limits, sigma)
-        spread = planned_cost(b, corrections.costs, DRIFT_PER_DV * one.dv, sigma)
-        spent = (signs * one.dv).sum() + DV_OF_COST * spread
-        return modelled(craft, one, lacking).time + 0.02 * spent if sooner else spent
+        candidate = plan(z)
+        _, b = steps(craft, candidate)
+        corrections = gains_of(craft, candidate, limits, sigma)
+        spread = planned_cost(b, corrections.costs, DRIFT_PER_DV * candidate.dv, sigma)
+        spent = (signs * candidate.dv).sum() + DV_OF_COST * spread
+        return modelled(craft, candidate, lacking).time + 0.02 * spent if sooner else spent
 
     def equal(z):
         end = modelled(craft, plan(z), lacking)
@@ -202,8 +202,8 @@ def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Pla
     bounds += [(0.0, size) if sign > 0.0 else (-size, 0.0) for sign, size in zip(signs, largest, strict=True)]
     conditions = ({"type": "eq", "fun": equal}, {"type": "ineq", "fun": inside})
     first = np.concatenate([start.coasts / SIDEREAL_DAY, start.dv])
-    found = minimize(
+    search = minimize(
         cost, first, method="SLSQP", bounds=bounds, constraints=conditions, options={"maxiter": 300, "ftol": 1e-10}
     )
-    good = np.abs(equal(found.x)).max() < 1e-6 and inside(found.x).min() > -1e-6
-    return (float(found.fun), plan(found.x)) if good else None
+    feasible = np.abs(equal(search.x)).max() < 1e-6 and inside(search.x).min() > -1e-6
+    return (float(search.fun), plan(search.x)) if feasible else None

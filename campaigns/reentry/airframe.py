@@ -27,7 +27,8 @@ _TABLES = [np.empty(0), *(_shares_over_mach(vehicle) for vehicle in VEHICLES.val
 COEFFICIENTS = np.concatenate(_TABLES)  # the tables of all vehicles, as flights find them in o.tables
 # where that of each code of the setting `vehicle` begins, -1 for constant coefficients
 _PLACES = np.array(
-    [sum(one.size for one in _TABLES[:k]) if table.size else -1.0 for k, table in enumerate(_TABLES)], dtype=float
+    [sum(before.size for before in _TABLES[:k]) if table.size else -1.0 for k, table in enumerate(_TABLES)],
+    dtype=float,
 )
 
 

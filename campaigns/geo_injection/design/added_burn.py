@@ -51,10 +51,10 @@ def _where_lengths_agree(problem: Problem, low: tuple, high: tuple) -> np.ndarra
     for _ in range(20):
         share = f0 / (f0 - f1)
         guess = x0 + share * (x1 - x0)
-        found = solve(problem, guess, first_burn(problem))
-        if found is None:
+        solution = solve(problem, guess, first_burn(problem))
+        if solution is None:
             return None
-        x, f = found, _gap(problem, found)
+        x, f = solution, _gap(problem, solution)
         if abs(f) < 1e-9:
             break
         if f * f1 < 0.0:

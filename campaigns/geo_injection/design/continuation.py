@@ -39,9 +39,9 @@ def optimum(problem: Problem) -> Solution:
         raise ModelError(f"the optimal sequence has 2 or 3 burns, not {problem.burns}")
     _refuse_descents(problem)
     x = _two_burns(problem) if problem.burns == 2 else _three_burns(problem)
-    found = Solution(problem, x, switch_states(problem, x[None])[0])
-    _refuse_waiting(found)
-    return found
+    solution = Solution(problem, x, switch_states(problem, x[None])[0])
+    _refuse_waiting(solution)
+    return solution
 
 
 def _refuse_descents(problem: Problem) -> None:
@@ -54,13 +54,13 @@ def _refuse_descents(problem: Problem) -> None:
         )
 
 
-def _refuse_waiting(found: Solution) -> None:
+def _refuse_waiting(solution: Solution) -> None:
     """Each coast ends at the first apsis that serves: one that lasts longer belongs to another sequence."""
-    ends = found.states[1:-1:2]
+    ends = solution.states[1:-1:2]
     a = 1.0 / (2.0 / np.linalg.norm(ends[:, :3], axis=1) - (ends[:, 3:6] ** 2).sum(1))
-    if not (found.coasts < 2.0 * np.pi * a**1.5).all():
+    if not (solution.coasts < 2.0 * np.pi * a**1.5).all():
         raise ModelError(
-            f"the search for the optimal {found.problem.burns} burns found only one that lets a revolution pass"
+            f"the search for the optimal {solution.problem.burns} burns found only one that lets a revolution pass"
         )
 
 
@@ -84,15 +84,15 @@ def _two_burns(problem: Problem) -> np.ndarray:
     ways: list[Callable[[Problem], np.ndarray]] = [_from_perigee]
     if problem.plane_change > 0.0:
         ways = [_from_ascending_node, _from_descending_node, _from_perigee]
-    found, failed = [], []
+    solved, failed = [], []
     for way in ways:
         try:
-            found.append(way(problem))
+            solved.append(way(problem))
         except ModelError as error:
             failed.append(error)
-    if not found:
+    if not solved:
         raise failed[-1]
-    return min(found, key=lambda x: float(x[7] + x[8]))
+    return min(solved, key=lambda x: float(x[7] + x[8]))
 
 
 def _widened(problem: Problem) -> Problem:
@@ -144,10 +144,10 @@ def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
         following = moved(x, by)
         while following is not None and following[7:9].sum() < x[7:9].sum():
             x, following = following, moved(following, by)
-    found = solve(problem, x)
-    if found is None or abs(found[0] - x[0]) > 3.0 * _PLACE_STEP:
+    best = solve(problem, x)
+    if best is None or abs(best[0] - x[0]) > 3.0 * _PLACE_STEP:
         raise ModelError("the search for the optimal burns found no best place of the first one on the parking orbit")
-    return found
+    return best
 
 
 def _from_ascending_node(problem: Problem) -> np.ndarray:
@@ -195,13 +195,13 @@ def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None
         here, there = _between(start, end, done), _between(start, end, share)
         line = x if last is None else x + (share - done) / (done - last[0]) * (x - last[1])
         guess = _longer_burns(here, there, x) if last is None else line
-        found = solve(there, guess, instead)
-        if found is None or np.abs(found - guess).max() > _FAR * max(1.0, np.abs(found - x).max()):
+        solution = solve(there, guess, instead)
+        if solution is None or np.abs(solution - guess).max() > _FAR * max(1.0, np.abs(solution - x).max()):
             step *= 0.5
             if step < _LEAST_STEP:
                 raise ModelError(_how_far(here, end, x))
             continue
-        last, x, done, step = (done, x), found, share, min(1.5 * step, _LONGEST_STEP)
+        last, x, done, step = (done, x), solution, share, min(1.5 * step, _LONGEST_STEP)
     return x
 
 

@@ -187,20 +187,19 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
             return None
 
         def value(x: np.ndarray) -> np.ndarray:
-            found = residuals(problem, x[None])[0]
-            found = np.append(np.where(np.isfinite(found), found, 1e3), held @ (x - guess))
+            left = residuals(problem, x[None])[0]
+            left = np.append(np.where(np.isfinite(left), left, 1e3), held @ (x - guess))
             if instead is not None:
-                found[instead[0]] = x[instead[1]] - guess[instead[1]]
-            return found
+                left[instead[0]] = x[instead[1]] - guess[instead[1]]
+            return left
 
         def slope(x: np.ndarray) -> np.ndarray:
-            found = np.vstack([np.nan_to_num(_jacobian(problem, x)), held])
+            jacobian = np.vstack([np.nan_to_num(_jacobian(problem, x)), held])
             if instead is not None:
-                found[instead[0]] = np.eye(1, x.size, instead[1])
-            return found
+                jacobian[instead[0]] = np.eye(1, x.size, instead[1])
+            return jacobian
 
-        found = least_squares(value, guess, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
-        x = found.x
+        x = least_squares(value, guess, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60).x
         for _ in range(2):
             x = x - np.linalg.lstsq(slope(x), value(x), rcond=1e-9)[0]
         good = np.abs(value(x)).max() < SOLVED and (x[7:] > 0.0).all()

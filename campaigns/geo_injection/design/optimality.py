@@ -39,8 +39,7 @@ def arcs(solution: Solution, n: int = 200) -> list[Arc]:
     H = s (k - T |p| / m - flow l) + q.v - p.g with s = 1 on burns, l' = -s T |p| / m^2, l = 0 at the end, and k such
     that the bracket, the switching function, is zero at the last cut-off.
     """
-    found = list(_backward(solution, n))
-    return found[::-1]
+    return list(_backward(solution, n))[::-1]
 
 
 def _backward(solution: Solution, n: int) -> Iterator[Arc]:
@@ -51,7 +50,7 @@ def _backward(solution: Solution, n: int) -> Iterator[Arc]:
         start, duration = solution.states[2 * k], solution.durations[k]
         t = np.linspace(0.0, duration, n)
         states, mass = _flown(problem, start, masses[k], t), masses[k] - problem.flow * t
-        costate = mass_costate + np.array([_push(problem, start, masses[k], one, duration) for one in t])
+        costate = mass_costate + np.array([_push(problem, start, masses[k], low, duration) for low in t])
         size = np.linalg.norm(states[:, 6:9], axis=1)
         switching = unit - problem.thrust * size / mass - problem.flow * costate
         hamiltonian = switching + coast_hamiltonian(states)

@@ -70,7 +70,7 @@ def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float)
     count = max(1, int(np.ceil(duration / _LONGEST)))
     edges = np.linspace(0.0, duration, count + 1)
     nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-    worst, found = 0.0, []
+    worst, segments = 0.0, []
     for low, high in pairwise(edges):
         times = 0.5 * (low + high) + 0.5 * (high - low) * nodes
         states = fly_burns(
@@ -83,8 +83,8 @@ def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float)
         worst = max(worst, float(np.abs(error).max()))
         steering = np.array([_powers(column) for column in series.T])
         unit = sequence.time_unit
-        found.append(Segment(float(low * unit), float((high - low) * unit), steering))
-    return worst, tuple(found)
+        segments.append(Segment(float(low * unit), float((high - low) * unit), steering))
+    return worst, tuple(segments)
 
 
 def _powers(column: np.ndarray) -> np.ndarray:
@@ -159,8 +159,8 @@ def from_text(text: str) -> Program:
             burn["direction_error_rad"],
             np.array(burn["end"]),
             tuple(
-                Segment(one["start_s"], one["length_s"], np.array([one[axis] for axis in "xyz"]))
-                for one in burn["segment"]
+                Segment(segment["start_s"], segment["length_s"], np.array([segment[axis] for axis in "xyz"]))
+                for segment in burn["segment"]
             ),
         )
         for burn in record["burn"]

@@ -70,8 +70,8 @@ def circle(radius: float) -> Conditions:
     def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
         h = np.cross(r, v)
         rate, r2 = (r * v).sum(-1), (r * r).sum(-1)
-        found = [h[..., 0], h[..., 1], h[..., 2] - np.sqrt(radius), rate, r2 / radius - radius]
-        return np.stack(found, axis=-1) / np.sqrt(radius)
+        conditions = [h[..., 0], h[..., 1], h[..., 2] - np.sqrt(radius), rate, r2 / radius - radius]
+        return np.stack(conditions, axis=-1) / np.sqrt(radius)
 
     return reached
 
@@ -145,12 +145,12 @@ def fly_shortest(stage: Stage, primer: np.ndarray, rate: np.ndarray, duration: f
             both = np.nan_to_num(_residuals(stage, np.concatenate([x + steps, x - steps])))
             return (both[: x.size] - both[x.size :]).T / (2.0 * np.diag(steps))
 
-        found = least_squares(value, x, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
-        x = found.x
+        search = least_squares(value, x, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        x = search.x
         for _ in range(2):
             x = x - np.linalg.lstsq(slope(x), value(x), rcond=1e-10)[0]
         left = float(np.abs(value(x)).max())
     if not left < SOLVED or x[6] <= 0.0:
         raise ModelError(f"the search for the shortest burn stopped with a residual of {left:.1e}")
     start, end = _ends(stage, x[None])
-    return Burn(float(x[7]), float(x[6]), start[0], end[0], int(found.njev))
+    return Burn(float(x[7]), float(x[6]), start[0], end[0], int(search.njev))

@@ -35,7 +35,7 @@ class StagedBurn:
 
 def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
     """The burns over the given intermediate orbits, one fewer than burns; ModelError names the burn that fails."""
-    found: list[StagedBurn] = []
+    burns: list[StagedBurn] = []
     circle_first = problem.eccentricity == 0.0
     if not circle_first and abs(np.sin(0.5 * problem.perigee)) > 1e-9:
         raise ModelError(
@@ -52,17 +52,18 @@ def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
         wanted = -np.sqrt(1.0 / problem.ratio) if last else _perigee_speed(between[k])
         burn = _last(stage, wanted, problem) if last else _shortest(stage, wanted, between[k].inclination)
         ignition = 0.0 if k == 0 else lead + burn.ignition
-        found.append(StagedBurn(ignition, burn))
+        burns.append(StagedBurn(ignition, burn))
         mass -= problem.flow * burn.duration
         if not last:
             at_apogee = k == problem.burns - 2
             wait, reference = _next_apsis(burn.end[:6], at_apogee)
             lead = ignition + burn.duration + wait
-    return found
+    return burns
 
 
-def _perigee_speed(one: Orbit) -> float:
-    return float(np.sqrt((1.0 + one.e) / ((1.0 - one.e) * one.a)))
+def _perigee_speed(transfer: Orbit) -> float:
+    """Canonical speed at perigee: sqrt((1 + e) / ((1 - e) a)).  Curtis, 3rd ed., eqs (2.50), (2.71), (2.73)."""
+    return float(np.sqrt((1.0 + transfer.e) / ((1.0 - transfer.e) * transfer.a)))
 
 
 def _shortest(stage: Stage, wanted: float, inclination: float) -> Burn:

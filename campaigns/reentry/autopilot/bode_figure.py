@@ -20,14 +20,14 @@ def bode_figure(loops: dict[str, tuple[Response, Response]]) -> Any:
     upper, lower = figure.subplots(2, 1, sharex=True)
     w = np.geomspace(0.05, 200.0, 1200)
     for colour, (text, (bare, compensated)) in enumerate(loops.items()):
-        found = margins_of(compensated)
-        legend = f"{text}: {np.degrees(found.phase):.1f}° at {found.crossover:.2f} rad/s"
+        margins = margins_of(compensated)
+        legend = f"{text}: {np.degrees(margins.phase):.1f}° at {margins.crossover:.2f} rad/s"
         for loop, style, label in ((bare, "--", None), (compensated, "-", legend)):
             upper.loglog(w, np.abs(loop(w)), style, color=f"C{colour}", label=label)
             phase = np.degrees(np.angle(loop(w)))
             # a quarter of a turn of lead at most: what is above it has lagged by the rest of a turn
             lower.semilogx(w, np.where(phase > 90.0, phase - 360.0, phase), style, color=f"C{colour}")
-        lower.plot(found.crossover, np.degrees(found.phase) - 180.0, "o", color=f"C{colour}")
+        lower.plot(margins.crossover, np.degrees(margins.phase) - 180.0, "o", color=f"C{colour}")
     upper.axhline(1.0, color="0.5", linewidth=0.8)
     lower.axhline(-180.0, color="0.5", linewidth=0.8)
     upper.set_ylabel("gain of the open loop")

@@ -208,8 +208,8 @@ def riccati_gains(lost: np.ndarray, a: np.ndarray, b: np.ndarray, weights: Weigh
         return (m.T @ p + p @ m - np.outer(p @ v, v @ p) / weights.control + running).ravel()
 
     span = lost[-1] - lost[0]
-    found = solve_ivp(backward, (0.0, span), final.ravel(), "LSODA", rtol=1e-7, atol=1e-9, dense_output=True)
-    p = found.sol(lost[-1] - lost).T.reshape(-1, 3, 3)
+    solution = solve_ivp(backward, (0.0, span), final.ravel(), "LSODA", rtol=1e-7, atol=1e-9, dense_output=True)
+    p = solution.sol(lost[-1] - lost).T.reshape(-1, 3, 3)
     return np.einsum("ni,nij->nj", b, p) / weights.control / _SCALES
 
 
@@ -241,12 +241,12 @@ def stored_references(plans: Plan, asked: np.ndarray, first: int, refusals: Refu
         )
     for k, numbers in enumerate(distinct.T):
         mine = np.flatnonzero(asked)[which.ravel() == k]
-        found = reference_table_of(Plan(*(float(number) for number in numbers)))
-        if isinstance(found, str):
-            refusals.reason[mine] = found
+        reference = reference_table_of(Plan(*(float(number) for number in numbers)))
+        if isinstance(reference, str):
+            refusals.reason[mine] = reference
         else:
-            place[mine], along[mine] = first + sum(one.size for one in tables), found[table.RANGE]
-            tables.append(found)
+            place[mine], along[mine] = first + sum(stored.size for stored in tables), reference[table.RANGE]
+            tables.append(reference)
     return StoredReferences(place, along, np.concatenate(tables))
 
 
@@ -289,7 +289,7 @@ def _write_path(out: np.ndarray, planner: Planner, path: Reference, weights: Wei
     over = [path.axial, np.log(path.axial), path.speed, np.gradient(path.along, path.t), path.along]
     # before the laws command, the gains are those of their first row
     stored = [np.interp(path.t[felt], steered.t, gain) for gain in gains.T]
-    columns = [*(one[felt] for one in over), *stored]
+    columns = [*(column[felt] for column in over), *stored]
     out[table.LOST_DENSITY] = _write_rows(out, table.LOST_TABLE, path.lost[felt], columns)
 
 
