@@ -10,10 +10,11 @@ difference of large numbers, and within a Runge-Kutta step two places taken apar
 from collections import namedtuple
 
 from campaigns.deorbit.elements import osculating
-from mc_engine.lanes import any_lane, exp, physics, rint, sincos, sqrt, where
+from mc_engine.lanes import any_lane, exp, physics, sincos, sqrt, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.atmosphere import layered
 from mc_engine.physics.constants import EARTH_RATE, EQUATORIAL_RADIUS, MU_EARTH
+from mc_engine.physics.frames import half_turn
 from mc_engine.physics.gravity import j2_perturbation, point_mass
 from mc_engine.physics.pulse_modulators import lag_rate
 
@@ -36,7 +37,6 @@ Parameters = namedtuple(
 Events = namedtuple("Events", "entry pulse_on pulse_off")
 Desired = namedtuple("Desired", "x y z vx vy vz ax ay az rx ry rz tx ty tz rate")
 
-TAU = 6.283185307179586
 # settings arrive as numbers: places in the lists of words of `model.py`
 CONTINUOUS, CLIPPED, PULSED, OFF = 0.0, 1.0, 2.0, 3.0
 FEED_CONTINUOUS = 0.0
@@ -57,8 +57,7 @@ def element_errors(s, p):
     """Flown less desired (a [m], e, omega [rad, within half a turn])."""
     x, y, z, vx, vy, vz = flown(s, desired_motion(s.f_desired, p))
     a, e, omega = osculating(x, y, z, vx, vy, vz)
-    turn = omega - p.omega
-    return a - p.a, e - p.e, turn - TAU * rint(turn * (1.0 / TAU))
+    return a - p.a, e - p.e, half_turn(omega - p.omega)
 
 
 @physics
@@ -81,7 +80,7 @@ def start(p, o):
 
 @physics
 def fix_position(t, s, m, p, o, draws):
-    """A new navigation fix: constant error plus a fresh normal deviate on every component."""
+    """A new navigation fix: constant error plus a fresh normal deviate on every component [m, m/s along R, T, N]."""
     k, w = p.noise_position, p.noise_velocity
     n1 = n2 = n3 = n4 = n5 = n6 = 0.0 * k
     if any_lane(k + w > 0.0):  # without noise the deviates would be multiplied by zero: save them
@@ -151,7 +150,10 @@ def law(d, ex, ey, ez, wx, wy, wz, p, o):
 
 @physics
 def measured(s, d, m):
-    """Errors of position and velocity as the navigation sees them; its own lie along R, T, N of the desired path."""
+    """Errors of position [m] and velocity [m/s] as the navigation sees them, inertial axes.  (24), (25)
+
+    Its own errors lie along R, T, N of the desired path and are added here; the source has none.
+    """
     nx, ny, nz = d.ry * d.tz - d.rz * d.ty, d.rz * d.tx - d.rx * d.tz, d.rx * d.ty - d.ry * d.tx
     return (
         s.x + m.r_r * d.rx + m.r_t * d.tx + m.r_n * nx,
@@ -263,7 +265,10 @@ def rhs(t, s, m, p, o):
 
 @physics
 def events(t, s, m, p, o):
-    """Entry interface; Schmitt trigger of the modulator."""
+    """Entry interface as r^2 - R^2 [m^2]; Schmitt trigger of the modulator on its filtered input [N].
+
+    M. J. Sidi, Spacecraft Dynamics and Control (1997), which the source follows.
+    """
     x, y, z, _vx, _vy, _vz = flown(s, desired_motion(s.f_desired, p))
     above = x * x + y * y + z * z - p.radius * p.radius
     firing = m.on > 0.5
@@ -272,7 +277,7 @@ def events(t, s, m, p, o):
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """The trigger turns: on counts a pulse."""
+    """The trigger of the modulator turns: on counts a pulse.  M. J. Sidi, Spacecraft Dynamics and Control (1997)."""
     on = where(hit.pulse_on > 0.5, 1.0, where(hit.pulse_off > 0.5, 0.0, m.on))
     pulses = m.pulses + where(hit.pulse_on > 0.5, 1.0, 0.0)
     return s, Memory(

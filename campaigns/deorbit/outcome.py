@@ -1,10 +1,9 @@
-"""What is seen along a de-orbit flight and what it comes to: quantities and metrics.  SI, radians."""
+"""Quantities along a de-orbit flight and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
 from campaigns.deorbit.dynamics import (
     OFF,
-    TAU,
     command,
     desired_motion,
     element_errors,
@@ -13,9 +12,10 @@ from campaigns.deorbit.dynamics import (
     propellant,
     thrust,
 )
-from mc_engine.lanes import asin, atan2, floor, maximum, minimum, physics, rint, sqrt, where
+from mc_engine.lanes import asin, atan2, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Extremum, Field
 from mc_engine.physics.constants import EARTH_RATE
+from mc_engine.physics.frames import full_turn, half_turn
 
 SETTLED = 0.01  # of its first value: an element's error below this has settled
 QUANTITIES = (
@@ -100,13 +100,13 @@ Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ig
 
 @physics
 def distance(x, y, z):
-    """Length of a vector."""
+    """Length of a vector, in the unit of its components: sqrt(x^2 + y^2 + z^2)."""
     return sqrt(x * x + y * y + z * z)
 
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     d = desired_motion(s.f_desired, p)
     fx, fy, fz, size = command(t, s, m, d, p, o)
     scale, force = thrust(size, m, p, o)
@@ -134,14 +134,12 @@ def observe(t, s, m, p, o):
 
 
 @physics
-def positive_angle(angle):
-    """The angle in [0, 2 pi)."""
-    return angle - TAU * floor(angle * (1.0 / TAU))
-
-
-@physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at entry."""
+    """The metrics in the order of METRICS, at entry, SI and radians.
+
+    Heading and flight-path angle come from the inertial velocity's components to the east, to the north and up, the
+    longitude from the right ascension less the Earth's rotation since the epoch; derived here.
+    """
     d = desired_motion(s.f_desired, p)
     x, y, z, vx, vy, vz = flown(s, d)
     r, v = distance(x, y, z), distance(vx, vy, vz)
@@ -175,17 +173,17 @@ def evaluate(t, s, m, p, o, best, when):
         entry_time=entry_time,
         entry_speed=v,
         entry_flight_path_angle=atan2(climb, sqrt(maximum(v * v - climb * climb, 0.0))),
-        entry_heading=positive_angle(atan2(east, north)),
-        entry_latitude_argument=positive_angle(atan2(across, along) + p.omega),
+        entry_heading=full_turn(atan2(east, north)),
+        entry_latitude_argument=full_turn(atan2(across, along) + p.omega),
         entry_latitude=asin(maximum(-1.0, minimum(1.0, z / r))),
-        entry_longitude=longitude - TAU * rint(longitude * (1.0 / TAU)),
+        entry_longitude=half_turn(longitude),
         entry_right_ascension=right_ascension,
         entry_radius=r,
         entry_mass=p.mass - spent,
         initial_velocity_error=distance(p.vx, p.vy, p.vz),
         actual_semi_major_axis=p.a + a_error,
         actual_eccentricity=p.e + e_error,
-        actual_perigee_argument=positive_angle(p.omega + omega_error),
+        actual_perigee_argument=full_turn(p.omega + omega_error),
         desired_semi_major_axis=p.a,
         desired_eccentricity=p.e,
         desired_perigee_argument=p.omega,

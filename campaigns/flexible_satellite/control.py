@@ -18,7 +18,10 @@ PER_SAMPLE = 1.0
 
 @physics
 def start(p, o):
-    """Before the first sample: nothing fired, and an integral that the first sample brings to zero."""
+    """Before the first sample: nothing fired, no torque [N m].
+
+    The integral of (13) starts half a sample back, so that the first sample of the trapezoidal rule brings it to zero.
+    """
     zero, calm, half = 0.0, at_rest(), -0.5 * o.step * o.steps_per_sample
     q1, q2, q3, wx, wy, wz = known(initial(p, o), p, o)
     return Memory(
@@ -44,7 +47,7 @@ def known(s, p, o):
 
 @physics
 def measured(s, p, o, draws):
-    """The same as the sensors give it, each axis with a fresh error."""
+    """The same [1, rad/s] as the sensors give it, each axis with a fresh error; the source has perfect sensors."""
     q1, q2, q3, wx, wy, wz = known(s, p, o)
     if any_lane(p.rate_noise + p.attitude_noise > 0.0):
         n1, n2 = normal_pair(draws, 0)
@@ -94,16 +97,17 @@ def law(q1, q2, q3, wx, wy, wz, ix, iy, iz, p):
 
 @physics
 def late(fired, coming, after, p):
-    """(torque now, in the next sample, in the one after it) of an axis whose valves open and close late.
+    """(torque now, in the next sample, in the one after it) [N m] of an axis whose valves open and close late.
 
-    coming, after : what earlier samples have left for this sample and for the next.
+    coming, after : what earlier samples have left for this sample and for the next.  The shares now, next and then add
+    to one, so that the impulse is kept; derived here.
     """
     return coming + p.now * fired, after + p.next * fired, p.then * fired
 
 
 @physics
 def control(t, s, m, p, o, draws):
-    """One sample: measure, integrate, ask for a torque, fire."""
+    """One sample: measure, integrate by trapezoids (13), command a torque [N m] (11)-(16), fire (18)-(21)."""
     period = o.step * o.steps_per_sample
     q1, q2, q3, wx, wy, wz = measured(s, p, o, draws)
     nx, ny, nz = p.c1 * wx + p.c2 * q1, p.c1 * wy + p.c2 * q2, p.c1 * wz + p.c2 * q3

@@ -74,7 +74,7 @@ def body_rate(s, p):
 
 @physics
 def modal_rates(s, wx, wy, wz, p):
-    """Rates eta' of the four modes from their momenta: psi - c0^T w."""
+    """Rates eta' [kg^(1/2) m/s] of the four modes from their momenta: psi - c0^T w, which defines psi."""
     return (
         s.psi1 - (p.cx1 * wx + p.cy1 * wy + p.cz1 * wz),
         s.psi2 - (p.cx2 * wx + p.cy2 * wy + p.cz2 * wz),

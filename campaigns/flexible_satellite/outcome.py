@@ -1,4 +1,4 @@
-"""What is seen along a flight of the flexible satellite and what it comes to: quantities and metrics.  SI, radians."""
+"""Quantities along a flight of the flexible satellite and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
@@ -65,7 +65,7 @@ Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ig
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     wx, wy, wz = body_rate(s, p)
     mode = maximum(maximum(abs(s.eta1), abs(s.eta2)), maximum(abs(s.eta3), abs(s.eta4)))
     return Quantities(
@@ -99,7 +99,7 @@ def observe(t, s, m, p, o):
 
 @physics
 def vector_norm(s):
-    """Size of the quaternion's vector part."""
+    """Size of the quaternion's vector part: the sine of half the attitude error.  (4)"""
     return sqrt(s.q1 * s.q1 + s.q2 * s.q2 + s.q3 * s.q3)
 
 
@@ -127,7 +127,7 @@ def fired(impulse, thrust, p, o):
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at the end."""
+    """The metrics in the order of METRICS, at the end, SI and radians."""
     wx, wy, wz = body_rate(s, p)
     effort = s.impulse_x + s.impulse_y + s.impulse_z
     return Metrics(

@@ -27,7 +27,7 @@ class Rise:
 
     @property
     def acceleration(self) -> float:
-        """Thrust over the first weight."""
+        """Thrust over the first weight, the f of eq. (18)."""
         return self.thrust / self.mass / (MU_EARTH / self.radius**2)
 
     @property

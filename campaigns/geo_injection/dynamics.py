@@ -59,6 +59,8 @@ def direction(t, m):
     """Unit vector of the thrust: the program's, turned by the pointing errors.
 
     d' = unit(d + tan(pitch) e1 + tan(yaw) e2) with e1 = unit(Z x d), e2 = d x e1 and Z the pole.
+
+    Derived here from |d| = 1: e1 = (-y, x, 0) / level and e2 = (-z x, -z y, level^2) / level, no unit.
     """
     s = (t - m.middle) * m.rate
     x = _polynomial(s, m.x0, m.x1, m.x2, m.x3, m.x4, m.x5, m.x6, m.x7, m.x8, m.x9, m.x10, m.x11)
@@ -74,7 +76,7 @@ def direction(t, m):
 
 @physics
 def level_of(t, m, p):
-    """Thrust over its full size: 1 in a burn, falling along a line in a tail-off."""
+    """Thrust over its full size, no unit: 1 in a burn, falling linearly in time in a tail-off."""
     falling = maximum(m.until - t, 0.0) / where(p.tail > 0.0, p.tail, 1.0)
     return where(m.phase == BURN, 1.0, where(m.phase == TAIL, falling, 0.0 * t))
 
@@ -108,7 +110,10 @@ def _counted(s, m, p):
 
 @physics
 def events(t, s, m, p, o):
-    """Ignition, the next segment of a long burn, shut-down command, end of a tail-off, end of the flight."""
+    """Ignition, the next segment of a long burn, shut-down command, end of a tail-off, end of the flight.
+
+    Times [s] past the due time, or, for shut-down by sensed velocity, speed change [m/s] past the one commanded.
+    """
     never = NEVER + 0.0 * t
     coasting, burning, falling = m.phase == COAST, m.phase == BURN, m.phase == TAIL
     last = m.burn + 1.0 >= n_burns(o.tables)
@@ -129,12 +134,13 @@ def events(t, s, m, p, o):
 
 @physics
 def _of_burn(burn, first, second, third):
+    """The value that belongs to a burn, counted from 0, in its own unit."""
     return where(burn < 0.5, first, where(burn < 1.5, second, third))
 
 
 @physics
 def _memory(phase, burn, segment, until, ignited, mass_ignited, sensed, aim, out_1, out_2, p, o):
-    """Memory with the steering of the segment."""
+    """Memory with the steering of the segment, SI; the steering's argument s goes from -1 to 1 over the segment."""
     row = segment_row(o.tables, segment)
     c = steering_row(o.tables, segment)
     if o.guidance > OPEN_LOOP:
@@ -157,14 +163,17 @@ def _memory(phase, burn, segment, until, ignited, mass_ignited, sensed, aim, out
 
 @physics
 def _commanded(burn, sensed, p, o):
-    """Speed change at which the command is due, so that a nominal tail-off makes up for the rest."""
+    """Speed change [m/s] at which the command is due, so that a nominal tail-off makes up for the rest.
+
+    Derived here: the flow falls linearly, so a tail-off spends half of flow times its duration; rocket equation.
+    """
     end = burn_row(o.tables, burn).end_mass
     return sensed - o.thrust / o.mass_flow * log(1.0 + 0.5 * o.mass_flow * o.tail_off / end)
 
 
 @physics
 def start(p, o):
-    """The first burn has just been ignited."""
+    """Memory at the first ignition, SI; the command is due half a tail-off before the nominal duration is over."""
     zero = 0.0 * p.mass
     row, aim = burn_row(o.tables, zero), stored(zero, o)
     sensed = _commanded(zero, row.sensed, p, o)
@@ -174,7 +183,7 @@ def start(p, o):
 
 @physics
 def _next_aim(t, s, burn, p, o):
-    """The aim of the next burn, as a coast begins: as stored, or of the last burn, if guided, as aimed now."""
+    """The aim [1, m/s, s] of the next burn, as a coast begins: as stored, or of the last burn, if guided, aimed now."""
     zero = 0.0 * t
     kept = stored(burn, o)
     ignition = where(burn < 1.5, p.ignition_2, p.ignition_3)
@@ -191,7 +200,7 @@ def _next_aim(t, s, burn, p, o):
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """The phase that follows an event."""
+    """The phase that follows an event, and when it ends [s]."""
     ignite, segment = hit.ignite > 0.5, hit.next_segment > 0.5
     shut, over = hit.shut_down > 0.5, hit.burn_out > 0.5
     to_tail = shut & (p.tail > 0.0)

@@ -35,11 +35,15 @@ def contributions(nominal: Mapping[str, Any], sigmas: Mapping[str, float]) -> di
 
 
 def predicted_sigmas(nominal: Mapping[str, Any], sigmas: Mapping[str, float]) -> dict[str, float]:
-    """Standard deviation of each smooth metric for independent dispersions: the root of the sum of squares."""
+    """Standard deviation of each smooth metric for independent dispersions: the root of the sum of squares.
+
+    Each in the unit of its metric.
+    """
     return {name: float(np.sqrt((column**2).sum())) for name, column in contributions(nominal, sigmas).items()}
 
 
 def _report(name: str, n_cases: int = 4000) -> None:
+    """Print linear and flown standard deviations, each in the unit of its column, for a campaign."""
     from mc_engine.campaign.cases import case_table
     from mc_engine.campaign.loading import load_campaign
 

@@ -134,10 +134,10 @@ def _rows(i: SimpleNamespace, o: SimpleNamespace, program: Program) -> tuple[dic
 
 
 def _first_states(i: SimpleNamespace, program: Program) -> tuple[np.ndarray, np.ndarray]:
-    """Places [n, 3] and velocities [n, 3] at the actual first ignition.
+    """Places [m] and velocities [m/s], [n, 3], inertial, at the actual first ignition.
 
     Errors count in the radial, transverse and normal axes of the nominal state at its time; from there the stage
-    coasts, forward or backward, to the actual ignition.
+    coasts (19)-(21), forward or backward, to the actual ignition.
     """
     r, v = program.start[:3], program.start[3:]
     normal = np.cross(r, v)

@@ -1,4 +1,4 @@
-"""What a flight is judged by: the orbit at the last cut-off, the corrections it needs, and the propellant."""
+"""Quantities along a flight, and metrics at its end: orbit at the last cut-off, corrections it needs, propellant."""
 
 from collections import namedtuple
 
@@ -75,7 +75,7 @@ def orbit_of(s):
 
 @physics
 def observe(t, s, m, p, o):
-    """Quantities along the flight."""
+    """Quantities along the flight, SI and radians, inertial axes."""
     orbit = orbit_of(s)
     # on a coast a polynomial would go astray beyond its segment
     dx, dy, dz = direction(where(m.phase == COAST, minimum(t, m.middle + 1.0 / m.rate), t), m)
@@ -101,20 +101,23 @@ def observe(t, s, m, p, o):
 
 @physics
 def _speed_at(r, other):
-    """Speed at one apsis of an ellipse with the apses r and other."""
+    """Speed [m/s] at one apsis of an ellipse with the apses r, other [m]: the vis-viva equation, 2 a = r + other."""
     return sqrt(maximum(2.0 * MU_EARTH * other / (r * (r + other)), 0.0))
 
 
 @physics
 def _two_impulses(r, other, target):
-    """Speed changes at r, which carries the other apsis to the target, and there into the circle."""
+    """Speed changes [m/s], added, at r, which carries the other apsis to the target [m], and there into the circle."""
     circular = sqrt(MU_EARTH / target)
     return abs(_speed_at(r, target) - _speed_at(r, other)) + abs(circular - _speed_at(target, r))
 
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """Metrics of a case; an orbit that does not close has no correction."""
+    """Metrics of a case, SI and radians; an orbit that does not close has no correction.
+
+    The plane is corrected by one impulse at the node, 2 v sin(i/2); drift: sqrt(mu/a^3) less that of the final circle.
+    """
     orbit = orbit_of(s)
     radius = o.final_radius + 0.0 * t
     closed = orbit.a > 0.0

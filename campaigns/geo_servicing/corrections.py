@@ -1,7 +1,15 @@
-"""What happens between coasts: ignitions, cut-offs, decisions, and the looks at what a transfer has come to.
+"""Events between coasts: ignitions, cut-offs, decisions, and the evaluation at the end of a transfer.
 
-A flight waits for one thing at a time, which is due at a time that the memory holds.  Phasing follows its plan, with
-feedback on what navigation tells at ignition; the inspection decides for itself, burn after burn.
+The memory holds the next action, `mode`, and the time at which it is due.
+
+mode        action                                          next
+IGNITION    start the burn                                  CUT_OFF
+CUT_OFF     end the burn                                    IGNITION, DECISION (inspection) or DAY_LATER (phasing)
+DECISION    inspection: choose the next coast               IGNITION or DECISION
+DAY_LATER   phasing: evaluate the sidereal day after        NOTHING
+
+In the phasing, corrections follow the plan, with feedback on what navigation measures at ignition.  In the inspection
+the law chooses each coast and each correction.
 """
 
 from collections import namedtuple
@@ -13,14 +21,14 @@ from campaigns.geo_servicing.dynamics import (
     PHASING,
     RATE,
     SIDEREAL_DAY,
-    TURN,
     V0,
     Memory,
     longitudes,
 )
 from campaigns.geo_servicing.inspection import PAIRS, next_coast, next_pair, relative_orbit, velocity_change
 from campaigns.geo_servicing.navigation import FILTERED, RAW, Estimate, burnt, estimate_of, navigated_elements
-from mc_engine.lanes import any_lane, atan, exp, maximum, physics, rint, sincos, sqrt, where
+from mc_engine.lanes import any_lane, atan, exp, maximum, physics, sincos, sqrt, where
+from mc_engine.physics.frames import TURN, half_turn
 from mc_engine.physics.radiation import discs
 from mc_engine.physics.sun_moon import ephemeris
 
@@ -39,7 +47,7 @@ DRIFT_PER_DV = -3.0 * TURN / V0  # rad/rev per m/s, first order about the geosta
 
 @physics
 def start(p, o):
-    """Before the first sample: what is due first."""
+    """Before the first sample: what is due first, and when [s]."""
     zero = 0.0 * p.x
     due, mode = zero + NEVER, zero + NOTHING
     if o.phase == PHASING:
@@ -61,7 +69,7 @@ def start(p, o):
 
 @physics
 def events(t, s, m, p, o):
-    """What is due, when the inspection counts as settled, and the edges of the Earth's shadow.
+    """What is due [s], when the inspection counts as settled [s], and the edges of the Earth's shadow [rad].
 
     At the edges nothing is done: steps end there, since the light has corners that no step may go over.
     """
@@ -84,7 +92,7 @@ def navigated(t, s, m, p):
     """(mean longitude deviation [rad], drift [rad/rev]) as navigation tells them."""
     x = navigated_elements(s, m)
     mean = x.mean - (p.aim + RATE * t)
-    return mean - TURN * rint(mean / TURN), drift_of(x.a)
+    return half_turn(mean), drift_of(x.a)
 
 
 @physics
@@ -103,7 +111,7 @@ def phasing_change(t, s, m, p, o):
 
 @physics
 def of_burn(k, a, b, c, d, e):
-    """The number that belongs to burn k, counted from 0."""
+    """The value that belongs to burn k, counted from 0, in its own unit."""
     return where(k < 0.5, a, where(k < 1.5, b, where(k < 2.5, c, where(k < 3.5, d, e))))
 
 
@@ -124,7 +132,10 @@ def execution(m, p, o):
 
 @physics
 def ignited(t, s, m, p, o):
-    """The burn that begins now."""
+    """The burn that begins now: velocity change [m/s], duration [s], thrust [N] outward, ahead and to the normal.
+
+    Duration by the rocket equation, m c (1 - exp(-|dv|/c)) / F; the errors stretch the thrust and tilt it.
+    """
     dv = (
         phasing_change(t, s, m, p, o)
         if o.phase == PHASING
@@ -147,7 +158,11 @@ def ignited(t, s, m, p, o):
 
 @physics
 def learnt(m, p, o, cut):
-    """The estimate after a burn, where `cut` holds."""
+    """The estimate [m, m/s] after a burn, where `cut` holds.
+
+    A filter adds what the burn gave over the command to its error, and the assumed errors to its covariance; without a
+    filter there is a fix of its own.
+    """
     e = estimate_of(m)
     if o.navigation == FILTERED:
         # what the burn gave: the command, stretched and tilted
@@ -184,7 +199,7 @@ def inspection_coast(s, m, e, cut, p, o):
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """Do what is due, and say what is due next."""
+    """Do what is due, and set what is due next, and when [s]."""
     now = hit.due > 0.5
     ignite, cut = now & (m.mode == IGNITION), now & (m.mode == CUT_OFF)
     decide, day = now & (m.mode == DECISION), now & (m.mode == DAY_LATER)
@@ -227,7 +242,7 @@ def switch(t, s, m, p, o, hit):
 
 @physics
 def ended(t, s, m, p, over, day):
-    """What is kept of the transfer's end: at the last cut-off, and a sidereal day later."""
+    """The `TransferEnd` [s, rad, rad/rev]: kept at the last cut-off, and a sidereal day later."""
     true, mean, x = longitudes(t, s, p)
     e, tilt = sqrt(x.k * x.k + x.h * x.h), 2.0 * atan(sqrt(x.q * x.q + x.p * x.p))
     return TransferEnd(

@@ -1,11 +1,12 @@
-"""Where a flight begins: states from elements, for whole chunks of cases.  NumPy, SI, radians."""
+"""First states of a flight from orbital elements, for whole chunks of cases.  NumPy, SI, radians."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.geo_servicing.dynamics import MU, TURN
+from campaigns.geo_servicing.dynamics import MU
 from mc_engine.model import Refusals
+from mc_engine.physics.frames import TURN
 
 _AXES = ("x", "y", "z", "vx", "vy", "vz")
 

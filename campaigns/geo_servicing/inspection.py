@@ -5,9 +5,10 @@ Numbers in brackets are equations of the source (`model.SOURCE`); the procedure 
 
 from collections import namedtuple
 
-from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, TURN
+from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY
 from campaigns.geo_servicing.navigation import navigated_elements
-from mc_engine.lanes import atan2, floor, maximum, minimum, physics, rint, sqrt, where
+from mc_engine.lanes import atan2, floor, maximum, minimum, physics, sqrt, where
+from mc_engine.physics.frames import TURN, half_turn
 from mc_engine.physics.orbital_elements import equinoctial
 
 # along: mean distance ahead of the target [m], drift of it [m/rev]; e: length of the difference of the eccentricity
@@ -30,13 +31,16 @@ def correction(y, v, t, chi1, chi2, weight, sigma):
 
 @physics
 def relative_orbit(s, m):
-    """The module's motion about the target, as navigation tells it."""
+    """The module's motion about the target, as navigation tells it [m, m/rev, 1, rad].
+
+    The distance is R0 times the difference of the mean longitudes, e and phase those of (3.43), (3.44); the drift,
+    -3 pi R0 (a - a_target) / a_target per revolution, is derived here from T ~ a^1.5.
+    """
     module = navigated_elements(s, m)
     target = equinoctial(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz, MU)
-    ahead = module.mean - target.mean
     dk, dh = module.k - target.k, module.h - target.h
     return Relative(
-        R0 * (ahead - TURN * rint(ahead / TURN)),
+        R0 * half_turn(module.mean - target.mean),
         -1.5 * TURN * R0 * (module.a - target.a) / target.a,
         sqrt(dk * dk + dh * dh),
         module.true - atan2(dh, dk),
@@ -101,9 +105,8 @@ def first_of_pair(x, p, o):
 
 @physics
 def _low(x):
-    """1 in the lower half of the relative ellipse, -1 in the upper one."""
-    phase = x.phase - TURN * rint(x.phase / TURN)
-    return where(abs(phase) < 0.25 * TURN, 1.0, -1.0)
+    """1 in the lower half of the relative ellipse, phase [rad] within a quarter turn of 0, and -1 in the upper one."""
+    return where(abs(half_turn(x.phase)) < 0.25 * TURN, 1.0, -1.0)
 
 
 @physics

@@ -74,7 +74,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
 
 
 def _inspection_rows(i: SimpleNamespace, o: SimpleNamespace) -> dict[str, np.ndarray]:
-    """The law's parameters; `around` is the difference of eccentricities that a fly-around keeps.
+    """The law's parameters, SI; `around` is the difference of eccentricities that a fly-around keeps.
 
     The relative ellipse has the half axes R0 e outward and 2 R0 e ahead: it is between the ranges wanted if e is
     between low/R0 and high/(2 R0), and in the middle of that here.
@@ -92,7 +92,7 @@ def _inspection_rows(i: SimpleNamespace, o: SimpleNamespace) -> dict[str, np.nda
 
 
 def _sun_moon_rows(epoch: np.ndarray, o: SimpleNamespace) -> dict[str, np.ndarray]:
-    """The nodes that the chunk's flights need, and where each case finds its first."""
+    """The nodes that the chunk's flights need, where each case finds its first, and the time [s] since that."""
     number, time = node_before(epoch)
     # from the node before the start to two behind the end: the cubic takes one, a look past the last step another
     nodes = np.ceil((o.duration / _DAY) / SPACING) + 3.0
@@ -118,7 +118,7 @@ def tables(o: Any) -> np.ndarray:
 
 
 def _nominal(o: Any) -> tuple[SimpleNamespace, np.ndarray]:
-    """(kernel parameters of the case without errors, nodes of Sun and Moon for it)."""
+    """(kernel parameters, SI, of the case without errors, nodes of Sun and Moon for it)."""
     inputs = SimpleNamespace(**{item.symbol: np.array([item.default * item.si_factor]) for item in PARAMETERS})
     settings = SimpleNamespace(**{item.symbol: np.array([getattr(o, item.symbol)]) for item in SETTINGS})
     # a plan may end after the flight

@@ -75,7 +75,10 @@ def propagated(e, t, noise):
 
 @physics
 def first_measured(e, error, variance):
-    """The estimate after a measurement of its first component with this error."""
+    """The estimate [m, m/s] after a measurement of its first component with this error.
+
+    Kalman (1960), scalar update.
+    """
     inverse = 1.0 / (e.prr + variance)
     kr, ks, ku, kw = e.prr * inverse, e.prs * inverse, e.pru * inverse, e.prw * inverse
     news = error - e.r
@@ -108,7 +111,7 @@ def fixed(e, n1, n2, n3, n4, place, velocity):
 
 @physics
 def single_fix(n1, n2, n3, n4, place, velocity):
-    """The estimate that one fix alone gives."""
+    """The estimate [m, m/s] that one fix alone gives: its errors, and their variances on the diagonal."""
     zero = 0.0 * n1
     a, b = place * place + zero, velocity * velocity + zero
     return Estimate(
@@ -163,7 +166,10 @@ def estimate_of(m):
 
 @physics
 def control(t, s, m, p, o, draws):
-    """A fix, if there are any, and what a burn before the next needs: fresh deviates, and the single fix behind it."""
+    """A fix [m, m/s], if there are any, and what a burn before the next needs.
+
+    That is fresh deviates for the burn's errors, and the single fix that follows it.
+    """
     n1, n2 = normal_pair(draws, 0)
     n3, n4 = normal_pair(draws, 1)
     d1, d2 = normal_pair(draws, 2)

@@ -1,13 +1,13 @@
-"""What is seen along a flight and what it comes to: quantities and metrics.  SI, radians."""
+"""Quantities along a flight and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
 from campaigns.geo_servicing.corrections import drift_of
-from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, SIDEREAL_DAY, TURN, longitudes
+from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, SIDEREAL_DAY, longitudes
 from campaigns.geo_servicing.inspection import relative_orbit
 from mc_engine.lanes import atan, log, physics, sqrt, where
 from mc_engine.model import Extremum, Field
-from mc_engine.physics.frames import orbital_axes
+from mc_engine.physics.frames import TURN, orbital_axes
 
 FAR = 1e9  # m, a range that is none
 
@@ -104,7 +104,7 @@ def inclination_of(elements):
 
 @physics
 def pair_of(s, m, p, o):
-    """The module seen from the target; nothing in the other phases, which have none."""
+    """The module seen from the target [m], in its radial and transverse axes; missing in phases without a target."""
     zero = 0.0 * s.x
     along, radial, distance, drift, e = zero + float("nan"), zero + float("nan"), zero, zero, zero
     if o.phase == INSPECTION:
@@ -119,7 +119,7 @@ def pair_of(s, m, p, o):
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     true, mean, x = longitudes(t, s, p)
     drift = drift_of(x.a)
     pair = pair_of(s, m, p, o)
@@ -148,7 +148,7 @@ def observe(t, s, m, p, o):
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at the end."""
+    """The metrics in the order of METRICS, at the end, SI and radians."""
     gone = float("nan")
     true, mean, x = longitudes(t, s, p)
     final_e = sqrt(x.k * x.k + x.h * x.h)

@@ -1,6 +1,6 @@
-"""How a phasing plan stands in the tables of the model: a row for every correction, then what ends the transfer.
+"""Layout of a phasing plan in the tables of the model: the number of corrections, then a row for each.
 
-The rows of the gravity harmonics follow behind.
+The rows of the gravity harmonics follow.
 """
 
 import numpy as np

@@ -75,7 +75,10 @@ def initial(p, o):
 
 @physics
 def place_of(s, p, o):
-    """Altitude, its rate, and the direction up."""
+    """Altitude [m], its rate [m/s], and the direction up, planet-fixed axes.
+
+    The rate is that of r less the ellipsoid's radius: r' - (dR/d sin^2) (sin^2)', derived here with sin = z / r.
+    """
     if o.shape == FLAT:
         zero = 0.0 * s.x
         altitude, climb, ux, uy, uz = s.z + zero, s.vz + zero, zero, zero, 1.0 + zero
@@ -94,7 +97,10 @@ def place_of(s, p, o):
 
 @physics
 def air_of(s, place, p, o):
-    """Air where the vehicle is, and how it goes through it."""
+    """The `Air` where the vehicle is, and how it goes through it, SI: the wind blows along the local east and north.
+
+    Derived here: shear = -(V . dW/dh), by which the speed through the air changes per metre climbed, times that speed.
+    """
     value, slope, temperature = logarithm_of_density(place.altitude, p, o)
     vx, vy, vz, shear = s.vx, s.vy, s.vz, 0.0 * s.vx
     if o.weather > 0.5:
@@ -156,7 +162,7 @@ def speed2(s):
 
 @physics
 def bank_of(t, m, o):
-    """(cosine, sine) of the bank; no sine in a planar flight."""
+    """(cosine, sine) of the bank angle [rad]; the sine is 0 in a planar flight."""
     if o.guidance == UNGUIDED:
         cosine, sine = m.cos_bank, m.sin_bank
     else:
@@ -167,7 +173,7 @@ def bank_of(t, m, o):
 
 @physics
 def rhs(t, s, m, p, o):
-    """Time derivative of the state: field, Coriolis force, drag, lift, and the heat rate."""
+    """Time derivative of the state, SI: field, Coriolis force, drag, lift, heat rate.  Vinh, chapter 2, as vectors."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
     v = sqrt(speed2(air))
@@ -189,7 +195,8 @@ def events(t, s, m, p, o):
     """Peaks of dynamic pressure and heat rate, pull-out, rolls, and the ends of the flight.
 
     A peak is where the rate falls through zero.  Both quantities are rho^a V^b, whose logarithm has the rate
-    a rho'/rho climb + b v.a/V^2; the events are V^2 times that, so that a vehicle at rest divides nothing by zero.
+    a rho'/rho climb + b v.a/V^2, derived here; the events are V^2 times that [m^2/s^3], so that a vehicle at rest
+    divides nothing by zero.  Rolls are sines of flight-path angles, ends altitudes [m] and times [s].
     """
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
@@ -219,7 +226,7 @@ def events(t, s, m, p, o):
 
 @physics
 def exposure_of(s, p, o):
-    """The `Exposure` of a state."""
+    """The `Exposure` of a state, SI: dynamic pressure rho V^2 / 2."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
     v2 = speed2(air)
@@ -230,7 +237,7 @@ def exposure_of(s, p, o):
 
 @physics
 def start(p, o):
-    """Peaks begin with the values at entry."""
+    """Memory at entry, SI: peaks begin with the values there."""
     pressure, flux, altitude, v, force = exposure_of(initial(p, o), p, o)
     zero = 0.0 * v
     unknown = zero + UNKNOWN
@@ -273,7 +280,7 @@ def exit_of(s, p, o):
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """Keep the larger of each peak, the first pull-out and the first exit; change the bank where a roll is due."""
+    """Keep the larger of each peak, the first pull-out and the first exit, SI; change the bank where a roll is due."""
     pressure, flux, altitude, v, force = exposure_of(s, p, o)
     push = (hit.pressure_peak > 0.5) & (pressure > m.pressure)
     heat = (hit.heat_peak > 0.5) & (flux > m.flux)

@@ -1,4 +1,4 @@
-"""What is seen along an entry and what it comes to: quantities and metrics.  SI, radians."""
+"""Quantities along an entry and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
@@ -17,11 +17,9 @@ from campaigns.reentry.dynamics import (
     place_of,
     speed2,
 )
-from mc_engine.lanes import atan2, floor, physics, sqrt, where
+from mc_engine.lanes import atan2, physics, sqrt, where
 from mc_engine.model import Field
-from mc_engine.physics.frames import geodetic_latitude, spherical, velocity_angles
-
-TAU = 6.283185307179586
+from mc_engine.physics.frames import TURN, full_turn, geodetic_latitude, spherical, velocity_angles
 
 QUANTITIES = (
     Field("altitude_km", "km", "geodetic altitude"),
@@ -110,15 +108,10 @@ Ground = namedtuple("Ground", "latitude longitude downrange crossrange path head
 
 
 @physics
-def full_turn(angle):
-    """The angle in [0, 2 pi)."""
-    return angle - TAU * floor(angle * (1.0 / TAU))
-
-
-@physics
 def ground_of(s, altitude, p, o):
-    """Place over ground and direction of flight.  Distances are counted from the planned entry place.
+    """Place over ground and direction of flight [m, rad].  Distances are counted from the planned entry place.
 
+    Downrange is the arc along the planned great circle, crossrange the arc from it, on a sphere of the planet's radius.
     Downrange goes on beyond the antipodes, from a quarter of a turn behind the entry place to three quarters ahead.
     """
     if o.shape == FLAT:
@@ -132,7 +125,7 @@ def ground_of(s, altitude, p, o):
         ahead = s.x * p.fx + s.y * p.fy + s.z * p.fz
         right = s.x * p.nx + s.y * p.ny + s.z * p.nz
         along = atan2(ahead, up)
-        downrange = p.radius * where(along < -0.25 * TAU, along + TAU, along)
+        downrange = p.radius * where(along < -0.25 * TURN, along + TURN, along)
         crossrange = p.radius * atan2(right, sqrt(up * up + ahead * ahead))
         path, heading = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)
     return Ground(latitude, longitude, downrange, crossrange, path, full_turn(heading))
@@ -140,7 +133,7 @@ def ground_of(s, altitude, p, o):
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
     v2 = speed2(air)
@@ -180,7 +173,7 @@ def known(value):
 
 @physics
 def violations(load, pressure, flux, heat, p):
-    """How many of load, heat rate, heat load and dynamic pressure were above their limits."""
+    """How many of load [m/s^2], heat rate [W/m^2], heat load [J/m^2], dynamic pressure [Pa] were above their limits."""
     return (
         where(load > p.corridor_load, 1.0, 0.0)
         + where(flux > p.corridor_heat_rate, 1.0, 0.0)
@@ -191,7 +184,7 @@ def violations(load, pressure, flux, heat, p):
 
 @physics
 def target_of(t, p, o):
-    """(geodetic latitude, longitude) of the target, not numbers without one or over a flat Earth."""
+    """(geodetic latitude, longitude) of the target [rad], not numbers without one or over a flat Earth."""
     if o.shape == FLAT:
         latitude, longitude = float("nan") + t, float("nan") + t
     else:
@@ -216,7 +209,7 @@ def planned_range(t, p, o):
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at the end of the flight."""
+    """The metrics in the order of METRICS, at the end of the flight, SI and radians."""
     pressure, flux, altitude, v, force = exposure_of(s, p, o)
     ground = ground_of(s, altitude, p, o)
     push, heat = pressure > m.pressure, flux > m.flux  # the flight may end before a peak

@@ -11,7 +11,7 @@ _SHORT = 0.05  # first length of an added burn, and how it grows, over the burn 
 
 
 def with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
-    """Three-burn unknowns from those of two burns, or None."""
+    """Three-burn unknowns from those of two burns, canonical, or None."""
     grow = _SHORT * two[7]
     x = solve(problem, _short_burn_ahead(problem, two, grow), first_burn(problem))
     last: tuple[float, np.ndarray] | None = None
@@ -28,13 +28,13 @@ def with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
 
 
 def _gap(problem: Problem, x: np.ndarray) -> float:
-    """Length of the primer vector after the first coast less that before it."""
+    """Length of the primer vector after the first coast less that before; 0 at the optimum (Lawden, chapter 5)."""
     size = np.linalg.norm(switch_states(problem, x[None])[0, :, 6:9], axis=1)
     return float(size[2] - size[1])
 
 
 def _longer(problem: Problem, before: tuple | None, x: np.ndarray, grow: float) -> np.ndarray | None:
-    """The solution with a first burn longer by `grow`."""
+    """The solution with a first burn longer by `grow`, canonical time; the guess is linear in that burn's duration."""
     guess = x.copy()
     if before is not None:
         guess = x + (x - before[1]) * grow / (x[7] - before[1][7])
@@ -66,7 +66,10 @@ def _where_lengths_agree(problem: Problem, low: tuple, high: tuple) -> np.ndarra
 
 
 def _short_burn_ahead(problem: Problem, two: np.ndarray, length: float) -> np.ndarray:
-    """Guess of three burns: a burn where the primer vector is longest on the parking orbit, one revolution ahead."""
+    """Guess of three burns, canonical: a short burn one revolution ahead, centred where the primer vector is longest.
+
+    Lawden, chapter 5: where that length exceeds 1 on a coast, an impulse there saves propellant.
+    """
     period = 2.0 * np.pi / (1.0 - problem.eccentricity) ** 1.5
     start = first_states(problem, two[None])
     times = np.linspace(-0.5, 2.0, 501)

@@ -11,6 +11,7 @@ _STEP = 1e-40  # along the imaginary axis: its square vanishes beside one
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Scalar product over the last axis, canonical, without conjugation: complex parts carry derivatives."""
     return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
 
 
@@ -57,6 +58,9 @@ def _anomaly_difference(m: np.ndarray, cosine: np.ndarray, sine: np.ndarray) -> 
 
 
 def coast(y: np.ndarray, dt: np.ndarray) -> np.ndarray:
-    """States [n, 12] (place, velocity, primer vector, its rate) a time dt [n] after the states y."""
+    """States [n, 12] (place, velocity, primer vector, its rate), canonical, a time dt [n] after the states y.
+
+    (19)-(21)
+    """
     place, velocity = kepler(y[..., 0:3] + 1j * _STEP * y[..., 6:9], y[..., 3:6] + 1j * _STEP * y[..., 9:12], dt)
     return np.concatenate([place.real, velocity.real, place.imag / _STEP, velocity.imag / _STEP], axis=-1)

@@ -45,7 +45,10 @@ def optimum(problem: Problem) -> Solution:
 
 
 def _refuse_descents(problem: Problem) -> None:
-    """The sequences begin about perigee and end at apogee, so the final circle has to lie outside the parking orbit."""
+    """The sequences begin about perigee and end at apogee, so the final circle has to lie outside the parking orbit.
+
+    Compared in canonical radii: the apogee is (1 + e) / (1 - e).
+    """
     farthest = (1.0 + problem.eccentricity) / (1.0 - problem.eccentricity)
     if farthest >= problem.ratio:
         raise ModelError(
@@ -55,7 +58,10 @@ def _refuse_descents(problem: Problem) -> None:
 
 
 def _refuse_waiting(solution: Solution) -> None:
-    """Each coast ends at the first apsis that serves: one that lasts longer belongs to another sequence."""
+    """Each coast ends at the first apsis that serves: one that lasts longer belongs to another sequence.
+
+    The period of a coast's orbit is 2 pi a^1.5, canonical (Kepler's third law).
+    """
     ends = solution.states[1:-1:2]
     a = 1.0 / (2.0 / np.linalg.norm(ends[:, :3], axis=1) - (ends[:, 3:6] ** 2).sum(1))
     if not (solution.coasts < 2.0 * np.pi * a**1.5).all():
@@ -78,7 +84,7 @@ def _impulsive_guess(problem: Problem) -> np.ndarray:
 
 
 def _two_burns(problem: Problem) -> np.ndarray:
-    """Two-burn unknowns: from a circle as it comes, from an ellipse the cheapest of all ways."""
+    """Two-burn unknowns, canonical: from a circle as it comes, from an ellipse the cheapest of all ways."""
     if problem.eccentricity == 0.0:
         return _from_circle(problem)
     ways: list[Callable[[Problem], np.ndarray]] = [_from_perigee]
@@ -124,6 +130,8 @@ def _from_perigee(problem: Problem) -> np.ndarray:
     """The planar circle, then the eccentricity and the plane change with the first place held, then the best place.
 
     A planar circle has no place of its own, and an ellipse that is nearly one only a soft one.  Less thrust comes last.
+
+    Canonical units.
     """
     strong = problem.with_thrust(max(problem.thrust, 2.0 * GENTLE_THRUST))
     circle = replace(strong, plane_change=0.0, eccentricity=0.0)
@@ -135,7 +143,7 @@ def _from_perigee(problem: Problem) -> np.ndarray:
 
 
 def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
-    """Unknowns with the first place free: it is moved by steps while the burns grow shorter."""
+    """Unknowns with the first place [rad] free: it is moved by steps while the burns grow shorter."""
 
     def moved(x: np.ndarray, by: float) -> np.ndarray | None:
         return solve(problem, x + by * np.eye(1, x.size)[0], FIRST_PLACE)
@@ -158,7 +166,10 @@ def _from_ascending_node(problem: Problem) -> np.ndarray:
 
 
 def _from_descending_node(problem: Problem) -> np.ndarray:
-    """The same from the mirror image about the earth's centre, which a circle allows."""
+    """The same from the mirror image about the earth's centre, which a circle allows.
+
+    The image changes the sign of the normal components and moves the place by pi [rad].
+    """
     wide = _widened(problem)
     top, x = _at_large_thrust(replace(wide, eccentricity=0.0))
     mirrored = x * np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
@@ -172,7 +183,7 @@ def _stretched(top: Problem, x: np.ndarray, wide: Problem, problem: Problem) -> 
 
 
 def _between(start: Problem, end: Problem, share: float) -> Problem:
-    """On the way from one problem to another: thrust along its logarithm, the rest along lines."""
+    """On the way from one problem to another, canonical: thrust along its logarithm, the rest along lines."""
     if share >= 1.0:
         return end
     thrust = start.thrust * (end.thrust / start.thrust) ** share
@@ -185,6 +196,8 @@ def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None
     """Unknowns of the problem `end` from those of `start`, each step foreseen from the last two solutions.
 
     A solution far from what was foreseen belongs to another family of extremals, and the step is halved.
+
+    Secant prediction; the unknowns and their distances are canonical.
     """
     if start == end:
         return x
@@ -206,6 +219,7 @@ def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None
 
 
 def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
+    """How far the search got from thrust, plane change [deg] and eccentricity that it began with, and what may help."""
     where = [f"{here.thrust / end.thrust:.3f} of the wanted thrust"]
     where.append(f"a plane change of {np.degrees(here.plane_change):.3f} of {np.degrees(end.plane_change):.3f} deg")
     if end.eccentricity > 0.0:
@@ -218,7 +232,10 @@ def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
 
 
 def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
-    """The same sequence with burns longer by what the thrust is smaller, about the same middles."""
+    """The same sequence with burns longer by what the thrust is smaller, about the same middles.
+
+    The burn times scale with 1 / thrust, canonical; sqrt(1 + e) is the rate of the place at perigee.
+    """
     n, guess = here.burns, x.copy()
     longer = here.thrust / there.thrust
     guess[7 : 7 + n] *= longer

@@ -43,6 +43,8 @@ def _primer_rate(start: np.ndarray, first: np.ndarray, second: np.ndarray, dt: f
     """Rate of the primer vector at the first impulse: it becomes `second` after dt, and is longest at both.
 
     Half a revolution leaves one component free, so the five conditions on three numbers are met by least squares.
+
+    Canonical; the conditions are those of Lawden, chapter 5.
     """
     basis = np.zeros((4, 12))
     basis[:, :6] = start

@@ -15,6 +15,7 @@ THRUST, MASS_FLOW, MASS = 20_000.0, 6.14, 22_170.0
 
 
 def _sequence(burns: int, degrees: float, method: str = "optimal") -> Sequence:
+    """A sequence of the source: tables 2 to 8, with the burns, plane change [deg] and method given."""
     change = float(np.radians(degrees))
     between = source_orbits(burns, change) if method == "staged" else ()
     return Sequence(
@@ -36,7 +37,7 @@ SEQUENCES = {
 
 
 def write_all() -> None:
-    """Design every sequence and write its file."""
+    """Design every sequence of the source and write its file, SI."""
     KEPT.mkdir(exist_ok=True)
     for name, sequence in SEQUENCES.items():
         (KEPT / f"{name}.toml").write_text(to_text(new_design(sequence)), encoding="utf-8", newline="\n")

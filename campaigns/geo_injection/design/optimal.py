@@ -37,11 +37,11 @@ class Problem:
 
     @property
     def exhaust(self) -> float:
-        """Exhaust speed."""
+        """Exhaust speed T / m', canonical: the c of eq. (1)."""
         return self.thrust / self.flow
 
     def with_thrust(self, thrust: float) -> "Problem":
-        """The same engine with another thrust and the same exhaust speed."""
+        """The same engine with another thrust, canonical, and the same exhaust speed."""
         return replace(self, thrust=thrust, flow=thrust / self.exhaust)
 
 
@@ -66,12 +66,15 @@ class Solution:
 
     @property
     def ignitions(self) -> np.ndarray:
-        """Times of the ignitions after the first."""
+        """Times of the ignitions after the first, canonical."""
         return np.concatenate([[0.0], np.cumsum(self.durations[:-1] + self.coasts)])
 
 
 def switch_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
-    """States [n, 2 burns, 12] at the ignitions and cut-offs of n sets of unknowns [n, 6 + 2 burns]."""
+    """States [n, 2 burns, 12] at the ignitions and cut-offs of n sets of unknowns [n, 6 + 2 burns].
+
+    Canonical; coasts by (19)-(21), burns by (1) and (16).
+    """
     from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
 
     y = first_states(problem, unknowns)
@@ -121,7 +124,7 @@ def first_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
 
 
 def coast_hamiltonian(y: np.ndarray) -> np.ndarray:
-    """q.v - p.g of states [..., 12]: the part of the Hamiltonian that holds no thrust, with its sign."""
+    """q.v - p.g of states [..., 12], canonical: eq. (13) without the thrust and the 1, with its sign."""
     r, v, p, q = (y[..., 3 * k : 3 * k + 3] for k in range(4))
     r3 = (r * r).sum(-1) ** 1.5
     return (q * v).sum(-1) + (p * r).sum(-1) / r3
@@ -154,7 +157,7 @@ def residuals(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
 
 
 def _jacobian(problem: Problem, x: np.ndarray) -> np.ndarray:
-    """Central differences over all unknowns at once."""
+    """Central differences of the residuals over all unknowns at once, canonical: [6 + 2 burns, 6 + 2 burns]."""
     steps = _STEP * np.diag(np.maximum(1.0, np.abs(x)))
     both = residuals(problem, np.concatenate([x + steps, x - steps]))
     n = x.size
@@ -171,7 +174,7 @@ def first_burn(problem: Problem) -> Instead:
 
 
 def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -> np.ndarray | None:
-    """Unknowns of the optimum near a guess, or None.
+    """Unknowns (canonical) of the optimum near a guess, or None.
 
     A planar sequence keeps its primer vector in the plane, and may begin anywhere on a circular parking orbit, so that
     its first place is held at the guess; one of its conditions then follows from the others, which

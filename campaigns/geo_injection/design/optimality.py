@@ -1,4 +1,4 @@
-"""What shows that a sequence is an optimum: its Hamiltonian and its switching function along the flight."""
+"""Check that a sequence is an optimum: Hamiltonian and switching function along the flight, canonical units."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,6 +27,7 @@ class Arc:
 
 
 def _flown(problem: Problem, start: np.ndarray, mass: float, times: np.ndarray) -> np.ndarray:
+    """States [n, 12] at the times [n] of a burn, canonical."""
     from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
 
     repeated = np.repeat(start[None], times.size, axis=0)
@@ -43,6 +44,7 @@ def arcs(solution: Solution, n: int = 200) -> list[Arc]:
 
 
 def _backward(solution: Solution, n: int) -> Iterator[Arc]:
+    """The arcs from the last to the first, canonical: the mass costate is known at the end, where it is 0."""
     problem = solution.problem
     masses = 1.0 - problem.flow * np.concatenate([[0.0], np.cumsum(solution.durations)])
     mass_costate, unit = 0.0, problem.thrust / masses[-1]

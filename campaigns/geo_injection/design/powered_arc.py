@@ -36,7 +36,10 @@ def _rates(y, acceleration, out):
 
 @compile_kernel
 def _fly_one(y, mass, duration, thrust, flow, n_steps, nodes, starts, columns, weights, stages):
-    """Carry y over one burn in place.  mass : at its start;  thrust, flow : per initial mass."""
+    """Carry y over one burn in place, canonical.  mass : at its start;  thrust, flow : per initial mass.
+
+    Weights of order 8 of DOP853: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993).
+    """
     h = duration / n_steps
     n_stages = stages.shape[0]
     now = np.empty(y.shape[0])

@@ -88,7 +88,7 @@ def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float)
 
 
 def _powers(column: np.ndarray) -> np.ndarray:
-    """Coefficients of powers from those of a Chebyshev series; numpy drops the zeros at their end."""
+    """Coefficients (no unit) of powers from those of a Chebyshev series; numpy drops the zeros at their end."""
     powers = chebyshev.cheb2poly(column)
     return np.pad(powers, (0, DEGREE + 1 - powers.size))
 
@@ -97,6 +97,7 @@ Flown = tuple[float, float, np.ndarray, np.ndarray]
 
 
 def _in_space(sequence: Sequence, state: np.ndarray) -> np.ndarray:
+    """Place [m] and velocity [m/s], float64[6], z to the north pole, of a canonical state of the design's axes."""
     place = sequence.inertial(state[:3]) * sequence.parking_radius
     return np.concatenate([place, sequence.inertial(state[3:6]) * sequence.speed_unit])
 
@@ -126,7 +127,7 @@ def of_stages(sequence: Sequence, stages: list[StagedBurn]) -> Program:
 
 
 def to_text(program: Program) -> str:
-    """The program as TOML."""
+    """The program as TOML, SI."""
     lines = ["# Burn program: see program.py.  Written by the design; edit its inputs instead.", f"design = {DESIGN}"]
     lines += [f"optimal = {str(program.optimal).lower()}", f"start = {_list(program.start)}", "", "[sequence]"]
     for name, value in program.sequence.record().items():
@@ -142,6 +143,7 @@ def to_text(program: Program) -> str:
 
 
 def _list(values: np.ndarray) -> str:
+    """Numbers as a TOML array with every digit of float64[n]."""
     return "[" + ", ".join(repr(float(value)) for value in values) + "]"
 
 

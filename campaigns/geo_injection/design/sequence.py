@@ -73,7 +73,10 @@ class Sequence:
         return tuple(Orbit(a / self.parking_radius, e, max(change - so_far, 0.0)) for a, e, so_far in self.between)
 
     def inertial(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors [..., 3] of the design's axes (z normal to the final orbit) in axes with z to the north pole."""
+        """Vectors [..., 3] of the design's axes (z normal to the final orbit) in axes with z to the north pole.
+
+        A rotation about x by the final inclination [rad], in the vectors' own unit.
+        """
         x, y, z = vectors[..., 0], vectors[..., 1], self.turn * vectors[..., 2]
         c, s = np.cos(self.final_inclination), np.sin(self.final_inclination)
         return np.stack([x, c * y - s * z, s * y + c * z], axis=-1)

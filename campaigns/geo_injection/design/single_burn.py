@@ -77,7 +77,11 @@ def circle(radius: float) -> Conditions:
 
 
 def orbit(a: float, e: float, inclination: float) -> Conditions:
-    """An ellipse of given size, shape and inclination with node and apse line on the x axis."""
+    """An ellipse of given size, shape and inclination with node and apse line on the x axis, canonical.
+
+    Conditions: the angular momentum by eq. (17), the energy -1 / (2 a), and an eccentricity vector without a component
+    across the x axis.
+    """
     h_wanted = np.sqrt(a * (1.0 - e * e))
 
     def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -125,6 +129,8 @@ def fly_shortest(stage: Stage, primer: np.ndarray, rate: np.ndarray, duration: f
 
     The guess fixes directions and a ratio; the size follows from H = 0.  Multipliers of the end conditions begin at
     the values that fit the guessed end best.
+
+    Canonical; the conditions are eqs (9)-(17) of the source, solved by Levenberg-Marquardt and two Newton steps.
     """
     size = float(np.linalg.norm(primer))
     x = np.array([*primer / size, *rate / size, duration, ignition])

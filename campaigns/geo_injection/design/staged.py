@@ -34,7 +34,7 @@ class StagedBurn:
 
 
 def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
-    """The burns over the given intermediate orbits, one fewer than burns; ModelError names the burn that fails."""
+    """The burns over the given intermediate orbits, canonical; ModelError names the burn that fails."""
     burns: list[StagedBurn] = []
     circle_first = problem.eccentricity == 0.0
     if not circle_first and abs(np.sin(0.5 * problem.perigee)) > 1e-9:
@@ -62,7 +62,7 @@ def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
 
 
 def _perigee_speed(transfer: Orbit) -> float:
-    """Canonical speed at perigee: sqrt((1 + e) / ((1 - e) a)).  Curtis, 3rd ed., eqs (2.50), (2.71), (2.73)."""
+    """Canonical speed at perigee, sqrt((1 + e) / ((1 - e) a)): the vis-viva equation at r = a (1 - e)."""
     return float(np.sqrt((1.0 + transfer.e) / ((1.0 - transfer.e) * transfer.a)))
 
 

@@ -12,7 +12,7 @@ from campaigns.reentry.autopilot.model import MODEL
 
 
 def bode_figure(loops: dict[str, tuple[Response, Response]]) -> Any:
-    """Figure of gain and phase of open loops over the frequency: dashed without, solid with compensation.
+    """Figure of gain and phase [deg] of open loops over the frequency [rad/s]: dashed without, solid with compensation.
 
     loops : by legend text, (plant times gain, plant times compensator)
     """
@@ -38,7 +38,7 @@ def bode_figure(loops: dict[str, tuple[Response, Response]]) -> Any:
 
 
 def main(path: str) -> None:
-    """Draw the pitch loop of the autopilot campaign."""
+    """Draw the pitch loop of the autopilot campaign at dynamic pressures of 0, 4e3 and 12e3 [Pa]."""
     o = {setting.symbol: setting.code(setting.default) for setting in MODEL.settings}
     loops = {}
     for pressure in (0.0, 4e3, 12e3):
@@ -49,6 +49,7 @@ def main(path: str) -> None:
 
 
 def _loops(plant: Response, gain: float, lead: Lead) -> tuple[Response, Response]:
+    """(gain times plant, compensator times plant) over the frequency [rad/s]."""
     return lambda w: gain * plant(w), lambda w: lead.response(w) * plant(w)
 
 

@@ -33,7 +33,7 @@ def pitch_design(o: Mapping[str, float], pressure: float) -> tuple[Response, flo
 
 
 def bank_design(o: Mapping[str, float]) -> Lead:
-    """Lead compensator of the bank loop, whose plant is a double integrator."""
+    """Lead compensator of the bank loop, whose plant is the double integrator 1/s^2 [s^2]."""
     return design_lead(short_period(0.0), o["bandwidth"] ** 2, o["phase_margin"])
 
 
@@ -46,7 +46,7 @@ def planned_profile() -> np.ndarray:
 
 
 def autopilot_tables(o: Any) -> np.ndarray:
-    """What `autopilot` reads, for its settings o."""
+    """What the autopilot's flight reads, for its settings o, SI."""
     numbers = o._asdict()
     out = np.zeros(LENGTH)
     profile = planned_profile()[:SECONDS]

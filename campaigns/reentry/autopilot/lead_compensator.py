@@ -35,12 +35,12 @@ class Lead:
     margins: Margins
 
     def response(self, w: Any) -> Any:
-        """Complex gain at a frequency."""
+        """Complex gain at a frequency w [rad/s]: gain (j w + zero) / (j w + pole)."""
         return self.gain * (1j * w + self.zero) / (1j * w + self.pole)
 
 
 def crossover_of(loop: Response, level: float = 1.0) -> float:
-    """Highest frequency at which the loop's gain falls through a level."""
+    """Highest frequency [rad/s] at which the loop's gain falls through a level."""
 
     def above(logarithm: float) -> float:
         return float(np.log(np.abs(loop(np.exp(logarithm))) / level))
@@ -85,7 +85,7 @@ def _lead_of(plant: Response, gain: float, lead: float) -> Lead:
 
 
 def short_period(stiffness: float, damping: float = 0.0) -> Response:
-    """Angle over angular acceleration of a vehicle about its trim: 1 / (s^2 + damping s + stiffness)."""
+    """Angle over angular acceleration [s^2] of a vehicle about its trim: 1 / (s^2 + damping s + stiffness)."""
 
     def response(w: Any) -> Any:
         return 1.0 / (stiffness - np.asarray(w) ** 2 + 1j * damping * np.asarray(w))

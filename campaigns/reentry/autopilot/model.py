@@ -43,7 +43,7 @@ Metrics = namedtuple(
 
 
 def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Kernel parameters of each case: coefficients over its inertia, torques, errors."""
+    """Kernel parameters of each case, SI: coefficients over its inertia, torques, errors."""
     pitch, roll = settings.inertia_pitch * i.inertia_pitch_factor, settings.inertia_roll * i.inertia_roll_factor
     lever = settings.area * settings.diameter / pitch
     return {
@@ -135,7 +135,11 @@ def torques(t, s, p, o, pressure):
 
 @physics
 def rhs(t, s, m, p, o):
-    """Short period about trim and free roll under limited torques."""
+    """Short period about trim and free roll under limited torques, SI and radians.
+
+    I a'' = q S d [C_ma (a - offset) + C_mq d a' / (2 V)] + M: pitch about trim with linear coefficients, derived here;
+    the bank is a double integrator.
+    """
     pressure, speed = air_at(t, p, o)
     pitch, roll, error, lead_alpha, lead_bank, limited = torques(t, s, p, o, pressure)
     air = pressure * (p.moment * (s.alpha - p.offset) + p.damping * s.alpha_rate / speed)
@@ -155,7 +159,7 @@ def rhs(t, s, m, p, o):
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     pressure, _ = air_at(t, p, o)
     pitch, roll, error, _, _, _ = torques(t, s, p, o, pressure)
     return Quantities(
@@ -165,7 +169,7 @@ def observe(t, s, m, p, o):
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS."""
+    """The metrics in the order of METRICS, SI and radians; means over the flight from integrals of squares."""
     return Metrics(
         peak_alpha=best.alpha,
         peak_alpha_time=when.alpha,

@@ -41,13 +41,13 @@ Reckoning = namedtuple("Reckoning", "lost range rate axial excess")
 
 @physics
 def bounded(x, size):
-    """x within -size and size."""
+    """x within -size and size, in their unit."""
     return minimum(maximum(x, -size), size)
 
 
 @physics
 def sensed(s, p, o, draws):
-    """What navigation and accelerometer tell, with their errors."""
+    """What navigation and accelerometer measure, with their errors, SI and radians; `Sensed` names the frames."""
     pressure, _, altitude, v, force = exposure_of(s, p, o)
     place = place_of(s, p, o)
     up = s.x * p.ex + s.y * p.ey + s.z * p.ez
@@ -78,7 +78,11 @@ def target_shift(p):
 
 @physics
 def navigated_share(x, p, o):
-    """Laws 1 and 2: vertical share of the lift less that of the reference."""
+    """Laws 1 and 2: vertical share of the lift less that of the reference, u - u_r, without unit.
+
+    u - u_r = -(k_h dh + k_gamma dgamma + k_s ds) at equal speed; law 2 takes dh = -H_s (D - D_r) / D_r and dgamma =
+    (h' - h'_r) / V.  Derived here for the source's three laws, of which it gives the outline alone.
+    """
     row = BySpeed(*by_speed(o.tables, p.reference, x.speed))
     along = x.along - row.range - target_shift(p)
     if o.guidance == LAW1:
@@ -93,7 +97,10 @@ def navigated_share(x, p, o):
 
 @physics
 def apollo_share(x, p, o):
-    """Vertical share of the lift by the range that the flown influence coefficients predict."""
+    """Vertical share of the lift, without unit, by the range that the flown influence coefficients predict.
+
+    R = R_r + F1 (D - D_r) + F2 (h' - h'_r) [m] and L/D = 0.18 + K (to go - R) / F3, K = 4: R. Morth, R-532 (1966).
+    """
     row = Influence(*by_speed(o.tables, p.reference, x.speed))
     predicted = row.range + row.by_drag * (x.drag - row.drag) + row.by_climb * (x.climb - row.climb)
     to_go = p.aim_down - x.along
@@ -103,7 +110,10 @@ def apollo_share(x, p, o):
 
 @physics
 def reckoned(t, m, x, p, o):
-    """The accelerometer's account after a sample: by the clock until the air is felt, then by the speed lost."""
+    """The accelerometer's account after a sample: by the clock until the air is felt, then by the speed lost [m/s].
+
+    W = integral of n dt and the range [m] along W by trapezoids; derived here for the source's law 3.
+    """
     period = o.guidance_period
     before = m.lost <= 0.0
     felt = x.axial > FELT
@@ -120,7 +130,11 @@ def reckoned(t, m, x, p, o):
 
 @physics
 def accelerometer_share(now, m, p, o):
-    """Law 3: vertical share of the lift less that of the reference."""
+    """Law 3: vertical share of the lift less that of the reference, without unit, and the stored speed [m/s].
+
+    dh = -H_s (n - n_r) / n_r and h' = -H_s [rate of ln(n / n_r) + 2 (n - n_r) / V_r]: the logarithm of n ~ rho V^2
+    differentiated in an exponential atmosphere, derived here.
+    """
     row = by_loss(o.tables, p.reference, now.lost)
     share = now.axial / row.axial - 1.0
     high = bounded(-SCALE_HEIGHT * share, LARGEST_CLIMB)
@@ -135,7 +149,7 @@ def accelerometer_share(now, m, p, o):
 
 @physics
 def commanded_share(t, s, m, x, p, o):
-    """(vertical share of the lift before its limits, speed by which the law goes, what law 3 keeps)."""
+    """(vertical share of the lift before its limits, speed [m/s] by which the law goes, what law 3 keeps)."""
     zero = 0.0 * t
     kept = Reckoning(m.lost, m.reckoned, m.range_rate, m.axial, m.excess)
     if o.guidance == LAW3 or o.guidance == LAW3R:
@@ -151,7 +165,7 @@ def commanded_share(t, s, m, x, p, o):
 
 @physics
 def steer(t, s, m, p, o, draws):
-    """One sample: sense, ask for a share of the lift, choose its side, and send the bank after it."""
+    """One sample: sense, ask for a share of the lift, choose its side, and send the bank [rad] after it."""
     x = sensed(s, p, o, draws)
     share, speed, kept = commanded_share(t, s, m, x, p, o)
     if o.guidance == LAW3 or o.guidance == LAW3R:

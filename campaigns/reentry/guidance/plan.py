@@ -1,4 +1,4 @@
-"""What is planned: the entry, vehicle and bank that a guidance law's reference path is flown with.  NumPy, SI.
+"""The plan: the entry, vehicle and bank that a guidance law's reference path is flown with.  NumPy, SI.
 
 A plan knows no errors and no factors.  By default it is each case's own entry, vehicle and bank, so that cases which
 differ in their errors alone have one plan; with plan = "given" it is that of the settings plan_..., one for all.
@@ -81,7 +81,7 @@ def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planne
 
 
 def default_plan() -> Plan:
-    """The plan of the model's default inputs, as plain numbers."""
+    """The plan of the model's default inputs, as plain numbers, SI."""
     i, settings = (
         SimpleNamespace(**{item.symbol: np.array([number(item)]) for item in items})
         for items, number in (

@@ -76,6 +76,7 @@ class Planner:
     """Motion of the planned vehicle about the planned world."""
 
     def __init__(self, plan: Plan):
+        """plan : SI numbers of one plan; the temperature [K] of an exponential atmosphere is g H0 / R."""
         self.plan = plan
         planet = list(PLANETS.values())[int(plan.planet)]
         e2 = planet.e2 if plan.shape == ELLIPSOID else 0.0
@@ -122,7 +123,7 @@ class Planner:
 
 
 def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
-    """The reference from the planned entry down to plan_stop_altitude, at equal steps of time."""
+    """The reference from the planned entry down to plan_stop_altitude, at equal steps of time, SI."""
 
     begin = planner.start()
     if planner.height(begin[0], begin[2])[0] <= planner.plan.end:
@@ -168,7 +169,7 @@ def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
 
 
 def steered_part(path: Reference) -> slice:
-    """Where the laws command: from STEERED down to LAST_SPEED."""
+    """Where the laws command: from STEERED [m/s^2] down to LAST_SPEED [m/s]."""
     first = int(np.argmax(path.drag > STEERED))
     if path.drag[first] <= STEERED:
         raise ModelError("the planned entry never has 0.15 g of drag, so that no law could steer")
@@ -214,9 +215,9 @@ def riccati_gains(lost: np.ndarray, a: np.ndarray, b: np.ndarray, weights: Weigh
 
 
 class StoredReferences(NamedTuple):
-    """Where each case finds its reference path in the tables, and its range [m]; both 0 without one."""
+    """Index at which each case's reference path begins in the tables, and its range [m]; both 0 without one."""
 
-    place: np.ndarray
+    start: np.ndarray
     range: np.ndarray
     tables: np.ndarray
 
@@ -224,14 +225,14 @@ class StoredReferences(NamedTuple):
 def stored_references(plans: Plan, asked: np.ndarray, first: int, refusals: Refusals) -> StoredReferences:
     """The reference paths of the plans (float64[n] each), one for all cases of the same plan.
 
-    asked : bool[n], cases with a law;  first : place of the first reference.  Cases whose plan has no reference path
-    join `refusals`.
+    asked : bool[n], cases with a law;  first : index at which the first reference begins.  Cases whose plan has no
+    reference path join `refusals`.
     """
     columns = np.array([np.broadcast_to(column, asked.shape) for column in plans])
-    place, along, tables = np.zeros(asked.size), np.zeros(asked.size), [np.empty(0)]
+    start, along, tables = np.zeros(asked.size), np.zeros(asked.size), [np.empty(0)]
     asked = asked & ~refusals.mask
     if not asked.any():
-        return StoredReferences(place, along, tables[0])
+        return StoredReferences(start, along, tables[0])
     distinct, which = np.unique(columns[:, asked], axis=1, return_inverse=True)
     # an error and not a refusal: what a case comes to must not depend on the cases it is prepared with
     if distinct.shape[1] > MOST_PLANS:
@@ -245,9 +246,9 @@ def stored_references(plans: Plan, asked: np.ndarray, first: int, refusals: Refu
         if isinstance(reference, str):
             refusals.reason[mine] = reference
         else:
-            place[mine], along[mine] = first + sum(stored.size for stored in tables), reference[table.RANGE]
+            start[mine], along[mine] = first + sum(stored.size for stored in tables), reference[table.RANGE]
             tables.append(reference)
-    return StoredReferences(place, along, np.concatenate(tables))
+    return StoredReferences(start, along, np.concatenate(tables))
 
 
 @lru_cache(maxsize=64)
@@ -277,7 +278,7 @@ def _designed(plan: Plan) -> np.ndarray:
 
 
 def _write_path(out: np.ndarray, planner: Planner, path: Reference, weights: Weights) -> None:
-    """Path and gains over the speed, and over the speed lost."""
+    """Path and gains over the speed [m/s], and over the speed lost [m/s], SI."""
     part = steered_part(path)
     steered = Reference(**{name: value[part] for name, value in vars(path).items()})
     lost = steered.speed[0] - steered.speed
@@ -294,7 +295,10 @@ def _write_path(out: np.ndarray, planner: Planner, path: Reference, weights: Wei
 
 
 def _write_clock(out: np.ndarray, path: Reference) -> None:
-    """The range by the clock until the air is felt: a parabola through the entry, with range and rate of its end."""
+    """The range by the clock until the air is felt: a parabola through the entry, with range and rate of its end.
+
+    SI; derived here: s = along + rate (t - end) + bend (t - end)^2 with s(0) = 0.
+    """
     k = max(2, int(np.argmax(path.lost > 0.0)))
     end, along = path.t[k], path.along[k]
     rate = np.gradient(path.along[: k + 1], path.t[: k + 1])[-1]

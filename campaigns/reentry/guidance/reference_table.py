@@ -1,4 +1,4 @@
-"""The stored reference path: how it lies in the tables, one for all cases of a plan, and how a flight reads it.
+"""Layout of a stored reference path in the tables, one for all cases of a plan, and its reading in flight.
 
 Two tables of eight columns, one over the speed, one over the speed lost W that an accelerometer has counted.  Rows
 are equally spaced in ln(1 + x / SPREAD) with x the speed lost since the first row: close where the air is thin and
@@ -32,7 +32,7 @@ Influence = namedtuple("Influence", "climb drag range by_drag by_climb by_lift u
 
 
 @physics
-def _row(tables, start, density, x):
+def _interpolated_row(tables, start, density, x):
     """The eight columns at a speed lost x [m/s]; the first and the last row stand for what lies beyond."""
     place = log(1.0 + maximum(x, 0.0) * (1.0 / SPREAD)) * density
     place = minimum(maximum(place, 0.0), LAST_PLACE)
@@ -56,13 +56,13 @@ def _row(tables, start, density, x):
 def by_speed(tables, first, speed):
     """The row of the speed table at a speed [m/s]; here and below, first : place where the reference begins."""
     lost = look_up(tables, first + FIRST_SPEED) - speed
-    return _row(tables, first + SPEED_TABLE, look_up(tables, first + SPEED_DENSITY), lost)
+    return _interpolated_row(tables, first + SPEED_TABLE, look_up(tables, first + SPEED_DENSITY), lost)
 
 
 @physics
 def by_loss(tables, first, lost):
     """The row of the other table at a speed lost W [m/s]."""
-    return ByLoss(*_row(tables, first + LOST_TABLE, look_up(tables, first + LOST_DENSITY), lost))
+    return ByLoss(*_interpolated_row(tables, first + LOST_TABLE, look_up(tables, first + LOST_DENSITY), lost))
 
 
 @physics

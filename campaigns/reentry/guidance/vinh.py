@@ -1,7 +1,7 @@
-"""Vinh's equations of motion: they check the flown motion, and fly nothing.
+"""Vinh's equations of motion: the reference path is flown by them, and tests compare the flights with them.
 
 The same motion as `dynamics.rhs` in distance, longitude, latitude, speed, flight-path angle and heading.  Singular in
-vertical flight, at rest and over the poles, which is why the flight has components instead.
+vertical flight, at rest and over the poles, which is why the flight uses Cartesian components instead.
 
 N. X. Vinh, A. Busemann, R. D. Culp, Hypersonic and Planetary Entry Flight Mechanics (1980), chapter 2, with the
 heading from north, clockwise (Vinh: from east, counter-clockwise).  Angles over ground, SI.
@@ -20,7 +20,7 @@ def gravity(r, latitude, mu, j2=J2_EARTH):
 
 
 def rates(r, latitude, v, path, heading, drag, lift, bank, g_in, g_north, omega):
-    """Rates of (r, longitude, latitude, v, path, heading); drag, lift, g_in, g_north are accelerations."""
+    """Rates (SI) of (r, longitude, latitude, v, path, heading); drag, lift, g_in, g_north are accelerations."""
     s, c = np.sin(path), np.cos(path)
     sh, ch = np.sin(heading), np.cos(heading)
     sl, cl = np.sin(latitude), np.cos(latitude)
