@@ -1,4 +1,4 @@
-"""Standard deviations by linear theory beside those of flown cases: what a Monte Carlo run has to agree with.
+"""Standard deviations by linear theory, with which those of flown cases are compared.
 
 `python -m campaigns.geo_injection.linear_prediction [CAMPAIGN]` prints both for a campaign file of this folder.
 Good for metrics that are smooth in the errors, such as the semi-major axis; eccentricity, inclination and correction

@@ -15,13 +15,13 @@ the law chooses each coast and each correction.
 from collections import namedtuple
 
 from campaigns.geo_servicing import plan_table
+from campaigns.geo_servicing.drift_model import DRIFT_PER_DV
 from campaigns.geo_servicing.dynamics import (
     INSPECTION,
     MU,
     PHASING,
     RATE,
     SIDEREAL_DAY,
-    V0,
     Memory,
     longitudes,
 )
@@ -42,7 +42,6 @@ NEVER = 1e15  # s
 FIRST_LOOK = 1.0  # s: the inspection decides first when the first fix is there
 SHORTEST_BURN = 1e-6  # s
 MISSING = float("nan")
-DRIFT_PER_DV = -3.0 * TURN / V0  # rad/rev per m/s, first order about the geostationary orbit
 
 
 @physics
@@ -61,9 +60,9 @@ def start(p, o):
         due=due, mode=mode, burns=zero, outward=zero, ahead=zero, across=zero, dv=zero, settled=zero, second=zero,
         end_time=gone, end_true=gone, end_mean=gone, end_drift=gone, end_e=gone, end_inclination=gone, end_sum=gone,
         day_mean=gone, day_drift=gone,
-        r=zero, s=zero, u=zero, w=zero, prr=zero, prs=zero, pru=zero, prw=zero, pss=zero, psu=zero, psw=zero, puu=zero,
-        puw=zero, pww=zero, after_r=zero, after_s=zero, after_u=zero,
-        after_w=zero, d1=zero, d2=zero, d3=zero,
+        r=zero, s=zero, u=zero, w=zero, prr=zero, prs=zero, pru=zero, prw=zero, pss=zero, psu=zero, psw=zero,
+        puu=zero, puw=zero, pww=zero,
+        after_r=zero, after_s=zero, after_u=zero, after_w=zero, d1=zero, d2=zero, d3=zero,
     )  # fmt: skip
 
 
@@ -88,8 +87,14 @@ def drift_of(a):
 
 
 @physics
+def inclination_of(elements):
+    """Inclination [rad] of equinoctial elements."""
+    return 2.0 * atan(sqrt(elements.q * elements.q + elements.p * elements.p))
+
+
+@physics
 def navigated(t, s, m, p):
-    """(mean longitude deviation [rad], drift [rad/rev]) as navigation tells them."""
+    """(mean longitude deviation [rad], drift [rad/rev]) as navigation measures them."""
     x = navigated_elements(s, m)
     mean = x.mean - (p.aim + RATE * t)
     return half_turn(mean), drift_of(x.a)
@@ -157,7 +162,7 @@ def ignited(t, s, m, p, o):
 
 
 @physics
-def learnt(m, p, o, cut):
+def estimate_after_burn(m, p, o, cut):
     """The estimate [m, m/s] after a burn, where `cut` holds.
 
     A filter adds what the burn gave over the command to its error, and the assumed errors to its covariance; without a
@@ -170,12 +175,12 @@ def learnt(m, p, o, cut):
         outward, ahead = size * m.outward / p.thrust, size * m.ahead / p.thrust
         e = burnt(e, outward, ahead - where(cut, m.dv, 0.0), size, o.assumed_thrust, o.assumed_pointing)
     elif o.navigation == RAW:
-        e = fixed_anew(e, m, cut)
+        e = fix_after_burn(e, m, cut)
     return e
 
 
 @physics
-def fixed_anew(e, m, cut):
+def fix_after_burn(e, m, cut):
     """A fix of its own where `cut` holds: what is decided after a burn does not share the errors of its ignition."""
     return Estimate(
         r=where(cut, m.after_r, e.r), s=where(cut, m.after_s, e.s), u=where(cut, m.after_u, e.u),
@@ -203,7 +208,7 @@ def switch(t, s, m, p, o, hit):
     now = hit.due > 0.5
     ignite, cut = now & (m.mode == IGNITION), now & (m.mode == CUT_OFF)
     decide, day = now & (m.mode == DECISION), now & (m.mode == DAY_LATER)
-    e = learnt(m, p, o, cut)
+    e = estimate_after_burn(m, p, o, cut)
     due, mode, second, over = m.due, m.mode, m.second, cut & (not cut)
     if o.phase == PHASING:
         burns = m.burns + where(cut, 1.0, 0.0)
@@ -244,14 +249,13 @@ def switch(t, s, m, p, o, hit):
 def ended(t, s, m, p, over, day):
     """The `TransferEnd` [s, rad, rad/rev]: kept at the last cut-off, and a sidereal day later."""
     true, mean, x = longitudes(t, s, p)
-    e, tilt = sqrt(x.k * x.k + x.h * x.h), 2.0 * atan(sqrt(x.q * x.q + x.p * x.p))
     return TransferEnd(
         time=where(over, t, m.end_time),
         true=where(over, true, m.end_true),
         mean=where(over, mean, m.end_mean),
         drift=where(over, drift_of(x.a), m.end_drift),
-        e=where(over, e, m.end_e),
-        inclination=where(over, tilt, m.end_inclination),
+        e=where(over, sqrt(x.k * x.k + x.h * x.h), m.end_e),
+        inclination=where(over, inclination_of(x), m.end_inclination),
         sum=where(over, s.longitude_sum, m.end_sum),
         day_mean=where(day, (s.longitude_sum - m.end_sum) / SIDEREAL_DAY, m.day_mean),
         day_drift=where(day, mean - m.end_mean, m.day_drift),

@@ -1,4 +1,4 @@
-"""The inspection law: when to correct, and by how much, so that the module stays at its place beside the target.
+"""The inspection law: when to correct, and by how much, so that the module keeps its distance from the target.
 
 Numbers in brackets are equations of the source (`model.SOURCE`); the procedure around them is the README's.
 """
@@ -31,7 +31,7 @@ def correction(y, v, t, chi1, chi2, weight, sigma):
 
 @physics
 def relative_orbit(s, m):
-    """The module's motion about the target, as navigation tells it [m, m/rev, 1, rad].
+    """The module's motion about the target, as navigation measures it [m, m/rev, 1, rad].
 
     The distance is R0 times the difference of the mean longitudes, e and phase those of (3.43), (3.44); the drift,
     -3 pi R0 (a - a_target) / a_target per revolution, is derived here from T ~ a^1.5.

@@ -210,7 +210,7 @@ def chosen(mask, a, b):
 
 @physics
 def navigated_elements(s, m):
-    """Equinoctial elements of the module as navigation tells them: m.r, m.s [m] and m.u, m.w [m/s] are its errors.
+    """Equinoctial elements of the module as navigation measures them: m.r, m.s [m] and m.u, m.w [m/s] are its errors.
 
     r, u : outward;  s, w : ahead.
     """

@@ -2,10 +2,10 @@
 
 from collections import namedtuple
 
-from campaigns.geo_servicing.corrections import drift_of
+from campaigns.geo_servicing.corrections import drift_of, inclination_of
 from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, SIDEREAL_DAY, longitudes
 from campaigns.geo_servicing.inspection import relative_orbit
-from mc_engine.lanes import atan, log, physics, sqrt, where
+from mc_engine.lanes import log, physics, sqrt, where
 from mc_engine.model import Extremum, Field
 from mc_engine.physics.frames import TURN, orbital_axes
 
@@ -94,12 +94,6 @@ EXACT = Error(0.0, 0.0, 0.0, 0.0)  # what navigation would be without its errors
 def period_error(drift):
     """Period less the sidereal day [s] of a drift [rad/rev]."""
     return SIDEREAL_DAY / (1.0 + drift / TURN) - SIDEREAL_DAY
-
-
-@physics
-def inclination_of(elements):
-    """Inclination [rad] of equinoctial elements."""
-    return 2.0 * atan(sqrt(elements.q * elements.q + elements.p * elements.p))
 
 
 @physics

@@ -23,7 +23,7 @@ def corrections(tables):
 
 @physics
 def planned(tables, burn, column):
-    """A column of the row of one correction, counted from 0; the last row stands for those behind it."""
+    """A column of the row of one correction, counted from 0; an index past the last row reads the last row."""
     return look_up(tables, 1.0 + ROW * burn + column)
 
 

@@ -20,7 +20,7 @@ _TOLERANCES = {"rtol": 1e-9, "atol": [*[1e-3] * 3, *[1e-7] * 3, 1e-6, *[1.0] * 6
 
 @dataclass(frozen=True)
 class End:
-    """What a plan comes to.
+    """End of a flown plan.
 
     y : mean longitude deviation of the sidereal day after [rad];  v : actual drift in it [rad/rev]
     e : osculating eccentricity vector at the last cut-off, x + i y;  time : of that [rev]

@@ -17,30 +17,30 @@ Metrics = namedtuple("Metrics", "apogee_altitude apogee_time top_speed")
 
 
 @physics
-def initial(p, o):  # just after the burn, on the x axis
+def initial(p, o):  # [m, m/s] just after the burn, on the x axis
     r, dv = EQUATORIAL_RADIUS + p.altitude, p.burn_dv * (1.0 + p.magnitude_error)
     return State(r, 0.0, dv * sin(p.pitch_error), sqrt(MU_EARTH / r) + dv * cos(p.pitch_error))
 
 
 @physics
-def rhs(t, s, m, p, o):  # the derivative of the state: a point mass attracts
+def rhs(t, s, m, p, o):  # derivative of the state: a point mass attracts, mu / r^2 [m/s^2]
     r2 = s.x * s.x + s.y * s.y
     g = -MU_EARTH / (r2 * sqrt(r2))
     return State(s.vx, s.vy, g * s.x, g * s.y)
 
 
 @physics
-def events(t, s, m, p, o):  # zero at the apogee, where the distance stops growing
+def events(t, s, m, p, o):  # r r' [m^2/s]: zero at the apogee
     return Events(s.x * s.vx + s.y * s.vy)
 
 
 @physics
-def observe(t, s, m, p, o):  # what histories show
+def observe(t, s, m, p, o):  # what histories show [m, m/s]
     return Quantities(sqrt(s.x * s.x + s.y * s.y) - EQUATORIAL_RADIUS, sqrt(s.vx * s.vx + s.vy * s.vy))
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):  # what a case comes to, at its end
+def evaluate(t, s, m, p, o, best, when):  # at the end of a case [m, s, m/s]
     return Metrics(sqrt(s.x * s.x + s.y * s.y) - EQUATORIAL_RADIUS, t, best.speed)
 
 
