@@ -22,10 +22,20 @@ _SIGMA_DIGITS = 5
 
 
 def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray]:
-    """Column per dispersion, in file order and declared units: float64[n], bool[n], or object[n] of words.
+    """The dispersed inputs of any cases of a campaign, without flying them.
 
-    case_ids : int64[n], in any order.  For "mc" and "sobol" they may go beyond the campaign's
-    number of cases: these are the cases it would have if it were longer.
+    campaign : Campaign
+    case_ids : int64[n], numbers of the cases, in any order.  For "mc" and "sobol" they may exceed the campaign's number
+        of cases: these are the cases of a longer campaign.
+
+    Returns a dict with one column per dispersion, in file order and declared units: float64[n], bool[n], or object[n]
+    of words.  A row depends on (campaign, seed, case_id) alone.
+
+    Raises CampaignError for a case that the campaign does not have, or whose upstream run has yet to be flown.
+
+    >>> table = case_table(load_campaign("minimal"), np.array([0, 17]))
+    >>> table["pitch_error_deg"].round(3).tolist()
+    [1.003, -1.985]
     """
     ids = _checked(campaign, case_ids)
     if campaign.upstream is not None:

@@ -70,17 +70,43 @@ _LARGEST_FILE = 250_000  # bytes; more of them could take the reader of TOML lon
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign that can be flown.  Numbers are in the units that the model declares.
+    """A campaign that can be flown: a model, how its inputs are dispersed, and what its results must meet.
 
-    text : the file as read; `cases` and `seed` may have been changed on the command line since.
-    parameters : what [parameters] says.  nominal : every parameter and setting of the model.
-    upstream : what is taken from another run.  first : that run's campaign, where it has yet to be flown.
-    table : the columns of the design "table", else empty.  tuning : what [tuning] says, if it is there.
-    looks : numbers of cases at which a run that ends with its verdicts is judged; empty where all cases fly.
-    messages : orbit messages beside the file that covariances were read from.
-    sensitivity : what [sensitivity] says, if it is there.  report : probability and confidence of its statistics.
-    digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
-        cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
+    Read one with `load_campaign`.  Numbers are in the units that the model declares.
+
+    name : str, the shipped name ("deorbit/map") or the one that the file's path suggests
+    title : str, one line for the report
+    text : str, the campaign file as read; `cases` and `seed` may have been replaced since
+    directory : Path, the folder of the file, in which its tables and orbit messages are looked for
+    model : Model, the system that is flown
+    model_reference : str, its module ("campaigns.deorbit") or its file next to the campaign file ("model.py")
+    cases : int, number of cases
+    design : str, how the cases are laid out: "mc", "lhs", "sobol", "saltelli", "morris", "grid", "one_at_a_time",
+        "table"
+    seed : int, from which every draw is derived
+    parameters : dict, name to value, what the section [parameters] sets
+    nominal : dict, name to value, every parameter and setting of the model
+    dispersions : tuple of Dispersion, the inputs that differ from case to case, in file order
+    correlations : tuple of Correlation, rank correlations between dispersions
+    requirements : tuple of Requirement, the limits that the results must meet
+    retention : Retention, the cases whose time histories are saved
+    digest : str, SHA-256 of all that decides the inputs of a case or the verdicts.  The number of cases is part of it
+        only for "lhs": an extended campaign is the same campaign.
+    table_path : Path or None, the file of the design "table"
+    table : dict, its columns by name; empty for any other design
+    tuning : Tuning or None, the section [tuning]
+    upstream : Upstream or None, the run that inputs are taken from
+    first : Campaign or None, the campaign of that run where it has yet to be flown
+    looks : tuple of int, numbers of cases at which `run --until verdict` judges; empty where all cases fly
+    messages : tuple of str, files of orbit messages that covariances were read from
+    sensitivity : SensitivityDesign or None, the section [sensitivity]
+    report : ReportSection, probability and confidence of the statistics in the report
+
+    >>> campaign = load_campaign("minimal", cases=8)
+    >>> campaign.title, campaign.design, campaign.cases
+    ('Apogee raised by one burn', 'mc', 8)
+    >>> [dispersion.name for dispersion in campaign.dispersions]
+    ['magnitude_error_pct', 'pitch_error_deg']
     """
 
     name: str
@@ -119,12 +145,23 @@ def load_campaign(
     directory: Path | None = None,
     upstream: Path | None = None,
 ) -> Campaign:
-    """The campaign of a shipped name or of a path; CampaignError lists all that is wrong with it.
+    """Read a campaign file and check it against its model.
 
-    cases, seed : in place of what the file says.
-    text, directory : the text of the file and the folder it counts as being in, where it is kept elsewhere;
-        `reference` is then only its name.
-    upstream : the run to take inputs from, in place of the one that [inputs] names.
+    reference : str or Path, a shipped name ("deorbit", "deorbit/map"), a .toml file, or a folder with a campaign.toml;
+        where `text` is given, only the name of the campaign
+    cases : int, number of cases in place of the file's
+    seed : int, seed in place of the file's
+    text : str, the contents of the file, where they do not come from a file
+    directory : Path, the folder in which `text` looks for its tables; the working folder by default
+    upstream : Path, the run to take inputs from, in place of the one that [inputs] names
+
+    Returns the Campaign.
+
+    Raises CampaignError with every mistake of the file, each with its place.
+
+    >>> campaign = load_campaign("minimal", cases=100, seed=7)
+    >>> campaign.cases, campaign.seed
+    (100, 7)
     """
     if text is None:
         path = find_campaign(reference)

@@ -22,7 +22,16 @@ class ShippedCampaign(NamedTuple):
 
 
 def list_campaigns() -> list[ShippedCampaign]:
-    """Every shipped campaign file: "deorbit" is campaigns/deorbit/campaign.toml, "deorbit/map" its map.toml."""
+    """The campaigns that come with mc-engine.
+
+    Returns a list of named tuples (name, path, title), sorted by name: "deorbit" is campaigns/deorbit/campaign.toml,
+    "deorbit/map" is campaigns/deorbit/map.toml.
+
+    Raises nothing: a file that cannot be read has an empty title.
+
+    >>> [campaign.name for campaign in list_campaigns()][:2]
+    ['deorbit', 'deorbit/demonstration']
+    """
     return [ShippedCampaign(name, path, _title(path)) for name, path in sorted(_shipped().items())]
 
 

@@ -17,7 +17,13 @@ def escaped(text: str) -> str:
 def prose(docstring: str) -> str:
     """Paragraphs of a docstring; those set out in columns or steps keep their layout."""
     paragraphs = re.split(r"\n\s*\n", docstring.strip("\n"))
-    return "\n\n".join(_verbatim(one) if _is_set_out(one) else _flowing(one) for one in paragraphs if one.strip())
+    return "\n\n".join(_block(paragraph) for paragraph in paragraphs if paragraph.strip())
+
+
+def _block(paragraph: str) -> str:
+    if paragraph.startswith(">>> "):
+        return f"{_FENCE}pycon\n{paragraph}\n{_FENCE}"
+    return _verbatim(paragraph) if _is_set_out(paragraph) else _flowing(paragraph)
 
 
 def _is_set_out(paragraph: str) -> bool:

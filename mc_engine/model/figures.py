@@ -11,7 +11,17 @@ from typing import Any
 
 @dataclass(frozen=True)
 class MapFigure:
-    """Filled contours of a metric over two inputs, with the flown cases on them."""
+    """Filled contours of a metric over two inputs, with the flown cases on them.
+
+    metric : str, column
+    x : str, column
+    y : str, column
+    title : str
+    upstream : bool, x and y may be columns of the run that a campaign takes its inputs from
+
+    >>> MapFigure("propellant_kg", "ve_pct", "oe_pct", "Propellant over the two errors").metric
+    'propellant_kg'
+    """
 
     metric: str
     x: str
@@ -22,7 +32,14 @@ class MapFigure:
 
 @dataclass(frozen=True)
 class HistoryFigure:
-    """History quantities of the retained cases against time, one panel a quantity."""
+    """Saved time histories: one panel for each quantity.
+
+    quantities : tuple of str
+    title : str
+
+    >>> HistoryFigure(("altitude_km", "speed_m_s"), "Altitude and speed").quantities
+    ('altitude_km', 'speed_m_s')
+    """
 
     quantities: tuple[str, ...]
     title: str
@@ -30,7 +47,16 @@ class HistoryFigure:
 
 @dataclass(frozen=True)
 class ScatterFigure:
-    """One column against another, a point a case."""
+    """One column against another, a point for each case.
+
+    x : str, column
+    y : str, column
+    title : str
+    upstream : bool, x and y may be columns of the run that a campaign takes its inputs from
+
+    >>> ScatterFigure("ve_pct", "propellant_kg", "Propellant against the speed error").x
+    've_pct'
+    """
 
     x: str
     y: str
@@ -40,11 +66,18 @@ class ScatterFigure:
 
 @dataclass(frozen=True)
 class FootprintFigure:
-    """Where the flights end on a planet, with the regions that hold them; written as KML and GeoJSON besides.
+    """Impact points on a planet, with the regions that hold them; the report also writes them as KML and GeoJSON.
 
-    latitude, longitude : columns, geodetic, degrees.  ends_below : (column, value): a case above it has not come
-    down.  planet : the setting that names the planet, if the model flies to others than the Earth.  target : columns
-    or parameters with the latitude and longitude aimed at; without them distances count from the nominal case.
+    latitude : str, column, geodetic [deg]
+    longitude : str, column [deg]
+    title : str
+    ends_below : tuple (column, value) or None; a case above the value has not come down
+    planet : str, the setting that names the planet; empty for the Earth
+    target : tuple of two columns or parameters, latitude and longitude aimed at; without it distances count from the
+        nominal case
+
+    >>> FootprintFigure("end_latitude_deg", "end_longitude_deg", "Impact points").planet
+    ''
     """
 
     latitude: str
@@ -57,7 +90,15 @@ class FootprintFigure:
 
 @dataclass(frozen=True)
 class ProfileFigure:
-    """One history quantity against another, as altitude against speed, with percentile bands of x at each y."""
+    """One history quantity against another, as altitude against speed, with percentile bands of x at each y.
+
+    x : str, quantity
+    y : str, quantity
+    title : str
+
+    >>> ProfileFigure("speed_m_s", "altitude_km", "Speed along the descent").y
+    'altitude_km'
+    """
 
     x: str
     y: str
@@ -66,7 +107,17 @@ class ProfileFigure:
 
 @dataclass(frozen=True)
 class CorridorFigure:
-    """Cases over two columns, coloured by the limits that they violate, of the requirements on these metrics."""
+    """Cases over two columns, coloured by the requirements that they violate.
+
+    x : str, column
+    y : str, column
+    metrics : tuple of str, those whose requirements count
+    title : str
+    upstream : bool, x and y may be columns of the run that a campaign takes its inputs from
+
+    >>> CorridorFigure("ve_pct", "oe_pct", ("propellant_kg",), "Corridor").metrics
+    ('propellant_kg',)
+    """
 
     x: str
     y: str

@@ -41,9 +41,17 @@ THREADS = Backend()
 
 @dataclass(frozen=True)
 class Replay:
-    """One case flown again.  `differences` names each stored number that came out with other bits.
+    """One case flown again, and whether every number of it came out as stored.
 
-    lost : what made the state or a metric not finite: file, line and values; empty where all are.
+    equal : bool, every stored number has the same bits
+    differences : tuple of str, a sentence for each number that has not
+    history : DataFrame, the flight: case_id, t_s and the model's quantities
+    row : dict, the stored line of the case table, by column name
+    lost : str, file, line and values of what made the state or a metric not finite; empty where all are finite
+
+    >>> again = replay("runs/small", 3)
+    >>> again.equal, list(again.history)
+    (True, ['case_id', 't_s', 'altitude_km', 'speed_m_s'])
     """
 
     equal: bool
@@ -63,14 +71,25 @@ def run(
     backend: Backend | str = THREADS,
     shard: Shard | None = None,
 ) -> Store:
-    """Fly a campaign into the new directory `out` (default: runs/<campaign>-<time>).
+    """Run a campaign and store every case in the new directory `out`.
 
-    workers : threads or processes, all cores by default.  chunk : cases that a worker flies at a time.
-    backend : who flies, see `mc_engine.runner.pools`.  shard : only these cases; `mc_engine.runner.shards.merge` joins
-    shards.
-    A campaign that takes inputs from one that has yet to be flown has it flown first, beside `out`.
-    Raises StoreError if `out` is occupied or a URL, RunInterrupted on Ctrl-C; the store then holds whole chunks, and
-    `resume` completes it.
+    campaign : Campaign, from `load_campaign`
+    out : str or Path, must not exist or be empty; runs/<campaign>-<UTC time> by default
+    progress : function of (cases done, cases wanted, cases failed), called after each chunk
+    workers : int, threads or processes; all cores by default
+    chunk : int, cases that a worker flies at a time
+    backend : Backend, or its name: "threading", "loky" (processes: a crash in model code is isolated), or "dask"
+    shard : Shard, fly only these cases; `mc_engine.runner.runner.merge` joins the shards
+
+    Returns the Store, complete.  Its rows do not depend on workers, chunk and backend.  Where the campaign takes inputs
+    from another one that has yet to be flown, that one is flown first, into a directory next to `out`.
+
+    Raises StoreError if `out` is occupied or a URL, and RunInterrupted on Ctrl-C or a full disk; complete chunks are
+    kept, and `resume` flies the rest.
+
+    >>> store = run(load_campaign("minimal", cases=8), "runs/example")
+    >>> store.cases()["apogee_altitude_km"].median().round(1)
+    np.float64(657.5)
     """
     if out is not None and is_url(out):
         raise StoreError(f"{out}: is a URL; fly into a folder, and give that and the URL to object_store.publish")
@@ -125,9 +144,22 @@ def resume(
     backend: Backend | str = THREADS,
     repair: bool = False,
 ) -> Store:
-    """Complete the run in `path`; StoreError if the sources have changed since it began.
+    """Complete a run that was interrupted.
 
-    repair : what is damaged is flown again, see `mc_engine.store.repair`.
+    path : str or Path, the run directory
+    progress : function of (cases done, cases wanted, cases failed), called after each chunk
+    workers : int, threads or processes; all cores by default
+    chunk : int, cases that a worker flies at a time
+    backend : Backend, or its name, as for `run`
+    repair : bool, fly damaged parts again, too
+
+    Returns the Store, complete.
+
+    Raises StoreError if the model or the engine's sampling has changed since the run began, and RunInterrupted as `run`
+    does.
+
+    >>> resume("runs/small").missing()
+    []
     """
     if repair:
         mend_journal(Path(path))
@@ -144,9 +176,22 @@ def extend(
     chunk: int | None = None,
     backend: Backend | str = THREADS,
 ) -> Store:
-    """Give the run in `path` as many cases in all; the cases are those of a longer campaign.
+    """Give a run more cases; those it has stay as they are.
 
-    StoreError if the design cannot grow or has as many cases already, CampaignError if its blocks do not fit so many.
+    path : str or Path, the run directory
+    cases : int, the number of cases that it is to have in all
+    progress : function of (cases done, cases wanted, cases failed), called after each chunk
+    workers : int, threads or processes; all cores by default
+    chunk : int, cases that a worker flies at a time
+    backend : Backend, or its name, as for `run`
+
+    Returns the Store, complete.  Its cases are those of a campaign that had this number from the start.
+
+    Raises StoreError if the design cannot be extended or the run has as many cases, CampaignError if the number does
+    not fit the blocks of the design, and RunInterrupted as `run` does.
+
+    >>> extend("runs/small", 12).n_cases
+    12
     """
     store = open_store(path)
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
@@ -187,7 +232,18 @@ def merge(
 
 
 def replay(path: str | Path, case_id: int) -> Replay:
-    """Fly one case of a run alone, through the plain float64 build, and compare every stored number bit for bit."""
+    """Fly one case of a run again, alone, and compare every stored number bit for bit.
+
+    path : str or Path, the run directory
+    case_id : int, number of the case, from 0
+
+    Returns a Replay, with the history of the flight.
+
+    Raises StoreError if there is no such case, or if the model or the engine's sampling has changed since.
+
+    >>> replay("runs/small", 3).differences
+    ()
+    """
     store = open_store(path)
     campaign = campaign_of(store)
     table = case_table(campaign, np.array([case_id]))

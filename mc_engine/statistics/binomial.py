@@ -20,19 +20,57 @@ from scipy.special import bdtr, betainc, betaincinv, gammaln
 
 
 def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
-    """One-sided lower confidence bound on the passing share; 0.0 when nothing passed or nothing was tried."""
+    """One-sided lower confidence bound on the probability that a case passes (Clopper-Pearson).
+
+    passed : int, number of cases that passed
+    tried : int, number of independent cases, fixed in advance
+    confidence : float in (0, 1)
+
+    Returns a float in [0, 1]; 0.0 when nothing passed or nothing was tried.
+
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
+    >>> round(lower_bound(2302, 2302), 4)
+    0.999
+    """
     check_counts(passed, tried, confidence)
     return float(betaincinv(passed, tried - passed + 1, 1.0 - confidence)) if passed else 0.0
 
 
 def upper_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
-    """One-sided upper confidence bound on the passing share; 1.0 when all passed or nothing was tried."""
+    """One-sided upper confidence bound on the probability that a case passes (Clopper-Pearson).
+
+    passed : int, number of cases that passed
+    tried : int, number of independent cases, fixed in advance
+    confidence : float in (0, 1)
+
+    Returns a float in [0, 1]; 1.0 when all passed or nothing was tried.
+
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
+    >>> round(upper_bound(90, 100), 3)
+    0.937
+    """
     check_counts(passed, tried, confidence)
     return float(betaincinv(passed + 1, tried - passed, confidence)) if passed < tried else 1.0
 
 
 def clopper_pearson(count: int, tried: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Two-sided interval on a share, each tail holding (1 - confidence)/2."""
+    """Two-sided confidence interval on a probability; each tail holds (1 - confidence)/2.
+
+    count : int, number of cases counted
+    tried : int, number of independent cases, fixed in advance
+    confidence : float in (0, 1)
+
+    Returns (lower, upper).
+
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
+    Clopper & Pearson, Biometrika 26 (1934), 404-413.
+
+    >>> [round(limit, 3) for limit in clopper_pearson(90, 100)]
+    [0.824, 0.951]
+    """
     check_counts(count, tried, confidence)
     one_sided = 0.5 * (1.0 + confidence)
     return lower_bound(count, tried, one_sided), upper_bound(count, tried, one_sided)

@@ -38,12 +38,24 @@ POINTS_AT_ONCE = 256
 
 @dataclass(frozen=True)
 class SurfaceMap:
-    """value[iy, ix] over x and y (both ascending); NaN outside the support.  error : standard error, or None.
+    """A metric over two inputs, on a grid: what `map_metric` returns.
 
-    exact : the nodes are cases themselves.  cases_per_node : 1 for an exact grid; more when other inputs vary
-    between cases of one node, and value is then their mean; 0 for scattered cases.  n_smoothed : of the n_used
-    cases with numbers, those that a smoothed surface is made of.  explained : share of the metric's variance that the
-    surface predicts of cases left out; 1 for an exact grid.
+    x : float64[nx], ascending
+    y : float64[ny], ascending
+    value : float64[ny, nx], NaN where the cases support no value
+    error : float64[ny, nx], standard error of the value, or None where each node is one case
+    exact : bool, the nodes are cases themselves
+    cases_per_node : int, 1 for an exact grid; more where other inputs vary between the cases of a node, and value is
+        their mean; 0 for scattered cases
+    neighbours : int, cases that each point of a smoothed surface is fitted to
+    n_used : int, cases with numbers
+    n_tried : int, all cases
+    n_smoothed : int, of the n_used cases, those that the surface was made of
+    explained : float, fraction of the metric's variance that the surface predicts in cross-validation; 1 for an exact
+        grid
+
+    >>> map_metric(np.tile([0.0, 1.0], 2), np.repeat([0.0, 1.0], 2), np.arange(4.0)).exact
+    True
     """
 
     x: np.ndarray
@@ -60,9 +72,20 @@ class SurfaceMap:
 
 
 def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -> SurfaceMap | None:
-    """Map of z over x and y (float64[n_tried] each, NaN for a case without a number).
+    """Map of a metric over two inputs: exact from a full grid, smoothed by local regression from scattered cases.
 
-    None when there are too few cases, or when they lie on a line, for a map to mean anything.
+    x : float64[n_tried], NaN for a case without a number
+    y : float64[n_tried]
+    z : float64[n_tried], the metric
+    points : int, grid points of a smoothed map along each axis
+
+    Returns a SurfaceMap, or None where the cases are too few, or lie on a line.
+
+    Raises nothing for numbers of any size.
+
+    >>> x, y = np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0])
+    >>> map_metric(x.ravel(), y.ravel(), (x + 10.0 * y).ravel()).value.tolist()
+    [[0.0, 1.0, 2.0], [10.0, 11.0, 12.0]]
     """
     pairs = [near_one(np.asarray(values, dtype=np.float64)) for values in (x, y, z)]
     found = _map(pairs[0][0], pairs[1][0], pairs[2][0], points)

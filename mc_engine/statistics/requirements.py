@@ -46,16 +46,37 @@ class ShareLimits(Protocol):
 
 @dataclass(frozen=True)
 class Verdict:
-    """One requirement judged.  `estimate`, `lower`, `upper` are shares; None without a case.
+    """One requirement judged on the cases of a run, or, without metric and limits, all requirements at once.
 
-    The joint verdict is one, too: without metric and limits.
-    demonstrated : the limit that the cases at hand do show with share and confidence, None if they show none
-        (or if the requirement has two limits).  enclosed : the same for two limits.
-    needed : cases that would show the share if no further one failed; None if it is shown or refuted.
-    accepted : the most failures with which so many cases pass, None if they cannot.
-    consumer_risk : probability of passing a system that just misses the share.  producer_risk : of not passing one
-        that fails half as often as it may.  Both None where the number of cases was decided on the way; the
-        consumer's is then at most 1 - confidence.
+    name : str, of the requirement
+    metric : str, column that is limited
+    at_most : float or None, upper limit
+    at_least : float or None, lower limit
+    share : float, required probability of being inside the limits
+    confidence : float, required of the demonstration
+    outcome : str, "pass", "fail" or "not demonstrable"
+    passed : int, cases inside the limits
+    tried : int, all cases
+    no_number : int, cases that failed or have no finite metric; they count as not inside
+    estimate : float or None, passed / tried
+    lower : float or None, one-sided lower confidence bound on the probability
+    upper : float or None, one-sided upper confidence bound
+    demonstrated : float or None, the limit that the cases do demonstrate with share and confidence (tolerance limit);
+        None with two limits
+    enclosed : tuple or None, the two limits that they demonstrate, for a requirement with two
+    needed : int or None, cases that would demonstrate the share if no further one failed; None if it is decided
+    accepted : int or None, most failures with which so many cases pass; None if they cannot
+    consumer_risk : float or None, probability of passing a system that just misses the share; None where the number of
+        cases was decided along the way, and then it is at most 1 - confidence
+    producer_risk : float or None, probability of not passing a system that fails half as often as it may
+    shared_outcome : str, the outcome at the confidence that makes all verdicts of a campaign hold together
+    random : bool, the cases are a random sample, so that a fraction of them estimates a probability
+    looked : bool, the number of cases was decided by looking at them
+
+    >>> requirement = {"name": "fuel", "metric": "fuel_kg", "at_most": 2.5, "share": 0.9, "confidence": 0.9}
+    >>> verdict = judge(requirement, np.linspace(1.0, 2.0, 40), np.ones(40, dtype=bool))
+    >>> verdict.outcome, verdict.demonstrated, verdict.margin
+    ('pass', 1.9743589743589745, 0.5256410256410255)
     """
 
     name: str
@@ -94,12 +115,21 @@ class Verdict:
 
 
 def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple[float, float]:
-    """Share of passing cases with its exact lower confidence bound.
+    """Fraction of passing cases with its exact lower confidence bound.
 
-    passed, tried : int, 0 <= passed <= tried, tried > 0.  Failed cases count as tried.
+    passed : int, 0 <= passed <= tried
+    tried : int, above 0; failed cases count as tried
+    confidence : float in (0, 1)
+
     Returns (estimate, lower).  With nothing failed, lower = (1 - confidence)**(1/tried).
 
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
     Clopper & Pearson, Biometrika 26 (1934), 404-413.
+
+    >>> estimate, lower = pass_probability(2302, 2302)
+    >>> estimate, lower >= 0.999
+    (1.0, True)
     """
     if tried <= 0:
         raise ValueError("no case was tried")
@@ -151,9 +181,22 @@ def judge_all(
     design: str = "mc",
     looked: bool = False,
 ) -> tuple[list[Verdict], Verdict | None]:
-    """The verdict on each requirement record, and the joint one; see `judge_counted`.
+    """Judge every requirement of a campaign, and all of them at once.
 
-    column : metric to float64[n_tried].  ok : bool[n_tried], whether the case was completed.
+    requirements : sequence of dict ("name", "metric", "at_most", "at_least", "share", "confidence"), as in a manifest
+    column : function from a metric's name to float64[n_tried]
+    ok : bool[n_tried], whether the case was completed
+    design : str, of the campaign; only for `SAMPLING_DESIGNS` does a fraction of cases estimate a probability
+    looked : bool, whether the number of cases was decided by looking at them; see `was_looked_at`
+
+    Returns (verdicts, joint): a list of Verdict, and the joint Verdict, or None for fewer than two requirements.
+
+    Raises ValueError for a confidence outside (0, 1).
+
+    >>> requirements = [{"name": "fuel", "metric": "fuel_kg", "at_most": 2.5, "share": 0.9, "confidence": 0.9}]
+    >>> verdicts, joint = judge_all(requirements, lambda metric: np.linspace(1.0, 2.0, 40), np.ones(40, dtype=bool))
+    >>> verdicts[0].outcome, joint
+    ('pass', None)
     """
     ok = np.asarray(ok, dtype=bool)
     counts = LimitCounts(requirements)
@@ -213,9 +256,21 @@ def joint_share(shares: Sequence[float]) -> float | None:
 def judge(
     requirement: Mapping[str, Any], values: np.ndarray, ok: np.ndarray, design: str = "mc", looked: bool = False
 ) -> Verdict:
-    """Verdict on one requirement record ("name", "metric", "at_most", "at_least", "share", "confidence").
+    """Judge one requirement.
 
-    values : float64[n_tried], the metric; ok : bool[n_tried], whether the case was completed.
+    requirement : dict ("name", "metric", "at_most", "at_least", "share", "confidence"), as in a manifest
+    values : float64[n_tried], the metric
+    ok : bool[n_tried], whether the case was completed
+    design : str, of the campaign
+    looked : bool, whether the number of cases was decided by looking at them
+
+    Returns a Verdict.
+
+    Raises ValueError for a confidence outside (0, 1).
+
+    >>> requirement = {"name": "fuel", "metric": "fuel_kg", "at_most": 2.5, "share": 0.9, "confidence": 0.9}
+    >>> judge(requirement, np.linspace(2.0, 3.0, 40), np.ones(40, dtype=bool)).outcome
+    'fail'
     """
     return judge_all([requirement], lambda _: values, ok, design, looked)[0][0]
 
@@ -307,9 +362,17 @@ def _with_limits_shown(verdict: Verdict, ranked: Callable[[str, int], float], li
 
 
 def was_looked_at(manifest: Mapping[str, Any], n_cases: int) -> bool:
-    """True if the number of cases was not fixed before the first flew: `run --until verdict`, or extended since.
+    """Whether the number of cases was not fixed before the first flew: `run --until verdict`, or extended since.
 
-    n_cases : how many are wanted now.
+    manifest : dict, of the run
+    n_cases : int, cases that the run is to have now
+
+    Returns a bool, the argument `looked` of `judge_all`.
+
+    Raises nothing.
+
+    >>> was_looked_at({"campaign": {"cases": 1000}}, 2000)
+    True
     """
     return bool(manifest.get("looks")) or n_cases > manifest.get("campaign", {}).get("cases", n_cases)
 

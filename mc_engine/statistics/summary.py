@@ -24,7 +24,21 @@ def nearly_equal(low: float, high: float) -> bool:
 
 @dataclass(frozen=True)
 class Summary:
-    """Statistics of the finite values of a metric; what n_used is too small for is None (or no quantile)."""
+    """Statistics of one metric; what n_used is too small for is None, or an empty tuple.
+
+    n_used : int, cases with a finite value
+    n_tried : int, all cases
+    mean : float or None
+    sd : float or None, standard deviation with n - 1 in its denominator
+    minimum : float or None
+    maximum : float or None
+    quantiles : tuple of Quantile, in the order asked for
+    confidence : float, of the quantiles' intervals
+    shape : Normality or None
+
+    >>> summarize(np.array([1.0, 2.0, 3.0, np.nan])).sd
+    1.0
+    """
 
     n_used: int
     n_tried: int
@@ -53,10 +67,19 @@ class Summary:
 
 
 def summarize(values: np.ndarray, *, probabilities: tuple[float, ...] = QUANTILES, confidence: float = 0.90) -> Summary:
-    """Summary of `values` (float64[n_tried]; NaN and infinite values count as tried, not as used).
+    """Moments and quantiles of a metric, the same to the last bit in any order of the cases.
 
-    sd has n - 1 in its denominator and is None below two values.  Each quantile limit holds with a
-    probability of 1 - (1 - confidence)/2.  No bit of it depends on the order of the values.
+    values : float64[n_tried]; NaN and infinite values count as tried, not as used
+    probabilities : tuple of float, of the quantiles
+    confidence : float in (0, 1), of the two-sided intervals on the quantiles
+
+    Returns a Summary.
+
+    Raises nothing: without a finite value its numbers are None.
+
+    >>> summary = summarize(np.arange(1001.0))
+    >>> summary.mean, summary.at(0.5).value
+    (500.0, 500.0)
     """
     tally = Tally()
     finite = tally.add(np.asarray(values, dtype=np.float64))

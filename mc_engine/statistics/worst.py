@@ -59,10 +59,20 @@ def _goodness(values: np.ndarray, largest: bool, limits: Limits | None) -> np.nd
 def worst_cases(
     values: np.ndarray, ok: np.ndarray, count: int, largest: bool = True, limits: Limits | None = None
 ) -> np.ndarray:
-    """Row numbers (int64[<= count]), worst first, ties in row order.
+    """The worst cases of a metric, worst first.
 
-    values : float64[n], ok : bool[n].  limits : the worst have the smallest margin to the nearest of them; without
-    any, the largest values are the worst, or the smallest.
+    values : float64[n], the metric
+    ok : bool[n], whether the case was completed
+    count : int, how many cases
+    largest : bool, without limits, whether the largest values are the worst
+    limits : Limits or None; with limits, the worst cases have the smallest margin to the nearest of them
+
+    Returns row numbers, int64, `count` at most; ties in row order.  Cases without a finite value are left out.
+
+    Raises nothing.
+
+    >>> worst_cases(np.array([3.0, 9.0, np.nan, 5.0]), np.ones(4, dtype=bool), 2).tolist()
+    [1, 3]
     """
     values = np.asarray(values, dtype=np.float64)
     rows = np.flatnonzero(np.asarray(ok, dtype=bool) & np.isfinite(values))

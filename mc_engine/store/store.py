@@ -87,7 +87,19 @@ def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
 
 
 class Store:
-    """One run directory.  Ranges of cases are half open: (first, stop)."""
+    """A run directory: the case table, the saved time histories, and the journal that says which of them count.
+
+    Its methods raise StoreError for what is not there or is damaged.  A Store is for one thread, and one process at a
+    time may write.  Ranges of cases are half open: (first, stop).
+
+    path : Path, the run directory; `open_store` also takes the URL of a published run
+
+    >>> store = open_store("runs/small")
+    >>> store.n_cases, store.missing(), store.status_counts()
+    (8, [], {'ok': 8})
+    >>> store.cases(["case_id", "apogee_altitude_km"]).attrs["units"]
+    {'case_id': '', 'apogee_altitude_km': 'km'}
+    """
 
     def __init__(self, path: Path):
         self.path = path

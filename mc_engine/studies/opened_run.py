@@ -37,7 +37,18 @@ _DIGITS = 6
 
 
 def open_run(path: str | Path) -> "Run":
-    """The run in directory `path`; StoreError if there is none, or it is damaged."""
+    """Open a run to look at its results, interactively or in a notebook.
+
+    path : str or Path, the run directory, or the URL of a published run
+
+    Returns a Run.
+
+    Raises StoreError if there is no run, or it is damaged.
+
+    >>> run = open_run("runs/small")
+    >>> run.statuses
+    {'ok': 8}
+    """
     return Run(open_store(path))
 
 
@@ -54,7 +65,20 @@ class _Metrics(dict[str, "Summary"]):
 
 @dataclass(frozen=True)
 class Run:
-    """A run directory as it stands when it is first asked; open it again to see what was flown since."""
+    """The results of a run, as they are when they are first asked for; open it again to see cases flown since.
+
+    In a notebook it shows itself as tables of verdicts and metrics.
+
+    store : Store, the run directory
+
+    >>> run = open_run("runs/small")
+    >>> run.metrics["apogee_altitude_km"].n_used
+    8
+    >>> run.verdicts[0].outcome
+    'not demonstrable'
+    >>> run.case(3).metrics["apogee_altitude_km"].round(1)
+    np.float64(656.9)
+    """
 
     store: Store
 
@@ -130,7 +154,20 @@ class Run:
 
 @dataclass(frozen=True)
 class Case:
-    """One case of a run: `row` is its line of the case table, by column name."""
+    """One case of a run: its inputs, its results and its flight.
+
+    In a notebook it shows itself as a table, with a picture of the history if that was saved.
+
+    store : Store, the run directory
+    case_id : int, its number; -1 for the nominal case
+    row : dict, its line of the case table, by column name
+
+    >>> case = open_run("runs/small").case(3)
+    >>> case.status
+    'ok'
+    >>> case.inputs.round(3).to_dict()
+    {'magnitude_error_pct': -0.106, 'pitch_error_deg': 0.647}
+    """
 
     store: Store
     case_id: int

@@ -55,11 +55,26 @@ def tune(
     workers: int | None = None,
     progress: ProgressCall | None = None,
 ) -> TuningRecord:
-    """Search as the campaign's [tuning] says and leave the result in the new directory `out`.
+    """Search for the parameters that the campaign's section [tuning] asks for, by NSGA-II, and store the result.
 
-    seed, generations, population : in place of the file's.  workers : threads, all cores by default.
-    Raises RunInterrupted on Ctrl-C, after the generation in flight; what was found till then is in the directory, as
-    it is after each generation: a search that is killed loses the one in flight.
+    Needs the extra `tune` (pymoo).  The result is stored after every generation.
+
+    campaign : Campaign with a [tuning]
+    out : Path, the new directory; runs/<campaign>-<UTC time> by default
+    seed : int, of the search, in place of the file's
+    generations : int, in place of the file's
+    population : int, candidates in a generation, in place of the file's
+    workers : int, threads; all cores by default.  The result does not depend on it.
+    progress : function of (flights done, flights wanted, flights failed), called after each generation
+
+    Returns a TuningRecord.
+
+    Raises CampaignError without a [tuning], EngineError without pymoo, StoreError if `out` is occupied, and
+    RunInterrupted after the generation in which Ctrl-C was pressed; the generations completed by then are stored.
+
+    >>> record = tune(load_campaign("apogee.toml"), "runs/apogee", generations=2, population=4)
+    >>> len(record.evaluations)
+    8
     """
     tuning = campaign.tuning
     if tuning is None:

@@ -20,10 +20,17 @@ UNFINISHED = "not ended"  # instead of why the search ended
 
 @dataclass(frozen=True)
 class TuningRecord:
-    """A tuning: all of it, or what there is of one that has not ended.
+    """The result of a search by `tune`: complete, or as far as an interrupted one came.
 
-    evaluations : every candidate flown, in order.  front : those of them inside all limits that no other one of these
-        beats; no rows if none is inside.  generations : how the search went on.
+    path : Path, its directory
+    manifest : dict, what was searched, with which sources; ["tuning"] has the settings of the search and how it ended
+    evaluations : DataFrame, every candidate in the order flown, a row each
+    generations : DataFrame, the progress of the search, a row for each generation
+    front : DataFrame, the feasible candidates that no other one dominates; empty if none is feasible
+
+    >>> record = open_tuning("runs/tuned")
+    >>> record.feasible, list(record.front)[:4]
+    (True, ['candidate', 'generation', 'altitude_km', 'burn_dv_m_s'])
     """
 
     path: Path
@@ -39,7 +46,17 @@ class TuningRecord:
 
 
 def open_tuning(path: str | Path) -> TuningRecord:
-    """The tuning in directory `path`; StoreError if there is none, or a byte of it changed."""
+    """Open the result of a search by `tune`.
+
+    path : str or Path, its directory
+
+    Returns a TuningRecord.
+
+    Raises StoreError if there is none, or a file of it was damaged.
+
+    >>> open_tuning("runs/tuned").manifest["tuning"]["end"]
+    'all generations'
+    """
     manifest, tables = read_result(Path(path), TUNING)
     return TuningRecord(Path(path), manifest, **tables)
 
