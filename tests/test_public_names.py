@@ -1,4 +1,4 @@
-"""Every public name explains itself: what each argument is, what comes back, what is raised, and an example that runs."""
+"""Every public name explains its arguments, what it returns and what it raises, and shows an example that runs."""
 
 import doctest
 import inspect
