@@ -18,7 +18,7 @@ from mc_engine.units import convert
 _CASE_ID = "case_id"  # `mc-engine sample` writes it; here it may only count the rows
 
 
-def read_case_table(path: Path, model: Model, units: Mapping[str, str], found: Findings) -> dict[str, np.ndarray]:
+def read_case_table(path: Path, model: Model, units: Mapping[str, str], findings: Findings) -> dict[str, np.ndarray]:
     """Column name -> values in declared units: float64[n], object[n] of words, or bool[n].
 
     units : of the columns that are not in their parameter's own unit.
@@ -28,7 +28,7 @@ def read_case_table(path: Path, model: Model, units: Mapping[str, str], found: F
     try:
         columns = read_columns(path)
     except FileFault as fault:
-        found.add("", str(fault))
+        findings.add("", str(fault))
         return table
     for name, cells in columns.items():
         try:
@@ -37,13 +37,13 @@ def read_case_table(path: Path, model: Model, units: Mapping[str, str], found: F
             elif name in items:
                 table[name] = _values(path, items[name], cells, units.get(name))
             else:
-                found.add("", f'the column "{name}" is not a parameter of {model.name}{hint(name, items)}')
+                findings.add("", f'the column "{name}" is not a parameter of {model.name}{hint(name, items)}')
         except FileFault as fault:
-            found.add("", str(fault))
+            findings.add("", str(fault))
     if table and not len(next(iter(table.values()))):
-        found.add("", f'"{path.name}" has no rows below its first line')
-    elif not table and not found.problems:
-        found.add("", f'"{path.name}" has no column of a parameter')
+        findings.add("", f'"{path.name}" has no rows below its first line')
+    elif not table and not findings.problems:
+        findings.add("", f'"{path.name}" has no column of a parameter')
     return table
 
 
@@ -74,19 +74,19 @@ def _values(path: Path, item: Parameter | Setting, cells: np.ndarray, unit: str 
 
 def _dates(path: Path, item: Setting, cells: np.ndarray) -> np.ndarray:
     """object[n]: the cells as dates of the setting."""
-    found = Findings()
-    dates = [check_value(str(cell), item, found, "") for cell in cells]
-    if found.problems:
+    findings = Findings()
+    dates = [check_value(str(cell), item, findings, "") for cell in cells]
+    if findings.problems:
         row = dates.index(None)
-        raise FileFault(f'"{path.name}", row {row + 1}, column "{item.name}": {found.problems[0].message}')
+        raise FileFault(f'"{path.name}", row {row + 1}, column "{item.name}": {findings.problems[0].message}')
     return np.array(dates, dtype=object)
 
 
 def table_dispersions(
-    table: Mapping[str, np.ndarray], declared: Mapping[str, Dispersion], found: Findings
+    table: Mapping[str, np.ndarray], declared: Mapping[str, Dispersion], findings: Findings
 ) -> tuple[Dispersion, ...]:
     """One dispersion per column, with the source that the campaign file gives it."""
     for name in declared:
         if name not in table:
-            found.under("dispersion").add(name, f"the table has no such column{hint(name, table)}")
+            findings.under("dispersion").add(name, f"the table has no such column{hint(name, table)}")
     return tuple(declared.get(name, Dispersion(name, None, {}, "", "")) for name in table)

@@ -22,12 +22,18 @@ def input_column(item: Parameter | Setting) -> Column:
 
 def result_columns(model: Model) -> list[Column]:
     """Metrics, and time and state at the end of the flight."""
-    columns = [Column(one.name, one.unit, "metric", one.description) for one in model.metrics]
+    columns = [Column(metric.name, metric.unit, "metric", metric.description) for metric in model.metrics]
     columns.append(Column(END_TIME, "s", "state", "time at the end of the flight, from its start"))
-    columns += [Column(f"end_{one.name}", one.unit, "state", f"{one.description}, at the end") for one in model.states]
+    columns += [
+        Column(f"end_{state.name}", state.unit, "state", f"{state.description}, at the end") for state in model.states
+    ]
     return columns
 
 
-def case_columns(model: Model, dispersions: Sequence[Dispersion], taken: Sequence[Column] = ()) -> list[Column]:
+def case_columns(model: Model, dispersions: Sequence[Dispersion], upstream: Sequence[Column] = ()) -> list[Column]:
     """All columns of a campaign's table; `taken` are those of the run that it takes inputs from."""
-    return [*taken, *(input_column(model.input(one.name)) for one in dispersions), *result_columns(model)]
+    return [
+        *upstream,
+        *(input_column(model.input(dispersion.name)) for dispersion in dispersions),
+        *result_columns(model),
+    ]

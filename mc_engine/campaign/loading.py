@@ -171,10 +171,10 @@ def load_campaign(
         name, source, directory = str(reference), Path(str(reference)).name, Path(directory or Path.cwd())
     document = parse_toml(text, source)
     _override(document, {"cases": cases, "seed": seed})
-    found = Findings()
-    campaign = _assemble(name, text, directory, document, cases is not None, upstream, found)
-    if campaign is None or found.problems:
-        raise CampaignError(source, found.problems)
+    findings = Findings()
+    campaign = _assemble(name, text, directory, document, cases is not None, upstream, findings)
+    if campaign is None or findings.problems:
+        raise CampaignError(source, findings.problems)
     return campaign
 
 
@@ -207,28 +207,32 @@ def _assemble(
     document: dict[str, Any],
     shortened: bool,
     run: Path | None,
-    found: Findings,
+    findings: Findings,
 ) -> Campaign | None:
     """The campaign, or None where it lacks a section or a model to hold the rest against."""
-    messages = spread_covariances(document, directory, found)
-    sections = read_sections(document, found)
-    model = _model(document, directory, found)
+    messages = spread_covariances(document, directory, findings)
+    sections = read_sections(document, findings)
+    model = _model(document, directory, findings)
     if model is None:
         return None
-    inside = found.under("campaign")
+    inside = findings.under("campaign")
     section = sections.campaign
     model = _within_budget(model, section, inside)
     design = section.design if section is not None else _named_design(document)
-    upstream, first = take_inputs(sections, model, directory, run, design, load_campaign, found)
-    nominal = _nominal(model, sections, {} if upstream is None or first is not None else upstream.nominal, found)
-    requirements = check_requirements(sections.requirements, model, found.under("requirement"))
-    _unknown_names(document, sections, nominal, model, found)
-    check_taken(sections, upstream, design, found)
-    dispersions = _dispersions(sections, model, nominal, design, directory, found)
-    correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", found)
-    table_path, table = (None, {}) if upstream is not None else _table(section, model, dispersions, directory, found)
+    upstream, first = take_inputs(sections, model, directory, run, design, load_campaign, findings)
+    nominal = _nominal(model, sections, {} if upstream is None or first is not None else upstream.nominal, findings)
+    requirements = check_requirements(sections.requirements, model, findings.under("requirement"))
+    _unknown_names(document, sections, nominal, model, findings)
+    check_taken(sections, upstream, design, findings)
+    dispersions = _dispersions(sections, model, nominal, design, directory, findings)
+    correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", findings)
+    table_path, table = (None, {}) if upstream is not None else _table(section, model, dispersions, directory, findings)
     if design == "table" and upstream is None:
-        dispersions = table_dispersions(table, {one.name: one for one in dispersions}, found) if table else ()
+        dispersions = (
+            table_dispersions(table, {dispersion.name: dispersion for dispersion in dispersions}, findings)
+            if table
+            else ()
+        )
     count = None
     if section is not None and (sections.inputs is None or upstream is not None):
         rows = 0 if upstream is None else (first.cases if first is not None else upstream.rows.n_cases)
@@ -237,16 +241,16 @@ def _assemble(
         check_size(count, design or "", dispersions, correlations, inside)
     retention = Retention()
     if sections.retention is not None:
-        retention = check_retention(sections.retention, model, count, shortened, found.under("retention"))
+        retention = check_retention(sections.retention, model, count, shortened, findings.under("retention"))
     tuning = None
     if sections.tuning is not None:
-        names = [one.name for one in dispersions]
-        tuning = check_tuning(sections.tuning, model, names, design, found.under("tuning"))
+        names = [dispersion.name for dispersion in dispersions]
+        tuning = check_tuning(sections.tuning, model, names, design, findings.under("tuning"))
     flown_before = None if upstream is None else upstream.name
     sensitivity = check_sensitivity(
-        sections.sensitivity, model, dispersions, correlations, design, flown_before, found.under("sensitivity")
+        sections.sensitivity, model, dispersions, correlations, design, flown_before, findings.under("sensitivity")
     )
-    if section is None or count is None or found.problems:
+    if section is None or count is None or findings.problems:
         return None
     return Campaign(
         name=name,
@@ -283,7 +287,7 @@ def _named_design(document: dict[str, Any]) -> str | None:
     return design if isinstance(design, str) and design in DESIGNS else None
 
 
-def _model(document: dict[str, Any], directory: Path, found: Findings) -> Model | None:
+def _model(document: dict[str, Any], directory: Path, findings: Findings) -> Model | None:
     """The model, even where other keys of [campaign] are wrong: the rest of the file is read against it."""
     section = document.get("campaign")
     reference = section.get("model") if isinstance(section, dict) else None
@@ -295,48 +299,50 @@ def _model(document: dict[str, Any], directory: Path, found: Findings) -> Model 
         known = [f"campaigns.{folder.parent.name}" for folder in SHIPPED.glob("*/campaign.toml")]
         known += [file.name for file in directory.glob("*.py")]
         near = "" if reference in known else hint(reference, known)
-        found.under("campaign").add("model", f"{error}{near if 'did you mean' in near else ''}")
+        findings.under("campaign").add("model", f"{error}{near if 'did you mean' in near else ''}")
         return None
 
 
-def _within_budget(model: Model, section: CampaignSection | None, found: Findings) -> Model:
+def _within_budget(model: Model, section: CampaignSection | None, findings: Findings) -> Model:
     """The model with the file's own cap on integration steps."""
     if section is None or section.max_steps is None:
         return model
     if not isinstance(model.clock, AdaptiveStep):
-        found.add("max_steps", f"is for models that choose their steps; {model.name} steps on a fixed grid")
+        findings.add("max_steps", f"is for models that choose their steps; {model.name} steps on a fixed grid")
         return model
     return replace(model, clock=replace(model.clock, attempts=section.max_steps))
 
 
-def _nominal(model: Model, sections: Sections, taken: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
-    spot = found.under("parameters")
-    before = len(found.problems)
-    nominal = {**nominal_values(model, sections.parameters, spot), **taken}
-    if len(found.problems) == before:
+def _nominal(model: Model, sections: Sections, upstream: Mapping[str, Scalar], findings: Findings) -> dict[str, Scalar]:
+    section_findings = findings.under("parameters")
+    before = len(findings.problems)
+    nominal = {**nominal_values(model, sections.parameters, section_findings), **upstream}
+    if len(findings.problems) == before:
         try:
             sentence = refusal(model, nominal)
         except ModelError as error:
-            found.under("campaign").add("model", str(error))
+            findings.under("campaign").add("model", str(error))
         else:
             if sentence:
-                spot.add("", f"the nominal case cannot be flown: {sentence}")
+                section_findings.add("", f"the nominal case cannot be flown: {sentence}")
     return nominal
 
 
 def _unknown_names(
-    document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: Model, found: Findings
+    document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: Model, findings: Findings
 ) -> None:
     """Dispersions of no parameter and requirements of no metric, also where their section is wrong in itself."""
     written = document.get("dispersion")
     for name in written if isinstance(written, dict) else ():
         if name not in sections.dispersions and name not in nominal:
-            found.under("dispersion", name).add("", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}")
+            findings.under("dispersion", name).add(
+                "", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}"
+            )
     written = document.get("requirement")
     for name, raw in written.items() if isinstance(written, dict) else ():
         metric = raw.get("metric") if isinstance(raw, dict) else None
         if name not in sections.requirements and isinstance(metric, str):
-            check_metric(metric, model, found.under("requirement", name))
+            check_metric(metric, model, findings.under("requirement", name))
 
 
 def _dispersions(
@@ -345,16 +351,18 @@ def _dispersions(
     nominal: Mapping[str, Scalar],
     design: str | None,
     directory: Path,
-    found: Findings,
+    findings: Findings,
 ) -> tuple[Dispersion, ...]:
     built = []
     for name, section in sections.dispersions.items():
-        spot = found.under("dispersion", name)
+        section_findings = findings.under("dispersion", name)
         if name not in nominal:
-            near = "" if found.full else hint(name, inputs_of(model))
-            spot.add("", f"is not a parameter of {model.name}{near}")
+            near = "" if findings.full else hint(name, inputs_of(model))
+            section_findings.add("", f"is not a parameter of {model.name}{near}")
         elif design is not None:  # without a design it is unknown which keys make sense
-            built.append(build_dispersion(name, section, model.input(name), nominal[name], design, directory, spot))
+            built.append(
+                build_dispersion(name, section, model.input(name), nominal[name], design, directory, section_findings)
+            )
     return tuple(built)
 
 
@@ -363,45 +371,49 @@ def _table(
     model: Model,
     dispersions: tuple[Dispersion, ...],
     directory: Path,
-    found: Findings,
+    findings: Findings,
 ) -> tuple[Path | None, dict[str, np.ndarray]]:
-    spot = found.under("campaign", "table")
+    section_findings = findings.under("campaign", "table")
     if section is None or (section.design != "table" and section.table is None):
         return None, {}
     if section.design != "table":
-        spot.add("", f'the design "{section.design}" reads no table; it is for design = "table"')
+        section_findings.add("", f'the design "{section.design}" reads no table; it is for design = "table"')
     elif section.table is None:
-        spot.add("", "is missing: CSV or Parquet beside this file, a case a row")
+        section_findings.add("", "is missing: CSV or Parquet beside this file, a case a row")
     else:
         try:
             path = resolve_beside(directory, section.table)
-            units = {one.name: one.spec["unit"] for one in dispersions if "unit" in one.spec}
-            return path, read_case_table(path, model, units, spot)
+            units = {
+                dispersion.name: dispersion.spec["unit"] for dispersion in dispersions if "unit" in dispersion.spec
+            }
+            return path, read_case_table(path, model, units, section_findings)
         except FileFault as fault:
-            spot.add("", str(fault))
+            section_findings.add("", str(fault))
     return None, {}
 
 
 def _case_count(
-    section: CampaignSection, dispersions: tuple[Dispersion, ...], table: Mapping[str, np.ndarray], found: Findings
+    section: CampaignSection, dispersions: tuple[Dispersion, ...], table: Mapping[str, np.ndarray], findings: Findings
 ) -> int | None:
     """How many cases the design has; None where that is unknown."""
     if section.design in (*RANDOM, *IN_BLOCKS):
         for key, value in (("cases", section.cases), ("seed", section.seed)):
             if value is None:
-                found.add(key, f"is missing: {CampaignSection.model_fields[key].description}")
+                findings.add(key, f"is missing: {CampaignSection.model_fields[key].description}")
         return section.cases
-    if found.problems:
+    if findings.problems:
         return None
     if section.design in BY_LEVELS:
-        count = level_count(section.design, [len(one.levels) for one in dispersions])
+        count = level_count(section.design, [len(dispersion.levels) for dispersion in dispersions])
     else:
         count = len(next(iter(table.values())))
     if count > MOST_CASES:
-        found.add("design", f"{count} cases; at most {MOST_CASES} are possible")
+        findings.add("design", f"{count} cases; at most {MOST_CASES} are possible")
         return None
     if section.cases not in (None, count):
-        found.add("cases", f'{section.cases} is not allowed; the design "{section.design}" has {count} cases by itself')
+        findings.add(
+            "cases", f'{section.cases} is not allowed; the design "{section.design}" has {count} cases by itself'
+        )
     return count
 
 
@@ -418,9 +430,9 @@ def _digest(
         content["campaign"].pop("cases", None)
     content.pop("report", None)  # how a run is told, not what it is
     content["campaign"]["seed"] = section.seed or 0  # a grid may do without one, and is resumed with 0
-    order = [one.name for one in dispersions]
+    order = [dispersion.name for dispersion in dispersions]
     digest = sha256(json.dumps([content, order], sort_keys=True).encode())
-    files = [directory / one.spec["file"] for one in dispersions if one.dist == "empirical"]
+    files = [directory / dispersion.spec["file"] for dispersion in dispersions if dispersion.dist == "empirical"]
     for path in [*files, *([table_path] if table_path is not None else [])]:
         digest.update(sha256(path.read_bytes()).digest())
     if upstream is not None:

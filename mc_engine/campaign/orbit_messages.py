@@ -81,10 +81,10 @@ def read_message(text: str) -> list[UncertainState]:
     if first == "CCSDS_OPM_VERS":
         return [_opm(lines)]
     if first == "CCSDS_OEM_VERS":
-        found = list(_oem(lines))
-        if not found:
+        states = list(_oem(lines))
+        if not states:
             raise MessageFault("the ephemeris has no covariance (COVARIANCE_START)")
-        return found
+        return states
     raise MessageFault("is no orbit message: its first line is neither CCSDS_OPM_VERS = ... nor CCSDS_OEM_VERS = ...")
 
 

@@ -68,28 +68,30 @@ class Retention:
     rows: int = 1500
 
 
-def nominal_values(model: Model, overrides: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
+def nominal_values(model: Model, overrides: Mapping[str, Scalar], findings: Findings) -> dict[str, Scalar]:
     """Every parameter and setting at its nominal value: what [parameters] says, else the model's default."""
     inputs = inputs_of(model)
     for name in overrides:
         if name not in inputs:
-            near = hint(name, inputs) if len(found.problems) < MOST_SHOWN else ""  # a search takes its time
-            found.add(name, f"is not a parameter of {model.name}{near}")
+            near = hint(name, inputs) if len(findings.problems) < MOST_SHOWN else ""  # a search takes its time
+            findings.add(name, f"is not a parameter of {model.name}{near}")
     values: dict[str, Scalar] = {}
     for item in inputs.values():
         default = item.default if isinstance(item, Setting) else float(item.default)
         if item.name in overrides:
-            checked = check_value(overrides[item.name], item, found, item.name)
+            checked = check_value(overrides[item.name], item, findings, item.name)
             values[item.name] = default if checked is None else checked
         else:
-            _check_default(default, item, found)
+            _check_default(default, item, findings)
             values[item.name] = default
     return values
 
 
-def _check_default(default: Scalar, item: Parameter | Setting, found: Findings) -> None:
+def _check_default(default: Scalar, item: Parameter | Setting, findings: Findings) -> None:
     if not isinstance(default, bool | str) and not item.low <= default <= item.high:
-        found.add(item.name, f"the model's own value {number(default)} is not within {accepted_range(item)}; give one")
+        findings.add(
+            item.name, f"the model's own value {number(default)} is not within {accepted_range(item)}; give one"
+        )
 
 
 def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
@@ -112,93 +114,101 @@ def check_correlations(
     dispersions: tuple[Dispersion, ...],
     model: Model,
     design: str,
-    found: Findings,
+    findings: Findings,
 ) -> tuple[Correlation, ...]:
     """The correlations; `sections` by place in the file."""
     if sections and design not in RANDOM:
         why = "is for independent inputs" if design in IN_BLOCKS else "has no chance in it"
-        found.add("correlation", f'the design "{design}" {why}; correlations are for {listed(RANDOM)}')
+        findings.add("correlation", f'the design "{design}" {why}; correlations are for {listed(RANDOM)}')
         return ()
     by_name = {dispersion.name: dispersion for dispersion in dispersions}
     kept: list[Correlation] = []
     for place, section in sections.items():
         first, second = section.between
-        spot = found.under(place)
-        before = len(found.problems)
+        section_findings = findings.under(place)
+        before = len(findings.problems)
         for name in section.between:
-            _check_correlated(name, by_name, model, spot)
+            _check_correlated(name, by_name, model, section_findings)
         if first == second:
-            spot.add("between", f'"{first}" is there twice')
+            section_findings.add("between", f'"{first}" is there twice')
         elif any({first, second} == {other.first, other.second} for other in kept):
-            spot.add("between", f'"{first}" and "{second}" have a correlation already')
-        if len(found.problems) == before:
+            section_findings.add("between", f'"{first}" and "{second}" have a correlation already')
+        if len(findings.problems) == before:
             kept.append(Correlation(first, second, section.rank, section.source))
     matrix = group_matrix(list(by_name), rank_pairs(kept))[1]
     if kept and not is_positive_definite(matrix):
-        text = ", ".join(f"{one.first} ~ {one.second} = {number(one.rank)}" for one in kept)
-        found.add(
+        text = ", ".join(
+            f"{correlation.first} ~ {correlation.second} = {number(correlation.rank)}" for correlation in kept
+        )
+        findings.add(
             "correlation", f"no numbers can be correlated like this: {text} (the matrix is not positive definite)"
         )
     return tuple(kept)
 
 
-def _check_correlated(name: str, by_name: Mapping[str, Dispersion], model: Model, found: Findings) -> None:
+def _check_correlated(name: str, by_name: Mapping[str, Dispersion], model: Model, findings: Findings) -> None:
     if name not in by_name:
-        found.add("between", f'"{name}" is not dispersed{hint(name, by_name)}')
+        findings.add("between", f'"{name}" is not dispersed{hint(name, by_name)}')
     elif any(setting.name == name for setting in model.settings):
-        found.add("between", f'"{name}" is a setting; only parameters can be correlated')
+        findings.add("between", f'"{name}" is a setting; only parameters can be correlated')
     elif by_name[name].dist == "constant":
-        found.add("between", f'"{name}" is constant; it cannot be correlated')
+        findings.add("between", f'"{name}" is constant; it cannot be correlated')
 
 
 def rank_pairs(correlations: Sequence[Correlation]) -> tuple[tuple[str, str, float], ...]:
     """The correlations as plain tuples."""
-    return tuple((one.first, one.second, one.rank) for one in correlations)
+    return tuple((correlation.first, correlation.second, correlation.rank) for correlation in correlations)
 
 
 def check_size(
-    count: int, design: str, dispersions: tuple[Dispersion, ...], correlations: tuple[Correlation, ...], found: Findings
+    count: int,
+    design: str,
+    dispersions: tuple[Dispersion, ...],
+    correlations: tuple[Correlation, ...],
+    findings: Findings,
 ) -> None:
     """Note a number of cases, or of dispersions, that the design cannot have."""
     if design == "lhs":
-        check_room_for_correlations(count, correlations, found)
+        check_room_for_correlations(count, correlations, findings)
         if count > _LARGEST_HYPERCUBE:
-            found.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
+            findings.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
     most = {"sobol": MAX_DIMENSIONS, "saltelli": MAX_DIMENSIONS // 2}.get(design, len(dispersions))
     if len(dispersions) > most:
-        found.add("design", f'"{design}" has at most {most} dispersions, here are {len(dispersions)}; use "mc"')
+        findings.add("design", f'"{design}" has at most {most} dispersions, here are {len(dispersions)}; use "mc"')
     if design in IN_BLOCKS and not dispersions:
-        found.add("design", f'"{design}" needs a dispersion to find the effect of')
+        findings.add("design", f'"{design}" needs a dispersion to find the effect of')
     if sentence := block_problem(design, len(dispersions), count):
-        found.add("cases", sentence)
+        findings.add("cases", sentence)
 
 
-def check_room_for_correlations(cases: int, correlations: tuple[Correlation, ...], found: Findings) -> None:
+def check_room_for_correlations(cases: int, correlations: tuple[Correlation, ...], findings: Findings) -> None:
     """A Latin hypercube of few cases has few ways to be paired."""
-    needed = _CASES_PER_CORRELATED * len({name for one in correlations for name in (one.first, one.second)})
+    needed = _CASES_PER_CORRELATED * len(
+        {name for correlation in correlations for name in (correlation.first, correlation.second)}
+    )
     if cases < needed:
-        found.add("cases", f'{cases} is not allowed; "lhs" with these correlations needs at least {needed}')
+        findings.add("cases", f'{cases} is not allowed; "lhs" with these correlations needs at least {needed}')
 
 
 def check_requirements(
-    sections: Mapping[str, RequirementSection], model: Model, found: Findings
+    sections: Mapping[str, RequirementSection], model: Model, findings: Findings
 ) -> tuple[Requirement, ...]:
     """The requirements, each with a metric of the model and at least one limit."""
     kept = []
     for name, section in sections.items():
-        spot = found.under(name)
-        check_metric(section.metric, model, spot)
+        section_findings = findings.under(name)
+        check_metric(section.metric, model, section_findings)
         low, high = section.at_least, section.at_most
         if low is None and high is None:
-            spot.add("", "has no limit; give at_most, at_least or both")
+            section_findings.add("", "has no limit; give at_most, at_least or both")
         elif low is not None and high is not None and low > high:
-            spot.add("at_least", f"{number(low)} is above at_most = {number(high)}")
+            section_findings.add("at_least", f"{number(low)} is above at_most = {number(high)}")
         kept.append(Requirement(name, section.metric, high, low, section.share, section.confidence, section.source))
     return tuple(kept)
 
 
 def check_retention(
-    section: RetentionSection, model: Model, cases: int | None, shortened: bool, found: Findings
+    section: RetentionSection, model: Model, cases: int | None, shortened: bool, findings: Findings
 ) -> Retention:
     """The retention, its case numbers checked against `cases` (None: unknown).
 
@@ -207,19 +217,19 @@ def check_retention(
     histories = section.histories
     worst = histories.worst or []
     entries = [worst] if isinstance(worst, WorstSection) else worst
-    spot = found.under("histories")
+    section_findings = findings.under("histories")
     for k, entry in enumerate(entries, start=1):
-        check_metric(entry.metric, model, spot.under("worst" if entries is not worst else f"worst {k}"))
+        check_metric(entry.metric, model, section_findings.under("worst" if entries is not worst else f"worst {k}"))
     for case in histories.cases:
         if cases is not None and case >= cases and not shortened:
-            spot.add("cases", f"there is no case {case}; they are 0 to {cases - 1}")
+            section_findings.add("cases", f"there is no case {case}; they are 0 to {cases - 1}")
     kept = tuple(case for case in histories.cases if cases is None or case < cases)
     chosen = tuple(Worst(entry.metric, entry.count, entry.side) for entry in entries)
     return Retention(histories.nominal, histories.first, chosen, kept, histories.rows)
 
 
-def check_metric(metric: str, model: Model, found: Findings) -> None:
+def check_metric(metric: str, model: Model, findings: Findings) -> None:
     """Note a name that is not a metric of the model."""
     names = [field.name for field in model.metrics]
     if metric not in names:
-        found.add("metric", f'"{metric}" is not a metric of {model.name}{hint(metric, names)}')
+        findings.add("metric", f'"{metric}" is not a metric of {model.name}{hint(metric, names)}')

@@ -133,22 +133,22 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         raise CampaignError(source, [Problem("", f"this is not TOML that can be read: {error}")]) from None
 
 
-def read_sections(document: dict[str, Any], found: Findings) -> Sections:
+def read_sections(document: dict[str, Any], findings: Findings) -> Sections:
     """Read every section, noting all that is wrong inside each."""
     for name in document:
         if name not in CampaignFile.model_fields:
-            found.add(name, f"is not a section{hint(name, CampaignFile.model_fields)}")
+            findings.add(name, f"is not a section{hint(name, CampaignFile.model_fields)}")
     if "campaign" not in document:
-        found.add("campaign", "is missing: the table [campaign] with model, design, ...")
-    inside = {name: found.under(name) for name in CampaignFile.model_fields}
+        findings.add("campaign", "is missing: the table [campaign] with model, design, ...")
+    inside = {name: findings.under(name) for name in CampaignFile.model_fields}
     return Sections(
         campaign=read(CampaignSection, document.get("campaign"), inside["campaign"])
         if "campaign" in document
         else None,
         parameters=_parameters(document, inside["parameters"]),
-        dispersions=_read_each(_dispersion, _named(document, "dispersion", found)),
-        correlations=_read_each(_correlation, _listed(document, "correlation", found)),
-        requirements=_read_each(_requirement, _freely_named(document, "requirement", found)),
+        dispersions=_read_each(_dispersion, _named(document, "dispersion", findings)),
+        correlations=_read_each(_correlation, _listed(document, "correlation", findings)),
+        requirements=_read_each(_requirement, _freely_named(document, "requirement", findings)),
         retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
         tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
         inputs=_optional(InputsSection, document, inside),
@@ -162,16 +162,16 @@ def _optional(section: type[_AnySection], document: dict[str, Any], inside: dict
     return read(section, document[name], inside[name]) if name in document else None
 
 
-def read(section: type[_AnySection], raw: Any, found: Findings) -> _AnySection | None:
+def read(section: type[_AnySection], raw: Any, findings: Findings) -> _AnySection | None:
     """`raw` as a section, or None with all its mistakes noted."""
     try:
         return section.model_validate(raw)
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
         for details in mistakes[:MOST_SHOWN]:
-            found.add(_place(raw, details["loc"]), _sentence(section, details))
+            findings.add(_place(raw, details["loc"]), _sentence(section, details))
         # nobody is shown the rest: it is only counted
-        found.problems.extend(Problem(found.place, details["msg"]) for details in mistakes[MOST_SHOWN:])
+        findings.problems.extend(Problem(findings.place, details["msg"]) for details in mistakes[MOST_SHOWN:])
         return None
 
 
@@ -193,97 +193,97 @@ def _read_each(
 ) -> dict[str, _AnySection]:
     """The entries that could be read, by name."""
     sections = {}
-    for name, raw, spot in entries:
-        section = reader(raw, spot)
+    for name, raw, section_findings in entries:
+        section = reader(raw, section_findings)
         if section is not None:
             sections[name] = section
     return sections
 
 
-def _named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+def _named(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     raw = document.get(name, {})
     if isinstance(raw, dict):
-        return [(key, entry, found.under(name, key)) for key, entry in raw.items()]
-    header = f"{found.place}.{name}" if found.place else name
-    found.add(name, f"{shown(raw)} is not a table; write [{header}.NAME]")
+        return [(key, entry, findings.under(name, key)) for key, entry in raw.items()]
+    header = f"{findings.place}.{name}" if findings.place else name
+    findings.add(name, f"{shown(raw)} is not a table; write [{header}.NAME]")
     return []
 
 
-def _freely_named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+def _freely_named(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     """The tables whose names the file chooses; one that is no word is noted and left out."""
-    entries = _named(document, name, found)
+    entries = _named(document, name, findings)
     wrong = [entry for entry in entries if not _FREE_NAME.fullmatch(entry[0])]
     for key, _, _ in wrong:
-        found.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
+        findings.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
     return [entry for entry in entries if entry not in wrong]
 
 
-def _listed(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+def _listed(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     raw = document.get(name, [])
     if isinstance(raw, list):
         places = [f"{name} {k}" for k in range(1, len(raw) + 1)]
-        return [(place, entry, found.under(place)) for place, entry in zip(places, raw, strict=True)]
-    header = f"{found.place}.{name}" if found.place else name
-    found.add(name, f"{shown(raw)} is not a list of tables; write [[{header}]] with two brackets")
+        return [(place, entry, findings.under(place)) for place, entry in zip(places, raw, strict=True)]
+    header = f"{findings.place}.{name}" if findings.place else name
+    findings.add(name, f"{shown(raw)} is not a list of tables; write [[{header}]] with two brackets")
     return []
 
 
-def _correlation(raw: Any, found: Findings) -> CorrelationSection | None:
-    return read(CorrelationSection, raw, found)
+def _correlation(raw: Any, findings: Findings) -> CorrelationSection | None:
+    return read(CorrelationSection, raw, findings)
 
 
-def _requirement(raw: Any, found: Findings) -> RequirementSection | None:
-    return read(RequirementSection, raw, found)
+def _requirement(raw: Any, findings: Findings) -> RequirementSection | None:
+    return read(RequirementSection, raw, findings)
 
 
-def _tuning(raw: Any, found: Findings) -> TuningSections | None:
+def _tuning(raw: Any, findings: Findings) -> TuningSections | None:
     """[tuning], each of its tables read for itself, so that a slip in one hides nothing in the others."""
     if not isinstance(raw, dict):
-        found.add("", f"{shown(raw)} is not a table; write [tuning]")
+        findings.add("", f"{shown(raw)} is not a table; write [tuning]")
         return None
     tables = ("parameter", "objective", "constraint", "published")
     objectives = raw.get("objective")
     return TuningSections(
-        head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, found),
-        parameters=_read_each(partial(read, TunedSection), _named(raw, "parameter", found)),
-        objectives=_read_each(partial(read, ObjectiveSection), _freely_named(raw, "objective", found)),
-        constraints=_read_each(partial(read, ConstraintSection), _freely_named(raw, "constraint", found)),
-        published=_read_each(partial(read, PublishedPointSection), _listed(raw, "published", found)),
+        head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, findings),
+        parameters=_read_each(partial(read, TunedSection), _named(raw, "parameter", findings)),
+        objectives=_read_each(partial(read, ObjectiveSection), _freely_named(raw, "objective", findings)),
+        constraints=_read_each(partial(read, ConstraintSection), _freely_named(raw, "constraint", findings)),
+        published=_read_each(partial(read, PublishedPointSection), _listed(raw, "published", findings)),
         objective_names=tuple(objectives) if isinstance(objectives, dict) else (),
     )
 
 
-def _parameters(document: dict[str, Any], found: Findings) -> dict[str, Scalar]:
+def _parameters(document: dict[str, Any], findings: Findings) -> dict[str, Scalar]:
     raw = document.get("parameters", {})
     if not isinstance(raw, dict):
-        found.add("", f"{shown(raw)} is not a table; write [parameters]")
+        findings.add("", f"{shown(raw)} is not a table; write [parameters]")
         return {}
     values: dict[str, Scalar] = {}
     for name, value in raw.items():
         try:
             values[name] = _VALUE.validate_python(value)
         except ValidationError as error:
-            found.add(name, _sentence(None, error.errors(include_url=False)[0]))
+            findings.add(name, _sentence(None, error.errors(include_url=False)[0]))
     return values
 
 
-def _dispersion(raw: Any, found: Findings) -> DispersionSection | None:
+def _dispersion(raw: Any, findings: Findings) -> DispersionSection | None:
     """The section of the distribution that `dist` names; the keys allowed depend on it."""
     dist = raw.get("dist") if isinstance(raw, dict) else None
     if dist is None:
         slip = _slip_of_dist(raw) if isinstance(raw, dict) else None
         if slip is None:
-            return read(LevelsDispersion, raw, found)
-        found.add(slip, 'is not a known key; did you mean "dist"?')
+            return read(LevelsDispersion, raw, findings)
+        findings.add(slip, 'is not a known key; did you mean "dist"?')
         dist = raw[slip]
         raw = {"dist": dist, **{key: value for key, value in raw.items() if key != slip}}
     if not isinstance(dist, str):
-        found.add("dist", f"{shown(dist)} is not text in quotes; known are {listed(DISTRIBUTIONS)}")
+        findings.add("dist", f"{shown(dist)} is not text in quotes; known are {listed(DISTRIBUTIONS)}")
         return None
     if dist not in DISTRIBUTIONS:
-        found.add("dist", f'"{dist}" is not known{hint(dist, DISTRIBUTIONS)}')
+        findings.add("dist", f'"{dist}" is not known{hint(dist, DISTRIBUTIONS)}')
         return None
-    return read(DISTRIBUTIONS[dist], raw, found)
+    return read(DISTRIBUTIONS[dist], raw, findings)
 
 
 def _slip_of_dist(raw: dict[str, Any]) -> str | None:
@@ -348,7 +348,7 @@ def _class_at(section: type[BaseModel], location: tuple[int | str, ...]) -> type
 def _section_in(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _section_in(part))), None)
+    return next((nested for part in get_args(annotation) if (nested := _section_in(part))), None)
 
 
 def _lower_first(message: str) -> str:

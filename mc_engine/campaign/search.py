@@ -48,9 +48,11 @@ def campaign_paths(begun: str) -> list[str]:
     except (OSError, ValueError):
         return []
     before = f"{folder}/" if "/" in begun else ""
-    fitting = [one for one in entries if one.name.startswith(name) and (name or not one.name.startswith("."))]
+    fitting = [entry for entry in entries if entry.name.startswith(name) and (name or not entry.name.startswith("."))]
     return [
-        f"{before}{one.name}{'/' if one.is_dir() else ''}" for one in fitting if one.is_dir() or one.suffix == ".toml"
+        f"{before}{entry.name}{'/' if entry.is_dir() else ''}"
+        for entry in fitting
+        if entry.is_dir() or entry.suffix == ".toml"
     ]
 
 
@@ -61,7 +63,7 @@ def model_sources() -> dict[str, str]:
     """
     from mc_engine.model.record import load_model
 
-    found = {}
+    sources = {}
     for folder in sorted(path.parent for path in SHIPPED.glob("*/campaign.toml")):
         try:
             reference = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8"))["campaign"]["model"]
@@ -69,8 +71,8 @@ def model_sources() -> dict[str, str]:
         except (ModelError, OSError, ValueError, LookupError, TypeError):
             continue
         if source:
-            found[folder.name] = source
-    return found
+            sources[folder.name] = source
+    return sources
 
 
 def find_campaign(reference: str | Path) -> Path:
@@ -84,11 +86,11 @@ def find_campaign(reference: str | Path) -> Path:
         return shipped[text]
     path = Path(text)
     try:
-        found = path / "campaign.toml" if path.is_dir() else path
-        if found.is_file():
-            if (place := str(found.resolve())) != readable(place):
+        file = path / "campaign.toml" if path.is_dir() else path
+        if file.is_file():
+            if (place := str(file.resolve())) != readable(place):
                 raise CampaignError(readable(text), [Problem("", NO_TEXT)])
-            return found
+            return file
     except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
         pass
     raise CampaignError(without_secrets(text), [Problem("", _not_found(text, path, list(shipped)))])
@@ -141,8 +143,8 @@ def _is_folder(path: Path) -> bool:
 def _not_found(text: str, path: Path, names: list[str]) -> str:
     if text and _is_folder(path):
         others = [name for name in campaign_paths(f"{text.rstrip('/')}/") if name.endswith(".toml")]
-        found = f", but {others[0]}" if others else "; `mc-engine init DIR` makes a campaign in a new folder"
-        return f"holds no campaign.toml{found}"
+        instead = f", but {others[0]}" if others else "; `mc-engine init DIR` makes a campaign in a new folder"
+        return f"holds no campaign.toml{instead}"
     if path.suffix == ".toml":
         return (
             "there is no such file; `mc-engine list` names the shipped campaigns, `mc-engine init DIR` makes a new one"

@@ -61,26 +61,26 @@ def check_sensitivity(
     correlations: Sequence[Correlation],
     design: str | None,
     upstream: str | None,
-    found: Findings,
+    findings: Findings,
 ) -> SensitivityDesign | None:
     """The design that [sensitivity] asks for, None without one.  upstream : name of the campaign flown before."""
     if section is None:
         return None
     if design in (*BY_LEVELS, *IN_BLOCKS) or (design == "table" and upstream is None):
-        found.add("", f'the design "{design}" draws nothing from distributions; [sensitivity] is for mc, lhs, sobol')
+        findings.add("", f'the design "{design}" draws nothing from distributions; [sensitivity] is for mc, lhs, sobol')
         return None
-    problems = len(found.problems)
-    groups = dict(_groups(section, model, dispersions, correlations, found.under("group")))
+    problems = len(findings.problems)
+    groups = dict(_groups(section, model, dispersions, correlations, findings.under("group")))
     if upstream is not None:
         groups = {f"cases of {upstream}": (), **groups}
     chosen = SensitivityDesign(section.cases, groups)
     if not groups:
-        found.add("", "there is no dispersion whose contribution could be computed")
+        findings.add("", "there is no dispersion whose contribution could be computed")
     elif chosen.flights > MOST_CASES:
-        found.add(
+        findings.add(
             "cases", f"{section.cases} with {len(groups)} groups are {chosen.flights} flights; at most {MOST_CASES}"
         )
-    return chosen if len(found.problems) == problems else None
+    return chosen if len(findings.problems) == problems else None
 
 
 def _groups(
@@ -88,24 +88,24 @@ def _groups(
     model: Model,
     dispersions: Sequence[Dispersion],
     correlations: Sequence[Correlation],
-    found: Findings,
+    findings: Findings,
 ) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Each group with its dispersions, in the order of the file; the random draws last."""
-    names = [one.name for one in dispersions]
+    names = [dispersion.name for dispersion in dispersions]
     draws = [name for name in names if _names_a_draw(model, name)]
     home = {name: name for name in names}  # the group of each dispersion
     for group, members in section.group.items():
         for name in members:
             if name not in home:
-                found.add(group, f'"{name}" is not dispersed{hint(name, names)}')
+                findings.add(group, f'"{name}" is not dispersed{hint(name, names)}')
             elif name in draws:
-                found.add(group, f'"{name}" names a random draw; it is in the group "{RANDOM_DRAWS}"')
+                findings.add(group, f'"{name}" names a random draw; it is in the group "{RANDOM_DRAWS}"')
             elif home[name] != name:
-                found.add(group, f'"{name}" is in the group "{home[name]}" already')
+                findings.add(group, f'"{name}" is in the group "{home[name]}" already')
             else:
                 home[name] = group
-    for one in correlations:  # inputs that are correlated have no contributions of their own
-        first, second = home[one.first], home[one.second]
+    for pair in correlations:  # inputs that are correlated have no contributions of their own
+        first, second = home[pair.first], home[pair.second]
         joined = f"{first}, {second}" if first != second else first
         home = {name: joined if group in (first, second) else group for name, group in home.items()}
     for group in dict.fromkeys(home[name] for name in names if name not in draws):
@@ -148,15 +148,15 @@ def companion_table(campaign: "Campaign", case_ids: np.ndarray) -> dict[str, np.
     """The dispersions of cases of a companion, in declared units.  case_ids : int64[n]."""
     layout, block, row = _blocks(campaign, case_ids)
     assert campaign.sensitivity is not None  # a companion has one
-    names = [one.name for one in campaign.dispersions]
+    names = [dispersion.name for dispersion in campaign.dispersions]
     pairs = rank_pairs(campaign.correlations)
     points = [_point(campaign, names, pairs, k, block) for k in range(len(_POINTS))]
     table = {}
-    for place, one in enumerate(campaign.dispersions):
-        group = next(name for name, members in campaign.sensitivity.groups.items() if one.name in members)
+    for place, dispersion in enumerate(campaign.dispersions):
+        group = next(name for name, members in campaign.sensitivity.groups.items() if dispersion.name in members)
         u = np.choose(layout.points(group)[row], [columns[place] for columns in points])
-        assert one.distribution is not None  # of a random design
-        table[one.name] = quantiles(one.distribution, u)
+        assert dispersion.distribution is not None  # of a random design
+        table[dispersion.name] = quantiles(dispersion.distribution, u)
     return table
 
 

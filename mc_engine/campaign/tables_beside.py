@@ -82,9 +82,9 @@ def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
         if len(ragged) > _MOST_LINES:
             break
     if ragged:
-        more = " and more" if len(ragged) > _MOST_LINES else ""
-        told = ", ".join(ragged[:_MOST_LINES])
-        raise FileFault(f'"{path.name}", {told}{more} where {len(names)} columns are named')
+        ending = " and more" if len(ragged) > _MOST_LINES else ""
+        lines = ", ".join(ragged[:_MOST_LINES])
+        raise FileFault(f'"{path.name}", {lines}{ending} where {len(names)} columns are named')
     return {name: np.array(column, dtype=object) for name, column in zip(names, columns, strict=True)}
 
 
@@ -132,8 +132,8 @@ def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
     wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
     if wrong.size:
         row = wrong[0]
-        what = f"is beyond {LARGEST:g}" if np.isfinite(values[row]) else "is not a finite number"
-        raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{str(cells[row])[:_LONGEST_NAME]}" {what}')
+        fault = f"is beyond {LARGEST:g}" if np.isfinite(values[row]) else "is not a finite number"
+        raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{str(cells[row])[:_LONGEST_NAME]}" {fault}')
     return values
 
 

@@ -57,8 +57,10 @@ class Rows:
     def content(self) -> bytes:
         """A Parquet file of all this: what a run directory keeps, and what digests are taken of."""
         table = arrow_table(self.columns, self.table, self.n_cases, Path(COMPANION))
-        more = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
-        return parquet_bytes(table.replace_schema_metadata({_FACTS: json.dumps(more, sort_keys=True, default=float)}))
+        metadata = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
+        return parquet_bytes(
+            table.replace_schema_metadata({_FACTS: json.dumps(metadata, sort_keys=True, default=float)})
+        )
 
 
 @dataclass(frozen=True)
@@ -136,14 +138,14 @@ def _rows_of_copy(path: Path) -> Rows:
 
 def _copy_problem(table: pa.Table, columns: tuple[Column, ...], nominal: Mapping[str, Any]) -> str:
     """What no engine writes into a copy; empty if every column is there, of its kind, and no value is missing."""
-    if not table.schema.equals(arrow_schema(columns)) or any(one.null_count for one in table.columns):
+    if not table.schema.equals(arrow_schema(columns)) or any(column.null_count for column in table.columns):
         return "its columns are not those that it names, or have missing values"
     if not np.array_equal(table["case_id"].to_numpy(), np.arange(table.num_rows)):
         return "its case_id does not count from 0"
     if not {*pc.unique(table["status"]).to_pylist()} <= {*STATUS_NAME.values()}:
         return "it has a status that there is not"
     kinds = {"number": (int, float), "integer": (int,), "word": (str,), "switch": (bool,)}
-    if table.num_rows and not all(type(nominal.get(one.name)) in kinds[one.kind] for one in columns):
+    if table.num_rows and not all(type(nominal.get(column.name)) in kinds[column.kind] for column in columns):
         return "its nominal case has not a value of the right kind for every column"
     return ""
 
@@ -161,15 +163,15 @@ def find_run(reference: str, directory: Path) -> Path | None:
         return None
 
 
-def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str], found: Findings) -> Upstream:
+def link(rows: Rows, section: InputsSection, model: Model, own_columns: Iterable[str], findings: Findings) -> Upstream:
     """Hold the rows against the model; what does not fit is noted.
 
     taken : names that the campaign's own table has, beside those of the inputs.
     """
     upstream = {column.name: column for column in rows.columns}
-    links = _links(upstream, section, model, found)
+    links = _links(upstream, section, model, findings)
     if rows.n_cases and rows.nominal.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]:
-        found.add("from", f"the nominal case of that run ended as {rows.nominal['status']}; choose one that flies")
+        findings.add("from", f"the nominal case of that run ended as {rows.nominal['status']}; choose one that flies")
     failed = np.asarray(rows.table["status"] != STATUS_NAME[OK], dtype=bool)
     table: dict[str, np.ndarray] = {}
     nominal: dict[str, Scalar] = {}
@@ -181,7 +183,7 @@ def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str],
         nominal[name] = float(convert(float(rows.nominal[column]), unit, item.unit))
     kept = [input_column(inputs[name]) for name in links]
     names: dict[str, str] = {}
-    used = {*taken, *_OURS, *inputs}
+    used = {*own_columns, *_OURS, *inputs}
     for column_ in rows.columns:
         if column_.name == "case_id" or links.get(column_.name) == column_.name:
             continue
@@ -198,23 +200,25 @@ def _word(name: str) -> str:
     return re.sub(r"\W+", "_", name)
 
 
-def _links(upstream: Mapping[str, Column], section: InputsSection, model: Model, found: Findings) -> dict[str, str]:
+def _links(upstream: Mapping[str, Column], section: InputsSection, model: Model, findings: Findings) -> dict[str, str]:
     """Input -> column: those of [inputs.columns], and inputs that have the name of a result upstream."""
-    spot = found.under("columns")
+    section_findings = findings.under("columns")
     parameters = {item.name: item for item in model.parameters}
     results = [name for name, column in upstream.items() if column.role in ("metric", "state")]
     links = {name: name for name in results if name in parameters}
     for name, column in section.columns.items():
         if name not in parameters:
-            spot.add(name, f"is not a parameter of {model.name}{hint(name, parameters)}")
+            section_findings.add(name, f"is not a parameter of {model.name}{hint(name, parameters)}")
         elif column not in upstream or upstream[column].kind != "number":
-            spot.add(name, f'"{column}" is no column of numbers of that run{hint(column, results)}')
+            section_findings.add(name, f'"{column}" is no column of numbers of that run{hint(column, results)}')
         elif upstream[column].unit not in compatible(parameters[name].unit):
-            spot.add(name, f'"{column}" is in {upstream[column].unit}, which does not fit {parameters[name].unit}')
+            section_findings.add(
+                name, f'"{column}" is in {upstream[column].unit}, which does not fit {parameters[name].unit}'
+            )
         else:
             links[name] = column
     if not links and not section.columns:
-        found.add(
+        findings.add(
             "", f"no result of that run has the name of a parameter of {model.name}; name them in [inputs.columns]"
         )
     return links

@@ -10,7 +10,9 @@ _FENCE = "``````"
 def escaped(text: str) -> str:
     """One line of prose; what stands between backticks is code."""
     pieces = re.split(r"(`[^`\n]+`)", text)
-    line = "".join(one if one.startswith("`") and len(one) > 1 else _MARKUP.sub(r"\\\1", one) for one in pieces)
+    line = "".join(
+        piece if piece.startswith("`") and len(piece) > 1 else _MARKUP.sub(r"\\\1", piece) for piece in pieces
+    )
     return re.sub(r"^(\s*)([-+]|\d+[.)])(?=\s)", r"\1\\\2", line)
 
 
@@ -49,7 +51,7 @@ def _flowing(paragraph: str) -> str:
             items.append(escaped(line.strip()))
         else:
             items[-1] += " " + escaped(line.strip())
-    return "\n".join(f"- {one}" for one in items)
+    return "\n".join(f"- {item}" for item in items)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

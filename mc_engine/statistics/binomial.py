@@ -145,13 +145,13 @@ def half_rate_share(share: float) -> float:
     return 0.5 * (1.0 + share)
 
 
-def hypergeometric_tails(total: int, marked: int, drawn: int, found: int) -> tuple[float, float]:
+def hypergeometric_tails(total: int, marked: int, drawn: int, count: int) -> tuple[float, float]:
     """Probabilities of at most, and of at least, `found` marked ones among `drawn` of `total`, of which some are."""
     k = np.arange(max(0, drawn - (total - marked)), min(marked, drawn) + 1)
     chance = -gammaln(k + 1.0) - gammaln(marked - k + 1.0)
     chance -= gammaln(drawn - k + 1.0) + gammaln(total - marked - drawn + k + 1.0)
     chance = np.exp(chance - chance.max())
-    return float(chance[k <= found].sum() / chance.sum()), float(chance[k >= found].sum() / chance.sum())
+    return float(chance[k <= count].sum() / chance.sum()), float(chance[k >= count].sum() / chance.sum())
 
 
 def check_counts(passed: int, tried: int, confidence: float) -> None:

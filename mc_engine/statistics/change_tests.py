@@ -134,21 +134,21 @@ def metric_change(
         return float(in_units(float(pair[0]), exponent)), float(in_units(float(pair[1]), exponent))
 
     mean, deviation = _of(np.mean, a, b), _of(_deviation, a, b)
-    told = metric, used, tried, differing, back(mean), back(deviation)
+    described = metric, used, tried, differing, back(mean), back(deviation)
     if min(used) < FEWEST:
-        return MetricChange(*told, Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf), UNKNOWN, np.nan,
-                            np.nan)  # fmt: skip
-    a, b = (one[:: -(-one.size // MOST_CASES)] for one in (a, b))
+        shift = Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf)
+        return MetricChange(*described, shift, UNKNOWN, np.nan, np.nan)
+    a, b = (values[:: -(-values.size // MOST_CASES)] for values in (a, b))
     z = float(norm.ppf(0.5 + 0.5 * confidence))
     if max(np.ptp(a), np.ptp(b), abs(a[0] - b[0])) <= unit:  # the same constant
         same = float(in_units(float(np.median(b) - np.median(a)), exponent))
-        return MetricChange(*told, Estimate(same, same, same), UNKNOWN, np.nan, np.nan)
+        return MetricChange(*described, Estimate(same, same, same), UNKNOWN, np.nan, np.nan)
     shift, shift_p = _shift(a, b, paired, unit, z)
     ratio, spread_p = _ratio(a, b, paired, unit, z)
     if min(deviation) <= _ROUNDING * scale:
         ratio = UNKNOWN
-    shift = Estimate(*(float(in_units(one, exponent)) for one in astuple(shift)))
-    return MetricChange(*told, shift, ratio, shift_p, spread_p)
+    shift = Estimate(*(float(in_units(end, exponent)) for end in astuple(shift)))
+    return MetricChange(*described, shift, ratio, shift_p, spread_p)
 
 
 def share_change(name: str, a: np.ndarray, b: np.ndarray, *, paired: bool, confidence: float = 0.95) -> ShareChange:
@@ -180,7 +180,7 @@ def holm(p_values: Sequence[float]) -> np.ndarray:
 
 
 def _of(function, a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
-    return tuple(float(function(one)) if one.size else np.nan for one in (a, b))  # type: ignore[return-value]
+    return tuple(float(function(values)) if values.size else np.nan for values in (a, b))  # type: ignore[return-value]
 
 
 def _deviation(values: np.ndarray) -> float:
@@ -201,26 +201,26 @@ def _shift(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) ->
 
 def _ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) -> tuple[Estimate, float]:
     """The ratio of the distances to each run's own median with its interval, and the p-value of 1."""
-    one, other = (np.abs(values - np.median(values)) for values in (a, b))
-    if max(np.ptp(one), np.ptp(other)) <= unit:
+    before, other = (np.abs(values - np.median(values)) for values in (a, b))
+    if max(np.ptp(before), np.ptp(other)) <= unit:
         return UNKNOWN, np.nan if np.ptp(a) > unit else 1.0
     if paired:
-        moved = np.abs(other - one) > unit
+        moved = np.abs(other - before) > unit
         if not moved.any():
             return Estimate(1.0, 1.0, 1.0), 1.0
-        one, other = one[moved], other[moved]
-    if min(one.mean(), other.mean()) <= unit:
-        return UNKNOWN, _p_value(_mean_score(one, other))
-    score = _log_ratio_score(one, other, paired)
-    start = float(np.log(other.mean() / one.mean()))
-    found, p_value = _inverted(score, start, 1.0 / sqrt(min(one.size, other.size)), z)
-    return Estimate(*(float(np.exp(end)) for end in (found.value, found.lower, found.upper))), p_value
+        before, other = before[moved], other[moved]
+    if min(before.mean(), other.mean()) <= unit:
+        return UNKNOWN, _p_value(_mean_score(before, other))
+    score = _log_ratio_score(before, other, paired)
+    start = float(np.log(other.mean() / before.mean()))
+    logarithm, p_value = _inverted(score, start, 1.0 / sqrt(min(before.size, other.size)), z)
+    return Estimate(*(float(np.exp(end)) for end in (logarithm.value, logarithm.lower, logarithm.upper))), p_value
 
 
-def _log_ratio_score(one: np.ndarray, other: np.ndarray, paired: bool) -> Callable[[float], float]:
+def _log_ratio_score(before: np.ndarray, other: np.ndarray, paired: bool) -> Callable[[float], float]:
     if paired:
-        return lambda ratio: _signed_ranks(other * np.exp(-ratio) - one)
-    return lambda ratio: _mean_score(one, other * np.exp(-ratio))
+        return lambda ratio: _signed_ranks(other * np.exp(-ratio) - before)
+    return lambda ratio: _mean_score(before, other * np.exp(-ratio))
 
 
 def _inverted(score: Callable[[float], float], start: float, step: float, z: float) -> tuple[Estimate, float]:

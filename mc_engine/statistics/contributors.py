@@ -27,9 +27,9 @@ def contributors(inputs: Mapping[str, Any], values: np.ndarray) -> list[Contribu
     columns = input_columns(inputs)
     rows = np.flatnonzero(np.isfinite(values) & finite_rows(columns, len(values)))
     rows = rows[:: -(-rows.size // MOST_CASES) or 1]
-    live = [column for column in (one.at(rows) for one in columns) if column.varies]
+    live = [column for column in (input_column.at(rows) for input_column in columns) if column.varies]
     table = np.asarray(values, dtype=np.float64)[rows, None]
     if rows.size < FEWEST_CASES or not np.ptp(table) > 1e-12 * np.abs(table).max():
         return [Contributor(column.name, np.nan) for column in live]
-    found = [Contributor(column.name, float(first_order(column, table)[0][0])) for column in live]
-    return sorted(found, key=lambda one: -np.nan_to_num(one.share, nan=-1.0))
+    shares = [Contributor(column.name, float(first_order(column, table)[0][0])) for column in live]
+    return sorted(shares, key=lambda contributor: -np.nan_to_num(contributor.share, nan=-1.0))

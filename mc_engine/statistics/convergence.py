@@ -106,9 +106,10 @@ def running_quantile(values: np.ndarray, probability: float, confidence: float =
     finite = _numbers(values)
     if finite is None:
         return None
-    found = [quantile(np.sort(finite[:n]), probability, confidence) for n in used]
+    quantiles = [quantile(np.sort(finite[:n]), probability, confidence) for n in used]
     estimate, lower, upper = (
-        np.array([getattr(one, name) for one in found], dtype=np.float64) for name in ("value", "lower", "upper")
+        np.array([getattr(estimate_, name) for estimate_ in quantiles], dtype=np.float64)
+        for name in ("value", "lower", "upper")
     )
     ends = np.array([estimate[-1] - lower[-1], upper[-1] - estimate[-1]])
     scale = float(np.abs(finite).max())

@@ -65,10 +65,10 @@ def designed_indices(
         if n_used[k] < FEWEST_BLOCKS or np.ptp(y) <= 1e-12 * np.abs(y).max():
             continue
         if design == "saltelli":
-            found = _saltelli(tuple(inputs), y, confidence)
+            indices = _saltelli(tuple(inputs), y, confidence)
         else:
-            found = _morris(tuple(inputs), coded[flown], y, confidence)
-        for name, (value, half) in found.items():
+            indices = _morris(tuple(inputs), coded[flown], y, confidence)
+        for name, (value, half) in indices.items():
             values[name][:, k], reach[name][:, k] = value, half
     return DesignedIndices(design, tuple(inputs), tuple(metrics), values, reach, n_used, len(rows))
 
@@ -80,10 +80,10 @@ def _problem(names: tuple[str, ...]) -> dict[str, Any]:
 def _saltelli(names: tuple[str, ...], y: np.ndarray, confidence: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     from SALib.analyze import sobol  # imports matplotlib and pandas
 
-    found = sobol.analyze(
+    indices = sobol.analyze(
         _problem(names), y.ravel(), calc_second_order=False, num_resamples=RESAMPLES, conf_level=confidence, seed=_SEED
     )
-    return {"first_order": (found["S1"], found["S1_conf"]), "total": (found["ST"], found["ST_conf"])}
+    return {"first_order": (indices["S1"], indices["S1_conf"]), "total": (indices["ST"], indices["ST_conf"])}
 
 
 def _morris(
@@ -92,7 +92,7 @@ def _morris(
     """Of the inputs SALib takes only which one moved, and whether up; a move to an equal value has no effect."""
     from SALib.analyze import morris
 
-    found = morris.analyze(
+    effects = morris.analyze(
         _problem(names),
         coded.reshape(-1, len(names)),
         y.ravel(),
@@ -103,7 +103,7 @@ def _morris(
     )
     unknown = np.full(len(names), np.nan)
     return {
-        "mu_star": (np.asarray(found["mu_star"]), np.asarray(found["mu_star_conf"])),
-        "mu": (np.asarray(found["mu"]), unknown),
-        "sigma": (np.asarray(found["sigma"]), unknown),
+        "mu_star": (np.asarray(effects["mu_star"]), np.asarray(effects["mu_star_conf"])),
+        "mu": (np.asarray(effects["mu"]), unknown),
+        "sigma": (np.asarray(effects["sigma"]), unknown),
     }

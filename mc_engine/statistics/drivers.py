@@ -85,15 +85,15 @@ def failure_drivers(
 
     Benjamini & Hochberg, J. R. Stat. Soc. B 57 (1995), 289-300, over all tests of singles, and over all of pairs.
     """
-    every = np.array([np.asarray(one, dtype=bool) for one in failed.values()])
-    decided = [k for k, one in enumerate(every) if min(one.sum(), (~one).sum()) >= FEWEST]
+    every = np.array([np.asarray(cases, dtype=bool) for cases in failed.values()])
+    decided = [k for k, lost in enumerate(every) if min(lost.sum(), (~lost).sum()) >= FEWEST]
     names = list(failed)
     undecided = tuple(name for k, name in enumerate(names) if k not in decided)
     if not decided:
         return Drivers((), (), 0, 0, undecided)
     columns = input_columns(inputs)
     rows = _tested_rows(every[decided], finite_rows(columns, every.shape[1]))
-    columns = [one for one in (column.at(rows) for column in columns) if one.varies]
+    columns = [part for part in (column.at(rows) for column in columns) if part.varies]
     # rows without an input may have taken failed cases away
     tested = {names[k]: every[k, rows] for k in decided if _fewer_group(every[k, rows]) >= FEWEST}
     singles = [_single(name, column, lost) for name, lost in tested.items() for column in columns]
@@ -101,8 +101,8 @@ def failure_drivers(
     pairs = list(_pairs(columns, rich)) if rich and len(columns) > 1 else []
     by_name = {column.name: column for column in columns}
     located = tuple(
-        _located(one, by_name[one.inputs[0]], by_name[one.inputs[1]], rich[one.requirement])
-        for one in _discovered(pairs, rate)
+        _located(pair, by_name[pair.inputs[0]], by_name[pair.inputs[1]], rich[pair.requirement])
+        for pair in _discovered(pairs, rate)
     )
     return Drivers(_discovered(singles, rate), located, len(singles), len(pairs), undecided)
 
@@ -156,9 +156,11 @@ def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
 def _discovered(tested: list[Driver], rate: float) -> tuple[Driver, ...]:
     if not tested:
         return ()
-    adjusted = _adjusted(np.array([one.p_value for one in tested]))
-    found = [replace(one, adjusted=float(value)) for one, value in zip(tested, adjusted, strict=True) if value <= rate]
-    return tuple(sorted(found, key=lambda one: (one.p_value, -one.effect)))
+    adjusted = _adjusted(np.array([driver.p_value for driver in tested]))
+    discovered = [
+        replace(driver, adjusted=float(value)) for driver, value in zip(tested, adjusted, strict=True) if value <= rate
+    ]
+    return tuple(sorted(discovered, key=lambda driver: (driver.p_value, -driver.effect)))
 
 
 def _adjusted(p_values: np.ndarray) -> np.ndarray:
@@ -206,7 +208,9 @@ def _group(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
     size = np.array([np.count_nonzero(column.values == level) for level in levels])
     hits = np.array([np.count_nonzero(failed & (column.values == level)) for level in levels])
     drawn = zip(size.tolist(), hits.tolist(), strict=True)
-    tail = np.array([min(hypergeometric_tails(n, n_failed, one, found)) for one, found in drawn])
+    tail = np.array(
+        [min(hypergeometric_tails(n, n_failed, level_size, level_hits)) for level_size, level_hits in drawn]
+    )
     effects = hits / n_failed - (size - hits) / (n - n_failed)
     best = int(np.lexsort((-effects, tail))[0])
     # of two levels one test says all
@@ -230,7 +234,7 @@ def _scores(column: InputColumn) -> list[np.ndarray]:
         ranks = average_ranks(column.values)
         return [2.0 * ranks / (ranks.size + 1) - 1.0]
     indicators = [(column.values == level).astype(np.float64) for level in np.unique(column.values)]
-    return [one - one.mean() for one in indicators]
+    return [indicator - indicator.mean() for indicator in indicators]
 
 
 def _pairs(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> Iterator[Driver]:
@@ -250,7 +254,7 @@ def _pairs(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> 
     basis = basis[:, sizes > 1e-9 * sizes[0]]
     if n < 3 * basis.shape[1]:
         return
-    lost = np.column_stack([one.astype(np.float64) for one in failed.values()])
+    lost = np.column_stack([cases.astype(np.float64) for cases in failed.values()])
     freed = lost - basis @ (basis.T @ lost)
     z: dict[tuple[str, str], list[np.ndarray]] = {}
     for k, (name, score) in enumerate(scored):

@@ -88,12 +88,14 @@ def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -
     [[0.0, 1.0, 2.0], [10.0, 11.0, 12.0]]
     """
     pairs = [near_one(np.asarray(values, dtype=np.float64)) for values in (x, y, z)]
-    found = _map(pairs[0][0], pairs[1][0], pairs[2][0], points)
-    if found is None:
+    surface = _map(pairs[0][0], pairs[1][0], pairs[2][0], points)
+    if surface is None:
         return None
-    x, y, value = (in_units(*one) for one in zip((found.x, found.y, found.value), (e for _, e in pairs), strict=True))
+    x, y, value = (
+        in_units(*scaled) for scaled in zip((surface.x, surface.y, surface.value), (e for _, e in pairs), strict=True)
+    )
     return replace(
-        found, x=x, y=y, value=value, error=None if found.error is None else in_units(found.error, pairs[2][1])
+        surface, x=x, y=y, value=value, error=None if surface.error is None else in_units(surface.error, pairs[2][1])
     )
 
 
@@ -109,8 +111,8 @@ def _map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap
 
 def explained_share(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
     """The share of the variance of z that a smooth surface over x and y predicts of cases left out; NaN for too few."""
-    found = map_metric(x, y, z, points=2)
-    return np.nan if found is None else found.explained
+    surface = map_metric(x, y, z, points=2)
+    return np.nan if surface is None else surface.explained
 
 
 def _spread(values: np.ndarray) -> bool:
@@ -281,8 +283,8 @@ class _Fit:
         weighted = design * self.weight[:, :, None]
         right = np.swapaxes(weighted, 1, 2) @ z[self.near][:, :, None]
         residual = z[self.near] - (design @ np.linalg.solve(self.normal, right))[:, :, 0]
-        taken = np.linalg.solve(self.normal, np.swapaxes(weighted, 1, 2) @ weighted)
-        freedom = self.weight.sum(axis=1) - np.trace(taken, axis1=1, axis2=2)
+        hat = np.linalg.solve(self.normal, np.swapaxes(weighted, 1, 2) @ weighted)
+        freedom = self.weight.sum(axis=1) - np.trace(hat, axis1=1, axis2=2)
         enough = freedom > 0.5
         variance = (self.weight * residual**2).sum(axis=1) / np.where(enough, freedom, 1.0)
         error = np.sqrt(variance * (self._smoother(self.row) ** 2).sum(axis=1))
@@ -292,5 +294,7 @@ class _Fit:
 def _value_row(normal: np.ndarray) -> np.ndarray:
     """First row of the inverses of normal matrices; terms that the cases do not tell apart are left out."""
     widths, vectors = np.linalg.eigh(normal)
-    told = widths > 1e-10 * widths[:, -1:]
-    return np.einsum("mij,mj->mi", vectors, np.where(told, vectors[:, 0, :] / np.where(told, widths, 1.0), 0.0))
+    determined = widths > 1e-10 * widths[:, -1:]
+    return np.einsum(
+        "mij,mj->mi", vectors, np.where(determined, vectors[:, 0, :] / np.where(determined, widths, 1.0), 0.0)
+    )

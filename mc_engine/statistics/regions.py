@@ -77,10 +77,10 @@ def covariance_ellipses(
         return ()
     centre, spread, axes = frame
     squares = np.sum(((points - centre) @ axes / spread) ** 2, axis=1)
-    found = []
+    ellipses = []
     for content in contents:
         k = chi_square_scale(content)
-        found.append(
+        ellipses.append(
             Ellipse(
                 content=content,
                 scale=k,
@@ -91,7 +91,7 @@ def covariance_ellipses(
                 n=len(points),
             )
         )
-    return tuple(found)
+    return tuple(ellipses)
 
 
 def _principal_frame(points: np.ndarray, thinnest: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
@@ -190,12 +190,12 @@ def density_regions(
         return ()
     values = smoothed.at(points)
     ranked = np.sort(values[1::2])
-    found = []
+    regions = []
     for content in contents:
         rank = quantile_ranks(ranked.size, 1.0 - content, 2.0 * confidence - 1.0)[0]
         if rank is None or ranked[rank - 1] <= 0.0:
             continue
         level = float(ranked[rank - 1])
         inside = int(np.count_nonzero(values >= level))
-        found.append(DensityRegion(content, confidence, smoothed, level, inside, len(points)))
-    return tuple(found)
+        regions.append(DensityRegion(content, confidence, smoothed, level, inside, len(points)))
+    return tuple(regions)

@@ -111,7 +111,7 @@ class Verdict:
         low, high = self.enclosed if self.enclosed is not None else (self.demonstrated, self.demonstrated)
         above = None if self.at_most is None or high is None else self.at_most - high
         below = None if self.at_least is None or low is None else low - self.at_least
-        return min((one for one in (above, below) if one is not None), default=None)
+        return min((distance for distance in (above, below) if distance is not None), default=None)
 
 
 def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple[float, float]:
@@ -151,15 +151,18 @@ class LimitCounts:
     def add(self, column: Callable[[str], np.ndarray], ok: np.ndarray) -> None:
         """Count cases.  column : metric to float64[n].  ok : bool[n]."""
         self.tried += ok.size
-        kept = [inside_all([one], column, ok) for one in self.requirements]
-        numbers = [ok & np.isfinite(np.asarray(column(str(one["metric"])), np.float64)) for one in self.requirements]
-        for found, good in ((self._outside, kept), (self._lost, numbers)):
+        kept = [inside_all([requirement], column, ok) for requirement in self.requirements]
+        numbers = [
+            ok & np.isfinite(np.asarray(column(str(requirement["metric"])), np.float64))
+            for requirement in self.requirements
+        ]
+        for counter, good in ((self._outside, kept), (self._lost, numbers)):
             beyond = ~np.array(good, dtype=bool).reshape(len(good), ok.size)
             some = beyond[:, beyond.any(axis=0)]
             if some.size:
                 codes, cases = np.unique(np.packbits(some, axis=0, bitorder="little").T, axis=0, return_counts=True)
                 for code, n in zip(codes, cases.tolist(), strict=True):
-                    found[int.from_bytes(code.tobytes(), "little")] += n
+                    counter[int.from_bytes(code.tobytes(), "little")] += n
 
     def outside(self, requirements: Iterable[int] | None = None) -> int:
         """Cases outside any of these requirements, of all by default; they are named by their index."""
@@ -169,9 +172,9 @@ class LimitCounts:
         """Cases without a number for any of them."""
         return self._any(self._lost, requirements)
 
-    def _any(self, found: Counter[int], requirements: Iterable[int] | None) -> int:
+    def _any(self, counter: Counter[int], requirements: Iterable[int] | None) -> int:
         asked = sum(1 << k for k in (range(len(self.requirements)) if requirements is None else requirements))
-        return sum(cases for code, cases in found.items() if code & asked)
+        return sum(cases for code, cases in counter.items() if code & asked)
 
 
 def judge_all(
@@ -222,9 +225,13 @@ def judge_counted(
     to be asked for.  Its confidence is the smallest of theirs.
     """
     requirements = counts.requirements
-    share = joint_share([float(one["share"]) for one in requirements]) if len(requirements) > 1 else None
+    share = (
+        joint_share([float(requirement["share"]) for requirement in requirements]) if len(requirements) > 1 else None
+    )
     among = len(requirements) + (share is not None)
-    verdicts = [_verdict(one, counts, (k,), ranked, design, looked, among) for k, one in enumerate(requirements)]
+    verdicts = [
+        _verdict(requirement, counts, (k,), ranked, design, looked, among) for k, requirement in enumerate(requirements)
+    ]
     if share is None:
         return verdicts, None
     confidence = min(verdict.confidence for verdict in verdicts)
@@ -390,9 +397,9 @@ def inside_all(
     column : metric to float64[n].  ok : bool[n].  Without a requirement every completed case is inside.
     """
     inside = np.array(ok, dtype=bool)
-    for one in requirements:
-        values = np.asarray(column(str(one["metric"])), dtype=np.float64)
-        inside &= inside_limits(values, _limit(one, "at_most"), _limit(one, "at_least"))
+    for requirement in requirements:
+        values = np.asarray(column(str(requirement["metric"])), dtype=np.float64)
+        inside &= inside_limits(values, _limit(requirement, "at_most"), _limit(requirement, "at_least"))
     return inside
 
 

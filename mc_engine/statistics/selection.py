@@ -81,25 +81,25 @@ class Selection:
         if self.few:
             return self._found()
         running = self.counts.cumsum(axis=1)
-        found, sizes = {}, {}
+        narrowed, sizes = {}, {}
         for rank, (beginning, left) in wanted.items():
             row = running[np.searchsorted(self.beginnings, np.uint64(beginning))]
             digit = int(np.searchsorted(row, left))
             before = int(row[digit - 1]) if digit else 0
-            found[rank] = ((beginning << DIGIT_BITS) | digit, left - before)
-            sizes[found[rank][0]] = int(row[digit]) - before
+            narrowed[rank] = ((beginning << DIGIT_BITS) | digit, left - before)
+            sizes[narrowed[rank][0]] = int(row[digit]) - before
         last = self.digit + 1 == PASSES
-        return Selection(found, self.digit + 1, few=not last and sum(sizes.values()) <= FEW)
+        return Selection(narrowed, self.digit + 1, few=not last and sum(sizes.values()) <= FEW)
 
     def _found(self) -> "Selection":
         """The end: whole keys, from those kept."""
         keys = np.sort(np.concatenate([np.zeros(0, dtype=np.uint64), *self.kept]))
         below = 64 - DIGIT_BITS * self.digit
-        found = {}
+        keys_found = {}
         for rank, (beginning, left) in self.wanted.items():
             first = int(np.searchsorted(keys, np.uint64(beginning << below)))
-            found[rank] = (int(keys[first + left - 1]), 1)
-        return Selection(found, PASSES)
+            keys_found[rank] = (int(keys[first + left - 1]), 1)
+        return Selection(keys_found, PASSES)
 
     @property
     def values(self) -> dict[int, float]:

@@ -74,7 +74,7 @@ def stream(
                     spreads[name].add(finite)
         digits.update({name: digits[name].next() for name in unsettled})
         unsettled, second = [name for name in unsettled if not digits[name].done], False
-    ranked = {name: one.values for name, one in digits.items()}
+    ranked = {name: selection.values for name, selection in digits.items()}
     summaries = {}
     for name, tally in tallies.items():
         if name not in spreads:
@@ -86,4 +86,4 @@ def stream(
 
 
 def _ranks(n: int, probabilities: Iterable[float], confidence: float) -> set[int]:
-    return set().union(*(ranks_read(n, one, confidence) for one in probabilities))
+    return set().union(*(ranks_read(n, probability, confidence) for probability in probabilities))

@@ -169,10 +169,10 @@ def _chains(
         u = np.sqrt(1.0 - sigma * sigma) * state.u + sigma * rng.standard_normal(state.u.shape)
         noise = np.where(rng.random(length.size) < _KEEPS_NOISE, state.noise, FRESH)
         flown = _flown(flights, u, noise, state.run, level)
-        taken = flown.margin <= threshold
-        state = _chosen(taken, flown, state)
+        accepted = flown.margin <= threshold
+        state = _chosen(accepted, flown, state)
         kept.append(state)
-        shares.append(float(taken.mean()))
+        shares.append(float(accepted.mean()))
         scale = min(max(scale * math.exp((shares[-1] - _WANTED_ACCEPTANCE) / math.sqrt(len(shares))), 1e-3), 10.0)
     members = Members(*(np.concatenate(values) for values in zip(*kept, strict=True)))
     return members, float(np.mean(shares)), scale
@@ -188,9 +188,10 @@ def _shared_out(seeds: Members, per_run: int) -> tuple[Members, np.ndarray]:
     return seeds, per_run // each + (place < per_run % each)
 
 
-def _chosen(taken: np.ndarray, new: Members, old: Members) -> Members:
+def _chosen(accepted: np.ndarray, new: Members, old: Members) -> Members:
     return Members(
-        np.where(taken[:, None], new.u, old.u), *(np.where(taken, a, b) for a, b in zip(new[1:], old[1:], strict=True))
+        np.where(accepted[:, None], new.u, old.u),
+        *(np.where(accepted, a, b) for a, b in zip(new[1:], old[1:], strict=True)),
     )
 
 

@@ -88,7 +88,9 @@ def summarize(values: np.ndarray, *, probabilities: tuple[float, ...] = QUANTILE
     spread = Spread(tally)
     spread.add(finite)
     ordered = np.sort(finite)
-    return summary_of(spread, tuple(quantile(ordered, one, confidence) for one in probabilities), confidence)
+    return summary_of(
+        spread, tuple(quantile(ordered, probability, confidence) for probability in probabilities), confidence
+    )
 
 
 def without_number(tally: Tally, confidence: float) -> Summary:

@@ -43,9 +43,9 @@ class Limits(NamedTuple):
 
 def limits_on(metric: str, requirements: Iterable[Mapping[str, Any]]) -> Limits:
     """The tightest limits that these records ("metric", "at_most", "at_least") set on a metric."""
-    records = [one for one in requirements if one["metric"] == metric]
-    upper = [float(one["at_most"]) for one in records if one.get("at_most") is not None]
-    lower = [float(one["at_least"]) for one in records if one.get("at_least") is not None]
+    records = [requirement for requirement in requirements if requirement["metric"] == metric]
+    upper = [float(record["at_most"]) for record in records if record.get("at_most") is not None]
+    lower = [float(record["at_least"]) for record in records if record.get("at_least") is not None]
     return Limits(min(upper, default=None), max(lower, default=None))
 
 
@@ -92,11 +92,11 @@ class WorstSoFar:
 
     def add(self, values: np.ndarray, first: int) -> None:
         """values : float64[n] of the cases `first` and on, NaN for one that was not completed."""
-        found = np.isfinite(values)
-        goodness = _goodness(values if found.all() else np.where(found, values, np.nan), True, self.limits)
+        candidates = np.isfinite(values)
+        goodness = _goodness(values if candidates.all() else np.where(candidates, values, np.nan), True, self.limits)
         if self.case_ids.size == self.count:
-            found &= goodness < self._goodness[-1]
-        rows = np.flatnonzero(found)
+            candidates &= goodness < self._goodness[-1]
+        rows = np.flatnonzero(candidates)
         if rows.size:
             rows = rows[worst_cases(-goodness[rows], np.ones(rows.size, dtype=bool), self.count)]
             together = np.concatenate([self._goodness, goodness[rows]])

@@ -58,19 +58,23 @@ def fly_candidates(campaign: Campaign, tuning: Tuning, candidates: np.ndarray, w
     n, per = len(candidates), cases_per_candidate(campaign, tuning)
     ids, table = _shared_cases(campaign, tuning)
     inputs = {name: np.tile(values, n) for name, values in table.items()}
-    inputs |= {one.name: np.repeat(candidates[:, k], per) for k, one in enumerate(tuning.parameters)}
-    names = list(dict.fromkeys(one.metric for one in tuning.measures))
+    inputs |= {parameter.name: np.repeat(candidates[:, k], per) for k, parameter in enumerate(tuning.parameters)}
+    names = list(dict.fromkeys(measure.metric for measure in tuning.measures))
     with naming_faults(campaign.model_reference, "a candidate"):
         flown = fly_in_threads(campaign, inputs, np.tile(ids, n), ["status", "reason", *names], workers)
     ok = (flown["status"] == STATUS_NAME[OK]).reshape(n, per)
     metrics = {name: np.where(ok, flown[name].reshape(n, per), np.nan) for name in names}
     measured = [
-        _measured(metrics[one.metric], one.quantile, one.large_is_bad, tuning.nominal) for one in tuning.measures
+        _measured(metrics[measure.metric], measure.quantile, measure.large_is_bad, tuning.nominal)
+        for measure in tuning.measures
     ]
     objectives, limited = measured[: len(tuning.objectives)], measured[len(tuning.objectives) :]
-    excess = [_excess(values, one) for values, one in zip(limited, tuning.constraints, strict=True)]
+    excess = [_excess(values, constraint) for values, constraint in zip(limited, tuning.constraints, strict=True)]
     status, reason = (flown[name].reshape(n, per) for name in ("status", "reason"))
-    reasons = [commonest_failure(status[one][~ok[one]], reason[one][~ok[one]]) for one in range(n)]
+    reasons = [
+        commonest_failure(status[candidate][~ok[candidate]], reason[candidate][~ok[candidate]])
+        for candidate in range(n)
+    ]
     return Scores(
         _columns(objectives, n),
         _columns(limited, n),
@@ -95,7 +99,7 @@ def _columns(values: list[np.ndarray], n: int) -> np.ndarray:
 
 def _shared_cases(campaign: Campaign, tuning: Tuning) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(case numbers, dispersed inputs) that every candidate flies; the nominal case is the first, if it is wanted."""
-    nominal = {one.name: column([campaign.nominal[one.name]]) for one in campaign.dispersions}
+    nominal = {dispersion.name: column([campaign.nominal[dispersion.name]]) for dispersion in campaign.dispersions}
     if not tuning.robust:
         return np.array([NOMINAL_NOISE]), nominal
     ids = np.arange(campaign.cases, dtype=np.int64)
@@ -114,8 +118,8 @@ def _measured(values: np.ndarray, quantile: float | None, large_is_bad: bool, no
         return values[:, 0]
     dispersed = values[:, int(nominal_first) :]
     ranked = np.sort(np.where(np.isnan(dispersed), np.inf if large_is_bad else -np.inf, dispersed), axis=1)
-    found = ranked[:, quantile_rank(quantile, ranked.shape[1], large_is_bad)]
-    return np.where(np.isfinite(found), found, np.nan)
+    chosen = ranked[:, quantile_rank(quantile, ranked.shape[1], large_is_bad)]
+    return np.where(np.isfinite(chosen), chosen, np.nan)
 
 
 def quantile_rank(quantile: float, n_cases: int, large_is_bad: bool) -> int:

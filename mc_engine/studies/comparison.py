@@ -69,7 +69,7 @@ class VerdictChange:
     @property
     def words(self) -> str:
         """Such as "fail → pass", or "pass in both runs"."""
-        ends = [one or "not required" for one in (self.before, self.after)]
+        ends = [outcome or "not required" for outcome in (self.before, self.after)]
         return " → ".join(ends) if ends[0] != ends[1] else f"{ends[0]} in both runs"
 
     def inside_words(self, counted: Callable[[int], str]) -> str:
@@ -118,20 +118,20 @@ class Comparison:
 
     @property
     def shifted(self) -> tuple[MetricChange, ...]:
-        return tuple(one for one in self.metrics if one.shift_adjusted <= self.alpha)
+        return tuple(metric for metric in self.metrics if metric.shift_adjusted <= self.alpha)
 
     @property
     def spread(self) -> tuple[MetricChange, ...]:
-        return tuple(one for one in self.metrics if one.spread_adjusted <= self.alpha)
+        return tuple(metric for metric in self.metrics if metric.spread_adjusted <= self.alpha)
 
     @property
     def moved_shares(self) -> tuple[ShareChange, ...]:
-        return tuple(one for one in self.shares if one.adjusted <= self.alpha)
+        return tuple(share for share in self.shares if share.adjusted <= self.alpha)
 
     @property
     def worse_verdicts(self) -> tuple[VerdictChange, ...]:
         """Requirements with a worse verdict on the same cases; on other cases chance alone may change a verdict."""
-        return tuple(one for one in self.verdicts if one.worse) if self.pairing.paired else ()
+        return tuple(verdict for verdict in self.verdicts if verdict.worse) if self.pairing.paired else ()
 
     @property
     def changed(self) -> bool:
@@ -148,7 +148,7 @@ def compare_runs(
     """
     manifests = a.manifest, b.manifest
     tables = a.cases(), b.cases()
-    facts = tuple({one["name"]: one for one in manifest["columns"]} for manifest in manifests)
+    facts = tuple({fact["name"]: fact for fact in manifest["columns"]} for manifest in manifests)
     pairing = pair_cases(tables, (_of_role(facts[0], "dispersion"), _of_role(facts[1], "dispersion")))
     metrics, left_out = _shared_metrics(*facts)
     if left_out and not metrics:
@@ -166,21 +166,25 @@ def compare_runs(
     ]  # fmt: skip
     counted = {FLOWN: ok, **_inside(manifests[1], values, ok)}
     shares = [
-        share_change(name, one[first], other[second], paired=pairing.paired, confidence=CONFIDENCE)
-        for name, (one, other) in counted.items()
+        share_change(name, before[first], other[second], paired=pairing.paired, confidence=CONFIDENCE)
+        for name, (before, other) in counted.items()
     ]
     adjusted = iter(holm(_p_values(changes, shares)).tolist())
     return Comparison(
         names=names,
-        titles=_each(manifests, lambda one: str(one["campaign"].get("title") or one["campaign"].get("name", ""))),
-        created=_each(manifests, lambda one: str(one.get("created_utc", ""))),
+        titles=_each(
+            manifests, lambda manifest: str(manifest["campaign"].get("title") or manifest["campaign"].get("name", ""))
+        ),
+        created=_each(manifests, lambda manifest: str(manifest.get("created_utc", ""))),
         cases=_each(tables, len),
-        ok=_each(ok, lambda one: int(one.sum())),
+        ok=_each(ok, lambda flown: int(flown.sum())),
         pairing=pairing,
         alpha=alpha,
         tolerance=tolerance,
-        metrics=tuple(replace(one, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for one in changes),
-        shares=tuple(replace(one, adjusted=next(adjusted)) for one in shares),
+        metrics=tuple(
+            replace(change, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for change in changes
+        ),
+        shares=tuple(replace(share, adjusted=next(adjusted)) for share in shares),
         verdicts=_verdicts(manifests, tables, ok),
         units={name: str(facts[1][name].get("unit", "")) for name in metrics},
         left_out=left_out,
@@ -211,8 +215,8 @@ def pair_cases(tables: tuple[pd.DataFrame, pd.DataFrame], inputs: tuple[list[str
         return Pairing(False, everything, f"not paired: {why}")
     n = int(same.sum())
     rest = len(tables[0]) + len(tables[1]) - 2 * n
-    more = f"; {rest} cases that only one run has, or with other inputs, are left out" if rest else ""
-    return Pairing(True, (first[same], second[same]), f"paired: {n} cases have the same inputs in both runs{more}")
+    remainder = f"; {rest} cases that only one run has, or with other inputs, are left out" if rest else ""
+    return Pairing(True, (first[same], second[same]), f"paired: {n} cases have the same inputs in both runs{remainder}")
 
 
 def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -222,7 +226,7 @@ def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _of_role(facts: Mapping[str, Mapping[str, Any]], role: str) -> list[str]:
-    return [name for name, one in facts.items() if one.get("role") == role]
+    return [name for name, fact in facts.items() if fact.get("role") == role]
 
 
 def _shared_metrics(
@@ -234,7 +238,7 @@ def _shared_metrics(
     left_out += [f"{name}: only in B" for name in ours if name not in theirs]
     shared = [name for name in ours if name in theirs]
     units = {name: (a[name].get("unit", ""), b[name].get("unit", "")) for name in shared}
-    left_out += [f"{name}: in {one} in A, in {two} in B" for name, (one, two) in units.items() if one != two]
+    left_out += [f"{name}: in {unit} in A, in {two} in B" for name, (unit, two) in units.items() if unit != two]
     return [name for name in shared if units[name][0] == units[name][1]], tuple(left_out)
 
 
@@ -242,7 +246,7 @@ def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok
     """bool[n] of both runs for each requirement of B: inside its limits."""
     return {
         str(record["name"]): tuple(
-            inside_all([record], one.__getitem__, flown) for one, flown in zip(values, ok, strict=True)
+            inside_all([record], columns.__getitem__, flown) for columns, flown in zip(values, ok, strict=True)
         )
         for record in manifest.get("requirements", [])
         if record["metric"] in values[0]
@@ -250,17 +254,17 @@ def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok
 
 
 def _verdicts(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
-    found: list[dict[str, Verdict]] = []
+    judged_runs: list[dict[str, Verdict]] = []
     for manifest, table, flown in zip(manifests, tables, ok, strict=True):
         design = str(manifest["campaign"].get("design", "mc"))
         records = manifest.get("requirements", []) if design in SAMPLING_DESIGNS else []
         looked = was_looked_at(manifest, len(table))
-        columns = {one["metric"]: table[one["metric"]].to_numpy(dtype=np.float64) for one in records}
+        columns = {record["metric"]: table[record["metric"]].to_numpy(dtype=np.float64) for record in records}
         judged, joint = judge_all(records, columns.__getitem__, flown, design, looked)
-        found.append({verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]})
+        judged_runs.append({verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]})
     changes = []
-    for name in dict.fromkeys([*found[0], *found[1]]):
-        a, b = (_told(one.get(name)) for one in found)
+    for name in dict.fromkeys([*judged_runs[0], *judged_runs[1]]):
+        a, b = (_told(verdicts.get(name)) for verdicts in judged_runs)
         changes.append(VerdictChange(name, a[0], b[0], (a[1], b[1])))
     return tuple(changes)
 
@@ -270,9 +274,9 @@ def _told(verdict: Verdict | None) -> tuple[str | None, tuple[int, int] | None]:
 
 
 def _p_values(metrics: Any, shares: Any) -> list[float]:
-    of_metrics = [p for one in metrics for p in (one.shift_p, one.spread_p)]
-    return of_metrics + [one.p_value for one in shares]
+    of_metrics = [p for metric in metrics for p in (metric.shift_p, metric.spread_p)]
+    return of_metrics + [share.p_value for share in shares]
 
 
 def _each(pair: Any, function: Any) -> Any:
-    return tuple(function(one) for one in pair)
+    return tuple(function(item) for item in pair)

@@ -25,13 +25,13 @@ class GeneticSearch:
         """EngineError in a sentence if pymoo is not installed."""
         pymoo = _pymoo()
         n_tuned = len(tuning.parameters)
-        self._signs = np.array([1.0 if one.large_is_bad else -1.0 for one in tuning.objectives])
+        self._signs = np.array([1.0 if objective.large_is_bad else -1.0 for objective in tuning.objectives])
         self._problem = pymoo["Problem"](
             n_var=n_tuned,
             n_obj=len(tuning.objectives),
             n_ieq_constr=len(tuning.constraints) + 1,
-            xl=np.array([one.lower for one in tuning.parameters]),
-            xu=np.array([one.upper for one in tuning.parameters]),
+            xl=np.array([parameter.lower for parameter in tuning.parameters]),
+            xu=np.array([parameter.upper for parameter in tuning.parameters]),
         )
         self._evaluate, self._static = pymoo["Evaluator"]().eval, pymoo["StaticProblem"]
         self._algorithm = pymoo["NSGA2"](
@@ -74,7 +74,7 @@ def _pymoo() -> dict[str, Any]:
             raise
         raise EngineError(f"tuning needs pymoo, which is not installed; {how_to_install('tune')}") from None
     names = (NSGA2, Evaluator, Problem, SBX, PM, LHS, StaticProblem)
-    return {one.__name__: one for one in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}
+    return {cls.__name__: cls for cls in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}
 
 
 def non_dominated(values: np.ndarray) -> np.ndarray:

@@ -46,7 +46,9 @@ class LimitState:
     ):
         refuse_unmappable(campaign)
         self.campaign, self.requirement = campaign, requirement
-        self.names = [one.name for one in campaign.dispersions if not isinstance(one.distribution, Constant)]
+        self.names = [
+            dispersion.name for dispersion in campaign.dispersions if not isinstance(dispersion.distribution, Constant)
+        ]
         self.status: list[np.ndarray] = []
         self.metric: list[np.ndarray] = []
         self._workers, self._watch = workers or os.cpu_count() or 1, watch
@@ -56,18 +58,20 @@ class LimitState:
         """float64[n]: distance inside the nearer limit, in the metric's unit; -inf for a case without a number."""
         if self._watch is not None:
             self._watch(self._n, self._failed)
-        one, ids = self.requirement, FIRST_NOISE + noise
+        requirement, ids = self.requirement, FIRST_NOISE + noise
         with naming_faults(self.campaign.model_reference, "a case"):
-            flown = fly_in_threads(self.campaign, self.inputs(u), ids, ["status", one.metric], self._workers)
-        status, metric = flown["status"], flown[one.metric]
+            flown = fly_in_threads(self.campaign, self.inputs(u), ids, ["status", requirement.metric], self._workers)
+        status, metric = flown["status"], flown[requirement.metric]
         able = (status == STATUS_NAME[OK]) & np.isfinite(metric)
         with np.errstate(invalid="ignore"):
             sides = [
-                limit for limit in (_below(one.at_most, metric), _below(metric, one.at_least)) if limit is not None
+                limit
+                for limit in (_below(requirement.at_most, metric), _below(metric, requirement.at_least))
+                if limit is not None
             ]
             margin = np.where(able, np.min(sides, axis=0), -np.inf)
         # a case right at its limit is inside: the engine's word for it, safe from rounding of the difference
-        inside = able & inside_limits(metric, one.at_most, one.at_least)
+        inside = able & inside_limits(metric, requirement.at_most, requirement.at_least)
         margin = np.where(inside, np.maximum(margin, _LEAST), np.minimum(margin, 0.0))
         self.status.append(status)
         self.metric.append(metric)
@@ -93,9 +97,11 @@ class LimitState:
         """A column per dispersion of the campaign, in declared units."""
         shares = dict(zip(self.names, self.shares(u), strict=True))
         table = {}
-        for one in self.campaign.dispersions:
-            assert one.distribution is not None  # a loaded campaign has one for every random design
-            table[one.name] = quantiles(one.distribution, shares.get(one.name, np.full(len(u), 0.5)))
+        for dispersion in self.campaign.dispersions:
+            assert dispersion.distribution is not None  # a loaded campaign has one for every random design
+            table[dispersion.name] = quantiles(
+                dispersion.distribution, shares.get(dispersion.name, np.full(len(u), 0.5))
+            )
         return table
 
 
@@ -105,7 +111,7 @@ def _below(upper: np.ndarray | float | None, lower: np.ndarray | float | None) -
 
 def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:
     """The requirement of that name, or the only one."""
-    names = [one.name for one in campaign.requirements]
+    names = [requirement.name for requirement in campaign.requirements]
     if not names:
         message = "is missing: a rare event is a requirement not met; add one with a metric and a limit"
         raise CampaignError(campaign.name, [Problem("requirement", message)])
@@ -114,7 +120,7 @@ def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:
     if name is not None and name not in names:
         message = f'"{name}" is not a requirement of this campaign{hint(name, names)}'
         raise CampaignError(campaign.name, [Problem("requirement", message)])
-    return next(one for one in campaign.requirements if name in (None, one.name))
+    return next(requirement for requirement in campaign.requirements if name in (None, requirement.name))
 
 
 def refuse_unmappable(campaign: Campaign) -> None:
@@ -126,17 +132,17 @@ def refuse_unmappable(campaign: Campaign) -> None:
     if campaign.design not in RANDOM:
         message = f'"{campaign.design}" gives its cases no probabilities; use {listed(RANDOM)}'
         problems.append(Problem("campaign.design", message))
-    for one in campaign.dispersions if not problems else ():
-        if isinstance(one.distribution, Discrete):
+    for dispersion in campaign.dispersions if not problems else ():
+        if isinstance(dispersion.distribution, Discrete):
             message = (
                 "has no values between its own, so no chain can move through it; make one campaign a value, and add "
                 "up their probabilities by weight"
             )
-            problems.append(Problem(f"dispersion.{one.name}", message))
-        if isinstance(one.distribution, Empirical):
+            problems.append(Problem(f"dispersion.{dispersion.name}", message))
+        if isinstance(dispersion.distribution, Empirical):
             message = "measured values say nothing beyond the largest of them; give a distribution fitted to them"
-            problems.append(Problem(f"dispersion.{one.name}", message))
-    if not problems and all(isinstance(one.distribution, Constant) for one in campaign.dispersions):
+            problems.append(Problem(f"dispersion.{dispersion.name}", message))
+    if not problems and all(isinstance(dispersion.distribution, Constant) for dispersion in campaign.dispersions):
         problems.append(Problem("dispersion", "nothing is dispersed, so there is no probability to estimate"))
     if problems:
         raise CampaignError(campaign.name, problems)

@@ -55,8 +55,8 @@ def open_run(path: str | Path) -> "Run":
 class _Metrics(dict[str, "Summary"]):
     """Summaries by metric; a name that is not there is answered with the nearest."""
 
-    def __init__(self, path: Path, found: "dict[str, Summary]"):
-        super().__init__(found)
+    def __init__(self, path: Path, summaries_: "dict[str, Summary]"):
+        super().__init__(summaries_)
         self._path = path
 
     def __missing__(self, name: str) -> "Summary":
@@ -132,16 +132,27 @@ class Run:
 
     def __repr__(self) -> str:
         lines = [f"Run {self.path}: {self.title}", f"  {case_line(self.store)}"]
-        return clean("\n".join([*lines, *(f"  {verdict_line(one, self.store.units)}" for one in self.verdicts)]))
+        return clean(
+            "\n".join([*lines, *(f"  {verdict_line(verdict, self.store.units)}" for verdict in self.verdicts)])
+        )
 
     def _repr_html_(self) -> str:
         units = self.store.units
         verdicts = [
-            [one.name, one.outcome, verdict_line(one, units).split(f"{one.outcome}, ", 1)[-1]] for one in self.verdicts
+            [verdict.name, verdict.outcome, verdict_line(verdict, units).split(f"{verdict.outcome}, ", 1)[-1]]
+            for verdict in self.verdicts
         ]
         metrics = [
-            [name, units[name], f"{one.n_used:,} of {one.n_tried:,}", one.mean, one.sd, one.minimum, one.maximum]
-            for name, one in self.metrics.items()
+            [
+                name,
+                units[name],
+                f"{summary.n_used:,} of {summary.n_tried:,}",
+                summary.mean,
+                summary.sd,
+                summary.minimum,
+                summary.maximum,
+            ]
+            for name, summary in self.metrics.items()
         ]
         return "".join(
             [
@@ -241,7 +252,7 @@ class Case:
 
     def _repr_html_(self) -> str:
         units = self.store.units
-        rows = [[what, name, value, units[name]] for what, columns in (("input", self.inputs), ("metric", self.metrics))
+        rows = [[role, name, value, units[name]] for role, columns in (("input", self.inputs), ("metric", self.metrics))
                 for name, value in columns.items()]  # fmt: skip
         why = f" ({_html(self.reason)})" if self.reason else ""
         head = f"<h4>{_html(self.name)}: {_html(self.status)}{why}</h4>"
@@ -266,7 +277,7 @@ def _html(text: str) -> str:
 def _table(heads: list[str], rows: list[list[Any]]) -> str:
     if not rows:
         return ""
-    head = "".join(f"<th>{_html(one)}</th>" for one in heads)
+    head = "".join(f"<th>{_html(head)}</th>" for head in heads)
     body = "".join("<tr>" + "".join(f"<td>{_html(_text(cell))}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 

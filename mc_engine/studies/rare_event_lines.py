@@ -22,10 +22,10 @@ def outcome_lines(result: dict[str, Any]) -> Iterator[str]:
 
 
 def requirement_words(result: dict[str, Any]) -> str:
-    one, unit = result["requirement"], result["metric"]["unit"]
-    limits = [("at least", one["at_least"]), ("at most", one["at_most"])]
+    requirement, unit = result["requirement"], result["metric"]["unit"]
+    limits = [("at least", requirement["at_least"]), ("at most", requirement["at_most"])]
     texts = [f"{word} {limit:g}{' ' * bool(unit)}{unit}" for word, limit in limits if limit is not None]
-    return f"{one['name']}: {one['metric']} {' and '.join(texts)}"
+    return f"{requirement['name']}: {requirement['metric']} {' and '.join(texts)}"
 
 
 def probability_words(result: dict[str, Any]) -> str:
@@ -66,13 +66,14 @@ def _level_lines(result: dict[str, Any]) -> Iterator[str]:
 def _input_lines(result: dict[str, Any]) -> Iterator[str]:
     if not result["inputs"]:
         return
-    width = max(len(one["name"]) for one in result["inputs"])
+    width = max(len(record["name"]) for record in result["inputs"])
     across = result["inputs"][0].get("across") is not None
     yield f"failed cases, by input: mean and spread in sigmas; the likeliest{', and the one across' * across}"
-    for one in sorted(result["inputs"], key=lambda one: -abs(one["likeliest_sigma"])):
+    for record in sorted(result["inputs"], key=lambda item: -abs(item["likeliest_sigma"])):
         texts = [
-            f"{one[what]:.5g}{' ' * bool(one['unit'])}{one['unit']} ({one[f'{what}_sigma']:+.2f} σ)"
-            for what in ("likeliest", "across")
-            if one.get(what) is not None
+            f"{record[case]:.5g}{' ' * bool(record['unit'])}{record['unit']} ({record[f'{case}_sigma']:+.2f} σ)"
+            for case in ("likeliest", "across")
+            if record.get(case) is not None
         ]
-        yield f"  {one['name']:<{width}}  {one['mean_sigma']:+.2f} ± {one['spread_sigma']:.2f} σ;  {'; '.join(texts)}"
+        mean, spread = record["mean_sigma"], record["spread_sigma"]
+        yield f"  {record['name']:<{width}}  {mean:+.2f} ± {spread:.2f} σ;  {'; '.join(texts)}"

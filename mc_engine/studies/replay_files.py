@@ -37,8 +37,8 @@ def _table(case_id: int) -> str:
 def replayed_cases(run: Path) -> list[int]:
     """The cases of which a replay lies in the run, in order."""
     names = names_in(run, REPLAYS) if (run / REPLAYS).exists() else []
-    found = [re.fullmatch(r"case-([0-9]{1,10})\.parquet", name) for name in names]
-    return sorted(int(match[1]) for match in found if match)
+    matches = [re.fullmatch(r"case-([0-9]{1,10})\.parquet", name) for name in names]
+    return sorted(int(match[1]) for match in matches if match)
 
 
 def read_replay(run: Path, case_id: int, quantities: Sequence[Mapping[str, str]]) -> pd.DataFrame:

@@ -97,5 +97,5 @@ def _git(state: Mapping[str, Any] | None) -> str:
 
 def changed_lines(differences: tuple[Difference, ...]) -> Iterator[str]:
     """A line each, for the terminal."""
-    for one in differences:
-        yield f"{one.what}: {one.before} -> {one.after}"
+    for difference in differences:
+        yield f"{difference.what}: {difference.before} -> {difference.after}"

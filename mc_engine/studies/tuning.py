@@ -134,9 +134,9 @@ def _search(
             flown.append(_generation(candidates, scores, before, signs))
             keep(flown, UNFINISHED)
             if progress is not None:
-                failed = sum(int(one.scores.failed.sum()) for one in flown)
+                failed = sum(int(generation.scores.failed.sum()) for generation in flown)
                 progress(
-                    per * sum(len(one.candidates) for one in flown),
+                    per * sum(len(generation.candidates) for generation in flown),
                     per * plan["population"] * plan["generations"],
                     failed,
                 )
@@ -148,7 +148,7 @@ def _search(
 
 
 def _signs(tuning: Tuning) -> np.ndarray:
-    return np.array([1.0 if one.large_is_bad else -1.0 for one in tuning.objectives])
+    return np.array([1.0 if objective.large_is_bad else -1.0 for objective in tuning.objectives])
 
 
 def _generation(candidates: np.ndarray, scores: Scores, before: Generation | None, signs: np.ndarray) -> Generation:
@@ -195,7 +195,7 @@ def _write(
     lock: WriterLock,
 ) -> None:
     columns, arrays = _evaluations(campaign, tuning, flown)
-    small = _signs(tuning) * np.column_stack([arrays[one.name] for one in tuning.objectives])
+    small = _signs(tuning) * np.column_stack([arrays[objective.name] for objective in tuning.objectives])
     front = np.flatnonzero(non_dominated(np.where(arrays["feasible"][:, None], small, np.nan)))
     front = front[np.argsort(small[front, 0], kind="stable")]
     ended = manifest["tuning"]["end"] != UNFINISHED
@@ -210,38 +210,45 @@ def _write(
 def _evaluations(
     campaign: Campaign, tuning: Tuning, flown: list[Generation]
 ) -> tuple[list[Column], dict[str, np.ndarray]]:
-    model, violation = campaign.model, np.concatenate([one.scores.violation for one in flown])
-    inputs = [model.input(one.name) for one in tuning.parameters]
+    model, violation = campaign.model, np.concatenate([generation.scores.violation for generation in flown])
+    inputs = [model.input(parameter.name) for parameter in tuning.parameters]
     columns = [
         Column("candidate", "", "candidate", "number of the candidate, from 0", "integer"),
         Column("generation", "", "candidate", "generation that it came in, from 0", "integer"),
-        *(Column(one.name, one.unit, "tuned", one.description) for one in inputs),
-        *(_measure_column(campaign, one, "objective") for one in tuning.objectives),
-        *(_measure_column(campaign, one, "constraint") for one in tuning.constraints),
+        *(Column(input.name, input.unit, "tuned", input.description) for input in inputs),
+        *(_measure_column(campaign, objective, "objective") for objective in tuning.objectives),
+        *(_measure_column(campaign, constraint, "constraint") for constraint in tuning.constraints),
         Column("violation", "", "candidate", "how far beyond the limits, in shares of them, added up"),
         Column("feasible", "", "candidate", "whether it is inside all limits", "switch"),
         Column("failed_cases", "", "candidate", "its cases that did not complete", "integer"),
         Column("commonest_failure", "", "candidate", "how and why most of these ended", "word"),
     ]
-    numbers = np.vstack([np.hstack([one.candidates, one.scores.objectives, one.scores.limited]) for one in flown])
+    numbers = np.vstack(
+        [
+            np.hstack([generation.candidates, generation.scores.objectives, generation.scores.limited])
+            for generation in flown
+        ]
+    )
     arrays = {
         "candidate": np.arange(len(numbers)),
-        "generation": np.repeat(np.arange(len(flown)), [len(one.candidates) for one in flown]),
+        "generation": np.repeat(np.arange(len(flown)), [len(generation.candidates) for generation in flown]),
         **{column.name: numbers[:, k] for k, column in enumerate(columns[2:-4])},
         "violation": violation,
         "feasible": violation == 0.0,
-        "failed_cases": np.concatenate([one.scores.failed for one in flown]),
-        "commonest_failure": np.concatenate([one.scores.reasons for one in flown]),
+        "failed_cases": np.concatenate([generation.scores.failed for generation in flown]),
+        "commonest_failure": np.concatenate([generation.scores.reasons for generation in flown]),
     }
     return columns, arrays
 
 
-def _measure_column(campaign: Campaign, one: Objective | Constraint, role: str) -> Column:
-    metric = next(metric for metric in campaign.model.metrics if metric.name == one.metric)
+def _measure_column(campaign: Campaign, measure: Objective | Constraint, role: str) -> Column:
+    metric = next(metric for metric in campaign.model.metrics if metric.name == measure.metric)
     of = (
-        "the nominal case" if one.quantile is None else f"quantile {one.quantile:g} of {campaign.cases} dispersed cases"
+        "the nominal case"
+        if measure.quantile is None
+        else f"quantile {measure.quantile:g} of {campaign.cases} dispersed cases"
     )
-    return Column(one.name, metric.unit, role, f"{metric.description}; {of}")
+    return Column(measure.name, metric.unit, role, f"{metric.description}; {of}")
 
 
 def _generations(flown: list[Generation], ended: bool) -> tuple[list[Column], dict[str, np.ndarray]]:
@@ -256,11 +263,13 @@ def _generations(flown: list[Generation], ended: bool) -> tuple[list[Column], di
     ]
     arrays = {
         "generation": np.arange(len(flown)),
-        "evaluations": np.cumsum([len(one.candidates) for one in flown]),
-        "feasible_so_far": np.cumsum([np.count_nonzero(one.scores.violation == 0.0) for one in flown]),
-        "front_size": np.array([len(one.front) for one in flown]),
-        "least_violation": np.array([one.least_violation for one in flown]),
-        "dominated_share": dominated_shares([one.front for one in flown]) if ended else np.full(len(flown), np.nan),
+        "evaluations": np.cumsum([len(generation.candidates) for generation in flown]),
+        "feasible_so_far": np.cumsum([np.count_nonzero(generation.scores.violation == 0.0) for generation in flown]),
+        "front_size": np.array([len(generation.front) for generation in flown]),
+        "least_violation": np.array([generation.least_violation for generation in flown]),
+        "dominated_share": dominated_shares([generation.front for generation in flown])
+        if ended
+        else np.full(len(flown), np.nan),
     }
     return columns, arrays
 
@@ -269,10 +278,12 @@ def _wording(campaign: Campaign, tuning: Tuning) -> dict[str, Any]:
     """What was searched, as plain data for the report."""
     return {
         "cases": campaign.cases if tuning.robust else 1,
-        "parameters": [asdict(one) | {"nominal": campaign.nominal[one.name]} for one in tuning.parameters],
-        "objectives": [asdict(one) for one in tuning.objectives],
-        "constraints": [asdict(one) for one in tuning.constraints],
-        "published": [asdict(one) for one in tuning.published],
+        "parameters": [
+            asdict(parameter) | {"nominal": campaign.nominal[parameter.name]} for parameter in tuning.parameters
+        ],
+        "objectives": [asdict(objective) for objective in tuning.objectives],
+        "constraints": [asdict(constraint) for constraint in tuning.constraints],
+        "published": [asdict(point) for point in tuning.published],
         "crossover": tuning.crossover,
         "mutation": tuning.mutation or 1.0 / len(tuning.parameters),
     }

@@ -72,9 +72,11 @@ def outcome_lines(record: TuningRecord) -> list[str]:
         return [*lines, f"front        {infeasibility(record)}"]
     lines.append(f"front        {len(record.front)} candidates")
     units = record.front.attrs["units"]
-    for one in tuning["objectives"]:
-        values = record.front[one["name"]]
-        lines.append(f"  {one['name']}  {values.min():.6g} to {values.max():.6g} {units[one['name']]}".rstrip())
+    for objective in tuning["objectives"]:
+        values = record.front[objective["name"]]
+        lines.append(
+            f"  {objective['name']}  {values.min():.6g} to {values.max():.6g} {units[objective['name']]}".rstrip()
+        )
     return lines
 
 
@@ -86,11 +88,13 @@ def infeasibility(record: TuningRecord) -> str:
         return f"{tried}; none of them has a number for every metric{_commonest(record.evaluations)}"
     units = record.evaluations.attrs["units"]
     broken = []
-    for one in record.manifest["tuning"]["constraints"]:
-        value, unit = float(row[one["name"]]), units[one["name"]]
-        for word, limit, sign in (("at most", one["at_most"], 1.0), ("at least", one["at_least"], -1.0)):
+    for constraint in record.manifest["tuning"]["constraints"]:
+        value, unit = float(row[constraint["name"]]), units[constraint["name"]]
+        for word, limit, sign in (("at most", constraint["at_most"], 1.0), ("at least", constraint["at_least"], -1.0)):
             if limit is not None and sign * (value - limit) > 0.0:
-                broken.append(f"{one['name']} {value:.4g}{' ' * bool(unit)}{unit} where {word} {limit:g} is allowed")
+                broken.append(
+                    f"{constraint['name']} {value:.4g}{' ' * bool(unit)}{unit} where {word} {limit:g} is allowed"
+                )
     return f"{tried}; the least violation found is {float(row['violation']):.4g}: {', '.join(broken)}"
 
 
