@@ -8,14 +8,42 @@ import numpy as np
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.inputs import accepted_range, check_value, inputs_of, number
 from mc_engine.campaign.reading import Findings
+from mc_engine.campaign.sections import CampaignSection
 from mc_engine.campaign.tables_beside import numbers, read_columns, switches, words
 from mc_engine.model.fields import Parameter, Setting
-from mc_engine.model.files import FileFault
+from mc_engine.model.files import FileFault, resolve_beside
 from mc_engine.model.record import Model
 from mc_engine.suggestions import hint
 from mc_engine.units import convert
 
 _CASE_ID = "case_id"  # `mc-engine sample` writes it; here it may only count the rows
+
+
+def cases_of_table(
+    section: CampaignSection | None,
+    model: Model,
+    dispersions: tuple[Dispersion, ...],
+    directory: Path,
+    findings: Findings,
+) -> tuple[Path | None, dict[str, np.ndarray]]:
+    """(path, columns) of the file that `table` names; (None, {}) for any other design, and where the file is wrong."""
+    section_findings = findings.under("campaign", "table")
+    if section is None or (section.design != "table" and section.table is None):
+        return None, {}
+    if section.design != "table":
+        section_findings.add("", f'the design "{section.design}" reads no table; it is for design = "table"')
+    elif section.table is None:
+        section_findings.add("", "is missing: CSV or Parquet beside this file, a case a row")
+    else:
+        try:
+            path = resolve_beside(directory, section.table)
+            units = {
+                dispersion.name: dispersion.spec["unit"] for dispersion in dispersions if "unit" in dispersion.spec
+            }
+            return path, read_case_table(path, model, units, section_findings)
+        except FileFault as fault:
+            section_findings.add("", str(fault))
+    return None, {}
 
 
 def read_case_table(path: Path, model: Model, units: Mapping[str, str], findings: Findings) -> dict[str, np.ndarray]:
@@ -35,7 +63,7 @@ def read_case_table(path: Path, model: Model, units: Mapping[str, str], findings
             if name == _CASE_ID:
                 _check_case_ids(path, cells)
             elif name in items:
-                table[name] = _values(path, items[name], cells, units.get(name))
+                table[name] = _checked_values(path, items[name], cells, units.get(name))
             else:
                 findings.add("", f'the column "{name}" is not a parameter of {model.name}{hint(name, items)}')
         except FileFault as fault:
@@ -55,7 +83,7 @@ def _check_case_ids(path: Path, cells: np.ndarray) -> None:
         raise FileFault(f'"{path.name}", row {row + 1}: case_id is {number(ids[row])}; rows are numbered 0, 1, 2, ...')
 
 
-def _values(path: Path, item: Parameter | Setting, cells: np.ndarray, unit: str | None) -> np.ndarray:
+def _checked_values(path: Path, item: Parameter | Setting, cells: np.ndarray, unit: str | None) -> np.ndarray:
     if isinstance(item, Setting) and item.choices:
         return words(path, item.name, cells, item.choices)
     if isinstance(item, Setting) and isinstance(item.default, bool):

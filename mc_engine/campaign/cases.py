@@ -13,7 +13,7 @@ from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion_table, upstream_ids
 from mc_engine.errors import CampaignError, Problem
 from mc_engine.sampling.designs import EXTENSIBLE, grid_levels, one_at_a_time_levels, unit_cube
-from mc_engine.sampling.distributions import Scalar, column, quantiles
+from mc_engine.sampling.distributions import column, quantiles
 from mc_engine.units import convert
 
 _UNITLESS_KEYS = ("log_sigma", "alpha", "beta")
@@ -37,7 +37,7 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
     >>> table["pitch_error_deg"].round(3).tolist()
     [1.003, -1.985]
     """
-    ids = _checked(campaign, case_ids)
+    ids = _checked_ids(campaign, case_ids)
     if campaign.upstream is not None:
         rows = upstream_ids(campaign, ids)
         inputs = {name: values[rows] for name, values in campaign.upstream.table.items()}
@@ -60,7 +60,7 @@ def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray
     return _random_table(campaign, ids)
 
 
-def _checked(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
+def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
     ids = np.asarray(case_ids, dtype=np.int64).reshape(-1)
     if campaign.first is not None:
         message = f'has yet to be flown; `mc-engine run` flies "{campaign.first.name}" before this campaign'
@@ -86,11 +86,6 @@ def _random_table(campaign: Campaign, ids: np.ndarray) -> dict[str, np.ndarray]:
         assert dispersion.distribution is not None  # a loaded campaign has one for every random design
         table[dispersion.name] = quantiles(dispersion.distribution, u)
     return table
-
-
-def nominal_row(campaign: Campaign) -> dict[str, Scalar]:
-    """Every parameter and setting of the model at its nominal value, in declared units."""
-    return dict(campaign.nominal)
 
 
 def full_inputs(campaign: Campaign, table: dict[str, np.ndarray]) -> dict[str, Any]:

@@ -31,7 +31,7 @@ def result_columns(model: Model) -> list[Column]:
 
 
 def case_columns(model: Model, dispersions: Sequence[Dispersion], upstream: Sequence[Column] = ()) -> list[Column]:
-    """All columns of a campaign's table; `taken` are those of the run that it takes inputs from."""
+    """All columns of a campaign's table; `upstream` are those of the run that it takes inputs from."""
     return [
         *upstream,
         *(input_column(model.input(dispersion.name)) for dispersion in dispersions),

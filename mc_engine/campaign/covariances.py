@@ -41,7 +41,7 @@ def spread_covariances(document: dict[str, Any], directory: Path, findings: Find
         files.append(section.file)
         matrix = _matrix(section, directory, section_findings)
         if matrix is not None:
-            _put(document, section, matrix, section_findings)
+            _add_dispersions(document, section, matrix, section_findings)
     return tuple(files)
 
 
@@ -83,7 +83,9 @@ def _chosen(states: list[UncertainState], section: CovarianceSection) -> Uncerta
     return chosen[0]
 
 
-def _put(document: dict[str, Any], section: CovarianceSection, matrix: np.ndarray, findings: Findings) -> None:
+def _add_dispersions(
+    document: dict[str, Any], section: CovarianceSection, matrix: np.ndarray, findings: Findings
+) -> None:
     dispersions, correlations = document.setdefault("dispersion", {}), document.setdefault("correlation", [])
     if not isinstance(dispersions, dict) or not isinstance(correlations, list):
         return  # which the reader of those sections says
@@ -93,10 +95,10 @@ def _put(document: dict[str, Any], section: CovarianceSection, matrix: np.ndarra
             findings.add("parameters", f'"{name}" has a dispersion already; leave one of the two out')
             continue
         dispersions[name] = {"dist": "normal", "sigma": float(sigma), "unit": unit, "source": source}
-    correlations.extend(_pairs(section.parameters, matrix, source))
+    correlations.extend(_rank_correlations(section.parameters, matrix, source))
 
 
-def _pairs(names: list[str], matrix: np.ndarray, source: str) -> Iterator[dict[str, Any]]:
+def _rank_correlations(names: list[str], matrix: np.ndarray, source: str) -> Iterator[dict[str, Any]]:
     sigma = np.sqrt(np.diag(matrix))
     for i, j in combinations(range(len(names)), 2):
         if matrix[i, j] != 0.0:

@@ -47,7 +47,7 @@ def build_dispersion(
     directory: Path,
     findings: Findings,
 ) -> Dispersion:
-    """The dispersion; where something is wrong it is noted in `found` and the result is of no use."""
+    """The dispersion; where something is wrong it is noted in `findings`, and the result is of no use."""
     spec = {
         key: value for key, value in section.model_dump(exclude_none=True).items() if key in section.model_fields_set
     }

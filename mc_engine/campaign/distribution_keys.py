@@ -58,13 +58,13 @@ def build_distribution(context: DispersionContext) -> Distribution | None:
     if distribution is None or len(context.findings.problems) > before:
         return None
     if isinstance(distribution, Continuous):
-        distribution = _cut(distribution, context)
+        distribution = _truncated(distribution, context)
     if distribution is not None and isinstance(context.item, Parameter):
         distribution = _inside_parameter_range(distribution, context)
     return distribution
 
 
-def _cut(distribution: Continuous, context: DispersionContext) -> Continuous | Truncated | None:
+def _truncated(distribution: Continuous, context: DispersionContext) -> Continuous | Truncated | None:
     """The distribution between the bounds `lower` and `upper` of the file."""
     lower = -math.inf if context.keys.lower is None else context.keys.lower
     upper = math.inf if context.keys.upper is None else context.keys.upper
@@ -109,7 +109,9 @@ def _normal(context: DispersionContext) -> Distribution | None:
     if len(given) != 1:
         context.findings.add("", f"needs sigma or three_sigma{', not both' if given else ''}")
         return None
-    return Normal(_about(keys.mean, context), keys.sigma if keys.sigma is not None else keys.three_sigma / 3.0)
+    return Normal(
+        _given_or_nominal(keys.mean, context), keys.sigma if keys.sigma is not None else keys.three_sigma / 3.0
+    )
 
 
 def _uniform(context: DispersionContext) -> Distribution | None:
@@ -119,7 +121,7 @@ def _uniform(context: DispersionContext) -> Distribution | None:
 
 def _triangular(context: DispersionContext) -> Distribution | None:
     bounds = _bounds(context, "mode")
-    mode = _about(context.keys.mode, context)
+    mode = _given_or_nominal(context.keys.mode, context)
     if bounds is None:
         return None
     if not bounds[0] <= mode <= bounds[1]:
@@ -137,7 +139,7 @@ def _bounds(context: DispersionContext, middle: str) -> tuple[float, float] | No
             context.findings.add("mean", "belongs to half_range; lower and upper already say it all")
         return (keys.lower, keys.upper) if _in_order(context, keys.lower, keys.upper) else None
     if keys.half_range is not None and plain == [None, None]:
-        centre = _about(getattr(keys, middle), context)
+        centre = _given_or_nominal(getattr(keys, middle), context)
         return centre - keys.half_range, centre + keys.half_range
     context.findings.add("", "needs lower and upper, or half_range, not a mixture of them")
     return None
@@ -149,7 +151,7 @@ def _lognormal(context: DispersionContext) -> Distribution | None:
     if by_median == by_mean or (by_median and keys.mean is not None) or (by_mean and keys.median is not None):
         context.findings.add("", "needs median with log_sigma, or mean with sigma")
         return None
-    centre = _about(keys.median if by_median else keys.mean, context)
+    centre = _given_or_nominal(keys.median if by_median else keys.mean, context)
     if not centre > 0.0:
         key = "median" if by_median else "mean"
         context.findings.add(key, f"the nominal value {number(centre)} is not above 0, as a log-normal must be")
@@ -163,7 +165,7 @@ def _beta(context: DispersionContext) -> Distribution | None:
 
 
 def _exponential(context: DispersionContext) -> Distribution:
-    return Exponential(_about(context.keys.origin, context), context.keys.scale)
+    return Exponential(_given_or_nominal(context.keys.origin, context), context.keys.scale)
 
 
 def _discrete(context: DispersionContext) -> Distribution | None:
@@ -221,6 +223,6 @@ _BUILDERS: dict[str, Callable[[DispersionContext], Distribution | None]] = {
 }
 
 
-def _about(given: float | None, context: DispersionContext) -> float:
+def _given_or_nominal(given: float | None, context: DispersionContext) -> float:
     """The value given, or the nominal one."""
     return float(context.nominal) if given is None else given

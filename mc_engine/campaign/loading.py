@@ -6,14 +6,14 @@ by itself.  What the file may say is in `mc_engine.campaign.sections`.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mc_engine.campaign.case_table import read_case_table, table_dispersions
+from mc_engine.campaign.case_table import cases_of_table, table_dispersions
 from mc_engine.campaign.chain import chained_count, check_taken, take_inputs
 from mc_engine.campaign.covariances import spread_covariances
 from mc_engine.campaign.dispersions import Dispersion, build_dispersion
@@ -30,15 +30,21 @@ from mc_engine.campaign.parts import (
     check_size,
     nominal_values,
     refusal,
+    with_step_limit,
 )
 from mc_engine.campaign.reading import Findings, Sections, parse_toml, read_sections
-from mc_engine.campaign.search import SHIPPED, ShippedCampaign, campaign_name, find_campaign, list_campaigns
+from mc_engine.campaign.search import (
+    SHIPPED,
+    ShippedCampaign,
+    campaign_name,
+    campaign_text,
+    find_campaign,
+    list_campaigns,
+)
 from mc_engine.campaign.sections import CampaignSection, schema
 from mc_engine.campaign.sensitivity_design import SensitivityDesign, check_sensitivity
 from mc_engine.campaign.tuning_section import Tuning, check_tuning
-from mc_engine.errors import CampaignError, ModelError, Problem
-from mc_engine.model.fields import AdaptiveStep
-from mc_engine.model.files import FileFault, resolve_beside
+from mc_engine.errors import CampaignError, ModelError
 from mc_engine.model.record import Model, load_model
 from mc_engine.sampling.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, level_count
 from mc_engine.sampling.distributions import Scalar
@@ -64,8 +70,6 @@ __all__ = [
     "load_campaign",
     "schema",
 ]
-
-_LARGEST_FILE = 250_000  # bytes; more of them could take the reader of TOML longer than a second
 
 
 @dataclass(frozen=True)
@@ -166,7 +170,7 @@ def load_campaign(
     if text is None:
         path = find_campaign(reference)
         name, source, directory = campaign_name(path), path.name, path.resolve().parent
-        text = _read(path)
+        text = campaign_text(path)
     else:
         name, source, directory = str(reference), Path(str(reference)).name, Path(directory or Path.cwd())
     document = parse_toml(text, source)
@@ -176,22 +180,6 @@ def load_campaign(
     if campaign is None or findings.problems:
         raise CampaignError(source, findings.problems)
     return campaign
-
-
-def _read(path: Path) -> str:
-    try:
-        data = path.read_bytes() if path.stat().st_size <= _LARGEST_FILE else None
-    except OSError as error:
-        raise CampaignError(path.name, [Problem("", f"cannot be read: {error.strerror}")]) from None
-    if data is None:
-        raise CampaignError(
-            path.name, [Problem("", "is larger than 250 kB; a long table of cases belongs into a CSV file")]
-        )
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise CampaignError(path.name, [Problem(f"line {line}", "is not text in UTF-8")]) from None
 
 
 def _override(document: dict[str, Any], wanted: dict[str, int | None]) -> None:
@@ -217,16 +205,20 @@ def _assemble(
         return None
     inside = findings.under("campaign")
     section = sections.campaign
-    model = _within_budget(model, section, inside)
+    model = with_step_limit(model, section, inside)
     design = section.design if section is not None else _named_design(document)
     upstream, first = take_inputs(sections, model, directory, run, design, load_campaign, findings)
-    nominal = _nominal(model, sections, {} if upstream is None or first is not None else upstream.nominal, findings)
+    nominal = _nominal_inputs(
+        model, sections, {} if upstream is None or first is not None else upstream.nominal, findings
+    )
     requirements = check_requirements(sections.requirements, model, findings.under("requirement"))
     _unknown_names(document, sections, nominal, model, findings)
     check_taken(sections, upstream, design, findings)
     dispersions = _dispersions(sections, model, nominal, design, directory, findings)
     correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", findings)
-    table_path, table = (None, {}) if upstream is not None else _table(section, model, dispersions, directory, findings)
+    table_path, table = (
+        (None, {}) if upstream is not None else cases_of_table(section, model, dispersions, directory, findings)
+    )
     if design == "table" and upstream is None:
         dispersions = (
             table_dispersions(table, {dispersion.name: dispersion for dispersion in dispersions}, findings)
@@ -303,17 +295,9 @@ def _model(document: dict[str, Any], directory: Path, findings: Findings) -> Mod
         return None
 
 
-def _within_budget(model: Model, section: CampaignSection | None, findings: Findings) -> Model:
-    """The model with the file's own cap on integration steps."""
-    if section is None or section.max_steps is None:
-        return model
-    if not isinstance(model.clock, AdaptiveStep):
-        findings.add("max_steps", f"is for models that choose their steps; {model.name} steps on a fixed grid")
-        return model
-    return replace(model, clock=replace(model.clock, attempts=section.max_steps))
-
-
-def _nominal(model: Model, sections: Sections, upstream: Mapping[str, Scalar], findings: Findings) -> dict[str, Scalar]:
+def _nominal_inputs(
+    model: Model, sections: Sections, upstream: Mapping[str, Scalar], findings: Findings
+) -> dict[str, Scalar]:
     section_findings = findings.under("parameters")
     before = len(findings.problems)
     nominal = {**nominal_values(model, sections.parameters, section_findings), **upstream}
@@ -364,32 +348,6 @@ def _dispersions(
                 build_dispersion(name, section, model.input(name), nominal[name], design, directory, section_findings)
             )
     return tuple(built)
-
-
-def _table(
-    section: CampaignSection | None,
-    model: Model,
-    dispersions: tuple[Dispersion, ...],
-    directory: Path,
-    findings: Findings,
-) -> tuple[Path | None, dict[str, np.ndarray]]:
-    section_findings = findings.under("campaign", "table")
-    if section is None or (section.design != "table" and section.table is None):
-        return None, {}
-    if section.design != "table":
-        section_findings.add("", f'the design "{section.design}" reads no table; it is for design = "table"')
-    elif section.table is None:
-        section_findings.add("", "is missing: CSV or Parquet beside this file, a case a row")
-    else:
-        try:
-            path = resolve_beside(directory, section.table)
-            units = {
-                dispersion.name: dispersion.spec["unit"] for dispersion in dispersions if "unit" in dispersion.spec
-            }
-            return path, read_case_table(path, model, units, section_findings)
-        except FileFault as fault:
-            section_findings.add("", str(fault))
-    return None, {}
 
 
 def _case_count(

@@ -1,7 +1,7 @@
 """The parts of a campaign, checked against its model: nominal values, correlations, requirements, retention."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -10,10 +10,17 @@ import numpy as np
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.inputs import accepted_range, check_value, inputs_of, number
 from mc_engine.campaign.reading import Findings
-from mc_engine.campaign.sections import CorrelationSection, RequirementSection, RetentionSection, WorstSection
+from mc_engine.campaign.sections import (
+    CampaignSection,
+    ConstraintSection,
+    CorrelationSection,
+    RequirementSection,
+    RetentionSection,
+    WorstSection,
+)
 from mc_engine.errors import MOST_SHOWN
 from mc_engine.model.faults import naming_faults
-from mc_engine.model.fields import Parameter, Setting
+from mc_engine.model.fields import AdaptiveStep, Parameter, Setting
 from mc_engine.model.preparation import call_prepare
 from mc_engine.model.record import Model, Refusals
 from mc_engine.sampling.correlation import group_matrix, is_positive_definite
@@ -94,6 +101,16 @@ def _check_default(default: Scalar, item: Parameter | Setting, findings: Finding
         )
 
 
+def with_step_limit(model: Model, section: CampaignSection | None, findings: Findings) -> Model:
+    """The model with the file's own cap on integration steps."""
+    if section is None or section.max_steps is None:
+        return model
+    if not isinstance(model.clock, AdaptiveStep):
+        findings.add("max_steps", f"is for models that choose their steps; {model.name} steps on a fixed grid")
+        return model
+    return replace(model, clock=replace(model.clock, attempts=section.max_steps))
+
+
 def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
     """Why the model cannot start from these values, as one sentence; empty if it can.
 
@@ -169,7 +186,10 @@ def check_size(
 ) -> None:
     """Note a number of cases, or of dispersions, that the design cannot have."""
     if design == "lhs":
-        check_room_for_correlations(count, correlations, findings)
+        # A Latin hypercube of few cases has few ways to be paired.
+        needed = _CASES_PER_CORRELATED * len({name for pair in correlations for name in (pair.first, pair.second)})
+        if count < needed:
+            findings.add("cases", f'{count} is not allowed; "lhs" with these correlations needs at least {needed}')
         if count > _LARGEST_HYPERCUBE:
             findings.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
     most = {"sobol": MAX_DIMENSIONS, "saltelli": MAX_DIMENSIONS // 2}.get(design, len(dispersions))
@@ -181,15 +201,6 @@ def check_size(
         findings.add("cases", sentence)
 
 
-def check_room_for_correlations(cases: int, correlations: tuple[Correlation, ...], findings: Findings) -> None:
-    """A Latin hypercube of few cases has few ways to be paired."""
-    needed = _CASES_PER_CORRELATED * len(
-        {name for correlation in correlations for name in (correlation.first, correlation.second)}
-    )
-    if cases < needed:
-        findings.add("cases", f'{cases} is not allowed; "lhs" with these correlations needs at least {needed}')
-
-
 def check_requirements(
     sections: Mapping[str, RequirementSection], model: Model, findings: Findings
 ) -> tuple[Requirement, ...]:
@@ -198,13 +209,19 @@ def check_requirements(
     for name, section in sections.items():
         section_findings = findings.under(name)
         check_metric(section.metric, model, section_findings)
-        low, high = section.at_least, section.at_most
-        if low is None and high is None:
-            section_findings.add("", "has no limit; give at_most, at_least or both")
-        elif low is not None and high is not None and low > high:
-            section_findings.add("at_least", f"{number(low)} is above at_most = {number(high)}")
-        kept.append(Requirement(name, section.metric, high, low, section.share, section.confidence, section.source))
+        check_limits(section, section_findings)
+        at_most, at_least, share = section.at_most, section.at_least, section.share
+        kept.append(Requirement(name, section.metric, at_most, at_least, share, section.confidence, section.source))
     return tuple(kept)
+
+
+def check_limits(section: RequirementSection | ConstraintSection, findings: Findings) -> None:
+    """Note a section without a limit, or with limits in the wrong order."""
+    low, high = section.at_least, section.at_most
+    if low is None and high is None:
+        findings.add("", "has no limit; give at_most, at_least or both")
+    elif low is not None and high is not None and low > high:
+        findings.add("at_least", f"{number(low)} is above at_most = {number(high)}")
 
 
 def check_retention(

@@ -146,9 +146,11 @@ def read_sections(document: dict[str, Any], findings: Findings) -> Sections:
         if "campaign" in document
         else None,
         parameters=_parameters(document, inside["parameters"]),
-        dispersions=_read_each(_dispersion, _named(document, "dispersion", findings)),
-        correlations=_read_each(_correlation, _listed(document, "correlation", findings)),
-        requirements=_read_each(_requirement, _freely_named(document, "requirement", findings)),
+        dispersions=_read_each(_dispersion, _named_tables(document, "dispersion", findings)),
+        correlations=_read_each(partial(read, CorrelationSection), _listed_tables(document, "correlation", findings)),
+        requirements=_read_each(
+            partial(read, RequirementSection), _freely_named_tables(document, "requirement", findings)
+        ),
         retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
         tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
         inputs=_optional(InputsSection, document, inside),
@@ -169,7 +171,7 @@ def read(section: type[_AnySection], raw: Any, findings: Findings) -> _AnySectio
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
         for details in mistakes[:MOST_SHOWN]:
-            findings.add(_place(raw, details["loc"]), _sentence(section, details))
+            findings.add(_place(raw, details["loc"]), _message(section, details))
         # nobody is shown the rest: it is only counted
         findings.problems.extend(Problem(findings.place, details["msg"]) for details in mistakes[MOST_SHOWN:])
         return None
@@ -200,7 +202,7 @@ def _read_each(
     return sections
 
 
-def _named(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
+def _named_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     raw = document.get(name, {})
     if isinstance(raw, dict):
         return [(key, entry, findings.under(name, key)) for key, entry in raw.items()]
@@ -209,16 +211,16 @@ def _named(document: dict[str, Any], name: str, findings: Findings) -> list[tupl
     return []
 
 
-def _freely_named(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
+def _freely_named_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     """The tables whose names the file chooses; one that is no word is noted and left out."""
-    entries = _named(document, name, findings)
+    entries = _named_tables(document, name, findings)
     wrong = [entry for entry in entries if not _FREE_NAME.fullmatch(entry[0])]
     for key, _, _ in wrong:
         findings.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
     return [entry for entry in entries if entry not in wrong]
 
 
-def _listed(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
+def _listed_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     raw = document.get(name, [])
     if isinstance(raw, list):
         places = [f"{name} {k}" for k in range(1, len(raw) + 1)]
@@ -226,14 +228,6 @@ def _listed(document: dict[str, Any], name: str, findings: Findings) -> list[tup
     header = f"{findings.place}.{name}" if findings.place else name
     findings.add(name, f"{shown(raw)} is not a list of tables; write [[{header}]] with two brackets")
     return []
-
-
-def _correlation(raw: Any, findings: Findings) -> CorrelationSection | None:
-    return read(CorrelationSection, raw, findings)
-
-
-def _requirement(raw: Any, findings: Findings) -> RequirementSection | None:
-    return read(RequirementSection, raw, findings)
 
 
 def _tuning(raw: Any, findings: Findings) -> TuningSections | None:
@@ -245,10 +239,10 @@ def _tuning(raw: Any, findings: Findings) -> TuningSections | None:
     objectives = raw.get("objective")
     return TuningSections(
         head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, findings),
-        parameters=_read_each(partial(read, TunedSection), _named(raw, "parameter", findings)),
-        objectives=_read_each(partial(read, ObjectiveSection), _freely_named(raw, "objective", findings)),
-        constraints=_read_each(partial(read, ConstraintSection), _freely_named(raw, "constraint", findings)),
-        published=_read_each(partial(read, PublishedPointSection), _listed(raw, "published", findings)),
+        parameters=_read_each(partial(read, TunedSection), _named_tables(raw, "parameter", findings)),
+        objectives=_read_each(partial(read, ObjectiveSection), _freely_named_tables(raw, "objective", findings)),
+        constraints=_read_each(partial(read, ConstraintSection), _freely_named_tables(raw, "constraint", findings)),
+        published=_read_each(partial(read, PublishedPointSection), _listed_tables(raw, "published", findings)),
         objective_names=tuple(objectives) if isinstance(objectives, dict) else (),
     )
 
@@ -263,7 +257,7 @@ def _parameters(document: dict[str, Any], findings: Findings) -> dict[str, Scala
         try:
             values[name] = _VALUE.validate_python(value)
         except ValidationError as error:
-            findings.add(name, _sentence(None, error.errors(include_url=False)[0]))
+            findings.add(name, _message(None, error.errors(include_url=False)[0]))
     return values
 
 
@@ -306,7 +300,7 @@ def _place(raw: Any, location: tuple[int | str, ...]) -> str:
     return place
 
 
-def _sentence(section: type[Section] | None, details: ErrorDetails) -> str:
+def _message(section: type[Section] | None, details: ErrorDetails) -> str:
     kind, context, location = details["type"], details.get("ctx", {}), details["loc"]
     value = details["input"]
     if kind == "missing" and section is not None:

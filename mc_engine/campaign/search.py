@@ -10,6 +10,7 @@ from mc_engine.store.run_folder import NO_TEXT, readable
 from mc_engine.store.urls import is_url, without_secrets
 from mc_engine.suggestions import hint
 
+_LARGEST_FILE = 250_000  # bytes; more of them could take the reader of TOML longer than a second
 SHIPPED = Path(__file__).resolve().parents[2] / "campaigns"
 
 
@@ -94,6 +95,23 @@ def find_campaign(reference: str | Path) -> Path:
     except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
         pass
     raise CampaignError(without_secrets(text), [Problem("", _not_found(text, path, list(shipped)))])
+
+
+def campaign_text(path: Path) -> str:
+    """The contents of a campaign file; CampaignError where it cannot be read, is too large, or is not UTF-8."""
+    try:
+        data = path.read_bytes() if path.stat().st_size <= _LARGEST_FILE else None
+    except OSError as error:
+        raise CampaignError(path.name, [Problem("", f"cannot be read: {error.strerror}")]) from None
+    if data is None:
+        raise CampaignError(
+            path.name, [Problem("", "is larger than 250 kB; a long table of cases belongs into a CSV file")]
+        )
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise CampaignError(path.name, [Problem(f"line {line}", "is not text in UTF-8")]) from None
 
 
 def requirement_names(reference: str) -> list[str]:

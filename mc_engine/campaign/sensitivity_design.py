@@ -150,7 +150,7 @@ def companion_table(campaign: "Campaign", case_ids: np.ndarray) -> dict[str, np.
     assert campaign.sensitivity is not None  # a companion has one
     names = [dispersion.name for dispersion in campaign.dispersions]
     pairs = rank_pairs(campaign.correlations)
-    points = [_point(campaign, names, pairs, k, block) for k in range(len(_POINTS))]
+    points = [_point_columns(campaign, names, pairs, k, block) for k in range(len(_POINTS))]
     table = {}
     for place, dispersion in enumerate(campaign.dispersions):
         group = next(name for name, members in campaign.sensitivity.groups.items() if dispersion.name in members)
@@ -160,7 +160,7 @@ def companion_table(campaign: "Campaign", case_ids: np.ndarray) -> dict[str, np.
     return table
 
 
-def _point(
+def _point_columns(
     campaign: "Campaign", names: Sequence[str], pairs: tuple[tuple[str, str, float], ...], k: int, block: np.ndarray
 ) -> list[np.ndarray]:
     """Uniform numbers of the k-th point of each block, a column a dispersion, correlated as the campaign's.

@@ -58,15 +58,15 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
     with open_beside(path, MOST_CSV_BYTES) as binary:
         lines = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
         try:
-            return _columns(path, csv.reader(lines, strict=True))
+            return _csv_columns(path, csv.reader(lines, strict=True))
         except (UnicodeDecodeError, csv.Error) as error:
             raise FileFault(f'"{path.name}" is not CSV text in UTF-8: {error}') from None
 
 
-def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
+def _csv_columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
     """The columns, gathered row by row; FileFault where they are more than a table of cases may have."""
     filled = ((line, row) for line, row in enumerate(rows, start=1) if any(cell.strip() for cell in row))
-    names = [_as_meant(cell) for cell in next(filled, (0, []))[1]]
+    names = [_without_guard(cell) for cell in next(filled, (0, []))[1]]
     if not names:
         raise FileFault(f'"{path.name}" is empty')
     _check_names(path, names)
@@ -78,7 +78,7 @@ def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
         elif len(columns[0]) == most:
             raise FileFault(f'"{path.name}" has more than {MOST_CSV_CELLS:,} cells; a Parquet file may have more')
         for column, cell in zip(columns, row, strict=False):
-            column.append(_as_meant(cell))
+            column.append(_without_guard(cell))
         if len(ragged) > _MOST_LINES:
             break
     if ragged:
@@ -121,14 +121,16 @@ def _is_guarded(cell: str) -> bool:
     return cell.startswith(_GUARD) and cell.lstrip(_GUARD).startswith(_FORMULA)
 
 
-def _as_meant(cell: str) -> str:
+def _without_guard(cell: str) -> str:
     cell = cell.strip()
     return cell[1:] if _is_guarded(cell) else cell
 
 
 def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
     """float64[n]: the cells as finite numbers."""
-    values = cells.astype(np.float64) if cells.dtype.kind in "fiu" else np.array([_number(cell) for cell in cells])
+    values = (
+        cells.astype(np.float64) if cells.dtype.kind in "fiu" else np.array([_number_or_nan(cell) for cell in cells])
+    )
     wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
     if wrong.size:
         row = wrong[0]
@@ -137,7 +139,7 @@ def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
     return values
 
 
-def _number(cell: Any) -> float:
+def _number_or_nan(cell: Any) -> float:
     """A cell as a number; NaN for one that is none."""
     known = is_real(cell) if isinstance(cell, str) else type(cell) is not bool and isinstance(cell, _NUMBERS)
     return float(cell) if known else math.nan

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from mc_engine.campaign.inputs import check_value, inputs_of, number
+from mc_engine.campaign.parts import check_limits, check_metric
 from mc_engine.campaign.reading import Findings, TuningSections
 from mc_engine.campaign.sections import ConstraintSection, ObjectiveSection, TunedSection
 from mc_engine.model.fields import Setting
@@ -111,7 +112,10 @@ def check_tuning(
         _check_measured(objective, model, dispersed, design, findings.under("objective", name))
     for name, constraint in sections.constraints.items():
         _check_measured(constraint, model, dispersed, design, findings.under("constraint", name))
-        _check_limits(constraint, findings.under("constraint", name))
+        check_limits(constraint, findings.under("constraint", name))
+        if constraint.quantile is not None and constraint.at_most is not None and constraint.at_least is not None:
+            message = "one quantile cannot keep two limits; make two constraints of it"
+            findings.under("constraint", name).add("quantile", message)
     _check_names(sections, findings)
     for place, point in sections.published.items():
         _check_values(point.values, sections.objective_names, findings.under(place, "values"))
@@ -185,9 +189,7 @@ def _check_measured(
     design: str | None,
     findings: Findings,
 ) -> None:
-    names = [metric.name for metric in model.metrics]
-    if section.metric not in names:
-        findings.add("metric", f'"{section.metric}" is not a metric of {model.name}{hint(section.metric, names)}')
+    check_metric(section.metric, model, findings)
     if section.quantile is None:
         return
     if not dispersed:
@@ -196,17 +198,6 @@ def _check_measured(
         )
     elif design is not None and design not in RANDOM:
         findings.add("quantile", f'the design "{design}" draws no cases at random; quantiles are for {listed(RANDOM)}')
-
-
-def _check_limits(section: ConstraintSection, findings: Findings) -> None:
-    low, high = section.at_least, section.at_most
-    if low is None and high is None:
-        findings.add("", "has no limit; give at_most, at_least or both")
-    elif low is not None and high is not None:
-        if low > high:
-            findings.add("at_least", f"{number(low)} is above at_most = {number(high)}")
-        if section.quantile is not None:
-            findings.add("quantile", "one quantile cannot keep two limits; make two constraints of it")
 
 
 def _check_values(values: Mapping[str, float], objectives: Iterable[str], findings: Findings) -> None:

@@ -166,7 +166,7 @@ def find_run(reference: str, directory: Path) -> Path | None:
 def link(rows: Rows, section: InputsSection, model: Model, own_columns: Iterable[str], findings: Findings) -> Upstream:
     """Hold the rows against the model; what does not fit is noted.
 
-    taken : names that the campaign's own table has, beside those of the inputs.
+    own_columns : names that the campaign's own table has, beside those of the inputs.
     """
     upstream = {column.name: column for column in rows.columns}
     links = _links(upstream, section, model, findings)
@@ -187,7 +187,7 @@ def link(rows: Rows, section: InputsSection, model: Model, own_columns: Iterable
     for column_ in rows.columns:
         if column_.name == "case_id" or links.get(column_.name) == column_.name:
             continue
-        name = column_.name if column_.name not in used else f"{_word(rows.facts['name'])}_{column_.name}"
+        name = column_.name if column_.name not in used else f"{_identifier(rows.facts['name'])}_{column_.name}"
         role = "dispersion" if column_.role == "dispersion" else "upstream"
         description = f"{rows.facts['name']}: {column_.description}"
         names[column_.name] = name
@@ -196,7 +196,7 @@ def link(rows: Rows, section: InputsSection, model: Model, own_columns: Iterable
     return Upstream(rows, links, tuple(kept), names, table, nominal, failed)
 
 
-def _word(name: str) -> str:
+def _identifier(name: str) -> str:
     return re.sub(r"\W+", "_", name)
 
 

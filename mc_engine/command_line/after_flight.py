@@ -74,20 +74,19 @@ def status(place: RunPlace) -> None:
     from mc_engine.runner.summary import case_line
     from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
     from mc_engine.store.writer_lock import described, holder
-    from mc_engine.studies.rare_event_folder import open_rare_event
-    from mc_engine.studies.rare_event_lines import outcome_lines as rare_lines
-    from mc_engine.studies.tuning_folder import open_tuning, outcome_lines
+    from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
+    from mc_engine.studies.tuning_folder import open_tuning, tuning_lines
 
     folder = run_at(place)
     if kind_of(folder) == TUNING:
         record = open_tuning(folder)
         typer.echo(f"tuning       {place}\ncampaign     {record.manifest['campaign']['name']}")
-        typer.echo("\n".join(outcome_lines(record)))
+        typer.echo("\n".join(tuning_lines(record)))
         return
     if kind_of(folder) == RARE_EVENT:
         estimate = open_rare_event(folder)
         typer.echo(f"rare event   {place}\ncampaign     {estimate.record['campaign']['name']}")
-        typer.echo("\n".join(rare_lines(estimate.result)))
+        typer.echo("\n".join(rare_event_lines(estimate.result)))
         return
     store = existing_run(folder)
     typer.echo(f"run       {place}")

@@ -65,7 +65,7 @@ def rare(
     from mc_engine.store.run_folder import default_folder
     from mc_engine.studies.limit_state import chosen_requirement, refuse_unmappable
     from mc_engine.studies.rare_event import METHODS, estimate_rare_event
-    from mc_engine.studies.rare_event_lines import outcome_lines
+    from mc_engine.studies.rare_event_folder import rare_event_lines
 
     if method not in METHODS:
         leave(USAGE, f'--method "{method}" is not known; {" or ".join(METHODS)}')
@@ -87,7 +87,7 @@ def rare(
         progress=_Teller(),
     )
     heed()
-    for line in (f"rare event   {path}", *outcome_lines(found.result)):
+    for line in (f"rare event   {path}", *rare_event_lines(found.result)):
         typer.echo(line)
     for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
         typer.echo(f"report       {report_path}")

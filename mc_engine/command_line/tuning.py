@@ -50,7 +50,7 @@ def tune(
     advise(lambda: after_search(path, "tuning.json", "the generations that were flown are"))
     from mc_engine.runner.progress import Progress
     from mc_engine.studies.tuning import tune
-    from mc_engine.studies.tuning_folder import outcome_lines
+    from mc_engine.studies.tuning_folder import tuning_lines
 
     with Progress() as progress:
         record = tune(
@@ -63,7 +63,7 @@ def tune(
             progress=progress,
         )
     heed()
-    for line in [f"tuning       {path}", *outcome_lines(record)]:
+    for line in [f"tuning       {path}", *tuning_lines(record)]:
         typer.echo(line)
     for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
         typer.echo(f"report       {report_path}")

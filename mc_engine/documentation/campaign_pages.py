@@ -76,11 +76,14 @@ def _model(model: Model, reference: str, files: Sequence[ShippedCampaign], alone
     level = "##" if alone else "###"
     yield f"{level} Campaign files"
     yield table(("Name", "Title"), [(code(file.name), escaped(file.title)) for file in files])
-    yield from _columns(model, level)
+    yield from _column_tables(model, level)
 
 
-def _columns(model: Model, level: str) -> Iterator[str]:
-    rows = [(*_meaning(parameter), f"{parameter.default:.10g}", _range(parameter)) for parameter in model.parameters]
+def _column_tables(model: Model, level: str) -> Iterator[str]:
+    rows = [
+        (*_meaning(parameter), f"{parameter.default:.10g}", _accepted_values(parameter))
+        for parameter in model.parameters
+    ]
     yield f"{level} Parameters"
     yield table(("Parameter", "Unit", "Meaning", "Nominal", "Allowed"), rows)
     if model.settings:
@@ -111,7 +114,7 @@ def _meaning(field: Named, at_the_end: bool = False) -> tuple[str, str, str]:
     )
 
 
-def _range(item: Parameter | Setting) -> str:
+def _accepted_values(item: Parameter | Setting) -> str:
     if np.isinf(item.low) and np.isinf(item.high):
         return ""
     if np.isinf(item.high):
@@ -122,7 +125,7 @@ def _range(item: Parameter | Setting) -> str:
 def _choices(setting: Setting) -> str:
     if setting.date:
         return "a date in UTC"
-    return ", ".join(code(word) for word in setting.choices) or _range(setting)
+    return ", ".join(code(word) for word in setting.choices) or _accepted_values(setting)
 
 
 def _word(value: str | bool | float) -> str:

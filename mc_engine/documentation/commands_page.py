@@ -30,23 +30,23 @@ def page() -> str:
 
 
 def _verb(name: str, command: Any) -> Iterator[str]:
-    arguments = [_value(param) for param in command.params if param.param_type_name == "argument"]
+    arguments = [_option_value(param) for param in command.params if param.param_type_name == "argument"]
     usage = " ".join(["mc-engine", name, *arguments, "[OPTIONS]"])
     yield f"## {name}\n\n```text\n{usage}\n```\n\n{prose(command.help or '')}\n\n{prose(command.epilog or '')}\n"
-    rows = [(code(_names(param)), escaped(param.help or ""), _default(param)) for param in command.params]
+    rows = [(code(_option_names(param)), escaped(param.help or ""), _default(param)) for param in command.params]
     yield (table(("Argument or option", "Meaning", "Default"), rows) + "\n") if rows else ""
 
 
-def _value(option: Any) -> str:
+def _option_value(option: Any) -> str:
     """The word that stands for a value; of the library's own, which differ between its versions, none is used."""
     return str(option.metavar or option.name.upper())
 
 
-def _names(option: Any) -> str:
+def _option_names(option: Any) -> str:
     if option.param_type_name == "argument":
-        return _value(option)
+        return _option_value(option)
     words = ", ".join([*option.opts, *option.secondary_opts])
-    return words if option.is_flag else f"{words} {_value(option)}"
+    return words if option.is_flag else f"{words} {_option_value(option)}"
 
 
 def _default(option: Any) -> str:

@@ -41,7 +41,7 @@ def _section(title: str, definition: Mapping[str, Any], definitions: Mapping[str
     rows = [
         (
             code(key),
-            _kind(record, definitions),
+            _type_text(record, definitions),
             "required" if key in required else _default(record),
             escaped(record.get("description", "")),
         )
@@ -55,11 +55,11 @@ def _default(record: Mapping[str, Any]) -> str:
     return "" if value in (None, "") or isinstance(value, dict) else code(json.dumps(value))
 
 
-def _kind(record: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
+def _type_text(record: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
     """What a value may be, in words."""
     for several in ("anyOf", "oneOf"):
         if several in record:
-            words = [_kind(choice, definitions) for choice in record[several] if choice.get("type") != "null"]
+            words = [_type_text(choice, definitions) for choice in record[several] if choice.get("type") != "null"]
             return " or ".join(dict.fromkeys(words))
     if "$ref" in record:
         name = record["$ref"].rsplit("/", 1)[-1]
@@ -70,18 +70,18 @@ def _kind(record: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
     if "enum" in record:
         return ", ".join(code(json.dumps(word)) for word in record["enum"])
     if record.get("type") == "array":
-        return f"list of: {_kind(record.get('items', {}), definitions)}"
+        return f"list of: {_type_text(record.get('items', {}), definitions)}"
     if record.get("type") == "object":
         inner = record.get("additionalProperties")
-        return f"tables by name, each: {_kind(inner, definitions)}" if isinstance(inner, dict) else "table"
-    return _WORDS.get(record.get("type", ""), "any") + _range(record)
+        return f"tables by name, each: {_type_text(inner, definitions)}" if isinstance(inner, dict) else "table"
+    return _WORDS.get(record.get("type", ""), "any") + _allowed_range(record)
 
 
 _WORDS = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false"}
 _LARGEST = 1e40  # limits beyond it keep arithmetic finite and are of no interest to a reader
 
 
-def _range(record: Mapping[str, Any]) -> str:
+def _allowed_range(record: Mapping[str, Any]) -> str:
     words = {"minimum": "≥", "exclusiveMinimum": "\\>", "maximum": "≤", "exclusiveMaximum": "\\<"}
     limits = [f"{sign} {record[key]:g}" for key, sign in words.items() if abs(record.get(key, 1e50)) < _LARGEST]
     return f" {', '.join(limits)}" if limits else ""

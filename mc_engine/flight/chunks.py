@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.campaign.cases import case_table, full_inputs, nominal_row
+from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import noise_ids, upstream_ids
 from mc_engine.flight.flight import fly
@@ -194,7 +194,7 @@ def _gathered(names: Sequence[str], tables: Sequence[Mapping[str, Any]]) -> Colu
 
 def fly_nominal(campaign: Campaign) -> dict[str, Any]:
     """The nominal case by column name."""
-    inputs = nominal_row(campaign)
+    inputs = campaign.nominal
     ids = np.array([NOMINAL_NOISE])
     with naming_faults(campaign.model_reference, "the nominal case"):
         flight = fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)

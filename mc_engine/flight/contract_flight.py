@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.campaign.cases import case_table, full_inputs, nominal_row
+from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
@@ -74,7 +74,7 @@ def faults(campaign: Campaign) -> list[str]:
 def _fly_nominal(campaign: Campaign) -> Columns:
     """Fly the nominal case, after a single step of it that compiles the kernel; end the process with a sentence if it
     does not land."""
-    clock, inputs, ids = campaign.model.clock, nominal_row(campaign), np.array([NOMINAL_NOISE])
+    clock, inputs, ids = campaign.model.clock, campaign.nominal, np.array([NOMINAL_NOISE])
     one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
     fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
     with _landing_within(LONGEST_S, "the nominal case has", campaign):
@@ -137,7 +137,7 @@ def _not_finite(
     """One sentence with the line of the model if a flight ended not-finite: the nominal one, or the first of these."""
     word = STATUS_NAME[NOT_FINITE]
     bad = np.flatnonzero(flown["status"] == word)
-    own: tuple[Mapping[str, Any], int, str] = nominal_row(campaign), NOMINAL_NOISE, "the nominal case"
+    own: tuple[Mapping[str, Any], int, str] = campaign.nominal, NOMINAL_NOISE, "the nominal case"
     if nominal["status"][0] != word:
         if not bad.size:
             return []

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mc_engine.campaign.cases import case_table, full_inputs, nominal_row
+from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.chunks import NOMINAL_NOISE
 from mc_engine.flight.flight import fly_history
@@ -29,7 +29,7 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     retained = retained_cases(store, campaign)
     if _are_kept(store, campaign, retained):
         return True
-    flights = [(-1, nominal_row(campaign), NOMINAL_NOISE)] if campaign.retention.nominal else []
+    flights = [(-1, campaign.nominal, NOMINAL_NOISE)] if campaign.retention.nominal else []
     for case_id in retained:
         inputs = {name: column[0] for name, column in case_table(campaign, np.array([case_id])).items()}
         flights.append((case_id, full_inputs(campaign, inputs), case_id))

@@ -76,6 +76,28 @@ def clopper_pearson(count: int, tried: int, confidence: float = 0.95) -> tuple[f
     return lower_bound(count, tried, one_sided), upper_bound(count, tried, one_sided)
 
 
+def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple[float, float]:
+    """Fraction of passing cases with its exact lower confidence bound.
+
+    passed : int, 0 <= passed <= tried
+    tried : int, above 0; failed cases count as tried
+    confidence : float in (0, 1)
+
+    Returns (estimate, lower).  With nothing failed, lower = (1 - confidence)**(1/tried).
+
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
+    Clopper & Pearson, Biometrika 26 (1934), 404-413.
+
+    >>> estimate, lower = pass_probability(2302, 2302)
+    >>> estimate, lower >= 0.999
+    (1.0, True)
+    """
+    if tried <= 0:
+        raise ValueError("no case was tried")
+    return passed / tried, lower_bound(passed, tried, confidence)
+
+
 def pass_chance(tried: int, accepted: int | None, true_share: float) -> float:
     """Probability that at most `accepted` of `tried` cases fail when the true passing share is `true_share`.
 
@@ -146,7 +168,7 @@ def half_rate_share(share: float) -> float:
 
 
 def hypergeometric_tails(total: int, marked: int, drawn: int, count: int) -> tuple[float, float]:
-    """Probabilities of at most, and of at least, `found` marked ones among `drawn` of `total`, of which some are."""
+    """Probabilities of at most, and of at least, `count` marked ones among `drawn` of `total`, of which some are."""
     k = np.arange(max(0, drawn - (total - marked)), min(marked, drawn) + 1)
     chance = -gammaln(k + 1.0) - gammaln(marked - k + 1.0)
     chance -= gammaln(drawn - k + 1.0) + gammaln(total - marked - drawn + k + 1.0)

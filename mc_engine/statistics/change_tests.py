@@ -122,7 +122,7 @@ def metric_change(
         a, b = a[np.isfinite(a)], b[np.isfinite(b)]
     used = (a.size, b.size)
     if min(used) == 0:
-        return MetricChange(metric, used, tried, 0 if paired else None, _of(np.mean, a, b), _of(np.std, a, b),
+        return MetricChange(metric, used, tried, 0 if paired else None, _by_run(np.mean, a, b), _by_run(np.std, a, b),
                             UNKNOWN, UNKNOWN, np.nan, np.nan)  # fmt: skip
     both, exponent = near_one(np.concatenate([a, b]))
     a, b = both[: a.size], both[a.size :]
@@ -133,7 +133,7 @@ def metric_change(
     def back(pair: Sequence[float]) -> tuple[float, float]:
         return float(in_units(float(pair[0]), exponent)), float(in_units(float(pair[1]), exponent))
 
-    mean, deviation = _of(np.mean, a, b), _of(_deviation, a, b)
+    mean, deviation = _by_run(np.mean, a, b), _by_run(_deviation, a, b)
     described = metric, used, tried, differing, back(mean), back(deviation)
     if min(used) < FEWEST:
         shift = Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf)
@@ -144,7 +144,7 @@ def metric_change(
         same = float(in_units(float(np.median(b) - np.median(a)), exponent))
         return MetricChange(*described, Estimate(same, same, same), UNKNOWN, np.nan, np.nan)
     shift, shift_p = _shift(a, b, paired, unit, z)
-    ratio, spread_p = _ratio(a, b, paired, unit, z)
+    ratio, spread_p = _spread_ratio(a, b, paired, unit, z)
     if min(deviation) <= _ROUNDING * scale:
         ratio = UNKNOWN
     shift = Estimate(*(float(in_units(end, exponent)) for end in astuple(shift)))
@@ -179,7 +179,7 @@ def holm(p_values: Sequence[float]) -> np.ndarray:
     return adjusted
 
 
-def _of(function, a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
+def _by_run(function, a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
     return tuple(float(function(values)) if values.size else np.nan for values in (a, b))  # type: ignore[return-value]
 
 
@@ -199,7 +199,7 @@ def _shift(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) ->
     return _inverted(lambda shift: _signed_ranks(moved - shift), float(np.median(moved)), step, z)
 
 
-def _ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) -> tuple[Estimate, float]:
+def _spread_ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) -> tuple[Estimate, float]:
     """The ratio of the distances to each run's own median with its interval, and the p-value of 1."""
     before, other = (np.abs(values - np.median(values)) for values in (a, b))
     if max(np.ptp(before), np.ptp(other)) <= unit:
@@ -269,7 +269,7 @@ def _mean_score(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sign(statistic) * norm.isf(max(t.sf(abs(statistic), freedom), 1e-300)))
 
 
-def _about(value: float, error: float, confidence: float) -> Estimate:
+def _normal_interval(value: float, error: float, confidence: float) -> Estimate:
     reach = float(norm.ppf(0.5 + 0.5 * confidence)) * error
     return Estimate(value, value - reach, value + reach)
 
@@ -294,7 +294,7 @@ def _paired_share(lost: int, gained: int, n: int, confidence: float) -> Estimate
     """Difference of paired shares: Agresti & Min, Stat. Med. 24 (2005), 729-740, half a case added to each cell."""
     up, down, all_cases = gained + 0.5, lost + 0.5, n + 2.0
     error = sqrt(up + down - (up - down) ** 2 / all_cases) / all_cases
-    around = _about((up - down) / all_cases, error, confidence)
+    around = _normal_interval((up - down) / all_cases, error, confidence)
     return Estimate((gained - lost) / n, max(around.lower, -1.0), min(around.upper, 1.0))
 
 

@@ -70,7 +70,7 @@ def running_mean(values: np.ndarray, confidence: float = 0.90) -> RunningEstimat
 
     None for fewer than 20 numbers, or a constant.
     """
-    cases, used = _places(values)
+    cases, used = _sampled_counts(values)
     finite = _numbers(values)
     if finite is None:
         return None
@@ -102,7 +102,7 @@ def running_quantile(values: np.ndarray, probability: float, confidence: float =
 
     The halves are compared by how many of each lie above the quantile of all (Fisher's exact test).
     """
-    cases, used = _places(values)
+    cases, used = _sampled_counts(values)
     finite = _numbers(values)
     if finite is None:
         return None
@@ -128,7 +128,7 @@ def _numbers(values: np.ndarray) -> np.ndarray | None:
     return finite
 
 
-def _places(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _sampled_counts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of cases at which the estimate is looked at, evenly in their logarithm, and how many have a number."""
     numbers = np.isfinite(values).cumsum()
     if not numbers.size or numbers[-1] < FEWEST:

@@ -73,7 +73,7 @@ def designed_indices(
     return DesignedIndices(design, tuple(inputs), tuple(metrics), values, reach, n_used, len(rows))
 
 
-def _problem(names: tuple[str, ...]) -> dict[str, Any]:
+def _salib_problem(names: tuple[str, ...]) -> dict[str, Any]:
     return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
 
 
@@ -81,7 +81,12 @@ def _saltelli(names: tuple[str, ...], y: np.ndarray, confidence: float) -> dict[
     from SALib.analyze import sobol  # imports matplotlib and pandas
 
     indices = sobol.analyze(
-        _problem(names), y.ravel(), calc_second_order=False, num_resamples=RESAMPLES, conf_level=confidence, seed=_SEED
+        _salib_problem(names),
+        y.ravel(),
+        calc_second_order=False,
+        num_resamples=RESAMPLES,
+        conf_level=confidence,
+        seed=_SEED,
     )
     return {"first_order": (indices["S1"], indices["S1_conf"]), "total": (indices["ST"], indices["ST_conf"])}
 
@@ -93,7 +98,7 @@ def _morris(
     from SALib.analyze import morris
 
     effects = morris.analyze(
-        _problem(names),
+        _salib_problem(names),
         coded.reshape(-1, len(names)),
         y.ravel(),
         num_levels=MORRIS_LEVELS,

@@ -96,9 +96,9 @@ def failure_drivers(
     columns = [part for part in (column.at(rows) for column in columns) if part.varies]
     # rows without an input may have taken failed cases away
     tested = {names[k]: every[k, rows] for k in decided if _fewer_group(every[k, rows]) >= FEWEST}
-    singles = [_single(name, column, lost) for name, lost in tested.items() for column in columns]
+    singles = [_rank_test(name, column, lost) for name, lost in tested.items() for column in columns]
     rich = {name: lost for name, lost in tested.items() if _fewer_group(lost) >= FEWEST_FOR_PAIRS}
-    pairs = list(_pairs(columns, rich)) if rich and len(columns) > 1 else []
+    pairs = list(_pair_tests(columns, rich)) if rich and len(columns) > 1 else []
     by_name = {column.name: column for column in columns}
     located = tuple(
         _located(pair, by_name[pair.inputs[0]], by_name[pair.inputs[1]], rich[pair.requirement])
@@ -172,9 +172,9 @@ def _adjusted(p_values: np.ndarray) -> np.ndarray:
     return adjusted
 
 
-def _single(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
+def _rank_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
     if column.levels:
-        return _group(requirement, column, failed)
+        return _level_test(requirement, column, failed)
     ranks = average_ranks(column.values)
     ends = average_ranks(np.abs(ranks - 0.5 * (ranks.size + 1)))
     (trend, p_trend), (spread, p_spread) = _separation(ranks, failed), _separation(ends, failed)
@@ -201,7 +201,7 @@ def _separation(ranks: np.ndarray, failed: np.ndarray) -> tuple[float, float]:
     return 2.0 * excess / (n_failed * n_passed), float(2.0 * ndtr(-abs(excess) / np.sqrt(variance)))
 
 
-def _group(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
+def _level_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
     """The level that failed cases prefer or avoid most: Fisher's exact test of each level against all others."""
     levels = np.unique(column.values).astype(np.int64)
     n, n_failed = failed.size, int(failed.sum())
@@ -237,7 +237,7 @@ def _scores(column: InputColumn) -> list[np.ndarray]:
     return [indicator - indicator.mean() for indicator in indicators]
 
 
-def _pairs(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> Iterator[Driver]:
+def _pair_tests(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> Iterator[Driver]:
     """The test of every pair of inputs, for each requirement; where its cases fail is not yet looked for.
 
     The score of a pair and the failures are both freed from what the single inputs give (regression on scores and

@@ -78,14 +78,14 @@ def _approach(
         target = weight * failed
         good = min(_variation(failed / _softened(margin, softness)), _variation(target)) <= _VARIATION
         if good or (stalled and _effective(target) >= _ENOUGH * n):
-            levels.append(_record(margin, target, log_weight))
+            levels.append(_level_record(margin, target, log_weight))
             return (fit_mixture(u, target, rng) if number else None), levels, True
         if stalled == _PATIENCE or np.ptp(np.clip(margin, -1e300, 1e300)) == 0.0:
             return mixture, levels, False
         before, softness = softness, _next_softness(weight, margin, softness)
         stalled = stalled + 1 if softness > _HALT * before else 0
         target = weight * _softened(margin, softness)
-        levels.append(_record(margin, target, log_weight))
+        levels.append(_level_record(margin, target, log_weight))
         mixture = fit_mixture(u, target, rng)
     return mixture, levels, False
 
@@ -128,7 +128,7 @@ def _next_softness(weight: np.ndarray, margin: np.ndarray, softness: float) -> f
     return math.exp(high)
 
 
-def _record(margin: np.ndarray, target: np.ndarray, log_weight: np.ndarray) -> Level:
+def _level_record(margin: np.ndarray, target: np.ndarray, log_weight: np.ndarray) -> Level:
     """The level as its table shows it: the median margin of what the next density is fitted to, and its probability.
 
     At the last level, where that median has failed, the limit itself.

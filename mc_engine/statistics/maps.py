@@ -88,7 +88,7 @@ def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -
     [[0.0, 1.0, 2.0], [10.0, 11.0, 12.0]]
     """
     pairs = [near_one(np.asarray(values, dtype=np.float64)) for values in (x, y, z)]
-    surface = _map(pairs[0][0], pairs[1][0], pairs[2][0], points)
+    surface = _surface_map(pairs[0][0], pairs[1][0], pairs[2][0], points)
     if surface is None:
         return None
     x, y, value = (
@@ -99,7 +99,7 @@ def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -
     )
 
 
-def _map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap | None:
+def _surface_map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap | None:
     grid = _full_grid(x, y, z)
     if grid is not None:
         return grid

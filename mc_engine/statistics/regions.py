@@ -72,7 +72,7 @@ def covariance_ellipses(
     None of them for fewer than three points, and for points on a line: a standard deviation across it of no more
     than `thinnest` (in the unit of the points), or than a billionth of that along it.
     """
-    frame = _principal_frame(points, thinnest)
+    frame = _principal_axes(points, thinnest)
     if frame is None:
         return ()
     centre, spread, axes = frame
@@ -94,7 +94,7 @@ def covariance_ellipses(
     return tuple(ellipses)
 
 
-def _principal_frame(points: np.ndarray, thinnest: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def _principal_axes(points: np.ndarray, thinnest: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Centre, standard deviations (larger first) and directions (columns); None for points that have no width."""
     if len(points) < FEWEST:
         return None
@@ -122,7 +122,7 @@ class Density:
 
     @classmethod
     def of(cls, points: np.ndarray, thinnest: float = 0.0) -> "Density | None":
-        frame = _principal_frame(points, thinnest)
+        frame = _principal_axes(points, thinnest)
         if frame is None or len(points) < FEWEST_SMOOTHED:
             return None
         centre, spread, axes = frame

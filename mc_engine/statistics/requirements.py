@@ -114,28 +114,6 @@ class Verdict:
         return min((distance for distance in (above, below) if distance is not None), default=None)
 
 
-def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple[float, float]:
-    """Fraction of passing cases with its exact lower confidence bound.
-
-    passed : int, 0 <= passed <= tried
-    tried : int, above 0; failed cases count as tried
-    confidence : float in (0, 1)
-
-    Returns (estimate, lower).  With nothing failed, lower = (1 - confidence)**(1/tried).
-
-    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
-
-    Clopper & Pearson, Biometrika 26 (1934), 404-413.
-
-    >>> estimate, lower = pass_probability(2302, 2302)
-    >>> estimate, lower >= 0.999
-    (1.0, True)
-    """
-    if tried <= 0:
-        raise ValueError("no case was tried")
-    return passed / tried, binomial.lower_bound(passed, tried, confidence)
-
-
 class LimitCounts:
     """How many cases are outside which limits: all that verdicts count, added up over the parts of a table.
 

@@ -89,7 +89,7 @@ def subset_simulation(
     if runs < 3 or per_run * SHARE < FEWEST_SEEDS:
         raise ValueError(f"{cases_per_level} cases per level are too few for {runs} runs; 3 runs of 50 are the least")
     flights, rng = Flights(margin, noise), stream(seed, "subset simulation", 0)
-    climb = _climb(flights, rng, n_inputs, runs, per_run)
+    climb = _run_levels(flights, rng, n_inputs, runs, per_run)
     if len(climb.levels) == 1:
         return plain_count(flights, climb.levels, confidence)
     estimates = climb.reached * _shares(climb.members.run[climb.members.margin <= 0.0], runs, per_run)
@@ -103,7 +103,7 @@ def subset_simulation(
     return RareEvent("subset", mean, lower, upper, confidence, error, climb.levels, cases, remarks)
 
 
-def _climb(flights: Flights, rng: np.random.Generator, n_inputs: int, runs: int, per_run: int) -> Climb:
+def _run_levels(flights: Flights, rng: np.random.Generator, n_inputs: int, runs: int, per_run: int) -> Climb:
     """Level by level to the failures, or to where there is no further level."""
     n = per_run * runs
     fresh, run = np.full(n, FRESH), np.repeat(np.arange(runs), per_run)

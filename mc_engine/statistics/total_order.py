@@ -70,7 +70,7 @@ def total_order(columns: Sequence[InputColumn], table: np.ndarray) -> tuple[np.n
     centred = (table - table.mean(axis=0)) / table.std(axis=0)
     left, noise = np.empty_like(centred), np.empty(n_metrics)
     for metric in range(n_metrics):
-        fit = _fit(basis, low, centred[:, metric])
+        fit = _surrogate(basis, low, centred[:, metric])
         left[:, metric], noise[metric] = fit.left, fit.noise
         total[:, metric], error[:, metric] = _indices(basis, fit)
     steps, steps_error = _steps(columns, left)
@@ -155,7 +155,7 @@ class _Fit:
         return float((self.left**2).sum() / max(len(self.y) - 1 - len(self.terms), 1))
 
 
-def _fit(basis: Sequence[_Functions], low: np.ndarray, y: np.ndarray) -> _Fit:
+def _surrogate(basis: Sequence[_Functions], low: np.ndarray, y: np.ndarray) -> _Fit:
     """First single inputs, then pairs that what is left depends on, then triples of inputs that act in pairs."""
     groups: list[Group] = [(index,) for index in range(len(basis))]
     fit = _extended(basis, _refit(basis, _Fit((), np.empty((y.size, 0)), np.empty(0), y, y), []), groups)

@@ -76,9 +76,9 @@ def fly_candidates(campaign: Campaign, tuning: Tuning, candidates: np.ndarray, w
         for candidate in range(n)
     ]
     return Scores(
-        _columns(objectives, n),
-        _columns(limited, n),
-        _columns(excess, n),
+        _side_by_side(objectives, n),
+        _side_by_side(limited, n),
+        _side_by_side(excess, n),
         np.count_nonzero(~ok, axis=1),
         np.array(reasons, dtype=object),
     )
@@ -93,7 +93,7 @@ def commonest_failure(status: Iterable[str], reason: Iterable[str]) -> str:
     return ends.most_common(1)[0][0] if ends else ""
 
 
-def _columns(values: list[np.ndarray], n: int) -> np.ndarray:
+def _side_by_side(values: list[np.ndarray], n: int) -> np.ndarray:
     return np.column_stack(values) if values else np.empty((n, 0))
 
 

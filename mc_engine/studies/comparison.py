@@ -164,7 +164,7 @@ def compare_runs(
                       confidence=CONFIDENCE, tolerance=tolerance)
         for name in metrics
     ]  # fmt: skip
-    counted = {FLOWN: ok, **_inside(manifests[1], values, ok)}
+    counted = {FLOWN: ok, **_cases_inside(manifests[1], values, ok)}
     shares = [
         share_change(name, before[first], other[second], paired=pairing.paired, confidence=CONFIDENCE)
         for name, (before, other) in counted.items()
@@ -172,12 +172,12 @@ def compare_runs(
     adjusted = iter(holm(_p_values(changes, shares)).tolist())
     return Comparison(
         names=names,
-        titles=_each(
+        titles=_both(
             manifests, lambda manifest: str(manifest["campaign"].get("title") or manifest["campaign"].get("name", ""))
         ),
-        created=_each(manifests, lambda manifest: str(manifest.get("created_utc", ""))),
-        cases=_each(tables, len),
-        ok=_each(ok, lambda flown: int(flown.sum())),
+        created=_both(manifests, lambda manifest: str(manifest.get("created_utc", ""))),
+        cases=_both(tables, len),
+        ok=_both(ok, lambda flown: int(flown.sum())),
         pairing=pairing,
         alpha=alpha,
         tolerance=tolerance,
@@ -185,7 +185,7 @@ def compare_runs(
             replace(change, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for change in changes
         ),
         shares=tuple(replace(share, adjusted=next(adjusted)) for share in shares),
-        verdicts=_verdicts(manifests, tables, ok),
+        verdicts=_verdict_changes(manifests, tables, ok),
         units={name: str(facts[1][name].get("unit", "")) for name in metrics},
         left_out=left_out,
         code=code_differences(*manifests),
@@ -242,7 +242,7 @@ def _shared_metrics(
     return [name for name in shared if units[name][0] == units[name][1]], tuple(left_out)
 
 
-def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok: Any) -> dict[str, Any]:
+def _cases_inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok: Any) -> dict[str, Any]:
     """bool[n] of both runs for each requirement of B: inside its limits."""
     return {
         str(record["name"]): tuple(
@@ -253,7 +253,7 @@ def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok
     }
 
 
-def _verdicts(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
+def _verdict_changes(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
     judged_runs: list[dict[str, Verdict]] = []
     for manifest, table, flown in zip(manifests, tables, ok, strict=True):
         design = str(manifest["campaign"].get("design", "mc"))
@@ -264,12 +264,12 @@ def _verdicts(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]
         judged_runs.append({verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]})
     changes = []
     for name in dict.fromkeys([*judged_runs[0], *judged_runs[1]]):
-        a, b = (_told(verdicts.get(name)) for verdicts in judged_runs)
+        a, b = (_outcome_and_counts(verdicts.get(name)) for verdicts in judged_runs)
         changes.append(VerdictChange(name, a[0], b[0], (a[1], b[1])))
     return tuple(changes)
 
 
-def _told(verdict: Verdict | None) -> tuple[str | None, tuple[int, int] | None]:
+def _outcome_and_counts(verdict: Verdict | None) -> tuple[str | None, tuple[int, int] | None]:
     return (None, None) if verdict is None else (verdict.outcome, (verdict.passed, verdict.tried))
 
 
@@ -278,5 +278,5 @@ def _p_values(metrics: Any, shares: Any) -> list[float]:
     return of_metrics + [share.p_value for share in shares]
 
 
-def _each(pair: Any, function: Any) -> Any:
+def _both(pair: Any, function: Any) -> Any:
     return tuple(function(item) for item in pair)

@@ -20,8 +20,8 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
     for verdict in comparison.verdicts:
         inside = verdict.inside_words("{:,}".format)
         yield f"requirement {verdict.name}: {verdict.words}{', ' if inside else ''}{inside}"
-    yield from _changes(comparison)
-    yield from _table(comparison)
+    yield from _source_changes(comparison)
+    yield from _metric_table(comparison)
     yield from (f"not compared: {sentence}" for sentence in comparison.left_out)
     yield from (_share_line(share, comparison.alpha) for share in comparison.shares)
     yield answer(comparison)
@@ -33,19 +33,19 @@ def answer(comparison: Comparison) -> str:
     if not comparison.changed:
         return f"no significant change ({held})"
     parts = [
-        _named("shift of", [metric.metric for metric in comparison.shifted]),
-        _named("spread of", [metric.metric for metric in comparison.spread]),
-        _named("fraction", [share.name for share in comparison.moved_shares]),
-        _named("requirement worse:", [verdict.name for verdict in comparison.worse_verdicts]),
+        _kind_and_names("shift of", [metric.metric for metric in comparison.shifted]),
+        _kind_and_names("spread of", [metric.metric for metric in comparison.spread]),
+        _kind_and_names("fraction", [share.name for share in comparison.moved_shares]),
+        _kind_and_names("requirement worse:", [verdict.name for verdict in comparison.worse_verdicts]),
     ]
     return f"changed: {'; '.join(part for part in parts if part)} ({held})"
 
 
-def _named(kind: str, names: list[str]) -> str:
+def _kind_and_names(kind: str, names: list[str]) -> str:
     return f"{kind} {', '.join(names)}" if names else ""
 
 
-def _changes(comparison: Comparison) -> Iterator[str]:
+def _source_changes(comparison: Comparison) -> Iterator[str]:
     yield f"code: {'unchanged' if not comparison.code else ''}".rstrip()
     yield from (f"  {line}" for line in changed_lines(comparison.code))
     same = not comparison.campaign and not comparison.diff
@@ -55,13 +55,13 @@ def _changes(comparison: Comparison) -> Iterator[str]:
         yield from (f"  {line}" for line in comparison.diff)
 
 
-def _table(comparison: Comparison) -> Iterator[str]:
+def _metric_table(comparison: Comparison) -> Iterator[str]:
     same = [metric.metric for metric in comparison.metrics if metric.same]
     moved = sorted(
         (metric for metric in comparison.metrics if not metric.same and finite(metric.shift)),
         key=lambda change: -change.effect,
     )
-    rows = [_HEADINGS, *(_row(change, comparison) for change in moved)]
+    rows = [_HEADINGS, *(_metric_cells(change, comparison) for change in moved)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADINGS))]
     for row in rows if len(rows) > 1 else []:
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
@@ -73,15 +73,15 @@ def _table(comparison: Comparison) -> Iterator[str]:
         yield f"without a number in one of the runs: {', '.join(absent)}"
 
 
-def _row(change: MetricChange, comparison: Comparison) -> tuple[str, ...]:
+def _metric_cells(change: MetricChange, comparison: Comparison) -> tuple[str, ...]:
     unit = comparison.units[change.metric]
     return (
         f"{change.metric}{f' [{unit}]' if unit else ''}",
-        _number(change.shift.value),
+        _four_digits(change.shift.value),
         _with_interval(change.shift_in_sigma),
-        _p(change.shift_adjusted, comparison.alpha),
+        _p_value_text(change.shift_adjusted, comparison.alpha),
         _with_interval(change.ratio),
-        _p(change.spread_adjusted, comparison.alpha),
+        _p_value_text(change.spread_adjusted, comparison.alpha),
         f"{change.n_used[0]:,}, {change.n_used[1]:,}",
     )
 
@@ -89,7 +89,7 @@ def _row(change: MetricChange, comparison: Comparison) -> tuple[str, ...]:
 def _share_line(share: ShareChange, alpha: float) -> str:
     counts = " -> ".join(f"{k:,} of {n:,}" for k, n in zip(share.counted, share.tried, strict=True))
     pairs = f", {share.lost:,} lost and {share.gained:,} gained" if share.lost is not None else ""
-    return f"{share.name}: {counts}{pairs}, adjusted p {_p(share.adjusted, alpha)}"
+    return f"{share.name}: {counts}{pairs}, adjusted p {_p_value_text(share.adjusted, alpha)}"
 
 
 def _with_interval(estimate: Estimate) -> str:
@@ -98,11 +98,11 @@ def _with_interval(estimate: Estimate) -> str:
     return f"{estimate.value:.3g} [{estimate.lower:.3g}, {estimate.upper:.3g}]"
 
 
-def _number(value: float) -> str:
+def _four_digits(value: float) -> str:
     return f"{value:.4g}" if np.isfinite(value) else "-"
 
 
-def _p(value: float, alpha: float) -> str:
+def _p_value_text(value: float, alpha: float) -> str:
     """The p-value, a star where it is significant."""
     if not np.isfinite(value):
         return "no test"

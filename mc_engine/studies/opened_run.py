@@ -157,8 +157,8 @@ class Run:
         return "".join(
             [
                 f"<h4>{_html(self.title)}</h4><p>{_html(case_line(self.store))}</p>",
-                _table(["requirement", "verdict", "on which cases"], verdicts),
-                _table(["metric", "unit", "cases with a number", "mean", "sd", "smallest", "largest"], metrics),
+                _html_table(["requirement", "verdict", "on which cases"], verdicts),
+                _html_table(["metric", "unit", "cases with a number", "mean", "sd", "smallest", "largest"], metrics),
             ]
         )
 
@@ -256,7 +256,7 @@ class Case:
                 for name, value in columns.items()]  # fmt: skip
         why = f" ({_html(self.reason)})" if self.reason else ""
         head = f"<h4>{_html(self.name)}: {_html(self.status)}{why}</h4>"
-        return head + _table(["", "column", "value", "unit"], rows) + self._picture()
+        return head + _html_table(["", "column", "value", "unit"], rows) + self._picture()
 
     def _picture(self) -> str:
         """The kept history as a small picture; nothing is flown for being shown."""
@@ -274,7 +274,7 @@ def _html(text: str) -> str:
     return escape(clean(text))
 
 
-def _table(heads: list[str], rows: list[list[Any]]) -> str:
+def _html_table(heads: list[str], rows: list[list[Any]]) -> str:
     if not rows:
         return ""
     head = "".join(f"<th>{_html(head)}</th>" for head in heads)

@@ -75,18 +75,18 @@ def plan_lines(campaign: Campaign, failures: Sequence[int] = range(ROWS), two_si
         yield f'shares of cases of design "{campaign.design}" are no probabilities: what follows is for "mc"'
     asked = sorted(campaign.requirements, key=_wanted, reverse=True)
     for (share, confidence), group in groupby(asked, key=_wanted):
-        yield from _block(
+        yield from _requirement_block(
             ", ".join(requirement.name for requirement in group), share, confidence, failures, campaign.cases, two_sided
         )
     if len(asked) > 1:
-        yield from _together(campaign, failures)
+        yield from _joint_block(campaign, failures)
 
 
 def _wanted(requirement: Requirement) -> tuple[float, float]:
     return requirement.share, requirement.confidence
 
 
-def _block(
+def _requirement_block(
     names: str, share: float, confidence: float, failures: Sequence[int], cases: int, two_sided: bool
 ) -> Iterator[str]:
     yield ""
@@ -110,7 +110,7 @@ def _allowance(cases: int, share: float, confidence: float) -> str:
     )
 
 
-def _together(campaign: Campaign, failures: Sequence[int]) -> Iterator[str]:
+def _joint_block(campaign: Campaign, failures: Sequence[int]) -> Iterator[str]:
     """All requirements: the cases that show each, the joint share, and each with the confidence shared."""
     asked = campaign.requirements
     confidence = min(requirement.confidence for requirement in asked)
@@ -127,4 +127,4 @@ def _together(campaign: Campaign, failures: Sequence[int]) -> Iterator[str]:
         )
         yield f"{number:>8}  {each:>9}  {shared}"
     if share is not None:
-        yield from _block(JOINT, share, confidence, failures, campaign.cases, two_sided=False)
+        yield from _requirement_block(JOINT, share, confidence, failures, campaign.cases, two_sided=False)

@@ -72,14 +72,14 @@ def estimate_rare_event(
             )
         except ValueError as error:
             raise CampaignError(campaign.name, [Problem("--cases-per-level", str(error))]) from None
-        columns, arrays = _case_table(limit, estimate)
-        facts = {"asked": {"method": method, "cases_per_level": cases_per_level}, **_facts(limit, estimate)}
+        columns, arrays = _flown_cases(limit, estimate)
+        facts = {"asked": {"method": method, "cases_per_level": cases_per_level}, **_result_record(limit, estimate)}
         record = {**manifest, "rare_event": facts}
         write_result(path, RARE_EVENT, campaign.text, record, {"cases": (columns, arrays)}, lock)
     return open_rare_event(path)
 
 
-def _case_table(limit: LimitState, estimate: RareEvent) -> tuple[list[Column], dict[str, np.ndarray]]:
+def _flown_cases(limit: LimitState, estimate: RareEvent) -> tuple[list[Column], dict[str, np.ndarray]]:
     campaign, cases = limit.campaign, estimate.cases
     metric = next(candidate for candidate in campaign.model.metrics if candidate.name == limit.requirement.metric)
     inputs = limit.inputs(cases.u)
@@ -108,7 +108,7 @@ def _case_table(limit: LimitState, estimate: RareEvent) -> tuple[list[Column], d
     return columns, arrays
 
 
-def _facts(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
+def _result_record(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
     """The result as JSON knows it: None for what is infinite."""
     metric = next(candidate for candidate in limit.campaign.model.metrics if candidate.name == limit.requirement.metric)
     inputs, remark = _failed_inputs(limit, estimate)

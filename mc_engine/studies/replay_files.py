@@ -24,13 +24,13 @@ _LARGEST = 1e100  # of any unit; what a flight that is lost holds beyond it, no 
 
 def write_replay(store: Store, case_id: int, history: pd.DataFrame, picture: bytes) -> list[Path]:
     """Write `RUN/replay/case-<id>.parquet` and `.png`, of which `picture` is the content; the two paths."""
-    table, image = _table(case_id), f"{REPLAYS}/case-{case_id}.png"
+    table, image = _history_file(case_id), f"{REPLAYS}/case-{case_id}.png"
     content = parquet_bytes(history_table(history, store.manifest.get("quantities", []), store.path / table))
     derived_files(store.path).write({table: content, image: picture})
     return [store.path / table, store.path / image]
 
 
-def _table(case_id: int) -> str:
+def _history_file(case_id: int) -> str:
     return f"{REPLAYS}/case-{case_id}.parquet"
 
 
@@ -43,7 +43,7 @@ def replayed_cases(run: Path) -> list[int]:
 
 def read_replay(run: Path, case_id: int, quantities: Sequence[Mapping[str, str]]) -> pd.DataFrame:
     """The history of a case that was replayed; StoreError if a byte of it changed."""
-    name = _table(case_id)
+    name = _history_file(case_id)
     try:
         table = parquet_table(derived_files(run).read([name])[name])
         problem = history_problem(table, quantities)

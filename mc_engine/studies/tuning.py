@@ -100,8 +100,8 @@ def tune(
     manifest["provenance"]["packages"]["pymoo"] = version("pymoo")
 
     def keep(flown: list[Generation], end: str) -> None:
-        about = {**plan, "flown": len(flown), "end": end, **_wording(campaign, tuning)}
-        _write(path, campaign, tuning, flown, {**manifest, "tuning": about}, lock)
+        about = {**plan, "flown": len(flown), "end": end, **_search_record(campaign, tuning)}
+        _write_tables(path, campaign, tuning, flown, {**manifest, "tuning": about}, lock)
 
     with writer_of_new(path, lambda: refuse_occupied(path)) as lock:
         flown, end = _search(campaign, tuning, plan, search, workers or os.cpu_count() or 1, keep, progress)
@@ -186,7 +186,7 @@ def dominated_shares(fronts: Sequence[np.ndarray]) -> np.ndarray:
 # ---- the tables
 
 
-def _write(
+def _write_tables(
     path: Path,
     campaign: Campaign,
     tuning: Tuning,
@@ -274,7 +274,7 @@ def _generations(flown: list[Generation], ended: bool) -> tuple[list[Column], di
     return columns, arrays
 
 
-def _wording(campaign: Campaign, tuning: Tuning) -> dict[str, Any]:
+def _search_record(campaign: Campaign, tuning: Tuning) -> dict[str, Any]:
     """What was searched, as plain data for the report."""
     return {
         "cases": campaign.cases if tuning.robust else 1,

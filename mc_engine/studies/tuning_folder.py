@@ -61,7 +61,7 @@ def open_tuning(path: str | Path) -> TuningRecord:
     return TuningRecord(Path(path), manifest, **tables)
 
 
-def outcome_lines(record: TuningRecord) -> list[str]:
+def tuning_lines(record: TuningRecord) -> list[str]:
     """How the search ended, for the command line."""
     tuning, evaluations = record.manifest["tuning"], record.evaluations
     inside = int(evaluations["feasible"].sum())

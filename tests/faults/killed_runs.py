@@ -20,7 +20,6 @@ import broken_builds
 from mc_engine import load_campaign
 from mc_engine.runner import pools as crews
 from mc_engine.runner import runner
-from mc_engine.campaign.cases import nominal_row
 from mc_engine.flight.chunks import NOMINAL_NOISE, fly_nominal
 from mc_engine.flight.flight import fly_history
 
@@ -29,7 +28,7 @@ if len(sys.argv) > 4:
     broken_builds.BREAKS[sys.argv[4]](setattr)
 campaign = load_campaign(folder / "campaign.toml")
 fly_nominal(campaign)
-fly_history(campaign.model, nominal_row(campaign), NOMINAL_NOISE, campaign.seed, folder=campaign.directory)
+fly_history(campaign.model, campaign.nominal, NOMINAL_NOISE, campaign.seed, folder=campaign.directory)
 carry_out = crews.carry_out
 
 def noted(campaign, columns, run, order, guard=None):

@@ -18,7 +18,7 @@ from mutated_records import assert_answered, call, put_companion
 
 from mc_engine import load_campaign, open_store
 from mc_engine.campaign import tables_beside as case_files
-from mc_engine.campaign.orbit_messages import MessageFault, _number
+from mc_engine.campaign.orbit_messages import MessageFault, _finite_number
 from mc_engine.campaign.tables_beside import numbers, read_columns
 from mc_engine.errors import CampaignError
 from mc_engine.model.files import FileFault
@@ -67,7 +67,7 @@ def test_a_cell_is_a_number_as_people_write_it(tmp_path, cell):
 @pytest.mark.parametrize("cell", CELLS)
 def test_a_number_of_an_orbit_message_is_written_so_too(cell):
     with pytest.raises(MessageFault, match=r"line 9: .* is not a finite number"):
-        _number(9, cell)
+        _finite_number(9, cell)
 
 
 def test_plain_numbers_are_read_to_the_last_bit(tmp_path):

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.stats import kstest, norm, spearmanr
 from toy import load
 
-from mc_engine.campaign.cases import case_table, dispersion_records, full_inputs, nominal_row
+from mc_engine.campaign.cases import case_table, dispersion_records, full_inputs
 from mc_engine.errors import CampaignError
 from mc_engine.sampling.designs import EXTENSIBLE, RANDOM
 from mc_engine.sampling.streams import stream
@@ -125,7 +125,7 @@ def test_one_at_a_time_starts_nominal_and_moves_one_input_a_case():
 def test_all_inputs_are_the_nominal_ones_but_for_the_dispersed_columns():
     campaign = load("[parameters]\nheight_km = 3\n" + MORE)
     inputs = full_inputs(campaign, case_table(campaign, np.arange(4)))
-    assert set(inputs) == set(nominal_row(campaign))
+    assert set(inputs) == set(campaign.nominal)
     assert inputs["angle_deg"].shape == (4,)
     assert (inputs["height_km"], inputs["control"], inputs["drag"]) == (3.0, "continuous", True)
 

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from mc_engine.statistics.exact_sums import BLOCK, UNIT_BITS, ExactSum
+from mc_engine.statistics.moments import BLOCK, UNIT_BITS, ExactSum
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 

@@ -19,8 +19,7 @@ from mc_engine.sampling.correlation import normal_correlation
 from mc_engine.sampling.distributions import Constant, Discrete, Empirical, Normal
 from mc_engine.studies.limit_state import FIRST_NOISE, LimitState, chosen_requirement
 from mc_engine.studies.rare_event import estimate_rare_event
-from mc_engine.studies.rare_event_folder import open_rare_event
-from mc_engine.studies.rare_event_lines import outcome_lines
+from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
 
 MINIMAL = SHIPPED / "minimal"
 
@@ -176,7 +175,7 @@ def test_the_command_line_says_probability_interval_cost_and_failures(tmp_path):
     assert done.exit_code == 0, done.output
     assert "below" in done.output or "of not meeting it" in done.output
     record = open_rare_event(tmp_path / "out")
-    for line in outcome_lines(record.result):
+    for line in rare_event_lines(record.result):
         assert line in done.output
     status = CliRunner().invoke(app, ["status", str(tmp_path / "out")])
     assert "requirement  apogee: apogee_altitude_km at least 600 km" in status.output
