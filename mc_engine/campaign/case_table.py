@@ -1,4 +1,7 @@
-"""The file of the design "table": a case a row, a dispersed parameter a column."""
+"""The file of the design "table": one row for each case, one column for each dispersed parameter.
+
+Every problem is noted with file, row and column; nothing is raised.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,7 @@
-"""Campaigns that take inputs from another run: [inputs] checked against that run, or the one to be flown first."""
+"""Campaigns that take inputs from another run: the section [inputs].
+
+It is checked against that run, or against the campaign that has to be flown first.
+"""
 
 import os
 from collections.abc import Callable
@@ -24,7 +27,7 @@ _waiting: ContextVar[int] = ContextVar("_waiting", default=0)  # campaigns of th
 
 
 class _Endless(CampaignError):
-    """A chain that comes back to itself, or is longer than any that is meant; told once, where it begins."""
+    """A chain of campaigns that returns to itself or exceeds `_LONGEST_CHAIN`; reported once, by its first campaign."""
 
 
 def take_inputs(
@@ -36,9 +39,9 @@ def take_inputs(
     load: "Callable[..., Campaign]",
     findings: Findings,
 ) -> "tuple[Upstream | None, Campaign | None]":
-    """What is taken from another run, and the campaign to be flown for it where there is none yet.
+    """The upstream run, and the campaign that has to be flown for it where there is no such run yet.
 
-    run : in place of the one that [inputs] names.  load : reads that campaign, as `load_campaign` does.
+    run : used instead of the one that [inputs] names.  load : reads that campaign, as `load_campaign` does.
     """
     if sections.inputs is None:
         return None, None
@@ -88,7 +91,7 @@ def take_inputs(
 
 
 def _rows_to_come(first: "Campaign") -> "Rows":
-    """The columns that a campaign will have, without a case."""
+    """The columns of a run that has yet to be flown, without rows."""
     from mc_engine.campaign.columns import case_columns
     from mc_engine.campaign.upstream import Rows
     from mc_engine.store.parts import CASE_COLUMNS
@@ -107,7 +110,7 @@ def _rows_to_come(first: "Campaign") -> "Rows":
 
 
 def check_taken(sections: Sections, upstream: "Upstream | None", design: str | None, findings: Findings) -> None:
-    """Inputs that come from upstream and from this file too."""
+    """Note inputs that this file sets although they come from the upstream run."""
     if upstream is None:
         return
     if design == "table":
@@ -121,7 +124,7 @@ def check_taken(sections: Sections, upstream: "Upstream | None", design: str | N
 
 
 def chained_count(section: CampaignSection, rows: int, findings: Findings) -> int:
-    """How many cases a chain has: all of those upstream, or the first so many."""
+    """Number of cases: all of the upstream run, or the first ones as `cases` says."""
     if section.design in RANDOM and section.seed is None:
         findings.add("seed", f"is missing: {CampaignSection.model_fields['seed'].description}")
     if section.table is not None:

@@ -1,4 +1,7 @@
-"""The columns of a case table after case_id, status and reason: what was taken, dispersions, metrics, last state."""
+"""The columns of a run's case table after case_id, status and reason.
+
+In order: columns taken from an upstream run, dispersions, metrics, time and state at the end.
+"""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The dispersions of a campaign: which input, spread how, on the word of which source."""
+"""The dispersions of a campaign: which input varies, by which distribution or levels, and the source of the numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _WITHOUT_UNIT = {"dist", "unit", "levels", "source", "note", "log_sigma", "alpha
 
 @dataclass(frozen=True)
 class Dispersion:
-    """One dispersed input: `spec` as written in the file, and what it means in the parameter's own unit.
+    """One dispersed input: `spec` as written in the file, and its distribution in the parameter's own unit.
 
     distribution : for the random designs.  levels : for "grid" and "one_at_a_time", one value a level.
     """
@@ -47,7 +47,10 @@ def build_dispersion(
     directory: Path,
     findings: Findings,
 ) -> Dispersion:
-    """The dispersion; where something is wrong it is noted in `findings`, and the result is of no use."""
+    """The dispersion that a section [dispersion.NAME] describes.
+
+    Problems are noted in `findings`; the result must not be used then.
+    """
     spec = {
         key: value for key, value in section.model_dump(exclude_none=True).items() if key in section.model_fields_set
     }
@@ -86,7 +89,7 @@ def _converted(key: str, value: Any, unit: str, to: str) -> Any:
 
 
 def _check_keys_fit(spec: Mapping[str, Any], design: str, context: DispersionContext) -> None:
-    """Keys that this design, or this kind of input, has no use for."""
+    """Note keys that this design, or this kind of input, does not use."""
     findings, dist = context.findings, spec.get("dist")
     if design == "table":
         for key in [key for key in spec if key not in ("unit", "source", "note")]:
@@ -109,7 +112,7 @@ def _check_keys_fit(spec: Mapping[str, Any], design: str, context: DispersionCon
 
 
 def _levels(context: DispersionContext, distribution: Distribution | None) -> tuple[Scalar, ...]:
-    """The values that a grid, or one dispersion at a time, goes through."""
+    """The values that the designs "grid" and "one_at_a_time" use."""
     keys = context.keys
     if isinstance(distribution, Discrete):
         return distribution.values

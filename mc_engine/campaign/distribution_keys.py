@@ -1,4 +1,8 @@
-"""From the keys of a [dispersion.NAME] to a distribution in the unit of the model's parameter."""
+"""Builds a distribution, in the unit of the model's parameter, from the keys of a [dispersion.NAME].
+
+One function for each distribution checks its keys; bounds truncate the distribution, and what would leave the range
+that the model accepts is refused.
+"""
 
 import math
 from collections.abc import Callable
@@ -50,7 +54,7 @@ class DispersionContext:
 
 
 def build_distribution(context: DispersionContext) -> Distribution | None:
-    """The distribution that the keys describe; None where there is none, or where a mistake was noted."""
+    """The distribution that the keys describe; None without `dist`, or where a problem was noted."""
     if context.keys.dist is None:
         return None
     before = len(context.findings.problems)
@@ -86,7 +90,7 @@ def _in_order(context: DispersionContext, lower: float, upper: float) -> bool:
 
 
 def _inside_parameter_range(distribution: Distribution, context: DispersionContext) -> Distribution | None:
-    """The distribution checked against what the model accepts; a tail too thin to be drawn is cut."""
+    """The distribution checked against the range that the model accepts; a tail below `_UNSEEN_SHARE` is truncated."""
     low, high = context.item.low, context.item.high
     lowest, highest = distribution.support
     if low <= lowest and highest <= high:

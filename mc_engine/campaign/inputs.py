@@ -1,4 +1,4 @@
-"""Single values checked against the model's inputs: is it a number, in range, one of the words, a date?"""
+"""Checks of single values against the model's inputs, and how values are written in messages."""
 
 from mc_engine.campaign.reading import Findings, shown
 from mc_engine.dates import EXAMPLE, date_text, modified_julian_date

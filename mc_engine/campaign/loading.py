@@ -1,7 +1,7 @@
-"""A campaign: a model, how its inputs are dispersed, and what the results must meet, read from a TOML file.
+"""Reads a campaign from a TOML file: a model, how its inputs are dispersed, and what the results must meet.
 
-`load_campaign` reports every mistake of the file at once and imports neither numba nor scipy nor matplotlib
-by itself.  What the file may say is in `mc_engine.campaign.sections`.
+`load_campaign` reports every mistake of the file at once.  The module itself imports neither numba nor scipy nor
+matplotlib, so that the command line starts fast.  The keys of the file are in `mc_engine.campaign.sections`.
 """
 
 import json
@@ -197,7 +197,7 @@ def _assemble(
     run: Path | None,
     findings: Findings,
 ) -> Campaign | None:
-    """The campaign, or None where it lacks a section or a model to hold the rest against."""
+    """The campaign, or None where a section or the model is missing, without which the rest cannot be checked."""
     messages = spread_covariances(document, directory, findings)
     sections = read_sections(document, findings)
     model = _model(document, directory, findings)
@@ -273,14 +273,14 @@ def _assemble(
 
 
 def _named_design(document: dict[str, Any]) -> str | None:
-    """The design, even where other keys of [campaign] are wrong: the dispersions are read against it."""
+    """The design, even where other keys of [campaign] are wrong: dispersions are checked against it."""
     section = document.get("campaign")
     design = section.get("design") if isinstance(section, dict) else None
     return design if isinstance(design, str) and design in DESIGNS else None
 
 
 def _model(document: dict[str, Any], directory: Path, findings: Findings) -> Model | None:
-    """The model, even where other keys of [campaign] are wrong: the rest of the file is read against it."""
+    """The model, even where other keys of [campaign] are wrong: the rest of the file is checked against it."""
     section = document.get("campaign")
     reference = section.get("model") if isinstance(section, dict) else None
     if not isinstance(reference, str) or not reference:
@@ -315,7 +315,7 @@ def _nominal_inputs(
 def _unknown_names(
     document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: Model, findings: Findings
 ) -> None:
-    """Dispersions of no parameter and requirements of no metric, also where their section is wrong in itself."""
+    """Note unknown parameters and metrics in sections that have mistakes of their own."""
     written = document.get("dispersion")
     for name in written if isinstance(written, dict) else ():
         if name not in sections.dispersions and name not in nominal:

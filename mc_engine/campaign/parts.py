@@ -1,4 +1,4 @@
-"""The parts of a campaign, checked against its model: nominal values, correlations, requirements, retention."""
+"""Checks of a campaign's sections against its model: nominal values, correlations, requirements, histories."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -102,7 +102,7 @@ def _check_default(default: Scalar, item: Parameter | Setting, findings: Finding
 
 
 def with_step_limit(model: Model, section: CampaignSection | None, findings: Findings) -> Model:
-    """The model with the file's own cap on integration steps."""
+    """The model with the file's own limit on integration steps."""
     if section is None or section.max_steps is None:
         return model
     if not isinstance(model.clock, AdaptiveStep):
@@ -114,7 +114,7 @@ def with_step_limit(model: Model, section: CampaignSection | None, findings: Fin
 def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
     """Why the model cannot start from these values, as one sentence; empty if it can.
 
-    Raises ModelError if `prepare` itself breaks.
+    Raises ModelError if `prepare` itself fails.
     """
     if model.prepare is None:
         return ""

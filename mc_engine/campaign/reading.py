@@ -1,4 +1,7 @@
-"""Reading the sections of a campaign file one by one, every mistake turned into a sentence with its place."""
+"""Reads the sections of a campaign file; each mistake becomes one sentence with its place in the file.
+
+A mistake in one section does not hide those in others: each table is validated separately (pydantic).
+"""
 
 import json
 import re
@@ -70,29 +73,29 @@ _MESSAGES = {
 
 @dataclass(frozen=True)
 class Findings:
-    """The problems found so far, and the place in the file where we are looking."""
+    """The problems found so far, and the place in the file that is being checked."""
 
     place: str = ""
     problems: list[Problem] = field(default_factory=list)
 
     def under(self, *names: str) -> "Findings":
-        """The same list, one or more steps further in."""
+        """The same list of problems, for a place one or more steps further in."""
         readable = [name if name.isprintable() else json.dumps(name) for name in names]
         return Findings(".".join(part for part in (self.place, *readable) if part), self.problems)
 
     @property
     def full(self) -> bool:
-        """So much is wrong that no further sentence is shown; it need not say what was meant."""
+        """Whether so many problems are known that no further one is shown, and suggestions need not be searched."""
         return len(self.problems) >= MOST_SHOWN
 
     def add(self, key: str, message: str) -> None:
-        """Note a problem with `key` of the place we are at; the place itself where `key` is empty."""
+        """Note a problem with `key` of the current place, or with the place itself where `key` is empty."""
         self.problems.append(Problem(self.under(key).place, message))
 
 
 @dataclass(frozen=True)
 class Sections:
-    """The sections that could be read; what could not is None or left out, and among the findings."""
+    """The sections of a campaign file that could be read; those with mistakes are None or left out."""
 
     campaign: CampaignSection | None
     parameters: dict[str, Scalar]
@@ -108,7 +111,7 @@ class Sections:
 
 @dataclass(frozen=True)
 class TuningSections:
-    """What could be read of [tuning]; `head` has its plain keys alone, `objective_names` all that are there."""
+    """What could be read of [tuning]; `head` has its plain keys, `objective_names` every name written in the file."""
 
     head: TuningSection | None
     parameters: dict[str, TunedSection]
@@ -231,7 +234,7 @@ def _listed_tables(document: dict[str, Any], name: str, findings: Findings) -> l
 
 
 def _tuning(raw: Any, findings: Findings) -> TuningSections | None:
-    """[tuning], each of its tables read for itself, so that a slip in one hides nothing in the others."""
+    """[tuning], each of its tables read separately, so that a mistake in one does not hide those in others."""
     if not isinstance(raw, dict):
         findings.add("", f"{shown(raw)} is not a table; write [tuning]")
         return None
@@ -281,7 +284,7 @@ def _dispersion(raw: Any, findings: Findings) -> DispersionSection | None:
 
 
 def _slip_of_dist(raw: dict[str, Any]) -> str | None:
-    """The key that was to be `dist`, without which no other key of a dispersion could be judged."""
+    """The misspelt key that was meant to be `dist`: without it no other key of a dispersion can be checked."""
     known = [*LevelsDispersion.model_fields, "dist"]
     others = [key for key in raw if not any(key in section.model_fields for section in DISTRIBUTIONS.values())]
     return next((key for key in others if nearest(key, known) == "dist"), None)

@@ -1,4 +1,4 @@
-"""Where campaign files are: the shipped ones by name, any other by its path."""
+"""Finds campaign files, the shipped ones by name and any other by its path, and reads their text."""
 
 import re
 import tomllib

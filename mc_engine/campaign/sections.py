@@ -1,6 +1,6 @@
-"""The words of a campaign file: its sections, their keys, and the JSON schema of the whole.
+"""The keys of a campaign file: its sections as pydantic models, and their JSON schema.
 
-These classes know nothing of a model; `mc_engine.campaign.loading` holds the file against one.
+These classes do not depend on a model; `mc_engine.campaign.loading` checks a file against one.
 """
 
 import math

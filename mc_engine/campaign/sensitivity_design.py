@@ -1,9 +1,9 @@
-"""The flights beside a run from which the contributions of its inputs are computed: a pick-freeze design.
+"""The section [sensitivity]: a pick-freeze design, flown besides the run, for first-order and total Sobol' indices.
 
-The companion of a campaign is a campaign of its own, whose cases come in blocks (`statistics.pick_freeze`): groups of
-inputs are exchanged between independent points of the campaign's own distributions.  A group is a dispersion, the
-dispersions that a [sensitivity.group] names or that are correlated, the cases of the run upstream, or the random draws:
-the noise made in flight and the parameters that name a draw.
+Its cases form a campaign of their own, the companion, and come in blocks (`statistics.pick_freeze`): groups of inputs
+are exchanged between independent points of the campaign's own distributions.  A group is one dispersion, the
+dispersions that a [sensitivity.group] names or that are correlated, the cases of the upstream run, or the random draws:
+noise made in flight and the parameters that name a draw.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

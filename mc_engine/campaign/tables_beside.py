@@ -1,7 +1,7 @@
-"""Tables next to a campaign file: the cases of the design "table", the numbers of "empirical".
+"""Tables in files next to a campaign file: cases of the design "table", numbers of "empirical" distributions.
 
-CSV (comma, first line the names) or Parquet.  Every fault is a sentence with file, line and column.  What is read has
-bounds, so that no file fills the memory: of its size before it is opened, of its cells while it is read.
+CSV (comma, UTF-8, names in the first line) or Parquet.  Every mistake is one sentence with file, row and column.  File
+size and number of cells are limited, so that no file fills the memory.
 """
 
 import csv
@@ -64,7 +64,7 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
 
 
 def _csv_columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
-    """The columns, gathered row by row; FileFault where they are more than a table of cases may have."""
+    """The columns of a CSV file; FileFault for a table without names, with ragged rows, or with too many cells."""
     filled = ((line, row) for line, row in enumerate(rows, start=1) if any(cell.strip() for cell in row))
     names = [_without_guard(cell) for cell in next(filled, (0, []))[1]]
     if not names:
@@ -99,10 +99,9 @@ def _check_names(path: Path, names: list[str]) -> None:
 
 
 def csv_text(frame: "pd.DataFrame") -> str:
-    """The table as CSV; text in which a spreadsheet would find a formula is guarded by an apostrophe.
+    """The table as CSV; an apostrophe is put before text that a spreadsheet would evaluate as a formula.
 
-    Numbers stay numbers, with all their digits.  `read_columns` takes the apostrophes away again.
-    OWASP, "CSV Injection".
+    Numbers keep all their digits.  `read_columns` removes the apostrophes.  OWASP, "CSV Injection".
     """
     words = {name: frame[name].map(_without_formula) for name in frame.select_dtypes(exclude=["number", "bool"])}
     guarded = frame.assign(**words).rename(columns=_without_formula)

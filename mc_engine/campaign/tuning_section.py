@@ -1,4 +1,4 @@
-"""The tuning of a campaign, checked against its model: what may be chosen, what for, and within which limits."""
+"""The section [tuning], checked against the model: parameters to be chosen, objectives, constraints."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -99,7 +99,7 @@ class Tuning:
 def check_tuning(
     sections: TuningSections, model: Model, dispersed: Iterable[str], design: str | None, findings: Findings
 ) -> Tuning | None:
-    """The tuning, or None if its plain keys could not be read; what is wrong is noted."""
+    """The tuning, or None if its plain keys could not be read; problems are noted in `findings`."""
     dispersed = list(dispersed)
     for kind, entries in (("parameter", sections.parameters), ("objective", sections.objectives)):
         if not entries and not any(
@@ -150,7 +150,7 @@ def check_tuning(
 
 
 def _check_names(sections: TuningSections, findings: Findings) -> None:
-    """Each names a column of the same tables."""
+    """Parameters, objectives and constraints are columns of the same tables, so that their names must differ."""
     owners = dict.fromkeys(OWN_COLUMNS, "a column of every tuning")
     kinds: dict[str, Mapping[str, object]] = {
         "parameter": sections.parameters,

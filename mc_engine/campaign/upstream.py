@@ -1,7 +1,8 @@
-"""The run that a campaign takes inputs from: a chain, in which the end of one flight is the start of the next.
+"""The upstream run of a chain: the run whose results are the inputs of this campaign, case by case.
 
 Case i of the campaign takes its inputs from case i upstream, and its row keeps all columns of that case.  A run
-directory holds a copy of what was taken, so that it can be resumed and replayed by itself.
+directory keeps a copy of the upstream rows (upstream.parquet), so that it can be resumed and replayed without the
+upstream run.
 """
 
 import json
@@ -41,7 +42,7 @@ _OURS = {column.name for column in CASE_COLUMNS}
 
 @dataclass(frozen=True)
 class Rows:
-    """The cases of a run as they stand in its store; `facts` say which run it was."""
+    """The case table of a run, with `facts` that identify the run."""
 
     facts: Mapping[str, Any]
     columns: tuple[Column, ...]
@@ -55,7 +56,7 @@ class Rows:
 
     @cached_property
     def content(self) -> bytes:
-        """A Parquet file of all this: what a run directory keeps, and what digests are taken of."""
+        """A Parquet file of table and facts: what a run directory keeps, and what the digest is computed from."""
         table = arrow_table(self.columns, self.table, self.n_cases, Path(COMPANION))
         metadata = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
         return parquet_bytes(
@@ -65,12 +66,12 @@ class Rows:
 
 @dataclass(frozen=True)
 class Upstream:
-    """What a campaign takes from a run.
+    """What a campaign takes from an upstream run.
 
-    links : input of the model -> column that it takes its values from.  columns : what every row of the campaign
-    keeps, under names that its own columns leave free.  names : a column upstream -> its name here.
-    table : their values, and those of the linked inputs in the units of the model.  nominal : the linked inputs of
-    the nominal case.  failed : bool[n], cases that did not fly to their end.
+    links : input of the model to the upstream column that it takes its values from.  columns : upstream columns that
+        every row of the campaign keeps, under names that its own columns do not use.  names : upstream column to its
+        name here. table : their values, and those of the linked inputs in the model's units.  nominal : the linked
+        inputs of the nominal case.  failed : bool[n], upstream cases that did not complete.
     """
 
     rows: Rows
@@ -92,12 +93,12 @@ class Upstream:
         return sha256(self.rows.content).hexdigest()
 
     def nominal_row(self) -> dict[str, Any]:
-        """What the row of the nominal case keeps: the nominal case upstream, and the linked inputs."""
+        """The upstream columns of the nominal case: the nominal case upstream, and the linked inputs."""
         names = {self.names[column.name]: column.name for column in self.rows.columns if column.name in self.names}
         return {**{name: self.rows.nominal[column] for name, column in names.items()}, **self.nominal}
 
     def refusals(self, case_ids: np.ndarray) -> np.ndarray:
-        """object[n]: why a case has nothing to start from, empty where it has."""
+        """object[n] of str: why a case cannot start, because its upstream case failed; empty where it can."""
         words = self.rows.table["status"][case_ids]
         return np.where(self.failed[case_ids], f"its case of {self.name} ended as " + words.astype(object), "")
 
@@ -137,7 +138,7 @@ def _rows_of_copy(path: Path) -> Rows:
 
 
 def _copy_problem(table: pa.Table, columns: tuple[Column, ...], nominal: Mapping[str, Any]) -> str:
-    """What no engine writes into a copy; empty if every column is there, of its kind, and no value is missing."""
+    """Why the engine cannot have written a copy; empty if every column is there, with its type and no missing value."""
     if not table.schema.equals(arrow_schema(columns)) or any(column.null_count for column in table.columns):
         return "its columns are not those that it names, or have missing values"
     if not np.array_equal(table["case_id"].to_numpy(), np.arange(table.num_rows)):
@@ -164,9 +165,9 @@ def find_run(reference: str, directory: Path) -> Path | None:
 
 
 def link(rows: Rows, section: InputsSection, model: Model, own_columns: Iterable[str], findings: Findings) -> Upstream:
-    """Hold the rows against the model; what does not fit is noted.
+    """The upstream rows matched with the model's inputs; problems are noted.
 
-    own_columns : names that the campaign's own table has, beside those of the inputs.
+    own_columns : names of the campaign's own columns, besides those of the inputs.
     """
     upstream = {column.name: column for column in rows.columns}
     links = _links(upstream, section, model, findings)

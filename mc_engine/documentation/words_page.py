@@ -1,4 +1,4 @@
-"""The words of a report, which the report explains in the same way at its end."""
+"""The glossary page, from the glossary of the report."""
 
 import importlib
 

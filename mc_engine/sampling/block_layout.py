@@ -1,4 +1,4 @@
-"""How the cases of a pick-freeze design lie in blocks (`statistics.pick_freeze`); loads nothing but NumPy."""
+"""The layout of the cases of a pick-freeze design in blocks (see `statistics.pick_freeze`); imports NumPy alone."""
 
 from dataclasses import dataclass
 from itertools import combinations

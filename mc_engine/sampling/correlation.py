@@ -1,8 +1,8 @@
-"""Rank (Spearman) correlation between dispersions, laid on their uniform numbers before the quantiles.
+"""Rank (Spearman) correlation between dispersions, imposed on their uniform numbers before the quantile functions.
 
-`gaussian_copula` works case by case and serves the designs that can be extended; `iman_conover` re-pairs a
-whole Latin hypercube, which keeps its strata.  Both leave the first column, and every dispersion that no
-correlation names, as they were; both aim at rank correlations, so the distributions may be anything.
+`gaussian_copula` works case by case and serves the designs that can be extended; `iman_conover` re-pairs a whole Latin
+hypercube, which keeps its strata.  Both leave the first column, and every dispersion without a correlation, as they
+were; both aim at rank correlations, so the distributions may be anything.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""What a table of cases means: summaries, requirement verdicts, maps.  Tables in, plain records out."""
+"""Statistics of the case table of a run: summaries, verdicts on requirements, maps.  Arrays in, plain records out."""
 
 from mc_engine.statistics.binomial import clopper_pearson, lower_bound, pass_probability, upper_bound
 from mc_engine.statistics.maps import SurfaceMap, map_metric

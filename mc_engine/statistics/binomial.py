@@ -1,14 +1,13 @@
-"""Exact limits on the share of passing cases, for a number of cases that was fixed in advance.
+"""Exact confidence bounds on the probability that a case passes, for a number of cases that was fixed in advance.
 
-Valid for independent cases drawn from the dispersions (design `mc`).  For `lhs` and `sobol` the
-spread of a share is smaller than binomial, so the limits are then on the safe side; for `grid` and
-`one_at_a_time` a share of cases is no probability and none of this applies.  Where the number of cases was decided
-by looking at them, `time_uniform` has the limits that hold.
+Valid for independent cases drawn from the dispersions (design `mc`).  For `lhs` and `sobol` the scatter of the passing
+fraction is smaller than binomial, so the bounds are conservative; for `grid` and `one_at_a_time` a fraction of cases is
+no probability and none of this applies.  Where the number of cases was decided by looking at them, use `time_uniform`.
 
-k of N: with at most k failures among N cases a share is demonstrated.  The same numbers are those of distribution-free
-tolerance limits (Wilks, Ann. Math. Statist. 12 (1941), 91-96): the (k + 1)-th largest of N values is an upper limit to
-the share, and the interval between two order statistics that leaves r values out at each end, those two among them,
-takes as many cases as 2 r - 1 failures.
+k of N: with at most k failures among N cases a probability is demonstrated.  The same numbers are those of
+distribution-free tolerance limits (Wilks, Ann. Math. Statist. 12 (1941), 91-96): the (k + 1)-th largest of N values is
+an upper tolerance limit, and the interval between two order statistics that leaves r values out at each end, those two
+among them, takes as many cases as 2 r - 1 failures.
 
 Clopper & Pearson, Biometrika 26 (1934), 404-413.
 """

@@ -299,5 +299,5 @@ def _paired_share(lost: int, gained: int, n: int, confidence: float) -> Estimate
 
 
 def finite(estimate: Estimate) -> bool:
-    """Whether the number itself is defined."""
+    """Whether the estimate is defined."""
     return isfinite(estimate.value)

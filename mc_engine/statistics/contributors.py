@@ -1,4 +1,4 @@
-"""The inputs that contribute most to a metric, as far as the table of cases tells."""
+"""The inputs that contribute most to a metric: first-order Sobol' indices estimated from the case table."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
@@ -13,7 +13,10 @@ MOST_CASES = 20_000  # above, so many are picked evenly
 
 
 class Contributor(NamedTuple):
-    """An input and the share of the metric's variance that it explains alone; NaN where the cases are too few."""
+    """An input and its first-order index: the fraction of the metric's variance that it explains alone.
+
+    NaN for too few cases.
+    """
 
     name: str
     share: float

@@ -1,12 +1,13 @@
-"""How an estimate came to its value with the number of cases, and whether it has settled.
+"""Running estimates: how a mean or quantile develops with the number of cases, and whether it has converged.
 
-Settled means two things at once, of the estimate from all cases:
-- its interval reaches no farther from it than a stated part of the metric's standard deviation
-  (`CLOSE_MEAN`, `CLOSE_QUANTILE`), so that more cases cannot move it by much;
-- the first and the second half of the cases tell no difference beyond chance (`DRIFT`), so that it does not wander
-  with the case number, which independent cases never do.
-The order is that of the case numbers.  The first n cases of `lhs` are no Latin hypercube of n: their intervals,
-those of independent draws, are on the safe side.
+An estimate from all cases has converged if both hold:
+- its interval reaches no farther from it than a stated part of the metric's standard deviation (`CLOSE_MEAN`,
+  `CLOSE_QUANTILE`), so that more cases cannot change it much;
+- the first and the second half of the cases differ no more than by chance (`DRIFT`), so that it does not drift with the
+  case number, which independent cases never do.
+
+The order is that of the case numbers.  The first n cases of `lhs` are no Latin hypercube of n: their intervals, those
+of independent draws, are conservative.
 """
 
 from dataclasses import dataclass
@@ -46,12 +47,12 @@ class RunningEstimate:
 
     @property
     def close(self) -> float:
-        """What `reach` must not exceed."""
+        """The largest `reach` of a converged estimate, in standard deviations."""
         return CLOSE_MEAN if self.probability is None else CLOSE_QUANTILE
 
     @property
     def settled(self) -> bool:
-        """As the module says."""
+        """Whether the estimate has converged, as the module defines it."""
         return self.reach is not None and self.reach <= self.close and self.halves_p >= DRIFT
 
     @property

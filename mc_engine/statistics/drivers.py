@@ -1,12 +1,12 @@
-"""Which inputs, and which pairs of them, tell the failed cases from the passed ones.
+"""Which inputs, and which pairs of them, separate the failed cases from the passed ones.
 
-For a single input of numbers two rank tests: are failed cases at one end of it, are they at both ends (or in its
-middle).  For a word or a switch: does a level hold more failed cases than its share.  For a pair: does the product of
-the two rank scores tell more than each of the two alone; "more" is meant of the share of failed cases, to which
-single inputs may add as a straight line and a parabola.  Of all tests of a kind, over all inputs and requirements,
-those are reported whose false-discovery rate is held.
+For a number, two rank tests: are failed cases at one end of its range, or at both ends (or in the middle).  For a word
+or a switch: does a level hold more than its share of the failed cases.  For a pair: does the product of the two rank
+scores explain failures beyond a straight line and a parabola of each input.  The false-discovery rate is controlled
+over all tests of a kind, over all inputs and requirements.
 
-A driver is a difference between two groups of cases, not a cause: an input that is correlated with one is one as well.
+A driver is a difference between two groups of cases, not a cause: an input that is correlated with a driver is one,
+too.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -49,7 +49,7 @@ class Driver:
 
 @dataclass(frozen=True)
 class Drivers:
-    """singles and pairs found, strongest evidence first; how many were tested; which requirements could not be.
+    """Singles and pairs found, strongest evidence first, and how many of each were tested.
 
     undecided : requirements with fewer than FEWEST failed or passed cases.
     """
@@ -138,9 +138,9 @@ def success_along(values: Any, passed: np.ndarray, confidence: float = 0.95, bin
 
 
 def _tested_rows(failed: np.ndarray, usable: np.ndarray) -> np.ndarray:
-    """Rows of the cases that are tested: all, or of very many the failed ones and some of the others.
+    """Rows of the cases that are tested: all, or of very many the failed ones and an even choice of the others.
 
-    A test between two groups does not mind how large each of them is.
+    The test compares two groups, so their sizes do not bias it.
     """
     rows = np.flatnonzero(usable)
     if rows.size <= MOST_ROWS:
@@ -202,7 +202,7 @@ def _separation(ranks: np.ndarray, failed: np.ndarray) -> tuple[float, float]:
 
 
 def _level_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
-    """The level that failed cases prefer or avoid most: Fisher's exact test of each level against all others."""
+    """The level with most or fewest failed cases for its size: Fisher's exact test of each level against all others."""
     levels = np.unique(column.values).astype(np.int64)
     n, n_failed = failed.size, int(failed.sum())
     size = np.array([np.count_nonzero(column.values == level) for level in levels])

@@ -1,4 +1,4 @@
-"""First-order indices from the cases at hand: the share of a metric's variance between the bins of an input."""
+"""First-order Sobol' indices from any random cases: variance of a metric between the bins of an input."""
 
 import numpy as np
 from scipy.sparse import csr_array

@@ -1,15 +1,15 @@
-"""Importance sampling by cross entropy: cases drawn where failures are, each with the weight that makes up for it.
+"""Importance sampling by cross entropy: cases are drawn where failures are, and weighted by the ratio of the densities.
 
-The density to draw from is found in levels: at each, the hard limit is softened to Phi(-margin / softness), just so
-much that the next density is within reach of the present one, and a mixture is fitted to the softened failures.  When
-the softened limit is as good as the hard one, the mixture is frozen and fresh cases are drawn from it: the estimate
-rests on these alone, so it has no bias, and its interval is that of a mean.
+The density to draw from is found in levels: at each, the indicator of failure is smoothed to Phi(-margin / softness),
+just so much that the next density can be estimated from the present cases, and a mixture is fitted to the weighted
+cases. When the smoothed indicator is as good as the exact one, the mixture is frozen and fresh cases are drawn from it:
+the estimate uses these alone, so it is unbiased, and its interval is that of a mean.
 
-Papaioannou, Geyer & Straub, Improved cross entropy-based importance sampling with a flexible mixture model,
-Reliability Engineering & System Safety 191 (2019) 106564.
+Papaioannou, Geyer & Straub, Improved cross entropy-based importance sampling with a flexible mixture model, Reliability
+Engineering & System Safety 191 (2019) 106564.
 
-Valid up to some hundred inputs; with noise of the flight that decides the failures, few weights carry the sum, and
-that is said.  A region of failures that no case pointed to has no weight in the interval.
+Valid up to some hundred inputs.  Where noise in flight decides the failures, few weights dominate the sum, which a
+remark says.  A region of failures that no case came near is not covered by the interval.
 """
 
 import math

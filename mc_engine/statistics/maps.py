@@ -1,17 +1,16 @@
 """A metric over two inputs: exact from a full grid, smoothed from scattered cases.
 
-Scattered cases: at each point of a picture grid, a quadratic surface through the nearest cases, weighted by
-distance (local regression, Cleveland & Devlin, J. Am. Stat. Assoc. 83 (1988), 596-610).  How many cases are near is
-for the data to say: the number with the smallest squared error of cases left out one at a time, so that few are
-taken where the metric follows the two inputs closely, and many where the other inputs scatter it.
+Scattered cases: at each point of a plotting grid, a quadratic surface is fitted to the nearest cases, weighted by
+distance (local regression, Cleveland & Devlin, J. Am. Stat. Assoc. 83 (1988), 596-610).  The number of neighbours is
+the one with the smallest leave-one-out error: few where the metric follows the two inputs closely, many where other
+inputs scatter it.
 
-The error given has two parts.  One is the standard error of the fitted value: it holds the scatter of the cases about
-the surface, among it all that the other inputs do.  The other is the bias of a surface that bends within one
-neighbourhood, for which the step to a cubic surface through the same cases stands (the correction of Calonico,
-Cattaneo & Farrell, J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).
-Points outside the hull of the cases, in a hole between them, or where the error is large, are NaN: a map is no
-extrapolation.  Where the two inputs explain less than `LEAST_EXPLAINED` of the metric's variance, in cross-validation
-by the same cases left out one at a time, no point has a value: contours would be those of noise.
+The error has two parts.  One is the standard error of the fitted value, from the scatter of the cases about the
+surface, which includes the effect of all other inputs.  The other is the bias of a surface that bends within one
+neighbourhood, estimated by the step to a cubic surface through the same cases (the correction of Calonico, Cattaneo &
+Farrell, J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).  Points outside the
+hull of the cases, in a hole between them, or with a large error are NaN: a map does not extrapolate.  Where the two
+inputs explain less than `LEAST_EXPLAINED` of the metric's variance in cross-validation, no point has a value.
 """
 
 from dataclasses import dataclass, replace
@@ -110,7 +109,10 @@ def _surface_map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> Su
 
 
 def explained_share(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
-    """The share of the variance of z that a smooth surface over x and y predicts of cases left out; NaN for too few."""
+    """Fraction of the variance of z that a smooth surface over x and y predicts; NaN for too few cases.
+
+    By cross-validation, with cases left out one at a time.
+    """
     surface = map_metric(x, y, z, points=2)
     return np.nan if surface is None else surface.explained
 
@@ -200,8 +202,10 @@ def _hull(cloud: np.ndarray) -> np.ndarray | None:
 
 
 def _chosen_neighbours(tree: cKDTree, cloud: np.ndarray, z: np.ndarray) -> tuple[int, float]:
-    """The number of neighbours that predicts left-out cases best, or a smaller one that is as good; and the share of
-    the variance of z that it predicts."""
+    """(number of neighbours, fraction of the variance of z that it predicts), by leaving cases out one at a time.
+
+    A smaller number is chosen where it predicts as well.
+    """
     rows = np.unique(np.linspace(0, len(cloud) - 1, min(len(cloud), LEFT_OUT)).astype(np.int64))
     choices = [number for number in NEIGHBOURS if number < len(cloud)]
     if len(choices) < 2:

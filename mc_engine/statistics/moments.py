@@ -28,16 +28,16 @@ def finite_values(values: np.ndarray) -> np.ndarray:
 
 
 def near_one(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`values` (float64[n] or [n, k]) in units of a power of two near the largest of each column; and its exponent.
+    """`values` (float64[n] or [n, k]) divided by a power of two near the largest of each column; and its exponent.
 
-    It rounds nothing.  Squares and differences of what comes out neither overflow nor vanish.
+    The division is exact.  Squares and differences of the result neither overflow nor vanish.
     """
     exponent = np.frexp(np.abs(np.where(np.isfinite(values), values, 0.0)).max(axis=0, initial=0.0))[1]
     return np.ldexp(values, -exponent), exponent
 
 
 def in_units(values: np.ndarray | float, exponent: np.ndarray) -> np.ndarray:
-    """What `near_one` has made small, in its own unit again; infinite, and no warning, beyond float64."""
+    """The inverse of `near_one`: values in their own unit again; infinite, without a warning, beyond float64."""
     with np.errstate(over="ignore"):
         return np.ldexp(values, exponent)
 
@@ -82,7 +82,7 @@ def _block_units(values: np.ndarray) -> int:
 
 
 class Tally:
-    """First pass.  n_used : finite values of n_tried."""
+    """First pass: number, extremes and exact sum.  n_used : finite values of n_tried."""
 
     def __init__(self) -> None:
         self.n_used = self.n_tried = 0
@@ -115,7 +115,7 @@ class Tally:
 
 
 class Spread:
-    """Second pass, about the mean of a tally that has seen all values, of which it needs one at least."""
+    """Second pass: powers of the distances from the mean of a complete `Tally` with at least one value."""
 
     def __init__(self, tally: Tally):
         self.tally = tally
@@ -156,7 +156,7 @@ class Spread:
 
     @property
     def shape(self) -> Normality | None:
-        """Shape against the normal; None for fewer than 20 values, or (nearly) constant ones."""
+        """Skewness and kurtosis; None for fewer than 20 values, or (nearly) constant ones."""
         if self.unit <= 1e-13 or self.tally.minimum == self.tally.maximum:
             return None
         n = self.tally.n_used

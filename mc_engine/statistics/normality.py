@@ -1,7 +1,7 @@
-"""A hint whether a metric may be treated as normal: skewness, excess kurtosis and an omnibus test.
+"""Whether a metric may be treated as normal: skewness, excess kurtosis and an omnibus test.
 
-With thousands of cases the test finds deviations that matter to nobody; read the size of skewness and kurtosis
-first.  Below 20 values nothing is said.
+With thousands of cases the test finds deviations that do not matter; look at skewness and kurtosis first.  Needs 20
+values.
 """
 
 from dataclasses import dataclass

@@ -78,7 +78,7 @@ def estimate_place(n: int, probability: float) -> float:
 
 
 def ranks_read(n: int, probability: float, confidence: float = 0.90) -> set[int]:
-    """The ranks (1 ... n) of the order statistics that `quantile` looks at."""
+    """The ranks (1 ... n) of the order statistics that `quantile` uses."""
     place = estimate_place(n, probability)
     return {floor(place), ceil(place), *(rank for rank in quantile_ranks(n, probability, confidence) if rank)}
 
@@ -102,7 +102,7 @@ def quantile(ordered: np.ndarray, probability: float, confidence: float = 0.90) 
 
 
 def ranked_quantile(n: int, at: Callable[[int], float], probability: float, confidence: float = 0.90) -> Quantile:
-    """The same from the order statistics alone: `at` gives the value of a rank of `ranks_read`."""
+    """As `quantile`, from single order statistics: `at` returns the value of a rank of `ranks_read`."""
     place = estimate_place(n, probability)
     below, above = at(floor(place)), at(ceil(place))
     part = place - floor(place)

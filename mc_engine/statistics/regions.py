@@ -1,8 +1,7 @@
-"""Regions of a plane that hold a stated share of a cloud of points: covariance ellipses, and regions of any shape.
+"""Regions of a plane that contain a stated fraction of points: covariance ellipses, and distribution-free regions.
 
-A covariance ellipse holds its stated share of a normal distribution whose covariance is known; clouds are seldom
-normal, so the share of the cases that really lie inside is counted.  `density_region` assumes nothing but that the
-cases are independent draws.
+A covariance ellipse contains its stated fraction of a normal distribution with known covariance; real scatter is seldom
+normal, so the cases inside are counted.  `density_regions` assumes only independent draws.
 """
 
 from dataclasses import dataclass

@@ -1,20 +1,20 @@
-"""Requirement verdicts: is the wanted share of cases inside the limit, shown with the wanted confidence?
+"""Verdicts on requirements: is the required probability of being inside the limit demonstrated?
 
-pass              the lower confidence bound on the passing share reaches the wanted share
-fail              even the upper confidence bound stays below it
+pass              the lower confidence bound on the probability reaches the required one
+fail              even the upper confidence bound is below it
 not demonstrable  the number of cases decides neither way, or the design gives no probabilities
 
 A case that failed, or whose metric is not a number, counts as not inside the limit.
 
 Where the number of cases was decided while looking at them (`looked`), the bounds are those of `time_uniform`, which
-hold at every number of cases at once; else those of `binomial`, which hold for the number fixed in advance.
+hold at every number of cases; else those of `binomial`, which hold for a number fixed in advance.
 
-Several requirements.  Each verdict has the confidence that its requirement asks for.  The joint one counts the cases
-that are inside every limit at once, and wants of them 1 less what each requirement may miss: if each is met, so is
-that (Boole).  It passes if that share is shown and every requirement passes, which then holds with the smallest of
-their confidences (Berger, Technometrics 24 (1982), 295-300).  It fails if one of these tests fails with the error
-allowed, 1 - confidence, divided by their number (Bonferroni); `shared_outcome` is each verdict at that confidence, and
-those hold all at once.
+Several requirements.  Each verdict has the confidence that its requirement asks for.  The joint verdict counts the
+cases inside every limit at once, and requires of them 1 minus the sum of what each requirement may miss: if each is
+met, so is that (Boole).  It passes if that probability is demonstrated and every requirement passes, which then holds
+with the smallest of their confidences (Berger, Technometrics 24 (1982), 295-300).  It fails if one of these tests fails
+with the error allowed, 1 - confidence, divided by their number (Bonferroni); `shared_outcome` is each verdict at that
+confidence, and those hold all at once.
 """
 
 from collections import Counter

@@ -1,9 +1,10 @@
-"""Order statistics of values that are seen part by part: exact, in two to four passes, whatever the order of parts.
+"""Exact order statistics of values that are read part by part, in two to four passes and any order of the parts.
 
-The bits of a float64, read as a whole number of 64 bits, can be made to sort as the values do.  Each pass counts 16
-of these bits, from the leading ones on, among the values that agree with a wanted one so far (radix selection:
-D. E. Knuth, The Art of Computer Programming, vol. 3, 2nd ed., 5.2.5 and 5.3.3); once they are few, the next pass
-keeps and sorts them, and is the last.  Counts of parts are added.
+The bits of a float64, read as a 64-bit integer, can be made to sort as the values do.  Each pass counts 16 of these
+bits, beginning with the leading ones, among the values that agree with a wanted one so far (radix selection: D. E.
+Knuth, The Art of Computer Programming, vol. 3, 2nd ed., 5.2.5 and 5.3.3); once few values are left, the next pass keeps
+and sorts them, and is the last.  Counts of parts are added.
+
 Memory: 65 536 counts per wanted rank, or FEW values, whatever the number of values.
 """
 

@@ -56,10 +56,10 @@ class Members(NamedTuple):
 
 
 class Climb(NamedTuple):
-    """Where the levels led to.
+    """The last level reached.
 
-    reached : float64[runs], each run's probability of the last level, which `members` stand for.  weight : float64, of
-    every case flown.  flat : whether ties of the margin ended it.
+    reached : float64[runs], each run's probability of the last level, which `members` represent.  weight : float64, of
+        every case flown.  flat : whether equal margins ended the levels.
     """
 
     members: Members
@@ -104,7 +104,7 @@ def subset_simulation(
 
 
 def _run_levels(flights: Flights, rng: np.random.Generator, n_inputs: int, runs: int, per_run: int) -> Climb:
-    """Level by level to the failures, or to where there is no further level."""
+    """Level by level to the failures, or until there is no further level."""
     n = per_run * runs
     fresh, run = np.full(n, FRESH), np.repeat(np.arange(runs), per_run)
     members = _flown(flights, rng.standard_normal((n, n_inputs)), fresh, run, 0)

@@ -1,8 +1,8 @@
-"""Summary of one metric over the cases: how many numbers there are, where they lie, how surely.
+"""Summary of one metric over the cases: moments, extremes and quantiles with their confidence intervals.
 
-Every summary says n_used of n_tried: failed cases and NaN have no number, and are never dropped silently.
-Nothing in it is an approximation of a stream: mean and quantiles are exact whether the values are at hand
-(`summarize`) or seen part by part (`streaming`), and no bit depends on the order or the size of the parts.
+Every summary states n_used of n_tried: failed cases and NaN have no number, and are never dropped silently.  Mean and
+quantiles are exact, whether the values are in memory (`summarize`) or read part by part (`streaming`), and no bit
+depends on the order or the size of the parts.
 """
 
 from dataclasses import dataclass
@@ -52,13 +52,12 @@ class Summary:
 
     @property
     def constant(self) -> bool:
-        """All values that there are are the same, but for rounding."""
+        """Whether all values are the same, but for rounding."""
         return self.minimum is not None and self.maximum is not None and nearly_equal(self.minimum, self.maximum)
 
     @property
     def spread(self) -> float | None:
-        """sd, or None where it is that of rounding or nothing: the digits of a number that it would ask for mean
-        nothing."""
+        """The standard deviation, or None where it is only rounding."""
         return None if self.constant else self.sd
 
     def at(self, probability: float) -> Quantile | None:

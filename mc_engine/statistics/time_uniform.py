@@ -1,19 +1,19 @@
-"""Limits on the share of passing cases that hold at every number of cases at once, whoever stops when and why.
+"""Confidence bounds on the probability that a case passes that hold at every number of cases at once (anytime-valid).
 
-Clopper-Pearson limits hold for a number of cases that was fixed in advance.  Looked at again and again until they
-say what one hopes for, they are wrong more often than promised.  The limits here may be looked at after every case:
-with the stated confidence they hold at all of them.  They are wider; near 99.73 % with 90 % confidence and no
-failure, 1104 cases take the place of 852.
+Clopper-Pearson bounds hold for a number of cases that was fixed in advance.  Checked repeatedly until they show what
+one hopes for, they are wrong more often than stated.  These bounds may be checked after every case and hold at all of
+them with the stated confidence.  They are wider; near 99.73 % with 90 % confidence and no failure, 1104 cases are
+needed instead of 852.
 
-A failure rate q0 is given up once the mixed likelihood ratio
+A failure rate q0 is rejected once the mixed likelihood ratio
 
     e(q0) = integral of w(q) (q / q0)^k ((1 - q) / (1 - q0))^(n - k) dq       k failures in n cases
 
-reaches 1 / (1 - confidence).  Under q0 it is a martingale that starts at 1, so it ever gets there with a probability
-of at most 1 - confidence (Ville, Etude critique de la notion de collectif, 1939; Robbins, Ann. Math. Statist. 41
-(1970), 1397-1409; Howard, Ramdas, McAuliffe & Sekhon, Ann. Statist. 49 (2021), 1055-1080).  The weights w(q) go as
-q^(-1/2) on the side that would refute q0, below it for the lower limit on the passing share and above it for the
-upper one, and as nothing on the other.  Valid for independent cases (design `mc`).
+reaches 1 / (1 - confidence).  Under q0 it is a martingale that starts at 1, so it ever gets there with a probability of
+at most 1 - confidence (Ville, Etude critique de la notion de collectif, 1939; Robbins, Ann. Math. Statist. 41 (1970),
+1397-1409; Howard, Ramdas, McAuliffe & Sekhon, Ann. Statist. 49 (2021), 1055-1080).  The weights w(q) are proportional
+to q^(-1/2) on the side that would refute q0, below it for the lower bound on the passing probability and above it for
+the upper one, and zero on the other.  Valid for independent cases (design `mc`).
 """
 
 from collections.abc import Callable

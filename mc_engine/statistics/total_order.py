@@ -1,15 +1,15 @@
-"""Total indices from the cases at hand: what an input does to a metric alone and together with others.
+"""Total Sobol' indices from any random cases: the effect of an input alone and together with others.
 
     total[i] = E[Var(metric | all inputs but i)] / Var(metric)
 
 A surrogate of the metric is fitted to the cases: a sum of products of orthonormal functions of one, two and (between
-inputs that were found to act in pairs) three inputs, only those products that the cases show beyond chance.  Of such
-a sum every variance is the sum of the squared coefficients.  Steps of a single input, which polynomials follow badly,
-are added from the means of its bins.
+inputs that were found to act in pairs) three inputs, with only those products that are significant.  The variance of
+such a sum is the sum of the squared coefficients.  Steps in a single input, which polynomials follow badly, are added
+from the means of its bins.
 
-Holds for inputs that are independent of each other.  What the surrogate does not explain (noise in flight, sharp
-corners of three and more inputs, an edge between passed and failed cases) belongs to no input: `unexplained` says how
-much of the variance that is, and a total index may lie higher by up to it.
+Valid for independent inputs.  What the surrogate does not explain (noise in flight, sharp corners of three and more
+inputs, an edge between passed and failed cases) belongs to no input: `unexplained` is its fraction of the variance, and
+a total index may be larger by up to it.
 
 Sudret, Reliab. Eng. Syst. Saf. 93 (2008), 964-979 (indices from polynomial chaos); Blatman & Sudret, Prob. Eng. Mech.
 25 (2010), 183-197 (sparse, chosen by the data).

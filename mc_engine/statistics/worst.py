@@ -1,7 +1,7 @@
 """The worst cases of a metric: those with the smallest margin to the nearest limit that a requirement sets.
 
-A metric without a requirement has no bad side of its own: its worst cases are then those with the largest values, or
-with the smallest where somebody asks for them.  Failed cases have no number and are listed apart.
+Without a requirement, the largest values are the worst, or the smallest where the campaign file asks for them.  Failed
+cases have no number and are listed separately.
 """
 
 from collections.abc import Iterable, Mapping
@@ -84,7 +84,10 @@ def worst_cases(
 
 
 class WorstSoFar:
-    """The same of cases that are seen part by part, in the order of their numbers.  case_ids : of the worst, int64."""
+    """As `worst_cases`, for cases that are read part by part in the order of their numbers.
+
+    case_ids : int64, of the worst.
+    """
 
     def __init__(self, count: int, limits: Limits):
         self.count, self.limits = count, limits

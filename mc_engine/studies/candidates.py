@@ -1,7 +1,8 @@
-"""Candidates of a tuning: choices of the tuned parameters, flown side by side and measured.
+"""Candidates of a tuning: sets of values of the tuned parameters, flown together and scored.
 
-A generation of candidates, times the dispersed cases where a quantile is wanted, is one table of cases for the lane
-engine.  Every candidate flies the same cases with the same noise, so that two candidates differ by their choice alone.
+All candidates of a generation, times the dispersed cases where a quantile is asked for, are flown as one table of
+cases. Every candidate flies the same cases with the same noise, so that two candidates differ by their parameters
+alone.
 """
 
 from collections import Counter
@@ -23,12 +24,13 @@ _MEANING = {name: STATUS_TEXT[code] for code, name in STATUS_NAME.items()}
 
 @dataclass(frozen=True)
 class Scores:
-    """What n candidates come to, in declared units.  NaN: the nominal case, or too many of the others, failed.
+    """Scores of n candidates, in declared units.  NaN: the nominal case, or too many of the dispersed ones, failed.
 
-    objectives : float64[n, n_objectives];  limited : float64[n, n_constraints], the metrics under constraints
-    excess : float64[n, n_constraints], how far each is beyond its limit, in shares of that limit; 0 inside
-    failed : int64[n], cases that did not fly to their end;  reasons : object[n], how and why most of these ended, in
-        words, empty where none failed
+    objectives : float64[n, n_objectives]
+    limited : float64[n, n_constraints], the metrics under constraints
+    excess : float64[n, n_constraints], how far each is beyond its limit, as a fraction of that limit; 0 inside
+    failed : int64[n], cases that did not complete
+    reasons : object[n] of str, the commonest failure of each candidate; empty where none failed
     """
 
     objectives: np.ndarray
@@ -85,9 +87,10 @@ def fly_candidates(campaign: Campaign, tuning: Tuning, candidates: np.ndarray, w
 
 
 def commonest_failure(status: Iterable[str], reason: Iterable[str]) -> str:
-    """How and why most of some failed cases ended, as "refused: ..."; of equally many the first, empty without any.
+    """The commonest status and reason among failed cases, as "refused: ..."; empty without any.
 
-    status, reason : of each failed case; without a reason of its own, what the status means.
+    status, reason : of each failed case; without a reason, the meaning of the status is used.  Of equally common ones,
+        the first.
     """
     ends = Counter(f"{how}: {why or _MEANING[how]}" for how, why in zip(status, reason, strict=True))
     return ends.most_common(1)[0][0] if ends else ""

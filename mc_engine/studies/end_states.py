@@ -1,4 +1,4 @@
-"""The end states of a run for other tools: as CSV, and as ephemerides of one point a case (CCSDS OEM, KVN).
+"""End states of a run exported as CSV, or as ephemerides with one point for each case (CCSDS OEM, KVN).
 
 CCSDS 502.0-B-3, Orbit Data Messages (2023), section 5.
 """

@@ -1,7 +1,7 @@
-"""The search behind `mc-engine tune`: NSGA-II of pymoo, asked for candidates and told what they came to.
+"""The search of `mc-engine tune`: NSGA-II of pymoo, through its ask-and-tell interface.
 
 K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002), 182-197; its
-constraints: a feasible candidate beats any other, of two others the one with the smaller violation.
+constraint handling: a feasible candidate beats any other, of two infeasible ones the one with the smaller violation.
 """
 
 from typing import Any
@@ -19,7 +19,7 @@ _CROSSOVER_INDEX, _MUTATION_INDEX = 15.0, 20.0  # Deb's distribution indices: ho
 
 
 class GeneticSearch:
-    """One search; `ask` and `tell` in turn.  The same seed and the same answers give the same candidates."""
+    """One search: call `ask` and `tell` in turn.  The same seed and scores give the same candidates."""
 
     def __init__(self, tuning: Tuning, population: int, seed: int):
         """EngineError in a sentence if pymoo is not installed."""
@@ -44,14 +44,14 @@ class GeneticSearch:
         self._asked: Any = None
 
     def ask(self) -> np.ndarray:
-        """The next generation, float64[n, n_tuned]; no rows where the search makes no child that is new to it."""
+        """The next generation, float64[n, n_tuned]; no rows where the search finds no new candidate."""
         self._asked = self._algorithm.ask()
         if self._asked is None or not len(self._asked):
             return np.empty((0, self._problem.n_var))
         return np.array(self._asked.get("X"), dtype=np.float64)
 
     def tell(self, scores: Scores) -> None:
-        """What the candidates of the last `ask` came to."""
+        """Report the scores of the candidates of the last `ask`."""
         dead = ~np.isfinite(scores.violation)
         objectives = np.where(np.isfinite(scores.objectives), scores.objectives * self._signs, _WORST)
         excess = np.column_stack([np.nan_to_num(scores.excess, nan=0.0), np.where(dead, _DEAD, 0.0)])

@@ -1,7 +1,7 @@
-"""How fast a model flies on one thread, one case at a time and in lanes: the time of the kernel calls alone.
+"""Speed of a model on one thread, one case at a time and in SIMD batches: the time of the kernel calls alone.
 
-Compiling, or loading the compiled kernel, is kept apart.  The builds take turns at short flights and the shortest time
-of each counts, so that other work on the machine disturbs little.
+Compiling, or loading the compiled kernel, is timed separately.  The builds take turns at short flights and the shortest
+time of each counts, so that other work on the machine has little influence.
 """
 
 import time

@@ -1,11 +1,11 @@
-"""A campaign as a limit state: from standard normal numbers to the margin that a flown case has to a requirement.
+"""A campaign as a limit state function: from standard normal numbers to the margin of a case to a requirement.
 
-Each dispersed input has one standard normal number u, independent of the others.  Its share of the distribution is
-Phi(u), correlations are laid on as the campaign's designs lay them on, and the quantile of the share is the input.
-So the cases have the distribution that the campaign file says, for any of its random designs.
+Each dispersed input has one independent standard normal number u.  Phi(u) is its probability, the campaign's
+correlations are applied to these, and the input is the quantile.  The cases so have the distribution that the campaign
+file describes.
 
-Noise of the flight belongs to the number of a case.  Cases here are numbered from FIRST_NOISE on, so that none shares
-its noise with a case of the campaign's own runs.
+Noise in flight is addressed by the number of a case.  Numbers here begin at FIRST_NOISE, so that no case has the noise
+of a case of the campaign's own runs.
 """
 
 import os
@@ -124,7 +124,7 @@ def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:
 
 
 def refuse_unmappable(campaign: Campaign) -> None:
-    """CampaignError for a campaign whose inputs are no continuous function of normal numbers."""
+    """Raise CampaignError for a campaign whose inputs are not continuous functions of standard normal numbers."""
     problems = []
     if campaign.upstream is not None or campaign.first is not None:
         message = "takes inputs from another run, whose cases cannot be moved towards failure; give distributions"

@@ -1,11 +1,11 @@
-"""A run and its cases for an interactive session: what was asked, what came out, and how each case went.
+"""Runs and cases for an interactive session or a notebook: verdicts, statistics, case table, time histories.
 
     run = open_run("runs/deorbit")
     run.verdicts                  every requirement, judged
     run.cases                     the case table, a pandas DataFrame
-    run.case(17).history()        its flight, from the store or flown again
+    run.case(17).history()        its time history, from the store or flown again
 
-`Run` and `Case` show themselves as tables in a notebook.  They read; what writes is in `mc_engine.store.store`.
+They only read; methods that write are in `mc_engine.store.store`.
 """
 
 from base64 import b64encode

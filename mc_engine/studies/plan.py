@@ -1,4 +1,4 @@
-"""How many cases demonstrate a required probability: tables for one, and for the requirements of a campaign."""
+"""Test planning: how many cases demonstrate a required probability, for one requirement and for those of a campaign."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -21,9 +21,10 @@ ROWS = 6  # failures 0 to 5
 
 
 class PlanRow(NamedTuple):
-    """failures allowed among `cases`; `shown` is the share that they still demonstrate.
+    """`cases` is the smallest number of cases that demonstrates the required probability with `failures` failures.
 
-    half_rate : probability that so many cases pass a system that fails half as often as it may.
+    shown : probability that they demonstrate (lower confidence bound)
+    half_rate : probability that so many cases pass a system that fails half as often as required
     """
 
     failures: int
@@ -98,7 +99,7 @@ def _requirement_block(
 
 
 def _allowance(cases: int, share: float, confidence: float) -> str:
-    """What the file's own number of cases comes to."""
+    """How many failures the campaign's own number of cases allows."""
     accepted = acceptance_number(cases, share, confidence)
     if accepted is None:
         needed = plan_row(share, confidence, 0).cases

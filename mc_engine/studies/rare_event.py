@@ -1,8 +1,8 @@
-"""The probability that a campaign's requirement is not met, far below what its plain cases can show.
+"""Probability that a campaign violates a requirement, far below what its plain cases can show.
 
-The campaign is flown as it stands, on its own model, distributions and correlations; only where in their space the
-cases lie is chosen, by `statistics.subset_simulation` or `statistics.importance_sampling`.  The same campaign, method,
-numbers and seed give the same result, whatever the number of threads.
+Model, distributions and correlations are the campaign's own; only the sampling differs: `statistics.subset_simulation`
+or `statistics.importance_sampling`.  The same campaign, method, settings and seed give the same result on any number of
+threads.
 """
 
 import math
@@ -109,7 +109,7 @@ def _flown_cases(limit: LimitState, estimate: RareEvent) -> tuple[list[Column], 
 
 
 def _result_record(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
-    """The result as JSON knows it: None for what is infinite."""
+    """The result as JSON; None for infinite values."""
     metric = next(candidate for candidate in limit.campaign.model.metrics if candidate.name == limit.requirement.metric)
     inputs, remark = _failed_inputs(limit, estimate)
     return {
@@ -132,11 +132,11 @@ def _result_record(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
 
 
 def _failed_inputs(limit: LimitState, estimate: RareEvent) -> tuple[list[dict[str, Any]], list[str]]:
-    """(where failures are, a record an input; a remark where one mean does not describe them).
+    """Where failures lie: one record for each input, and a remark where one mean does not describe them.
 
     The likeliest failed case is the one nearest to the origin of standard normal space, where the density is greatest:
-    the design point of structural reliability, as near as the cases came to it.  Where failures lie apart, the
-    likeliest one on the other side of the origin is added, if there is one.
+    the design point of structural reliability, as near as the cases came to it.  Where failures lie in several regions,
+    the likeliest failed case on the opposite side of the origin is added, if there is one.
     """
     failed = np.flatnonzero(estimate.cases.failed)
     if not failed.size:

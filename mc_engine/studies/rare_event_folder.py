@@ -1,8 +1,8 @@
-"""The directory of a rare event's estimate: what `mc-engine rare` leaves behind.
+"""The directory that `mc-engine rare` writes, and its result as text.
 
     rare.toml   rare.json   cases.parquet   journal.jsonl
 
-Which of them count, and with which bytes, the journal says; see `result_folder`.
+The journal holds the checksums of the other files; see `store.result_folder`.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ METHOD_WORDS = {
 
 @dataclass(frozen=True)
 class RareEventRecord:
-    """An estimate: record is what rare.json holds, cases every case flown for it, in order."""
+    """A rare-event estimate: `record` is the content of rare.json, `cases` every case flown for it, in order."""
 
     path: Path
     record: dict[str, Any]

@@ -1,4 +1,4 @@
-"""What `replay` leaves in a run: the history of one case as Parquet, and a picture of it."""
+"""The files of `mc-engine replay` in a run directory: the time history of one case as Parquet, and a plot of it."""
 
 import re
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What changed in code and campaign between two runs, as their manifests and campaign files tell it."""
+"""Differences in code and campaign between two runs, from their manifests and campaign files."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
-"""Tuning: a search for the parameters with the best metrics, nominal or over dispersed cases, within limits.
+"""Tuning: a search for the parameters with the best metrics, nominal or over dispersed cases, within constraints.
 
-A generation is flown as one table of cases; see `candidates`.  What is kept is every candidate that was flown, and the
-front is taken from all of them, not from the last generation alone.
+A generation is flown as one table of cases; see `candidates`.  Every candidate flown is kept, and the front is computed
+from all of them, not from the last generation alone.
 """
 
 import os

@@ -1,8 +1,8 @@
-"""The directory of a tuning: what `mc-engine tune` leaves behind.
+"""The directory that `mc-engine tune` writes, and its result as text.
 
     tuning.toml   tuning.json   evaluations.parquet   generations.parquet   front.parquet   journal.jsonl
 
-All of them are replaced together after each generation: whenever the search is killed, what counts is whole.
+All files are replaced together after each generation, so that a killed search leaves the result of a whole generation.
 """
 
 from dataclasses import dataclass
