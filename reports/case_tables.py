@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.shell_words import shell_word
-from mc_engine.statistics.contributors import Contributor, contributors
+from mc_engine.statistics.first_order import Contributor, contributors
 from mc_engine.statistics.worst import Limits
 from reports.document import Cell, Column, Table
 from reports.flown import ColumnFacts, Flown

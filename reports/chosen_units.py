@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.statistics import Summary, Verdict
-from mc_engine.statistics.contributors import Contributor
+from mc_engine.statistics.first_order import Contributor
 from mc_engine.statistics.worst import Limits
 from mc_engine.units import convert
 from reports.flown import ColumnFacts, Flown

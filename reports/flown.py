@@ -10,7 +10,7 @@ import pandas as pd
 
 from mc_engine.model.figures import KINDS, MapFigure, ScatterFigure, from_record
 from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, was_looked_at
-from mc_engine.statistics.contributors import Contributor, contributors
+from mc_engine.statistics.first_order import Contributor, contributors
 from mc_engine.statistics.worst import Limits, limits_on
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
 from reports.all_cases import Run, all_cases, without_attributes

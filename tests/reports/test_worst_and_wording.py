@@ -9,7 +9,7 @@ from synthetic_run import synthetic_run
 
 import reports
 from mc_engine.model.figures import MapFigure, ScatterFigure, to_record
-from mc_engine.statistics.contributors import contributors
+from mc_engine.statistics.first_order import contributors
 from mc_engine.statistics.maps import explained_share
 from mc_engine.statistics.worst import Limits, limits_on
 from reports.contents import build
