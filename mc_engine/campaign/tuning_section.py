@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from mc_engine.campaign.inputs import check_value, inputs_of, number
 from mc_engine.campaign.parts import check_limits, check_metric
@@ -10,6 +11,7 @@ from mc_engine.campaign.sections import ConstraintSection, ObjectiveSection, Tun
 from mc_engine.model.fields import Setting
 from mc_engine.model.record import Model
 from mc_engine.sampling.designs import RANDOM
+from mc_engine.section import Section
 from mc_engine.suggestions import hint, listed
 
 # columns of a tuning's tables beside those named by parameters, objectives and constraints
@@ -122,31 +124,19 @@ def check_tuning(
     head = sections.head
     if head is None:
         return None
+    tables = {"parameter", "objective", "constraint", "published"}
     return Tuning(
-        parameters=tuple(
-            Tuned(name, parameter.lower, parameter.upper, parameter.source)
-            for name, parameter in sections.parameters.items()
-        ),
-        objectives=tuple(
-            Objective(name, objective.metric, objective.goal, objective.quantile)
-            for name, objective in sections.objectives.items()
-        ),
-        constraints=tuple(
-            Constraint(
-                name, constraint.metric, constraint.at_most, constraint.at_least, constraint.quantile, constraint.source
-            )
-            for name, constraint in sections.constraints.items()
-        ),
-        published=tuple(
-            PublishedPoint(point.name, point.values, point.source) for point in sections.published.values()
-        ),
-        population=head.population,
-        generations=head.generations,
-        patience=head.patience,
-        seed=head.seed,
-        crossover=head.crossover,
-        mutation=head.mutation,
+        parameters=tuple(Tuned(name, **_values(section)) for name, section in sections.parameters.items()),
+        objectives=tuple(Objective(name, **_values(section)) for name, section in sections.objectives.items()),
+        constraints=tuple(Constraint(name, **_values(section)) for name, section in sections.constraints.items()),
+        published=tuple(PublishedPoint(**_values(section)) for section in sections.published.values()),
+        **head.model_dump(exclude=tables),
     )
+
+
+def _values(section: Section) -> dict[str, Any]:
+    """The keys of a section that a tuning keeps, as its record has them."""
+    return section.model_dump(exclude={"note"})
 
 
 def _check_names(sections: TuningSections, findings: Findings) -> None:

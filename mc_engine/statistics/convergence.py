@@ -109,7 +109,7 @@ def running_quantile(values: np.ndarray, probability: float, confidence: float =
         return None
     quantiles = [quantile(np.sort(finite[:n]), probability, confidence) for n in used]
     estimate, lower, upper = (
-        np.array([getattr(estimate_, name) for estimate_ in quantiles], dtype=np.float64)
+        np.array([getattr(interval, name) for interval in quantiles], dtype=np.float64)
         for name in ("value", "lower", "upper")
     )
     ends = np.array([estimate[-1] - lower[-1], upper[-1] - estimate[-1]])

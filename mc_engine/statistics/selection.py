@@ -96,11 +96,11 @@ class Selection:
         """The end: whole keys, from those kept."""
         keys = np.sort(np.concatenate([np.zeros(0, dtype=np.uint64), *self.kept]))
         below = 64 - DIGIT_BITS * self.digit
-        keys_found = {}
+        whole_keys = {}
         for rank, (beginning, left) in self.wanted.items():
             first = int(np.searchsorted(keys, np.uint64(beginning << below)))
-            keys_found[rank] = (int(keys[first + left - 1]), 1)
-        return Selection(keys_found, PASSES)
+            whole_keys[rank] = (int(keys[first + left - 1]), 1)
+        return Selection(whole_keys, PASSES)
 
     @property
     def values(self) -> dict[int, float]:

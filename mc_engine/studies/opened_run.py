@@ -55,8 +55,8 @@ def open_run(path: str | Path) -> "Run":
 class _Metrics(dict[str, "Summary"]):
     """Summaries by metric; a name that is not there is answered with the nearest."""
 
-    def __init__(self, path: Path, summaries_: "dict[str, Summary]"):
-        super().__init__(summaries_)
+    def __init__(self, path: Path, by_name: "dict[str, Summary]"):
+        super().__init__(by_name)
         self._path = path
 
     def __missing__(self, name: str) -> "Summary":
