@@ -12,9 +12,10 @@ import numpy as np
 from mc_engine.campaign.columns import END_TIME
 from mc_engine.errors import ModelError
 from mc_engine.flight.kernel import build_kernel, usual_width
-from mc_engine.flight.kernel_parts import settings_class
+from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.interruption import in_another_thread
 from mc_engine.lanes.functions import TABLES
+from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
 from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model.fields import AdaptiveStep, FixedStep
@@ -264,7 +265,8 @@ def _bound_kernel(
     kernel = kernel or build_kernel(model, folder, width)
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
     kernel_settings = _kernel_settings(model, settings, chosen)
-    shared = np.ascontiguousarray(parameters), kernel_settings, np.uint64(noise_key(seed)), cases
+    data = gathered(blocks_of(model))
+    shared = np.ascontiguousarray(parameters), kernel_settings, data, np.uint64(noise_key(seed)), cases
     if isinstance(clock, AdaptiveStep):
         return partial(kernel, *shared, *adaptive_arguments(model, clock, chosen), *out, history, float(pace))
     return partial(kernel, *shared, *grid_of(clock, chosen), *out, history, int(pace))

@@ -49,7 +49,9 @@ class InterpretedFlight:
         )
         self._model, self._settings = model, settings_class(model)
 
-    def kernel(self, parameters: np.ndarray, settings: np.ndarray, key: Any, cases: np.ndarray, *rest: Any) -> int:
+    def kernel(
+        self, parameters: np.ndarray, settings: np.ndarray, data: Any, key: Any, cases: np.ndarray, *rest: Any
+    ) -> int:
         """Fly the first case; arguments and results are those of the model's kernel."""
         model, adaptive = self._model, isinstance(self._model.clock, AdaptiveStep)
         fly = self._interpreted("adaptive_flight" if adaptive else "fixed_step")["fly"]

@@ -40,13 +40,17 @@ _FIXED = '''"""Kernel of {reference}, {width} cases at a time.  Written by the e
 from mc_engine.flight.kernel_parts import Functions
 from mc_engine.lanes.compiler import compile_kernel
 from mc_engine.lanes.fixed_step import fly
+from mc_engine.lanes.kernel_data import hand_over
 
-_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = PARTS
+_F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 {names} = _F
 
 
 @compile_kernel
-def kernel(parameters, settings, key, cases, n_steps, h, control_every, time, status, state, metrics, history, stride):
+def kernel(
+    parameters, settings, data, key, cases, n_steps, h, control_every, time, status, state, metrics, history, stride,
+):
+    hand_over(BLOCKS, data)
     f = Functions({names})
     grid, kinds, out = (n_steps, h, control_every), (HAS_EVENTS, MUST_STOP), (time, status, state, metrics)
     return fly(f, Parameters, Settings, {width}, parameters, settings, key, cases, grid, kinds, out, history, stride)
@@ -58,16 +62,18 @@ import numpy as np
 from mc_engine.flight.kernel_parts import Functions
 from mc_engine.lanes.adaptive_flight import fly
 from mc_engine.lanes.compiler import compile_kernel
+from mc_engine.lanes.kernel_data import hand_over
 
-_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = PARTS
+_F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 {names} = _F
 
 
 @compile_kernel
 def kernel(
-    parameters, settings, key, cases, nodes, starts, columns, weights, clock, atol, time, status, state, metrics,
+    parameters, settings, data, key, cases, nodes, starts, columns, weights, clock, atol, time, status, state, metrics,
     history, spacing,
 ):
+    hand_over(BLOCKS, data)
     f = Functions({names})
     tables, out = (nodes, starts, columns, weights), (time, status, state, metrics)
     return fly(

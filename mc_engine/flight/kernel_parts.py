@@ -5,7 +5,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from mc_engine.lanes import physics
+from mc_engine.lanes.block_search import blocks_in
 from mc_engine.lanes.functions import TABLES
+from mc_engine.lanes.kernel_data import Blocks, DataBlock
 from mc_engine.model.event_watch import watching_events
 from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum
 from mc_engine.model.record import Model, NoMemory
@@ -20,6 +22,7 @@ Functions = namedtuple(
     "initial start rhs control events switch observe evaluate peaks_of lasts_of best_of when_of smooth_of kinds_of "
     "signs_of stops_of switches_of states_of metrics_of",
 )
+_PHYSICS = Functions._fields[:8]
 NoEvents = namedtuple("NoEvents", "unused")
 
 
@@ -51,6 +54,7 @@ class Parts(NamedTuple):
     settings: type
     has_events: bool
     must_stop: bool
+    blocks: Blocks
 
 
 def settings_class(model: Model) -> type:
@@ -64,7 +68,13 @@ def parts_of(model: Model, watching: bool) -> Parts:
     model = watching_events(model) if watching else model
     actions = [event.action for event in model.event_list]
     settings = settings_class(model)
-    return Parts(functions_of(model), model.kernel_parameters, settings, bool(actions), "stop" in actions)
+    kinds = bool(actions), "stop" in actions
+    return Parts(functions_of(model), model.kernel_parameters, settings, *kinds, Blocks(blocks_of(model)))
+
+
+def blocks_of(model: Model) -> tuple[DataBlock, ...]:
+    """The data that the physics of a model reads by their names, such as curves, in the order of its kernel."""
+    return blocks_in(getattr(model, name) for name in _PHYSICS)
 
 
 def functions_of(model: Model, makers: Any = None) -> Functions:

@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
+from mc_engine.lanes.block_search import blocks_in
+from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import place_in_model, relative_import, wrong_record
 from mc_engine.model.fields import (
     AdaptiveStep,
@@ -136,7 +138,8 @@ def load_model(reference: str, beside: Path | None = None) -> Model:
     if not isinstance(model, Model):
         raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
     try:
-        sources = sources.with_data(model.data)
+        curves = blocks_in(value for value in vars(model).values() if isinstance(value, PhysicsFunction))
+        sources = sources.with_data(model.data, [block.file for block in curves if block.file])
     except ModelError as error:
         raise ModelError(f'"{reference}": {error}') from None
     object.__setattr__(model, "reference", reference)

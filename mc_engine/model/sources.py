@@ -17,7 +17,7 @@ from mc_engine.errors import ModelError
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.files import FileFault, resolve_beside
 from mc_engine.model.imports import PACKAGES, USER, CapturedLoader, importable, new_module
-from mc_engine.model.syntax_tree import data_names, imported_names
+from mc_engine.model.syntax_tree import curve_files, data_names, imported_names
 
 _ENGINE = "mc_engine"  # its own sources are counted apart
 
@@ -27,7 +27,7 @@ class Sources:
     """A model's module and the files that it was made of, as they were read.
 
     home : folder that the names of the files begin in.  folder : the model's own.  data : contents of the files that
-    Model(data=...) names, as they were before the import.
+    Model(data=...) names and of those that curves are read from, as they were before the import.
     """
 
     module: ModuleType
@@ -43,8 +43,10 @@ class Sources:
             name = path.relative_to(self.home).as_posix() if path.is_relative_to(self.home) else path.name
             yield name, contents[path]
 
-    def with_data(self, names: Sequence[str]) -> "Sources":
+    def with_data(self, names: Sequence[str], read: Iterable[Path] = ()) -> "Sources":
         """The same with the data of the model itself; ModelError for a name that is wrong.
+
+        read : files that its curves were read from; each must stand in a call of `curve` or `surface`.
 
         The model opens its data itself while it is imported.  What lay there before the import and lies there after it
         is what the model has read.
@@ -56,7 +58,13 @@ class Sources:
         for path, name in paths.items():
             if path not in self.data:
                 raise ModelError(f'data: write "{name}" into the call itself, as in Model(..., data=("{name}",))')
-            if _content(path) != self.data[path]:
+        for path in _curves_beside(self.files):
+            paths.setdefault(path, path.name)
+        for path in read:
+            if path.resolve() not in map(Path.resolve, paths):
+                raise ModelError(f'write "{path.name}" into the call of `curve` or `surface` itself, not as a variable')
+        for path, name in paths.items():
+            if _content(path) != self.data.get(path):
                 raise ModelError(f'data: "{name}" was changed while the model was loaded; begin again')
         return replace(self, data={path: self.data[path] for path in paths})
 
@@ -70,7 +78,7 @@ def sources_of_file(path: Path) -> Sources:
     The files and packages beside it can be imported, and count as its text.
     """
     files = sources_beside(path)
-    data = _data_in(path.parent, files.values())
+    data = _data_in(path.parent, files)
     texts = (f"{file}\n{len(text)}\n".encode() + text for file, text in {**files, **data}.items())
     mark = sha256(str(path).encode() + b"".join(texts)).hexdigest()[:12]
     name = f"{USER}{path.stem}_{mark}"
@@ -81,16 +89,28 @@ def sources_of_file(path: Path) -> Sources:
     return _OF_FILES[name]
 
 
-def _data_in(folder: Path, sources: Iterable[bytes]) -> dict[Path, bytes]:
-    """Contents of the files that calls of `Model` in these sources name as their data; those that cannot be read are
-    left out."""
-    found = {}
-    for name in sorted({name for source in sources for name in data_names(source)}):
+def _data_in(folder: Path, sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
+    """Contents of the files that calls of `Model` in these sources name as their data, and of those that their curves
+    are read from; what cannot be read is left out."""
+    found = _curves_beside(sources)
+    for name in sorted({name for source in sources.values() for name in data_names(source)}):
         with suppress(FileFault):
             path = resolve_beside(folder, name)
             if (content := _content(path)) is not None:
                 found[path] = content
     return found
+
+
+def _curves_beside(sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
+    """Contents of the files, named from the folder of each source, that its curves and surfaces are read from."""
+    found = {}
+    for file, source in sources.items():
+        for name in curve_files(source):
+            with suppress(FileFault):
+                path = resolve_beside(file.parent, name)
+                if (content := _content(path)) is not None:
+                    found[path] = content
+    return dict(sorted(found.items()))
 
 
 def sources_beside(file: Path) -> dict[Path, bytes]:
@@ -124,7 +144,7 @@ def sources_of_module(name: str, folder: Path) -> Sources:
     What a program has imported before, by itself, counts as what its files say now.
     """
     root = name.partition(".")[0]
-    data = _data_in(folder, _contents(folder.glob("*.py")).values())
+    data = _data_in(folder, _contents(folder.glob("*.py")))
     with PACKAGES.loading(root):
         module = import_module(name)
     assert module.__file__ is not None  # a model's module always comes from a file
@@ -139,6 +159,7 @@ def sources_of_module(name: str, folder: Path) -> Sources:
                 seen.add(reached)
                 waiting.append(reached)
                 found[Path(str(sys.modules[reached].__file__))] = _source(reached)
+    data = {**_curves_beside(found), **data}
     base = home.parents[name.count(".") + (home.name == "__init__.py")]
     return Sources(module, base, folder, found, data)
 
