@@ -50,8 +50,8 @@ def data_names(source: bytes) -> frozenset[str]:
 
 @lru_cache(maxsize=512)
 def curve_files(source: bytes) -> frozenset[str]:
-    """The files that calls of `curve` and `surface` name; none of a broken source."""
-    calls = _calls(source, ("curve", "surface"))
+    """The files that calls of `curve`, `surface` and `wind_profile` name; none of a broken source."""
+    calls = _calls(source, ("curve", "surface", "wind_profile"))
     return _texts([*_arguments(calls, "file"), *(call.args[0] for call in calls if call.args)])
 
 

@@ -23,6 +23,7 @@ from mc_engine.lanes.kernel_data import DataBlock, four_at, numbers_of, one_at, 
 from mc_engine.lanes.number import Number, result_of
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.physics.curve_files import columns_of
+from mc_engine.physics.vectors import Vector
 
 KINDS = ("linear", "cubic", "nearest")
 OUTSIDE = ("held", "zero", "ends")
@@ -82,12 +83,42 @@ def curve(
         xs, ys = read[str(x)], read[str(y)]
     else:
         xs, ys = _array(x, "x"), _array(y, "y")
-    words = f"the curve {file or ''}".rstrip()
+    return _through(xs, ys, kind, outside, path)
+
+
+def _through(xs: np.ndarray, ys: np.ndarray, kind: str, outside: str, path: Path | None) -> Curve:
+    """The curve through points in SI.  path : that they come from."""
+    words = f"the curve {path.name}" if path else "the curve"
     _refuse_points(words, xs, ys, xs.size)
     axis = _axis(xs)
     axis[_HEADER - 1] = axis.size
     block = DataBlock(np.concatenate([axis, _ROWS[kind](xs, ys).ravel()]), path)
     return Curve(_bounded(_AT[kind], block, outside), block, words, kind, outside)
+
+
+def wind_profile(
+    file: str, altitude: str, north: str = "", east: str = "", *, speed: str = "", coming_from: str = "",
+    kind: str = "linear", outside: str = "held",
+) -> PhysicsFunction:  # fmt: skip
+    """wind(h) -> Vector, velocity of the air over the ground [m/s] at altitude h [m]: north, east, down (zero).
+
+    file, kind, outside : as in `curve`; the other arguments are names of columns.  Either north and east are given, the
+    components, or speed and coming_from, the direction that the wind blows from, clockwise from north.  Components are
+    what is interpolated, so that 350 and 10 degrees have north between them, with a speed a little below both.
+    """
+    path = _caller_folder() / file
+    wanted = [name for name in (altitude, north, east, speed, coming_from) if name]
+    if len(wanted) != 3 or bool(north) != bool(east):
+        raise ModelError("a wind has the columns north and east, or speed and coming_from")
+    h, *pair = (columns_of(path, dict.fromkeys(wanted))[name] for name in wanted)
+    components = pair if north else [-pair[0] * np.cos(pair[1]), -pair[0] * np.sin(pair[1])]
+    to_north, to_east = (_through(h, one, kind, outside, path) for one in components)
+
+    @physics
+    def wind(h):
+        return Vector(to_north(h), to_east(h), 0.0 * h)
+
+    return wind
 
 
 def surface(
