@@ -10,8 +10,8 @@ LVLH   x ahead, y against the angular momentum, z to the centre of the Earth
 
 A matrix `ned_from_ecef` takes components in ECEF to components in NED by `matrix_times`, and back by
 `transposed_times`; `from_matrix` of `mc_engine.physics.rotations` makes the quaternion of it.  Vectors are `Vector`s,
-SI and radians.  Precession, nutation and the pole's motion are left out in flights: from 20 to 40 km at the ground for a
-frame of epoch 2000, so start from axes of date, or use `ecef_from_gcrs` before a flight.
+SI and radians.  Precession, nutation and the pole's motion are left out in flights: since the epoch 2000 they are tens
+of kilometres at the ground, so start from axes of date, or use `ecef_from_gcrs` before a flight.
 """
 
 from collections import namedtuple
@@ -113,8 +113,8 @@ def geodetic_to_ecef(place):
 def ecef_to_geodetic(r_ecef):
     """Geodetic place of an ECEF position [m].
 
-    Three rounds of Bowring's step: latitude within 1e-15 rad and altitude within 5e-9 m or, farther out, the rounding of
-    the position; from 10 km below the ellipsoid to 3e8 m above it.  Not for the Earth's interior.
+    Three rounds of Bowring's step: latitude within 1e-15 rad and altitude within 5e-9 m or, farther out, the rounding
+    of the position; from 10 km below the ellipsoid to 3e8 m above it.  Not for the Earth's interior.
     B. R. Bowring, Survey Review 23 (1976) 323-327;  start and altitude: Bowring, Survey Review 28 (1985) 202-206.
     """
     x, y, z = r_ecef.x, r_ecef.y, r_ecef.z
@@ -203,7 +203,7 @@ def course_to_ned(course):
 def body_to_flow(v_body):
     """Speed, angle of attack and of sideslip of a velocity through the air, in body axes.
 
-    B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed. (2003), section 2.3: alpha = atan2(w, u),
+    B. L. Stevens and F. L. Lewis, Aircraft Control and Simulation, 2nd ed. (2003), chapter 2: alpha = atan2(w, u),
     beta = asin(v / speed).
     """
     ahead2 = v_body.x * v_body.x + v_body.z * v_body.z
