@@ -2,6 +2,7 @@
 
 from collections import namedtuple
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from mc_engine.lanes import physics
@@ -72,6 +73,7 @@ def parts_of(model: Model, watching: bool) -> Parts:
     return Parts(functions_of(model), model.kernel_parameters, settings, *kinds, Blocks(blocks_of(model)))
 
 
+@lru_cache(maxsize=64)
 def blocks_of(model: Model) -> tuple[DataBlock, ...]:
     """The data that the physics of a model reads by their names, such as curves, in the order of its kernel."""
     return blocks_in(getattr(model, name) for name in _PHYSICS)

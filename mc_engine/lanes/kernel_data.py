@@ -47,26 +47,32 @@ def numbers_of(block: DataBlock) -> np.ndarray:
 
 
 def one_at(numbers, place):
-    """The number at `place`, which is inside: nothing is checked."""
+    """The number at `place`, which is inside: nothing is checked, here and below.
+
+    A fraction of a place or row is left away; what is not a number must not come here.
+    """
     return _taken(numbers, place, 1)[0]
 
 
-def two_at(numbers, place):
-    """The numbers at `place` and behind it."""
-    return _taken(numbers, place, 2)
+def row_of_two(numbers, first, row):
+    """Row number `row` of a table of two columns that begins at place `first`, the same in all lanes."""
+    return _taken(numbers, int(first) + 2 * _whole(row), 2)
 
 
-def four_at(numbers, place):
-    """The number at `place` and the three behind it."""
-    return _taken(numbers, place, 4)
+def row_of_four(numbers, first, row):
+    """Row number `row` of a table of four columns that begins at place `first`."""
+    return _taken(numbers, int(first) + 4 * _whole(row), 4)
+
+
+def _whole(value: Any) -> Any:
+    return int(value) if np.ndim(value) == 0 else np.asarray(value).astype(np.int64)
 
 
 def _taken(numbers: np.ndarray, place: Any, count: int) -> tuple[Any, ...]:
-    if np.ndim(place) == 0:
-        first = int(place)
+    first = _whole(place)
+    if np.ndim(first) == 0:
         return tuple(numbers[first : first + count].tolist())
-    places = np.asarray(place).astype(np.int64)
-    return tuple(numbers[places + i] for i in range(count))
+    return tuple(numbers[first + i] for i in range(count))
 
 
 def hand_over(blocks: Blocks, array: np.ndarray) -> None:

@@ -14,7 +14,7 @@ from mc_engine.errors import ModelError
 from mc_engine.lanes import kernel_data
 from mc_engine.lanes.call_frame import BLOCK, DATA, KernelCalls, PartCalls
 from mc_engine.lanes.lane_type import F64, I32, I64, common_width, is_number, number_type
-from mc_engine.lanes.lowering import llvm_type
+from mc_engine.lanes.lowering import constant, llvm_type
 
 
 class BlockType(types.Opaque):
@@ -106,28 +106,55 @@ def _unchanging(builder, load):
     load.set_metadata("invariant.load", builder.module.add_metadata([]))
 
 
+def _whole(context, builder, value, ty):
+    """A number as the whole number that it begins with."""
+    if isinstance(ty, types.Integer):
+        return context.cast(builder, value, ty, types.int64)
+    return builder.fptosi(value, llvm_type(common_width(ty), I64))
+
+
+@infer_global(kernel_data.one_at)
+class _OneTyping(AbstractTemplate):
+    key = kernel_data.one_at
+
+    def generic(self, args, kws):
+        if len(args) != 2 or not isinstance(args[0], types.CPointer) or not is_number(args[1]):
+            return None
+        return signature(number_type(common_width(args[1])), *args)
+
+
+@lower_builtin(kernel_data.one_at, types.CPointer, types.Any)
+def _one_at(context, builder, sig, args):
+    return _rows(builder, args[0], _whole(context, builder, args[1], sig.args[1]), common_width(sig.args[1]), 1)[0]
+
+
 def _register(function: Any, count: int) -> None:
-    """Type and lower a function that reads `count` numbers from each lane's place on."""
+    """Type and lower a function that reads a row of `count` numbers for each lane."""
 
     @infer_global(function)
     class Typing(AbstractTemplate):
         key = function
 
         def generic(self, args, kws):
-            if len(args) != 2 or not isinstance(args[0], types.CPointer) or not is_number(args[1]):
+            if len(args) != 3 or not isinstance(args[0], types.CPointer) or not all(map(is_number, args[1:])):
                 return None
-            width = common_width(args[1])
-            number = number_type(width)
-            given = types.int64 if isinstance(args[1], types.Integer) else number
-            return signature(types.UniTuple(number, count) if count > 1 else number, args[0], given)
+            return signature(types.UniTuple(number_type(common_width(args[2])), count), *args)
 
-    @lower_builtin(function, types.CPointer, types.Any)
+    @lower_builtin(function, types.CPointer, types.Any, types.Any)
     def lower(context, builder, sig, args):
-        width = common_width(sig.args[1])
-        places = args[1] if sig.args[1] == types.int64 else builder.fptosi(args[1], llvm_type(width, I64))
-        rows = [_row(builder, args[0], places, lane if width > 1 else None, count) for lane in range(width)]
-        columns = _columns(builder, rows, count) if width > 1 else [_element(builder, rows[0], i) for i in range(count)]
-        return columns[0] if count == 1 else context.make_tuple(builder, sig.return_type, columns)
+        width = common_width(sig.args[2])
+        base = builder.gep(args[0], [_whole(context, builder, args[1], sig.args[1])])
+        row = _whole(context, builder, args[2], sig.args[2])
+        places = builder.mul(row, constant(width, count, I64))
+        return context.make_tuple(builder, sig.return_type, _rows(builder, base, places, width, count))
+
+
+def _rows(builder, base, places, width, count):
+    """`count` numbers from each lane's place on, each as a vector of lanes."""
+    rows = [_row(builder, base, places, lane if width > 1 else None, count) for lane in range(width)]
+    if width == 1:
+        return [builder.extract_element(rows[0], ir.Constant(I32, i)) for i in range(count)]
+    return _columns(builder, rows, count)
 
 
 def _row(builder, base, places, lane, count):
@@ -138,10 +165,6 @@ def _row(builder, base, places, lane, count):
     row.align = 8
     _unchanging(builder, row)
     return row
-
-
-def _element(builder, row, i):
-    return builder.extract_element(row, ir.Constant(I32, i))
 
 
 def _columns(builder, rows, count):
@@ -158,6 +181,5 @@ def _shuffle(builder, a, b, order):
     return builder.shuffle_vector(a, b, ir.Constant(ir.VectorType(I32, len(places)), places))
 
 
-_register(kernel_data.one_at, 1)
-_register(kernel_data.two_at, 2)
-_register(kernel_data.four_at, 4)
+_register(kernel_data.row_of_two, 2)
+_register(kernel_data.row_of_four, 4)

@@ -9,7 +9,6 @@ numbers compile nothing.  The range is divided into equal buckets, so that two c
 on both sides of an argument (see `_axis`).  An argument that is not a number gives one that is not.
 """
 
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,11 +17,10 @@ import numpy as np
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes import physics, where
-from mc_engine.lanes.functions import floor
-from mc_engine.lanes.kernel_data import DataBlock, four_at, numbers_of, one_at, two_at
+from mc_engine.lanes.kernel_data import DataBlock, numbers_of, one_at, row_of_four, row_of_two
 from mc_engine.lanes.number import Number, result_of
 from mc_engine.lanes.physics_function import PhysicsFunction
-from mc_engine.physics.curve_files import columns_of
+from mc_engine.physics.curve_points import array_of, caller_folder, columns_of, grid_of, refuse_points, refuse_steep
 from mc_engine.physics.vectors import Vector
 
 KINDS = ("linear", "cubic", "nearest")
@@ -77,22 +75,24 @@ def curve(
     """
     _refuse_unknown(kind, KINDS, "kind")
     _refuse_unknown(outside, OUTSIDE, "outside")
-    path = _caller_folder() / file if file is not None else None
+    path = caller_folder() / file if file is not None else None
     if path is not None:
         read = columns_of(path, {str(x): x_unit, str(y): y_unit})
         xs, ys = read[str(x)], read[str(y)]
     else:
-        xs, ys = _array(x, "x"), _array(y, "y")
+        xs, ys = array_of(x, "x"), array_of(y, "y")
     return _through(xs, ys, kind, outside, path)
 
 
 def _through(xs: np.ndarray, ys: np.ndarray, kind: str, outside: str, path: Path | None) -> Curve:
     """The curve through points in SI.  path : that they come from."""
     words = f"the curve {path.name}" if path else "the curve"
-    _refuse_points(words, xs, ys, xs.size)
+    refuse_points(words, xs, ys, xs.size)
     axis = _axis(xs)
     axis[_HEADER - 1] = axis.size
-    block = DataBlock(np.concatenate([axis, _ROWS[kind](xs, ys).ravel()]), path)
+    rows = _ROWS[kind](xs, ys)
+    refuse_steep(words, rows[:, :2])
+    block = DataBlock(np.concatenate([axis, rows.ravel()]), path)
     return Curve(_bounded(_AT[kind], block, outside), block, words, kind, outside)
 
 
@@ -106,7 +106,7 @@ def wind_profile(
     components, or speed and coming_from, the direction that the wind blows from, clockwise from north.  Components are
     what is interpolated, so that 350 and 10 degrees have north between them, with a speed a little below both.
     """
-    path = _caller_folder() / file
+    path = caller_folder() / file
     wanted = [name for name in (altitude, north, east, speed, coming_from) if name]
     if len(wanted) != 3 or bool(north) != bool(east):
         raise ModelError("a wind has the columns north and east, or speed and coming_from")
@@ -139,20 +139,22 @@ def surface(
     """
     _refuse_unknown(outside, OUTSIDE, "outside")
     words = f"the surface {file or ''}".rstrip()
-    path = _caller_folder() / file if file is not None else None
+    path = caller_folder() / file if file is not None else None
     if path is not None:
         names = [str(x), str(y), str(z)]
         read = columns_of(path, {name: (units or {}).get(name) for name in names})
-        xs, ys, zs = _grid(words, *(read[name] for name in names))
+        xs, ys, zs = grid_of(words, *(read[name] for name in names))
     else:
-        xs, ys, zs = _array(x, "x"), _array(y, "y"), np.asarray(z, dtype=np.float64)
-    _refuse_points(words, xs, zs, xs.size)
-    _refuse_points(words, ys, zs.T, ys.size)
+        xs, ys, zs = array_of(x, "x"), array_of(y, "y"), np.asarray(z, dtype=np.float64)
+    refuse_points(words, xs, zs, xs.size)
+    refuse_points(words, ys, zs.T, ys.size)
     first, second = _axis(xs), _axis(ys)
     first[_HEADER - 1] = first.size
     second[_HEADER - 1] = first.size + second.size
     second[5:7] += first.size
-    block = DataBlock(np.concatenate([first, second, [ys.size, 0.0, 0.0, 0.0], _cells(xs, ys, zs).ravel()]), path)
+    cells = _cells(xs, ys, zs)
+    refuse_steep(words, cells)
+    block = DataBlock(np.concatenate([first, second, [ys.size, 0.0, 0.0, 0.0], cells.ravel()]), path)
     return Curve(_bounded_surface(block, outside), block, words, "linear", outside)
 
 
@@ -191,15 +193,15 @@ def _segment(numbers, at, x):
 
     at : place of the axis.  The way is not a number where x is not one; the number of the point always is.
     """
-    low, high, scale, last = four_at(numbers, at)
-    levels, points, buckets, _ = four_at(numbers, at + 4.0)
+    low, high, scale, last = row_of_four(numbers, at, 0)
+    levels, points, buckets, _ = row_of_four(numbers, at, 1)
     outside = (x < low) | (x > high)
     x = where(x < low, low, where(x > high, high, x))
-    bucket = floor((x - low) * scale)
+    bucket = (x - low) * scale
     # in this order what is not a number becomes the first bucket
     bucket = where(bucket > 0.0, bucket, 0.0)
     bucket = where(bucket < last, bucket, last)
-    point, here, next_point, second = four_at(numbers, buckets + 4.0 * bucket)
+    point, here, next_point, second = row_of_four(numbers, buckets, bucket)
     if levels > 0.0:
         point, here = _bisected(numbers, points, levels, point, here, x)
     else:
@@ -228,13 +230,14 @@ def _bisected(numbers, points, levels, point, here, x):
 
 def _linear_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """(value, slope behind it) of each point; the last one has no slope, as nothing is behind it."""
-    return np.column_stack([y, np.append(np.diff(y) / np.diff(x), 0.0)])
+    with np.errstate(over="ignore"):
+        return np.column_stack([y, np.append(np.diff(y) / np.diff(x), 0.0)])
 
 
 @physics
 def _linear(numbers, x):
     point, way, outside, _ = _segment(numbers, 0.0, x)
-    y, slope = two_at(numbers, one_at(numbers, 7) + 2.0 * point)
+    y, slope = row_of_two(numbers, one_at(numbers, 7), point)
     return y + way * slope, outside
 
 
@@ -269,7 +272,7 @@ def _end(h0: float, h1: float, m0: float, m1: float) -> float:
 @physics
 def _cubic(numbers, x):
     point, way, outside, _ = _segment(numbers, 0.0, x)
-    y, c1, c2, c3 = four_at(numbers, one_at(numbers, 7) + 4.0 * point)
+    y, c1, c2, c3 = row_of_four(numbers, one_at(numbers, 7), point)
     return y + way * (c1 + way * (c2 + way * c3)), outside
 
 
@@ -282,7 +285,7 @@ def _nearest_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 @physics
 def _nearest(numbers, x):
     point, way, outside, x = _segment(numbers, 0.0, x)
-    y, other, middle, _ = four_at(numbers, one_at(numbers, 7) + 4.0 * point)
+    y, other, middle, _ = row_of_four(numbers, one_at(numbers, 7), point)
     return where(way == way, where(x > middle, other, y), way), outside
 
 
@@ -305,8 +308,7 @@ def _bilinear(numbers, x, y):
     i, way_x, outside_x, _ = _segment(numbers, 0.0, x)
     j, way_y, outside_y, _ = _segment(numbers, one_at(numbers, 7), y)
     cells = one_at(numbers, one_at(numbers, 7) + 7.0)
-    row = i * one_at(numbers, cells) + j
-    z, along_x, along_y, both = four_at(numbers, cells + 4.0 + 4.0 * row)
+    z, along_x, along_y, both = row_of_four(numbers, cells + 4.0, i * one_at(numbers, cells) + j)
     return z + way_x * along_x + way_y * (along_y + way_x * both), outside_x | outside_y
 
 
@@ -348,46 +350,6 @@ def _bounded_surface(block: DataBlock, outside: str) -> Callable[..., Any]:
     return value_inside
 
 
-# ---- what is wrong with points
-
-
-def _caller_folder() -> Path:
-    """Folder of the module that calls `curve` or `surface`."""
-    file = sys._getframe(2).f_globals.get("__file__")
-    return Path(file).parent if file else Path.cwd()
-
-
-def _array(values: Any, name: str) -> np.ndarray:
-    if isinstance(values, str):
-        raise ModelError(f'"{values}" is a column, but there is no file; give {name} as numbers')
-    return np.asarray(values, dtype=np.float64)
-
-
 def _refuse_unknown(value: str, known: Sequence[str], name: str) -> None:
     if value not in known:
         raise ModelError(f'{name} "{value}" is not known; write one of {", ".join(known)}')
-
-
-def _refuse_points(words: str, x: np.ndarray, values: np.ndarray, n: int) -> None:
-    """ModelError unless x rises and there is a finite value, or a row of them, for each."""
-    if x.ndim != 1 or x.size < 2 or values.shape[:1] != (n,):
-        raise ModelError(
-            f"{words}: {x.size} arguments, {len(values)} values; give two or more points, each with a value"
-        )
-    if not (np.isfinite(x).all() and np.isfinite(values).all()):
-        raise ModelError(f"{words}: a number is infinite or missing")
-    wrong = np.flatnonzero(np.diff(x) <= 0.0)
-    if wrong.size:
-        i = int(wrong[0])
-        raise ModelError(f"{words}: the argument must rise, but {x[i + 1]:g} follows {x[i]:g} (SI)")
-
-
-def _grid(words: str, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points of both axes and values [n_x, n_y] of rows in any order."""
-    xs, at_x = np.unique(x, return_inverse=True)
-    ys, at_y = np.unique(y, return_inverse=True)
-    values = np.full((xs.size, ys.size), np.nan)
-    values[at_x, at_y] = z
-    if np.isnan(values).any() or x.size != values.size:
-        raise ModelError(f"{words}: {x.size} rows are no grid of {xs.size} by {ys.size} points, each once")
-    return xs, ys, values

@@ -18,7 +18,14 @@ from mc_engine.status import STATUS_NAME
 
 RECIPES = [
     HOME / "how_to" / f"{name}.md"
-    for name in ("tables", "notebook", "correlated_covariances", "own_distributions", "prepare_and_end_cases")
+    for name in (
+        "tables",
+        "notebook",
+        "correlated_covariances",
+        "own_distributions",
+        "prepare_and_end_cases",
+        "curves_rotations_frames_air",
+    )
 ]
 HEAD = '[campaign]\nmodel = "{model}"\ncases = 1000\ndesign = "mc"\nseed = 1\n\n'
 

@@ -13,7 +13,16 @@ from mc_engine.errors import ModelError
 from mc_engine.lanes import kernel_data, physics
 from mc_engine.lanes.block_search import blocks_in
 from mc_engine.lanes.compiler import compile_callable
-from mc_engine.lanes.kernel_data import Blocks, DataBlock, four_at, gathered, hand_over, numbers_of, one_at, two_at
+from mc_engine.lanes.kernel_data import (
+    Blocks,
+    DataBlock,
+    gathered,
+    hand_over,
+    numbers_of,
+    one_at,
+    row_of_four,
+    row_of_two,
+)
 from mc_engine.model.imports import new_module
 
 # `shared` is not inlined: the data must reach functions that the kernel calls, too
@@ -43,7 +52,7 @@ def reading(one, other):
 
     @physics
     def outer(at):
-        first, second = two_at(numbers_of(one), at)
+        first, second = row_of_two(numbers_of(one), 1.0, at)
         return first + 10.0 * second + 100.0 * inner(at)
 
     return outer
@@ -55,7 +64,7 @@ def kernel_of(folder, one, other):
     names = {"BLOCKS": blocks, "inlined": function, "shared": compile_callable(function.function)}
     module = new_module("mc_engine_test_kernel", folder / "kernel.py", KERNEL, **names)
     at = PLACES.astype(int)
-    wanted = 2.0 * (one.numbers[at] + 10.0 * one.numbers[at + 1] + 100.0 * other.numbers[at])
+    wanted = 2.0 * (one.numbers[2 * at + 1] + 10.0 * one.numbers[2 * at + 2] + 100.0 * other.numbers[at])
     return module.kernel, gathered(blocks.blocks), wanted
 
 
@@ -70,7 +79,7 @@ def random_block(size):
 
 
 def test_the_same_machine_code_flies_other_data_in_turn_and_at_once(folder):
-    first = kernel_of(folder, random_block(6), random_block(7))
+    first = kernel_of(folder, random_block(16), random_block(7))
     second = kernel_of(folder, random_block(60), random_block(7))
     assert not np.array_equal(first[2], second[2])
     out = np.empty(N)
@@ -94,17 +103,17 @@ def test_the_same_machine_code_flies_other_data_in_turn_and_at_once(folder):
 
 
 def test_one_kernel_object_takes_other_data_with_each_call(folder):
-    kernel, data, wanted = kernel_of(folder, random_block(6), random_block(7))
+    kernel, data, wanted = kernel_of(folder, random_block(16), random_block(7))
     out = np.empty(N)
     kernel(PLACES, out, data)
     assert out.tolist() == wanted.tolist()
     longer = [DataBlock(-np.arange(8.0)), DataBlock(np.arange(90.0))]  # the inner function's is found first
     kernel(PLACES, out, gathered(longer))
-    assert out.tolist() == (2.0 * (PLACES + 10.0 * (PLACES + 1.0) - 100.0 * PLACES)).tolist()
+    assert out.tolist() == (2.0 * ((2.0 * PLACES + 1.0) + 10.0 * (2.0 * PLACES + 2.0) - 100.0 * PLACES)).tolist()
 
 
 def test_another_process_takes_the_kernel_from_the_disk_with_data_of_its_own(folder):
-    kernel, data, _ = kernel_of(folder, random_block(6), random_block(7))
+    kernel, data, _ = kernel_of(folder, random_block(16), random_block(7))
     kernel(PLACES, np.empty(N), data)
     script = """
     import sys
@@ -125,7 +134,7 @@ def test_another_process_takes_the_kernel_from_the_disk_with_data_of_its_own(fol
 
 
 def test_a_block_that_a_kernel_is_not_handed_is_refused_when_it_is_compiled(folder):
-    names = {"BLOCKS": Blocks(()), "inlined": reading(random_block(6), random_block(7))}
+    names = {"BLOCKS": Blocks(()), "inlined": reading(random_block(16), random_block(7))}
     names["shared"] = names["inlined"]
     kernel = new_module("mc_engine_test_kernel", folder / "kernel.py", KERNEL, **names).kernel
     with pytest.raises(Exception, match="were not found by the names"):
@@ -152,8 +161,8 @@ def test_blocks_are_found_wherever_physics_names_them_once_and_in_order():
 
 def test_what_is_read_together_is_what_is_read_alone():
     numbers = np.arange(10.0)
-    assert four_at(numbers, 3.0) == (3.0, 4.0, 5.0, 6.0)
-    assert [one.tolist() for one in two_at(numbers, np.array([0.0, 8.0]))] == [[0.0, 8.0], [1.0, 9.0]]
+    assert row_of_four(numbers, 1.0, 1.9) == (5.0, 6.0, 7.0, 8.0)
+    assert [one.tolist() for one in row_of_two(numbers, 0, np.array([0.0, 4.0]))] == [[0.0, 8.0], [1.0, 9.0]]
     assert one_at(numbers, 9) == 9.0
 
 

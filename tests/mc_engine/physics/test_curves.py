@@ -13,7 +13,7 @@ from scipy.interpolate import PchipInterpolator, RegularGridInterpolator, interp
 
 from mc_engine.errors import ModelError
 from mc_engine.physics import curves
-from mc_engine.physics.curve_files import si_factor
+from mc_engine.physics.curve_points import si_factor
 from mc_engine.physics.curves import curve, surface
 
 RNG = np.random.default_rng(11)
@@ -187,6 +187,8 @@ def test_what_is_wrong_with_a_call_is_said(folder):
         curve(x=[0, 1], y=[0, 1], outside="nan")
     with pytest.raises(ModelError, match="there is no file"):
         curve(x="time_s", y="thrust_n")
+    with pytest.raises(ModelError, match="so close"):
+        curve(x=[0.0, 5e-324, 1.0], y=[0.0, 1.0, 2.0])
     with pytest.raises(ModelError, match="rise"):
         surface(x=[0, 1], y=[1, 0], z=[[0, 0], [0, 0]])
     with pytest.raises(FileNotFoundError):

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import mc_engine
 from mc_engine.errors import ModelError
+from mc_engine.flight.contract import breaches
 from mc_engine.flight.flight import fly, fly_interpreted
 from mc_engine.model import load_model
 
@@ -144,3 +146,32 @@ def test_a_missing_file_is_said_with_the_line(tmp_path):
     (tmp_path / "thrust.csv").unlink()
     with pytest.raises(ModelError, match=r'model.py, line 13: there is no file "thrust.csv"'):
         load_model("model.py", tmp_path)
+
+
+CAMPAIGN = """[campaign]
+model = "model.py"
+cases = 16
+design = "mc"
+seed = 1
+
+[dispersion.mass_kg]
+dist = "uniform"
+lower = 1.0
+upper = 3.0
+source = "weighed"
+"""
+
+
+def test_a_run_keeps_the_files_of_its_curves_and_the_model_passes_the_check(tmp_path):
+    sled(tmp_path / "sled")
+    (tmp_path / "sled" / "campaign.toml").write_text(CAMPAIGN)
+    campaign = mc_engine.load_campaign(tmp_path / "sled" / "campaign.toml")
+    assert breaches(campaign) == []
+    store = mc_engine.run(campaign, tmp_path / "run", workers=2)
+    cases = store.cases()
+    assert (cases["status"] == "ok").all()
+    kept = {path.name: path for path in (tmp_path / "run").rglob("*.csv")}
+    assert kept["thrust.csv"].read_text() == THRUST
+    assert kept["drag.csv"].read_text() == DRAG
+    model = load_model("model.py", kept["thrust.csv"].parent)
+    assert flown(model, cases["mass_kg"], 8)["drag_n"].tolist() == cases["drag_n"].tolist()

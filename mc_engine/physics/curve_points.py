@@ -1,7 +1,10 @@
-"""Columns of a CSV or Parquet file as numbers in SI, by the units in their names."""
+"""Points of curves and surfaces: read from a CSV or Parquet file, in SI by the units in the names of its columns, and
+held to what a curve needs."""
 
+import sys
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -67,3 +70,47 @@ def _parquet(path: Path) -> dict[str, np.ndarray]:
 
 
 _NUMBERS = {"double", "float", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
+
+
+def caller_folder() -> Path:
+    """Folder of the module that calls the function that calls this one."""
+    file = sys._getframe(2).f_globals.get("__file__")
+    return Path(file).parent if file else Path.cwd()
+
+
+def array_of(values: Any, name: str) -> np.ndarray:
+    """The numbers of an argument; ModelError for the name of a column, where there is no file."""
+    if isinstance(values, str):
+        raise ModelError(f'"{values}" is a column, but there is no file; give {name} as numbers')
+    return np.asarray(values, dtype=np.float64)
+
+
+def refuse_points(words: str, x: np.ndarray, values: np.ndarray, n: int) -> None:
+    """ModelError unless x rises and there is a finite value, or a row of them, for each."""
+    if x.ndim != 1 or x.size < 2 or values.shape[:1] != (n,):
+        raise ModelError(
+            f"{words}: {x.size} arguments, {len(values)} values; give two or more points, each with a value"
+        )
+    if not (np.isfinite(x).all() and np.isfinite(values).all()):
+        raise ModelError(f"{words}: a number is infinite or missing")
+    wrong = np.flatnonzero(np.diff(x) <= 0.0)
+    if wrong.size:
+        i = int(wrong[0])
+        raise ModelError(f"{words}: the argument must rise, but {x[i + 1]:g} follows {x[i]:g} (SI)")
+
+
+def refuse_steep(words: str, rows: np.ndarray) -> None:
+    """ModelError where a slope is infinite: arguments next to each other as closely as floats are."""
+    if not np.isfinite(rows).all():
+        raise ModelError(f"{words}: two points lie so close that the slope between them is no number")
+
+
+def grid_of(words: str, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points of both axes and values [n_x, n_y] of rows in any order."""
+    xs, at_x = np.unique(x, return_inverse=True)
+    ys, at_y = np.unique(y, return_inverse=True)
+    values = np.full((xs.size, ys.size), np.nan)
+    values[at_x, at_y] = z
+    if np.isnan(values).any() or x.size != values.size:
+        raise ModelError(f"{words}: {x.size} rows are no grid of {xs.size} by {ys.size} points, each once")
+    return xs, ys, values
