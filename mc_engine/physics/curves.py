@@ -88,7 +88,7 @@ def _through(xs: np.ndarray, ys: np.ndarray, kind: str, outside: str, path: Path
     """The curve through points in SI.  path : that they come from."""
     words = f"the curve {path.name}" if path else "the curve"
     refuse_points(words, xs, ys, xs.size)
-    axis = _axis(xs)
+    axis = _axis(_turnovers(xs) if kind == "nearest" else xs)
     axis[_HEADER - 1] = axis.size
     rows = _ROWS[kind](xs, ys)
     refuse_steep(words, rows[:, :2])
@@ -127,14 +127,16 @@ def surface(
     y: str | Sequence[float] | np.ndarray = "y",
     z: str | np.ndarray = "z",
     *,
+    kind: str = "linear",
     outside: str = "held",
     units: dict[str, str] | None = None,
 ) -> Curve:
-    """A function z(x, y) through the points of a grid, linear in each direction between them (bilinear).
+    """A function z(x, y) through the points of a grid.
 
     file : CSV or Parquet as in `curve`, one row for each point of the grid, in any order.
     units : of columns whose names do not say theirs.
     Without a file, x and y are rising numbers and z is float64[n_x, n_y], in SI.
+    kind : "linear" in each direction (bilinear), or "nearest".
     outside : as in `curve`.
     """
     _refuse_unknown(outside, OUTSIDE, "outside")
@@ -148,14 +150,14 @@ def surface(
         xs, ys, zs = array_of(x, "x"), array_of(y, "y"), np.asarray(z, dtype=np.float64)
     refuse_points(words, xs, zs, xs.size)
     refuse_points(words, ys, zs.T, ys.size)
-    first, second = _axis(xs), _axis(ys)
+    first, second = (_axis(_turnovers(one) if kind == "nearest" else one) for one in (xs, ys))
     first[_HEADER - 1] = first.size
     second[_HEADER - 1] = first.size + second.size
     second[5:7] += first.size
-    cells = _cells(xs, ys, zs)
+    cells = _CELLS[kind](xs, ys, zs)
     refuse_steep(words, cells)
-    block = DataBlock(np.concatenate([first, second, [ys.size, 0.0, 0.0, 0.0], cells.ravel()]), path)
-    return Curve(_bounded_surface(block, outside), block, words, "linear", outside)
+    block = DataBlock(np.concatenate([first, second, [cells.shape[1], 0.0, 0.0, 0.0], cells.ravel()]), path)
+    return Curve(_bounded_surface(_ON[kind], block, outside), block, words, kind, outside)
 
 
 # ---- points and the buckets that they are found by
@@ -189,7 +191,7 @@ def _axis(points: np.ndarray) -> np.ndarray:
 
 @physics
 def _segment(numbers, at, x):
-    """(number of the point at or before x, way from it to x, whether x is outside), and x itself, held inside.
+    """(number of the point at or before x, way from it to x, whether x is outside); outside, x is held.
 
     at : place of the axis.  The way is not a number where x is not one; the number of the point always is.
     """
@@ -208,7 +210,7 @@ def _segment(numbers, at, x):
         passed, passed_both = x >= next_point, x >= second
         point = where(passed_both, point + 2.0, where(passed, point + 1.0, point))
         here = where(passed_both, second, where(passed, next_point, here))
-    return point, x - here, outside, x
+    return point, x - here, outside
 
 
 @physics
@@ -236,7 +238,7 @@ def _linear_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 @physics
 def _linear(numbers, x):
-    point, way, outside, _ = _segment(numbers, 0.0, x)
+    point, way, outside = _segment(numbers, 0.0, x)
     y, slope = row_of_two(numbers, one_at(numbers, 7), point)
     return y + way * slope, outside
 
@@ -271,29 +273,33 @@ def _end(h0: float, h1: float, m0: float, m1: float) -> float:
 
 @physics
 def _cubic(numbers, x):
-    point, way, outside, _ = _segment(numbers, 0.0, x)
+    point, way, outside = _segment(numbers, 0.0, x)
     y, c1, c2, c3 = row_of_four(numbers, one_at(numbers, 7), point)
     return y + way * (c1 + way * (c2 + way * c3)), outside
 
 
+def _turnovers(x: np.ndarray) -> np.ndarray:
+    """First point, the first arguments that are nearer to the next point than to the one before, last point."""
+    return np.concatenate([x[:1], np.nextafter(0.5 * x[:-1] + 0.5 * x[1:], np.inf), x[-1:]])
+
+
 def _nearest_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(value, the next value, where it begins, 0) of each point."""
-    middle = np.append(0.5 * x[:-1] + 0.5 * x[1:], np.inf)
-    return np.column_stack([y, np.append(y[1:], y[-1]), middle, np.zeros(x.size)])
+    """(value, 0) from each turnover on; at the last one begins what is outside."""
+    return np.column_stack([np.append(y, y[-1]), np.zeros(x.size + 1)])
 
 
 @physics
 def _nearest(numbers, x):
-    point, way, outside, x = _segment(numbers, 0.0, x)
-    y, other, middle, _ = row_of_four(numbers, one_at(numbers, 7), point)
-    return where(way == way, where(x > middle, other, y), way), outside
+    point, way, outside = _segment(numbers, 0.0, x)
+    y, _ = row_of_two(numbers, one_at(numbers, 7), point)
+    return where(way == way, y, way), outside
 
 
 _ROWS = {"linear": _linear_rows, "cubic": _cubic_rows, "nearest": _nearest_rows}
 _AT = {"linear": _linear, "cubic": _cubic, "nearest": _nearest}
 
 
-def _cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _linear_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     """(value, slope along x, slope along y, their product's) of the cell behind each point of the grid."""
     along_x, along_y = np.zeros_like(z), np.zeros_like(z)
     along_x[:-1] = np.diff(z, axis=0) / np.diff(x)[:, None]
@@ -303,13 +309,36 @@ def _cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.stack([z, along_x, along_y, both], axis=-1)
 
 
+def _nearest_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """The value from each pair of turnovers on."""
+    return np.pad(z, ((0, 1), (0, 1)), "edge")
+
+
+@physics
+def _cell(numbers, x, y):
+    """(first place, number of the cell, ways from its corner, whether the place is outside)."""
+    i, way_x, outside_x = _segment(numbers, 0.0, x)
+    j, way_y, outside_y = _segment(numbers, one_at(numbers, 7), y)
+    first = one_at(numbers, one_at(numbers, 7) + 7.0)
+    return first + 4.0, i * one_at(numbers, first) + j, way_x, way_y, outside_x | outside_y
+
+
 @physics
 def _bilinear(numbers, x, y):
-    i, way_x, outside_x, _ = _segment(numbers, 0.0, x)
-    j, way_y, outside_y, _ = _segment(numbers, one_at(numbers, 7), y)
-    cells = one_at(numbers, one_at(numbers, 7) + 7.0)
-    z, along_x, along_y, both = row_of_four(numbers, cells + 4.0, i * one_at(numbers, cells) + j)
-    return z + way_x * along_x + way_y * (along_y + way_x * both), outside_x | outside_y
+    first, cell, way_x, way_y, outside = _cell(numbers, x, y)
+    z, along_x, along_y, both = row_of_four(numbers, first, cell)
+    return z + way_x * along_x + way_y * (along_y + way_x * both), outside
+
+
+@physics
+def _nearest_on_grid(numbers, x, y):
+    first, cell, way_x, way_y, outside = _cell(numbers, x, y)
+    way = way_x + way_y
+    return where(way == way, one_at(numbers, first + cell), way), outside
+
+
+_CELLS = {"linear": _linear_cells, "nearest": _nearest_cells}
+_ON = {"linear": _bilinear, "nearest": _nearest_on_grid}
 
 
 # ---- functions that physics calls
@@ -332,18 +361,18 @@ def _bounded(at: Any, block: DataBlock, outside: str) -> Callable[..., Any]:
     return value_inside
 
 
-def _bounded_surface(block: DataBlock, outside: str) -> Callable[..., Any]:
+def _bounded_surface(on: Any, block: DataBlock, outside: str) -> Callable[..., Any]:
     """The same of x and y."""
     if outside == "held":
 
         def value(x, y):
-            return _bilinear(numbers_of(block), x, y)[0]
+            return on(numbers_of(block), x, y)[0]
 
         return value
     beyond = 0.0 if outside == "zero" else _NAN
 
     def value_inside(x, y):
-        z, is_outside = _bilinear(numbers_of(block), x, y)
+        z, is_outside = on(numbers_of(block), x, y)
         # a value that is none stays none, also where the other argument is outside
         return where(is_outside & (z == z), beyond, z)
 

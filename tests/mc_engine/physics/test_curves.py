@@ -55,13 +55,14 @@ def test_some_of_these_spacings_need_the_bisection_and_some_do_not():
     assert levels["three decades in each other"] >= 2.0
 
 
+@pytest.mark.parametrize("kind", ["linear", "nearest"])
 @pytest.mark.parametrize("sizes", [(2, 2), (12, 8), (40, 300)])
-def test_a_surface_is_scipys_and_meets_its_points(sizes):
+def test_a_surface_is_scipys_and_meets_its_points(sizes, kind):
     x, y = (np.sort(RNG.uniform(-1.0, 1.0, size)) for size in sizes)
     z = RNG.normal(size=sizes)
-    f = surface(x=x, y=y, z=z)
+    f = surface(x=x, y=y, z=z, kind=kind)
     at = RNG.uniform(x[0], x[-1], N), RNG.uniform(y[0], y[-1], N)
-    close(every_way(f, *at), RegularGridInterpolator((x, y), z)(np.transpose(at)), np.abs(z).max())
+    close(every_way(f, *at), RegularGridInterpolator((x, y), z, kind)(np.transpose(at)), np.abs(z).max())
     assert f(*np.meshgrid(x, y, indexing="ij")).tolist() == z.tolist()
 
 
@@ -112,21 +113,23 @@ def test_what_is_not_a_number_gives_what_is_not_one(kind, outside, name):
     assert np.isnan(f(at)).tolist() == np.isnan(at).tolist()
 
 
+@pytest.mark.parametrize("kind", ["linear", "nearest"])
 @pytest.mark.parametrize("outside", curves.OUTSIDE)
-def test_a_surface_has_the_same_edges(outside):
-    f = surface(x=[0.0, 1.0], y=[0.0, 2.0], z=[[1.0, 2.0], [3.0, 4.0]], outside=outside)
+def test_a_surface_has_the_same_edges(outside, kind):
+    f = surface(x=[0.0, 1.0], y=[0.0, 2.0], z=[[1.0, 2.0], [3.0, 4.0]], outside=outside, kind=kind)
     x, y = np.array([0.5, -1.0, 0.5, np.nan, 0.5, np.nan, 9.0]), np.array([1.0, 1.0, 5.0, 1.0, np.nan, 5.0, np.nan])
     found = every_way(f, x, y)
-    beyond = {"held": [1.5, 3.0], "zero": [0.0, 0.0], "ends": [np.nan, np.nan]}[outside]
-    np.testing.assert_array_equal(found, [2.5, *beyond, np.nan, np.nan, np.nan, np.nan])
+    middle, held = (2.5, [1.5, 3.0]) if kind == "linear" else (1.0, [1.0, 2.0])
+    beyond = {"held": held, "zero": [0.0, 0.0], "ends": [np.nan, np.nan]}[outside]
+    np.testing.assert_array_equal(found, [middle, *beyond, np.nan, np.nan, np.nan, np.nan])
 
 
 def test_the_structure_has_no_numbers_of_the_points():
     one, other = curve(x=[0.0, 1.0], y=[0.0, 1.0]), curve(x=[0.0, 3.0, 4.0], y=[0.0, 1.0, 7.0])
     assert one.structure() == other.structure()
     kinds = {curve(x=[0, 1], y=[0, 1], kind=k, outside=o).structure() for k in curves.KINDS for o in curves.OUTSIDE}
-    flat = surface(x=[0, 1], y=[0, 1], z=[[0, 0], [0, 0]]).structure()
-    assert len({*kinds, flat}) == 10
+    flat = {surface(x=[0, 1], y=[0, 1], z=[[0, 0], [0, 0]], kind=k).structure() for k in ("linear", "nearest")}
+    assert len(kinds | flat) == 11
 
 
 # ---- files
