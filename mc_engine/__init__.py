@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from mc_engine.errors import CampaignError, EngineError, ModelError, RunInterrupted, StoreError
     from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedStep, Parameter, Setting
     from mc_engine.model.record import Model, Refusals
+    from mc_engine.model.simulator import Refuse, Simulator
     from mc_engine.runner.runner import Replay, extend, replay, resume, run
     from mc_engine.store.opening import open_store
     from mc_engine.store.store import Store
@@ -34,6 +35,7 @@ _HOME = {
         "Refusals",
         "Setting",
     ),
+    "model.simulator": ("Refuse", "Simulator"),
     "studies.opened_run": ("Case", "Run", "open_run"),
     "runner.runner": ("Replay", "extend", "replay", "resume", "run"),
     "store.opening": ("open_store",),
@@ -62,6 +64,8 @@ __all__ = [  # noqa: RUF022 - by module, as above
     "Parameter",
     "Refusals",
     "Setting",
+    "Refuse",
+    "Simulator",
     "Case",
     "Run",
     "open_run",

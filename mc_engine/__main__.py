@@ -6,31 +6,33 @@ from importlib import import_module
 
 
 def _forget_working_folder() -> None:
-    """Take the folder that `python -m` puts first off the path: what lies there by chance is not to be imported in
-    place of what is meant.  It stays where it is the one that the engine itself comes from."""
+    """Remove the working folder, which `python -m` puts first, from the import path, unless the engine is in it.
+
+    A file there could otherwise replace a module of the standard library.
+    """
     first, own = os.path.realpath(sys.path[0] or "."), os.path.dirname(os.path.dirname(os.path.realpath(__file__)))
     if not sys.flags.safe_path and first == os.path.realpath(".") != own:
         del sys.path[0]
 
 
 def main() -> None:
-    """Run the command line of this process; does not return."""
-    from mc_engine.interruption import listen
+    """Run the command line in this process; does not return."""
+    from mc_engine.interruption import install_handlers
     from mc_engine.text import clean_streams
     from mc_engine.unforeseen import UNFORESEEN, catch_all, refuse_small_memory, unforeseen
 
-    listen()  # to Ctrl-C also while the rest is loaded
+    install_handlers()  # before the rest is loaded, which takes longest
     for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(library, "1")  # its threads wait for each other longer than the small matrices here take
+        os.environ.setdefault(library, "1")  # for small matrices its threads cost more than they gain
     catch_all()
     refuse_small_memory()
     with clean_streams():
         try:
-            # by name, since this file lies below all packages and its process stands above them
+            # by name: this file is in the lowest package, which must not import from the highest
             import_module("mc_engine.command_line.commands").app(prog_name="mc-engine")
         except (SystemExit, KeyboardInterrupt):
             raise
-        except BaseException as error:  # while no command is at work, such as in loading itself
+        except BaseException as error:  # outside of a command, for example while modules are loaded
             print(unforeseen(error), file=sys.stderr)
             sys.exit(UNFORESEEN)
 

@@ -1,17 +1,16 @@
-"""Files that are whole or absent, also after a power cut; and the one place where the engine writes.
+"""Durable files: complete or absent, also after a power cut.  The engine writes all its files through this module.
 
-Content goes to a temporary name, is synced and renamed, and the folder is synced.  Temporary names start with a
-dot and end in `.tmp`, so that neither Arrow's nor DuckDB's reading of a folder takes them for parts.
-Every OSError leaves here as a DiskError that names the path, or as a StoreError where a file is gone.
+Content is written to a temporary name, synced and renamed, and the folder is synced.  Temporary names start with a dot
+and end in `.tmp`, so that Arrow and DuckDB do not read them as parts.  Every OSError becomes a DiskError that names the
+path, or a StoreError if a file is missing.
 
-A directory may come from anyone.  All that lies in one is read, written, replaced and removed by functions that take
-the directory, as the user named it, and a name in it, with slashes.  The directory itself may be a symbolic link.
-Below it no link is followed: each folder is opened from the one around it, where the system can do that, and its path
-is resolved and compared where it cannot.  What is read or written is a regular file, never a pipe or a device.
+Functions with `root` and `name` are for directories of unknown origin: `root` is the directory as the user named it,
+which may be a symbolic link, and `name` is a path in it, with slashes.  Below `root` no link is followed: each folder
+is opened relative to its parent, or, where the system cannot do that, its resolved path is compared.  Only regular
+files are read or written, no pipes and no devices.
 """
 
 import errno
-import hashlib
 import os
 import stat
 from collections.abc import Iterator, Sequence
@@ -27,21 +26,21 @@ if os.name != "nt":
 
     _FULL_SYNC = getattr(fcntl, "F_FULLFSYNC", None)
 
-# A file that someone made longer than any of its kind must not fill the memory of whoever reads it whole.
+# Largest files that are read at once, so that an oversized one cannot fill the memory.
 MOST_OF_TEXT, MOST_OF_JOURNAL, MOST_OF_FILE = 2**28, 2**30, 2**34  # bytes
 
-_LINK = "is a symbolic link; only files of its own count in a directory"
-# A pipe without a writer must not keep the reader waiting.  Windows has neither flag.
-_PLAINLY = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+_LINK = "is a symbolic link; put the file itself there"
+# Opening follows no link, and does not wait for the writer of a pipe.  Windows has neither flag.
+_REGULAR = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 _NEW = os.O_WRONLY | os.O_CREAT | os.O_TRUNC
 _HOLDS_FOLDERS = os.open in os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")  # not on Windows
 
 
 @contextmanager
-def naming(path: Path) -> Iterator[None]:
+def disk_errors(path: Path) -> Iterator[None]:
     """Turn an OSError of the block into a DiskError whose text begins with `path`.
 
-    A StoreError instead where no other disk would help: the file is not there, or is a symbolic link.
+    If the file is missing or is a symbolic link, it becomes a StoreError, since the disk is not the cause.
     """
     try:
         yield
@@ -55,7 +54,7 @@ def naming(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _refusing_folder(path: Path) -> Iterator[None]:
-    """Where the system refuses, in whatever words, because `path` is a folder, a StoreError that says so."""
+    """Turn an OSError of the block into a plain StoreError if its cause is that `path` is a folder."""
     try:
         yield
     except OSError as error:
@@ -64,7 +63,7 @@ def _refusing_folder(path: Path) -> Iterator[None]:
         raise
 
 
-# ---- where a name leads
+# ---- folders, opened without following links
 
 
 class _Folder(NamedTuple):
@@ -74,31 +73,31 @@ class _Folder(NamedTuple):
     descriptor: int | None
 
     def of(self, name: str) -> str:
-        """What the system is given, beside the descriptor, for a name in this folder."""
+        """The path to pass to the system, together with the descriptor, for a name in this folder."""
         return str(self.path / name) if self.descriptor is None else name
 
 
 def inner_names(name: str) -> list[str]:
-    """The folders on the way to a file of a directory, and its own name; ValueError if it can lie elsewhere."""
+    """The folders on the path to a file of a directory, and the file's name; ValueError if it may lie outside."""
     names = name.split("/")
-    strange = "\0\\:" if os.name == "nt" else "\0"
-    if any(one in ("", ".", "..") or {*one} & {*strange} for one in names):
+    forbidden = "\0\\:" if os.name == "nt" else "\0"
+    if any(part in ("", ".", "..") or {*part} & {*forbidden} for part in names):
         raise ValueError("lies outside the directory")
     return names
 
 
 @contextmanager
-def _place(root: Path, name: str, told: str | None = None, make: bool = False) -> Iterator[tuple[_Folder, str]]:
-    """The folder that the file `name` of a directory lies in, and its name there.
+def _parent(root: Path, name: str, shown: str | None = None, make: bool = False) -> Iterator[tuple[_Folder, str]]:
+    """The folder of the file `name` of a directory, and the file's name in that folder.
 
-    told : name for messages, if not this one.  make : create the folders on the way.
+    shown : name for messages, if not `name`.  make : create missing folders.
     """
-    path = root / (told or name)
+    path = root / (shown or name)
     try:
         *folders, last = inner_names(name)
     except ValueError as error:
         raise StoreError(f"{path}: {error}") from None
-    with naming(path), _held(root, folders, make) as folder:
+    with disk_errors(path), _held(root, folders, make) as folder:
         yield folder, last
 
 
@@ -144,7 +143,7 @@ def open_regular(path: Path, flags: int, folder: _Folder | None = None) -> int:
     """Descriptor of the file `path`, as `os.open` gives it; StoreError if it is there and no regular file."""
     folder = folder or _Folder(path.parent, None)
     with _refusing_folder(path):
-        descriptor = os.open(folder.of(path.name), flags | _PLAINLY, 0o666, dir_fd=folder.descriptor)
+        descriptor = os.open(folder.of(path.name), flags | _REGULAR, 0o666, dir_fd=folder.descriptor)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
         raise StoreError(f"{path}: is no regular file")
@@ -152,9 +151,9 @@ def open_regular(path: Path, flags: int, folder: _Folder | None = None) -> int:
 
 
 @contextmanager
-def _opened(root: Path, name: str, flags: int, told: str | None = None) -> Iterator[int]:
+def _opened(root: Path, name: str, flags: int, shown: str | None = None) -> Iterator[int]:
     """Descriptor of the file `name` of a directory."""
-    with _place(root, name, told) as (folder, last):
+    with _parent(root, name, shown) as (folder, last):
         descriptor = open_regular(folder.path / last, flags, folder)
         try:
             yield descriptor
@@ -166,7 +165,7 @@ def _opened(root: Path, name: str, flags: int, told: str | None = None) -> Itera
 
 
 def temporary_name(name: str) -> str:
-    """Where the content of the file `name` stands until it is whole."""
+    """The name under which the content of the file `name` is written until it is complete."""
     folder, slash, last = name.rpartition("/")
     return f"{folder}{slash}.{last}.tmp"
 
@@ -187,10 +186,10 @@ def write_inside(root: Path, name: str, content: bytes) -> None:
     publish(root, temporary_name(name), name)
 
 
-def write_synced(root: Path, name: str, content: bytes, told: str | None = None) -> None:
-    """Write a new file whose bytes, but not yet whose name, are on the disk.  told : name for messages."""
+def write_synced(root: Path, name: str, content: bytes, shown: str | None = None) -> None:
+    """Write a new file and sync its bytes, but not its name.  shown : name for messages, if not `name`."""
     try:
-        with _opened(root, name, _NEW, told) as descriptor:
+        with _opened(root, name, _NEW, shown) as descriptor:
             write_all(descriptor, content)
             sync(descriptor)
     except DiskError:
@@ -199,13 +198,13 @@ def write_synced(root: Path, name: str, content: bytes, told: str | None = None)
 
 
 def leave(root: Path, name: str, content: bytes = b"") -> None:
-    """Write a note that nothing rests on: a power cut may take it."""
+    """Write a file without syncing it; a power cut may remove it."""
     with _opened(root, name, _NEW) as descriptor:
         write_all(descriptor, content)
 
 
 def append_synced(root: Path, name: str, at: int, content: bytes) -> None:
-    """Put `content` behind the first `at` bytes of a file, where it ends after an error; it is then on the disk."""
+    """Write `content` after the first `at` bytes of a file, and sync it.  After an error the file ends at `at`."""
     with _opened(root, name, os.O_RDWR) as descriptor:
         os.ftruncate(descriptor, at)
         os.lseek(descriptor, at, os.SEEK_SET)
@@ -213,14 +212,14 @@ def append_synced(root: Path, name: str, at: int, content: bytes) -> None:
             write_all(descriptor, content)
             sync(descriptor)
         except OSError:
-            with suppress(OSError):  # what was written whole, and not synced, must not count for the next reader
+            with suppress(OSError):  # content that was written but not synced must not be read
                 os.ftruncate(descriptor, at)
             raise
 
 
 def publish(root: Path, temporary: str, name: str) -> None:
-    """Give a synced file its name in the same folder, in place of what had it; on return the name is on the disk."""
-    with _place(root, name) as (folder, last):
+    """Rename a synced file within its folder, replacing a file of that name; on return the name is on the disk."""
+    with _parent(root, name) as (folder, last):
         before, held = temporary.rpartition("/")[2], folder.descriptor
         try:
             with _refusing_folder(folder.path / last):
@@ -232,13 +231,13 @@ def publish(root: Path, temporary: str, name: str) -> None:
 
 
 def remove_file(root: Path, name: str) -> None:
-    """Remove the file `name` of a directory, if it is there; of a symbolic link, the link."""
-    with _place(root, name) as (folder, last), _refusing_folder(folder.path / last), suppress(FileNotFoundError):
+    """Remove the file `name` of a directory, if it exists; a symbolic link is removed, not its target."""
+    with _parent(root, name) as (folder, last), _refusing_folder(folder.path / last), suppress(FileNotFoundError):
         os.unlink(folder.of(last), dir_fd=folder.descriptor)
 
 
 def _discard(root: Path, name: str) -> None:
-    """A full disk gets its space back; the first error is the one to report."""
+    """Remove a file that could not be written; further errors are ignored, since the first one is reported."""
     with suppress(StoreError):
         remove_file(root, name)
 
@@ -253,7 +252,7 @@ def write_all(descriptor: int, content: bytes) -> None:
 def sync(descriptor: int) -> None:
     """On return the bytes of a file, or the names in a folder, are on the disk.
 
-    The fsync of macOS leaves them in the memory of the drive; its F_FULLFSYNC does not, where the volume knows it.
+    On macOS fsync leaves them in the drive's cache; F_FULLFSYNC does not, where the volume supports it.
     """
     if _FULL_SYNC is not None:
         with suppress(OSError):
@@ -271,26 +270,26 @@ def sync_file(root: Path, name: str) -> None:
 def make_folder(path: Path) -> None:
     """Create the folder `path`, as the user named it, with its parents, and sync the names that are new."""
     new = [folder for folder in (path, *path.parents) if not folder.exists()]
-    with naming(path):
+    with disk_errors(path):
         path.mkdir(parents=True, exist_ok=True)
     for folder in new:
         sync_folder(folder.parent)
 
 
 def make_way(root: Path, name: str) -> None:
-    """Create the folders on the way to the file `name` of a directory, and sync their names."""
-    with _place(root, name, make=True):
+    """Create the folders on the path to the file `name` of a directory, and sync their names."""
+    with _parent(root, name, make=True):
         pass
 
 
 def sync_folder(path: Path) -> None:
     """Make the names in the folder `path`, as the user named it, durable."""
-    with naming(path), _held(path) as folder:
+    with disk_errors(path), _held(path) as folder:
         _sync_names(folder)
 
 
 def _sync_names(folder: _Folder) -> None:
-    """Windows cannot open a folder; its renames are journaled by the system."""
+    """Sync the names in a folder.  Windows cannot open a folder; there the file system journals renames."""
     if folder.descriptor is not None:
         sync(folder.descriptor)
 
@@ -299,21 +298,21 @@ def _sync_names(folder: _Folder) -> None:
 
 
 def names_in(root: Path, inner: str = "") -> list[str]:
-    """Names of all that lies in the folder `inner` of a directory, or in the directory itself."""
-    with _place(root, f"{inner}/*".lstrip("/"), inner or ".") as (folder, _):
+    """Names of all that is in the folder `inner` of a directory, or in the directory itself."""
+    with _parent(root, f"{inner}/*".lstrip("/"), inner or ".") as (folder, _):
         return sorted(os.listdir(folder.path if folder.descriptor is None else folder.descriptor))
 
 
 def read_file(path: Path, most: int | None = None, limit: int = MOST_OF_FILE) -> bytes:
     """The content of the regular file `path`, as the user named it, or its first `most` bytes.
 
-    limit : StoreError if there are more bytes to be read than that, or than the memory takes.
+    StoreError if more than `limit` bytes would be read, or more than the memory can hold.
     """
     return read_inside(path.parent, path.name, most, limit)
 
 
 def read_short(path: Path) -> bytes:
-    """The content of a file that people read too, such as a campaign or a manifest."""
+    """The content of a text file, such as a campaign or a manifest."""
     return read_file(path, limit=MOST_OF_TEXT)
 
 
@@ -325,15 +324,7 @@ def read_inside(root: Path, name: str, most: int | None = None, limit: int = MOS
             with os.fdopen(descriptor, "rb", closefd=False) as file:
                 return file.read() if most is None else file.read(min(most, size))
         except MemoryError as error:
-            raise StoreError(f"{root / name}: has {size:,} bytes, which the memory does not take") from error
-
-
-def sha256_inside(root: Path, name: str) -> str:
-    """SHA-256 of the file `name` of a directory, read piece by piece."""
-    with _opened(root, name, os.O_RDONLY) as descriptor:
-        _size(descriptor, root / name, None, MOST_OF_FILE)
-        with os.fdopen(descriptor, "rb", buffering=0, closefd=False) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+            raise StoreError(f"{root / name}: has {size:,} bytes, which do not fit into the memory") from error
 
 
 def _size(descriptor: int, path: Path, most: int | None, limit: int) -> int:

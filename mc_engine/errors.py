@@ -1,12 +1,12 @@
-"""Everything the engine raises on purpose.
+"""The errors that the engine raises on purpose.
 
 EngineError
-  CampaignError     the campaign file, or a number in it, is wrong; lists every problem, not the first
-  ModelError        the model behind the campaign does not keep its contract
+  CampaignError     the campaign file, or a number in it, is wrong; lists every problem, not only the first
+  ModelError        the model of the campaign breaks its contract
   StoreError        the run directory is damaged, busy, or belongs to another campaign
-    DiskError       the disk refused: full, forbidden or broken; what was committed before is safe
-  RunInterrupted    the run was stopped from outside; what was committed is safe and `resume` completes it
-  WorkersLost       there is nobody to fly cases: workers that cannot be reached, or die whatever they do
+    DiskError       the disk is full, write-protected or broken; committed cases are safe
+  RunInterrupted    the run was stopped; committed cases are safe, and `resume` completes the run
+  WorkersLost       the workers cannot be reached, or die repeatedly
 """
 
 from collections.abc import Sequence
@@ -14,20 +14,27 @@ from dataclasses import dataclass
 
 from mc_engine.text import clean
 
-_LONGEST = 2000  # letters of one sentence
-MOST_SHOWN = 100  # problems of one campaign file; a reader mends the first ones first
+_LONGEST = 2000  # characters of one problem
+MOST_SHOWN = 100  # problems of one campaign file
 
 
 class EngineError(Exception):
-    """Base of all errors that the engine raises on purpose; its text is one or more plain sentences."""
+    """Base class of every error that mc-engine raises on purpose; its text is one or more plain sentences.
+
+    >>> try:
+    ...     open_run("runs/nothing")
+    ... except EngineError as error:
+    ...     print(error)
+    runs/nothing: there is no such folder
+    """
 
     def __str__(self) -> str:
-        return clean(super().__str__())  # for those who call the engine from Python, and print it
+        return clean(super().__str__())  # callers in Python may print it to a terminal
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake: where it stands (dotted place in the campaign file) and what to do about it."""
+    """One mistake: its place in the campaign file (dotted keys), and what to do about it."""
 
     place: str
     message: str
@@ -38,7 +45,17 @@ class Problem:
 
 
 class CampaignError(EngineError):
-    """The campaign cannot be flown as written.  `problems` lists every mistake found."""
+    """The campaign cannot be flown as written.
+
+    source : str, the campaign file, or the option of the command line
+    problems : sequence of Problem (place, message), every mistake found; a place is dotted, as "dispersion.ve_pct.dist"
+
+    >>> try:
+    ...     load_campaign("minimal", cases=0)
+    ... except CampaignError as error:
+    ...     print(error.problems[0])
+    campaign.cases: 0 is not allowed; it must be at least 1
+    """
 
     def __init__(self, source: str, problems: Sequence[Problem]):
         self.source = source
@@ -51,11 +68,26 @@ class CampaignError(EngineError):
 
 
 class ModelError(EngineError):
-    """The model breaks its contract: a missing field, a wrong shape, code the compiler cannot take."""
+    """The model breaks its contract: a missing field, a wrong shape, or code that cannot be compiled.
+
+    >>> from mc_engine.model import load_model
+    >>> try:
+    ...     load_model("campaigns.mars")
+    ... except ModelError as error:
+    ...     print(error)
+    there is no module "campaigns.mars"; a file beside the campaign ends in .py
+    """
 
 
 class StoreError(EngineError):
-    """The run directory cannot be read or written as it stands; the text names the path."""
+    """The run directory cannot be read or written as it stands; the text names the path.
+
+    >>> try:
+    ...     open_store("runs/small").row(99)
+    ... except StoreError as error:
+    ...     print(error)
+    runs/small: case 99 is not there
+    """
 
 
 class DiskError(StoreError):
@@ -63,7 +95,18 @@ class DiskError(StoreError):
 
 
 class RunInterrupted(EngineError):
-    """The run was stopped; the text holds the command that completes it."""
+    """The run was stopped, by Ctrl-C or a full disk; the text holds the command that completes it.
+
+    Chunks that were complete are kept, and `resume` flies the rest.
+
+    >>> def stop(done, wanted, failed):
+    ...     raise RunInterrupted(f"stopped after {done} of {wanted} cases")
+    >>> try:
+    ...     stop(512, 2000, 0)
+    ... except RunInterrupted as error:
+    ...     print(error)
+    stopped after 512 of 2000 cases
+    """
 
 
 class WorkersLost(EngineError):

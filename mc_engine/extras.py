@@ -1,6 +1,6 @@
-"""The packages of the extras that commands ask for, so that a message can say what to install."""
+"""The packages of each optional extra, so that a message can give the command that installs them."""
 
-# as in pyproject.toml, which a test holds against this
+# as in pyproject.toml; a test compares them
 EXTRAS = {
     "cluster": ("distributed", "dask-jobqueue"),
     "cloud": ("fsspec", "s3fs"),

@@ -1,12 +1,12 @@
-"""Stopping from outside, by Ctrl-C or SIGTERM.
+"""Interruption by Ctrl-C or SIGTERM.
 
-While cases fly, the first signal lets what is in flight land, the second breaks off.  At all other times of the command
-line the first one ends what it is at, the second one the process, whatever it does.  Either way the exit status is
-INTERRUPTED, and the last words are the command that goes on.  This module loads next to nothing: the command line
-listens before it loads the rest of itself.
+While cases fly, the first signal lets the chunks in flight complete, and the second one stops at once.  At any other
+time the first signal ends the command, and the second one the process.  The exit status is INTERRUPTED, and the message
+names the command that continues.  This module imports very little, so that the command line can install its handlers
+before it loads the rest.
 
-Python hands signals to its main thread, between two steps of its own.  Kernels and the compiler hold them off for as
-long as they work, so the main thread of the command line calls them by `in_another_thread`, and waits.
+Python runs signal handlers in its main thread, between two bytecodes.  A kernel or the compiler would delay them, so
+the main thread of the command line runs both by `in_another_thread`, and waits.
 """
 
 import atexit
@@ -28,23 +28,23 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 INTERRUPTED = 4  # the exit status
-_MODEL_FAULT = 2  # the exit status of all that is wrong with a model
-NOTHING_BEGUN = "interrupted; nothing was begun, and the same command begins it"
-ONCE_MORE = "interrupted; the same command does it all once more"
-LANDING = "interrupted; what flies lands first, a second signal ends it at once"
+_MODEL_FAULT = 2  # the exit status of a faulty model
+NOTHING_BEGUN = "interrupted; nothing was begun, give the same command again"
+ONCE_MORE = "interrupted; the same command begins again from the start"
+COMPLETING = "interrupted; the cases in flight are completed first, a second signal stops at once"
 
 _LOOK_EVERY_S = 0.2
-_ONE_SIGNAL_S = 0.05  # what comes so soon after another was sent along with it: to the process, and to its group
+_ONE_SIGNAL_S = 0.05  # signals closer than this are one: `timeout` signals a process and then its group
 
 # Windows has Ctrl-Break beside Ctrl-C, and SIGTERM in name only.
 SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name))
 
 
 class Interrupted(KeyboardInterrupt):
-    """What a signal raises.
+    """Raised by a signal.
 
-    Of a kind of its own: Python remembers a plain KeyboardInterrupt that passes through `exec`, as in the making of a
-    dataclass, and would end the process by SIGINT at the end of all, whatever its exit status.
+    Not a plain KeyboardInterrupt: Python remembers one that passes through `exec`, as in the making of a dataclass, and
+    would then end the process by SIGINT, whatever its exit status.
     """
 
 
@@ -54,16 +54,16 @@ _leave = os._exit
 
 @dataclass
 class _CommandLine:
-    """What the signals of this process find: there is one set of handlers in a process, and so one of these.
+    """State of the signal handlers.  A process has one set of handlers, and so one such object.
 
-    process : that listens.  heard : how many signals came since then.  last_s : when the last one came.
-    under_way : a command is at work, which an exception may unwind.  done : the command has ended.
-    abandoned : a kernel or the compiler is still at work, for nobody.
+    installed : the handlers are those of the command line, in process `process`.  signals : how many came since then.
+    last_s : time of the last one.  under_way : a command is running, which an exception may unwind.
+    done : the command has ended.  abandoned : a kernel or the compiler still runs, and nobody waits for it.
     """
 
-    listening: bool = False
+    installed: bool = False
     process: int = 0
-    heard: int = 0
+    signals: int = 0
     last_s: float = -_ONE_SIGNAL_S
     under_way: bool = False
     done: bool = False
@@ -71,64 +71,69 @@ class _CommandLine:
     advice: Advice = lambda: NOTHING_BEGUN
 
     def count(self) -> bool:
-        """Count one more signal; false for one that was sent along with the last."""
+        """Count one more signal; False for one that belongs to the signal before it."""
         last, self.last_s = self.last_s, time.monotonic()
         if self.last_s - last < _ONE_SIGNAL_S:
             return False
-        if self.listening:
-            self.heard += 1
+        if self.installed:
+            self.signals += 1
         return True
 
-    def hear(self, number: int, frame: FrameType | None) -> None:
+    def on_signal(self, number: int, frame: FrameType | None) -> None:
         if not self.count():
             return
-        if self.heard > 1:
+        if self.signals > 1:
             self.leave_at_once()
         if self.done:
-            return  # all was said and written; leaving takes a moment
+            return  # the command is complete; only the interpreter has yet to end
         if self.under_way:
             raise Interrupted
         self.leave_at_once()
 
     def leave_at_once(self) -> None:
-        _tell(last_words())
+        _write_error(interruption_message())
         _leave(INTERRUPTED)
 
 
-def _tell(words: str) -> None:
-    """A line on standard error; not through sys.stderr, in the middle of whose writing a signal may have come."""
+def _write_error(message: str) -> None:
+    """Write a line to standard error; not through sys.stderr, which a signal may have interrupted."""
     with suppress(OSError):
-        begin = "\n" if os.isatty(2) else ""  # behind ^C and a bar of progress
-        os.write(2, f"{begin}{clean(words)}\n".encode())
+        begin = "\n" if os.isatty(2) else ""  # after ^C and a progress bar
+        os.write(2, f"{begin}{clean(message)}\n".encode())
 
 
 _COMMAND_LINE = _CommandLine()
 
 
-def listen() -> None:
-    """From here on the signals of this process are those of its command line."""
-    _COMMAND_LINE.listening, _COMMAND_LINE.process = True, os.getpid()
+def install_handlers() -> None:
+    """Install the signal handlers of the command line in this process."""
+    _COMMAND_LINE.installed, _COMMAND_LINE.process = True, os.getpid()
     for number in SIGNALS:
-        signal.signal(number, _COMMAND_LINE.hear)
-    os._exit = _exit_with_a_word
-    atexit.register(_end)  # the first one registered is the last one called
+        signal.signal(number, _COMMAND_LINE.on_signal)
+    os._exit = _report_exit
+    atexit.register(_at_exit)  # the first one registered is the last one called
 
 
-def _exit_with_a_word(status: int) -> NoReturn:
-    """In place of `os._exit`, by which a model would end a command with its own status and without a word."""
+def _report_exit(status: int) -> NoReturn:
+    """Replaces `os._exit`, with which a model could end a command without a message and with any exit status."""
     if os.getpid() == _COMMAND_LINE.process:  # not in a process that was forked from it
         caller = sys._getframe(1)
         place = f"{os.path.basename(caller.f_code.co_filename)}, line {caller.f_lineno}"
-        _tell(f"{place}: os._exit({status}) ends the program; a model only computes")
+        _write_error(f"{place}: os._exit({status}) ends the program; a model only computes")
         status = _MODEL_FAULT
     _leave(status)
 
 
-def _end() -> None:
-    """What comes while the interpreter is taken down must not turn the exit status of work that is done."""
+def ignore_signals() -> None:
+    """Ignore all SIGNALS in this process from now on."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    if _COMMAND_LINE.abandoned:  # and what is still at work must not lose the interpreter under it
+
+
+def _at_exit() -> None:
+    """Let no late signal change the exit status of a command that is complete."""
+    ignore_signals()
+    if _COMMAND_LINE.abandoned:  # a kernel that still runs needs the interpreter: end without taking it down
         for stream in (sys.stdout, sys.stderr):
             with suppress(OSError, ValueError):
                 stream.flush()
@@ -136,15 +141,19 @@ def _end() -> None:
 
 
 def in_another_thread(work: Callable[[], T]) -> T:
-    """What `work` returns or raises.  The main thread of the command line hears signals meanwhile, and may leave it."""
-    if not _COMMAND_LINE.listening or threading.current_thread() is not threading.main_thread():
+    """Return what `work` returns, or raise what it raises.
+
+    In the main thread of the command line, `work` runs in another thread: a signal is then handled at once, and the
+    work is abandoned.
+    """
+    if not _COMMAND_LINE.installed or threading.current_thread() is not threading.main_thread():
         return work()
     from concurrent.futures import Future, wait
 
     outcome: Future[T] = Future()
     threading.Thread(target=_settle, args=(work, outcome), daemon=True).start()
     try:
-        while not wait([outcome], _LOOK_EVERY_S).done:  # Windows hears nothing in a wait without an end
+        while not wait([outcome], _LOOK_EVERY_S).done:  # Windows handles no signal during a wait without limit
             pass
     except BaseException:
         _COMMAND_LINE.abandoned = True
@@ -161,7 +170,7 @@ def _settle(work: Callable[[], T], outcome: "Future[T]") -> None:
 
 @contextmanager
 def under_way() -> Iterator[None]:
-    """A command is at work: the first signal raises KeyboardInterrupt in it."""
+    """Within the block a command runs, and the first signal raises KeyboardInterrupt."""
     _COMMAND_LINE.advice = lambda: ONCE_MORE
     try:
         _COMMAND_LINE.under_way = True
@@ -172,46 +181,46 @@ def under_way() -> Iterator[None]:
 
 
 def advise(advice: Advice) -> None:
-    """What the command would say from here on, if it were interrupted."""
+    """Set the function that gives the message of an interruption from here on."""
     _COMMAND_LINE.advice = advice
 
 
-def last_words() -> str:
-    """The sentence to leave with after an interruption."""
+def interruption_message() -> str:
+    """The message of an interrupted command: the state of the work, and the command that continues it."""
     try:
         return _COMMAND_LINE.advice()
-    except Exception:  # in a process that was stopped in the middle of anything, with its folders in any state
+    except Exception:  # the signal may have come at any moment, with the run's folder in any state
         return ONCE_MORE
 
 
-def heed() -> None:
-    """Raise KeyboardInterrupt if a signal came that nobody has heeded: after the last case, or lost in a callback."""
-    if _COMMAND_LINE.heard:
+def raise_if_signalled() -> None:
+    """Raise KeyboardInterrupt if a signal has had no effect yet: it came after the last case, or in a callback."""
+    if _COMMAND_LINE.signals:
         raise Interrupted
 
 
 @contextmanager
 def stop_signal() -> Iterator[threading.Event]:
-    """Event that is set by the first SIGINT or SIGTERM; a second one raises KeyboardInterrupt.
+    """An event that the first SIGINT or SIGTERM sets; a second one raises KeyboardInterrupt.
 
-    Outside the main thread, where Python takes no signals, the event is never set.
+    Outside the main thread, where Python handles no signals, the event is never set.
     """
     stop = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield stop
         return
 
-    def ask(number: int, frame: FrameType | None) -> None:
+    def set_stop(number: int, frame: FrameType | None) -> None:
         if not _COMMAND_LINE.count():
             return
         if stop.is_set():
             raise Interrupted
         stop.set()
-        if _COMMAND_LINE.listening:
-            _tell(LANDING)
+        if _COMMAND_LINE.installed:
+            _write_error(COMPLETING)
 
-    before: dict[int, Any] = {number: signal.signal(number, ask) for number in SIGNALS}
-    if _COMMAND_LINE.heard:  # before there was this event to set
+    before: dict[int, Any] = {number: signal.signal(number, set_stop) for number in SIGNALS}
+    if _COMMAND_LINE.signals:  # one that came before the event existed
         stop.set()
     try:
         yield stop
@@ -222,9 +231,9 @@ def stop_signal() -> Iterator[threading.Event]:
 
 @contextmanager
 def unsignalled_children() -> Iterator[None]:
-    """Processes begun in this block do not hear a terminal's Ctrl-C; this process hears it when the block ends.
+    """Processes started in this block ignore Ctrl-C; this process handles one at the end of the block.
 
-    Where signals cannot be held back (Windows) the block does nothing.
+    Where signals cannot be blocked (Windows) the block has no effect.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield

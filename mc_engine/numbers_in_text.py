@@ -1,6 +1,6 @@
-"""Numbers as people write them in tables, messages and on the command line: ASCII digits, sign, point and exponent.
+"""The syntax of numbers in tables, messages and on the command line: ASCII digits, sign, point and exponent.
 
-Python's own reading also takes 1_0, digits of other scripts, nan and infinity, none of which anybody means there.
+Python itself would also accept 1_0, digits of other scripts, nan and infinity.
 """
 
 import re

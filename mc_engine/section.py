@@ -1,4 +1,4 @@
-"""What the sections of a campaign file and the records of a manifest have in common."""
+"""Base class and types shared by the sections of a campaign file and the records of a manifest."""
 
 from typing import Annotated
 
@@ -18,13 +18,13 @@ Share = Annotated[float, Field(gt=0.0, lt=1.0), AfterValidator(_not_an_end)]
 
 
 class Section(BaseModel):
-    """A table of the file: nothing unknown, nothing converted, nothing infinite."""
+    """A table of the campaign file: unknown keys, values of another type and infinite numbers are errors."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
 
 
 class ReportSection(Section):
-    """[report]: the probability and the confidence of all statistics of a report, beside its requirements' own."""
+    """[report]: probability and confidence of the statistics in a report; requirements have their own."""
 
     probability: Share = Field(default=0.9973, ge=0.5, description="of tolerance limits and percentiles")
     confidence: Share = Field(default=0.90, ge=0.5, description="with which each bound holds")

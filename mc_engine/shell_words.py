@@ -1,7 +1,4 @@
-"""Paths as words of the commands that are printed for the user to give next.
-
-This module loads next to nothing: the command line does before it loads the rest of itself.
-"""
+"""Quoting of paths in the commands that messages suggest.  Imports little, so that the command line starts fast."""
 
 import os
 import shlex
@@ -10,8 +7,8 @@ from pathlib import Path
 
 
 def shell_word(place: Path | str) -> str:
-    """A path, a URL or the name of a campaign as the shell takes it for one word, and no command for an option."""
+    """A path, a URL or a campaign's name, quoted as one word of the shell that no command takes for an option."""
     text = str(place)
     text = f"./{text}" if text.startswith("-") else text
-    # Windows: its shells know double quotes alone, and leave a backslash in peace
+    # The shells of Windows know double quotes only, and do not interpret a backslash.
     return subprocess.list2cmdline([text]) if os.name == "nt" else shlex.quote(text)

@@ -13,6 +13,9 @@ NO_STOP = 4
 REFUSED = 5
 WORKER_DIED = 6
 TIME_LIMIT = 7
+CRASHED = 8
+MEMORY_LIMIT = 9
+NO_RESULT = 10
 
 STATUS_NAME = {
     OK: "ok",
@@ -23,6 +26,9 @@ STATUS_NAME = {
     REFUSED: "refused",
     WORKER_DIED: "worker-died",
     TIME_LIMIT: "time-limit",
+    CRASHED: "crashed",
+    MEMORY_LIMIT: "memory-limit",
+    NO_RESULT: "no-result",
 }
 
 STATUS_TEXT = {
@@ -34,4 +40,7 @@ STATUS_TEXT = {
     REFUSED: "the model cannot start from these inputs; the column `reason` says why",
     WORKER_DIED: "the process flying this case died, or had too little memory for it",
     TIME_LIMIT: "the case took longer than it was allowed to; `mc-engine rerun` can give it more",
+    CRASHED: "the simulator ended by an exception, a signal or an exit code; the column `reason` says which",
+    MEMORY_LIMIT: "the simulator needed more memory than it was allowed to have",
+    NO_RESULT: "the simulator's output is missing, unreadable or incomplete; the column `reason` says what is wrong",
 }

@@ -1,9 +1,9 @@
-"""The nearest of the words that are allowed, for messages that end in "did you mean ...?"."""
+"""Suggestions for unknown words, for messages that end in "did you mean ...?"."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
-# What engineers type first, and the words of the campaign file for it; used only where that word is allowed.
+# Common synonyms of the campaign file's words; a synonym is suggested only where its word is allowed.
 _OTHER_NAMES = {
     "average": "mean",
     "binomial": "discrete",
@@ -56,48 +56,48 @@ _OTHER_NAMES = {
     "volts": "V",
     "watts": "W",
 }
-_FEW = 12
-_NEAR = 3
-_SHORTEST = 3  # letters; of two-letter words, such as kg and km, too many are one slip apart
+_MOST_LISTED = 12
+_NEAREST_LISTED = 3
+_SHORTEST = 3  # letters; too many words of two letters, such as kg and km, differ by one
 
 
 def nearest(word: str, allowed: Iterable[str]) -> str | None:
     """The allowed word that `word` was probably meant to be, or None."""
     plain = {name.lower().replace("-", "_"): name for name in allowed}
-    wanted = word.lower().replace("-", "_").replace(" ", "_")
-    other = (_OTHER_NAMES.get(wanted) or _OTHER_NAMES.get(f"{wanted}s", "")).lower()
-    if other and other in plain:
-        return plain[other]
-    if wanted in plain:
-        return plain[wanted]
-    slips = [name for name in plain if _one_slip_apart(wanted, name)]
-    matches = get_close_matches(wanted, slips or plain, n=1, cutoff=0.0 if slips else 0.6)
+    typed = word.lower().replace("-", "_").replace(" ", "_")
+    synonym = (_OTHER_NAMES.get(typed) or _OTHER_NAMES.get(f"{typed}s", "")).lower()
+    if synonym and synonym in plain:
+        return plain[synonym]
+    if typed in plain:
+        return plain[typed]
+    slips = [name for name in plain if _is_one_edit(typed, name)]
+    matches = get_close_matches(typed, slips or plain, n=1, cutoff=0.0 if slips else 0.6)
     return plain[matches[0]] if matches else None
 
 
-def _one_slip_apart(one: str, other: str) -> bool:
-    """True where a letter too many, too few or changed, or two neighbours swapped, makes one word of the other.
+def _is_one_edit(a: str, b: str) -> bool:
+    """True if one letter inserted, deleted or changed, or two neighbours swapped, turns one word into the other.
 
-    Damerau, Communications of the ACM 7 (1964), 171-176: four in five slips of a keyboard are one of these.
+    Damerau, Communications of the ACM 7 (1964), 171-176: four of five typing errors are one of these.
     """
-    if abs(len(one) - len(other)) > 1 or one == other or max(len(one), len(other)) < _SHORTEST:
+    if abs(len(a) - len(b)) > 1 or a == b or max(len(a), len(b)) < _SHORTEST:
         return False
-    same = next((i for i, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other)))
-    rest, its = one[same:], other[same:]
-    swapped = rest[:2] == its[:2][::-1] and rest[2:] == its[2:]
-    return rest[1:] == its[1:] or rest[1:] == its or rest == its[1:] or swapped
+    same = next((i for i, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+    rest_a, rest_b = a[same:], b[same:]
+    swapped = rest_a[:2] == rest_b[:2][::-1] and rest_a[2:] == rest_b[2:]
+    return rest_a[1:] == rest_b[1:] or rest_a[1:] == rest_b or rest_a == rest_b[1:] or swapped
 
 
 def hint(word: str, allowed: Iterable[str]) -> str:
-    """End of a sentence about an unknown word: the nearest one, or else all of them, or the nearest few."""
+    """End of a sentence about an unknown word: the nearest allowed word, or a list of the allowed ones."""
     allowed = list(allowed)
     match = nearest(word, allowed)
     if match is not None:
         return f'; did you mean "{match}"?'
     if not allowed:
         return ""
-    if len(allowed) > _FEW:
-        near = get_close_matches(word.lower(), allowed, n=_NEAR, cutoff=0.0)
+    if len(allowed) > _MOST_LISTED:
+        near = get_close_matches(word.lower(), allowed, n=_NEAREST_LISTED, cutoff=0.0)
         return f"; {len(allowed)} are known, nearest are {listed(near)}"
     return f"; known {'is' if len(allowed) == 1 else 'are'} {listed(allowed)}"
 

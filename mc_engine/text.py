@@ -1,10 +1,10 @@
-"""Text of unknown origin on its way to a reader: a terminal, a page, a picture.
+"""Text of unknown origin, made safe for a terminal, a page or a picture.
 
-Names, units and sentences of a run, a campaign or a folder may come from anyone.  Written as they are, some characters
-move the cursor, retitle the window, turn the order of reading round, or hide.
+Names and descriptions in a run, a campaign or a folder may contain characters that move the cursor, retitle the window,
+reverse the reading order, or are invisible.  `clean` replaces them.
 
-The command line writes through `clean_streams`.  Text that a stream refuses stops no flight and changes no exit status,
-as when a reader has gone away (`| head`).  Only a full disk behind standard output is told, and is no success.
+The command line writes through `clean_streams`.  A stream that cannot be written to, such as a closed pipe (`| head`),
+stops no flight and changes no exit status; only a full disk behind standard output is reported as an error.
 """
 
 import os
@@ -18,28 +18,26 @@ _NOT_ALL_PRINTED = 4  # the exit status, as of a full disk
 
 
 def clean(text: str) -> str:
-    r"""The text with every character that steers, reorders or hides replaced by its escape, such as \x1b or \u202e.
+    r"""The text with every control or invisible character replaced by its escape, such as \x1b or \u202e.
 
-    Those are controls but newline and tab, format characters (bidirectional, zero-width), line and paragraph
-    separators, lone surrogates (of file names that are not UTF-8), and private and unassigned code points.
+    Replaced are controls except newline and tab, format characters (bidirectional, zero-width), line and paragraph
+    separators, lone surrogates (from file names that are not UTF-8), and private and unassigned code points.
     """
     if text.isprintable():
         return text
-    return "".join(letter if _is_shown(letter) else _escape(letter) for letter in text)
+    return "".join(map(_shown, text))
 
 
-def _is_shown(letter: str) -> bool:
-    return letter.isprintable() or letter in "\n\t" or category(letter) == "Zs"
-
-
-def _escape(letter: str) -> str:
+def _shown(letter: str) -> str:
+    if letter.isprintable() or letter in "\n\t" or category(letter) == "Zs":
+        return letter
     return letter.encode("unicode_escape").decode("ascii")
 
 
 class CleanStream:
-    """Writes clean text to a stream.  What the stream refuses counts as written, and all that follows goes nowhere.
+    """A stream that writes clean text.  After an error of the stream below, all further text is discarded.
 
-    refusal : the first one that was not for want of a reader.  There is no `buffer`: bytes would not be clean.
+    refusal : the first error, unless the reader has closed the pipe.  There is no `buffer`: bytes would not be cleaned.
     """
 
     buffer: Any = None
@@ -49,7 +47,7 @@ class CleanStream:
         self.refusal: OSError | None = None
 
     def steering(self) -> "CleanStream":
-        """The same for a bar, whose text moves the cursor."""
+        """The same stream without cleaning, for a progress bar, which has to move the cursor."""
         return CleanStream(self._stream, str)
 
     def write(self, text: str) -> int:
@@ -66,7 +64,7 @@ class CleanStream:
             if not isinstance(error, BrokenPipeError):
                 self.refusal = error
             nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, self._stream.fileno())  # for what is still in the stream's memory, too
+            os.dup2(nowhere, self._stream.fileno())  # also for text that the stream still buffers
             os.close(nowhere)
 
     def __getattr__(self, name: str) -> Any:
@@ -75,12 +73,16 @@ class CleanStream:
 
 @contextmanager
 def clean_streams() -> Iterator[None]:
-    """Standard output and error of a process that ends with the block are clean; an encoding's gaps become escapes."""
+    """Clean standard output and error within the block, with which the process ends.
+
+    Characters that the encoding of a stream lacks become escapes.  If standard output could not be written for another
+    reason than a closed pipe, a message says so and the exit status is that of a full disk.
+    """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-        if getattr(sys, name) is None:  # closed by the shell: its number must not become that of the next file
+        if getattr(sys, name) is None:  # closed by the shell: the next file opened must not get its descriptor
             setattr(sys, name, open(os.devnull, mode))
     if not (hasattr(sys.stdout, "reconfigure") and hasattr(sys.stderr, "reconfigure")):
-        yield  # somebody gathers the text in memory, where nothing is refused
+        yield  # the streams are in memory, as in a test
         return
     for stream in (sys.stdout, sys.stderr):
         stream.reconfigure(errors="backslashreplace")

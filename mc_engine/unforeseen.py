@@ -1,7 +1,7 @@
-"""Errors that nobody foresaw: one sentence for the user, and a log file with the traceback for who mends it.
+"""Unexpected errors on the command line: one sentence for the user, and a log file with the traceback.
 
-The command line ends with UNFORESEEN, an exit status of its own, so that no script takes a fault of the program for a
-requirement that is not met.  The Python API raises what it raises.
+The exit status is UNFORESEEN, so that a script can tell such an error from a requirement that is not met.  In the
+Python interface unexpected errors are raised unchanged.
 """
 
 import os
@@ -15,32 +15,32 @@ from pathlib import Path
 from typing import Any
 
 UNFORESEEN = 6  # the exit status
-# Bytes of addresses: those without which no case flies, and those below which the threads of a BLAS have no room.
+# Bytes of address space: the least with which cases can fly, and the least for the threads of a BLAS.
 _LEAST, _SMALL = 900 * 2**20, 3 * 2**30
 
 
 def unforeseen(error: BaseException) -> str:
-    """The sentence to leave with; the traceback goes to a file that this user alone can read."""
-    log = _written("".join(traceback.format_exception(error)))
+    """The message for an unexpected error; its traceback is written to a file that only this user can read."""
+    log = _write_log("".join(traceback.format_exception(error)))
     where = f"; {log} says where" if log else ""
-    if _is_for_want_of_memory(error):
+    if _lacks_memory(error):
         return f"the memory that this process may have does not suffice; give it more{where}"
-    words = " ".join(str(error).split())[:200]
+    text = " ".join(str(error).split())[:200]
     kind = type(error).__name__
-    return f"the program failed, which is no fault of the run's results: {kind}{f': {words!a}' if words else ''}{where}"
+    return f"the program failed, which is no fault of the run's results: {kind}{f': {text!a}' if text else ''}{where}"
 
 
-def _is_for_want_of_memory(error: BaseException | None) -> bool:
-    """True for a MemoryError, for what libraries make of one, and for what came of either."""
+def _lacks_memory(error: BaseException | None) -> bool:
+    """True for a MemoryError, for the errors of libraries without memory, and for errors caused by them."""
     if error is None:
         return False
     words = ("cannot allocate memory", "failed to map segment", "can't start new thread", "bad_alloc", "out of memory")
-    told = any(word in str(error).lower() for word in words)
-    return isinstance(error, MemoryError) or told or _is_for_want_of_memory(error.__cause__ or error.__context__)
+    says_so = any(word in str(error).lower() for word in words)
+    return isinstance(error, MemoryError) or says_so or _lacks_memory(error.__cause__ or error.__context__)
 
 
-def _written(text: str) -> str:
-    """The name of the log, from the home folder on if it lies there; empty where none can be written."""
+def _write_log(text: str) -> str:
+    """Write the log.  Returns its path, with ~ for the home folder, or "" if it cannot be written."""
     with suppress(OSError):
         number, name = tempfile.mkstemp(prefix="mc-engine-", suffix=".log")  # with the rights 0600
         with os.fdopen(number, "w", encoding="utf-8", errors="backslashreplace") as file:
@@ -52,7 +52,7 @@ def _written(text: str) -> str:
 
 
 def catch_all() -> None:
-    """From here on warnings, and errors of threads, are a sentence each on standard error, and no Python source."""
+    """From now on print each warning, and each error of a thread, as one sentence without Python source."""
     warnings.showwarning = _tell_warning  # type: ignore[assignment]
     threading.excepthook = lambda facts: _tell_error(facts.exc_value)
     sys.unraisablehook = lambda facts: _tell_error(facts.exc_value)
@@ -68,9 +68,9 @@ def _tell_error(error: BaseException | None) -> None:
 
 
 def refuse_small_memory() -> None:
-    """Ends the process where `ulimit -v` leaves less than loading takes; where it is short, BLAS does with one thread.
+    """End the process if `ulimit -v` leaves less memory than loading takes; if it is small, limit BLAS to one thread.
 
-    A BLAS that finds no room for its threads never returns, or ends the process itself with the exit status 1.
+    A BLAS without memory for its threads never returns, or ends the process with the exit status 1.
     """
     with suppress(ImportError, ValueError, OSError):
         import resource

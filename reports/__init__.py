@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from reports.cli import report, write_reports
     from reports.contents import build
-    from reports.html import render_html
-    from reports.pdf import render_pdf
+    from reports.formats.html import render_html
+    from reports.formats.pdf import render_pdf
     from reports.replays import replay_picture
 
 _HOME = {
     "build": "contents",
-    "render_html": "html",
-    "render_pdf": "pdf",
+    "render_html": "formats.html",
+    "render_pdf": "formats.pdf",
     "replay_picture": "replays",
     "report": "cli",
     "write_reports": "cli",

@@ -8,14 +8,14 @@ from mc_engine.store.opening import open_store
 from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
 from mc_engine.store.run_folder import readable
 from reports.contents import build, titled
-from reports.data import FILE as JSON
-from reports.data import render_json
-from reports.document import Attachment, Document
-from reports.flown import Flown
-from reports.html import render_html
-from reports.markdown import FILE, figure_files, render_markdown
-from reports.pdf import render_pdf
-from reports.user_sections import RunFacts, TemplateError, run_facts, with_own_sections
+from reports.document.blocks import Attachment, Document
+from reports.formats.html import render_html
+from reports.formats.json_data import FILE as JSON
+from reports.formats.json_data import render_json
+from reports.formats.markdown import FILE, figure_files, render_markdown
+from reports.formats.pdf import render_pdf
+from reports.run.flown import Flown
+from reports.user_sections.sections import RunFacts, TemplateError, run_facts, with_own_sections
 
 
 def _html(document: Document) -> list[Attachment]:
@@ -84,12 +84,12 @@ def _document(path: Path, template: Path | None, beside: Sequence[Path]) -> Docu
         raise TemplateError(f"{path}: is a {kind}; a template speaks of runs")
     if kind == TUNING:  # loaded here, since most reports are of runs
         from mc_engine.studies.tuning_folder import open_tuning
-        from reports.tuning import build_tuning
+        from reports.studies.tuning import build_tuning
 
         return build_tuning(open_tuning(path), name)
     if kind == RARE_EVENT:
         from mc_engine.studies.rare_event_folder import open_rare_event
-        from reports.rare_events import build_rare_event
+        from reports.studies.rare_events import build_rare_event
 
         return build_rare_event(open_rare_event(path), name)
     run = open_store(path)
@@ -98,11 +98,11 @@ def _document(path: Path, template: Path | None, beside: Sequence[Path]) -> Docu
         return document
     facts = run_facts(Flown(run, name), document.title)
     others = {other.resolve(): other for other in beside}
-    runs = [facts if other == path.resolve() else _facts(other) for other in others] or [facts]
+    runs = [facts if other == path.resolve() else _facts_of(other) for other in others] or [facts]
     return with_own_sections(document, template, facts, runs)
 
 
-def _facts(path: Path) -> RunFacts:
+def _facts_of(path: Path) -> RunFacts:
     if (kind := kind_of(path)) in (TUNING, RARE_EVENT):
         raise TemplateError(f"{path}: is a {kind}; a template speaks of runs")
     flown = Flown(open_store(path), readable(path.name))

@@ -1,32 +1,36 @@
 """The contents of a report, in reading order: verdicts, what was flown, results; the appendices hold the evidence."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
-from reports.case_tables import case_table, worst_tables
-from reports.chosen_units import ShownRun
-from reports.convergence import convergence_blocks
-from reports.corridors import corridor_blocks
-from reports.data import run_data
-from reports.diagnostics import correlation_blocks, normal_probability_blocks
-from reports.document import Block, Document, Section, Text, numbered
-from reports.drawings import distribution_blocks, history_blocks, map_blocks, other_distributions, scatter_blocks
-from reports.flown import Flown, Run
-from reports.footprints import FootprintContents, footprint_contents
-from reports.glossary import GLOSSARY
-from reports.headline import cost_cards, summary_sentence, verdict_cards, warnings
-from reports.levels import level_blocks
-from reports.profiles import profile_blocks
-from reports.provenance import campaign_facts, provenance_table
-from reports.published import published_blocks
-from reports.published_statistics import statistics_tables
-from reports.requirement_tables import requirement_blocks
-from reports.scenario import scenario_blocks
-from reports.sensitivity import sensitivity_blocks
-from reports.single_cases import ANCHOR as CASES
-from reports.single_cases import case_blocks, case_data
-from reports.tables import fixed_table, quantile_table, status_table, summary_table
-
-Found = Iterable[Block | str | None]
+from reports.contributors.sensitivity import sensitivity_blocks
+from reports.document.blocks import Block, Document, Found, Section, as_blocks, numbered
+from reports.document.glossary import GLOSSARY
+from reports.footprint.section import FootprintContents, footprint_contents
+from reports.formats.json_data import run_data
+from reports.run.chosen_units import ShownRun
+from reports.run.flown import Flown, Run
+from reports.sections.case_tables import case_table, worst_tables
+from reports.sections.convergence import convergence_blocks
+from reports.sections.corridors import corridor_blocks
+from reports.sections.diagnostics import correlation_blocks, normal_probability_blocks
+from reports.sections.figure_blocks import (
+    distribution_blocks,
+    history_blocks,
+    map_blocks,
+    other_distributions,
+    scatter_blocks,
+)
+from reports.sections.headline import cost_cards, summary_sentence, verdict_cards, warnings
+from reports.sections.levels import level_blocks
+from reports.sections.profiles import profile_blocks
+from reports.sections.provenance import campaign_facts, provenance_table
+from reports.sections.published import published_blocks
+from reports.sections.published_statistics import statistics_tables
+from reports.sections.requirement_tables import requirement_blocks
+from reports.sections.scenario import scenario_blocks
+from reports.sections.single_cases import ANCHOR as CASES
+from reports.sections.single_cases import case_blocks, case_data
+from reports.sections.tables import fixed_table, quantile_table, status_table, summary_table
 
 
 def build(run: Run, name: str) -> Document:
@@ -86,8 +90,8 @@ def _appendices(flown: Flown) -> Iterator[Section]:
     yield _section("reading", "Glossary", (GLOSSARY,), "appendix")
 
 
-def _section(anchor: str, title: str, found: Found, kind: str = "chapter") -> Section:
-    return Section(anchor, title, blocks(found), kind)
+def _section(anchor: str, title: str, said: Found, kind: str = "chapter") -> Section:
+    return Section(anchor, title, as_blocks(said), kind)
 
 
 def _kept(sections: list[Section]) -> Iterator[Section]:
@@ -100,11 +104,6 @@ def _kept(sections: list[Section]) -> Iterator[Section]:
             parts.append(later)
         if section.blocks or (section.kind == "chapter" and any(part.blocks for part in parts)):
             yield section
-
-
-def blocks(found: Found) -> tuple[Block, ...]:
-    """Blocks without the absent ones; a sentence becomes a paragraph."""
-    return tuple(Text((item,)) if isinstance(item, str) else item for item in found if item is not None)
 
 
 def _metrics(flown: Flown) -> Iterator[Block | str | None]:

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from reports.drawings import NOMINAL, history_drawing, is_constant
-from reports.figures import Histories, HistoryLine, paper
-from reports.flown import Flown, Run
-from reports.pdf import render_picture
+from reports.drawing import paper
+from reports.drawing.marks import Drawing
+from reports.drawing.pictures import render_picture
+from reports.figures.histories import HistoryLine, history_figure
+from reports.run.flown import Flown, Run
+from reports.sections.figure_blocks import NOMINAL, is_constant, saved_histories
 
 LARGEST = 1e100  # of any unit: what a flight that is lost holds beyond it, no axis can have ticks for
 
@@ -18,7 +20,7 @@ def replay_picture(run: Run, case_id: int, history: pd.DataFrame) -> bytes:
     return render_picture(paper.svg(replay_drawing(run, case_id, history)), "png")
 
 
-def replay_drawing(run: Run, case_id: int, history: pd.DataFrame) -> Histories:
+def replay_drawing(run: Run, case_id: int, history: pd.DataFrame) -> Drawing:
     """A panel a quantity that varies."""
     flown = Flown(run, "")
     columns = {name: history[name].to_numpy(dtype=np.float64) for name in history.columns if name != "case_id"}
@@ -28,5 +30,6 @@ def replay_drawing(run: Run, case_id: int, history: pd.DataFrame) -> Histories:
     line = HistoryLine(f"case {case_id}", t, quantities, 1)
     held = set(flown.histories["case_id"]) if len(flown.histories) else set()
     nominal: dict[int, tuple[str, int | None]] = {NOMINAL: ("nominal", 0)} if NOMINAL in held else {}
-    drawing = history_drawing(flown, varying, nominal)
-    return replace(drawing, lines=(*drawing.lines, line))
+    histories = saved_histories(flown, varying, nominal)
+    histories = replace(histories, lines=(*histories.lines, line))
+    return history_figure([histories.plot(flown, name) for name in varying])

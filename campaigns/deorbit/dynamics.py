@@ -10,10 +10,11 @@ difference of large numbers, and within a Runge-Kutta step two places taken apar
 from collections import namedtuple
 
 from campaigns.deorbit.elements import osculating
-from mc_engine.lanes import any_lane, exp, physics, rint, sincos, sqrt, where
+from mc_engine.lanes import any_lane, exp, physics, sincos, sqrt, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.atmosphere import layered
 from mc_engine.physics.constants import EARTH_RATE, EQUATORIAL_RADIUS, MU_EARTH
+from mc_engine.physics.frames import half_turn
 from mc_engine.physics.gravity import j2_perturbation, point_mass
 from mc_engine.physics.pulse_modulators import lag_rate
 
@@ -36,7 +37,6 @@ Parameters = namedtuple(
 Events = namedtuple("Events", "entry pulse_on pulse_off")
 Desired = namedtuple("Desired", "x y z vx vy vz ax ay az rx ry rz tx ty tz rate")
 
-TAU = 6.283185307179586
 # settings arrive as numbers: places in the lists of words of `model.py`
 CONTINUOUS, CLIPPED, PULSED, OFF = 0.0, 1.0, 2.0, 3.0
 FEED_CONTINUOUS = 0.0
@@ -46,7 +46,10 @@ BURNING = 1.0
 @physics
 def initial(p, o):
     """State just after the burn."""
-    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz, p.f_desired, 0.0, 0.0)
+    return State(
+        x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz,
+        f_desired=p.f_desired, impulse=0.0, filtered=0.0,
+    )  # fmt: skip
 
 
 @physics
@@ -54,8 +57,7 @@ def element_errors(s, p):
     """Flown less desired (a [m], e, omega [rad, within half a turn])."""
     x, y, z, vx, vy, vz = flown(s, desired_motion(s.f_desired, p))
     a, e, omega = osculating(x, y, z, vx, vy, vz)
-    turn = omega - p.omega
-    return a - p.a, e - p.e, turn - TAU * rint(turn * (1.0 / TAU))
+    return a - p.a, e - p.e, half_turn(omega - p.omega)
 
 
 @physics
@@ -69,13 +71,16 @@ def inverse(first, scale):
 def start(p, o):
     """Navigation errors are the constant ones until the first fix; the thruster is off."""
     a, e, omega = element_errors(initial(p, o), p)
-    scales = inverse(a, p.a), inverse(e, 1.0), inverse(omega, 1.0)
-    return Memory(p.bias_r, p.bias_t, p.bias_n, p.bias_vr, p.bias_vt, p.bias_vn, 0.0, 0.0, *scales)
+    return Memory(
+        r_r=p.bias_r, r_t=p.bias_t, r_n=p.bias_n, v_r=p.bias_vr, v_t=p.bias_vt, v_n=p.bias_vn,
+        on=0.0, pulses=0.0,
+        a_scale=inverse(a, p.a), e_scale=inverse(e, 1.0), omega_scale=inverse(omega, 1.0),
+    )  # fmt: skip
 
 
 @physics
 def fix_position(t, s, m, p, o, draws):
-    """A new navigation fix: constant error plus a fresh normal deviate on every component."""
+    """A new navigation fix: constant error plus a fresh normal deviate on every component [m, m/s along R, T, N]."""
     k, w = p.noise_position, p.noise_velocity
     n1 = n2 = n3 = n4 = n5 = n6 = 0.0 * k
     if any_lane(k + w > 0.0):  # without noise the deviates would be multiplied by zero: save them
@@ -84,7 +89,11 @@ def fix_position(t, s, m, p, o, draws):
         n5, n6 = normal_pair(draws, 2)
     r_r, r_t, r_n = p.bias_r + k * n1, p.bias_t + k * n2, p.bias_n + k * n3
     v_r, v_t, v_n = p.bias_vr + w * n4, p.bias_vt + w * n5, p.bias_vn + w * n6
-    return Memory(r_r, r_t, r_n, v_r, v_t, v_n, m.on, m.pulses, m.a_scale, m.e_scale, m.omega_scale)
+    return Memory(
+        r_r=r_r, r_t=r_t, r_n=r_n, v_r=v_r, v_t=v_t, v_n=v_n,
+        on=m.on, pulses=m.pulses,
+        a_scale=m.a_scale, e_scale=m.e_scale, omega_scale=m.omega_scale,
+    )  # fmt: skip
 
 
 @physics
@@ -99,22 +108,22 @@ def desired_motion(f, p):
     v_r, v_t = h * (p.e / p.p) * s, h * u  # (34)
     g = -MU_EARTH * (u * u)  # (35)
     return Desired(
-        r * rx,
-        r * ry,
-        r * rz,
-        v_r * rx + v_t * tx,
-        v_r * ry + v_t * ty,
-        v_r * rz + v_t * tz,
-        g * rx,
-        g * ry,
-        g * rz,
-        rx,
-        ry,
-        rz,
-        tx,
-        ty,
-        tz,
-        h * (u * u),  # (33)
+        x=r * rx,
+        y=r * ry,
+        z=r * rz,
+        vx=v_r * rx + v_t * tx,
+        vy=v_r * ry + v_t * ty,
+        vz=v_r * rz + v_t * tz,
+        ax=g * rx,
+        ay=g * ry,
+        az=g * rz,
+        rx=rx,
+        ry=ry,
+        rz=rz,
+        tx=tx,
+        ty=ty,
+        tz=tz,
+        rate=h * (u * u),  # (33)
     )
 
 
@@ -141,7 +150,10 @@ def law(d, ex, ey, ez, wx, wy, wz, p, o):
 
 @physics
 def measured(s, d, m):
-    """Errors of position and velocity as the navigation sees them; its own lie along R, T, N of the desired path."""
+    """Errors of position [m] and velocity [m/s] as the navigation sees them, inertial axes.  (24), (25)
+
+    Its own errors lie along R, T, N of the desired path and are added here; the source has none.
+    """
     nx, ny, nz = d.ry * d.tz - d.rz * d.ty, d.rz * d.tx - d.rx * d.tz, d.rx * d.ty - d.ry * d.tx
     return (
         s.x + m.r_r * d.rx + m.r_t * d.tx + m.r_n * nx,
@@ -239,21 +251,24 @@ def rhs(t, s, m, p, o):
     else:
         filtered = 0.0 * size
     return State(
-        s.vx,
-        s.vy,
-        s.vz,
-        gx - d.ax + ax + k * fx,
-        gy - d.ay + ay + k * fy,
-        gz - d.az + az + k * fz,
-        d.rate,
-        force * inverse_mass,
-        filtered,
+        x=s.vx,
+        y=s.vy,
+        z=s.vz,
+        vx=gx - d.ax + ax + k * fx,
+        vy=gy - d.ay + ay + k * fy,
+        vz=gz - d.az + az + k * fz,
+        f_desired=d.rate,
+        impulse=force * inverse_mass,
+        filtered=filtered,
     )
 
 
 @physics
 def events(t, s, m, p, o):
-    """Entry interface; Schmitt trigger of the modulator."""
+    """Entry interface as r^2 - R^2 [m^2]; Schmitt trigger of the modulator on its filtered input [N].
+
+    M. J. Sidi, Spacecraft Dynamics and Control (1997), which the source follows.
+    """
     x, y, z, _vx, _vy, _vz = flown(s, desired_motion(s.f_desired, p))
     above = x * x + y * y + z * z - p.radius * p.radius
     firing = m.on > 0.5
@@ -262,10 +277,14 @@ def events(t, s, m, p, o):
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """The trigger turns: on counts a pulse."""
+    """The trigger of the modulator turns: on counts a pulse.  M. J. Sidi, Spacecraft Dynamics and Control (1997)."""
     on = where(hit.pulse_on > 0.5, 1.0, where(hit.pulse_off > 0.5, 0.0, m.on))
     pulses = m.pulses + where(hit.pulse_on > 0.5, 1.0, 0.0)
-    return s, Memory(m.r_r, m.r_t, m.r_n, m.v_r, m.v_t, m.v_n, on, pulses, m.a_scale, m.e_scale, m.omega_scale)
+    return s, Memory(
+        r_r=m.r_r, r_t=m.r_t, r_n=m.r_n, v_r=m.v_r, v_t=m.v_t, v_n=m.v_n,
+        on=on, pulses=pulses,
+        a_scale=m.a_scale, e_scale=m.e_scale, omega_scale=m.omega_scale,
+    )  # fmt: skip
 
 
 @physics

@@ -121,7 +121,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
 
 
 def _craft_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Parameters of the craft, its thrusters and its navigation."""
+    """Parameters of the craft, its thrusters and its navigation, SI."""
     return {
         "gain": i.gain,
         "mass": i.initial_mass,
@@ -150,7 +150,7 @@ def _craft_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
 
 
 def _misled(i: SimpleNamespace) -> np.ndarray:
-    """Above zero in the cases that navigate with any error at all."""
+    """Above zero in the cases that navigate with any error at all; no unit, since metres and m/s are added."""
     names = [f"{axis}_{kind}" for axis in ("radial", "transverse", "normal") for kind in ("position", "velocity")]
     constant = sum(np.abs(getattr(i, f"navigation_{name}_error")) for name in names)
     return np.asarray(constant + i.navigation_position_noise + i.navigation_velocity_noise)
@@ -171,7 +171,10 @@ def _turned(to_perigee, ahead, angle):
 
 
 def _on_path(path: path_design.DeorbitPath, f, to_perigee, ahead):
-    """Position and velocity [3, n] on the desired path at true anomaly f."""
+    """Position [m] and velocity [m/s], [3, n], inertial, on the desired path at true anomaly f [rad].
+
+    (31), (34), (37)
+    """
     radial, transverse = _turned(to_perigee, ahead, f)
     root = np.sqrt(MU_EARTH / path.p)
     r = path.p / (1.0 + path.e * np.cos(f))

@@ -1,10 +1,9 @@
-"""What is seen along a de-orbit flight and what it comes to: quantities and metrics.  SI, radians."""
+"""Quantities along a de-orbit flight and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
 from campaigns.deorbit.dynamics import (
     OFF,
-    TAU,
     command,
     desired_motion,
     element_errors,
@@ -13,9 +12,10 @@ from campaigns.deorbit.dynamics import (
     propellant,
     thrust,
 )
-from mc_engine.lanes import asin, atan2, floor, maximum, minimum, physics, rint, sqrt, where
+from mc_engine.lanes import asin, atan2, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Extremum, Field
 from mc_engine.physics.constants import EARTH_RATE
+from mc_engine.physics.frames import full_turn, half_turn
 
 SETTLED = 0.01  # of its first value: an element's error below this has settled
 QUANTITIES = (
@@ -95,18 +95,18 @@ Quantities = namedtuple(
     "position_error velocity_error a_error e_error omega_error a_left e_left omega_left unsettled "
     "force force_r force_t force_n command impulse radius",
 )
-Metrics = namedtuple("Metrics", [field.name for field in METRICS])  # type: ignore[misc]
+Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]
 
 
 @physics
 def distance(x, y, z):
-    """Length of a vector."""
+    """Length of a vector, in the unit of its components: sqrt(x^2 + y^2 + z^2)."""
     return sqrt(x * x + y * y + z * z)
 
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     d = desired_motion(s.f_desired, p)
     fx, fy, fz, size = command(t, s, m, d, p, o)
     scale, force = thrust(size, m, p, o)
@@ -114,34 +114,32 @@ def observe(t, s, m, p, o):
     a_error, e_error, omega_error = element_errors(s, p)
     a_left, e_left, omega_left = m.a_scale * a_error, m.e_scale * e_error, m.omega_scale * omega_error
     return Quantities(
-        distance(s.x, s.y, s.z),
-        distance(s.vx, s.vy, s.vz),
-        a_error,
-        e_error,
-        omega_error,
-        a_left,
-        e_left,
-        omega_left,
-        maximum(maximum(abs(a_left), abs(e_left)), abs(omega_left)),
-        force,
-        scale * (fx * d.rx + fy * d.ry + fz * d.rz),
-        scale * (fx * d.tx + fy * d.ty + fz * d.tz),
-        scale * (fx * nx + fy * ny + fz * nz),
-        size,
-        s.impulse,
-        distance(d.x + s.x, d.y + s.y, d.z + s.z),
+        position_error=distance(s.x, s.y, s.z),
+        velocity_error=distance(s.vx, s.vy, s.vz),
+        a_error=a_error,
+        e_error=e_error,
+        omega_error=omega_error,
+        a_left=a_left,
+        e_left=e_left,
+        omega_left=omega_left,
+        unsettled=maximum(maximum(abs(a_left), abs(e_left)), abs(omega_left)),
+        force=force,
+        force_r=scale * (fx * d.rx + fy * d.ry + fz * d.rz),
+        force_t=scale * (fx * d.tx + fy * d.ty + fz * d.tz),
+        force_n=scale * (fx * nx + fy * ny + fz * nz),
+        command=size,
+        impulse=s.impulse,
+        radius=distance(d.x + s.x, d.y + s.y, d.z + s.z),
     )
 
 
 @physics
-def positive_angle(angle):
-    """The angle in [0, 2 pi)."""
-    return angle - TAU * floor(angle * (1.0 / TAU))
-
-
-@physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at entry."""
+    """The metrics in the order of METRICS, at entry, SI and radians.
+
+    Heading and flight-path angle come from the inertial velocity's components to the east, to the north and up, the
+    longitude from the right ascension less the Earth's rotation since the epoch; derived here.
+    """
     d = desired_motion(s.f_desired, p)
     x, y, z, vx, vy, vz = flown(s, d)
     r, v = distance(x, y, z), distance(vx, vy, vz)
@@ -161,36 +159,36 @@ def evaluate(t, s, m, p, o, best, when):
     unsettled = (left > SETTLED) | (o.control == OFF)
     a_error, e_error, omega_error = element_errors(initial(p, o), p)
     return Metrics(
-        s.impulse,
-        spent,
-        best.force,
-        where(unsettled, float("nan"), when.settling + p.delay),
-        maximum(-best.a_below, 0.0),
-        maximum(-best.e_below, 0.0),
-        maximum(-best.omega_below, 0.0),
-        best.position_error,
-        when.position_error + p.delay,
-        distance(s.x, s.y, s.z),
-        m.pulses,
-        entry_time,
-        v,
-        atan2(climb, sqrt(maximum(v * v - climb * climb, 0.0))),
-        positive_angle(atan2(east, north)),
-        positive_angle(atan2(across, along) + p.omega),
-        asin(maximum(-1.0, minimum(1.0, z / r))),
-        longitude - TAU * rint(longitude * (1.0 / TAU)),
-        right_ascension,
-        r,
-        p.mass - spent,
-        distance(p.vx, p.vy, p.vz),
-        p.a + a_error,
-        p.e + e_error,
-        positive_angle(p.omega + omega_error),
-        p.a,
-        p.e,
-        p.omega,
-        p.theta_burn,
-        p.dv,
-        p.alpha,
-        p.duration,
+        correction_impulse=s.impulse,
+        propellant=spent,
+        peak_force=best.force,
+        settling_time=where(unsettled, float("nan"), when.settling + p.delay),
+        overshoot_a=maximum(-best.a_below, 0.0),
+        overshoot_e=maximum(-best.e_below, 0.0),
+        overshoot_omega=maximum(-best.omega_below, 0.0),
+        max_position_error=best.position_error,
+        max_position_error_time=when.position_error + p.delay,
+        final_position_error=distance(s.x, s.y, s.z),
+        pulse_count=m.pulses,
+        entry_time=entry_time,
+        entry_speed=v,
+        entry_flight_path_angle=atan2(climb, sqrt(maximum(v * v - climb * climb, 0.0))),
+        entry_heading=full_turn(atan2(east, north)),
+        entry_latitude_argument=full_turn(atan2(across, along) + p.omega),
+        entry_latitude=asin(maximum(-1.0, minimum(1.0, z / r))),
+        entry_longitude=half_turn(longitude),
+        entry_right_ascension=right_ascension,
+        entry_radius=r,
+        entry_mass=p.mass - spent,
+        initial_velocity_error=distance(p.vx, p.vy, p.vz),
+        actual_semi_major_axis=p.a + a_error,
+        actual_eccentricity=p.e + e_error,
+        actual_perigee_argument=full_turn(p.omega + omega_error),
+        desired_semi_major_axis=p.a,
+        desired_eccentricity=p.e,
+        desired_perigee_argument=p.omega,
+        burn_latitude_argument=p.theta_burn,
+        burn_dv=p.dv,
+        burn_angle=p.alpha,
+        planned_entry_time=p.duration,
     )

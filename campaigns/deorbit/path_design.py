@@ -89,7 +89,17 @@ def design_path(a_initial, speed, angle, radius, theta_entry, ascending, refusal
     dv = np.hypot(v_radial, v_transverse - v_initial)
     tilt = np.where(ascending, -1.0, 1.0)
     alpha = np.arctan2(-tilt * v_radial, v_initial - v_transverse)
-    return DeorbitPath(a, e, omega, f_entry, f_burn, np.mod(f_burn + omega, TAU), dv, alpha, tilt)
+    return DeorbitPath(
+        a=a,
+        e=e,
+        omega=omega,
+        f_entry=f_entry,
+        f_burn=f_burn,
+        theta_burn=np.mod(f_burn + omega, TAU),
+        dv=dv,
+        alpha=alpha,
+        tilt=tilt,
+    )
 
 
 def burnt_velocity(path: DeorbitPath, a_initial, magnitude_error, angle_error, out_of_plane):

@@ -18,16 +18,21 @@ PER_SAMPLE = 1.0
 
 @physics
 def start(p, o):
-    """Before the first sample: nothing fired, and an integral that the first sample brings to zero."""
+    """Before the first sample: nothing fired, no torque [N m].
+
+    The integral of (13) starts half a sample back, so that the first sample of the trapezoidal rule brings it to zero.
+    """
     zero, calm, half = 0.0, at_rest(), -0.5 * o.step * o.steps_per_sample
     q1, q2, q3, wx, wy, wz = known(initial(p, o), p, o)
     return Memory(
-        half * (p.c1 * wx + p.c2 * q1), half * (p.c1 * wy + p.c2 * q2), half * (p.c1 * wz + p.c2 * q3),
-        zero, zero, zero, zero, zero, zero, zero, zero, zero,
-        calm.filtered, calm.output, calm.age, calm.pulses, calm.shortest,
-        calm.filtered, calm.output, calm.age, calm.pulses, calm.shortest,
-        calm.filtered, calm.output, calm.age, calm.pulses, calm.shortest,
-        zero, zero, zero, zero, zero, zero,
+        integral_x=half * (p.c1 * wx + p.c2 * q1), integral_y=half * (p.c1 * wy + p.c2 * q2),
+        integral_z=half * (p.c1 * wz + p.c2 * q3),
+        command_x=zero, command_y=zero, command_z=zero, torque_x=zero, torque_y=zero, torque_z=zero, body_x=zero,
+        body_y=zero, body_z=zero,
+        filtered_x=calm.filtered, output_x=calm.output, age_x=calm.age, pulses_x=calm.pulses, shortest_x=calm.shortest,
+        filtered_y=calm.filtered, output_y=calm.output, age_y=calm.age, pulses_y=calm.pulses, shortest_y=calm.shortest,
+        filtered_z=calm.filtered, output_z=calm.output, age_z=calm.age, pulses_z=calm.pulses, shortest_z=calm.shortest,
+        next_x=zero, next_y=zero, next_z=zero, then_x=zero, then_y=zero, then_z=zero,
     )  # fmt: skip
 
 
@@ -42,7 +47,7 @@ def known(s, p, o):
 
 @physics
 def measured(s, p, o, draws):
-    """The same as the sensors give it, each axis with a fresh error."""
+    """The same [1, rad/s] as the sensors give it, each axis with a fresh error; the source has perfect sensors."""
     q1, q2, q3, wx, wy, wz = known(s, p, o)
     if any_lane(p.rate_noise + p.attitude_noise > 0.0):
         n1, n2 = normal_pair(draws, 0)
@@ -92,16 +97,17 @@ def law(q1, q2, q3, wx, wy, wz, ix, iy, iz, p):
 
 @physics
 def late(fired, coming, after, p):
-    """(torque now, in the next sample, in the one after it) of an axis whose valves open and close late.
+    """(torque now, in the next sample, in the one after it) [N m] of an axis whose valves open and close late.
 
-    coming, after : what earlier samples have left for this sample and for the next.
+    coming, after : what earlier samples have left for this sample and for the next.  The shares now, next and then add
+    to one, so that the impulse is kept; derived here.
     """
     return coming + p.now * fired, after + p.next * fired, p.then * fired
 
 
 @physics
 def control(t, s, m, p, o, draws):
-    """One sample: measure, integrate, ask for a torque, fire."""
+    """One sample: measure, integrate by trapezoids (13), command a torque [N m] (11)-(16), fire (18)-(21)."""
     period = o.step * o.steps_per_sample
     q1, q2, q3, wx, wy, wz = measured(s, p, o, draws)
     nx, ny, nz = p.c1 * wx + p.c2 * q1, p.c1 * wy + p.c2 * q2, p.c1 * wz + p.c2 * q3
@@ -127,13 +133,14 @@ def control(t, s, m, p, o, draws):
         offset = (p.disturbance_offset - 0.5) + drawn
     steady = p.disturbance_amplitude * offset
     return Memory(
-        m.integral_x + period * nx, m.integral_y + period * ny, m.integral_z + period * nz,
-        ux, uy, uz, tx, ty, tz,
-        p.axx * tx + p.axy * ty + p.axz * tz + steady,
-        p.ayx * tx + p.ayy * ty + p.ayz * tz + steady,
-        p.azx * tx + p.azy * ty + p.azz * tz + steady,
-        x.filtered, x.output, x.age, x.pulses, x.shortest,
-        y.filtered, y.output, y.age, y.pulses, y.shortest,
-        z.filtered, z.output, z.age, z.pulses, z.shortest,
-        next_x, next_y, next_z, then_x, then_y, then_z,
+        integral_x=m.integral_x + period * nx, integral_y=m.integral_y + period * ny,
+        integral_z=m.integral_z + period * nz,
+        command_x=ux, command_y=uy, command_z=uz, torque_x=tx, torque_y=ty, torque_z=tz,
+        body_x=p.axx * tx + p.axy * ty + p.axz * tz + steady,
+        body_y=p.ayx * tx + p.ayy * ty + p.ayz * tz + steady,
+        body_z=p.azx * tx + p.azy * ty + p.azz * tz + steady,
+        filtered_x=x.filtered, output_x=x.output, age_x=x.age, pulses_x=x.pulses, shortest_x=x.shortest,
+        filtered_y=y.filtered, output_y=y.output, age_y=y.age, pulses_y=y.pulses, shortest_y=y.shortest,
+        filtered_z=z.filtered, output_z=z.output, age_z=z.age, pulses_z=z.pulses, shortest_z=z.shortest,
+        next_x=next_x, next_y=next_y, next_z=next_z, then_x=then_x, then_y=then_y, then_z=then_z,
     )  # fmt: skip

@@ -52,8 +52,10 @@ def initial(p, o):
     """First state: modes at rest in the body."""
     zero = 0.0
     return State(
-        p.q0, p.q1, p.q2, p.q3, p.hx, p.hy, p.hz, p.psi1, p.psi2, p.psi3, p.psi4,
-        zero, zero, zero, zero, zero, zero, zero, zero, zero,
+        q0=p.q0, q1=p.q1, q2=p.q2, q3=p.q3, hx=p.hx, hy=p.hy, hz=p.hz, psi1=p.psi1, psi2=p.psi2, psi3=p.psi3,
+        psi4=p.psi4,
+        eta1=zero, eta2=zero, eta3=zero, eta4=zero, impulse_x=zero, impulse_y=zero, impulse_z=zero,
+        attitude_effort=zero, scalar_effort=zero,
     )  # fmt: skip
 
 
@@ -72,7 +74,7 @@ def body_rate(s, p):
 
 @physics
 def modal_rates(s, wx, wy, wz, p):
-    """Rates eta' of the four modes from their momenta: psi - c0^T w."""
+    """Rates eta' [kg^(1/2) m/s] of the four modes from their momenta: psi - c0^T w, which defines psi."""
     return (
         s.psi1 - (p.cx1 * wx + p.cy1 * wy + p.cz1 * wz),
         s.psi2 - (p.cx2 * wx + p.cy2 * wy + p.cz2 * wz),
@@ -97,24 +99,24 @@ def rhs(t, s, m, p, o):
     dq0, dq1, dq2, dq3 = quaternion_rates(s.q0, s.q1, s.q2, s.q3, wx, wy, wz)
     turn = 0.5 * p.orbit_rate  # the orbital frame's own rate multiplies q from the left: no matrix (9) is needed
     return State(
-        dq0 - turn * s.q2,
-        dq1 + turn * s.q3,
-        dq2 + turn * s.q0,
-        dq3 - turn * s.q1,
-        (m.body_x + wave) - (wy * s.hz - wz * s.hy),
-        (m.body_y + wave) - (wz * s.hx - wx * s.hz),
-        (m.body_z + wave) - (wx * s.hy - wy * s.hx),
-        -p.d1 * eta1 - p.k1 * s.eta1,
-        -p.d2 * eta2 - p.k2 * s.eta2,
-        -p.d3 * eta3 - p.k3 * s.eta3,
-        -p.d4 * eta4 - p.k4 * s.eta4,
-        eta1,
-        eta2,
-        eta3,
-        eta4,
-        abs(m.torque_x),
-        abs(m.torque_y),
-        abs(m.torque_z),
-        abs(s.q1) + abs(s.q2) + abs(s.q3),
-        abs(1.0 - s.q0),
+        q0=dq0 - turn * s.q2,
+        q1=dq1 + turn * s.q3,
+        q2=dq2 + turn * s.q0,
+        q3=dq3 - turn * s.q1,
+        hx=(m.body_x + wave) - (wy * s.hz - wz * s.hy),
+        hy=(m.body_y + wave) - (wz * s.hx - wx * s.hz),
+        hz=(m.body_z + wave) - (wx * s.hy - wy * s.hx),
+        psi1=-p.d1 * eta1 - p.k1 * s.eta1,
+        psi2=-p.d2 * eta2 - p.k2 * s.eta2,
+        psi3=-p.d3 * eta3 - p.k3 * s.eta3,
+        psi4=-p.d4 * eta4 - p.k4 * s.eta4,
+        eta1=eta1,
+        eta2=eta2,
+        eta3=eta3,
+        eta4=eta4,
+        impulse_x=abs(m.torque_x),
+        impulse_y=abs(m.torque_y),
+        impulse_z=abs(m.torque_z),
+        attitude_effort=abs(s.q1) + abs(s.q2) + abs(s.q3),
+        scalar_effort=abs(1.0 - s.q0),
     )

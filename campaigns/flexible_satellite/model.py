@@ -160,7 +160,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
 
 
 def _first_state(i: SimpleNamespace, inertia, coupling, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Attitude, angular momentum J w and modal momenta c0^T w, with the modes at rest in the body."""
+    """Attitude, angular momentum J w [N m s] and modal momenta c0^T w [kg^(1/2) m/s]; the modes rest in the body."""
     q = np.array([i.initial_q0, i.initial_q1, i.initial_q2, i.initial_q3])
     size = np.sqrt((q * q).sum(axis=0))
     refusals.add(~(size > 0.0), "the first quaternion is zero")
@@ -174,7 +174,7 @@ def _first_state(i: SimpleNamespace, inertia, coupling, refusals: Refusals) -> d
 
 
 def _law_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Parameters of the law, the disturbance and the sensors."""
+    """Parameters of the law (11)-(17), the disturbance and the sensors, SI."""
     return {
         "orbit_rate": i.orbit_rate,
         "disturbance_amplitude": i.disturbance_amplitude,
@@ -200,7 +200,7 @@ def _law_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
 
 
 def _thruster_rows(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Parameters of modulators, valves and thruster axes."""
+    """Parameters of modulators (18)-(21), valves and thruster axes, SI."""
     period = settings.step * settings.steps_per_sample
     half_level, half_torque = settings.pwpf_pairing == 2.0, settings.pwpf_pairing >= 1.0
     turn = np.array([i.misalignment_x, i.misalignment_y, i.misalignment_z])
@@ -224,7 +224,10 @@ def _thruster_rows(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refu
 
 
 def _delay_shares(delay: np.ndarray, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Shares of a sample's thrust that come in that sample and the next two; delay in samples, 0 to 2."""
+    """Shares of a sample's thrust that come in that sample and the next two; delay in samples, 0 to 2.
+
+    Linear between whole samples, derived here: the shares add to 1, and their mean delay is the one given.
+    """
     refusals.add(delay > LONGEST_DELAY, f"valve_delay_s is longer than {LONGEST_DELAY} samples of the control")
     return {name: np.maximum(0.0, 1.0 - np.abs(delay - k)) for k, name in enumerate(("now", "next", "then"))}
 

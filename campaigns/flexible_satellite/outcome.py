@@ -1,4 +1,4 @@
-"""What is seen along a flight of the flexible satellite and what it comes to: quantities and metrics.  SI, radians."""
+"""Quantities along a flight of the flexible satellite and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
@@ -65,41 +65,41 @@ Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ig
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     wx, wy, wz = body_rate(s, p)
     mode = maximum(maximum(abs(s.eta1), abs(s.eta2)), maximum(abs(s.eta3), abs(s.eta4)))
     return Quantities(
-        s.q0,
-        s.q1,
-        s.q2,
-        s.q3,
-        wx,
-        wy,
-        wz,
-        s.eta1,
-        s.eta2,
-        s.eta3,
-        s.eta4,
-        m.command_x,
-        m.command_y,
-        m.command_z,
-        m.torque_x,
-        m.torque_y,
-        m.torque_z,
-        1.0 - s.q0,
-        attitude_error(s),
-        sqrt(wx * wx + wy * wy + wz * wz),
-        mode,
-        s.impulse_x + s.impulse_y + s.impulse_z,
-        m.pulses_x,
-        m.pulses_y,
-        m.pulses_z,
+        q0=s.q0,
+        q1=s.q1,
+        q2=s.q2,
+        q3=s.q3,
+        omega_x=wx,
+        omega_y=wy,
+        omega_z=wz,
+        eta_1=s.eta1,
+        eta_2=s.eta2,
+        eta_3=s.eta3,
+        eta_4=s.eta4,
+        command_x=m.command_x,
+        command_y=m.command_y,
+        command_z=m.command_z,
+        torque_x=m.torque_x,
+        torque_y=m.torque_y,
+        torque_z=m.torque_z,
+        scalar_error=1.0 - s.q0,
+        attitude_error=attitude_error(s),
+        rate=sqrt(wx * wx + wy * wy + wz * wz),
+        largest_mode=mode,
+        control_effort=s.impulse_x + s.impulse_y + s.impulse_z,
+        pulse_count_x=m.pulses_x,
+        pulse_count_y=m.pulses_y,
+        pulse_count_z=m.pulses_z,
     )
 
 
 @physics
 def vector_norm(s):
-    """Size of the quaternion's vector part."""
+    """Size of the quaternion's vector part: the sine of half the attitude error.  (4)"""
     return sqrt(s.q1 * s.q1 + s.q2 * s.q2 + s.q3 * s.q3)
 
 
@@ -127,47 +127,47 @@ def fired(impulse, thrust, p, o):
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at the end."""
+    """The metrics in the order of METRICS, at the end, SI and radians."""
     wx, wy, wz = body_rate(s, p)
     effort = s.impulse_x + s.impulse_y + s.impulse_z
     return Metrics(
-        s.q0,
-        s.q1,
-        s.q2,
-        s.q3,
-        wx,
-        wy,
-        wz,
-        s.eta1,
-        s.eta2,
-        s.eta3,
-        s.eta4,
-        best.rate,
-        best.mode,
-        when.settling,
-        when.damping,
-        effort,
-        s.attitude_effort,
-        s.scalar_effort,
-        vector_norm(s),
-        attitude_error(s),
-        sqrt(s.eta1 * s.eta1 + s.eta2 * s.eta2 + s.eta3 * s.eta3 + s.eta4 * s.eta4),
-        m.pulses_x + m.pulses_y + m.pulses_z,
-        counted(minimum(m.shortest_x, minimum(m.shortest_y, m.shortest_z))),
-        m.pulses_x,
-        m.pulses_y,
-        m.pulses_z,
-        counted(m.shortest_x),
-        counted(m.shortest_y),
-        counted(m.shortest_z),
-        fired(s.impulse_x, p.thrust_x, p, o),
-        fired(s.impulse_y, p.thrust_y, p, o),
-        fired(s.impulse_z, p.thrust_z, p, o),
-        s.impulse_x,
-        s.impulse_y,
-        s.impulse_z,
-        s.impulse_x / p.exhaust_arm,
-        s.impulse_y / p.exhaust_arm,
-        s.impulse_z / p.exhaust_arm,
-        effort / p.exhaust_arm,
+        q0=s.q0,
+        q1=s.q1,
+        q2=s.q2,
+        q3=s.q3,
+        omega_x=wx,
+        omega_y=wy,
+        omega_z=wz,
+        eta_1=s.eta1,
+        eta_2=s.eta2,
+        eta_3=s.eta3,
+        eta_4=s.eta4,
+        peak_rate=best.rate,
+        peak_modal_displacement=best.mode,
+        settling_time=when.settling,
+        damping_time=when.damping,
+        control_effort=effort,
+        attitude_effort=s.attitude_effort,
+        scalar_effort=s.scalar_effort,
+        q_vector_norm=vector_norm(s),
+        attitude_error=attitude_error(s),
+        eta_norm=sqrt(s.eta1 * s.eta1 + s.eta2 * s.eta2 + s.eta3 * s.eta3 + s.eta4 * s.eta4),
+        pulse_count=m.pulses_x + m.pulses_y + m.pulses_z,
+        min_pulse=counted(minimum(m.shortest_x, minimum(m.shortest_y, m.shortest_z))),
+        pulse_count_x=m.pulses_x,
+        pulse_count_y=m.pulses_y,
+        pulse_count_z=m.pulses_z,
+        min_pulse_x=counted(m.shortest_x),
+        min_pulse_y=counted(m.shortest_y),
+        min_pulse_z=counted(m.shortest_z),
+        on_time_x=fired(s.impulse_x, p.thrust_x, p, o),
+        on_time_y=fired(s.impulse_y, p.thrust_y, p, o),
+        on_time_z=fired(s.impulse_z, p.thrust_z, p, o),
+        impulse_x=s.impulse_x,
+        impulse_y=s.impulse_y,
+        impulse_z=s.impulse_z,
+        propellant_x=s.impulse_x / p.exhaust_arm,
+        propellant_y=s.impulse_y / p.exhaust_arm,
+        propellant_z=s.impulse_z / p.exhaust_arm,
+        propellant=effort / p.exhaust_arm,
     )

@@ -12,8 +12,8 @@ from collections import namedtuple
 
 import numpy as np
 
-from campaigns.geo_injection.coast import kepler
-from campaigns.geo_injection.program import Program
+from campaigns.geo_injection.design.coast import kepler
+from campaigns.geo_injection.design.program import Program
 from campaigns.geo_injection.program_table import AIM, burn_row
 from mc_engine.lanes import atan2, exp, floor, look_up, maximum, physics, sincos, sqrt, where
 from mc_engine.physics.constants import MU_EARTH
@@ -27,12 +27,17 @@ PLANAR = 1e-3  # sine of a tilt to the final plane below which the orbit before 
 
 @physics
 def _cross(ax, ay, az, bx, by, bz):
+    """Vector product a x b; SI."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @physics
 def _axes(s, tilt_sin, tilt_cos, planar):
-    """Unit vectors to the node on the final plane (planar: to perigee) and a quarter revolution ahead; h; e; |h|."""
+    """(n, q, u, e, h) of the orbit through the state s [m, m/s].
+
+    n : unit vector to the node on the final plane (planar: to perigee);  q : a quarter revolution ahead;  u : normal
+    e : eccentricity vector;  h : angular momentum [m^2/s].  Curtis, 3rd ed., algorithm 4.2.
+    """
     hx, hy, hz = _cross(s.x, s.y, s.z, s.vx, s.vy, s.vz)
     h = sqrt(hx * hx + hy * hy + hz * hz)
     ux, uy, uz = hx / h, hy / h, hz / h
@@ -51,9 +56,12 @@ def _axes(s, tilt_sin, tilt_cos, planar):
 
 @physics
 def impulse_at(s, angle, tilt, radius, planar):
-    """The impulse on the coast from the state s at an angle from its node (planar: perigee).
+    """The impulse [s, m/s] on the coast from the state s at an angle [rad] from its node (planar: perigee).
 
-    tilt : inclination of the final orbit;  radius : of it, and the semi-major axis that is wanted
+    tilt : inclination of the final orbit [rad];  radius : of it, and the semi-major axis that is wanted [m]
+
+    Derived here: in the direction d, r = h^2 / (mu (1 + e.d)) and v = (mu/h) u x (e + d); the velocity after the
+    impulse is level, in the final plane, and of the size that the vis-viva equation gives.
     """
     tilt_sin, tilt_cos = sincos(tilt + 0.0 * s.x)
     n, q, u, e, h = _axes(s, tilt_sin, tilt_cos, planar)
@@ -72,7 +80,7 @@ def impulse_at(s, angle, tilt, radius, planar):
 
 @physics
 def known(s, p):
-    """Place and velocity as navigation knows them: the true ones with its errors, along the true local axes."""
+    """Place [m] and velocity [m/s] as navigation knows them: the true ones and its errors along the true local axes."""
     hx, hy, hz = _cross(s.x, s.y, s.z, s.vx, s.vy, s.vz)
     h = sqrt(hx * hx + hy * hy + hz * hz)
     r = sqrt(s.x * s.x + s.y * s.y + s.z * s.z)
@@ -91,7 +99,7 @@ def known(s, p):
 
 @physics
 def _wait(s, dx, dy, dz, u, e, along, r, h):
-    """Time from the state s to the direction d on its ellipse, less than a revolution."""
+    """Time [s] from the state s to the direction d on its ellipse, less than a revolution: Kepler's equation (21)."""
     r0 = sqrt(s.x * s.x + s.y * s.y + s.z * s.z)
     e2 = e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
     a = h * h / MU_EARTH / (1.0 - e2)
@@ -109,7 +117,7 @@ def _wait(s, dx, dy, dz, u, e, along, r, h):
 
 @physics
 def stored(burn, o):
-    """The aim of a burn that is flown as stored; its ignition is set elsewhere."""
+    """The aim of a burn that is flown as stored, SI; its ignition is set elsewhere."""
     row = burn_row(o.tables, burn)
     zero = 0.0 * burn
     x, y, z = look_up(o.tables, AIM + zero), look_up(o.tables, AIM + 1.0 + zero), look_up(o.tables, AIM + 2.0 + zero)
@@ -118,20 +126,24 @@ def stored(burn, o):
 
 @physics
 def aimed(t, s, burn, o):
-    """The aim of the last burn from the state s at which a coast begins."""
+    """The aim of the last burn from the state s [m, m/s] at which a coast begins at the time t [s].
+
+    The stored speed change is altered by what the impulse of this flight is larger than the nominal one; the burn's
+    duration follows from the rocket equation, and its middle is put where the impulse is.
+    """
     row, zero = burn_row(o.tables, burn), 0.0 * burn
     size, angle = look_up(o.tables, AIM + 3.0 + zero), look_up(o.tables, AIM + 4.0 + zero)
-    one = impulse_at(s, angle, o.final_inclination, o.final_radius, look_up(o.tables, AIM + 5.0 + zero))
-    sensed = maximum(row.sensed + one.size - size, 1.0)
+    impulse = impulse_at(s, angle, o.final_inclination, o.final_radius, look_up(o.tables, AIM + 5.0 + zero))
+    sensed = maximum(row.sensed + impulse.size - size, 1.0)
     exhaust = o.thrust / o.mass_flow
     mass = row.end_mass + o.mass_flow * row.duration
     duration = mass / o.mass_flow * (1.0 - exp(-sensed / exhaust))
-    return Aim(one.x, one.y, one.z, duration / row.duration, sensed, t + one.wait - 0.5 * duration)
+    return Aim(impulse.x, impulse.y, impulse.z, duration / row.duration, sensed, t + impulse.wait - 0.5 * duration)
 
 
 @physics
 def turned(steering, aim, o):
-    """The steering turned by the least rotation that takes the nominal impulse to the aimed one."""
+    """The steering turned by the least rotation [rad] from the nominal impulse to the aimed one: Rodrigues's rule."""
     zero = 0.0 * aim.x
     a = look_up(o.tables, AIM + zero), look_up(o.tables, AIM + 1.0 + zero), look_up(o.tables, AIM + 2.0 + zero)
     wx, wy, wz = _cross(a[0], a[1], a[2], aim.x, aim.y, aim.z)
@@ -139,12 +151,12 @@ def turned(steering, aim, o):
     xx, xy, xz = 1.0 - k * (wy * wy + wz * wz), k * wx * wy - wz, k * wx * wz + wy
     yx, yy, yz = k * wx * wy + wz, 1.0 - k * (wx * wx + wz * wz), k * wy * wz - wx
     zx, zy, zz = k * wx * wz - wy, k * wy * wz + wx, 1.0 - k * (wx * wx + wy * wy)
-    return (*_row(steering, xx, xy, xz), *_row(steering, yx, yy, yz), *_row(steering, zx, zy, zz))
+    return (*_combined(steering, xx, xy, xz), *_combined(steering, yx, yy, yz), *_combined(steering, zx, zy, zz))
 
 
 @physics
-def _row(c, a, b, d):
-    """a x + b y + d z of every power."""
+def _combined(c, a, b, d):
+    """a x + b y + d z of every power of the steering, dimensionless."""
     return (
         a * c[0] + b * c[12] + d * c[24],
         a * c[1] + b * c[13] + d * c[25],
@@ -175,5 +187,5 @@ def nominal_aim(program: Program) -> np.ndarray:
     wait = (last.ignition + 0.5 * last.duration - before.ignition - before.duration) / sequence.time_unit
     middle, _ = kepler(np.array([state[:3]]) / unit, np.array([state[3:]]) / speed, np.array([wait]))
     angle = float(np.arctan2(middle[0] @ np.array(q), middle[0] @ np.array(n)))
-    one = impulse_at(state, angle, tilt, sequence.final_radius, planar)
-    return np.array([one.x, one.y, one.z, one.size, angle, planar])
+    impulse = impulse_at(state, angle, tilt, sequence.final_radius, planar)
+    return np.array([impulse.x, impulse.y, impulse.z, impulse.size, angle, planar])

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaigns.geo_injection.single_burn import Burn, Stage, circle, fly_shortest, rise_guess
+from campaigns.geo_injection.design.single_burn import Burn, Stage, circle, fly_shortest, rise_guess
 from mc_engine.physics.constants import MU_EARTH
 
 # The thrust turns over in the middle of the burn, within a hundredth of the canonical time.
@@ -27,7 +27,7 @@ class Rise:
 
     @property
     def acceleration(self) -> float:
-        """Thrust over the first weight."""
+        """Thrust over the first weight, the f of eq. (18)."""
         return self.thrust / self.mass / (MU_EARTH / self.radius**2)
 
     @property
@@ -39,23 +39,23 @@ class Rise:
 AVOIDANCE = Rise(42_164_137.0, 2400.0, 1.3, 0.00069, 0.138454)
 
 
-def analytic_guess(one: Rise) -> tuple[float, float, float]:
+def analytic_guess(rise: Rise) -> tuple[float, float, float]:
     """(burn time, radial and transverse velocity costates): eq. (18), canonical, the radial place costate being 1."""
-    return rise_guess(one.rise)
+    return rise_guess(rise.rise)
 
 
 @lru_cache(maxsize=8)
-def burn_of(one: Rise) -> Burn:
+def burn_of(rise: Rise) -> Burn:
     """The burn of least time, searched from eq. (18)."""
-    time, radial, transverse = analytic_guess(one)
+    time, radial, transverse = analytic_guess(rise)
     start = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])
-    target = circle(1.0 + one.rise * one.acceleration)
-    stage = Stage(start, 1.0, one.acceleration, one.flow, target, "fixed", _STEP)
+    target = circle(1.0 + rise.rise * rise.acceleration)
+    stage = Stage(start, 1.0, rise.acceleration, rise.flow, target, "fixed", _STEP)
     return fly_shortest(stage, np.array([radial, transverse, 0.0]), np.array([-1.0, -radial, 0.0]), time, 0.0)
 
 
-def converged(one: Rise) -> tuple[float, float, float]:
+def converged(rise: Rise) -> tuple[float, float, float]:
     """(burn time, radial and transverse velocity costates) of the solution, in the scale and sign of table 1."""
-    burn = burn_of(one)
+    burn = burn_of(rise)
     scale = -burn.start[9]
     return burn.duration, float(burn.start[6] / scale), float(burn.start[7] / scale)

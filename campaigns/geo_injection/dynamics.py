@@ -14,15 +14,16 @@ from mc_engine.physics.constants import MU_EARTH
 from mc_engine.physics.gravity import point_mass
 
 State = namedtuple("State", "x y z vx vy vz mass")  # m, m/s, kg
-# phase; burn and segment, counted from 0; until: time at which the phase ends; segment_end; middle, rate: of the
-# steering's argument s; mass_ignited; sensed: speed change at which a burn is shut down; what re-aims the last burn
-# (its thrust direction, stretch of its duration); tangents of the pointing errors; burn-out times so far; steering
+# steering of the segment; phase; burn and segment, counted from 0; until: time at which the phase ends [s];
+# segment_end [s]; middle, rate: of the steering's argument s; mass_ignited [kg]; sensed: speed change at which a burn
+# is shut down [m/s]; what re-aims the last burn (its thrust direction, stretch of its duration); tangents of the
+# pointing errors; time of the last ignition and burn-out times so far [s]
 Memory = namedtuple(  # type: ignore[misc]
     "Memory",
     (
+        *TERM_NAMES,
         "phase", "burn", "segment", "until", "segment_end", "middle", "rate", "mass_ignited", "sensed",
         "aim_x", "aim_y", "aim_z", "stretch", "pitch", "yaw", "ignited", "burn_out_1", "burn_out_2",
-        *TERM_NAMES,
     ),
 )  # fmt: skip
 Parameters = namedtuple(
@@ -58,6 +59,8 @@ def direction(t, m):
     """Unit vector of the thrust: the program's, turned by the pointing errors.
 
     d' = unit(d + tan(pitch) e1 + tan(yaw) e2) with e1 = unit(Z x d), e2 = d x e1 and Z the pole.
+
+    Derived here from |d| = 1: e1 = (-y, x, 0) / level and e2 = (-z x, -z y, level^2) / level, no unit.
     """
     s = (t - m.middle) * m.rate
     x = _polynomial(s, m.x0, m.x1, m.x2, m.x3, m.x4, m.x5, m.x6, m.x7, m.x8, m.x9, m.x10, m.x11)
@@ -73,7 +76,7 @@ def direction(t, m):
 
 @physics
 def level_of(t, m, p):
-    """Thrust over its full size: 1 in a burn, falling along a line in a tail-off."""
+    """Thrust over its full size, no unit: 1 in a burn, falling linearly in time in a tail-off."""
     falling = maximum(m.until - t, 0.0) / where(p.tail > 0.0, p.tail, 1.0)
     return where(m.phase == BURN, 1.0, where(m.phase == TAIL, falling, 0.0 * t))
 
@@ -107,7 +110,10 @@ def _counted(s, m, p):
 
 @physics
 def events(t, s, m, p, o):
-    """Ignition, the next segment of a long burn, shut-down command, end of a tail-off, end of the flight."""
+    """Ignition, the next segment of a long burn, shut-down command, end of a tail-off, end of the flight.
+
+    Times [s] past the due time, or, for shut-down by sensed velocity, speed change [m/s] past the one commanded.
+    """
     never = NEVER + 0.0 * t
     coasting, burning, falling = m.phase == COAST, m.phase == BURN, m.phase == TAIL
     last = m.burn + 1.0 >= n_burns(o.tables)
@@ -128,36 +134,46 @@ def events(t, s, m, p, o):
 
 @physics
 def _of_burn(burn, first, second, third):
+    """The value that belongs to a burn, counted from 0, in its own unit."""
     return where(burn < 0.5, first, where(burn < 1.5, second, third))
 
 
 @physics
 def _memory(phase, burn, segment, until, ignited, mass_ignited, sensed, aim, out_1, out_2, p, o):
-    """Memory with the steering of the segment."""
+    """Memory with the steering of the segment, SI; the steering's argument s goes from -1 to 1 over the segment."""
     row = segment_row(o.tables, segment)
-    steering = steering_row(o.tables, segment)
+    c = steering_row(o.tables, segment)
     if o.guidance > OPEN_LOOP:
-        steering = turned(steering, aim, o)
+        c = turned(c, aim, o)
     half = 0.5 * row.length * aim.stretch
     after = ignited + row.start * aim.stretch
     end = where(row.more > 0.5, after + 2.0 * half, 1e300)
     pitch, yaw = _of_burn(burn, p.pitch_1, p.pitch_2, p.pitch_3), _of_burn(burn, p.yaw_1, p.yaw_2, p.yaw_3)
     return Memory(
-        phase, burn, segment, until, end, after + half, 1.0 / half, mass_ignited, sensed,
-        aim.x, aim.y, aim.z, aim.stretch, pitch, yaw, ignited, out_1, out_2, *steering,
+        x0=c[0], x1=c[1], x2=c[2], x3=c[3], x4=c[4], x5=c[5], x6=c[6], x7=c[7], x8=c[8], x9=c[9], x10=c[10], x11=c[11],
+        y0=c[12], y1=c[13], y2=c[14], y3=c[15], y4=c[16], y5=c[17], y6=c[18], y7=c[19], y8=c[20], y9=c[21], y10=c[22],
+        y11=c[23],
+        z0=c[24], z1=c[25], z2=c[26], z3=c[27], z4=c[28], z5=c[29], z6=c[30], z7=c[31], z8=c[32], z9=c[33], z10=c[34],
+        z11=c[35],
+        phase=phase, burn=burn, segment=segment, until=until, segment_end=end, middle=after + half, rate=1.0 / half,
+        mass_ignited=mass_ignited, sensed=sensed, aim_x=aim.x, aim_y=aim.y, aim_z=aim.z, stretch=aim.stretch,
+        pitch=pitch, yaw=yaw, ignited=ignited, burn_out_1=out_1, burn_out_2=out_2,
     )  # fmt: skip
 
 
 @physics
 def _commanded(burn, sensed, p, o):
-    """Speed change at which the command is due, so that a nominal tail-off makes up for the rest."""
+    """Speed change [m/s] at which the command is due, so that a nominal tail-off makes up for the rest.
+
+    Derived here: the flow falls linearly, so a tail-off spends half of flow times its duration; rocket equation.
+    """
     end = burn_row(o.tables, burn).end_mass
     return sensed - o.thrust / o.mass_flow * log(1.0 + 0.5 * o.mass_flow * o.tail_off / end)
 
 
 @physics
 def start(p, o):
-    """The first burn has just been ignited."""
+    """Memory at the first ignition, SI; the command is due half a tail-off before the nominal duration is over."""
     zero = 0.0 * p.mass
     row, aim = burn_row(o.tables, zero), stored(zero, o)
     sensed = _commanded(zero, row.sensed, p, o)
@@ -167,7 +183,7 @@ def start(p, o):
 
 @physics
 def _next_aim(t, s, burn, p, o):
-    """The aim of the next burn, as a coast begins: as stored, or of the last burn, if guided, as aimed now."""
+    """The aim [1, m/s, s] of the next burn, as a coast begins: as stored, or of the last burn, if guided, aimed now."""
     zero = 0.0 * t
     kept = stored(burn, o)
     ignition = where(burn < 1.5, p.ignition_2, p.ignition_3)
@@ -184,7 +200,7 @@ def _next_aim(t, s, burn, p, o):
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """The phase that follows an event."""
+    """The phase that follows an event, and when it ends [s]."""
     ignite, segment = hit.ignite > 0.5, hit.next_segment > 0.5
     shut, over = hit.shut_down > 0.5, hit.burn_out > 0.5
     to_tail = shut & (p.tail > 0.0)

@@ -1,4 +1,4 @@
-"""What can be set in an injection campaign: parameters, which may differ from case to case, and settings."""
+"""Inputs of an injection campaign: parameters, which may differ from case to case, and settings."""
 
 from mc_engine.model import Parameter, Setting
 

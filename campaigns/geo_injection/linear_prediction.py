@@ -1,4 +1,4 @@
-"""Standard deviations by linear theory beside those of flown cases: what a Monte Carlo run has to agree with.
+"""Standard deviations by linear theory, with which those of flown cases are compared.
 
 `python -m campaigns.geo_injection.linear_prediction [CAMPAIGN]` prints both for a campaign file of this folder.
 Good for metrics that are smooth in the errors, such as the semi-major axis; eccentricity, inclination and correction
@@ -35,11 +35,15 @@ def contributions(nominal: Mapping[str, Any], sigmas: Mapping[str, float]) -> di
 
 
 def predicted_sigmas(nominal: Mapping[str, Any], sigmas: Mapping[str, float]) -> dict[str, float]:
-    """Standard deviation of each smooth metric for independent dispersions: the root of the sum of squares."""
+    """Standard deviation of each smooth metric for independent dispersions: the root of the sum of squares.
+
+    Each in the unit of its metric.
+    """
     return {name: float(np.sqrt((column**2).sum())) for name, column in contributions(nominal, sigmas).items()}
 
 
 def _report(name: str, n_cases: int = 4000) -> None:
+    """Print linear and flown standard deviations, each in the unit of its column, for a campaign."""
     from mc_engine.campaign.cases import case_table
     from mc_engine.campaign.loading import load_campaign
 
@@ -47,7 +51,7 @@ def _report(name: str, n_cases: int = 4000) -> None:
     ids = np.arange(n_cases)
     drawn = case_table(campaign, ids)
     flown = fly(MODEL, {**campaign.nominal, **drawn}, ids, campaign.seed)
-    sigmas = {one.name: float(np.std(drawn[one.name], ddof=1)) for one in campaign.dispersions}
+    sigmas = {dispersion.name: float(np.std(drawn[dispersion.name], ddof=1)) for dispersion in campaign.dispersions}
     parts = contributions(campaign.nominal, sigmas)
     print(f"{name}: {n_cases} cases; change by one standard deviation of each dispersion")
     print(f"{'':28}" + "".join(f"{metric:>26}" for metric in SMOOTH))

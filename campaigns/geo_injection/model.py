@@ -8,12 +8,12 @@ import numpy as np
 
 from campaigns.geo_injection import dynamics, figures, outcome
 from campaigns.geo_injection.aiming import nominal_aim
-from campaigns.geo_injection.coast import kepler
-from campaigns.geo_injection.design import program_for
+from campaigns.geo_injection.design.coast import kepler
+from campaigns.geo_injection.design.program import Program
+from campaigns.geo_injection.design.programs import program_for
+from campaigns.geo_injection.design.sequence import Sequence, source_orbits
 from campaigns.geo_injection.inputs import METHODS, PARAMETERS, SETTINGS
-from campaigns.geo_injection.program import Program
 from campaigns.geo_injection.program_table import table_of
-from campaigns.geo_injection.sequence import Sequence, source_orbits
 from mc_engine.errors import ModelError
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.physics.frames import WGS84_RADIUS
@@ -41,10 +41,22 @@ def sequence_of(o: Any) -> Sequence:
         of_source = source_orbits(burns, abs(initial - final))
         between = tuple(_transfer(o, k, row) for k, row in enumerate(of_source, start=1))
     radius = WGS84_RADIUS + float(o.parking_altitude)
-    engine = float(o.thrust), float(o.mass_flow), float(o.initial_mass)
     e = float(o.parking_eccentricity)
     perigee = float(o.parking_argument_of_perigee) if e > 0.0 else 0.0  # a circle has none
-    return Sequence(method, burns, initial, final, radius, float(o.final_radius), *engine, between, e, perigee)
+    return Sequence(
+        method=method,
+        burns=burns,
+        initial_inclination=initial,
+        final_inclination=final,
+        parking_radius=radius,
+        final_radius=float(o.final_radius),
+        thrust=float(o.thrust),
+        mass_flow=float(o.mass_flow),
+        mass=float(o.initial_mass),
+        between=between,
+        parking_eccentricity=e,
+        parking_perigee=perigee,
+    )
 
 
 def _transfer(o: Any, k: int, of_source: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -80,8 +92,8 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
             refusals.add(same, str(error))
             continue
         part = SimpleNamespace(**{name: column[same] for name, column in vars(inputs).items()})
-        found, late = _rows(part, chosen, program)
-        for name, column in found.items():
+        columns, late = _rows(part, chosen, program)
+        for name, column in columns.items():
             rows.setdefault(name, np.zeros(same.size))[same] = column
         mask = np.zeros(same.size, dtype=bool)
         mask[same] = late
@@ -91,7 +103,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
 
 def _rows(i: SimpleNamespace, o: SimpleNamespace, program: Program) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """(kernel parameters, where ignitions overlap burns) of the cases of one sequence."""
-    sequence, one = program.sequence, np.ones_like(i.thrust_factor)
+    sequence = program.sequence
     place, velocity = _first_states(i, program)
     rows = {name: place[:, k] for k, name in enumerate("xyz")}
     rows |= {name: velocity[:, k] for k, name in enumerate(("vx", "vy", "vz"))}
@@ -105,7 +117,7 @@ def _rows(i: SimpleNamespace, o: SimpleNamespace, program: Program) -> tuple[dic
     for axis in "rtn":
         rows[f"known_{axis}"] = getattr(i, f"navigation_position_{axis}")
         rows[f"known_v{axis}"] = getattr(i, f"navigation_velocity_{axis}")
-    late = np.zeros(one.size, dtype=bool)
+    late = np.zeros(i.thrust_factor.size, dtype=bool)
     for k in (1, 2, 3):
         delay = getattr(i, f"ignition_delay_{k}")
         rows[f"delay_{k}"] = delay
@@ -122,18 +134,17 @@ def _rows(i: SimpleNamespace, o: SimpleNamespace, program: Program) -> tuple[dic
 
 
 def _first_states(i: SimpleNamespace, program: Program) -> tuple[np.ndarray, np.ndarray]:
-    """Places [n, 3] and velocities [n, 3] at the actual first ignition.
+    """Places [m] and velocities [m/s], [n, 3], inertial, at the actual first ignition.
 
     Errors count in the radial, transverse and normal axes of the nominal state at its time; from there the stage
-    coasts, forward or backward, to the actual ignition.
+    coasts (19)-(21), forward or backward, to the actual ignition.
     """
     r, v = program.start[:3], program.start[3:]
     normal = np.cross(r, v)
     radial, normal = r / np.linalg.norm(r), normal / np.linalg.norm(normal)
     axes = np.stack([radial, np.cross(normal, radial), normal])
-    letters = "rtn"
-    place = r + np.stack([getattr(i, f"initial_position_{one}") for one in letters], axis=1) @ axes
-    velocity = v + np.stack([getattr(i, f"initial_velocity_{one}") for one in letters], axis=1) @ axes
+    place = r + np.stack([getattr(i, f"initial_position_{axis}") for axis in "rtn"], axis=1) @ axes
+    velocity = v + np.stack([getattr(i, f"initial_velocity_{axis}") for axis in "rtn"], axis=1) @ axes
     sequence = program.sequence
     scales = sequence.parking_radius, sequence.speed_unit
     moved = kepler(place / scales[0], velocity / scales[1], i.ignition_delay_1 / sequence.time_unit)

@@ -1,4 +1,4 @@
-"""What a flight is judged by: the orbit at the last cut-off, the corrections it needs, and the propellant."""
+"""Quantities along a flight, and metrics at its end: orbit at the last cut-off, corrections it needs, propellant."""
 
 from collections import namedtuple
 
@@ -60,51 +60,64 @@ def orbit_of(s):
     ex, ey, ez = k * s.x - q * s.vx, k * s.y - q * s.vy, k * s.z - q * s.vz
     h = sqrt(hx * hx + hy * hy + hz * hz)
     e = sqrt(ex * ex + ey * ey + ez * ez)
-    return Orbit(1.0 / (2.0 / r - v2 / MU_EARTH), e, hx, hy, hz, h, r, rv / r, sqrt(v2))
+    return Orbit(
+        a=1.0 / (2.0 / r - v2 / MU_EARTH),
+        e=e,
+        hx=hx,
+        hy=hy,
+        hz=hz,
+        h=h,
+        r=r,
+        radial=rv / r,
+        speed=sqrt(v2),
+    )
 
 
 @physics
 def observe(t, s, m, p, o):
-    """Quantities along the flight."""
+    """Quantities along the flight, SI and radians, inertial axes."""
     orbit = orbit_of(s)
     # on a coast a polynomial would go astray beyond its segment
     dx, dy, dz = direction(where(m.phase == COAST, minimum(t, m.middle + 1.0 / m.rate), t), m)
     acceleration = level_of(t, m, p) * p.thrust / s.mass
     level = sqrt(orbit.hx * orbit.hx + orbit.hy * orbit.hy)
     return Quantities(
-        s.x,
-        s.y,
-        s.z,
-        orbit.r,
-        orbit.speed,
-        orbit.radial,
-        asin(orbit.radial / orbit.speed),
-        s.mass,
-        acceleration,
-        atan2(dy, dx),
-        atan2(dz, sqrt(dx * dx + dy * dy)),
-        orbit.a,
-        orbit.e,
-        atan2(level, orbit.hz),
+        x=s.x,
+        y=s.y,
+        z=s.z,
+        radius=orbit.r,
+        speed=orbit.speed,
+        radial_speed=orbit.radial,
+        flight_path_angle=asin(orbit.radial / orbit.speed),
+        mass=s.mass,
+        acceleration=acceleration,
+        thrust_right_ascension=atan2(dy, dx),
+        thrust_declination=atan2(dz, sqrt(dx * dx + dy * dy)),
+        osculating_semi_major_axis=orbit.a,
+        osculating_eccentricity=orbit.e,
+        osculating_inclination=atan2(level, orbit.hz),
     )
 
 
 @physics
 def _speed_at(r, other):
-    """Speed at one apsis of an ellipse with the apses r and other."""
+    """Speed [m/s] at one apsis of an ellipse with the apses r, other [m]: the vis-viva equation, 2 a = r + other."""
     return sqrt(maximum(2.0 * MU_EARTH * other / (r * (r + other)), 0.0))
 
 
 @physics
 def _two_impulses(r, other, target):
-    """Speed changes at r, which carries the other apsis to the target, and there into the circle."""
+    """Speed changes [m/s], added, at r, which carries the other apsis to the target [m], and there into the circle."""
     circular = sqrt(MU_EARTH / target)
     return abs(_speed_at(r, target) - _speed_at(r, other)) + abs(circular - _speed_at(target, r))
 
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """Metrics of a case; an orbit that does not close has no correction."""
+    """Metrics of a case, SI and radians; an orbit that does not close has no correction.
+
+    The plane is corrected by one impulse at the node, 2 v sin(i/2); drift: sqrt(mu/a^3) less that of the final circle.
+    """
     orbit = orbit_of(s)
     radius = o.final_radius + 0.0 * t
     closed = orbit.a > 0.0
@@ -124,22 +137,22 @@ def evaluate(t, s, m, p, o, best, when):
     used = p.mass - s.mass
     clock = t + p.delay_1
     return Metrics(
-        orbit.a,
-        orbit.e,
-        atan2(sqrt(orbit.hx * orbit.hx + orbit.hy * orbit.hy), orbit.hz),
-        tilt,
-        atan2(orbit.hx, -orbit.hy),
-        perigee,
-        apogee,
-        orbit.r - radius,
-        drift,
-        in_plane,
-        plane,
-        where(closed, sqrt(minimum(in_plane, 1e100) * minimum(in_plane, 1e100) + plane * plane), 1e300),
-        used,
-        o.propellant_limit - used,
-        s.mass,
-        m.burn_out_1 + p.delay_1,
-        where(n_burns(o.tables) > 2.5, m.burn_out_2 + p.delay_1, clock),
-        clock,
+        semi_major_axis=orbit.a,
+        eccentricity=orbit.e,
+        inclination=atan2(sqrt(orbit.hx * orbit.hx + orbit.hy * orbit.hy), orbit.hz),
+        plane_error=tilt,
+        node=atan2(orbit.hx, -orbit.hy),
+        perigee_radius=perigee,
+        apogee_radius=apogee,
+        radius_error=orbit.r - radius,
+        longitude_drift=drift,
+        in_plane_correction=in_plane,
+        plane_correction=plane,
+        correction_dv=where(closed, sqrt(minimum(in_plane, 1e100) * minimum(in_plane, 1e100) + plane * plane), 1e300),
+        propellant=used,
+        propellant_margin=o.propellant_limit - used,
+        final_mass=s.mass,
+        burn_out_1=m.burn_out_1 + p.delay_1,
+        burn_out_2=where(n_burns(o.tables) > 2.5, m.burn_out_2 + p.delay_1, clock),
+        last_burn_out=clock,
     )

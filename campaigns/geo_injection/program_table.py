@@ -1,10 +1,10 @@
-"""How a burn program lies in the tables that all cases share, and how a flight reads it.  SI."""
+"""Layout of a burn program in the tables that all cases share, and its reading in flight.  SI."""
 
 from collections import namedtuple
 
 import numpy as np
 
-from campaigns.geo_injection.program import DEGREE, Program
+from campaigns.geo_injection.design.program import DEGREE, Program
 from mc_engine.lanes import look_up, physics
 
 TERMS = 3 * (DEGREE + 1)
@@ -32,7 +32,7 @@ def n_burns(tables):
 
 @physics
 def burn_row(tables, burn):
-    """The row of a burn, counted from 0."""
+    """The row of a burn, counted from 0, SI."""
     at = _FIRST_BURN + _BURN_ROW * burn
     return BurnRow(
         look_up(tables, at),
@@ -46,14 +46,14 @@ def burn_row(tables, burn):
 
 @physics
 def segment_row(tables, segment):
-    """The row of a segment, counted from 0 over all burns, without its steering."""
+    """The row of a segment [s], counted from 0 over all burns, without its steering."""
     at = _FIRST_SEGMENT + _SEGMENT_ROW * segment
     return SegmentRow(look_up(tables, at), look_up(tables, at + 1.0), look_up(tables, at + 2.0))
 
 
 @physics
 def steering_row(tables, segment):
-    """The steering of a segment: 36 coefficients in the order of TERM_NAMES."""
+    """The steering of a segment: 36 coefficients (no unit) in the order of TERM_NAMES."""
     at = _FIRST_SEGMENT + _SEGMENT_ROW * segment + 4.0
     return (
         look_up(tables, at), look_up(tables, at + 1.0), look_up(tables, at + 2.0), look_up(tables, at + 3.0),

@@ -39,5 +39,8 @@ def best_corrections(a, b, c, running, weight, terminal, sigma) -> Corrections:
 
 
 def planned_cost(b, costs, u, sigma) -> float:
-    """Mean cost that the execution errors of planned corrections u [n] leave, the later ones answering the earlier."""
+    """Mean cost that the execution errors of planned corrections u [n] leave, the later ones answering the earlier.
+
+    Derived here from the recursion: correction k adds the variance (sigma u_k)^2 along b_k, which costs_{k+1} weighs.
+    """
     return float(sum(sigma**2 * u[k] ** 2 * b[k] @ costs[k + 1] @ b[k] for k in range(len(u))))

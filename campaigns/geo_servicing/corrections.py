@@ -1,43 +1,52 @@
-"""What happens between coasts: ignitions, cut-offs, decisions, and the looks at what a transfer has come to.
+"""Events between coasts: ignitions, cut-offs, decisions, and the evaluation at the end of a transfer.
 
-A flight waits for one thing at a time, which is due at a time that the memory holds.  Phasing follows its plan, with
-feedback on what navigation tells at ignition; the inspection decides for itself, burn after burn.
+The memory holds the next action, `mode`, and the time at which it is due.
+
+mode        action                                          next
+IGNITION    start the burn                                  CUT_OFF
+CUT_OFF     end the burn                                    IGNITION, DECISION (inspection) or DAY_LATER (phasing)
+DECISION    inspection: choose the next coast               IGNITION or DECISION
+DAY_LATER   phasing: evaluate the sidereal day after        NOTHING
+
+In the phasing, corrections follow the plan, with feedback on what navigation measures at ignition.  In the inspection
+the law chooses each coast and each correction.
 """
 
 from collections import namedtuple
 
 from campaigns.geo_servicing import plan_table
+from campaigns.geo_servicing.drift_model import DRIFT_PER_DV
 from campaigns.geo_servicing.dynamics import (
     INSPECTION,
     MU,
     PHASING,
     RATE,
     SIDEREAL_DAY,
-    TURN,
-    V0,
     Memory,
     longitudes,
 )
 from campaigns.geo_servicing.inspection import PAIRS, next_coast, next_pair, relative_orbit, velocity_change
 from campaigns.geo_servicing.navigation import FILTERED, RAW, Estimate, burnt, estimate_of, navigated_elements
-from mc_engine.lanes import any_lane, atan, exp, maximum, physics, rint, sincos, sqrt, where
+from mc_engine.lanes import any_lane, atan, exp, maximum, physics, sincos, sqrt, where
+from mc_engine.physics.frames import TURN, half_turn
 from mc_engine.physics.radiation import discs
 from mc_engine.physics.sun_moon import ephemeris
 
 Events = namedtuple("Events", "due settle penumbra umbra")
 # push: commanded thrust ahead [N]; tilts: sines of the pointing errors outward and to the normal
 Burn = namedtuple("Burn", "dv length outward ahead across")
+# as the memory's end_... and day_...
+TransferEnd = namedtuple("TransferEnd", "time true mean drift e inclination sum day_mean day_drift")
 IGNITION, CUT_OFF, DECISION, DAY_LATER, NOTHING = 0.0, 1.0, 2.0, 3.0, 4.0
 NEVER = 1e15  # s
 FIRST_LOOK = 1.0  # s: the inspection decides first when the first fix is there
 SHORTEST_BURN = 1e-6  # s
 MISSING = float("nan")
-DRIFT_PER_DV = -3.0 * TURN / V0  # rad/rev per m/s, first order about the geostationary orbit
 
 
 @physics
 def start(p, o):
-    """Before the first sample: what is due first."""
+    """Before the first sample: what is due first, and when [s]."""
     zero = 0.0 * p.x
     due, mode = zero + NEVER, zero + NOTHING
     if o.phase == PHASING:
@@ -48,16 +57,18 @@ def start(p, o):
         due, mode = zero + maximum(o.observation, FIRST_LOOK), zero + DECISION
     gone = zero + MISSING
     return Memory(
-        due, mode, zero, zero, zero, zero, zero, zero, zero,
-        gone, gone, gone, gone, gone, gone, gone, gone, gone,
-        zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero,
-        zero, zero, zero, zero,
+        due=due, mode=mode, burns=zero, outward=zero, ahead=zero, across=zero, dv=zero, settled=zero, second=zero,
+        end_time=gone, end_true=gone, end_mean=gone, end_drift=gone, end_e=gone, end_inclination=gone, end_sum=gone,
+        day_mean=gone, day_drift=gone,
+        r=zero, s=zero, u=zero, w=zero, prr=zero, prs=zero, pru=zero, prw=zero, pss=zero, psu=zero, psw=zero,
+        puu=zero, puw=zero, pww=zero,
+        after_r=zero, after_s=zero, after_u=zero, after_w=zero, d1=zero, d2=zero, d3=zero,
     )  # fmt: skip
 
 
 @physics
 def events(t, s, m, p, o):
-    """What is due, when the inspection counts as settled, and the edges of the Earth's shadow.
+    """What is due [s], when the inspection counts as settled [s], and the edges of the Earth's shadow [rad].
 
     At the edges nothing is done: steps end there, since the light has corners that no step may go over.
     """
@@ -76,11 +87,17 @@ def drift_of(a):
 
 
 @physics
+def inclination_of(elements):
+    """Inclination [rad] of equinoctial elements."""
+    return 2.0 * atan(sqrt(elements.q * elements.q + elements.p * elements.p))
+
+
+@physics
 def navigated(t, s, m, p):
-    """(mean longitude deviation [rad], drift [rad/rev]) as navigation tells them."""
+    """(mean longitude deviation [rad], drift [rad/rev]) as navigation measures them."""
     x = navigated_elements(s, m)
     mean = x.mean - (p.aim + RATE * t)
-    return mean - TURN * rint(mean / TURN), drift_of(x.a)
+    return half_turn(mean), drift_of(x.a)
 
 
 @physics
@@ -99,7 +116,7 @@ def phasing_change(t, s, m, p, o):
 
 @physics
 def of_burn(k, a, b, c, d, e):
-    """The number that belongs to burn k, counted from 0."""
+    """The value that belongs to burn k, counted from 0, in its own unit."""
     return where(k < 0.5, a, where(k < 1.5, b, where(k < 2.5, c, where(k < 3.5, d, e))))
 
 
@@ -120,7 +137,10 @@ def execution(m, p, o):
 
 @physics
 def ignited(t, s, m, p, o):
-    """The burn that begins now."""
+    """The burn that begins now: velocity change [m/s], duration [s], thrust [N] outward, ahead and to the normal.
+
+    Duration by the rocket equation, m c (1 - exp(-|dv|/c)) / F; the errors stretch the thrust and tilt it.
+    """
     dv = (
         phasing_change(t, s, m, p, o)
         if o.phase == PHASING
@@ -142,8 +162,12 @@ def ignited(t, s, m, p, o):
 
 
 @physics
-def learnt(m, p, o, cut):
-    """The estimate after a burn, where `cut` holds."""
+def estimate_after_burn(m, p, o, cut):
+    """The estimate [m, m/s] after a burn, where `cut` holds.
+
+    A filter adds what the burn gave over the command to its error, and the assumed errors to its covariance; without a
+    filter there is a fix of its own.
+    """
     e = estimate_of(m)
     if o.navigation == FILTERED:
         # what the burn gave: the command, stretched and tilted
@@ -151,16 +175,17 @@ def learnt(m, p, o, cut):
         outward, ahead = size * m.outward / p.thrust, size * m.ahead / p.thrust
         e = burnt(e, outward, ahead - where(cut, m.dv, 0.0), size, o.assumed_thrust, o.assumed_pointing)
     elif o.navigation == RAW:
-        e = fixed_anew(e, m, cut)
+        e = fix_after_burn(e, m, cut)
     return e
 
 
 @physics
-def fixed_anew(e, m, cut):
+def fix_after_burn(e, m, cut):
     """A fix of its own where `cut` holds: what is decided after a burn does not share the errors of its ignition."""
     return Estimate(
-        where(cut, m.after_r, e.r), where(cut, m.after_s, e.s), where(cut, m.after_u, e.u), where(cut, m.after_w, e.w),
-        e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww,
+        r=where(cut, m.after_r, e.r), s=where(cut, m.after_s, e.s), u=where(cut, m.after_u, e.u),
+        w=where(cut, m.after_w, e.w),
+        prr=e.prr, prs=e.prs, pru=e.pru, prw=e.prw, pss=e.pss, psu=e.psu, psw=e.psw, puu=e.puu, puw=e.puw, pww=e.pww,
     )  # fmt: skip
 
 
@@ -170,20 +195,20 @@ def inspection_coast(s, m, e, cut, p, o):
     x = relative_orbit(s, e)
     if o.inspection_law == PAIRS:
         second = where(cut, 1.0 - m.second, 0.0)
-        coast, found = where(second > 0.5, 0.5, next_pair(x, p, o)), 1.0 + 0.0 * second
+        coast, burns = where(second > 0.5, 0.5, next_pair(x, p, o)), 1.0 + 0.0 * second
     else:
-        coast, found = next_coast(x, p, o)
+        coast, burns = next_coast(x, p, o)
         second = 0.0 * coast
-    return coast, found, second
+    return coast, burns, second
 
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """Do what is due, and say what is due next."""
+    """Do what is due, and set what is due next, and when [s]."""
     now = hit.due > 0.5
     ignite, cut = now & (m.mode == IGNITION), now & (m.mode == CUT_OFF)
     decide, day = now & (m.mode == DECISION), now & (m.mode == DAY_LATER)
-    e = learnt(m, p, o, cut)
+    e = estimate_after_burn(m, p, o, cut)
     due, mode, second, over = m.due, m.mode, m.second, cut & (not cut)
     if o.phase == PHASING:
         burns = m.burns + where(cut, 1.0, 0.0)
@@ -196,9 +221,9 @@ def switch(t, s, m, p, o, hit):
     else:
         deciding = cut | decide
         if any_lane(deciding):
-            coast, found, second = inspection_coast(s, m, e, cut, p, o)
+            coast, fires, second = inspection_coast(s, m, e, cut, p, o)
             due = where(deciding, t + SIDEREAL_DAY * coast, due)
-            mode = where(deciding, where(found > 0.5, IGNITION, DECISION), mode)
+            mode = where(deciding, where(fires > 0.5, IGNITION, DECISION), mode)
             second = where(deciding, second, m.second)
     outward, ahead, across, dv = m.outward, m.ahead, m.across, m.dv
     if any_lane(ignite):
@@ -208,27 +233,30 @@ def switch(t, s, m, p, o, hit):
         across = where(ignite, burn.across, across)
     end = ended(t, s, m, p, over, day)
     return s, Memory(
-        due, mode, m.burns + where(cut, 1.0, 0.0),
-        where(cut, 0.0, outward), where(cut, 0.0, ahead), where(cut, 0.0, across), dv,
-        where(hit.settle > 0.5, 1.0, m.settled), second, *end,
-        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww,
-        m.after_r, m.after_s, m.after_u, m.after_w, m.d1, m.d2, m.d3,
+        due=due, mode=mode, burns=m.burns + where(cut, 1.0, 0.0),
+        outward=where(cut, 0.0, outward), ahead=where(cut, 0.0, ahead), across=where(cut, 0.0, across), dv=dv,
+        settled=where(hit.settle > 0.5, 1.0, m.settled), second=second,
+        end_time=end.time, end_true=end.true, end_mean=end.mean, end_drift=end.drift, end_e=end.e,
+        end_inclination=end.inclination, end_sum=end.sum,
+        day_mean=end.day_mean, day_drift=end.day_drift,
+        r=e.r, s=e.s, u=e.u, w=e.w, prr=e.prr, prs=e.prs, pru=e.pru, prw=e.prw, pss=e.pss, psu=e.psu, psw=e.psw,
+        puu=e.puu, puw=e.puw, pww=e.pww,
+        after_r=m.after_r, after_s=m.after_s, after_u=m.after_u, after_w=m.after_w, d1=m.d1, d2=m.d2, d3=m.d3,
     )  # fmt: skip
 
 
 @physics
 def ended(t, s, m, p, over, day):
-    """What is kept of the transfer's end: at the last cut-off, and a sidereal day later."""
+    """The `TransferEnd` [s, rad, rad/rev]: kept at the last cut-off, and a sidereal day later."""
     true, mean, x = longitudes(t, s, p)
-    e, tilt = sqrt(x.k * x.k + x.h * x.h), 2.0 * atan(sqrt(x.q * x.q + x.p * x.p))
-    return (
-        where(over, t, m.end_time),
-        where(over, true, m.end_true),
-        where(over, mean, m.end_mean),
-        where(over, drift_of(x.a), m.end_drift),
-        where(over, e, m.end_e),
-        where(over, tilt, m.end_inclination),
-        where(over, s.longitude_sum, m.end_sum),
-        where(day, (s.longitude_sum - m.end_sum) / SIDEREAL_DAY, m.day_mean),
-        where(day, mean - m.end_mean, m.day_drift),
+    return TransferEnd(
+        time=where(over, t, m.end_time),
+        true=where(over, true, m.end_true),
+        mean=where(over, mean, m.end_mean),
+        drift=where(over, drift_of(x.a), m.end_drift),
+        e=where(over, sqrt(x.k * x.k + x.h * x.h), m.end_e),
+        inclination=where(over, inclination_of(x), m.end_inclination),
+        sum=where(over, s.longitude_sum, m.end_sum),
+        day_mean=where(day, (s.longitude_sum - m.end_sum) / SIDEREAL_DAY, m.day_mean),
+        day_drift=where(day, mean - m.end_mean, m.day_drift),
     )

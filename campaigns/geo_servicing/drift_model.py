@@ -6,16 +6,18 @@ name says otherwise.  Numbers in brackets are equations of the source (`model.SO
 
 import numpy as np
 
-from campaigns.geo_servicing.dynamics import RATE, TURN, V0
+from campaigns.geo_servicing.dynamics import RATE, V0
+from mc_engine.physics.frames import TURN
 
 DRIFT_PER_DV = -3.0 * TURN / V0  # rad/rev per m/s of a transverse impulse
 E_PER_DV = 2.0 / V0  # length of the eccentricity vector per m/s of it
 
 
 def perturbation_coefficients(transverse, radial):
-    """(b_s [rad/rev^2], b_r [rad/rev]) of mean accelerations [m/s^2] ahead and outward, section 4.1 of the source.
+    """(b_s [rad/rev^2], b_r [rad/rev]) of (3.46) for mean accelerations [m/s^2] ahead and outward.
 
-    Over a coast t the longitude gains b_s t^2 + b_r t and the drift 2 b_s t.
+    Over a coast t the longitude gains b_s t^2 + b_r t and the drift 2 b_s t.  The printed coefficients are damaged;
+    derived here from Gauss's equations on a circle: drift rate -3 g_s / r0, and -2 g_r / V0 of the mean longitude.
     """
     revolution = TURN / RATE
     return -1.5 * RATE / V0 * transverse * revolution**2, -2.0 * radial / V0 * revolution
@@ -27,7 +29,10 @@ def after_correction(y, v, u, t, b_s=0.0, b_r=0.0):
 
 
 def two_impulses(y, v, first, second):
-    """Corrections (u1, u2) that bring longitude and drift to zero over two coasts."""
+    """Corrections (u1, u2) that bring longitude and drift to zero over two coasts, in the units of `braking`.
+
+    Derived here: v + u1 + u2 = 0 and y + v first + (v + u1) second = 0.
+    """
     u1 = -(y + v * (first + second)) / second
     return u1, -v - u1
 
@@ -55,7 +60,10 @@ def braking(y, v, last, shortest):
 
 
 def fastest(y, v, last, shortest):
-    """(corrections, coasts) that hurry first and brake then: the first as of two impulses, the rest as in `braking`."""
+    """(corrections, coasts) that hurry first and brake then, in the units of `braking`.
+
+    The first as of two impulses, the rest as in `braking`, (3.32)-(3.35), from the state after the first.
+    """
     t = np.array(shortest, dtype=np.float64)
     u1, _ = two_impulses(y, v, t[0], t[1:].sum())
     after = y + v * t[0], v + u1

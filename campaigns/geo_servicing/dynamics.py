@@ -7,8 +7,8 @@ mean sidereal rate.  The servicing module flies in all phases, the target module
 from collections import namedtuple
 
 from campaigns.geo_servicing import plan_table
-from mc_engine.lanes import any_lane, atan2, physics, rint, sincos, sqrt
-from mc_engine.physics.frames import orbital_axes, turned
+from mc_engine.lanes import any_lane, atan2, physics, sincos, sqrt
+from mc_engine.physics.frames import half_turn, orbital_axes, turned
 from mc_engine.physics.geopotential import MU_EGM2008, RADIUS_EGM2008, harmonics
 from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.orbital_elements import equinoctial
@@ -20,7 +20,6 @@ SIDEREAL_DAY = 86_164.0905  # s
 RATE = 7.292115857915991e-05  # 2 pi over it
 R0 = 42_164_169.61350804  # m, radius at which a point mass gives that period
 V0 = R0 * RATE
-TURN = 6.283185307179586
 
 BURNS = plan_table.BURNS
 # servicing module, its mass [kg]; target module; integral of the longitude deviation [rad s]
@@ -59,7 +58,11 @@ PHASING, INSPECTION = 0.0, 1.0
 @physics
 def initial(p, o):
     """State at the epoch."""
-    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz, p.mass, p.tx, p.ty, p.tz, p.tvx, p.tvy, p.tvz, 0.0)
+    return State(
+        x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz, mass=p.mass,
+        tx=p.tx, ty=p.ty, tz=p.tz, tvx=p.tvx, tvy=p.tvy, tvz=p.tvz,
+        longitude_sum=0.0,
+    )  # fmt: skip
 
 
 @physics
@@ -92,7 +95,7 @@ def longitudes(t, s, p):
     """(true, mean) longitude of the servicing module less the required one [rad], in [-pi, pi]; and its elements."""
     elements = equinoctial(s.x, s.y, s.z, s.vx, s.vy, s.vz, MU)
     mean = elements.mean - (p.aim + RATE * t)
-    return true_deviation(t, s, p), mean - TURN * rint(mean / TURN), elements
+    return true_deviation(t, s, p), half_turn(mean), elements
 
 
 @physics
@@ -113,7 +116,7 @@ def thrust(s, m):
 
 @physics
 def rhs(t, s, m, p, o):
-    """Time derivative of the state."""
+    """Time derivative of the state, SI, inertial axes: gravity, Sun and Moon, light, thrust, and mass flow F / c."""
     zero = 0.0 * s.x
     sx, sy, sz, mx, my, mz = zero, zero, zero, zero, zero, zero
     if o.sun_and_moon + o.sunlight > 0.5:
@@ -127,10 +130,15 @@ def rhs(t, s, m, p, o):
         flow = -push(m) / p.exhaust
     if o.phase == INSPECTION:
         bx, by, bz = field(t, s.tx, s.ty, s.tz, sun, moon, p.target_light, p, o)
-        other, away = (s.tvx, s.tvy, s.tvz, bx, by, bz), zero
+        ux, uy, uz, away = s.tvx, s.tvy, s.tvz, zero
     else:
-        other, away = (zero, zero, zero, zero, zero, zero), true_deviation(t, s, p)
-    return State(s.vx, s.vy, s.vz, ax, ay, az, flow, *other, away)
+        ux, uy, uz, bx, by, bz = zero, zero, zero, zero, zero, zero
+        away = true_deviation(t, s, p)
+    return State(
+        x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az, mass=flow,
+        tx=ux, ty=uy, tz=uz, tvx=bx, tvy=by, tvz=bz,
+        longitude_sum=away,
+    )  # fmt: skip
 
 
 @physics

@@ -1,11 +1,12 @@
-"""Where a flight begins: states from elements, for whole chunks of cases.  NumPy, SI, radians."""
+"""First states of a flight from orbital elements, for whole chunks of cases.  NumPy, SI, radians."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.geo_servicing.dynamics import MU, TURN
+from campaigns.geo_servicing.dynamics import MU
 from mc_engine.model import Refusals
+from mc_engine.physics.frames import TURN
 
 _AXES = ("x", "y", "z", "vx", "vy", "vz")
 
@@ -62,7 +63,7 @@ def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
 
 def first_states(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals, two) -> dict[str, np.ndarray]:
     """Rows of the first state of both craft; two : bool[n], the inspection, in which the second flies."""
-    one = phasing_start(i, o, sidereal, refusals)
+    phasing = phasing_start(i, o, sidereal, refusals)
     module, target = craft_start(i, "module"), craft_start(i, "target")
-    rows = {axis: np.where(two, module[k], one[axis]) for k, axis in enumerate(_AXES)}
+    rows = {axis: np.where(two, module[k], phasing[axis]) for k, axis in enumerate(_AXES)}
     return rows | {f"t{axis}": np.where(two, target[k], 0.0) for k, axis in enumerate(_AXES)}

@@ -1,13 +1,14 @@
-"""The inspection law: when to correct, and by how much, so that the module stays at its place beside the target.
+"""The inspection law: when to correct, and by how much, so that the module keeps its distance from the target.
 
 Numbers in brackets are equations of the source (`model.SOURCE`); the procedure around them is the README's.
 """
 
 from collections import namedtuple
 
-from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, TURN
+from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY
 from campaigns.geo_servicing.navigation import navigated_elements
-from mc_engine.lanes import atan2, floor, maximum, minimum, physics, rint, sqrt, where
+from mc_engine.lanes import atan2, floor, maximum, minimum, physics, sqrt, where
+from mc_engine.physics.frames import TURN, half_turn
 from mc_engine.physics.orbital_elements import equinoctial
 
 # along: mean distance ahead of the target [m], drift of it [m/rev]; e: length of the difference of the eccentricity
@@ -30,16 +31,19 @@ def correction(y, v, t, chi1, chi2, weight, sigma):
 
 @physics
 def relative_orbit(s, m):
-    """The module's motion about the target, as navigation tells it."""
-    one = navigated_elements(s, m)
-    other = equinoctial(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz, MU)
-    ahead = one.mean - other.mean
-    dk, dh = one.k - other.k, one.h - other.h
+    """The module's motion about the target, as navigation measures it [m, m/rev, 1, rad].
+
+    The distance is R0 times the difference of the mean longitudes, e and phase those of (3.43), (3.44); the drift,
+    -3 pi R0 (a - a_target) / a_target per revolution, is derived here from T ~ a^1.5.
+    """
+    module = navigated_elements(s, m)
+    target = equinoctial(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz, MU)
+    dk, dh = module.k - target.k, module.h - target.h
     return Relative(
-        R0 * (ahead - TURN * rint(ahead / TURN)),
-        -1.5 * TURN * R0 * (one.a - other.a) / other.a,
+        R0 * half_turn(module.mean - target.mean),
+        -1.5 * TURN * R0 * (module.a - target.a) / target.a,
         sqrt(dk * dk + dh * dh),
-        one.true - atan2(dh, dk),
+        module.true - atan2(dh, dk),
     )
 
 
@@ -71,8 +75,8 @@ def next_coast(x, p, o):
     wait_down, down = candidate(x, high, 1.0, p, o)  # u > 0: braking
     wait_up, up = candidate(x, 0.5 * TURN - high, -1.0, p, o)
     wait = minimum(where(down > 0.5, wait_down, 1e3), where(up > 0.5, wait_up, 1e3))
-    found = wait < 1e3
-    return where(found, wait, 1.0), where(found, 1.0, 0.0)
+    wanted = wait < 1e3
+    return where(wanted, wait, 1.0), where(wanted, 1.0, 0.0)
 
 
 @physics
@@ -101,9 +105,8 @@ def first_of_pair(x, p, o):
 
 @physics
 def _low(x):
-    """1 in the lower half of the relative ellipse, -1 in the upper one."""
-    phase = x.phase - TURN * rint(x.phase / TURN)
-    return where(abs(phase) < 0.25 * TURN, 1.0, -1.0)
+    """1 in the lower half of the relative ellipse, phase [rad] within a quarter turn of 0, and -1 in the upper one."""
+    return where(abs(half_turn(x.phase)) < 0.25 * TURN, 1.0, -1.0)
 
 
 @physics

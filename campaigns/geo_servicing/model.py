@@ -1,6 +1,5 @@
 """The servicing model as the engine sees it: inputs, what each case starts from, tables, and the MODEL record."""
 
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,10 +11,8 @@ from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, R0
 from campaigns.geo_servicing.first_state import first_states
 from campaigns.geo_servicing.inputs import GEOMETRIES, NAVIGATION, PARAMETERS, SETTINGS
 from campaigns.geo_servicing.phasing_plan import plan_of
-from campaigns.geo_servicing.plan_cache import remembered
 from mc_engine.errors import ModelError
-from mc_engine.flight.kernel import source_digest
-from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
+from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals, kept_design
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.physics.geopotential import COLUMNS, harmonics_rows, harmonics_table
 from mc_engine.physics.sun_moon import COLUMNS as SUN_MOON
@@ -77,7 +74,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
 
 
 def _inspection_rows(i: SimpleNamespace, o: SimpleNamespace) -> dict[str, np.ndarray]:
-    """The law's parameters; `around` is the difference of eccentricities that a fly-around keeps.
+    """The law's parameters, SI; `around` is the difference of eccentricities that a fly-around keeps.
 
     The relative ellipse has the half axes R0 e outward and 2 R0 e ahead: it is between the ranges wanted if e is
     between low/R0 and high/(2 R0), and in the middle of that here.
@@ -95,7 +92,7 @@ def _inspection_rows(i: SimpleNamespace, o: SimpleNamespace) -> dict[str, np.nda
 
 
 def _sun_moon_rows(epoch: np.ndarray, o: SimpleNamespace) -> dict[str, np.ndarray]:
-    """The nodes that the chunk's flights need, and where each case finds its first."""
+    """The nodes that the chunk's flights need, where each case finds its first, and the time [s] since that."""
     number, time = node_before(epoch)
     # from the node before the start to two behind the end: the cubic takes one, a look past the last step another
     nodes = np.ceil((o.duration / _DAY) / SPACING) + 3.0
@@ -114,18 +111,16 @@ def tables(o: Any) -> np.ndarray:
     rows = harmonics_table(int(o.gravity_degree), int(o.gravity_order)).ravel()
     plan = plan_table.no_plan()
     if o.phase == PHASING:
-        first, sun_moon = _nominal(o)
+        first, sun_moon = nominal_start(o)
         behind = np.concatenate([plan, rows, sun_moon.ravel()])
-        inputs = np.concatenate([[getattr(o, one.symbol) for one in SETTINGS], list(vars(first).values()), behind])
-        sources = source_digest(replace(MODEL, reference="campaigns.geo_servicing"), None)
-        plan = remembered(inputs, sources, lambda: plan_of(o, behind, first))
+        plan = kept_design(plan_of, o, behind, first)
     return np.concatenate([plan, rows])
 
 
-def _nominal(o: Any) -> tuple[SimpleNamespace, np.ndarray]:
-    """(kernel parameters of the case without errors, nodes of Sun and Moon for it)."""
-    inputs = SimpleNamespace(**{one.symbol: np.array([one.default * one.si_factor]) for one in PARAMETERS})
-    settings = SimpleNamespace(**{one.symbol: np.array([getattr(o, one.symbol)]) for one in SETTINGS})
+def nominal_start(o: Any) -> tuple[SimpleNamespace, np.ndarray]:
+    """(kernel parameters, SI, of the case without errors, nodes of Sun and Moon for it)."""
+    inputs = SimpleNamespace(**{item.symbol: np.array([item.default * item.si_factor]) for item in PARAMETERS})
+    settings = SimpleNamespace(**{item.symbol: np.array([getattr(o, item.symbol)]) for item in SETTINGS})
     # a plan may end after the flight
     settings.duration = np.maximum(settings.duration, settings.longest_transfer + 2.0 * _DAY)
     refusals = Refusals.none(1)

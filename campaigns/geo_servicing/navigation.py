@@ -55,20 +55,38 @@ def propagated(e, t, noise):
     _, _, puu, puw = hill(a2, b2, c2, d2, sine, cosine, t)
     _, _, _, pww = hill(a3, b3, c3, d3, sine, cosine, t)
     q = noise * noise
-    return Estimate(r, s, u, w, prr, prs, pru, prw, pss, psu, psw, puu + q, puw, pww + q)
+    return Estimate(
+        r=r,
+        s=s,
+        u=u,
+        w=w,
+        prr=prr,
+        prs=prs,
+        pru=pru,
+        prw=prw,
+        pss=pss,
+        psu=psu,
+        psw=psw,
+        puu=puu + q,
+        puw=puw,
+        pww=pww + q,
+    )
 
 
 @physics
 def first_measured(e, error, variance):
-    """The estimate after a measurement of its first component with this error."""
+    """The estimate [m, m/s] after a measurement of its first component with this error.
+
+    Kalman (1960), scalar update.
+    """
     inverse = 1.0 / (e.prr + variance)
     kr, ks, ku, kw = e.prr * inverse, e.prs * inverse, e.pru * inverse, e.prw * inverse
     news = error - e.r
     return Estimate(
-        e.r + kr * news, e.s + ks * news, e.u + ku * news, e.w + kw * news,
-        variance * kr, variance * ks, variance * ku, variance * kw,
-        e.pss - ks * e.prs, e.psu - ks * e.pru, e.psw - ks * e.prw,
-        e.puu - ku * e.pru, e.puw - ku * e.prw, e.pww - kw * e.prw,
+        r=e.r + kr * news, s=e.s + ks * news, u=e.u + ku * news, w=e.w + kw * news,
+        prr=variance * kr, prs=variance * ks, pru=variance * ku, prw=variance * kw,
+        pss=e.pss - ks * e.prs, psu=e.psu - ks * e.pru, psw=e.psw - ks * e.prw,
+        puu=e.puu - ku * e.pru, puw=e.puw - ku * e.prw, pww=e.pww - kw * e.prw,
     )  # fmt: skip
 
 
@@ -76,7 +94,8 @@ def first_measured(e, error, variance):
 def rotated(e):
     """The same estimate with its components in the order s, u, w, r."""
     return Estimate(
-        e.s, e.u, e.w, e.r, e.pss, e.psu, e.psw, e.prs, e.puu, e.puw, e.pru, e.pww, e.prw, e.prr,
+        r=e.s, s=e.u, u=e.w, w=e.r, prr=e.pss, prs=e.psu, pru=e.psw, prw=e.prs, pss=e.puu, psu=e.puw, psw=e.pru,
+        puu=e.pww, puw=e.prw, pww=e.prr,
     )  # fmt: skip
 
 
@@ -92,11 +111,24 @@ def fixed(e, n1, n2, n3, n4, place, velocity):
 
 @physics
 def single_fix(n1, n2, n3, n4, place, velocity):
-    """The estimate that one fix alone gives."""
+    """The estimate [m, m/s] that one fix alone gives: its errors, and their variances on the diagonal."""
     zero = 0.0 * n1
     a, b = place * place + zero, velocity * velocity + zero
     return Estimate(
-        place * n1, place * n2, velocity * n3, velocity * n4, a, zero, zero, zero, a, zero, zero, b, zero, b
+        r=place * n1,
+        s=place * n2,
+        u=velocity * n3,
+        w=velocity * n4,
+        prr=a,
+        prs=zero,
+        pru=zero,
+        prw=zero,
+        pss=a,
+        psu=zero,
+        psw=zero,
+        puu=b,
+        puw=zero,
+        pww=b,
     )
 
 
@@ -105,20 +137,39 @@ def burnt(e, outward, ahead, dv, thrust_sigma, pointing_sigma):
     """The estimate after a burn of dv [m/s] that gave so much more than commanded outward and ahead [m/s]."""
     a, b = pointing_sigma * dv, thrust_sigma * dv
     return Estimate(
-        e.r, e.s, e.u - outward, e.w - ahead,
-        e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu + a * a, e.puw, e.pww + b * b,
+        r=e.r, s=e.s, u=e.u - outward, w=e.w - ahead,
+        prr=e.prr, prs=e.prs, pru=e.pru, prw=e.prw, pss=e.pss, psu=e.psu, psw=e.psw, puu=e.puu + a * a, puw=e.puw,
+        pww=e.pww + b * b,
     )  # fmt: skip
 
 
 @physics
 def estimate_of(m):
     """The part of the memory that is the estimate."""
-    return Estimate(m.r, m.s, m.u, m.w, m.prr, m.prs, m.pru, m.prw, m.pss, m.psu, m.psw, m.puu, m.puw, m.pww)
+    return Estimate(
+        r=m.r,
+        s=m.s,
+        u=m.u,
+        w=m.w,
+        prr=m.prr,
+        prs=m.prs,
+        pru=m.pru,
+        prw=m.prw,
+        pss=m.pss,
+        psu=m.psu,
+        psw=m.psw,
+        puu=m.puu,
+        puw=m.puw,
+        pww=m.pww,
+    )
 
 
 @physics
 def control(t, s, m, p, o, draws):
-    """A fix, if there are any, and what a burn before the next needs: fresh deviates, and the single fix behind it."""
+    """A fix [m, m/s], if there are any, and what a burn before the next needs.
+
+    That is fresh deviates for the burn's errors, and the single fix that follows it.
+    """
     n1, n2 = normal_pair(draws, 0)
     n3, n4 = normal_pair(draws, 1)
     d1, d2 = normal_pair(draws, 2)
@@ -134,10 +185,14 @@ def control(t, s, m, p, o, draws):
         going = fixed(going, n1, n2, n3, n4, p.nav_position, p.nav_velocity)
         e = chosen(t > 0.0, going, alone)
     return Memory(
-        m.due, m.mode, m.burns, m.outward, m.ahead, m.across, m.dv, m.settled, m.second,
-        m.end_time, m.end_true, m.end_mean, m.end_drift, m.end_e, m.end_inclination, m.end_sum, m.day_mean, m.day_drift,
-        e.r, e.s, e.u, e.w, e.prr, e.prs, e.pru, e.prw, e.pss, e.psu, e.psw, e.puu, e.puw, e.pww,
-        p.nav_position * n5, p.nav_position * n6, p.nav_velocity * n7, p.nav_velocity * n8, d1, d2, d3,
+        due=m.due, mode=m.mode, burns=m.burns, outward=m.outward, ahead=m.ahead, across=m.across, dv=m.dv,
+        settled=m.settled, second=m.second,
+        end_time=m.end_time, end_true=m.end_true, end_mean=m.end_mean, end_drift=m.end_drift, end_e=m.end_e,
+        end_inclination=m.end_inclination, end_sum=m.end_sum, day_mean=m.day_mean, day_drift=m.day_drift,
+        r=e.r, s=e.s, u=e.u, w=e.w, prr=e.prr, prs=e.prs, pru=e.pru, prw=e.prw, pss=e.pss, psu=e.psu, psw=e.psw,
+        puu=e.puu, puw=e.puw, pww=e.pww,
+        after_r=p.nav_position * n5, after_s=p.nav_position * n6, after_u=p.nav_velocity * n7,
+        after_w=p.nav_velocity * n8, d1=d1, d2=d2, d3=d3,
     )  # fmt: skip
 
 
@@ -145,16 +200,17 @@ def control(t, s, m, p, o, draws):
 def chosen(mask, a, b):
     """Estimate a where the mask holds, b elsewhere."""
     return Estimate(
-        where(mask, a.r, b.r), where(mask, a.s, b.s), where(mask, a.u, b.u), where(mask, a.w, b.w),
-        where(mask, a.prr, b.prr), where(mask, a.prs, b.prs), where(mask, a.pru, b.pru), where(mask, a.prw, b.prw),
-        where(mask, a.pss, b.pss), where(mask, a.psu, b.psu), where(mask, a.psw, b.psw),
-        where(mask, a.puu, b.puu), where(mask, a.puw, b.puw), where(mask, a.pww, b.pww),
+        r=where(mask, a.r, b.r), s=where(mask, a.s, b.s), u=where(mask, a.u, b.u), w=where(mask, a.w, b.w),
+        prr=where(mask, a.prr, b.prr), prs=where(mask, a.prs, b.prs), pru=where(mask, a.pru, b.pru),
+        prw=where(mask, a.prw, b.prw),
+        pss=where(mask, a.pss, b.pss), psu=where(mask, a.psu, b.psu), psw=where(mask, a.psw, b.psw),
+        puu=where(mask, a.puu, b.puu), puw=where(mask, a.puw, b.puw), pww=where(mask, a.pww, b.pww),
     )  # fmt: skip
 
 
 @physics
 def navigated_elements(s, m):
-    """Equinoctial elements of the module as navigation tells them: m.r, m.s [m] and m.u, m.w [m/s] are its errors.
+    """Equinoctial elements of the module as navigation measures them: m.r, m.s [m] and m.u, m.w [m/s] are its errors.
 
     r, u : outward;  s, w : ahead.
     """

@@ -1,13 +1,13 @@
-"""What is seen along a flight and what it comes to: quantities and metrics.  SI, radians."""
+"""Quantities along a flight and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
-from campaigns.geo_servicing.corrections import drift_of
-from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, SIDEREAL_DAY, TURN, longitudes
+from campaigns.geo_servicing.corrections import drift_of, inclination_of
+from campaigns.geo_servicing.dynamics import INSPECTION, PHASING, SIDEREAL_DAY, longitudes
 from campaigns.geo_servicing.inspection import relative_orbit
-from mc_engine.lanes import atan, log, physics, sqrt, where
+from mc_engine.lanes import log, physics, sqrt, where
 from mc_engine.model import Extremum, Field
-from mc_engine.physics.frames import orbital_axes
+from mc_engine.physics.frames import TURN, orbital_axes
 
 FAR = 1e9  # m, a range that is none
 
@@ -97,14 +97,8 @@ def period_error(drift):
 
 
 @physics
-def inclination_of(elements):
-    """Inclination [rad] of equinoctial elements."""
-    return 2.0 * atan(sqrt(elements.q * elements.q + elements.p * elements.p))
-
-
-@physics
 def pair_of(s, m, p, o):
-    """The module seen from the target; nothing in the other phases, which have none."""
+    """The module seen from the target [m], in its radial and transverse axes; missing in phases without a target."""
     zero = 0.0 * s.x
     along, radial, distance, drift, e = zero + float("nan"), zero + float("nan"), zero, zero, zero
     if o.phase == INSPECTION:
@@ -119,67 +113,78 @@ def pair_of(s, m, p, o):
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     true, mean, x = longitudes(t, s, p)
     drift = drift_of(x.a)
     pair = pair_of(s, m, p, o)
     settled = m.settled > 0.5
     return Quantities(
-        true,
-        mean,
-        drift,
-        period_error(drift),
-        sqrt(x.k * x.k + x.h * x.h),
-        inclination_of(x),
-        m.ahead,
-        p.exhaust * log(p.mass / s.mass),
-        pair.along,
-        pair.radial,
-        pair.range,
-        where(settled, pair.range, 0.0),
-        where(settled, -pair.range, -FAR),
-        where(settled, pair.along, float("nan")),
-        where(settled, pair.radial, float("nan")),
-        pair.drift,
-        pair.e,
-        m.burns,
+        longitude_deviation=true,
+        mean_longitude_deviation=mean,
+        drift_rate=drift,
+        period_error=period_error(drift),
+        eccentricity=sqrt(x.k * x.k + x.h * x.h),
+        inclination=inclination_of(x),
+        thrust=m.ahead,
+        delta_v=p.exhaust * log(p.mass / s.mass),
+        along_track=pair.along,
+        radial=pair.radial,
+        range=pair.range,
+        settled_range=where(settled, pair.range, 0.0),
+        settled_nearness=where(settled, -pair.range, -FAR),
+        settled_along_track=where(settled, pair.along, float("nan")),
+        settled_radial=where(settled, pair.radial, float("nan")),
+        relative_drift=pair.drift,
+        relative_eccentricity=pair.e,
+        corrections=m.burns,
     )
 
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at the end."""
+    """The metrics in the order of METRICS, at the end, SI and radians."""
     gone = float("nan")
     true, mean, x = longitudes(t, s, p)
     final_e = sqrt(x.k * x.k + x.h * x.h)
     pair = pair_of(s, m, p, o)
     phasing, two = o.phase == PHASING, o.phase == INSPECTION
-    end = (m.end_true, m.end_mean, m.end_drift, m.end_e, m.end_inclination)
+    end_true, end_mean, end_drift, end_e, end_inclination = (
+        m.end_true,
+        m.end_mean,
+        m.end_drift,
+        m.end_e,
+        m.end_inclination,
+    )
     if not phasing:  # no transfer: where the module is at the end of the flight
-        end = (true, mean, drift_of(x.a), final_e, inclination_of(x))
+        end_true, end_mean, end_drift, end_e, end_inclination = true, mean, drift_of(x.a), final_e, inclination_of(x)
     settled_near, settled_far = -best.settled_near, best.settled_far
     steady = (m.settled > 0.5) & (settled_near >= o.range_low) & (settled_far <= o.range_high)
+    steady = where(steady, 1.0, 0.0)
+    near, far, relative_e, relative_drift = best.near, best.far, pair.e, pair.drift
+    if not two:  # no second craft
+        near, far, relative_e, relative_drift = gone + true, gone + true, gone + true, gone + true
+        settled_near, settled_far, steady = gone + true, gone + true, gone + true
     return Metrics(
-        end[0],
-        end[1],
-        m.day_mean,
-        end[2],
-        m.day_drift,
-        period_error(end[2]),
-        period_error(m.day_drift),
-        end[3],
-        best.eccentricity,
-        end[4],
-        p.exhaust * log(p.mass / s.mass),
-        m.end_time,
-        m.burns,
-        true,
-        final_e,
-        best.near if two else gone + true,
-        best.far if two else gone + true,
-        settled_near if two else gone + true,
-        settled_far if two else gone + true,
-        pair.e if two else gone + true,
-        pair.drift if two else gone + true,
-        where(steady, 1.0, 0.0) if two else gone + true,
+        longitude_deviation=end_true,
+        mean_longitude_deviation=end_mean,
+        daily_mean_longitude_deviation=m.day_mean,
+        drift_rate=end_drift,
+        actual_drift_rate=m.day_drift,
+        period_error=period_error(end_drift),
+        actual_period_error=period_error(m.day_drift),
+        eccentricity=end_e,
+        peak_eccentricity=best.eccentricity,
+        inclination=end_inclination,
+        delta_v=p.exhaust * log(p.mass / s.mass),
+        transfer_time=m.end_time,
+        corrections=m.burns,
+        final_longitude_deviation=true,
+        final_eccentricity=final_e,
+        min_range=near,
+        max_range=far,
+        settled_min_range=settled_near,
+        settled_max_range=settled_far,
+        relative_eccentricity=relative_e,
+        relative_drift=relative_drift,
+        steady=steady,
     )

@@ -14,10 +14,11 @@ from scipy.optimize import minimize
 from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.bellman import Corrections, best_corrections, planned_cost
 from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, E_PER_DV, after_correction, braking, fastest, largest_last
-from campaigns.geo_servicing.dynamics import SIDEREAL_DAY, TURN
+from campaigns.geo_servicing.dynamics import SIDEREAL_DAY
 from campaigns.geo_servicing.inputs import AIMS, SCHEDULES
 from campaigns.geo_servicing.planned_flight import Craft, End, Flight, fly_plan
 from mc_engine.errors import ModelError
+from mc_engine.physics.frames import TURN
 
 # Coasts and burns of the source's corrections [s], and the signs that bring the drift to zero.
 PUBLISHED = ((123_753.6, 7_726.3, 1.0), (37_692.0, 4_569.1, 1.0), (24_264.7, 1_290.3, -1.0))
@@ -82,7 +83,7 @@ def plan_of(o: Any, tables: np.ndarray, first: Any) -> np.ndarray:
 
 def published_plan(craft: Craft) -> Plan:
     """The source's corrections as velocity changes of this craft."""
-    coasts, burns, signs = (np.array(one) for one in zip(*PUBLISHED, strict=True))
+    coasts, burns, signs = (np.array(column) for column in zip(*PUBLISHED, strict=True))
     return Plan(coasts, signs * craft.velocity_changes(burns))
 
 
@@ -94,7 +95,11 @@ def middles(craft: Craft, plan: Plan) -> tuple[np.ndarray, float]:
 
 
 def modelled(craft: Craft, plan: Plan, lacking: Lacking) -> End:
-    """The end of the plan by the drift model: impulses in the middles of the burns, the mean pull between them."""
+    """The end of the plan by the drift model: impulses in the middles of the burns, the mean pull between them.
+
+    Longitude [rad] and drift [rad/rev] by (3.46) over each coast; an impulse moves the eccentricity vector by 2 dv / V0
+    along the radius.
+    """
     when, end = middles(craft, plan)
     y, v = after_correction(craft.y, craft.v, 0.0, when[0], *craft.pull)
     e = craft.e
@@ -107,7 +112,7 @@ def modelled(craft: Craft, plan: Plan, lacking: Lacking) -> End:
 
 
 def steps(craft: Craft, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
-    """(A, B) of the deviations from one ignition to the next, and to the check at the end."""
+    """(A, B) of the deviations [rad, rad/rev] from one ignition to the next, and to the check at the end.  (3.46)"""
     when, end = middles(craft, plan)
     ignition = when - 0.5 * craft.burn_times(plan.dv) / SIDEREAL_DAY
     following = np.append(ignition[1:], end + 0.5)
@@ -116,14 +121,18 @@ def steps(craft: Craft, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
 
 
 def gains_of(craft: Craft, plan: Plan, limits: Limits, sigma: float) -> Corrections:
-    """Gains for deviations from the plan; the end counts in thirds of its tolerances."""
+    """Gains for deviations [rad, rad/rev] from the plan, (3.25)-(3.30); the end counts in thirds of its tolerances."""
     a, b = steps(craft, plan)
     terminal = np.diag([(3.0 / limits.y) ** 2, (3.0 / limits.v) ** 2])
     return best_corrections(a, b, np.zeros_like(b), np.zeros((2, 2)), 1e-6 * terminal[1, 1], terminal, sigma)
 
 
 def design(o: Any, craft: Craft) -> tuple[Plan, Flight]:
-    """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity; their flight."""
+    """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity; their flight.
+
+    The source's successive approximations: the plan of the drift model is flown in the full dynamics, and what the
+    model lacks at the end [rad, rad/rev] is added to the next plan's aim.
+    """
     limits, lacking, plan = limits_of(o), Lacking(), None
     for _ in range(PASSES):
         plan = _best(o, craft, limits, lacking, [plan] if plan else first_approximations(o, craft, limits))
@@ -153,25 +162,25 @@ def first_approximations(o: Any, craft: Craft, limits: Limits) -> list[Plan]:
 
 
 def limits_of(o: Any) -> Limits:
-    """The limits that the settings ask for."""
+    """The limits that the settings ask for [rad, rad/rev, rev]; the last correction by `largest_last`."""
     v = TURN * float(o.period_tolerance) / SIDEREAL_DAY
     y, e, sigma = float(o.longitude_tolerance), float(o.eccentricity_tolerance), max(float(o.assumed_thrust), 1e-6)
     last = np.radians(largest_last(np.degrees(y), np.degrees(v), e, sigma, 0.5))
-    first, least, longest = (float(one) / SIDEREAL_DAY for one in (o.first_coast, o.least_coast, o.longest_transfer))
+    first, least, longest = (float(time) / SIDEREAL_DAY for time in (o.first_coast, o.least_coast, o.longest_transfer))
     return Limits(y, v, e, first, least, longest, float(o.largest_last) or float(last))
 
 
 def _best(o: Any, craft: Craft, limits: Limits, lacking: Lacking, starts: list[Plan]) -> Plan:
     """The plan of least cost among those that the starts lead to."""
-    found = [_improved(o, craft, limits, lacking, start) for start in starts]
-    good = [one for one in found if one is not None]
-    if not good:
+    improved = [_improved(o, craft, limits, lacking, start) for start in starts]
+    feasible = [candidate for candidate in improved if candidate is not None]
+    if not feasible:
         raise ModelError("no phasing plan meets the limits on coasts, time, last correction and eccentricity")
-    return min(good, key=lambda pair: pair[0])[1]
+    return min(feasible, key=lambda pair: pair[0])[1]
 
 
 def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Plan) -> tuple[float, Plan] | None:
-    """(cost, plan) of least cost near a start; None where the limits cannot be met from there."""
+    """(cost [m/s or rev], plan) of least cost near a start; None where the limits cannot be met from there."""
     n = len(start.dv)
     signs = np.sign(start.dv)
     sigma = float(o.assumed_thrust)
@@ -181,12 +190,12 @@ def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Pla
         return Plan(SIDEREAL_DAY * z[:n], z[n:])
 
     def cost(z):
-        one = plan(z)
-        _, b = steps(craft, one)
-        corrections = gains_of(craft, one, limits, sigma)
-        spread = planned_cost(b, corrections.costs, DRIFT_PER_DV * one.dv, sigma)
-        spent = (signs * one.dv).sum() + DV_OF_COST * spread
-        return modelled(craft, one, lacking).time + 0.02 * spent if sooner else spent
+        candidate = plan(z)
+        _, b = steps(craft, candidate)
+        corrections = gains_of(craft, candidate, limits, sigma)
+        spread = planned_cost(b, corrections.costs, DRIFT_PER_DV * candidate.dv, sigma)
+        spent = (signs * candidate.dv).sum() + DV_OF_COST * spread
+        return modelled(craft, candidate, lacking).time + 0.02 * spent if sooner else spent
 
     def equal(z):
         end = modelled(craft, plan(z), lacking)
@@ -202,8 +211,8 @@ def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Pla
     bounds += [(0.0, size) if sign > 0.0 else (-size, 0.0) for sign, size in zip(signs, largest, strict=True)]
     conditions = ({"type": "eq", "fun": equal}, {"type": "ineq", "fun": inside})
     first = np.concatenate([start.coasts / SIDEREAL_DAY, start.dv])
-    found = minimize(
+    search = minimize(
         cost, first, method="SLSQP", bounds=bounds, constraints=conditions, options={"maxiter": 300, "ftol": 1e-10}
     )
-    good = np.abs(equal(found.x)).max() < 1e-6 and inside(found.x).min() > -1e-6
-    return (float(found.fun), plan(found.x)) if good else None
+    feasible = np.abs(equal(search.x)).max() < 1e-6 and inside(search.x).min() > -1e-6
+    return (float(search.fun), plan(search.x)) if feasible else None

@@ -1,6 +1,6 @@
-"""How a phasing plan stands in the tables of the model: a row for every correction, then what ends the transfer.
+"""Layout of a phasing plan in the tables of the model: the number of corrections, then a row for each.
 
-The rows of the gravity harmonics follow behind.
+The rows of the gravity harmonics follow.
 """
 
 import numpy as np
@@ -23,7 +23,7 @@ def corrections(tables):
 
 @physics
 def planned(tables, burn, column):
-    """A column of the row of one correction, counted from 0; the last row stands for those behind it."""
+    """A column of the row of one correction, counted from 0; an index past the last row reads the last row."""
     return look_up(tables, 1.0 + ROW * burn + column)
 
 

@@ -20,7 +20,7 @@ _TOLERANCES = {"rtol": 1e-9, "atol": [*[1e-3] * 3, *[1e-7] * 3, 1e-6, *[1.0] * 6
 
 @dataclass(frozen=True)
 class End:
-    """What a plan comes to.
+    """End of a flown plan.
 
     y : mean longitude deviation of the sidereal day after [rad];  v : actual drift in it [rad/rev]
     e : osculating eccentricity vector at the last cut-off, x + i y;  time : of that [rev]
@@ -55,7 +55,7 @@ class Craft:
     """The servicing module at the start, without errors."""
 
     def __init__(self, o: Any, tables: np.ndarray, first: Any):
-        """o : settings;  tables : all tables of the model, the plan's place included;  first : kernel parameters."""
+        """o : settings;  tables : all tables of the model, with room for the plan;  first : kernel parameters, SI."""
         self.o, self.p = o._replace(tables=tables), first
         self.start = np.array([getattr(first, name) for name in State._fields[:7]] + [0.0] * 7)
         _, self.y, elements = longitudes(0.0, State(*self.start), first)
@@ -98,7 +98,7 @@ class Craft:
 
 
 def fly_plan(craft: Craft, coasts: np.ndarray, dv: np.ndarray) -> Flight:
-    """Coasts and burns of a plan, and the sidereal day after."""
+    """Coasts [s] and burns [m/s] of a plan, one after the other, and the sidereal day after."""
     t, s, seen = 0.0, craft.start, []
     for coast, change, burn in zip(coasts, dv, craft.burn_times(dv), strict=True):
         s = craft.fly(t, s, coast, 0.0)

@@ -1,74 +1,45 @@
-"""An apogee raised by one burn, an impulse at the perigee of a circular orbit: a start for a model of your own.
-
-Inside, all is SI and radians, and `burn_dv_m_s` is `burn_dv`; mc_engine.model says all that a model can have.
-"""
-
-from collections import namedtuple
+"""An apogee raised by one burn, an impulse at the perigee of a circular orbit: a start for a model of your own."""
 
 from mc_engine.lanes import cos, physics, sin, sqrt
-from mc_engine.model import Event, Extremum, Field, FixedStep, Model, Parameter
+from mc_engine.model import Event, FixedStep, Parameter, at_end, inputs, maximum_of, metrics, model, outputs, states
 from mc_engine.physics.constants import EQUATORIAL_RADIUS, MU_EARTH
 
-State = namedtuple("State", "x y vx vy")
-Parameters = namedtuple("Parameters", "altitude burn_dv magnitude_error pitch_error")
-Events = namedtuple("Events", "apogee")
-Quantities = namedtuple("Quantities", "altitude speed")
-Metrics = namedtuple("Metrics", "apogee_altitude apogee_time top_speed")
+Inputs = inputs(  # nominal value, meaning, range; a name ends in its unit, and physics has it in SI, without: `burn_dv`
+    altitude_km=Parameter(300.0, "altitude of the circular orbit", low=150.0, high=2000.0),
+    burn_dv_m_s=Parameter(100.0, "size of the burn", low=1.0),
+    magnitude_error_pct=Parameter(0.0, "error of the burn's size", low=-99.0),
+    pitch_error_deg=Parameter(0.0, "error of the burn's direction, in the orbital plane", low=-90.0, high=90.0),
+)
+State = states(x_m="x", y_m="y", vx_m_s="vx", vy_m_s="vy")
+Outputs = outputs(altitude_km="altitude", speed_m_s="speed")
+Metrics = metrics(apogee_altitude_km=at_end("altitude_km", "altitude of the apogee"),
+                  apogee_time_s=at_end("t_s", "time from the burn to the apogee"),
+                  top_speed_m_s=maximum_of("speed_m_s", "largest speed"))  # fmt: skip
 
 
 @physics
-def initial(p, o):  # just after the burn, on the x axis
+def initial(p):  # just after the burn, on the x axis; a function takes what it names: t, s, m, p, o
     r, dv = EQUATORIAL_RADIUS + p.altitude, p.burn_dv * (1.0 + p.magnitude_error)
-    return State(r, 0.0, dv * sin(p.pitch_error), sqrt(MU_EARTH / r) + dv * cos(p.pitch_error))
+    return State(x=r, y=0.0, vx=dv * sin(p.pitch_error), vy=sqrt(MU_EARTH / r) + dv * cos(p.pitch_error))
 
 
 @physics
-def rhs(t, s, m, p, o):  # the derivative of the state: a point mass attracts
+def rhs(s):  # derivative of the state: a point mass attracts, mu / r^2 [m/s^2]
     r2 = s.x * s.x + s.y * s.y
     g = -MU_EARTH / (r2 * sqrt(r2))
-    return State(s.vx, s.vy, g * s.x, g * s.y)
+    return State(x=s.vx, y=s.vy, vx=g * s.x, vy=g * s.y)
 
 
 @physics
-def events(t, s, m, p, o):  # zero at the apogee, where the distance stops growing
-    return Events(s.x * s.vx + s.y * s.vy)
+def climb(s):  # r r' [m^2/s]: zero at the apogee
+    return s.x * s.vx + s.y * s.vy
 
 
 @physics
-def observe(t, s, m, p, o):  # what histories show
-    return Quantities(sqrt(s.x * s.x + s.y * s.y) - EQUATORIAL_RADIUS, sqrt(s.vx * s.vx + s.vy * s.vy))
+def observe(s):  # what histories show, and extremes are taken of
+    return Outputs(altitude=sqrt(s.x * s.x + s.y * s.y) - EQUATORIAL_RADIUS, speed=sqrt(s.vx * s.vx + s.vy * s.vy))
 
 
-@physics
-def evaluate(t, s, m, p, o, best, when):  # what a case comes to, at its end
-    return Metrics(sqrt(s.x * s.x + s.y * s.y) - EQUATORIAL_RADIUS, t, best.speed)
-
-
-MODEL = Model(
-    name="minimal",
-    title="Apogee raised by one burn",
-    source="",
-    parameters=(  # name, unit, meaning, nominal value, and the range that is allowed
-        Parameter("altitude_km", "km", "altitude of the circular orbit", 300.0, low=150.0, high=2000.0),
-        Parameter("burn_dv_m_s", "m/s", "size of the burn", 100.0, low=1.0),
-        Parameter("magnitude_error_pct", "%", "error of the burn's size", 0.0, low=-99.0),
-        Parameter("pitch_error_deg", "deg", "error of the burn's direction, in the orbital plane", 0.0, -90.0, 90.0),
-    ),
-    settings=(),
-    states=(Field("x_m", "m", "x"), Field("y_m", "m", "y"), Field("vx_m_s", "m/s", "vx"), Field("vy_m_s", "m/s", "vy")),
-    quantities=(Field("altitude_km", "km", "altitude"), Field("speed_m_s", "m/s", "speed")),
-    metrics=(
-        Field("apogee_altitude_km", "km", "altitude of the apogee"),
-        Field("apogee_time_s", "s", "time from the burn to the apogee"),
-        Field("top_speed_m_s", "m/s", "largest speed"),
-    ),
-    clock=FixedStep(step=10.0, until=10_000.0),
-    kernel_parameters=Parameters,
-    initial=initial,
-    rhs=rhs,
-    events=events,
-    event_list=(Event("apogee", "falling", "stop"),),
-    observe=observe,
-    evaluate=evaluate,
-    extrema=(Extremum("speed", "speed_m_s"),),
-)
+MODEL = model(name="minimal", title="Apogee raised by one burn", inputs=Inputs, states=State, outputs=Outputs,
+              metrics=Metrics, clock=FixedStep(step=10.0, until=10_000.0), initial=initial, rhs=rhs, observe=observe,
+              events={"apogee": Event(climb, "falling", "stop")})  # fmt: skip

@@ -1,4 +1,4 @@
-"""The vehicle of each case: the campaign's numbers or one of vehicles.py, and what the flight makes of them."""
+"""The vehicle of each case: the campaign's numbers or one of vehicles.py, and kernel parameters that follow from it."""
 
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -17,7 +17,7 @@ _SYMBOLS = ("mass", "reference_area", "drag_coefficient", "lift_coefficient", "t
 
 
 def _shares_over_mach(vehicle: Vehicle) -> np.ndarray:
-    """The vehicle's table over the Mach number, in shares of its hypersonic coefficients; empty if it has none."""
+    """The vehicle's table over the Mach number, in shares of its hypersonic coefficients (no unit), or empty."""
     drag, lift = vehicle.drag_coefficient, vehicle.lift_coefficient
     rows = [(mach, of_drag / drag, of_lift / lift) for mach, of_drag, of_lift in vehicle.over_mach]
     return mach_table(rows) if rows else np.empty(0)
@@ -25,9 +25,10 @@ def _shares_over_mach(vehicle: Vehicle) -> np.ndarray:
 
 _TABLES = [np.empty(0), *(_shares_over_mach(vehicle) for vehicle in VEHICLES.values())]
 COEFFICIENTS = np.concatenate(_TABLES)  # the tables of all vehicles, as flights find them in o.tables
-# where that of each code of the setting `vehicle` begins, -1 for constant coefficients
-_PLACES = np.array(
-    [sum(one.size for one in _TABLES[:k]) if table.size else -1.0 for k, table in enumerate(_TABLES)], dtype=float
+# index at which that of each code of the setting `vehicle` begins, -1 for constant coefficients
+_FIRST_INDICES = np.array(
+    [sum(before.size for before in _TABLES[:k]) if table.size else -1.0 for k, table in enumerate(_TABLES)],
+    dtype=float,
 )
 
 
@@ -50,7 +51,7 @@ def _numbers_of(vehicle: Vehicle) -> tuple[float, ...]:
 
 
 def airframe_of(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> Airframe:
-    """Numbers of each case's vehicle; one that is named and given other numbers besides is refused."""
+    """Numbers of each case's vehicle, SI; one that is named and given other numbers besides is refused."""
     numbers = [getattr(i, symbol) for symbol in _SYMBOLS]
     items = {parameter.symbol: parameter for parameter in PARAMETERS}
     for k, (name, vehicle) in enumerate(VEHICLES.items(), start=1):
@@ -67,7 +68,7 @@ def airframe_of(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusal
 
 
 def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Airframe) -> dict[str, np.ndarray]:
-    """Areas over mass of the forces in hypersonic flow, dispersions included, and the coefficient of the heating."""
+    """Areas over mass [m^2/kg] of the forces in hypersonic flow, dispersions included; coefficient of the heating."""
     drag = airframe.drag_coefficient * i.cd_factor
     lift = airframe.lift_coefficient * i.cd_factor * i.ld_factor
     trim, tilted = airframe.trim, airframe.trim + i.accelerometer_misalignment
@@ -81,7 +82,7 @@ def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Airfr
         "total": np.hypot(drag, lift) * per_mass,
         "axial": axial_coefficient(drag, lift, np.cos(trim), np.sin(trim)) * per_mass,
         "sensed": axial_coefficient(drag, lift, np.cos(tilted), np.sin(tilted)) * per_mass,
-        "coefficients": _PLACES[settings.vehicle.astype(int)],
+        "coefficients": _FIRST_INDICES[settings.vehicle.astype(int)],
         "cos_trim": np.cos(trim),
         "sin_trim": np.sin(trim),
         "cos_tilted": np.cos(tilted),

@@ -1,4 +1,4 @@
-"""Closed forms of entry in an exponential atmosphere: they check the flown motion, and fly nothing.  NumPy, SI.
+"""Closed forms of entry in an exponential atmosphere, with which flights are compared.  NumPy, SI.
 
 Angles are in radians; a flight-path angle is negative down.  B is mass over drag area [kg/m^2], H0 the scale height.
 """
@@ -30,7 +30,7 @@ class SteepEntry:
 
     @property
     def _depth(self) -> float:
-        """rho0 H0 / (B s): how much air there is down to the ground."""
+        """rho0 H0 / (B s), without unit: how much air there is down to the ground.  Allen, Eggers (1958)."""
         return self.density * self.scale / (self.b * self._steepness)
 
     def speed_at(self, altitude):

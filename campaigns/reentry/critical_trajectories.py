@@ -68,6 +68,8 @@ def critical_periapses(inputs: Inputs) -> CriticalPeriapses:
     from a quarter of it up to eleven twelfths.  On the first the vehicle leaves the atmosphere at escape speed: higher,
     and it is lost.  On the second it just still leaves: lower, and it comes down at once.  Drag only, no gravity but
     that of the point mass.
+
+    Altitudes in km; the source's section on aerobraking, with its eqs (17), (18).
     """
     top = {"entry_altitude_km": interface_km(inputs.get("planet", "earth"))}
     asked = {**top, **inputs, "arrival": "hyperbola", "on_exit": "stop"}
@@ -90,7 +92,7 @@ def critical_roll(inputs: Inputs, low_deg: float = 0.1, high_deg: float = 45.0) 
 
 
 def main() -> None:
-    """Print the critical trajectories of the campaign files."""
+    """Print the critical trajectories of the campaign files [km, deg]."""
     periapses = critical_periapses(load_campaign(HERE / "aerobraking.toml").nominal)
     print(f"aerobraking: capture below {periapses.capture:.3f} km, entry below {periapses.entry:.3f} km")
     print(f"skip: roll to lift down at {critical_roll(load_campaign(HERE / 'skip.toml').nominal):.4f} deg")

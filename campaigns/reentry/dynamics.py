@@ -75,7 +75,10 @@ def initial(p, o):
 
 @physics
 def place_of(s, p, o):
-    """Altitude, its rate, and the direction up."""
+    """Altitude [m], its rate [m/s], and the direction up, planet-fixed axes.
+
+    The rate is that of r less the ellipsoid's radius: r' - (dR/d sin^2) (sin^2)', derived here with sin = z / r.
+    """
     if o.shape == FLAT:
         zero = 0.0 * s.x
         altitude, climb, ux, uy, uz = s.z + zero, s.vz + zero, zero, zero, 1.0 + zero
@@ -94,7 +97,10 @@ def place_of(s, p, o):
 
 @physics
 def air_of(s, place, p, o):
-    """Air where the vehicle is, and how it goes through it."""
+    """The `Air` where the vehicle is, and how it goes through it, SI: the wind blows along the local east and north.
+
+    Derived here: shear = -(V . dW/dh), by which the speed through the air changes per metre climbed, times that speed.
+    """
     value, slope, temperature = logarithm_of_density(place.altitude, p, o)
     vx, vy, vz, shear = s.vx, s.vy, s.vz, 0.0 * s.vx
     if o.weather > 0.5:
@@ -156,7 +162,7 @@ def speed2(s):
 
 @physics
 def bank_of(t, m, o):
-    """(cosine, sine) of the bank; no sine in a planar flight."""
+    """(cosine, sine) of the bank angle [rad]; the sine is 0 in a planar flight."""
     if o.guidance == UNGUIDED:
         cosine, sine = m.cos_bank, m.sin_bank
     else:
@@ -167,7 +173,7 @@ def bank_of(t, m, o):
 
 @physics
 def rhs(t, s, m, p, o):
-    """Time derivative of the state: field, Coriolis force, drag, lift, and the heat rate."""
+    """Time derivative of the state, SI: field, Coriolis force, drag, lift, heat rate.  Vinh, chapter 2, as vectors."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
     v = sqrt(speed2(air))
@@ -189,7 +195,8 @@ def events(t, s, m, p, o):
     """Peaks of dynamic pressure and heat rate, pull-out, rolls, and the ends of the flight.
 
     A peak is where the rate falls through zero.  Both quantities are rho^a V^b, whose logarithm has the rate
-    a rho'/rho climb + b v.a/V^2; the events are V^2 times that, so that a vehicle at rest divides nothing by zero.
+    a rho'/rho climb + b v.a/V^2, derived here; the events are V^2 times that [m^2/s^3], so that a vehicle at rest
+    divides nothing by zero.  Rolls are sines of flight-path angles, ends altitudes [m] and times [s].
     """
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
@@ -219,7 +226,7 @@ def events(t, s, m, p, o):
 
 @physics
 def exposure_of(s, p, o):
-    """The `Exposure` of a state."""
+    """The `Exposure` of a state, SI: dynamic pressure rho V^2 / 2."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
     v2 = speed2(air)
@@ -230,16 +237,20 @@ def exposure_of(s, p, o):
 
 @physics
 def start(p, o):
-    """Peaks begin with the values at entry."""
+    """Memory at entry, SI: peaks begin with the values there."""
     pressure, flux, altitude, v, force = exposure_of(initial(p, o), p, o)
     zero = 0.0 * v
     unknown = zero + UNKNOWN
     return Memory(
-        pressure, zero, altitude, v, force.total, force.axial, flux, zero, altitude, v,
-        unknown, unknown, p.cos_bank, p.sin_bank,
-        zero, zero, unknown, unknown, unknown, unknown, unknown,
-        zero, p.first_bank, zero, p.first_bank, zero, where(p.first_bank < 0.0, -1.0, 1.0), zero,
-        zero, zero, zero, zero, zero, zero, zero, zero,
+        pressure=pressure, pressure_time=zero, pressure_altitude=altitude, pressure_speed=v, pressure_total=force.total,
+        pressure_axial=force.axial, flux=flux, flux_time=zero, flux_altitude=altitude, flux_speed=v,
+        low=unknown, low_time=unknown, cos_bank=p.cos_bank, sin_bank=p.sin_bank,
+        rolls=zero, exits=zero, exit_time=unknown, exit_speed=unknown, exit_angle=unknown, exit_inertial=unknown,
+        exit_apoapsis=unknown,
+        sampled=zero, bank=p.first_bank, bank_rate=zero, next_bank=p.first_bank, next_rate=zero,
+        side=where(p.first_bank < 0.0, -1.0, 1.0), active=zero,
+        lost=zero, reckoned=zero, range_rate=zero, axial=zero, excess=zero, samples=zero, saturated=zero,
+        reversals=zero,
     )  # fmt: skip
 
 
@@ -269,7 +280,7 @@ def exit_of(s, p, o):
 
 @physics
 def switch(t, s, m, p, o, hit):
-    """Keep the larger of each peak, the first pull-out and the first exit; change the bank where a roll is due."""
+    """Keep the larger of each peak, the first pull-out and the first exit, SI; change the bank where a roll is due."""
     pressure, flux, altitude, v, force = exposure_of(s, p, o)
     push = (hit.pressure_peak > 0.5) & (pressure > m.pressure)
     heat = (hit.heat_peak > 0.5) & (flux > m.flux)
@@ -280,27 +291,40 @@ def switch(t, s, m, p, o, hit):
     speed, angle, inertial, apoapsis = exit_of(s, p, o)
     over = roll & (m.rolls == 0.0)
     return s, Memory(
-        where(push, pressure, m.pressure),
-        where(push, t, m.pressure_time),
-        where(push, altitude, m.pressure_altitude),
-        where(push, v, m.pressure_speed),
-        where(push, force.total, m.pressure_total),
-        where(push, force.axial, m.pressure_axial),
-        where(heat, flux, m.flux),
-        where(heat, t, m.flux_time),
-        where(heat, altitude, m.flux_altitude),
-        where(heat, v, m.flux_speed),
-        where(low, altitude, m.low),
-        where(low, t, m.low_time),
-        where(over, p.cos_rolled, where(roll, p.cos_bank, m.cos_bank)),
-        where(over, p.sin_rolled, where(roll, p.sin_bank, m.sin_bank)),
-        where(roll, m.rolls + 1.0, m.rolls),
-        where(leaving, m.exits + 1.0, m.exits),
-        where(first, t, m.exit_time),
-        where(first, speed, m.exit_speed),
-        where(first, angle, m.exit_angle),
-        where(first, inertial, m.exit_inertial),
-        where(first, apoapsis, m.exit_apoapsis),
-        *(m.sampled, m.bank, m.bank_rate, m.next_bank, m.next_rate, m.side, m.active),
-        *(m.lost, m.reckoned, m.range_rate, m.axial, m.excess, m.samples, m.saturated, m.reversals),
+        pressure=where(push, pressure, m.pressure),
+        pressure_time=where(push, t, m.pressure_time),
+        pressure_altitude=where(push, altitude, m.pressure_altitude),
+        pressure_speed=where(push, v, m.pressure_speed),
+        pressure_total=where(push, force.total, m.pressure_total),
+        pressure_axial=where(push, force.axial, m.pressure_axial),
+        flux=where(heat, flux, m.flux),
+        flux_time=where(heat, t, m.flux_time),
+        flux_altitude=where(heat, altitude, m.flux_altitude),
+        flux_speed=where(heat, v, m.flux_speed),
+        low=where(low, altitude, m.low),
+        low_time=where(low, t, m.low_time),
+        cos_bank=where(over, p.cos_rolled, where(roll, p.cos_bank, m.cos_bank)),
+        sin_bank=where(over, p.sin_rolled, where(roll, p.sin_bank, m.sin_bank)),
+        rolls=where(roll, m.rolls + 1.0, m.rolls),
+        exits=where(leaving, m.exits + 1.0, m.exits),
+        exit_time=where(first, t, m.exit_time),
+        exit_speed=where(first, speed, m.exit_speed),
+        exit_angle=where(first, angle, m.exit_angle),
+        exit_inertial=where(first, inertial, m.exit_inertial),
+        exit_apoapsis=where(first, apoapsis, m.exit_apoapsis),
+        sampled=m.sampled,
+        bank=m.bank,
+        bank_rate=m.bank_rate,
+        next_bank=m.next_bank,
+        next_rate=m.next_rate,
+        side=m.side,
+        active=m.active,
+        lost=m.lost,
+        reckoned=m.reckoned,
+        range_rate=m.range_rate,
+        axial=m.axial,
+        excess=m.excess,
+        samples=m.samples,
+        saturated=m.saturated,
+        reversals=m.reversals,
     )

@@ -60,7 +60,7 @@ class Entry:
 
 
 def world_of(i: SimpleNamespace, settings: SimpleNamespace) -> World:
-    """The planet of each case as its settings ask for it; one without an ellipsoid is its sphere."""
+    """The planet of each case as its settings ask for it, SI; one without an ellipsoid is its sphere."""
     radius = np.where(i.surface_radius > 0.0, i.surface_radius, of_planets(settings.planet, "radius"))
     e2 = np.where(settings.shape == ELLIPSOID, of_planets(settings.planet, "e2"), 0.0)
     rate = np.where(settings.rotating > 0.5, of_planets(settings.planet, "rate"), 0.0)
@@ -80,13 +80,13 @@ def hyperbolic_arrival(excess_speed, periapsis, radius, mu, refusals: Refusals, 
 
 
 def over_ground(components, radius, latitude, world: World, frame):
-    """North, east, up of the velocity over ground; `frame` says in which frame the components are."""
+    """North, east, up of the velocity over ground [m/s]; `frame` says in which frame the components are."""
     carried = carried_along(radius, latitude, world.rate)
     return components - np.where(frame == INERTIAL, carried, 0.0)
 
 
 def _height(i: SimpleNamespace, latitude, world: World):
-    """(radius, geodetic altitude) of the planned entry, one of which is given."""
+    """(radius, geodetic altitude) [m] of the planned entry, one of which is given."""
     radius = radius_at_altitude(i.entry_altitude, latitude, world.polar_radius, world.e2)
     radius = np.where(i.entry_radius > 0.0, i.entry_radius, radius)
     altitude = over_ellipsoid(radius, 1.0 / radius, np.sin(latitude) ** 2, world.polar_radius, world.e2)[0]
@@ -94,7 +94,7 @@ def _height(i: SimpleNamespace, latitude, world: World):
 
 
 def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusals: Refusals) -> Entry:
-    """The first state with its errors, and the frame of the entry that was planned without them."""
+    """The first state with its errors, SI, and the frame of the entry that was planned without them."""
     latitude, longitude = i.entry_latitude, i.entry_longitude
     radius, altitude = _height(i, latitude, world)
     comes = settings.arrival == HYPERBOLA
@@ -123,29 +123,30 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
     position = radius * up
     # minus zero would fly to other bits than zero does
     return Entry(
-        np.where(world.flat, _flat_place(radius - world.polar_radius), position) + 0.0,
-        np.where(world.flat, _flat_velocity(components, heading), velocity) + 0.0,
-        place,
-        ahead,
-        np.cross(ahead, place, axis=0),
-        altitude,
-        np.sqrt((components**2).sum(axis=0)),
-        np.arctan2(components[2], np.hypot(components[0], components[1])),
-        heading,
-        planned_radius,
-        planned_latitude,
-        np.sqrt((planned**2).sum(axis=0)),
-        np.arctan2(planned[2], level),
+        position=np.where(world.flat, _flat_place(radius - world.polar_radius), position) + 0.0,
+        velocity=np.where(world.flat, _flat_velocity(components, heading), velocity) + 0.0,
+        place=place,
+        ahead=ahead,
+        right=np.cross(ahead, place, axis=0),
+        altitude=altitude,
+        speed=np.sqrt((components**2).sum(axis=0)),
+        path=np.arctan2(components[2], np.hypot(components[0], components[1])),
+        heading=heading,
+        radius=planned_radius,
+        latitude=planned_latitude,
+        planned_speed=np.sqrt((planned**2).sum(axis=0)),
+        planned_path=np.arctan2(planned[2], level),
     )
 
 
 def _flat_place(altitude):
+    """Place [m] over the flat Earth: ahead, left and up of the entry point."""
     zero = np.zeros_like(altitude)
     return np.array([zero, zero, altitude])
 
 
 def _flat_velocity(components, heading):
-    """Ahead, left and up."""
+    """Velocity [m/s] ahead, left and up, from north, east and up."""
     north, east, up = components
     s, c = np.sin(heading), np.cos(heading)
     return np.array([north * c + east * s, north * s - east * c, up])

@@ -1,4 +1,4 @@
-"""What can be set in an entry campaign: parameters, which may differ from case to case, and settings."""
+"""Inputs of an entry campaign: parameters, which may differ from case to case, and settings."""
 
 from campaigns.reentry.planets import PLANETS
 from campaigns.reentry.vehicles import VEHICLES

@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from campaigns.reentry import dynamics, figures, guidance, outcome, weather
+from campaigns.reentry import dynamics, figures, outcome, weather
 from campaigns.reentry.air import GAS_CONSTANT
 from campaigns.reentry.airframe import COEFFICIENTS, DETRA_KEMP_RIDDELL, airframe_of, airframe_rows
 from campaigns.reentry.entry_state import FLAT, Entry, World, entry_of, world_of
+from campaigns.reentry.guidance import laws
+from campaigns.reentry.guidance.plan import planned_entry, plans_of
+from campaigns.reentry.guidance.reference import stored_references
 from campaigns.reentry.inputs import PARAMETERS, SETTINGS
-from campaigns.reentry.plan import planned_entry, plans_of
 from campaigns.reentry.planets import of_planets
-from campaigns.reentry.reference import stored_references
 from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
 from mc_engine.studies.published import read_published
 
@@ -53,7 +54,7 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     refusals.add(guided & ~(plan.lift_to_drag > 0.0), "a guidance law needs a vehicle with lift")
     references = stored_references(plan, guided, COEFFICIENTS.size, refusals)
     rows |= _target(inputs, world, planned, np.where(guided, references.range, inputs.target_downrange))
-    rows |= {"reference": references.place, "planned_range": references.range, "planned_share": plan.share}
+    rows |= {"reference": references.start, "planned_range": references.range, "planned_share": plan.share}
     rows |= {"planned_lift_to_drag": plan.lift_to_drag}
     return rows | _case_tables(inputs, settings, references.tables)
 
@@ -80,6 +81,7 @@ def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> 
 
 
 def _planet_rows(i: SimpleNamespace, settings: SimpleNamespace, world: World) -> dict[str, np.ndarray]:
+    """Gravity, rotation and air of each case's planet, and its corridor limits, SI; temperature [K] g H0 / R."""
     air = of_planets(settings.planet, "air")
     gravity = world.mu / world.radius**2
     return {
@@ -102,7 +104,7 @@ def _planet_rows(i: SimpleNamespace, settings: SimpleNamespace, world: World) ->
 
 
 def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Directions of the lift; a planar flight knows nothing of the side."""
+    """Directions of the lift, cosines and sines of bank and flight-path angle [rad]; a planar flight has no side."""
     side = np.where(settings.planar > 0.5, 0.0, 1.0)
     first, rolled = i.bank + i.bank_error, i.rolled_bank + i.bank_error
     never = 0.5 * np.pi * (1.0 - 1e-12)
@@ -117,7 +119,7 @@ def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.nd
 
 
 def _sensor_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Bank execution, reversals and sensor errors."""
+    """Bank execution, reversals and sensor errors, SI and radians."""
     return {
         "first_bank": i.bank + i.bank_error,
         "bank_error": i.bank_error,
@@ -138,7 +140,7 @@ def _sensor_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
 
 
 def _target(i: SimpleNamespace, world: World, entry: Entry, end: np.ndarray) -> dict[str, np.ndarray]:
-    """Axes of the distances, and the target; end : downrange of the target where the inputs name none, 0 for none."""
+    """Unit axes of the distances, and the target; end : its downrange [m] where the inputs name none, 0 for none."""
     rows: dict[str, np.ndarray] = {}
     for letter, vectors in (("e", entry.place), ("f", entry.ahead), ("n", entry.right)):
         rows |= {f"{letter}{axis}": vectors[k] for k, axis in enumerate("xyz")}
@@ -156,7 +158,7 @@ def _target(i: SimpleNamespace, world: World, entry: Entry, end: np.ndarray) -> 
 
 
 def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.ndarray) -> dict[str, np.ndarray]:
-    """Reference paths, behind them the air of each case, and where that begins."""
+    """Reference paths, then the air of each case, float64[n], and the index at which that begins."""
     asked = settings.weather > 0.5
     if not asked.any():
         return {"weather": np.zeros(asked.size), "tables": references}
@@ -186,7 +188,7 @@ MODEL = Model(
     prepare=prepare,
     initial=dynamics.initial,
     start=dynamics.start,
-    control=guidance.control,
+    control=laws.control,
     tables=shared_tables,
     rhs=dynamics.rhs,
     events=dynamics.events,

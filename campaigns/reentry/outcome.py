@@ -1,4 +1,4 @@
-"""What is seen along an entry and what it comes to: quantities and metrics.  SI, radians."""
+"""Quantities along an entry and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
@@ -17,11 +17,9 @@ from campaigns.reentry.dynamics import (
     place_of,
     speed2,
 )
-from mc_engine.lanes import atan2, floor, physics, sqrt, where
+from mc_engine.lanes import atan2, physics, sqrt, where
 from mc_engine.model import Field
-from mc_engine.physics.frames import geodetic_latitude, spherical, velocity_angles
-
-TAU = 6.283185307179586
+from mc_engine.physics.frames import TURN, full_turn, geodetic_latitude, spherical, velocity_angles
 
 QUANTITIES = (
     Field("altitude_km", "km", "geodetic altitude"),
@@ -105,20 +103,15 @@ Quantities = namedtuple(
     "altitude speed path heading latitude longitude downrange crossrange load axial pressure flux heat mach density "
     "bank",
 )
-Metrics = namedtuple("Metrics", [field.name for field in METRICS])  # type: ignore[misc]
+Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]
 Ground = namedtuple("Ground", "latitude longitude downrange crossrange path heading")
 
 
 @physics
-def full_turn(angle):
-    """The angle in [0, 2 pi)."""
-    return angle - TAU * floor(angle * (1.0 / TAU))
-
-
-@physics
 def ground_of(s, altitude, p, o):
-    """Place over ground and direction of flight.  Distances are counted from the planned entry place.
+    """Place over ground and direction of flight [m, rad].  Distances are counted from the planned entry place.
 
+    Downrange is the arc along the planned great circle, crossrange the arc from it, on a sphere of the planet's radius.
     Downrange goes on beyond the antipodes, from a quarter of a turn behind the entry place to three quarters ahead.
     """
     if o.shape == FLAT:
@@ -132,7 +125,7 @@ def ground_of(s, altitude, p, o):
         ahead = s.x * p.fx + s.y * p.fy + s.z * p.fz
         right = s.x * p.nx + s.y * p.ny + s.z * p.nz
         along = atan2(ahead, up)
-        downrange = p.radius * where(along < -0.25 * TAU, along + TAU, along)
+        downrange = p.radius * where(along < -0.25 * TURN, along + TURN, along)
         crossrange = p.radius * atan2(right, sqrt(up * up + ahead * ahead))
         path, heading = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)
     return Ground(latitude, longitude, downrange, crossrange, path, full_turn(heading))
@@ -140,7 +133,7 @@ def ground_of(s, altitude, p, o):
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES."""
+    """The quantities in the order of QUANTITIES, SI and radians."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
     v2 = speed2(air)
@@ -153,22 +146,22 @@ def observe(t, s, m, p, o):
     else:
         bank = angle_at(t, m, o.guidance_period)
     return Quantities(
-        place.altitude,
-        sqrt(speed2(s)),
-        ground.path,
-        ground.heading,
-        ground.latitude,
-        ground.longitude,
-        ground.downrange,
-        ground.crossrange,
-        pressure * force.total,
-        pressure * force.axial,
-        pressure,
-        heat_rate(air.density, through, p, o),
-        s.heat,
-        through / sound_speed(air.temperature),
-        air.density,
-        bank,
+        altitude=place.altitude,
+        speed=sqrt(speed2(s)),
+        path=ground.path,
+        heading=ground.heading,
+        latitude=ground.latitude,
+        longitude=ground.longitude,
+        downrange=ground.downrange,
+        crossrange=ground.crossrange,
+        load=pressure * force.total,
+        axial=pressure * force.axial,
+        pressure=pressure,
+        flux=heat_rate(air.density, through, p, o),
+        heat=s.heat,
+        mach=through / sound_speed(air.temperature),
+        density=air.density,
+        bank=bank,
     )
 
 
@@ -180,7 +173,7 @@ def known(value):
 
 @physics
 def violations(load, pressure, flux, heat, p):
-    """How many of load, heat rate, heat load and dynamic pressure were above their limits."""
+    """How many of load [m/s^2], heat rate [W/m^2], heat load [J/m^2], dynamic pressure [Pa] were above their limits."""
     return (
         where(load > p.corridor_load, 1.0, 0.0)
         + where(flux > p.corridor_heat_rate, 1.0, 0.0)
@@ -191,7 +184,7 @@ def violations(load, pressure, flux, heat, p):
 
 @physics
 def target_of(t, p, o):
-    """(geodetic latitude, longitude) of the target, not numbers without one or over a flat Earth."""
+    """(geodetic latitude, longitude) of the target [rad], not numbers without one or over a flat Earth."""
     if o.shape == FLAT:
         latitude, longitude = float("nan") + t, float("nan") + t
     else:
@@ -216,57 +209,64 @@ def planned_range(t, p, o):
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at the end of the flight."""
+    """The metrics in the order of METRICS, at the end of the flight, SI and radians."""
     pressure, flux, altitude, v, force = exposure_of(s, p, o)
     ground = ground_of(s, altitude, p, o)
     push, heat = pressure > m.pressure, flux > m.flux  # the flight may end before a peak
     pressure, flux = where(push, pressure, m.pressure), where(heat, flux, m.flux)
     load = pressure * where(push, force.total, m.pressure_total)
-    pressure_when = (
-        where(push, t, m.pressure_time),
-        where(push, altitude, m.pressure_altitude),
-        where(push, v, m.pressure_speed),
-    )
-    heat_when = where(heat, t, m.flux_time), where(heat, altitude, m.flux_altitude), where(heat, v, m.flux_speed)
+    # the load peaks with the dynamic pressure
+    load_time, load_altitude = where(push, t, m.pressure_time), where(push, altitude, m.pressure_altitude)
+    load_speed = where(push, v, m.pressure_speed)
+    target_latitude, target_longitude = target_of(t, p, o)
     leaves = (o.on_exit == STOP_ON_EXIT) & (altitude > p.exit - 1e-3) & (ground.path > 0.0)
     speed, angle, inertial, apoapsis = exit_of(s, p, o)
     pulled = m.low < UNKNOWN
     air = air_of(s, place_of(s, p, o), p, o)
     miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.aim_cross
     return Metrics(
-        load,
-        *pressure_when,
-        pressure * where(push, force.axial, m.pressure_axial),
-        *pressure_when,
-        pressure,
-        *pressure_when,
-        flux,
-        *heat_when,
-        s.heat,
-        violations(load, pressure, flux, s.heat, p),
-        where(pulled, m.low, altitude),
-        where(pulled, m.low_time, t),
-        where(leaves, 1.0, m.exits),
-        known(where(leaves, t, m.exit_time)),
-        known(where(leaves, speed, m.exit_speed)),
-        known(where(leaves, angle, m.exit_angle)),
-        known(where(leaves, inertial, m.exit_inertial)),
-        known(where(leaves, apoapsis, m.exit_apoapsis)),
-        t,
-        altitude,
-        v,
-        ground.path,
-        sqrt(speed2(air)) / sound_speed(air.temperature),
-        ground.latitude,
-        ground.longitude,
-        ground.downrange,
-        ground.crossrange,
-        where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), float("nan")),
-        *target_of(t, p, o),
-        planned_range(t, p, o),
-        where(m.samples > 0.0, m.saturated / where(m.samples > 0.0, m.samples, 1.0), float("nan")),
-        m.reversals,
-        p.speed,
-        p.path,
-        where(p.drag > 0.0, 1.0 / where(p.drag > 0.0, p.drag, 1.0), float("nan")),
+        peak_load=load,
+        peak_load_time=load_time,
+        peak_load_altitude=load_altitude,
+        peak_load_speed=load_speed,
+        peak_axial_load=pressure * where(push, force.axial, m.pressure_axial),
+        peak_axial_load_time=load_time,
+        peak_axial_load_altitude=load_altitude,
+        peak_axial_load_speed=load_speed,
+        peak_dynamic_pressure=pressure,
+        peak_dynamic_pressure_time=load_time,
+        peak_dynamic_pressure_altitude=load_altitude,
+        peak_dynamic_pressure_speed=load_speed,
+        peak_heat_rate=flux,
+        peak_heat_rate_time=where(heat, t, m.flux_time),
+        peak_heat_rate_altitude=where(heat, altitude, m.flux_altitude),
+        peak_heat_rate_speed=where(heat, v, m.flux_speed),
+        heat_load=s.heat,
+        corridor_violations=violations(load, pressure, flux, s.heat, p),
+        min_altitude=where(pulled, m.low, altitude),
+        min_altitude_time=where(pulled, m.low_time, t),
+        exits=where(leaves, 1.0, m.exits),
+        exit_time=known(where(leaves, t, m.exit_time)),
+        exit_speed=known(where(leaves, speed, m.exit_speed)),
+        exit_flight_path_angle=known(where(leaves, angle, m.exit_angle)),
+        exit_inertial_speed=known(where(leaves, inertial, m.exit_inertial)),
+        exit_apoapsis_altitude=known(where(leaves, apoapsis, m.exit_apoapsis)),
+        flight_time=t,
+        final_altitude=altitude,
+        final_speed=v,
+        final_flight_path_angle=ground.path,
+        final_mach=sqrt(speed2(air)) / sound_speed(air.temperature),
+        final_latitude=ground.latitude,
+        final_longitude=ground.longitude,
+        downrange=ground.downrange,
+        crossrange=ground.crossrange,
+        miss=where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), float("nan")),
+        target_latitude=target_latitude,
+        target_longitude=target_longitude,
+        reference_range=planned_range(t, p, o),
+        saturated_share=where(m.samples > 0.0, m.saturated / where(m.samples > 0.0, m.samples, 1.0), float("nan")),
+        reversals=m.reversals,
+        relative_speed=p.speed,
+        relative_flight_path_angle=p.path,
+        ballistic_coefficient=where(p.drag > 0.0, 1.0 / where(p.drag > 0.0, p.drag, 1.0), float("nan")),
     )

@@ -105,7 +105,7 @@ def _random_part(deviates: np.ndarray, sizes: np.ndarray, altitudes: np.ndarray)
 
 @physics
 def _between(tables, at, x):
-    """(value, change of it per node) between two nodes, level in both."""
+    """(value, change of it per node) between two nodes by Hermite's cubic, level in both, in the table's unit."""
     a, b = look_up(tables, at), look_up(tables, at + 3.0)
     return a + (b - a) * (x * x * (3.0 - 2.0 * x)), (b - a) * (6.0 * x * (1.0 - x))
 

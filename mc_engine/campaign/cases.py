@@ -12,8 +12,8 @@ from mc_engine.campaign.parts import rank_pairs
 from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion_table, upstream_ids
 from mc_engine.errors import CampaignError, Problem
-from mc_engine.sampling.designs import EXTENSIBLE, grid_levels, one_at_a_time_levels, unit_cube
-from mc_engine.sampling.distributions import Scalar, column, quantiles
+from mc_engine.sampling.designs import BY_LEVELS, EXTENSIBLE, grid_levels, one_at_a_time_levels, unit_cube
+from mc_engine.sampling.distributions import column, quantiles
 from mc_engine.units import convert
 
 _UNITLESS_KEYS = ("log_sigma", "alpha", "beta")
@@ -22,32 +22,40 @@ _SIGMA_DIGITS = 5
 
 
 def case_table(campaign: Campaign, case_ids: np.ndarray) -> dict[str, np.ndarray]:
-    """Column per dispersion, in file order and declared units: float64[n], bool[n], or object[n] of words.
+    """The dispersed inputs of any cases of a campaign, without flying them.
 
-    case_ids : int64[n], in any order.  For "mc" and "sobol" they may go beyond the campaign's
-    number of cases: these are the cases it would have if it were longer.
+    campaign : Campaign
+    case_ids : int64[n], numbers of the cases, in any order.  For "mc" and "sobol" they may exceed the campaign's number
+        of cases: these are the cases of a longer campaign.
+
+    Returns a dict with one column per dispersion, in file order and declared units: float64[n], bool[n], or object[n]
+    of words.  A row depends on (campaign, seed, case_id) alone.
+
+    Raises CampaignError for a case that the campaign does not have, or whose upstream run has yet to be flown.
+
+    >>> table = case_table(load_campaign("minimal"), np.array([0, 17]))
+    >>> table["pitch_error_deg"].round(3).tolist()
+    [1.003, -1.985]
     """
-    ids = _checked(campaign, case_ids)
+    ids = _checked_ids(campaign, case_ids)
     if campaign.upstream is not None:
         rows = upstream_ids(campaign, ids)
-        taken = {name: values[rows] for name, values in campaign.upstream.table.items()}
-        return taken if campaign.design == "table" else {**taken, **_random_table(campaign, ids)}
+        inputs = {name: values[rows] for name, values in campaign.upstream.table.items()}
+        return inputs if campaign.design == "table" else {**inputs, **_random_table(campaign, ids)}
     if campaign.design == "table":
         return {name: values[ids] for name, values in campaign.table.items()}
-    if campaign.design == "grid":
-        indices = grid_levels([len(one.levels) for one in campaign.dispersions], ids)
-        return {one.name: column(one.levels)[index] for one, index in zip(campaign.dispersions, indices, strict=True)}
-    if campaign.design == "one_at_a_time":
-        indices = one_at_a_time_levels([len(one.levels) for one in campaign.dispersions], ids)
+    if campaign.design in BY_LEVELS:
+        levels_of = grid_levels if campaign.design == "grid" else one_at_a_time_levels
+        indices = levels_of([len(dispersion.levels) for dispersion in campaign.dispersions], ids)
         # The nominal value stands last, where index -1 finds it.
         return {
-            one.name: column([*one.levels, campaign.nominal[one.name]])[index]
-            for one, index in zip(campaign.dispersions, indices, strict=True)
+            dispersion.name: column([*dispersion.levels, campaign.nominal[dispersion.name]])[index]
+            for dispersion, index in zip(campaign.dispersions, indices, strict=True)
         }
     return _random_table(campaign, ids)
 
 
-def _checked(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
+def _checked_ids(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
     ids = np.asarray(case_ids, dtype=np.int64).reshape(-1)
     if campaign.first is not None:
         message = f'has yet to be flown; `mc-engine run` flies "{campaign.first.name}" before this campaign'
@@ -65,19 +73,14 @@ def _checked(campaign: Campaign, case_ids: np.ndarray) -> np.ndarray:
 def _random_table(campaign: Campaign, ids: np.ndarray) -> dict[str, np.ndarray]:
     if campaign.design == PICK_FREEZE:
         return companion_table(campaign, ids)
-    names = [one.name for one in campaign.dispersions]
+    names = [dispersion.name for dispersion in campaign.dispersions]
     pairs = rank_pairs(campaign.correlations)
     cube = unit_cube(campaign.design, campaign.seed, names, ids, campaign.cases, pairs)
     table = {}
-    for one, u in zip(campaign.dispersions, cube, strict=True):
-        assert one.distribution is not None  # a loaded campaign has one for every random design
-        table[one.name] = quantiles(one.distribution, u)
+    for dispersion, u in zip(campaign.dispersions, cube, strict=True):
+        assert dispersion.distribution is not None  # a loaded campaign has one for every random design
+        table[dispersion.name] = quantiles(dispersion.distribution, u)
     return table
-
-
-def nominal_row(campaign: Campaign) -> dict[str, Scalar]:
-    """Every parameter and setting of the model at its nominal value, in declared units."""
-    return dict(campaign.nominal)
 
 
 def full_inputs(campaign: Campaign, table: dict[str, np.ndarray]) -> dict[str, Any]:
@@ -88,50 +91,50 @@ def full_inputs(campaign: Campaign, table: dict[str, np.ndarray]) -> dict[str, A
 def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
     """One plain record a dispersion, for manifest and report: name, unit, nominal, distribution, bounds, source."""
     records = []
-    for one in campaign.dispersions:
-        item = campaign.model.input(one.name)
+    for dispersion in campaign.dispersions:
+        item = campaign.model.input(dispersion.name)
         records.append(
             {
-                "name": one.name,
+                "name": dispersion.name,
                 "unit": item.unit,
                 "description": item.description,
-                "nominal": campaign.nominal[one.name],
-                "distribution": _distribution_text(campaign, one, item.unit),
-                "bounds": _bounds_text(one, item.unit),
-                "source": one.source,
-                "note": one.note,
+                "nominal": campaign.nominal[dispersion.name],
+                "distribution": _distribution_text(campaign, dispersion, item.unit),
+                "bounds": _bounds_text(dispersion, item.unit),
+                "source": dispersion.source,
+                "note": dispersion.note,
             }
         )
     return records
 
 
-def _distribution_text(campaign: Campaign, one: Dispersion, unit: str) -> str:
+def _distribution_text(campaign: Campaign, dispersion: Dispersion, unit: str) -> str:
     """Such as "normal, 3σ = 20 %", in the words of the campaign file and the unit of the input's row.
 
     A sigma has five digits at most: it may come of a covariance, or of another unit.
     """
     if campaign.design == "table":
         return f"column of {campaign.table_path.name}" if campaign.table_path else ""
-    if one.levels:
-        levels = [_scalar_text(value) for value in one.levels]
+    if dispersion.levels:
+        levels = [_scalar_text(value) for value in dispersion.levels]
         inside = levels if len(levels) <= 6 else [levels[0], levels[1], "...", levels[-1]]
         return _with_unit(f"{len(levels)} level{'s' if len(levels) > 1 else ''}: {', '.join(inside)}", unit)
     signs = {"three_sigma": "3σ", "sigma": "σ", "log_sigma": "σ of ln", "half_range": "±"}
     keys = ("mean", "median", "mode", "origin", "sigma", "three_sigma", "log_sigma", "half_range", "scale")
-    parts = [str(one.dist)]
+    parts = [str(dispersion.dist)]
     for key in (*keys, "alpha", "beta", "value", "values", "weights", "file", "column"):
-        if key in one.spec:
+        if key in dispersion.spec:
             plain = key in (*_UNITLESS_KEYS, "weights", "file", "column")
-            given = one.spec[key] if plain else _in_unit(one, one.spec[key], unit)
+            given = dispersion.spec[key] if plain else _in_unit(dispersion, dispersion.spec[key], unit)
             text = f"{given:.{_SIGMA_DIGITS}g}" if key in _SIGMAS else _scalar_text(given)
             value = _with_unit(text, "" if plain else unit)
             parts.append(f"±{value}" if key == "half_range" else f"{signs.get(key, key)} = {value}")
     return ", ".join(parts)
 
 
-def _bounds_text(one: Dispersion, unit: str) -> str:
+def _bounds_text(dispersion: Dispersion, unit: str) -> str:
     """Such as "-10 to 10 %", or empty where the file sets no bounds."""
-    lower, upper = (_in_unit(one, one.spec.get(key), unit) for key in ("lower", "upper"))
+    lower, upper = (_in_unit(dispersion, dispersion.spec.get(key), unit) for key in ("lower", "upper"))
     if lower is not None and upper is not None:
         return _with_unit(f"{number(lower)} to {number(upper)}", unit)
     if lower is not None:
@@ -139,18 +142,18 @@ def _bounds_text(one: Dispersion, unit: str) -> str:
     return f"up to {_with_unit(number(upper), unit)}" if upper is not None else ""
 
 
-def _in_unit(one: Dispersion, value: Any, unit: str) -> Any:
+def _in_unit(dispersion: Dispersion, value: Any, unit: str) -> Any:
     """A number (or list of numbers) of the campaign file in `unit`; words and switches as they are."""
     if isinstance(value, list):
-        return [_in_unit(one, item, unit) for item in value]
-    written = one.spec.get("unit", unit)
+        return [_in_unit(dispersion, item, unit) for item in value]
+    written = dispersion.spec.get("unit", unit)
     other = isinstance(value, int | float) and not isinstance(value, bool) and written != unit
     return convert(float(value), written, unit) if other else value
 
 
 def _scalar_text(value: Any) -> str:
     if isinstance(value, list):
-        return ", ".join(_scalar_text(one) for one in value)
+        return ", ".join(_scalar_text(item) for item in value)
     if isinstance(value, bool):
         return str(value).lower()
     return number(value) if isinstance(value, int | float) else str(value)

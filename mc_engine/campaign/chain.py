@@ -1,4 +1,7 @@
-"""Campaigns that take inputs from another run: [inputs] checked against that run, or the one to be flown first."""
+"""Campaigns that take inputs from another run: the section [inputs].
+
+It is checked against that run, or against the campaign that has to be flown first.
+"""
 
 import os
 from collections.abc import Callable
@@ -11,7 +14,7 @@ import numpy as np
 from mc_engine.campaign.reading import Findings, Sections
 from mc_engine.campaign.sections import CampaignSection
 from mc_engine.errors import CampaignError, Problem, StoreError
-from mc_engine.model.record import Model
+from mc_engine.model.simulator import System
 from mc_engine.sampling.designs import BY_LEVELS, IN_BLOCKS, RANDOM
 from mc_engine.store.urls import without_secrets
 
@@ -24,29 +27,29 @@ _waiting: ContextVar[int] = ContextVar("_waiting", default=0)  # campaigns of th
 
 
 class _Endless(CampaignError):
-    """A chain that comes back to itself, or is longer than any that is meant; told once, where it begins."""
+    """A chain of campaigns that returns to itself or exceeds `_LONGEST_CHAIN`; reported once, by its first campaign."""
 
 
 def take_inputs(
     sections: Sections,
-    model: Model,
+    model: System,
     directory: Path,
     run: Path | None,
     design: str | None,
     load: "Callable[..., Campaign]",
-    found: Findings,
+    findings: Findings,
 ) -> "tuple[Upstream | None, Campaign | None]":
-    """What is taken from another run, and the campaign to be flown for it where there is none yet.
+    """The upstream run, and the campaign that has to be flown for it where there is no such run yet.
 
-    run : in place of the one that [inputs] names.  load : reads that campaign, as `load_campaign` does.
+    run : used instead of the one that [inputs] names.  load : reads that campaign, as `load_campaign` does.
     """
     if sections.inputs is None:
         return None, None
     from mc_engine.campaign.columns import result_columns
     from mc_engine.campaign.upstream import find_run, link, read_rows
 
-    spot = found.under("inputs")
-    taken = [column.name for column in result_columns(model)]
+    section_findings = findings.under("inputs")
+    own_columns = [column.name for column in result_columns(model)]
     source = sections.inputs.source
     first = None
     try:
@@ -66,31 +69,35 @@ def take_inputs(
             )  # not Path.exists: a name may be too long
             rows = _rows_to_come(first)
     except StoreError as error:
-        spot.add("from", str(error))
+        section_findings.add("from", str(error))
         return None, None
     except _Endless as error:
         if _waiting.get():
             raise
-        spot.add("from", error.problems[0].message)
+        section_findings.add("from", error.problems[0].message)
         return None, None
     except CampaignError as error:
         named = without_secrets(source)
-        spot.add("from", f'"{named}" is neither a run nor a campaign that can be flown: {error.problems[0]}')
+        section_findings.add(
+            "from", f'"{named}" is neither a run nor a campaign that can be flown: {error.problems[0]}'
+        )
         return None, None
     random = rows.facts["design"] in RANDOM
     if design is not None and (design in (*BY_LEVELS, *IN_BLOCKS) or (design != "table" and not random)):
-        spot.add("from", f'its design "{rows.facts["design"]}" does not go with "{design}"; write design = "table"')
-    return link(rows, sections.inputs, model, taken, spot), first
+        section_findings.add(
+            "from", f'its design "{rows.facts["design"]}" does not go with "{design}"; write design = "table"'
+        )
+    return link(rows, sections.inputs, model, own_columns, section_findings), first
 
 
 def _rows_to_come(first: "Campaign") -> "Rows":
-    """The columns that a campaign will have, without a case."""
+    """The columns of a run that has yet to be flown, without rows."""
     from mc_engine.campaign.columns import case_columns
     from mc_engine.campaign.upstream import Rows
     from mc_engine.store.parts import CASE_COLUMNS
 
-    taken = () if first.upstream is None else first.upstream.columns
-    columns = (*CASE_COLUMNS, *case_columns(first.model, first.dispersions, taken))
+    upstream_columns = () if first.upstream is None else first.upstream.columns
+    columns = (*CASE_COLUMNS, *case_columns(first.model, first.dispersions, upstream_columns))
     facts: dict[str, Any] = {
         "name": first.name,
         "title": first.title,
@@ -102,26 +109,26 @@ def _rows_to_come(first: "Campaign") -> "Rows":
     return Rows(facts, columns, nothing, {column.name: 0.0 for column in columns})
 
 
-def check_taken(sections: Sections, upstream: "Upstream | None", design: str | None, found: Findings) -> None:
-    """Inputs that come from upstream and from this file too."""
+def check_taken(sections: Sections, upstream: "Upstream | None", design: str | None, findings: Findings) -> None:
+    """Note inputs that this file sets although they come from the upstream run."""
     if upstream is None:
         return
     if design == "table":
         for name in sections.dispersions:
             message = 'the design "table" takes all cases from the run upstream; write design = "mc" to disperse more'
-            found.under("dispersion").add(name, message)
+            findings.under("dispersion").add(name, message)
     for name in upstream.links:
         for place, names in (("parameters", sections.parameters), ("dispersion", sections.dispersions)):
             if name in names:
-                found.under(place).add(name, f"comes from the run of {upstream.name}; leave it out here")
+                findings.under(place).add(name, f"comes from the run of {upstream.name}; leave it out here")
 
 
-def chained_count(section: CampaignSection, rows: int, found: Findings) -> int:
-    """How many cases a chain has: all of those upstream, or the first so many."""
+def chained_count(section: CampaignSection, rows: int, findings: Findings) -> int:
+    """Number of cases: all of the upstream run, or the first ones as `cases` says."""
     if section.design in RANDOM and section.seed is None:
-        found.add("seed", f"is missing: {CampaignSection.model_fields['seed'].description}")
+        findings.add("seed", f"is missing: {CampaignSection.model_fields['seed'].description}")
     if section.table is not None:
-        found.add("table", "cannot be there together with [inputs]")
+        findings.add("table", "cannot be there together with [inputs]")
     if section.cases is not None and section.cases > rows:
-        found.add("cases", f"{section.cases} is not allowed; the run upstream has {rows} cases")
+        findings.add("cases", f"{section.cases} is not allowed; the run upstream has {rows} cases")
     return section.cases or rows

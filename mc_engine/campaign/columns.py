@@ -1,10 +1,13 @@
-"""The columns of a case table after case_id, status and reason: what was taken, dispersions, metrics, last state."""
+"""The columns of a run's case table after case_id, status and reason.
+
+In order: columns taken from an upstream run, dispersions, metrics, time and state at the end.
+"""
 
 from collections.abc import Sequence
 
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.model.fields import Parameter, Setting
-from mc_engine.model.record import Model
+from mc_engine.model.simulator import System
 from mc_engine.store.parts import Column
 
 END_TIME = "end_time_s"
@@ -20,14 +23,22 @@ def input_column(item: Parameter | Setting) -> Column:
     return Column(item.name, item.unit, "dispersion", item.description, kind)
 
 
-def result_columns(model: Model) -> list[Column]:
-    """Metrics, and time and state at the end of the flight."""
-    columns = [Column(one.name, one.unit, "metric", one.description) for one in model.metrics]
+def result_columns(model: System) -> list[Column]:
+    """Metrics, and time and state at the end of the flight; of a simulator, metrics alone."""
+    columns = [Column(metric.name, metric.unit, "metric", metric.description) for metric in model.metrics]
+    if not model.states:
+        return columns
     columns.append(Column(END_TIME, "s", "state", "time at the end of the flight, from its start"))
-    columns += [Column(f"end_{one.name}", one.unit, "state", f"{one.description}, at the end") for one in model.states]
+    columns += [
+        Column(f"end_{state.name}", state.unit, "state", f"{state.description}, at the end") for state in model.states
+    ]
     return columns
 
 
-def case_columns(model: Model, dispersions: Sequence[Dispersion], taken: Sequence[Column] = ()) -> list[Column]:
-    """All columns of a campaign's table; `taken` are those of the run that it takes inputs from."""
-    return [*taken, *(input_column(model.input(one.name)) for one in dispersions), *result_columns(model)]
+def case_columns(model: System, dispersions: Sequence[Dispersion], upstream: Sequence[Column] = ()) -> list[Column]:
+    """All columns of a campaign's table; `upstream` are those of the run that it takes inputs from."""
+    return [
+        *upstream,
+        *(input_column(model.input(dispersion.name)) for dispersion in dispersions),
+        *result_columns(model),
+    ]

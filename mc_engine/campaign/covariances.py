@@ -23,29 +23,29 @@ _UNITS = ("km", "km", "km", "km/s", "km/s", "km/s")
 _LEAST_EIGENVALUE = 1e-8  # of the matrix of correlations: below it, it is singular for the digits of a message
 
 
-def spread_covariances(document: dict[str, Any], directory: Path, found: Findings) -> tuple[str, ...]:
+def spread_covariances(document: dict[str, Any], directory: Path, findings: Findings) -> tuple[str, ...]:
     """Put the dispersions and correlations of every [covariance.NAME] into the document.
 
     Returns the files that were read, by their names in `directory`.
     """
     written = document.get("covariance", {})
     if not isinstance(written, dict):
-        found.add("covariance", f"{shown(written)} is not a table; write [covariance.NAME]")
+        findings.add("covariance", f"{shown(written)} is not a table; write [covariance.NAME]")
         return ()
     files = []
     for name, raw in written.items():
-        spot = found.under("covariance", name)
-        section = read(CovarianceSection, raw, spot)
+        section_findings = findings.under("covariance", name)
+        section = read(CovarianceSection, raw, section_findings)
         if section is None:
             continue
         files.append(section.file)
-        matrix = _matrix(section, directory, spot)
+        matrix = _matrix(section, directory, section_findings)
         if matrix is not None:
-            _put(document, section, matrix, spot)
+            _add_dispersions(document, section, matrix, section_findings)
     return tuple(files)
 
 
-def _matrix(section: CovarianceSection, directory: Path, found: Findings) -> np.ndarray | None:
+def _matrix(section: CovarianceSection, directory: Path, findings: Findings) -> np.ndarray | None:
     """The covariance in the axes asked for, or None with what is wrong noted."""
     try:
         with open_beside(resolve_beside(directory, section.file), _MOST_OF_MESSAGE) as file:
@@ -53,16 +53,18 @@ def _matrix(section: CovarianceSection, directory: Path, found: Findings) -> np.
         matrix = _chosen(read_message(text), section).covariance_in(section.frame)
     except (FileFault, MessageFault, UnicodeDecodeError) as fault:
         about = str(fault) if isinstance(fault, FileFault) else f'"{section.file}": {fault}'
-        found.add("file", about)
+        findings.add("file", about)
         return None
     variances = np.diag(matrix)
     if not (variances > 0.0).all():
         axis = AXES[int(np.flatnonzero(~(variances > 0.0))[0])]
-        found.add("file", f'"{section.file}": the variance of {axis} is not above 0; six parameters need six spreads')
+        findings.add(
+            "file", f'"{section.file}": the variance of {axis} is not above 0; six parameters need six spreads'
+        )
         return None
     sigma = np.sqrt(variances)
     if np.linalg.eigvalsh(matrix / np.outer(sigma, sigma))[0] <= _LEAST_EIGENVALUE:
-        found.add("file", f'"{section.file}": the covariance is not positive definite')
+        findings.add("file", f'"{section.file}": the covariance is not positive definite')
         return None
     return np.asarray(matrix)
 
@@ -73,26 +75,30 @@ def _chosen(states: list[UncertainState], section: CovarianceSection) -> Uncerta
         if len(states) > 1:
             raise MessageFault(f'has {len(states)} covariances; say which with epoch = "{states[0].epoch}"')
         return states[0]
-    chosen = [one for one in states if same_epoch(one.epoch, section.epoch)]
+    chosen = [state for state in states if same_epoch(state.epoch, section.epoch)]
     if not chosen:
-        raise MessageFault(f"has no covariance at {section.epoch}; it has {', '.join(one.epoch for one in states[:5])}")
+        raise MessageFault(
+            f"has no covariance at {section.epoch}; it has {', '.join(state.epoch for state in states[:5])}"
+        )
     return chosen[0]
 
 
-def _put(document: dict[str, Any], section: CovarianceSection, matrix: np.ndarray, found: Findings) -> None:
+def _add_dispersions(
+    document: dict[str, Any], section: CovarianceSection, matrix: np.ndarray, findings: Findings
+) -> None:
     dispersions, correlations = document.setdefault("dispersion", {}), document.setdefault("correlation", [])
     if not isinstance(dispersions, dict) or not isinstance(correlations, list):
         return  # which the reader of those sections says
     source = section.source or f"{section.file}, {section.frame} axes"
     for name, sigma, unit in zip(section.parameters, np.sqrt(np.diag(matrix)), _UNITS, strict=True):
         if name in dispersions:
-            found.add("parameters", f'"{name}" has a dispersion already; leave one of the two out')
+            findings.add("parameters", f'"{name}" has a dispersion already; leave one of the two out')
             continue
         dispersions[name] = {"dist": "normal", "sigma": float(sigma), "unit": unit, "source": source}
-    correlations.extend(_pairs(section.parameters, matrix, source))
+    correlations.extend(_rank_correlations(section.parameters, matrix, source))
 
 
-def _pairs(names: list[str], matrix: np.ndarray, source: str) -> Iterator[dict[str, Any]]:
+def _rank_correlations(names: list[str], matrix: np.ndarray, source: str) -> Iterator[dict[str, Any]]:
     sigma = np.sqrt(np.diag(matrix))
     for i, j in combinations(range(len(names)), 2):
         if matrix[i, j] != 0.0:

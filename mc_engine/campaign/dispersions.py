@@ -1,4 +1,4 @@
-"""The dispersions of a campaign: which input, spread how, on the word of which source."""
+"""The dispersions of a campaign: which input varies, by which distribution or levels, and the source of the numbers."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.campaign.distribution_keys import Desk, build_distribution
+from mc_engine.campaign.distribution_keys import DispersionContext, build_distribution
 from mc_engine.campaign.inputs import check_value, number
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import DISTRIBUTIONS, DispersionSection
@@ -24,7 +24,7 @@ _WITHOUT_UNIT = {"dist", "unit", "levels", "source", "note", "log_sigma", "alpha
 
 @dataclass(frozen=True)
 class Dispersion:
-    """One dispersed input: `spec` as written in the file, and what it means in the parameter's own unit.
+    """One dispersed input: `spec` as written in the file, and its distribution in the parameter's own unit.
 
     distribution : for the random designs.  levels : for "grid" and "one_at_a_time", one value a level.
     """
@@ -45,32 +45,35 @@ def build_dispersion(
     nominal: Scalar,
     design: str,
     directory: Path,
-    found: Findings,
+    findings: Findings,
 ) -> Dispersion:
-    """The dispersion; where something is wrong it is noted in `found` and the result is of no use."""
+    """The dispersion that a section [dispersion.NAME] describes.
+
+    Problems are noted in `findings`; the result must not be used then.
+    """
     spec = {
         key: value for key, value in section.model_dump(exclude_none=True).items() if key in section.model_fields_set
     }
-    before = len(found.problems)
-    desk = Desk(item, nominal, design, _own_unit(section, item, found), directory, found)
-    _check_keys_fit(spec, design, desk)
+    before = len(findings.problems)
+    context = DispersionContext(item, nominal, design, _own_unit(section, item, findings), directory, findings)
+    _check_keys_fit(spec, design, context)
     distribution = None
     levels: tuple[Scalar, ...] = ()
-    if len(found.problems) == before and design != "table":
-        distribution = build_distribution(desk)
-        if len(found.problems) == before and design in BY_LEVELS:
-            levels = _levels(desk, distribution)
+    if len(findings.problems) == before and design != "table":
+        distribution = build_distribution(context)
+        if len(findings.problems) == before and design in BY_LEVELS:
+            levels = _levels(context, distribution)
     return Dispersion(name, spec.get("dist"), spec, section.source, section.note, distribution, levels)
 
 
-def _own_unit(section: DispersionSection, item: Parameter | Setting, found: Findings) -> SimpleNamespace:
+def _own_unit(section: DispersionSection, item: Parameter | Setting, findings: Findings) -> SimpleNamespace:
     """All keys of the section, those with a unit converted to that of the parameter."""
     options = section.model_dump()
     unit = options["unit"]
     if unit is not None and unit not in compatible(item.unit):
         quantity = UNITS[item.unit].quantity
         meaning = "plain numbers" if quantity == "number" else f"{quantity}"
-        found.add("unit", f'"{unit}" is not a unit of {meaning}{hint(unit, compatible(item.unit))}')
+        findings.add("unit", f'"{unit}" is not a unit of {meaning}{hint(unit, compatible(item.unit))}')
         unit = None
     if unit is not None:
         options = {key: _converted(key, value, unit, item.unit) for key, value in options.items()}
@@ -81,74 +84,79 @@ def _converted(key: str, value: Any, unit: str, to: str) -> Any:
     if key in _WITHOUT_UNIT or isinstance(value, bool | str) or value is None:
         return value
     if isinstance(value, list):
-        return [_converted(key, one, unit, to) for one in value]
+        return [_converted(key, number, unit, to) for number in value]
     return convert(value, unit, to)
 
 
-def _check_keys_fit(spec: Mapping[str, Any], design: str, desk: Desk) -> None:
-    """Keys that this design, or this kind of input, has no use for."""
-    found, dist = desk.found, spec.get("dist")
+def _check_keys_fit(spec: Mapping[str, Any], design: str, context: DispersionContext) -> None:
+    """Note keys that this design, or this kind of input, does not use."""
+    findings, dist = context.findings, spec.get("dist")
     if design == "table":
         for key in [key for key in spec if key not in ("unit", "source", "note")]:
-            found.add(key, 'the design "table" takes its values from a file; only unit, source and note may stand here')
+            findings.add(
+                key, 'the design "table" takes its values from a file; only unit, source and note may stand here'
+            )
         return
     if design in BY_LEVELS:
         if "values" in spec and "levels" in spec:
-            found.add("levels", "there are values already; give one of the two")
+            findings.add("levels", "there are values already; give one of the two")
     elif dist is None:
-        found.add("dist", f'is missing; the design "{design}" needs one of {listed(DISTRIBUTIONS)}')
+        findings.add("dist", f'is missing; the design "{design}" needs one of {listed(DISTRIBUTIONS)}')
     else:
         for key in [key for key in ("levels", "values") if key in spec and (key, dist) != ("values", "discrete")]:
             other = ', and values for dist = "discrete"' if key == "values" else ""
-            found.add(key, f'the design "{design}" has no levels; they are for grid and one_at_a_time{other}')
-    if isinstance(desk.item, Setting) and dist not in (None, "discrete", "constant"):
-        own = f", or disperse {desk.item.dispersed_by}" if desk.item.dispersed_by else ""
-        found.add("dist", f'"{dist}" does not fit a setting, which all cases of a batch share; use "discrete"{own}')
+            findings.add(key, f'the design "{design}" has no levels; they are for grid and one_at_a_time{other}')
+    if isinstance(context.item, Setting) and dist not in (None, "discrete", "constant"):
+        own = f", or disperse {context.item.dispersed_by}" if context.item.dispersed_by else ""
+        findings.add("dist", f'"{dist}" does not fit a setting, which all cases of a batch share; use "discrete"{own}')
 
 
-def _levels(desk: Desk, distribution: Distribution | None) -> tuple[Scalar, ...]:
-    """The values that a grid, or one dispersion at a time, goes through."""
-    o = desk.o
+def _levels(context: DispersionContext, distribution: Distribution | None) -> tuple[Scalar, ...]:
+    """The values that the designs "grid" and "one_at_a_time" use."""
+    keys = context.keys
     if isinstance(distribution, Discrete):
         return distribution.values
     if isinstance(distribution, Constant):
         return (distribution.value,)
-    if o.values is not None:
-        values = [check_value(value, desk.item, desk.found, f"values {k}") for k, value in enumerate(o.values, start=1)]
+    if keys.values is not None:
+        values = [
+            check_value(value, context.item, context.findings, f"values {k}")
+            for k, value in enumerate(keys.values, start=1)
+        ]
         return tuple(value for value in values if value is not None)
-    if isinstance(desk.item, Setting):
-        desk.found.add("values", "is missing; a setting takes its levels from values = [...]")
+    if isinstance(context.item, Setting):
+        context.findings.add("values", "is missing; a setting takes its levels from values = [...]")
         return ()
-    if o.levels is None and desk.design == "grid":
-        desk.found.add("", "needs values = [...] or levels = n for the grid")
+    if keys.levels is None and context.design == "grid":
+        context.findings.add("", "needs values = [...] or levels = n for the grid")
         return ()
-    return _equal_steps(desk, distribution)
+    return _equal_steps(context, distribution)
 
 
-def _equal_steps(desk: Desk, distribution: Distribution | None) -> tuple[float, ...]:
-    span = _span(desk, distribution)
+def _equal_steps(context: DispersionContext, distribution: Distribution | None) -> tuple[float, ...]:
+    span = _span(context, distribution)
     if span is None:
         return ()
     for value in span:
-        check_value(value, desk.item, desk.found, "")
+        check_value(value, context.item, context.findings, "")
     # One dispersion at a time goes to its low and its high end unless more is asked for.
-    return tuple(np.linspace(*span, desk.o.levels or 2).tolist())
+    return tuple(np.linspace(*span, context.keys.levels or 2).tolist())
 
 
-def _span(desk: Desk, distribution: Distribution | None) -> tuple[float, float] | None:
+def _span(context: DispersionContext, distribution: Distribution | None) -> tuple[float, float] | None:
     """Lowest and highest level: the bounds, or where the distribution has none, three sigma."""
-    o = desk.o
+    keys = context.keys
     if distribution is not None:
         return distribution.span
-    reaches = [reach for reach in (o.half_range, o.three_sigma) if reach is not None]
-    bounds = [bound for bound in (o.lower, o.upper) if bound is not None]
-    if len(bounds) == 2 and not reaches and o.mean is None:
+    reaches = [reach for reach in (keys.half_range, keys.three_sigma) if reach is not None]
+    bounds = [bound for bound in (keys.lower, keys.upper) if bound is not None]
+    if len(bounds) == 2 and not reaches and keys.mean is None:
         if bounds[0] < bounds[1]:
             return bounds[0], bounds[1]
-        desk.found.add("lower", f"{number(bounds[0])} is not below upper = {number(bounds[1])}")
+        context.findings.add("lower", f"{number(bounds[0])} is not below upper = {number(bounds[1])}")
     elif len(reaches) == 1 and not bounds:
-        centre = float(desk.nominal) if o.mean is None else o.mean
+        centre = float(context.nominal) if keys.mean is None else keys.mean
         return centre - reaches[0], centre + reaches[0]
     else:
-        desk.found.add("", "needs lower and upper, or half_range, or three_sigma, and only one of these")
+        context.findings.add("", "needs lower and upper, or half_range, or three_sigma, and only one of these")
     return None

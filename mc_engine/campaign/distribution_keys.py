@@ -1,4 +1,8 @@
-"""From the keys of a [dispersion.NAME] to a distribution in the unit of the model's parameter."""
+"""Builds a distribution, in the unit of the model's parameter, from the keys of a [dispersion.NAME].
+
+One function for each distribution checks its keys; bounds truncate the distribution, and what would leave the range
+that the model accepts is refused.
+"""
 
 import math
 from collections.abc import Callable
@@ -35,56 +39,59 @@ _UNSEEN_SHARE = 1e-9  # so few draws outside the parameter's range may be cut wi
 
 
 @dataclass(frozen=True)
-class Desk:
-    """What the work on one dispersion needs: its keys `o`, in the parameter's unit, and where to complain."""
+class DispersionContext:
+    """What the keys of one dispersion are checked against.
+
+    keys : those of the section, numbers in the parameter's unit.  findings : where problems are noted.
+    """
 
     item: Parameter | Setting
     nominal: Scalar
     design: str
-    o: SimpleNamespace
+    keys: SimpleNamespace
     directory: Path
-    found: Findings
+    findings: Findings
 
 
-def build_distribution(desk: Desk) -> Distribution | None:
-    """The distribution that the keys describe; None where there is none, or where a mistake was noted."""
-    if desk.o.dist is None:
+def build_distribution(context: DispersionContext) -> Distribution | None:
+    """The distribution that the keys describe; None without `dist`, or where a problem was noted."""
+    if context.keys.dist is None:
         return None
-    before = len(desk.found.problems)
-    distribution = _BUILDERS[desk.o.dist](desk)
-    if distribution is None or len(desk.found.problems) > before:
+    before = len(context.findings.problems)
+    distribution = _BUILDERS[context.keys.dist](context)
+    if distribution is None or len(context.findings.problems) > before:
         return None
     if isinstance(distribution, Continuous):
-        distribution = _cut(distribution, desk)
-    if distribution is not None and isinstance(desk.item, Parameter):
-        distribution = _inside_parameter_range(distribution, desk)
+        distribution = _truncated(distribution, context)
+    if distribution is not None and isinstance(context.item, Parameter):
+        distribution = _inside_parameter_range(distribution, context)
     return distribution
 
 
-def _cut(distribution: Continuous, desk: Desk) -> Continuous | Truncated | None:
+def _truncated(distribution: Continuous, context: DispersionContext) -> Continuous | Truncated | None:
     """The distribution between the bounds `lower` and `upper` of the file."""
-    lower = -math.inf if desk.o.lower is None else desk.o.lower
-    upper = math.inf if desk.o.upper is None else desk.o.upper
-    if not _in_order(desk, lower, upper):
+    lower = -math.inf if context.keys.lower is None else context.keys.lower
+    upper = math.inf if context.keys.upper is None else context.keys.upper
+    if not _in_order(context, lower, upper):
         return None
     if (lower, upper) == (-math.inf, math.inf):
         return distribution
     if distribution.share_between(lower, upper) < _LEAST_SHARE:
-        desk.found.add("lower" if lower > -math.inf else "upper", "the bounds leave nothing of the distribution")
+        context.findings.add("lower" if lower > -math.inf else "upper", "the bounds leave nothing of the distribution")
         return None
     return truncate(distribution, lower, upper)
 
 
-def _in_order(desk: Desk, lower: float, upper: float) -> bool:
+def _in_order(context: DispersionContext, lower: float, upper: float) -> bool:
     if lower < upper:
         return True
-    desk.found.add("lower", f"{number(lower)} is not below upper = {number(upper)}")
+    context.findings.add("lower", f"{number(lower)} is not below upper = {number(upper)}")
     return False
 
 
-def _inside_parameter_range(distribution: Distribution, desk: Desk) -> Distribution | None:
-    """The distribution checked against what the model accepts; a tail too thin to be drawn is cut."""
-    low, high = desk.item.low, desk.item.high
+def _inside_parameter_range(distribution: Distribution, context: DispersionContext) -> Distribution | None:
+    """The distribution checked against the range that the model accepts; a tail below `_UNSEEN_SHARE` is truncated."""
+    low, high = context.item.low, context.item.high
     lowest, highest = distribution.support
     if low <= lowest and highest <= high:
         return distribution
@@ -92,119 +99,122 @@ def _inside_parameter_range(distribution: Distribution, desk: Desk) -> Distribut
         share = share_outside(distribution, low, high)
         if share < _UNSEEN_SHARE:
             return truncate(distribution, low, high)
-        accepted = accepted_range(desk.item)
-        desk.found.add("", f"{share:.2g} of the draws would be outside {accepted}; cut with lower and upper")
+        accepted = accepted_range(context.item)
+        context.findings.add("", f"{share:.2g} of the draws would be outside {accepted}; cut with lower and upper")
     else:
         reach = f"{number(lowest)} to {number(highest)}" if lowest < highest else number(lowest)
-        desk.found.add("", f"reaches {reach}; the model accepts {accepted_range(desk.item)}")
+        context.findings.add("", f"reaches {reach}; the model accepts {accepted_range(context.item)}")
     return None
 
 
-def _normal(desk: Desk) -> Distribution | None:
-    o = desk.o
-    given = [key for key in ("sigma", "three_sigma") if getattr(o, key) is not None]
+def _normal(context: DispersionContext) -> Distribution | None:
+    keys = context.keys
+    given = [key for key in ("sigma", "three_sigma") if getattr(keys, key) is not None]
     if len(given) != 1:
-        desk.found.add("", f"needs sigma or three_sigma{', not both' if given else ''}")
+        context.findings.add("", f"needs sigma or three_sigma{', not both' if given else ''}")
         return None
-    return Normal(_about(o.mean, desk), o.sigma if o.sigma is not None else o.three_sigma / 3.0)
+    return Normal(
+        _given_or_nominal(keys.mean, context), keys.sigma if keys.sigma is not None else keys.three_sigma / 3.0
+    )
 
 
-def _uniform(desk: Desk) -> Distribution | None:
-    bounds = _bounds(desk, "mean")
+def _uniform(context: DispersionContext) -> Distribution | None:
+    bounds = _bounds(context, "mean")
     return Uniform(*bounds) if bounds else None
 
 
-def _triangular(desk: Desk) -> Distribution | None:
-    bounds = _bounds(desk, "mode")
-    mode = _about(desk.o.mode, desk)
+def _triangular(context: DispersionContext) -> Distribution | None:
+    bounds = _bounds(context, "mode")
+    mode = _given_or_nominal(context.keys.mode, context)
     if bounds is None:
         return None
     if not bounds[0] <= mode <= bounds[1]:
-        desk.found.add("mode", f"{number(mode)} is not between {number(bounds[0])} and {number(bounds[1])}")
+        context.findings.add("mode", f"{number(mode)} is not between {number(bounds[0])} and {number(bounds[1])}")
         return None
     return Triangular(bounds[0], mode, bounds[1])
 
 
-def _bounds(desk: Desk, middle: str) -> tuple[float, float] | None:
+def _bounds(context: DispersionContext, middle: str) -> tuple[float, float] | None:
     """lower and upper as given, or half_range about the middle; the middle's key is idle between plain bounds."""
-    o = desk.o
-    plain = [o.lower, o.upper]
-    if o.half_range is None and None not in plain:
-        if middle == "mean" and o.mean is not None:
-            desk.found.add("mean", "belongs to half_range; lower and upper already say it all")
-        return (o.lower, o.upper) if _in_order(desk, o.lower, o.upper) else None
-    if o.half_range is not None and plain == [None, None]:
-        centre = _about(getattr(o, middle), desk)
-        return centre - o.half_range, centre + o.half_range
-    desk.found.add("", "needs lower and upper, or half_range, not a mixture of them")
+    keys = context.keys
+    plain = [keys.lower, keys.upper]
+    if keys.half_range is None and None not in plain:
+        if middle == "mean" and keys.mean is not None:
+            context.findings.add("mean", "belongs to half_range; lower and upper already say it all")
+        return (keys.lower, keys.upper) if _in_order(context, keys.lower, keys.upper) else None
+    if keys.half_range is not None and plain == [None, None]:
+        centre = _given_or_nominal(getattr(keys, middle), context)
+        return centre - keys.half_range, centre + keys.half_range
+    context.findings.add("", "needs lower and upper, or half_range, not a mixture of them")
     return None
 
 
-def _lognormal(desk: Desk) -> Distribution | None:
-    o = desk.o
-    by_median, by_mean = o.log_sigma is not None, o.sigma is not None
-    if by_median == by_mean or (by_median and o.mean is not None) or (by_mean and o.median is not None):
-        desk.found.add("", "needs median with log_sigma, or mean with sigma")
+def _lognormal(context: DispersionContext) -> Distribution | None:
+    keys = context.keys
+    by_median, by_mean = keys.log_sigma is not None, keys.sigma is not None
+    if by_median == by_mean or (by_median and keys.mean is not None) or (by_mean and keys.median is not None):
+        context.findings.add("", "needs median with log_sigma, or mean with sigma")
         return None
-    centre = _about(o.median if by_median else o.mean, desk)
+    centre = _given_or_nominal(keys.median if by_median else keys.mean, context)
     if not centre > 0.0:
         key = "median" if by_median else "mean"
-        desk.found.add(key, f"the nominal value {number(centre)} is not above 0, as a log-normal must be")
+        context.findings.add(key, f"the nominal value {number(centre)} is not above 0, as a log-normal must be")
         return None
-    return Lognormal(centre, o.log_sigma) if by_median else Lognormal.from_moments(centre, o.sigma)
+    return Lognormal(centre, keys.log_sigma) if by_median else Lognormal.from_moments(centre, keys.sigma)
 
 
-def _beta(desk: Desk) -> Distribution | None:
-    o = desk.o
-    return Beta(o.alpha, o.beta, o.lower, o.upper) if _in_order(desk, o.lower, o.upper) else None
+def _beta(context: DispersionContext) -> Distribution | None:
+    keys = context.keys
+    return Beta(keys.alpha, keys.beta, keys.lower, keys.upper) if _in_order(context, keys.lower, keys.upper) else None
 
 
-def _exponential(desk: Desk) -> Distribution:
-    return Exponential(_about(desk.o.origin, desk), desk.o.scale)
+def _exponential(context: DispersionContext) -> Distribution:
+    return Exponential(_given_or_nominal(context.keys.origin, context), context.keys.scale)
 
 
-def _discrete(desk: Desk) -> Distribution | None:
+def _discrete(context: DispersionContext) -> Distribution | None:
     values = [
-        check_value(value, desk.item, desk.found, f"values {k}") for k, value in enumerate(desk.o.values, start=1)
+        check_value(value, context.item, context.findings, f"values {k}")
+        for k, value in enumerate(context.keys.values, start=1)
     ]
-    weights = desk.o.weights if desk.o.weights is not None else [1.0] * len(values)
+    weights = context.keys.weights if context.keys.weights is not None else [1.0] * len(values)
     if len(weights) != len(values):
-        desk.found.add("weights", f"{len(weights)} weights for {len(values)} values")
+        context.findings.add("weights", f"{len(weights)} weights for {len(values)} values")
     elif not sum(weights) > 0.0:
-        desk.found.add("weights", "are all zero")
+        context.findings.add("weights", "are all zero")
     elif None not in values:
         return Discrete(tuple(value for value in values if value is not None), tuple(weights))
     return None
 
 
-def _empirical(desk: Desk) -> Distribution | None:
-    o = desk.o
+def _empirical(context: DispersionContext) -> Distribution | None:
+    keys = context.keys
     try:
-        measured = empirical_numbers(resolve_beside(desk.directory, o.file), o.column)
+        measured = empirical_numbers(resolve_beside(context.directory, keys.file), keys.column)
     except FileFault as fault:
-        desk.found.add("file", str(fault))
+        context.findings.add("file", str(fault))
         return None
-    if o.unit is not None:
-        measured = tuple(convert(value, o.unit, desk.item.unit) for value in measured)
-    lower = -math.inf if o.lower is None else o.lower
-    upper = math.inf if o.upper is None else o.upper
-    if not _in_order(desk, lower, upper):
+    if keys.unit is not None:
+        measured = tuple(convert(value, keys.unit, context.item.unit) for value in measured)
+    lower = -math.inf if keys.lower is None else keys.lower
+    upper = math.inf if keys.upper is None else keys.upper
+    if not _in_order(context, lower, upper):
         return None
     kept = Empirical(measured).within(lower, upper)
     if not kept.values:
-        desk.found.add(
-            "lower" if o.lower is not None else "upper", f"the bounds leave none of the {len(measured)} numbers"
+        context.findings.add(
+            "lower" if keys.lower is not None else "upper", f"the bounds leave none of the {len(measured)} numbers"
         )
         return None
     return kept
 
 
-def _constant(desk: Desk) -> Distribution | None:
-    value = check_value(desk.o.value, desk.item, desk.found, "value")
+def _constant(context: DispersionContext) -> Distribution | None:
+    value = check_value(context.keys.value, context.item, context.findings, "value")
     return None if value is None else Constant(value)
 
 
-_BUILDERS: dict[str, Callable[[Desk], Distribution | None]] = {
+_BUILDERS: dict[str, Callable[[DispersionContext], Distribution | None]] = {
     "normal": _normal,
     "uniform": _uniform,
     "triangular": _triangular,
@@ -217,6 +227,6 @@ _BUILDERS: dict[str, Callable[[Desk], Distribution | None]] = {
 }
 
 
-def _about(given: float | None, desk: Desk) -> float:
+def _given_or_nominal(given: float | None, context: DispersionContext) -> float:
     """The value given, or the nominal one."""
-    return float(desk.nominal) if given is None else given
+    return float(context.nominal) if given is None else given

@@ -1,59 +1,59 @@
-"""Single values checked against the model's inputs: is it a number, in range, one of the words, a date?"""
+"""Checks of single values against the model's inputs, and how values are written in messages."""
 
 from mc_engine.campaign.reading import Findings, shown
 from mc_engine.dates import EXAMPLE, date_text, modified_julian_date
 from mc_engine.model.fields import Parameter, Setting
-from mc_engine.model.record import Model
+from mc_engine.model.simulator import System
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.suggestions import hint, listed
 
 
-def inputs_of(model: Model) -> dict[str, Parameter | Setting]:
+def inputs_of(model: System) -> dict[str, Parameter | Setting]:
     """All parameters and settings by name."""
     inputs: list[Parameter | Setting] = [*model.parameters, *model.settings]
     return {item.name: item for item in inputs}
 
 
-def check_value(value: Scalar, item: Parameter | Setting, found: Findings, key: str) -> Scalar | None:
+def check_value(value: Scalar, item: Parameter | Setting, findings: Findings, key: str) -> Scalar | None:
     """`value` as `item` takes it, or None with the mistake noted: not a number, out of range, a word not known."""
     if isinstance(item, Setting) and item.choices:
         if isinstance(value, str) and value in item.choices:
             return value
         if isinstance(value, str):
-            found.add(key, f"{shown(value)} is not known{hint(value, item.choices)}")
+            findings.add(key, f"{shown(value)} is not known{hint(value, item.choices)}")
         else:
-            found.add(key, f"{shown(value)} is not one of {listed(item.choices)}")
+            findings.add(key, f"{shown(value)} is not one of {listed(item.choices)}")
         return None
     if isinstance(item, Setting) and isinstance(item.default, bool):
         if isinstance(value, bool):
             return value
-        found.add(key, f"{shown(value)} is neither true nor false")
+        findings.add(key, f"{shown(value)} is neither true nor false")
         return None
     if isinstance(item, Setting) and item.date:
-        return _checked_date(value, item, found, key)
+        return _checked_date(value, item, findings, key)
     if isinstance(value, bool | str):
-        found.add(key, f"{shown(value)} is not a number; {item.name} is {described(item)}")
+        findings.add(key, f"{shown(value)} is not a number; {item.name} is {described(item)}")
         return None
     if not item.low <= value <= item.high:
-        found.add(key, f"{number(value)} is not allowed; the model accepts {accepted_range(item)}")
+        findings.add(key, f"{number(value)} is not allowed; the model accepts {accepted_range(item)}")
         return None
     if isinstance(item, Setting) and item.whole and value != int(value):
-        found.add(key, f"{number(value)} is not a whole number; {item.name} is {described(item)}")
+        findings.add(key, f"{number(value)} is not a whole number; {item.name} is {described(item)}")
         return None
     return float(value)
 
 
-def _checked_date(value: Scalar, item: Setting, found: Findings, key: str) -> str | None:
+def _checked_date(value: Scalar, item: Setting, findings: Findings, key: str) -> str | None:
     """The date as text; a number counts as a modified Julian date."""
     try:
         date = modified_julian_date(value) if isinstance(value, str) else float(value)
     except (ValueError, OverflowError):
         date = float("nan")
     if isinstance(value, bool) or date != date:
-        found.add(key, f"{shown(value)} is not a date; write it in UTC as {EXAMPLE}")
+        findings.add(key, f"{shown(value)} is not a date; write it in UTC as {EXAMPLE}")
         return None
     if not item.low <= date <= item.high:
-        found.add(key, f"{shown(value)} is not allowed; the model accepts {accepted_range(item)}")
+        findings.add(key, f"{shown(value)} is not allowed; the model accepts {accepted_range(item)}")
         return None
     return date_text(date)
 

@@ -1,19 +1,19 @@
-"""A campaign: a model, how its inputs are dispersed, and what the results must meet, read from a TOML file.
+"""Reads a campaign from a TOML file: a model, how its inputs are dispersed, and what the results must meet.
 
-`load_campaign` reports every mistake of the file at once and imports neither numba nor scipy nor matplotlib
-by itself.  What the file may say is in `mc_engine.campaign.sections`.
+`load_campaign` reports every mistake of the file at once.  The module itself imports neither numba nor scipy nor
+matplotlib, so that the command line starts fast.  The keys of the file are in `mc_engine.campaign.sections`.
 """
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mc_engine.campaign.case_table import read_case_table, table_dispersions
+from mc_engine.campaign.case_table import cases_of_table, table_dispersions
 from mc_engine.campaign.chain import chained_count, check_taken, take_inputs
 from mc_engine.campaign.covariances import spread_covariances
 from mc_engine.campaign.dispersions import Dispersion, build_dispersion
@@ -30,16 +30,23 @@ from mc_engine.campaign.parts import (
     check_size,
     nominal_values,
     refusal,
+    system_of,
+    with_step_limit,
 )
 from mc_engine.campaign.reading import Findings, Sections, parse_toml, read_sections
-from mc_engine.campaign.search import SHIPPED, ShippedCampaign, campaign_name, find_campaign, list_campaigns
+from mc_engine.campaign.search import (
+    SHIPPED,
+    ShippedCampaign,
+    campaign_name,
+    campaign_text,
+    find_campaign,
+    list_campaigns,
+)
 from mc_engine.campaign.sections import CampaignSection, schema
 from mc_engine.campaign.sensitivity_design import SensitivityDesign, check_sensitivity
 from mc_engine.campaign.tuning_section import Tuning, check_tuning
-from mc_engine.errors import CampaignError, ModelError, Problem
-from mc_engine.model.fields import AdaptiveStep
-from mc_engine.model.files import FileFault, resolve_beside
-from mc_engine.model.record import Model, load_model
+from mc_engine.errors import CampaignError, ModelError
+from mc_engine.model.simulator import System
 from mc_engine.sampling.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, level_count
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.section import ReportSection
@@ -65,29 +72,53 @@ __all__ = [
     "schema",
 ]
 
-_LARGEST_FILE = 250_000  # bytes; more of them could take the reader of TOML longer than a second
-
 
 @dataclass(frozen=True)
 class Campaign:
-    """A campaign that can be flown.  Numbers are in the units that the model declares.
+    """A campaign that can be flown: a model, how its inputs are dispersed, and what its results must meet.
 
-    text : the file as read; `cases` and `seed` may have been changed on the command line since.
-    parameters : what [parameters] says.  nominal : every parameter and setting of the model.
-    upstream : what is taken from another run.  first : that run's campaign, where it has yet to be flown.
-    table : the columns of the design "table", else empty.  tuning : what [tuning] says, if it is there.
-    looks : numbers of cases at which a run that ends with its verdicts is judged; empty where all cases fly.
-    messages : orbit messages beside the file that covariances were read from.
-    sensitivity : what [sensitivity] says, if it is there.  report : probability and confidence of its statistics.
-    digest : SHA-256 of all that decides the inputs of a case or the judgement of the results.  The number of
-        cases is part of it only for "lhs": a campaign that was extended is still the same campaign.
+    Read one with `load_campaign`.  Numbers are in the units that the model declares.
+
+    name : str, the shipped name ("deorbit/map") or the one that the file's path suggests
+    title : str, one line for the report
+    text : str, the campaign file as read; `cases` and `seed` may have been replaced since
+    directory : Path, the folder of the file, in which its tables and orbit messages are looked for
+    model : Model or Simulator, the system that is flown
+    model_reference : str, its module ("campaigns.deorbit") or its file next to the campaign file ("model.py")
+    cases : int, number of cases
+    design : str, how the cases are laid out: "mc", "lhs", "sobol", "saltelli", "morris", "grid", "one_at_a_time",
+        "table"
+    seed : int, from which every draw is derived
+    parameters : dict, name to value, what the section [parameters] sets
+    nominal : dict, name to value, every parameter and setting of the model
+    dispersions : tuple of Dispersion, the inputs that differ from case to case, in file order
+    correlations : tuple of Correlation, rank correlations between dispersions
+    requirements : tuple of Requirement, the limits that the results must meet
+    retention : Retention, the cases whose time histories are saved
+    digest : str, SHA-256 of all that decides the inputs of a case or the verdicts.  The number of cases is part of it
+        only for "lhs": an extended campaign is the same campaign.
+    table_path : Path or None, the file of the design "table"
+    table : dict, its columns by name; empty for any other design
+    tuning : Tuning or None, the section [tuning]
+    upstream : Upstream or None, the run that inputs are taken from
+    first : Campaign or None, the campaign of that run where it has yet to be flown
+    looks : tuple of int, numbers of cases at which `run --until verdict` judges; empty where all cases fly
+    messages : tuple of str, files of orbit messages that covariances were read from
+    sensitivity : SensitivityDesign or None, the section [sensitivity]
+    report : ReportSection, probability and confidence of the statistics in the report
+
+    >>> campaign = load_campaign("minimal", cases=8)
+    >>> campaign.title, campaign.design, campaign.cases
+    ('Apogee raised by one burn', 'mc', 8)
+    >>> [dispersion.name for dispersion in campaign.dispersions]
+    ['magnitude_error_pct', 'pitch_error_deg']
     """
 
     name: str
     title: str
     text: str
     directory: Path
-    model: Model
+    model: System
     model_reference: str
     cases: int
     design: str
@@ -119,48 +150,38 @@ def load_campaign(
     directory: Path | None = None,
     upstream: Path | None = None,
 ) -> Campaign:
-    """The campaign of a shipped name or of a path; CampaignError lists all that is wrong with it.
+    """Read a campaign file and check it against its model.
 
-    cases, seed : in place of what the file says.
-    text, directory : the text of the file and the folder it counts as being in, where it is kept elsewhere;
-        `reference` is then only its name.
-    upstream : the run to take inputs from, in place of the one that [inputs] names.
+    reference : str or Path, a shipped name ("deorbit", "deorbit/map"), a .toml file, or a folder with a campaign.toml;
+        where `text` is given, only the name of the campaign
+    cases : int, number of cases in place of the file's
+    seed : int, seed in place of the file's
+    text : str, the contents of the file, where they do not come from a file
+    directory : Path, the folder in which `text` looks for its tables; the working folder by default
+    upstream : Path, the run to take inputs from, in place of the one that [inputs] names
+
+    Returns the Campaign.
+
+    Raises CampaignError with every mistake of the file, each with its place.
+
+    >>> campaign = load_campaign("minimal", cases=100, seed=7)
+    >>> campaign.cases, campaign.seed
+    (100, 7)
     """
     if text is None:
         path = find_campaign(reference)
         name, source, directory = campaign_name(path), path.name, path.resolve().parent
-        text = _read(path)
+        text = campaign_text(path)
     else:
         name, source, directory = str(reference), Path(str(reference)).name, Path(directory or Path.cwd())
     document = parse_toml(text, source)
-    _override(document, {"cases": cases, "seed": seed})
-    found = Findings()
-    campaign = _assemble(name, text, directory, document, cases is not None, upstream, found)
-    if campaign is None or found.problems:
-        raise CampaignError(source, found.problems)
+    written = _campaign_keys(document)
+    written.update({key: value for key, value in (("cases", cases), ("seed", seed)) if value is not None})
+    findings = Findings()
+    campaign = _assemble(name, text, directory, document, cases is not None, upstream, findings)
+    if campaign is None or findings.problems:
+        raise CampaignError(source, findings.problems)
     return campaign
-
-
-def _read(path: Path) -> str:
-    try:
-        data = path.read_bytes() if path.stat().st_size <= _LARGEST_FILE else None
-    except OSError as error:
-        raise CampaignError(path.name, [Problem("", f"cannot be read: {error.strerror}")]) from None
-    if data is None:
-        raise CampaignError(
-            path.name, [Problem("", "is larger than 250 kB; a long table of cases belongs into a CSV file")]
-        )
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise CampaignError(path.name, [Problem(f"line {line}", "is not text in UTF-8")]) from None
-
-
-def _override(document: dict[str, Any], wanted: dict[str, int | None]) -> None:
-    section = document.get("campaign")
-    if isinstance(section, dict):
-        section.update({key: value for key, value in wanted.items() if value is not None})
 
 
 def _assemble(
@@ -170,28 +191,36 @@ def _assemble(
     document: dict[str, Any],
     shortened: bool,
     run: Path | None,
-    found: Findings,
+    findings: Findings,
 ) -> Campaign | None:
-    """The campaign, or None where it lacks a section or a model to hold the rest against."""
-    messages = spread_covariances(document, directory, found)
-    sections = read_sections(document, found)
-    model = _model(document, directory, found)
+    """The campaign, or None where a section or the model is missing, without which the rest cannot be checked."""
+    messages = spread_covariances(document, directory, findings)
+    sections = read_sections(document, findings)
+    model = system_of(document, sections.program, directory, findings)
     if model is None:
         return None
-    inside = found.under("campaign")
+    inside = findings.under("campaign")
     section = sections.campaign
-    model = _within_budget(model, section, inside)
+    model = with_step_limit(model, section, inside)
     design = section.design if section is not None else _named_design(document)
-    upstream, first = take_inputs(sections, model, directory, run, design, load_campaign, found)
-    nominal = _nominal(model, sections, {} if upstream is None or first is not None else upstream.nominal, found)
-    requirements = check_requirements(sections.requirements, model, found.under("requirement"))
-    _unknown_names(document, sections, nominal, model, found)
-    check_taken(sections, upstream, design, found)
-    dispersions = _dispersions(sections, model, nominal, design, directory, found)
-    correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", found)
-    table_path, table = (None, {}) if upstream is not None else _table(section, model, dispersions, directory, found)
+    upstream, first = take_inputs(sections, model, directory, run, design, load_campaign, findings)
+    nominal = _nominal_inputs(
+        model, sections, {} if upstream is None or first is not None else upstream.nominal, findings
+    )
+    requirements = check_requirements(sections.requirements, model, findings.under("requirement"))
+    _unknown_names(document, sections, nominal, model, findings)
+    check_taken(sections, upstream, design, findings)
+    dispersions = _dispersions(sections, model, nominal, design, directory, findings)
+    correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", findings)
+    table_path, table = (
+        (None, {}) if upstream is not None else cases_of_table(section, model, dispersions, directory, findings)
+    )
     if design == "table" and upstream is None:
-        dispersions = table_dispersions(table, {one.name: one for one in dispersions}, found) if table else ()
+        dispersions = (
+            table_dispersions(table, {dispersion.name: dispersion for dispersion in dispersions}, findings)
+            if table
+            else ()
+        )
     count = None
     if section is not None and (sections.inputs is None or upstream is not None):
         rows = 0 if upstream is None else (first.cases if first is not None else upstream.rows.n_cases)
@@ -200,16 +229,16 @@ def _assemble(
         check_size(count, design or "", dispersions, correlations, inside)
     retention = Retention()
     if sections.retention is not None:
-        retention = check_retention(sections.retention, model, count, shortened, found.under("retention"))
+        retention = check_retention(sections.retention, model, count, shortened, findings.under("retention"))
     tuning = None
     if sections.tuning is not None:
-        names = [one.name for one in dispersions]
-        tuning = check_tuning(sections.tuning, model, names, design, found.under("tuning"))
+        names = [dispersion.name for dispersion in dispersions]
+        tuning = check_tuning(sections.tuning, model, names, design, findings.under("tuning"))
     flown_before = None if upstream is None else upstream.name
     sensitivity = check_sensitivity(
-        sections.sensitivity, model, dispersions, correlations, design, flown_before, found.under("sensitivity")
+        sections.sensitivity, model, dispersions, correlations, design, flown_before, findings.under("sensitivity")
     )
-    if section is None or count is None or found.problems:
+    if section is None or count is None or findings.problems:
         return None
     return Campaign(
         name=name,
@@ -217,7 +246,7 @@ def _assemble(
         text=text,
         directory=directory,
         model=model,
-        model_reference=section.model,
+        model_reference=model.reference,
         cases=count,
         design=section.design,
         seed=section.seed or 0,
@@ -239,132 +268,95 @@ def _assemble(
     )
 
 
-def _named_design(document: dict[str, Any]) -> str | None:
-    """The design, even where other keys of [campaign] are wrong: the dispersions are read against it."""
+def _campaign_keys(document: dict[str, Any]) -> dict[str, Any]:
+    """[campaign] as written; empty where it is no table."""
     section = document.get("campaign")
-    design = section.get("design") if isinstance(section, dict) else None
+    return section if isinstance(section, dict) else {}
+
+
+def _named_design(document: dict[str, Any]) -> str | None:
+    """The design, even where other keys of [campaign] are wrong: dispersions are checked against it."""
+    design = _campaign_keys(document).get("design")
     return design if isinstance(design, str) and design in DESIGNS else None
 
 
-def _model(document: dict[str, Any], directory: Path, found: Findings) -> Model | None:
-    """The model, even where other keys of [campaign] are wrong: the rest of the file is read against it."""
-    section = document.get("campaign")
-    reference = section.get("model") if isinstance(section, dict) else None
-    if not isinstance(reference, str) or not reference:
-        return None
-    try:
-        return load_model(reference, directory)
-    except ModelError as error:
-        known = [f"campaigns.{folder.parent.name}" for folder in SHIPPED.glob("*/campaign.toml")]
-        known += [file.name for file in directory.glob("*.py")]
-        near = "" if reference in known else hint(reference, known)
-        found.under("campaign").add("model", f"{error}{near if 'did you mean' in near else ''}")
-        return None
-
-
-def _within_budget(model: Model, section: CampaignSection | None, found: Findings) -> Model:
-    """The model with the file's own cap on integration steps."""
-    if section is None or section.max_steps is None:
-        return model
-    if not isinstance(model.clock, AdaptiveStep):
-        found.add("max_steps", f"is for models that choose their steps; {model.name} steps on a fixed grid")
-        return model
-    return replace(model, clock=replace(model.clock, attempts=section.max_steps))
-
-
-def _nominal(model: Model, sections: Sections, taken: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
-    spot = found.under("parameters")
-    before = len(found.problems)
-    nominal = {**nominal_values(model, sections.parameters, spot), **taken}
-    if len(found.problems) == before:
+def _nominal_inputs(
+    model: System, sections: Sections, upstream: Mapping[str, Scalar], findings: Findings
+) -> dict[str, Scalar]:
+    section_findings = findings.under("parameters")
+    before = len(findings.problems)
+    nominal = {**nominal_values(model, sections.parameters, section_findings), **upstream}
+    if len(findings.problems) == before:
         try:
             sentence = refusal(model, nominal)
         except ModelError as error:
-            found.under("campaign").add("model", str(error))
+            findings.under("campaign").add("model", str(error))
         else:
             if sentence:
-                spot.add("", f"the nominal case cannot be flown: {sentence}")
+                section_findings.add("", f"the nominal case cannot be flown: {sentence}")
     return nominal
 
 
 def _unknown_names(
-    document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: Model, found: Findings
+    document: dict[str, Any], sections: Sections, nominal: Mapping[str, Scalar], model: System, findings: Findings
 ) -> None:
-    """Dispersions of no parameter and requirements of no metric, also where their section is wrong in itself."""
+    """Note unknown parameters and metrics in sections that have mistakes of their own."""
     written = document.get("dispersion")
     for name in written if isinstance(written, dict) else ():
         if name not in sections.dispersions and name not in nominal:
-            found.under("dispersion", name).add("", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}")
+            findings.under("dispersion", name).add(
+                "", f"is not a parameter of {model.name}{hint(name, inputs_of(model))}"
+            )
     written = document.get("requirement")
     for name, raw in written.items() if isinstance(written, dict) else ():
         metric = raw.get("metric") if isinstance(raw, dict) else None
         if name not in sections.requirements and isinstance(metric, str):
-            check_metric(metric, model, found.under("requirement", name))
+            check_metric(metric, model, findings.under("requirement", name))
 
 
 def _dispersions(
     sections: Sections,
-    model: Model,
+    model: System,
     nominal: Mapping[str, Scalar],
     design: str | None,
     directory: Path,
-    found: Findings,
+    findings: Findings,
 ) -> tuple[Dispersion, ...]:
     built = []
     for name, section in sections.dispersions.items():
-        spot = found.under("dispersion", name)
+        section_findings = findings.under("dispersion", name)
         if name not in nominal:
-            near = "" if found.full else hint(name, inputs_of(model))
-            spot.add("", f"is not a parameter of {model.name}{near}")
+            near = "" if findings.full else hint(name, inputs_of(model))
+            section_findings.add("", f"is not a parameter of {model.name}{near}")
         elif design is not None:  # without a design it is unknown which keys make sense
-            built.append(build_dispersion(name, section, model.input(name), nominal[name], design, directory, spot))
+            built.append(
+                build_dispersion(name, section, model.input(name), nominal[name], design, directory, section_findings)
+            )
     return tuple(built)
 
 
-def _table(
-    section: CampaignSection | None,
-    model: Model,
-    dispersions: tuple[Dispersion, ...],
-    directory: Path,
-    found: Findings,
-) -> tuple[Path | None, dict[str, np.ndarray]]:
-    spot = found.under("campaign", "table")
-    if section is None or (section.design != "table" and section.table is None):
-        return None, {}
-    if section.design != "table":
-        spot.add("", f'the design "{section.design}" reads no table; it is for design = "table"')
-    elif section.table is None:
-        spot.add("", "is missing: CSV or Parquet beside this file, a case a row")
-    else:
-        try:
-            path = resolve_beside(directory, section.table)
-            units = {one.name: one.spec["unit"] for one in dispersions if "unit" in one.spec}
-            return path, read_case_table(path, model, units, spot)
-        except FileFault as fault:
-            spot.add("", str(fault))
-    return None, {}
-
-
 def _case_count(
-    section: CampaignSection, dispersions: tuple[Dispersion, ...], table: Mapping[str, np.ndarray], found: Findings
+    section: CampaignSection, dispersions: tuple[Dispersion, ...], table: Mapping[str, np.ndarray], findings: Findings
 ) -> int | None:
     """How many cases the design has; None where that is unknown."""
     if section.design in (*RANDOM, *IN_BLOCKS):
         for key, value in (("cases", section.cases), ("seed", section.seed)):
             if value is None:
-                found.add(key, f"is missing: {CampaignSection.model_fields[key].description}")
+                findings.add(key, f"is missing: {CampaignSection.model_fields[key].description}")
         return section.cases
-    if found.problems:
+    if findings.problems:
         return None
     if section.design in BY_LEVELS:
-        count = level_count(section.design, [len(one.levels) for one in dispersions])
+        count = level_count(section.design, [len(dispersion.levels) for dispersion in dispersions])
     else:
         count = len(next(iter(table.values())))
     if count > MOST_CASES:
-        found.add("design", f"{count} cases; at most {MOST_CASES} are possible")
+        findings.add("design", f"{count} cases; at most {MOST_CASES} are possible")
         return None
     if section.cases not in (None, count):
-        found.add("cases", f'{section.cases} is not allowed; the design "{section.design}" has {count} cases by itself')
+        findings.add(
+            "cases", f'{section.cases} is not allowed; the design "{section.design}" has {count} cases by itself'
+        )
     return count
 
 
@@ -381,9 +373,9 @@ def _digest(
         content["campaign"].pop("cases", None)
     content.pop("report", None)  # how a run is told, not what it is
     content["campaign"]["seed"] = section.seed or 0  # a grid may do without one, and is resumed with 0
-    order = [one.name for one in dispersions]
+    order = [dispersion.name for dispersion in dispersions]
     digest = sha256(json.dumps([content, order], sort_keys=True).encode())
-    files = [directory / one.spec["file"] for one in dispersions if one.dist == "empirical"]
+    files = [directory / dispersion.spec["file"] for dispersion in dispersions if dispersion.dist == "empirical"]
     for path in [*files, *([table_path] if table_path is not None else [])]:
         digest.update(sha256(path.read_bytes()).digest())
     if upstream is not None:

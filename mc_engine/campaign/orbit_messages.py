@@ -81,10 +81,10 @@ def read_message(text: str) -> list[UncertainState]:
     if first == "CCSDS_OPM_VERS":
         return [_opm(lines)]
     if first == "CCSDS_OEM_VERS":
-        found = list(_oem(lines))
-        if not found:
+        states = list(_oem(lines))
+        if not states:
             raise MessageFault("the ephemeris has no covariance (COVARIANCE_START)")
-        return found
+        return states
     raise MessageFault("is no orbit message: its first line is neither CCSDS_OPM_VERS = ... nor CCSDS_OEM_VERS = ...")
 
 
@@ -103,8 +103,8 @@ def _opm(lines: list[tuple[int, str]]) -> UncertainState:
     frame = _plain_frame(facts["REF_FRAME"][1])
     matrix = np.empty((6, 6))
     for name, i, j in _ENTRIES:
-        matrix[i, j] = matrix[j, i] = _number(*facts[name])
-    state = np.array([_number(*facts[name]) for name in AXES])
+        matrix[i, j] = matrix[j, i] = _finite_number(*facts[name])
+    state = np.array([_finite_number(*facts[name]) for name in AXES])
     of_matrix = _plain_frame(facts["COV_REF_FRAME"][1]) if "COV_REF_FRAME" in facts else frame
     return UncertainState(facts["EPOCH"][1], frame, state, of_matrix, matrix)
 
@@ -128,7 +128,7 @@ def _oem(lines: list[tuple[int, str]]) -> Iterator[UncertainState]:
         elif inside and key == "EPOCH":
             epoch, rows = value, []
         elif inside and not equals:
-            rows.append([_number(number, word) for word in line.split()])
+            rows.append([_finite_number(number, word) for word in line.split()])
             if len(rows[-1]) != len(rows):
                 raise MessageFault(f"line {number}: {len(rows[-1])} numbers; row {len(rows)} of a covariance has "
                                    f"{len(rows)}")  # fmt: skip
@@ -138,14 +138,14 @@ def _oem(lines: list[tuple[int, str]]) -> Iterator[UncertainState]:
                 yield UncertainState(epoch, frame, states.get(_moment(number, epoch)), own, matrix)
         elif not equals and len(line.split()) in (7, 10):
             when, *numbers = line.split()
-            states[_moment(number, when)] = np.array([_number(number, word) for word in numbers[:6]])
+            states[_moment(number, when)] = np.array([_finite_number(number, word) for word in numbers[:6]])
 
 
 def _plain_frame(name: str) -> str:
     return _SAME.get(name.strip().upper(), name.strip().upper())
 
 
-def _number(line: int, text: str) -> float:
+def _finite_number(line: int, text: str) -> float:
     if not (is_real(text) and np.isfinite(value := float(text))):
         raise MessageFault(f'line {line}: "{text}" is not a finite number')
     return value

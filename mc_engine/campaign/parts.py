@@ -1,21 +1,32 @@
-"""The parts of a campaign, checked against its model: nominal values, correlations, requirements, retention."""
+"""Checks of a campaign's sections against its model: nominal values, correlations, requirements, histories."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.inputs import accepted_range, check_value, inputs_of, number
 from mc_engine.campaign.reading import Findings
-from mc_engine.campaign.sections import CorrelationSection, RequirementSection, RetentionSection, WorstSection
-from mc_engine.errors import MOST_SHOWN
+from mc_engine.campaign.search import SHIPPED
+from mc_engine.campaign.sections import (
+    CampaignSection,
+    ConstraintSection,
+    CorrelationSection,
+    RequirementSection,
+    RetentionSection,
+    WorstSection,
+)
+from mc_engine.errors import MOST_SHOWN, ModelError
 from mc_engine.model.faults import naming_faults
-from mc_engine.model.fields import Parameter, Setting
+from mc_engine.model.fields import AdaptiveStep, Parameter, Setting
 from mc_engine.model.preparation import call_prepare
-from mc_engine.model.record import Model, Refusals
+from mc_engine.model.program import ProgramSection, program_simulator
+from mc_engine.model.record import Refusals, load_model
+from mc_engine.model.simulator import Simulator, System, load_simulator
 from mc_engine.sampling.correlation import group_matrix, is_positive_definite
 from mc_engine.sampling.designs import IN_BLOCKS, RANDOM, block_problem
 from mc_engine.sampling.distributions import Scalar
@@ -68,36 +79,85 @@ class Retention:
     rows: int = 1500
 
 
-def nominal_values(model: Model, overrides: Mapping[str, Scalar], found: Findings) -> dict[str, Scalar]:
+def system_of(
+    document: Mapping[str, Any], program: ProgramSection | None, directory: Path, findings: Findings
+) -> System | None:
+    """What flies, even where other keys of [campaign] are wrong: the rest of the file is checked against it."""
+    section, inside = document.get("campaign"), findings.under("campaign")
+    if not isinstance(section, dict):
+        return None
+    named = [key for key in ("model", "simulator") if key in section]
+    if not named and program is not None:
+        return _program(program, directory, findings)
+    if len(named) != 1 or "simulator" in document:  # which `read_sections` has noted
+        return None
+    reference = section[named[0]]
+    if not isinstance(reference, str) or not reference:
+        return None
+    try:
+        return load_model(reference, directory) if named == ["model"] else load_simulator(reference, directory)
+    except ModelError as error:
+        known = [f"campaigns.{folder.parent.name}" for folder in SHIPPED.glob("*/campaign.toml")]
+        known += [file.name for file in directory.glob("*.py")]
+        near = "" if reference in known else hint(reference, known)
+        inside.add(named[0], f"{error}{near if 'did you mean' in near else ''}")
+        return None
+
+
+def _program(section: ProgramSection, directory: Path, findings: Findings) -> System | None:
+    """The program of [simulator], or None with its mistakes noted."""
+    problems: list[tuple[str, str]] = []
+    simulator = program_simulator(section, directory, problems)
+    for key, message in problems:
+        findings.under("simulator").add(key, message)
+    return simulator
+
+
+def nominal_values(model: System, overrides: Mapping[str, Scalar], findings: Findings) -> dict[str, Scalar]:
     """Every parameter and setting at its nominal value: what [parameters] says, else the model's default."""
     inputs = inputs_of(model)
     for name in overrides:
         if name not in inputs:
-            near = hint(name, inputs) if len(found.problems) < MOST_SHOWN else ""  # a search takes its time
-            found.add(name, f"is not a parameter of {model.name}{near}")
+            near = hint(name, inputs) if len(findings.problems) < MOST_SHOWN else ""  # a search takes its time
+            findings.add(name, f"is not a parameter of {model.name}{near}")
     values: dict[str, Scalar] = {}
     for item in inputs.values():
         default = item.default if isinstance(item, Setting) else float(item.default)
         if item.name in overrides:
-            checked = check_value(overrides[item.name], item, found, item.name)
+            checked = check_value(overrides[item.name], item, findings, item.name)
             values[item.name] = default if checked is None else checked
         else:
-            _check_default(default, item, found)
+            _check_default(default, item, findings)
             values[item.name] = default
     return values
 
 
-def _check_default(default: Scalar, item: Parameter | Setting, found: Findings) -> None:
+def _check_default(default: Scalar, item: Parameter | Setting, findings: Findings) -> None:
     if not isinstance(default, bool | str) and not item.low <= default <= item.high:
-        found.add(item.name, f"the model's own value {number(default)} is not within {accepted_range(item)}; give one")
+        findings.add(
+            item.name, f"the model's own value {number(default)} is not within {accepted_range(item)}; give one"
+        )
 
 
-def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
+def with_step_limit(model: System, section: CampaignSection | None, findings: Findings) -> System:
+    """The model with the file's own limit on integration steps."""
+    if section is None or section.max_steps is None:
+        return model
+    if isinstance(model, Simulator):
+        findings.add("max_steps", f"is for compiled models; {model.name} has a limit of its own, time_limit_s")
+        return model
+    if not isinstance(model.clock, AdaptiveStep):
+        findings.add("max_steps", f"is for models that choose their steps; {model.name} steps on a fixed grid")
+        return model
+    return replace(model, clock=replace(model.clock, attempts=section.max_steps))
+
+
+def refusal(model: System, values: Mapping[str, Scalar]) -> str:
     """Why the model cannot start from these values, as one sentence; empty if it can.
 
-    Raises ModelError if `prepare` itself breaks.
+    Raises ModelError if `prepare` itself fails.
     """
-    if model.prepare is None:
+    if isinstance(model, Simulator) or model.prepare is None:
         return ""
     inputs = {p.symbol: np.array([float(values[p.name]) * p.si_factor]) for p in model.parameters}
     settings = {s.symbol: np.array([s.code(values[s.name])]) for s in model.settings}
@@ -110,95 +170,102 @@ def refusal(model: Model, values: Mapping[str, Scalar]) -> str:
 def check_correlations(
     sections: Mapping[str, CorrelationSection],
     dispersions: tuple[Dispersion, ...],
-    model: Model,
+    model: System,
     design: str,
-    found: Findings,
+    findings: Findings,
 ) -> tuple[Correlation, ...]:
     """The correlations; `sections` by place in the file."""
     if sections and design not in RANDOM:
         why = "is for independent inputs" if design in IN_BLOCKS else "has no chance in it"
-        found.add("correlation", f'the design "{design}" {why}; correlations are for {listed(RANDOM)}')
+        findings.add("correlation", f'the design "{design}" {why}; correlations are for {listed(RANDOM)}')
         return ()
     by_name = {dispersion.name: dispersion for dispersion in dispersions}
     kept: list[Correlation] = []
     for place, section in sections.items():
         first, second = section.between
-        spot = found.under(place)
-        before = len(found.problems)
+        section_findings = findings.under(place)
+        before = len(findings.problems)
         for name in section.between:
-            _check_correlated(name, by_name, model, spot)
+            _check_correlated(name, by_name, model, section_findings)
         if first == second:
-            spot.add("between", f'"{first}" is there twice')
+            section_findings.add("between", f'"{first}" is there twice')
         elif any({first, second} == {other.first, other.second} for other in kept):
-            spot.add("between", f'"{first}" and "{second}" have a correlation already')
-        if len(found.problems) == before:
+            section_findings.add("between", f'"{first}" and "{second}" have a correlation already')
+        if len(findings.problems) == before:
             kept.append(Correlation(first, second, section.rank, section.source))
     matrix = group_matrix(list(by_name), rank_pairs(kept))[1]
     if kept and not is_positive_definite(matrix):
-        text = ", ".join(f"{one.first} ~ {one.second} = {number(one.rank)}" for one in kept)
-        found.add(
+        text = ", ".join(
+            f"{correlation.first} ~ {correlation.second} = {number(correlation.rank)}" for correlation in kept
+        )
+        findings.add(
             "correlation", f"no numbers can be correlated like this: {text} (the matrix is not positive definite)"
         )
     return tuple(kept)
 
 
-def _check_correlated(name: str, by_name: Mapping[str, Dispersion], model: Model, found: Findings) -> None:
+def _check_correlated(name: str, by_name: Mapping[str, Dispersion], model: System, findings: Findings) -> None:
     if name not in by_name:
-        found.add("between", f'"{name}" is not dispersed{hint(name, by_name)}')
+        findings.add("between", f'"{name}" is not dispersed{hint(name, by_name)}')
     elif any(setting.name == name for setting in model.settings):
-        found.add("between", f'"{name}" is a setting; only parameters can be correlated')
+        findings.add("between", f'"{name}" is a setting; only parameters can be correlated')
     elif by_name[name].dist == "constant":
-        found.add("between", f'"{name}" is constant; it cannot be correlated')
+        findings.add("between", f'"{name}" is constant; it cannot be correlated')
 
 
 def rank_pairs(correlations: Sequence[Correlation]) -> tuple[tuple[str, str, float], ...]:
     """The correlations as plain tuples."""
-    return tuple((one.first, one.second, one.rank) for one in correlations)
+    return tuple((correlation.first, correlation.second, correlation.rank) for correlation in correlations)
 
 
 def check_size(
-    count: int, design: str, dispersions: tuple[Dispersion, ...], correlations: tuple[Correlation, ...], found: Findings
+    count: int,
+    design: str,
+    dispersions: tuple[Dispersion, ...],
+    correlations: tuple[Correlation, ...],
+    findings: Findings,
 ) -> None:
     """Note a number of cases, or of dispersions, that the design cannot have."""
     if design == "lhs":
-        check_room_for_correlations(count, correlations, found)
+        # A Latin hypercube of few cases has few ways to be paired.
+        needed = _CASES_PER_CORRELATED * len({name for pair in correlations for name in (pair.first, pair.second)})
+        if count < needed:
+            findings.add("cases", f'{count} is not allowed; "lhs" with these correlations needs at least {needed}')
         if count > _LARGEST_HYPERCUBE:
-            found.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
+            findings.add("cases", f'{count} is not allowed; "lhs" has at most {_LARGEST_HYPERCUBE}, "sobol" more')
     most = {"sobol": MAX_DIMENSIONS, "saltelli": MAX_DIMENSIONS // 2}.get(design, len(dispersions))
     if len(dispersions) > most:
-        found.add("design", f'"{design}" has at most {most} dispersions, here are {len(dispersions)}; use "mc"')
+        findings.add("design", f'"{design}" has at most {most} dispersions, here are {len(dispersions)}; use "mc"')
     if design in IN_BLOCKS and not dispersions:
-        found.add("design", f'"{design}" needs a dispersion to find the effect of')
+        findings.add("design", f'"{design}" needs a dispersion to find the effect of')
     if sentence := block_problem(design, len(dispersions), count):
-        found.add("cases", sentence)
-
-
-def check_room_for_correlations(cases: int, correlations: tuple[Correlation, ...], found: Findings) -> None:
-    """A Latin hypercube of few cases has few ways to be paired."""
-    needed = _CASES_PER_CORRELATED * len({name for one in correlations for name in (one.first, one.second)})
-    if cases < needed:
-        found.add("cases", f'{cases} is not allowed; "lhs" with these correlations needs at least {needed}')
+        findings.add("cases", sentence)
 
 
 def check_requirements(
-    sections: Mapping[str, RequirementSection], model: Model, found: Findings
+    sections: Mapping[str, RequirementSection], model: System, findings: Findings
 ) -> tuple[Requirement, ...]:
     """The requirements, each with a metric of the model and at least one limit."""
     kept = []
     for name, section in sections.items():
-        spot = found.under(name)
-        check_metric(section.metric, model, spot)
-        low, high = section.at_least, section.at_most
-        if low is None and high is None:
-            spot.add("", "has no limit; give at_most, at_least or both")
-        elif low is not None and high is not None and low > high:
-            spot.add("at_least", f"{number(low)} is above at_most = {number(high)}")
-        kept.append(Requirement(name, section.metric, high, low, section.share, section.confidence, section.source))
+        section_findings = findings.under(name)
+        check_metric(section.metric, model, section_findings)
+        check_limits(section, section_findings)
+        kept.append(Requirement(name, **section.model_dump(exclude={"note"})))
     return tuple(kept)
 
 
+def check_limits(section: RequirementSection | ConstraintSection, findings: Findings) -> None:
+    """Note a section without a limit, or with limits in the wrong order."""
+    low, high = section.at_least, section.at_most
+    if low is None and high is None:
+        findings.add("", "has no limit; give at_most, at_least or both")
+    elif low is not None and high is not None and low > high:
+        findings.add("at_least", f"{number(low)} is above at_most = {number(high)}")
+
+
 def check_retention(
-    section: RetentionSection, model: Model, cases: int | None, shortened: bool, found: Findings
+    section: RetentionSection, model: System, cases: int | None, shortened: bool, findings: Findings
 ) -> Retention:
     """The retention, its case numbers checked against `cases` (None: unknown).
 
@@ -207,19 +274,19 @@ def check_retention(
     histories = section.histories
     worst = histories.worst or []
     entries = [worst] if isinstance(worst, WorstSection) else worst
-    spot = found.under("histories")
+    section_findings = findings.under("histories")
     for k, entry in enumerate(entries, start=1):
-        check_metric(entry.metric, model, spot.under("worst" if entries is not worst else f"worst {k}"))
+        check_metric(entry.metric, model, section_findings.under("worst" if entries is not worst else f"worst {k}"))
     for case in histories.cases:
         if cases is not None and case >= cases and not shortened:
-            spot.add("cases", f"there is no case {case}; they are 0 to {cases - 1}")
+            section_findings.add("cases", f"there is no case {case}; they are 0 to {cases - 1}")
     kept = tuple(case for case in histories.cases if cases is None or case < cases)
     chosen = tuple(Worst(entry.metric, entry.count, entry.side) for entry in entries)
     return Retention(histories.nominal, histories.first, chosen, kept, histories.rows)
 
 
-def check_metric(metric: str, model: Model, found: Findings) -> None:
+def check_metric(metric: str, model: System, findings: Findings) -> None:
     """Note a name that is not a metric of the model."""
     names = [field.name for field in model.metrics]
     if metric not in names:
-        found.add("metric", f'"{metric}" is not a metric of {model.name}{hint(metric, names)}')
+        findings.add("metric", f'"{metric}" is not a metric of {model.name}{hint(metric, names)}')

@@ -1,4 +1,7 @@
-"""Reading the sections of a campaign file one by one, every mistake turned into a sentence with its place."""
+"""Reads the sections of a campaign file; each mistake becomes one sentence with its place in the file.
+
+A mistake in one section does not hide those in others: each table is validated separately (pydantic).
+"""
 
 import json
 import re
@@ -31,6 +34,7 @@ from mc_engine.campaign.sections import (
     Value,
 )
 from mc_engine.errors import MOST_SHOWN, CampaignError, Problem
+from mc_engine.model.program import ProgramSection
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.section import ReportSection, Section
 from mc_engine.suggestions import hint, listed, nearest
@@ -70,29 +74,29 @@ _MESSAGES = {
 
 @dataclass(frozen=True)
 class Findings:
-    """The problems found so far, and the place in the file where we are looking."""
+    """The problems found so far, and the place in the file that is being checked."""
 
     place: str = ""
     problems: list[Problem] = field(default_factory=list)
 
     def under(self, *names: str) -> "Findings":
-        """The same list, one or more steps further in."""
+        """The same list of problems, for a place one or more steps further in."""
         readable = [name if name.isprintable() else json.dumps(name) for name in names]
         return Findings(".".join(part for part in (self.place, *readable) if part), self.problems)
 
     @property
     def full(self) -> bool:
-        """So much is wrong that no further sentence is shown; it need not say what was meant."""
+        """Whether so many problems are known that no further one is shown, and suggestions need not be searched."""
         return len(self.problems) >= MOST_SHOWN
 
     def add(self, key: str, message: str) -> None:
-        """Note a problem with `key` of the place we are at; the place itself where `key` is empty."""
+        """Note a problem with `key` of the current place, or with the place itself where `key` is empty."""
         self.problems.append(Problem(self.under(key).place, message))
 
 
 @dataclass(frozen=True)
 class Sections:
-    """The sections that could be read; what could not is None or left out, and among the findings."""
+    """The sections of a campaign file that could be read; those with mistakes are None or left out."""
 
     campaign: CampaignSection | None
     parameters: dict[str, Scalar]
@@ -104,11 +108,12 @@ class Sections:
     inputs: InputsSection | None
     sensitivity: SensitivitySection | None
     report: ReportSection | None
+    program: ProgramSection | None
 
 
 @dataclass(frozen=True)
 class TuningSections:
-    """What could be read of [tuning]; `head` has its plain keys alone, `objective_names` all that are there."""
+    """What could be read of [tuning]; `head` has its plain keys, `objective_names` every name written in the file."""
 
     head: TuningSection | None
     parameters: dict[str, TunedSection]
@@ -133,28 +138,44 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
         raise CampaignError(source, [Problem("", f"this is not TOML that can be read: {error}")]) from None
 
 
-def read_sections(document: dict[str, Any], found: Findings) -> Sections:
+def read_sections(document: dict[str, Any], findings: Findings) -> Sections:
     """Read every section, noting all that is wrong inside each."""
     for name in document:
         if name not in CampaignFile.model_fields:
-            found.add(name, f"is not a section{hint(name, CampaignFile.model_fields)}")
+            findings.add(name, f"is not a section{hint(name, CampaignFile.model_fields)}")
     if "campaign" not in document:
-        found.add("campaign", "is missing: the table [campaign] with model, design, ...")
-    inside = {name: found.under(name) for name in CampaignFile.model_fields}
+        findings.add("campaign", "is missing: the table [campaign] with model, design, ...")
+    inside = {name: findings.under(name) for name in CampaignFile.model_fields}
+    _note_what_flies(document, inside["campaign"])
     return Sections(
         campaign=read(CampaignSection, document.get("campaign"), inside["campaign"])
         if "campaign" in document
         else None,
         parameters=_parameters(document, inside["parameters"]),
-        dispersions=_read_each(_dispersion, _named(document, "dispersion", found)),
-        correlations=_read_each(_correlation, _listed(document, "correlation", found)),
-        requirements=_read_each(_requirement, _freely_named(document, "requirement", found)),
+        dispersions=_read_each(_dispersion, _named_tables(document, "dispersion", findings)),
+        correlations=_read_each(partial(read, CorrelationSection), _listed_tables(document, "correlation", findings)),
+        requirements=_read_each(
+            partial(read, RequirementSection), _freely_named_tables(document, "requirement", findings)
+        ),
         retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
         tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
         inputs=_optional(InputsSection, document, inside),
         sensitivity=_optional(SensitivitySection, document, inside),
         report=read(ReportSection, document.get("report", {}), inside["report"]),
+        program=read(ProgramSection, document["simulator"], inside["simulator"]) if "simulator" in document else None,
     )
+
+
+def _note_what_flies(document: dict[str, Any], findings: Findings) -> None:
+    """Note a file that names nothing to fly, or two things."""
+    section = document.get("campaign")
+    named = [key for key in ("model", "simulator") if isinstance(section, dict) and key in section]
+    if "simulator" in document:
+        for key in named:
+            findings.add(key, "is there beside the table [simulator]; leave one of them out")
+    elif isinstance(section, dict) and len(named) != 1:
+        missing = f"is missing: {CampaignSection.model_fields['model'].description}"
+        findings.add("model", "is there beside simulator; leave one of them out" if named else missing)
 
 
 def _optional(section: type[_AnySection], document: dict[str, Any], inside: dict[str, Findings]) -> _AnySection | None:
@@ -162,16 +183,16 @@ def _optional(section: type[_AnySection], document: dict[str, Any], inside: dict
     return read(section, document[name], inside[name]) if name in document else None
 
 
-def read(section: type[_AnySection], raw: Any, found: Findings) -> _AnySection | None:
+def read(section: type[_AnySection], raw: Any, findings: Findings) -> _AnySection | None:
     """`raw` as a section, or None with all its mistakes noted."""
     try:
         return section.model_validate(raw)
     except ValidationError as error:
         mistakes = error.errors(include_url=False)
         for details in mistakes[:MOST_SHOWN]:
-            found.add(_place(raw, details["loc"]), _sentence(section, details))
+            findings.add(_place(raw, details["loc"]), _message(section, details))
         # nobody is shown the rest: it is only counted
-        found.problems.extend(Problem(found.place, details["msg"]) for details in mistakes[MOST_SHOWN:])
+        findings.problems.extend(Problem(findings.place, details["msg"]) for details in mistakes[MOST_SHOWN:])
         return None
 
 
@@ -193,101 +214,93 @@ def _read_each(
 ) -> dict[str, _AnySection]:
     """The entries that could be read, by name."""
     sections = {}
-    for name, raw, spot in entries:
-        section = reader(raw, spot)
+    for name, raw, section_findings in entries:
+        section = reader(raw, section_findings)
         if section is not None:
             sections[name] = section
     return sections
 
 
-def _named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+def _named_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     raw = document.get(name, {})
     if isinstance(raw, dict):
-        return [(key, entry, found.under(name, key)) for key, entry in raw.items()]
-    header = f"{found.place}.{name}" if found.place else name
-    found.add(name, f"{shown(raw)} is not a table; write [{header}.NAME]")
+        return [(key, entry, findings.under(name, key)) for key, entry in raw.items()]
+    header = f"{findings.place}.{name}" if findings.place else name
+    findings.add(name, f"{shown(raw)} is not a table; write [{header}.NAME]")
     return []
 
 
-def _freely_named(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+def _freely_named_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     """The tables whose names the file chooses; one that is no word is noted and left out."""
-    entries = _named(document, name, found)
+    entries = _named_tables(document, name, findings)
     wrong = [entry for entry in entries if not _FREE_NAME.fullmatch(entry[0])]
     for key, _, _ in wrong:
-        found.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
+        findings.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
     return [entry for entry in entries if entry not in wrong]
 
 
-def _listed(document: dict[str, Any], name: str, found: Findings) -> list[tuple[str, Any, Findings]]:
+def _listed_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
     raw = document.get(name, [])
     if isinstance(raw, list):
         places = [f"{name} {k}" for k in range(1, len(raw) + 1)]
-        return [(place, entry, found.under(place)) for place, entry in zip(places, raw, strict=True)]
-    header = f"{found.place}.{name}" if found.place else name
-    found.add(name, f"{shown(raw)} is not a list of tables; write [[{header}]] with two brackets")
+        return [(place, entry, findings.under(place)) for place, entry in zip(places, raw, strict=True)]
+    header = f"{findings.place}.{name}" if findings.place else name
+    findings.add(name, f"{shown(raw)} is not a list of tables; write [[{header}]] with two brackets")
     return []
 
 
-def _correlation(raw: Any, found: Findings) -> CorrelationSection | None:
-    return read(CorrelationSection, raw, found)
-
-
-def _requirement(raw: Any, found: Findings) -> RequirementSection | None:
-    return read(RequirementSection, raw, found)
-
-
-def _tuning(raw: Any, found: Findings) -> TuningSections | None:
-    """[tuning], each of its tables read for itself, so that a slip in one hides nothing in the others."""
+def _tuning(raw: Any, findings: Findings) -> TuningSections | None:
+    """[tuning], each of its tables read separately, so that a mistake in one does not hide those in others."""
     if not isinstance(raw, dict):
-        found.add("", f"{shown(raw)} is not a table; write [tuning]")
+        findings.add("", f"{shown(raw)} is not a table; write [tuning]")
         return None
     tables = ("parameter", "objective", "constraint", "published")
     objectives = raw.get("objective")
     return TuningSections(
-        head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, found),
-        parameters=_read_each(partial(read, TunedSection), _named(raw, "parameter", found)),
-        objectives=_read_each(partial(read, ObjectiveSection), _freely_named(raw, "objective", found)),
-        constraints=_read_each(partial(read, ConstraintSection), _freely_named(raw, "constraint", found)),
-        published=_read_each(partial(read, PublishedPointSection), _listed(raw, "published", found)),
+        head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, findings),
+        parameters=_read_each(partial(read, TunedSection), _named_tables(raw, "parameter", findings)),
+        objectives=_read_each(partial(read, ObjectiveSection), _freely_named_tables(raw, "objective", findings)),
+        constraints=_read_each(partial(read, ConstraintSection), _freely_named_tables(raw, "constraint", findings)),
+        published=_read_each(partial(read, PublishedPointSection), _listed_tables(raw, "published", findings)),
         objective_names=tuple(objectives) if isinstance(objectives, dict) else (),
     )
 
 
-def _parameters(document: dict[str, Any], found: Findings) -> dict[str, Scalar]:
+def _parameters(document: dict[str, Any], findings: Findings) -> dict[str, Scalar]:
     raw = document.get("parameters", {})
     if not isinstance(raw, dict):
-        found.add("", f"{shown(raw)} is not a table; write [parameters]")
+        findings.add("", f"{shown(raw)} is not a table; write [parameters]")
         return {}
     values: dict[str, Scalar] = {}
     for name, value in raw.items():
         try:
             values[name] = _VALUE.validate_python(value)
         except ValidationError as error:
-            found.add(name, _sentence(None, error.errors(include_url=False)[0]))
+            findings.add(name, _message(None, error.errors(include_url=False)[0]))
     return values
 
 
-def _dispersion(raw: Any, found: Findings) -> DispersionSection | None:
+def _dispersion(raw: Any, findings: Findings) -> DispersionSection | None:
     """The section of the distribution that `dist` names; the keys allowed depend on it."""
     dist = raw.get("dist") if isinstance(raw, dict) else None
     if dist is None:
         slip = _slip_of_dist(raw) if isinstance(raw, dict) else None
         if slip is None:
-            return read(LevelsDispersion, raw, found)
-        found.add(slip, 'is not a known key; did you mean "dist"?')
+            return read(LevelsDispersion, raw, findings)
+        findings.add(slip, 'is not a known key; did you mean "dist"?')
         dist = raw[slip]
         raw = {"dist": dist, **{key: value for key, value in raw.items() if key != slip}}
     if not isinstance(dist, str):
-        found.add("dist", f"{shown(dist)} is not text in quotes; known are {listed(DISTRIBUTIONS)}")
+        findings.add("dist", f"{shown(dist)} is not text in quotes; known are {listed(DISTRIBUTIONS)}")
         return None
     if dist not in DISTRIBUTIONS:
-        found.add("dist", f'"{dist}" is not known{hint(dist, DISTRIBUTIONS)}')
+        findings.add("dist", f'"{dist}" is not known{hint(dist, DISTRIBUTIONS)}')
         return None
-    return read(DISTRIBUTIONS[dist], raw, found)
+    return read(DISTRIBUTIONS[dist], raw, findings)
 
 
 def _slip_of_dist(raw: dict[str, Any]) -> str | None:
-    """The key that was to be `dist`, without which no other key of a dispersion could be judged."""
+    """The misspelt key that was meant to be `dist`: without it no other key of a dispersion can be checked."""
     known = [*LevelsDispersion.model_fields, "dist"]
     others = [key for key in raw if not any(key in section.model_fields for section in DISTRIBUTIONS.values())]
     return next((key for key in others if nearest(key, known) == "dist"), None)
@@ -306,7 +319,7 @@ def _place(raw: Any, location: tuple[int | str, ...]) -> str:
     return place
 
 
-def _sentence(section: type[Section] | None, details: ErrorDetails) -> str:
+def _message(section: type[Section] | None, details: ErrorDetails) -> str:
     kind, context, location = details["type"], details.get("ctx", {}), details["loc"]
     value = details["input"]
     if kind == "missing" and section is not None:
@@ -348,7 +361,7 @@ def _class_at(section: type[BaseModel], location: tuple[int | str, ...]) -> type
 def _section_in(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for part in get_args(annotation) if (found := _section_in(part))), None)
+    return next((nested for part in get_args(annotation) if (nested := _section_in(part))), None)
 
 
 def _lower_first(message: str) -> str:

@@ -1,4 +1,4 @@
-"""The case table as a file or on a terminal: the inputs of a campaign, without flying it."""
+"""The case table of `mc-engine sample`, as a file or on a terminal: the inputs of a campaign, without flying it."""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Where campaign files are: the shipped ones by name, any other by its path."""
+"""Finds campaign files, the shipped ones by name and any other by its path, and reads their text."""
 
 import re
 import tomllib
@@ -10,6 +10,7 @@ from mc_engine.store.run_folder import NO_TEXT, readable
 from mc_engine.store.urls import is_url, without_secrets
 from mc_engine.suggestions import hint
 
+_LARGEST_FILE = 250_000  # bytes; more of them could take the reader of TOML longer than a second
 SHIPPED = Path(__file__).resolve().parents[2] / "campaigns"
 
 
@@ -22,7 +23,16 @@ class ShippedCampaign(NamedTuple):
 
 
 def list_campaigns() -> list[ShippedCampaign]:
-    """Every shipped campaign file: "deorbit" is campaigns/deorbit/campaign.toml, "deorbit/map" its map.toml."""
+    """The campaigns that come with mc-engine.
+
+    Returns a list of named tuples (name, path, title), sorted by name: "deorbit" is campaigns/deorbit/campaign.toml,
+    "deorbit/map" is campaigns/deorbit/map.toml.
+
+    Raises nothing: a file that cannot be read has an empty title.
+
+    >>> [campaign.name for campaign in list_campaigns()][:2]
+    ['deorbit', 'deorbit/demonstration']
+    """
     return [ShippedCampaign(name, path, _title(path)) for name, path in sorted(_shipped().items())]
 
 
@@ -39,9 +49,11 @@ def campaign_paths(begun: str) -> list[str]:
     except (OSError, ValueError):
         return []
     before = f"{folder}/" if "/" in begun else ""
-    fitting = [one for one in entries if one.name.startswith(name) and (name or not one.name.startswith("."))]
+    fitting = [entry for entry in entries if entry.name.startswith(name) and (name or not entry.name.startswith("."))]
     return [
-        f"{before}{one.name}{'/' if one.is_dir() else ''}" for one in fitting if one.is_dir() or one.suffix == ".toml"
+        f"{before}{entry.name}{'/' if entry.is_dir() else ''}"
+        for entry in fitting
+        if entry.is_dir() or entry.suffix == ".toml"
     ]
 
 
@@ -52,7 +64,7 @@ def model_sources() -> dict[str, str]:
     """
     from mc_engine.model.record import load_model
 
-    found = {}
+    sources = {}
     for folder in sorted(path.parent for path in SHIPPED.glob("*/campaign.toml")):
         try:
             reference = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8"))["campaign"]["model"]
@@ -60,8 +72,8 @@ def model_sources() -> dict[str, str]:
         except (ModelError, OSError, ValueError, LookupError, TypeError):
             continue
         if source:
-            found[folder.name] = source
-    return found
+            sources[folder.name] = source
+    return sources
 
 
 def find_campaign(reference: str | Path) -> Path:
@@ -75,24 +87,31 @@ def find_campaign(reference: str | Path) -> Path:
         return shipped[text]
     path = Path(text)
     try:
-        found = path / "campaign.toml" if path.is_dir() else path
-        if found.is_file():
-            if (place := str(found.resolve())) != readable(place):
+        file = path / "campaign.toml" if path.is_dir() else path
+        if file.is_file():
+            if (place := str(file.resolve())) != readable(place):
                 raise CampaignError(readable(text), [Problem("", NO_TEXT)])
-            return found
+            return file
     except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
         pass
     raise CampaignError(without_secrets(text), [Problem("", _not_found(text, path, list(shipped)))])
 
 
-def requirement_names(reference: str) -> list[str]:
-    """The requirements of a campaign by their names in its file, for completion; none where there is no such file."""
+def campaign_text(path: Path) -> str:
+    """The contents of a campaign file; CampaignError where it cannot be read, is too large, or is not UTF-8."""
     try:
-        document = tomllib.loads(find_campaign(reference).read_text(encoding="utf-8"))
-    except (CampaignError, OSError, ValueError):
-        return []
-    written = document.get("requirement", {})
-    return list(written) if isinstance(written, dict) else []
+        data = path.read_bytes() if path.stat().st_size <= _LARGEST_FILE else None
+    except OSError as error:
+        raise CampaignError(path.name, [Problem("", f"cannot be read: {error.strerror}")]) from None
+    if data is None:
+        raise CampaignError(
+            path.name, [Problem("", "is larger than 250 kB; a long table of cases belongs into a CSV file")]
+        )
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise CampaignError(path.name, [Problem(f"line {line}", "is not text in UTF-8")]) from None
 
 
 def campaign_name(path: Path) -> str:
@@ -132,21 +151,17 @@ def _is_folder(path: Path) -> bool:
 def _not_found(text: str, path: Path, names: list[str]) -> str:
     if text and _is_folder(path):
         others = [name for name in campaign_paths(f"{text.rstrip('/')}/") if name.endswith(".toml")]
-        found = f", but {others[0]}" if others else "; `mc-engine init DIR` makes a campaign in a new folder"
-        return f"holds no campaign.toml{found}"
+        instead = f", but {others[0]}" if others else "; `mc-engine init DIR` makes a campaign in a new folder"
+        return f"holds no campaign.toml{instead}"
     if path.suffix == ".toml":
         return (
             "there is no such file; `mc-engine list` names the shipped campaigns, `mc-engine init DIR` makes a new one"
         )
     if is_url(text):
         return "is a URL; a campaign is read from a file here"
-    if "/" not in text and not text.startswith("."):
-        near = hint(text, names)
-        known = near if "did you mean" in near else "; `mc-engine list` names the campaigns"
-        return f"there is no campaign of that name, and no such path{known}"
     near = hint(text, names)
-    return (
-        f"there is no such path{near}"
-        if "did you mean" in near
-        else "there is no such path with a campaign.toml; `mc-engine init` makes one"
-    )
+    meant = near if "did you mean" in near else ""
+    if "/" not in text and not text.startswith("."):
+        known = meant or "; `mc-engine list` names the campaigns"
+        return f"there is no campaign of that name, and no such path{known}"
+    return f"there is no such path{meant or ' with a campaign.toml; `mc-engine init` makes one'}"

@@ -1,6 +1,6 @@
-"""The words of a campaign file: its sections, their keys, and the JSON schema of the whole.
+"""The keys of a campaign file: its sections as pydantic models, and their JSON schema.
 
-These classes know nothing of a model; `mc_engine.campaign.loading` holds the file against one.
+These classes do not depend on a model; `mc_engine.campaign.loading` checks a file against one.
 """
 
 import math
@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from mc_engine.model.program import ProgramSection
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.section import ReportSection, Section, Share
 from mc_engine.status import MOST_CASES
@@ -67,7 +68,12 @@ Positive = Annotated[float, Field(gt=0.0, le=LARGEST), AfterValidator(_not_tiny)
 class CampaignSection(Section):
     """[campaign]: which model, which cases."""
 
-    model: str = Field(min_length=1, description='a module such as "campaigns.deorbit", or "model.py" beside this file')
+    model: str | None = Field(
+        default=None, min_length=1, description='a module such as "campaigns.deorbit", or "model.py" beside this file'
+    )
+    simulator: str | None = Field(
+        default=None, min_length=1, description='in place of a model: a module, or "sim.py" beside this file'
+    )
     cases: int | None = Field(default=None, ge=1, le=MOST_CASES, description="number of cases; random designs only")
     design: DesignName = Field(description="how the cases are laid out: mc, lhs, sobol, saltelli, grid, ...")
     seed: int | None = Field(
@@ -371,6 +377,7 @@ class CampaignFile(Section):
     requirement: dict[str, RequirementSection] = Field(default_factory=dict)
     retention: RetentionSection = Field(default_factory=RetentionSection)
     sensitivity: SensitivitySection | None = Field(default=None, description="contributions of the inputs")
+    simulator: ProgramSection | None = Field(default=None, description="a program that flies, in place of a model")
     report: ReportSection = Field(default=ReportSection(), description="probability and confidence of the report")
     tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")
 

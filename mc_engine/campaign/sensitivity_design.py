@@ -1,9 +1,9 @@
-"""The flights beside a run from which the contributions of its inputs are computed: a pick-freeze design.
+"""The section [sensitivity]: a pick-freeze design, flown besides the run, for first-order and total Sobol' indices.
 
-The companion of a campaign is a campaign of its own, whose cases come in blocks (`statistics.pick_freeze`): groups of
-inputs are exchanged between independent points of the campaign's own distributions.  A group is a dispersion, the
-dispersions that a [sensitivity.group] names or that are correlated, the cases of the run upstream, or the random draws:
-the noise made in flight and the parameters that name a draw.
+Its cases form a campaign of their own, the companion, and come in blocks (`statistics.pick_freeze`): groups of inputs
+are exchanged between independent points of the campaign's own distributions.  A group is one dispersion, the
+dispersions that a [sensitivity.group] names or that are correlated, the cases of the upstream run, or the random draws:
+noise made in flight and the parameters that name a draw.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,9 +18,9 @@ from mc_engine.campaign.parts import Correlation, Retention, rank_pairs
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import MOST_CASES, SensitivitySection
 from mc_engine.model.fields import Parameter
-from mc_engine.model.record import Model
-from mc_engine.sampling import correlation
+from mc_engine.model.simulator import Simulator, System
 from mc_engine.sampling.block_layout import RANDOM_DRAWS, BlockLayout
+from mc_engine.sampling.correlation import correlated, gaussian_copula
 from mc_engine.sampling.designs import BY_LEVELS, IN_BLOCKS, sobol_key
 from mc_engine.sampling.distributions import quantiles
 from mc_engine.sampling.sobol import MAX_DIMENSIONS, scrambled_sobol
@@ -56,65 +56,65 @@ class SensitivityDesign:
 
 def check_sensitivity(
     section: SensitivitySection | None,
-    model: Model,
+    model: System,
     dispersions: Sequence[Dispersion],
     correlations: Sequence[Correlation],
     design: str | None,
     upstream: str | None,
-    found: Findings,
+    findings: Findings,
 ) -> SensitivityDesign | None:
     """The design that [sensitivity] asks for, None without one.  upstream : name of the campaign flown before."""
     if section is None:
         return None
     if design in (*BY_LEVELS, *IN_BLOCKS) or (design == "table" and upstream is None):
-        found.add("", f'the design "{design}" draws nothing from distributions; [sensitivity] is for mc, lhs, sobol')
+        findings.add("", f'the design "{design}" draws nothing from distributions; [sensitivity] is for mc, lhs, sobol')
         return None
-    problems = len(found.problems)
-    groups = dict(_groups(section, model, dispersions, correlations, found.under("group")))
+    problems = len(findings.problems)
+    groups = dict(_groups(section, model, dispersions, correlations, findings.under("group")))
     if upstream is not None:
         groups = {f"cases of {upstream}": (), **groups}
     chosen = SensitivityDesign(section.cases, groups)
     if not groups:
-        found.add("", "there is no dispersion whose contribution could be computed")
+        findings.add("", "there is no dispersion whose contribution could be computed")
     elif chosen.flights > MOST_CASES:
-        found.add(
+        findings.add(
             "cases", f"{section.cases} with {len(groups)} groups are {chosen.flights} flights; at most {MOST_CASES}"
         )
-    return chosen if len(found.problems) == problems else None
+    return chosen if len(findings.problems) == problems else None
 
 
 def _groups(
     section: SensitivitySection,
-    model: Model,
+    model: System,
     dispersions: Sequence[Dispersion],
     correlations: Sequence[Correlation],
-    found: Findings,
+    findings: Findings,
 ) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Each group with its dispersions, in the order of the file; the random draws last."""
-    names = [one.name for one in dispersions]
+    names = [dispersion.name for dispersion in dispersions]
     draws = [name for name in names if _names_a_draw(model, name)]
     home = {name: name for name in names}  # the group of each dispersion
     for group, members in section.group.items():
         for name in members:
             if name not in home:
-                found.add(group, f'"{name}" is not dispersed{hint(name, names)}')
+                findings.add(group, f'"{name}" is not dispersed{hint(name, names)}')
             elif name in draws:
-                found.add(group, f'"{name}" names a random draw; it is in the group "{RANDOM_DRAWS}"')
+                findings.add(group, f'"{name}" names a random draw; it is in the group "{RANDOM_DRAWS}"')
             elif home[name] != name:
-                found.add(group, f'"{name}" is in the group "{home[name]}" already')
+                findings.add(group, f'"{name}" is in the group "{home[name]}" already')
             else:
                 home[name] = group
-    for one in correlations:  # inputs that are correlated have no contributions of their own
-        first, second = home[one.first], home[one.second]
+    for pair in correlations:  # inputs that are correlated have no contributions of their own
+        first, second = home[pair.first], home[pair.second]
         joined = f"{first}, {second}" if first != second else first
         home = {name: joined if group in (first, second) else group for name, group in home.items()}
     for group in dict.fromkeys(home[name] for name in names if name not in draws):
         yield group, tuple(name for name in names if home[name] == group)
-    if draws or model.control is not None:
+    if draws or isinstance(model, Simulator) or model.control is not None:  # a simulator may draw by `case.rng`
         yield RANDOM_DRAWS, tuple(draws)
 
 
-def _names_a_draw(model: Model, name: str) -> bool:
+def _names_a_draw(model: System, name: str) -> bool:
     item = model.input(name)
     return isinstance(item, Parameter) and item.random_draw
 
@@ -148,19 +148,19 @@ def companion_table(campaign: "Campaign", case_ids: np.ndarray) -> dict[str, np.
     """The dispersions of cases of a companion, in declared units.  case_ids : int64[n]."""
     layout, block, row = _blocks(campaign, case_ids)
     assert campaign.sensitivity is not None  # a companion has one
-    names = [one.name for one in campaign.dispersions]
+    names = [dispersion.name for dispersion in campaign.dispersions]
     pairs = rank_pairs(campaign.correlations)
-    points = [_point(campaign, names, pairs, k, block) for k in range(len(_POINTS))]
+    points = [_point_columns(campaign, names, pairs, k, block) for k in range(len(_POINTS))]
     table = {}
-    for place, one in enumerate(campaign.dispersions):
-        group = next(name for name, members in campaign.sensitivity.groups.items() if one.name in members)
+    for place, dispersion in enumerate(campaign.dispersions):
+        group = next(name for name, members in campaign.sensitivity.groups.items() if dispersion.name in members)
         u = np.choose(layout.points(group)[row], [columns[place] for columns in points])
-        assert one.distribution is not None  # of a random design
-        table[one.name] = quantiles(one.distribution, u)
+        assert dispersion.distribution is not None  # of a random design
+        table[dispersion.name] = quantiles(dispersion.distribution, u)
     return table
 
 
-def _point(
+def _point_columns(
     campaign: "Campaign", names: Sequence[str], pairs: tuple[tuple[str, str, float], ...], k: int, block: np.ndarray
 ) -> list[np.ndarray]:
     """Uniform numbers of the k-th point of each block, a column a dispersion, correlated as the campaign's.
@@ -174,12 +174,7 @@ def _point(
             columns.append(scrambled_sobol(sobol_key(f"{campaign.seed}/{stream}"), dimension, block))
         else:
             columns.append(uniforms(campaign.seed, stream, block))
-    members, matrix = correlation.group_matrix(names, pairs)
-    if members:
-        mixed = correlation.gaussian_copula([columns[place] for place in members], matrix)
-        for place, column in zip(members, mixed, strict=True):
-            columns[place] = column
-    return columns
+    return correlated(gaussian_copula, columns, names, pairs)
 
 
 def noise_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:

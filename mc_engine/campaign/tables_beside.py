@@ -1,7 +1,7 @@
-"""Tables next to a campaign file: the cases of the design "table", the numbers of "empirical".
+"""Tables in files next to a campaign file: cases of the design "table", numbers of "empirical" distributions.
 
-CSV (comma, first line the names) or Parquet.  Every fault is a sentence with file, line and column.  What is read has
-bounds, so that no file fills the memory: of its size before it is opened, of its cells while it is read.
+CSV (comma, UTF-8, names in the first line) or Parquet.  Every mistake is one sentence with file, row and column.  File
+size and number of cells are limited, so that no file fills the memory.
 """
 
 import csv
@@ -58,15 +58,15 @@ def _read_csv(path: Path) -> dict[str, np.ndarray]:
     with open_beside(path, MOST_CSV_BYTES) as binary:
         lines = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
         try:
-            return _columns(path, csv.reader(lines, strict=True))
+            return _csv_columns(path, csv.reader(lines, strict=True))
         except (UnicodeDecodeError, csv.Error) as error:
             raise FileFault(f'"{path.name}" is not CSV text in UTF-8: {error}') from None
 
 
-def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
-    """The columns, gathered row by row; FileFault where they are more than a table of cases may have."""
+def _csv_columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
+    """The columns of a CSV file; FileFault for a table without names, with ragged rows, or with too many cells."""
     filled = ((line, row) for line, row in enumerate(rows, start=1) if any(cell.strip() for cell in row))
-    names = [_as_meant(cell) for cell in next(filled, (0, []))[1]]
+    names = [_without_guard(cell) for cell in next(filled, (0, []))[1]]
     if not names:
         raise FileFault(f'"{path.name}" is empty')
     _check_names(path, names)
@@ -78,13 +78,13 @@ def _columns(path: Path, rows: Iterator[list[str]]) -> dict[str, np.ndarray]:
         elif len(columns[0]) == most:
             raise FileFault(f'"{path.name}" has more than {MOST_CSV_CELLS:,} cells; a Parquet file may have more')
         for column, cell in zip(columns, row, strict=False):
-            column.append(_as_meant(cell))
+            column.append(_without_guard(cell))
         if len(ragged) > _MOST_LINES:
             break
     if ragged:
-        more = " and more" if len(ragged) > _MOST_LINES else ""
-        told = ", ".join(ragged[:_MOST_LINES])
-        raise FileFault(f'"{path.name}", {told}{more} where {len(names)} columns are named')
+        ending = " and more" if len(ragged) > _MOST_LINES else ""
+        lines = ", ".join(ragged[:_MOST_LINES])
+        raise FileFault(f'"{path.name}", {lines}{ending} where {len(names)} columns are named')
     return {name: np.array(column, dtype=object) for name, column in zip(names, columns, strict=True)}
 
 
@@ -99,10 +99,9 @@ def _check_names(path: Path, names: list[str]) -> None:
 
 
 def csv_text(frame: "pd.DataFrame") -> str:
-    """The table as CSV; text in which a spreadsheet would find a formula is guarded by an apostrophe.
+    """The table as CSV; an apostrophe is put before text that a spreadsheet would evaluate as a formula.
 
-    Numbers stay numbers, with all their digits.  `read_columns` takes the apostrophes away again.
-    OWASP, "CSV Injection".
+    Numbers keep all their digits.  `read_columns` removes the apostrophes.  OWASP, "CSV Injection".
     """
     words = {name: frame[name].map(_without_formula) for name in frame.select_dtypes(exclude=["number", "bool"])}
     guarded = frame.assign(**words).rename(columns=_without_formula)
@@ -121,23 +120,25 @@ def _is_guarded(cell: str) -> bool:
     return cell.startswith(_GUARD) and cell.lstrip(_GUARD).startswith(_FORMULA)
 
 
-def _as_meant(cell: str) -> str:
+def _without_guard(cell: str) -> str:
     cell = cell.strip()
     return cell[1:] if _is_guarded(cell) else cell
 
 
 def numbers(path: Path, name: str, cells: np.ndarray) -> np.ndarray:
     """float64[n]: the cells as finite numbers."""
-    values = cells.astype(np.float64) if cells.dtype.kind in "fiu" else np.array([_number(cell) for cell in cells])
+    values = (
+        cells.astype(np.float64) if cells.dtype.kind in "fiu" else np.array([_number_or_nan(cell) for cell in cells])
+    )
     wrong = np.flatnonzero(~(np.abs(values) <= LARGEST))
     if wrong.size:
         row = wrong[0]
-        what = f"is beyond {LARGEST:g}" if np.isfinite(values[row]) else "is not a finite number"
-        raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{str(cells[row])[:_LONGEST_NAME]}" {what}')
+        fault = f"is beyond {LARGEST:g}" if np.isfinite(values[row]) else "is not a finite number"
+        raise FileFault(f'"{path.name}", row {row + 1}, column "{name}": "{str(cells[row])[:_LONGEST_NAME]}" {fault}')
     return values
 
 
-def _number(cell: Any) -> float:
+def _number_or_nan(cell: Any) -> float:
     """A cell as a number; NaN for one that is none."""
     known = is_real(cell) if isinstance(cell, str) else type(cell) is not bool and isinstance(cell, _NUMBERS)
     return float(cell) if known else math.nan

@@ -1,13 +1,14 @@
-"""The tuning of a campaign, checked against its model: what may be chosen, what for, and within which limits."""
+"""The section [tuning], checked against the model: parameters to be chosen, objectives, constraints."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from mc_engine.campaign.inputs import check_value, inputs_of, number
+from mc_engine.campaign.parts import check_limits, check_metric
 from mc_engine.campaign.reading import Findings, TuningSections
-from mc_engine.campaign.sections import ConstraintSection, ObjectiveSection, TunedSection
+from mc_engine.campaign.sections import ConstraintSection, ObjectiveSection, PublishedPointSection, TunedSection
 from mc_engine.model.fields import Setting
-from mc_engine.model.record import Model
+from mc_engine.model.simulator import System
 from mc_engine.sampling.designs import RANDOM
 from mc_engine.suggestions import hint, listed
 
@@ -15,53 +16,30 @@ from mc_engine.suggestions import hint, listed
 OWN_COLUMNS = ("generation", "candidate", "violation", "feasible", "failed_cases", "commonest_failure")
 
 
-@dataclass(frozen=True)
-class Tuned:
+class Tuned(TunedSection):
     """A parameter that may be chosen between lower and upper, in its declared unit."""
 
     name: str
-    lower: float
-    upper: float
-    source: str = ""
 
 
-@dataclass(frozen=True)
-class Objective:
+class Objective(ObjectiveSection):
     """A metric to minimise or maximise: of the nominal case, or this quantile over the dispersed ones."""
 
     name: str
-    metric: str
-    goal: str
-    quantile: float | None = None
 
     @property
     def large_is_bad(self) -> bool:
         return self.goal == "minimise"
 
 
-@dataclass(frozen=True)
-class Constraint:
-    """Limits on a metric of the nominal case, or on this quantile over the dispersed ones.  A limit may be None."""
+class Constraint(ConstraintSection):
+    """Limits on a metric of the nominal case, or on this quantile over the dispersed ones."""
 
     name: str
-    metric: str
-    at_most: float | None
-    at_least: float | None
-    quantile: float | None = None
-    source: str = ""
 
     @property
     def large_is_bad(self) -> bool:
         return self.at_most is not None
-
-
-@dataclass(frozen=True)
-class PublishedPoint:
-    """A point to draw beside the front; values by objective."""
-
-    name: str
-    values: Mapping[str, float]
-    source: str = ""
 
 
 @dataclass(frozen=True)
@@ -71,7 +49,7 @@ class Tuning:
     parameters: tuple[Tuned, ...]
     objectives: tuple[Objective, ...]
     constraints: tuple[Constraint, ...]
-    published: tuple[PublishedPoint, ...]
+    published: tuple[PublishedPointSection, ...]
     population: int
     generations: int
     patience: int | None
@@ -87,57 +65,55 @@ class Tuning:
     @property
     def nominal(self) -> bool:
         """Whether the nominal case of a candidate is looked at."""
-        return any(one.quantile is None for one in self.measures)
+        return any(measure.quantile is None for measure in self.measures)
 
     @property
     def robust(self) -> bool:
         """Whether the dispersed cases of a candidate are looked at."""
-        return any(one.quantile is not None for one in self.measures)
+        return any(measure.quantile is not None for measure in self.measures)
 
 
 def check_tuning(
-    sections: TuningSections, model: Model, dispersed: Iterable[str], design: str | None, found: Findings
+    sections: TuningSections, model: System, dispersed: Iterable[str], design: str | None, findings: Findings
 ) -> Tuning | None:
-    """The tuning, or None if its plain keys could not be read; what is wrong is noted."""
+    """The tuning, or None if its plain keys could not be read; problems are noted in `findings`."""
     dispersed = list(dispersed)
     for kind, entries in (("parameter", sections.parameters), ("objective", sections.objectives)):
-        if not entries and not any(one.place.startswith(f"{found.place}.{kind}") for one in found.problems):
-            found.add("", f"has no {kind}; [tuning.{kind}.NAME] adds one")
+        if not entries and not any(
+            problem.place.startswith(f"{findings.place}.{kind}") for problem in findings.problems
+        ):
+            findings.add("", f"has no {kind}; [tuning.{kind}.NAME] adds one")
     for name, tuned in sections.parameters.items():
-        _check_tuned(name, tuned, model, dispersed, found.under("parameter", name))
+        _check_tuned(name, tuned, model, dispersed, findings.under("parameter", name))
     for name, objective in sections.objectives.items():
-        _check_measured(objective, model, dispersed, design, found.under("objective", name))
+        _check_measured(objective, model, dispersed, design, findings.under("objective", name))
     for name, constraint in sections.constraints.items():
-        _check_measured(constraint, model, dispersed, design, found.under("constraint", name))
-        _check_limits(constraint, found.under("constraint", name))
-    _check_names(sections, found)
+        _check_measured(constraint, model, dispersed, design, findings.under("constraint", name))
+        check_limits(constraint, findings.under("constraint", name))
+        if constraint.quantile is not None and constraint.at_most is not None and constraint.at_least is not None:
+            message = "one quantile cannot keep two limits; make two constraints of it"
+            findings.under("constraint", name).add("quantile", message)
+    _check_names(sections, findings)
     for place, point in sections.published.items():
-        _check_values(point.values, sections.objective_names, found.under(place, "values"))
+        _check_values(point.values, sections.objective_names, findings.under(place, "values"))
     head = sections.head
     if head is None:
         return None
+    tables = {"parameter", "objective", "constraint", "published"}
     return Tuning(
-        parameters=tuple(Tuned(name, one.lower, one.upper, one.source) for name, one in sections.parameters.items()),
-        objectives=tuple(
-            Objective(name, one.metric, one.goal, one.quantile) for name, one in sections.objectives.items()
-        ),
+        parameters=tuple(Tuned(name=name, **section.model_dump()) for name, section in sections.parameters.items()),
+        objectives=tuple(Objective(name=name, **section.model_dump()) for name, section in sections.objectives.items()),
         constraints=tuple(
-            Constraint(name, one.metric, one.at_most, one.at_least, one.quantile, one.source)
-            for name, one in sections.constraints.items()
+            Constraint(name=name, **section.model_dump()) for name, section in sections.constraints.items()
         ),
-        published=tuple(PublishedPoint(one.name, one.values, one.source) for one in sections.published.values()),
-        population=head.population,
-        generations=head.generations,
-        patience=head.patience,
-        seed=head.seed,
-        crossover=head.crossover,
-        mutation=head.mutation,
+        published=tuple(sections.published.values()),
+        **head.model_dump(exclude=tables),
     )
 
 
-def _check_names(sections: TuningSections, found: Findings) -> None:
-    """Each names a column of the same tables."""
-    taken = dict.fromkeys(OWN_COLUMNS, "a column of every tuning")
+def _check_names(sections: TuningSections, findings: Findings) -> None:
+    """Parameters, objectives and constraints are columns of the same tables, so that their names must differ."""
+    owners = dict.fromkeys(OWN_COLUMNS, "a column of every tuning")
     kinds: dict[str, Mapping[str, object]] = {
         "parameter": sections.parameters,
         "objective": sections.objectives,
@@ -145,63 +121,52 @@ def _check_names(sections: TuningSections, found: Findings) -> None:
     }
     for kind, entries in kinds.items():
         for name in entries:
-            if name in taken:
-                found.under(kind, name).add("", f"is the name of {taken[name]} already; choose another")
-            taken.setdefault(name, f"a{'n' if kind == 'objective' else ''} {kind}")
+            if name in owners:
+                findings.under(kind, name).add("", f"is the name of {owners[name]} already; choose another")
+            owners.setdefault(name, f"a{'n' if kind == 'objective' else ''} {kind}")
 
 
-def _check_tuned(name: str, section: TunedSection, model: Model, dispersed: list[str], found: Findings) -> None:
+def _check_tuned(name: str, section: TunedSection, model: System, dispersed: list[str], findings: Findings) -> None:
     item = inputs_of(model).get(name)
     if item is None:
-        found.add("", f"is not a parameter of {model.name}{hint(name, [one.name for one in model.parameters])}")
+        findings.add(
+            "", f"is not a parameter of {model.name}{hint(name, [parameter.name for parameter in model.parameters])}"
+        )
         return
     if isinstance(item, Setting):
-        found.add("", "is a setting, which all cases of a batch share; only parameters can be tuned")
+        findings.add("", "is a setting, which all cases of a batch share; only parameters can be tuned")
         return
     if name in dispersed:
-        found.add("", "is dispersed as well; a parameter is chosen or dispersed, not both")
+        findings.add("", "is dispersed as well; a parameter is chosen or dispersed, not both")
     for key, value in (("lower", section.lower), ("upper", section.upper)):
-        check_value(value, item, found, key)
+        check_value(value, item, findings, key)
     if section.lower >= section.upper:
-        found.add("lower", f"{number(section.lower)} is not below upper = {number(section.upper)}")
+        findings.add("lower", f"{number(section.lower)} is not below upper = {number(section.upper)}")
 
 
 def _check_measured(
     section: ObjectiveSection | ConstraintSection,
-    model: Model,
+    model: System,
     dispersed: list[str],
     design: str | None,
-    found: Findings,
+    findings: Findings,
 ) -> None:
-    names = [one.name for one in model.metrics]
-    if section.metric not in names:
-        found.add("metric", f'"{section.metric}" is not a metric of {model.name}{hint(section.metric, names)}')
+    check_metric(section.metric, model, findings)
     if section.quantile is None:
         return
     if not dispersed:
-        found.add(
+        findings.add(
             "quantile", "is over dispersed cases, and nothing is dispersed; add [dispersion.NAME] or leave it out"
         )
     elif design is not None and design not in RANDOM:
-        found.add("quantile", f'the design "{design}" draws no cases at random; quantiles are for {listed(RANDOM)}')
+        findings.add("quantile", f'the design "{design}" draws no cases at random; quantiles are for {listed(RANDOM)}')
 
 
-def _check_limits(section: ConstraintSection, found: Findings) -> None:
-    low, high = section.at_least, section.at_most
-    if low is None and high is None:
-        found.add("", "has no limit; give at_most, at_least or both")
-    elif low is not None and high is not None:
-        if low > high:
-            found.add("at_least", f"{number(low)} is above at_most = {number(high)}")
-        if section.quantile is not None:
-            found.add("quantile", "one quantile cannot keep two limits; make two constraints of it")
-
-
-def _check_values(values: Mapping[str, float], objectives: Iterable[str], found: Findings) -> None:
+def _check_values(values: Mapping[str, float], objectives: Iterable[str], findings: Findings) -> None:
     objectives = list(objectives)
     for name in values:
         if name not in objectives:
-            found.add(name, f"is not an objective{hint(name, objectives)}")
+            findings.add(name, f"is not an objective{hint(name, objectives)}")
     for name in objectives:
         if name not in values:
-            found.add(name, "is missing: a point needs a number for every objective")
+            findings.add(name, "is missing: a point needs a number for every objective")

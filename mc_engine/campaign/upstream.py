@@ -1,7 +1,8 @@
-"""The run that a campaign takes inputs from: a chain, in which the end of one flight is the start of the next.
+"""The upstream run of a chain: the run whose results are the inputs of this campaign, case by case.
 
 Case i of the campaign takes its inputs from case i upstream, and its row keeps all columns of that case.  A run
-directory holds a copy of what was taken, so that it can be resumed and replayed by itself.
+directory keeps a copy of the upstream rows (upstream.parquet), so that it can be resumed and replayed without the
+upstream run.
 """
 
 import json
@@ -23,7 +24,7 @@ from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import InputsSection
 from mc_engine.durable_file import read_file
 from mc_engine.errors import StoreError
-from mc_engine.model.record import Model
+from mc_engine.model.simulator import System
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
@@ -41,7 +42,7 @@ _OURS = {column.name for column in CASE_COLUMNS}
 
 @dataclass(frozen=True)
 class Rows:
-    """The cases of a run as they stand in its store; `facts` say which run it was."""
+    """The case table of a run, with `facts` that identify the run."""
 
     facts: Mapping[str, Any]
     columns: tuple[Column, ...]
@@ -55,20 +56,22 @@ class Rows:
 
     @cached_property
     def content(self) -> bytes:
-        """A Parquet file of all this: what a run directory keeps, and what digests are taken of."""
+        """A Parquet file of table and facts: what a run directory keeps, and what the digest is computed from."""
         table = arrow_table(self.columns, self.table, self.n_cases, Path(COMPANION))
-        more = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
-        return parquet_bytes(table.replace_schema_metadata({_FACTS: json.dumps(more, sort_keys=True, default=float)}))
+        metadata = {**self.facts, "nominal": self.nominal, "columns": [asdict(column) for column in self.columns]}
+        return parquet_bytes(
+            table.replace_schema_metadata({_FACTS: json.dumps(metadata, sort_keys=True, default=float)})
+        )
 
 
 @dataclass(frozen=True)
 class Upstream:
-    """What a campaign takes from a run.
+    """What a campaign takes from an upstream run.
 
-    links : input of the model -> column that it takes its values from.  columns : what every row of the campaign
-    keeps, under names that its own columns leave free.  names : a column upstream -> its name here.
-    table : their values, and those of the linked inputs in the units of the model.  nominal : the linked inputs of
-    the nominal case.  failed : bool[n], cases that did not fly to their end.
+    links : input of the model to the upstream column that it takes its values from.  columns : upstream columns that
+        every row of the campaign keeps, under names that its own columns do not use.  names : upstream column to its
+        name here. table : their values, and those of the linked inputs in the model's units.  nominal : the linked
+        inputs of the nominal case.  failed : bool[n], upstream cases that did not complete.
     """
 
     rows: Rows
@@ -90,12 +93,12 @@ class Upstream:
         return sha256(self.rows.content).hexdigest()
 
     def nominal_row(self) -> dict[str, Any]:
-        """What the row of the nominal case keeps: the nominal case upstream, and the linked inputs."""
+        """The upstream columns of the nominal case: the nominal case upstream, and the linked inputs."""
         names = {self.names[column.name]: column.name for column in self.rows.columns if column.name in self.names}
         return {**{name: self.rows.nominal[column] for name, column in names.items()}, **self.nominal}
 
     def refusals(self, case_ids: np.ndarray) -> np.ndarray:
-        """object[n]: why a case has nothing to start from, empty where it has."""
+        """object[n] of str: why a case cannot start, because its upstream case failed; empty where it can."""
         words = self.rows.table["status"][case_ids]
         return np.where(self.failed[case_ids], f"its case of {self.name} ended as " + words.astype(object), "")
 
@@ -135,15 +138,15 @@ def _rows_of_copy(path: Path) -> Rows:
 
 
 def _copy_problem(table: pa.Table, columns: tuple[Column, ...], nominal: Mapping[str, Any]) -> str:
-    """What no engine writes into a copy; empty if every column is there, of its kind, and no value is missing."""
-    if not table.schema.equals(arrow_schema(columns)) or any(one.null_count for one in table.columns):
+    """Why the engine cannot have written a copy; empty if every column is there, with its type and no missing value."""
+    if not table.schema.equals(arrow_schema(columns)) or any(column.null_count for column in table.columns):
         return "its columns are not those that it names, or have missing values"
     if not np.array_equal(table["case_id"].to_numpy(), np.arange(table.num_rows)):
         return "its case_id does not count from 0"
     if not {*pc.unique(table["status"]).to_pylist()} <= {*STATUS_NAME.values()}:
         return "it has a status that there is not"
     kinds = {"number": (int, float), "integer": (int,), "word": (str,), "switch": (bool,)}
-    if table.num_rows and not all(type(nominal.get(one.name)) in kinds[one.kind] for one in columns):
+    if table.num_rows and not all(type(nominal.get(column.name)) in kinds[column.kind] for column in columns):
         return "its nominal case has not a value of the right kind for every column"
     return ""
 
@@ -161,15 +164,15 @@ def find_run(reference: str, directory: Path) -> Path | None:
         return None
 
 
-def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str], found: Findings) -> Upstream:
-    """Hold the rows against the model; what does not fit is noted.
+def link(rows: Rows, section: InputsSection, model: System, own_columns: Iterable[str], findings: Findings) -> Upstream:
+    """The upstream rows matched with the model's inputs; problems are noted.
 
-    taken : names that the campaign's own table has, beside those of the inputs.
+    own_columns : names of the campaign's own columns, besides those of the inputs.
     """
     upstream = {column.name: column for column in rows.columns}
-    links = _links(upstream, section, model, found)
+    links = _links(upstream, section, model, findings)
     if rows.n_cases and rows.nominal.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]:
-        found.add("from", f"the nominal case of that run ended as {rows.nominal['status']}; choose one that flies")
+        findings.add("from", f"the nominal case of that run ended as {rows.nominal['status']}; choose one that flies")
     failed = np.asarray(rows.table["status"] != STATUS_NAME[OK], dtype=bool)
     table: dict[str, np.ndarray] = {}
     nominal: dict[str, Scalar] = {}
@@ -181,11 +184,11 @@ def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str],
         nominal[name] = float(convert(float(rows.nominal[column]), unit, item.unit))
     kept = [input_column(inputs[name]) for name in links]
     names: dict[str, str] = {}
-    used = {*taken, *_OURS, *inputs}
+    used = {*own_columns, *_OURS, *inputs}
     for column_ in rows.columns:
         if column_.name == "case_id" or links.get(column_.name) == column_.name:
             continue
-        name = column_.name if column_.name not in used else f"{_word(rows.facts['name'])}_{column_.name}"
+        name = column_.name if column_.name not in used else f"{_identifier(rows.facts['name'])}_{column_.name}"
         role = "dispersion" if column_.role == "dispersion" else "upstream"
         description = f"{rows.facts['name']}: {column_.description}"
         names[column_.name] = name
@@ -194,27 +197,29 @@ def link(rows: Rows, section: InputsSection, model: Model, taken: Iterable[str],
     return Upstream(rows, links, tuple(kept), names, table, nominal, failed)
 
 
-def _word(name: str) -> str:
+def _identifier(name: str) -> str:
     return re.sub(r"\W+", "_", name)
 
 
-def _links(upstream: Mapping[str, Column], section: InputsSection, model: Model, found: Findings) -> dict[str, str]:
+def _links(upstream: Mapping[str, Column], section: InputsSection, model: System, findings: Findings) -> dict[str, str]:
     """Input -> column: those of [inputs.columns], and inputs that have the name of a result upstream."""
-    spot = found.under("columns")
+    section_findings = findings.under("columns")
     parameters = {item.name: item for item in model.parameters}
     results = [name for name, column in upstream.items() if column.role in ("metric", "state")]
     links = {name: name for name in results if name in parameters}
     for name, column in section.columns.items():
         if name not in parameters:
-            spot.add(name, f"is not a parameter of {model.name}{hint(name, parameters)}")
+            section_findings.add(name, f"is not a parameter of {model.name}{hint(name, parameters)}")
         elif column not in upstream or upstream[column].kind != "number":
-            spot.add(name, f'"{column}" is no column of numbers of that run{hint(column, results)}')
+            section_findings.add(name, f'"{column}" is no column of numbers of that run{hint(column, results)}')
         elif upstream[column].unit not in compatible(parameters[name].unit):
-            spot.add(name, f'"{column}" is in {upstream[column].unit}, which does not fit {parameters[name].unit}')
+            section_findings.add(
+                name, f'"{column}" is in {upstream[column].unit}, which does not fit {parameters[name].unit}'
+            )
         else:
             links[name] = column
     if not links and not section.columns:
-        found.add(
+        findings.add(
             "", f"no result of that run has the name of a parameter of {model.name}; name them in [inputs.columns]"
         )
     return links

@@ -1,13 +1,14 @@
-"""The commands that read a run: report, status, verify."""
+"""The commands on a run that is there: report, status, summary, verify, export, publish, fetch."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from mc_engine.command_line.app import (
     DAMAGED,
     USAGE,
+    RunFolder,
     RunPlace,
     app,
     beginning,
@@ -15,15 +16,24 @@ from mc_engine.command_line.app import (
     existing_run,
     exit_status,
     leave,
+    new_file,
+    object_store,
     ranges,
     run_at,
     write_reports,
 )
-from mc_engine.command_line.object_stores import echo_publication
 from mc_engine.interruption import advise
 from mc_engine.shell_words import shell_word
+from mc_engine.store.urls import is_url, store_url
+from mc_engine.suggestions import hint
+
+if TYPE_CHECKING:
+    from mc_engine.store.store import Store
 
 REPORT_FORMATS = ("html", "pdf", "md", "json")
+EXPORT_FORMATS = ("csv", "oem")
+_OEM_COLUMNS = 6
+Url = Annotated[str, typer.Argument(metavar="URL", help="Such as s3://bucket/runs/deorbit.", parser=object_store)]
 
 
 @app.command()
@@ -59,10 +69,10 @@ def report(
         if folder != Path(named):
             published[folder] = named
         paths.append(existing_run(folder).path if kind_of(folder) in (RUN, None) else folder)
-    more: dict[str, Any] = {} if template is None else {"template": template, "beside": paths}
+    options: dict[str, Any] = {} if template is None else {"template": template, "beside": paths}
     for path in paths:
-        for written in write_reports(path, ("html", "pdf") if kind is None else (kind,), **more):
-            typer.echo(f"{published[path]}/{written.name}" if path in published else str(written))
+        for file in write_reports(path, ("html", "pdf") if kind is None else (kind,), **options):
+            typer.echo(f"{published[path]}/{file.name}" if path in published else str(file))
         if path in published:
             echo_publication(path, published[path])
 
@@ -74,20 +84,19 @@ def status(place: RunPlace) -> None:
     from mc_engine.runner.summary import case_line
     from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
     from mc_engine.store.writer_lock import described, holder
-    from mc_engine.studies.rare_event_folder import open_rare_event
-    from mc_engine.studies.rare_event_lines import outcome_lines as rare_lines
-    from mc_engine.studies.tuning_folder import open_tuning, outcome_lines
+    from mc_engine.studies.rare_event_folder import open_rare_event, rare_event_lines
+    from mc_engine.studies.tuning_folder import open_tuning, tuning_lines
 
     folder = run_at(place)
     if kind_of(folder) == TUNING:
         record = open_tuning(folder)
         typer.echo(f"tuning       {place}\ncampaign     {record.manifest['campaign']['name']}")
-        typer.echo("\n".join(outcome_lines(record)))
+        typer.echo("\n".join(tuning_lines(record)))
         return
     if kind_of(folder) == RARE_EVENT:
         estimate = open_rare_event(folder)
         typer.echo(f"rare event   {place}\ncampaign     {estimate.record['campaign']['name']}")
-        typer.echo("\n".join(rare_lines(estimate.result)))
+        typer.echo("\n".join(rare_event_lines(estimate.result)))
         return
     store = existing_run(folder)
     typer.echo(f"run       {place}")
@@ -113,6 +122,7 @@ def summary(
 ) -> None:
     """Moments and quantiles of the metrics of a run of any size, read part by part."""
     from mc_engine.runner.summary import summaries, summary_lines
+    from mc_engine.section import ReportSection
     from mc_engine.statistics import SAMPLING_DESIGNS
 
     store = existing_run(run_at(place))
@@ -121,10 +131,11 @@ def summary(
         if name not in known:
             leave(USAGE, f'--metric "{name}" is no metric of this run; it has {", ".join(known) or "none"}')
     random = store.manifest["campaign"].get("design", "mc") in SAMPLING_DESIGNS
-    for name, found in summaries(store, metric or None).items():
-        typer.echo("\n".join(summary_lines(name, found, store.units[name], random)))
+    for name, statistics in summaries(store, metric or None).items():
+        typer.echo("\n".join(summary_lines(name, statistics, store.units[name], random)))
     if random:
-        typer.echo("in brackets: distribution-free limits, each holding with 95 % for independent cases")
+        each = 100.0 * ReportSection(**store.manifest.get("report", {})).confidence
+        typer.echo(f"in brackets: distribution-free limits, each holding with {each:.6g} % for independent cases")
 
 
 @app.command()
@@ -137,10 +148,110 @@ def verify(place: RunPlace) -> None:
     folder = run_at(place)
     if kind_of(folder) is None:
         existing_run(folder)
-    found = damages(folder)
-    problems = [one for one in found if one.mended_by != RESUME]
-    for one in found:
-        typer.echo(f"{place}/{one.what}" + f"; {RESUME}" * (one.mended_by == RESUME), err=True)
+    items = damages(folder)
+    problems = [item for item in items if item.mended_by != RESUME]
+    for item in items:
+        typer.echo(f"{place}/{item.what}" + f"; {RESUME}" * (item.mended_by == RESUME), err=True)
     if problems:
         leave(DAMAGED, f"{place}: {counted(problems, 'problem')}; {'; '.join(remedies(place, problems))}")
     typer.echo(f"{place}: every byte is as it was written")
+
+
+@app.command()
+@exit_status()
+def export(
+    place: RunPlace,
+    kind: Annotated[
+        str,
+        typer.Option(
+            "--format",
+            help="csv, or oem (CCSDS ephemerides, a point a case).",
+            autocompletion=beginning(EXPORT_FORMATS),
+        ),
+    ] = "csv",
+    columns: Annotated[
+        str | None,
+        typer.Option(help="Columns with commas between; for oem those of x, y, z and their rates."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Where to write; by default end_states.csv or .oem in RUN.", parser=new_file),
+    ] = None,
+    epoch: Annotated[
+        str | None, typer.Option(help="For oem: start of the flights in UTC; by default the setting epoch_utc.")
+    ] = None,
+    frame: Annotated[str | None, typer.Option(help="For oem: reference frame of the columns, such as EME2000.")] = None,
+    centre: Annotated[str, typer.Option(help="For oem: the body at the origin.")] = "EARTH",
+) -> None:
+    """Write where the cases ended, for other tools."""
+    if kind not in EXPORT_FORMATS:
+        leave(USAGE, f'--format "{kind}" is not known; {" or ".join(EXPORT_FORMATS)}')
+    if out is None and is_url(place):
+        leave(USAGE, f"--out is missing: {store_url(place)} is a URL; name a file here")
+    store = existing_run(run_at(place))
+    path = out if out is not None else store.path / f"end_states.{kind}"
+    if not path.parent.is_dir():
+        leave(USAGE, f"--out {path}: there is no folder {path.parent}")
+    from mc_engine.studies.end_states import end_columns, write_csv
+
+    names = [name.strip() for name in columns.split(",")] if columns else end_columns(store)
+    for name in names:
+        if name not in store.units:
+            leave(USAGE, f'--columns: there is no column "{name}"{hint(name, store.units)}')
+    if kind == "csv":
+        typer.echo(f"{path}: {write_csv(store, names, path):,} cases")
+        return
+    _write_oem(store, names if columns else [], path, epoch, frame, centre)
+
+
+def _write_oem(store: "Store", names: list[str], path: Path, epoch: str | None, frame: str | None, centre: str) -> None:
+    from mc_engine.errors import StoreError
+    from mc_engine.studies.end_states import write_oem
+
+    if len(names) != _OEM_COLUMNS:
+        leave(USAGE, f"--columns: {len(names)} given; an OEM needs the six of x, y, z and their rates")
+    if frame is None:
+        leave(USAGE, "--frame is missing: the reference frame of the columns, such as EME2000 or ICRF")
+    start = epoch or _epoch_of(store)
+    if start is None:
+        leave(USAGE, "--epoch is missing: the start of the flights in UTC, such as 2026-01-31T12:00:00")
+    try:
+        written, cases = write_oem(store, names, path, start, frame, centre)
+    except StoreError as error:
+        leave(USAGE, str(error))
+    typer.echo(f"{path}: {written:,} of {cases:,} cases, those that completed")
+
+
+def _epoch_of(store: "Store") -> str | None:
+    """The campaign's epoch, if its model has the setting epoch_utc."""
+    records: list[dict[str, Any]] = store.manifest.get("settings", [])
+    return next((str(record["value"]) for record in records if record["name"] == "epoch_utc"), None)
+
+
+@app.command()
+@exit_status()
+def publish(folder: RunFolder, url: Url) -> None:
+    """Copy a run to an object store; only what is missing there or differs travels (needs fsspec, s3fs)."""
+    advise(lambda: f"interrupted; `mc-engine publish {shell_word(folder)} {shell_word(url)}` sends the rest")
+    existing_run(folder)
+    echo_publication(folder, url)
+
+
+def echo_publication(folder: Path, url: str) -> None:
+    """Publish the run, and print what was sent."""
+    from mc_engine.store.object_store import publish
+
+    done = publish(folder, url)
+    files = counted(done.sent, "file")
+    typer.echo(f"published    {done.url}: {files}, {done.sent_bytes:,} bytes; {done.kept} were there")
+
+
+@app.command()
+@exit_status()
+def fetch(
+    url: Url, folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the copy is to be.", parser=new_file)]
+) -> None:
+    """Copy a run from an object store to a new directory; the checksum of every part is verified."""
+    from mc_engine.store.object_store import fetch
+
+    typer.echo(f"run          {fetch(url, folder)}")

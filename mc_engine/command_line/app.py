@@ -1,8 +1,8 @@
-"""What all commands of the command line share: the application, exit statuses, kinds of arguments.
+"""The application of the command line, and what its commands share: exit statuses, arguments, checks of paths.
 
-Exit status: 0 done, 1 a requirement is not met (`run --judge`), 2 usage or campaign file, 3 more failed cases than
-allowed (`run --max-failed`), 4 interrupted or the disk full, and resumable, 5 store damaged or busy, 6 an error that
-nobody foresaw, or too little memory: a sentence, and a log file with the traceback.
+Exit status: 0 done, 1 a requirement is not met (`run --judge`), 2 wrong usage or campaign, 3 more failed cases than
+allowed (`run --max-failed`), 4 interrupted or disk full, and resumable, 5 directory damaged or busy, 6 unexpected error
+or too little memory, with a log file.
 """
 
 import errno
@@ -20,7 +20,7 @@ import typer
 from typer.core import TyperGroup
 
 from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError
-from mc_engine.interruption import INTERRUPTED, last_words, under_way
+from mc_engine.interruption import INTERRUPTED, interruption_message, under_way
 from mc_engine.numbers_in_text import LARGEST_WHOLE, is_real, is_whole
 from mc_engine.shell_words import shell_word
 from mc_engine.store.run_folder import NO_TEXT, readable
@@ -34,7 +34,7 @@ NOT_MET, USAGE, TOO_MANY_FAILED, DAMAGED = 1, 2, 3, 5  # and INTERRUPTED, 4
 
 
 class _Commands(TyperGroup):
-    """The commands, whose options take numbers as people write them, and no other."""
+    """The commands; their options accept numbers only in the syntax of `numbers_in_text`."""
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         command = super().get_command(ctx, cmd_name)
@@ -60,19 +60,19 @@ app = typer.Typer(
     epilog="Exit status: 0 done, 1 a requirement not met, 2 wrong usage or campaign, 3 too many failed cases, "
     "4 interrupted or disk full, 5 damaged or busy directory, 6 unforeseen error or too little memory.",
     no_args_is_help=True,
-    rich_markup_mode=None,  # plain help: rich's would take twice as long to load as all else
+    rich_markup_mode=None,  # plain help: importing rich takes longer than all the rest
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 120},
 )
 
 
 def beginning(words: Iterable[str]) -> Callable[[str], list[str]]:
-    """What the shell offers of these words."""
+    """Shell completion from these words."""
     return lambda incomplete: [word for word in words if word.startswith(incomplete)]
 
 
 def campaigns_beginning(incomplete: str) -> list[str]:
-    """What the shell offers for a campaign: shipped names, folders with a campaign, and .toml files."""
+    """Shell completion of a campaign: shipped names, folders with a campaign, and .toml files."""
     from mc_engine.campaign.search import campaign_names, campaign_paths
 
     return [name for name in (*campaign_names(), *campaign_paths(incomplete)) if name.startswith(incomplete)]
@@ -88,7 +88,7 @@ CampaignFile = Annotated[
 ]
 
 
-# `parser=` of an argument or option gets the text before it becomes a Path, which mangles a URL.
+# Parsers of arguments: they get the text before it becomes a Path, which would change a URL.
 def object_store(text: str) -> str:
     try:
         return store_url(text)
@@ -99,7 +99,7 @@ def object_store(text: str) -> str:
 def _on_disk(text: str, instead: str) -> Path:
     if is_url(text):
         url = object_store(text)
-        leave(USAGE, f"{url}: is a URL, and what is wanted here lies on a disk; {instead.format(shell_word(url))}")
+        leave(USAGE, f"{url}: is a URL, and a local path is needed here; {instead.format(shell_word(url))}")
     if text != readable(text):
         leave(USAGE, f"{readable(text)}: {NO_TEXT}")
     return Path(text)
@@ -156,18 +156,18 @@ NoReport = Annotated[bool, typer.Option("--no-report", help="Leave the reports o
 
 @contextmanager
 def exit_status() -> Iterator[None]:
-    """Turn what the engine raises on purpose into its sentence on stderr and an exit status."""
+    """Turn every error into a message on standard error and an exit status."""
     try:
         with under_way():
             yield
-    except (RunInterrupted, DiskError) as error:  # a disk may have room again
+    except (RunInterrupted, DiskError) as error:  # both can be resumed
         leave(INTERRUPTED, str(error))
     except StoreError as error:
         leave(DAMAGED, str(error))
     except EngineError as error:  # of the campaign, the model, or a package that is missing
         leave(USAGE, str(error))
     except KeyboardInterrupt:
-        leave(INTERRUPTED, last_words())
+        leave(INTERRUPTED, interruption_message())
     except OSError as error:
         if error.errno == errno.ENOMEM:
             leave(UNFORESEEN, unforeseen(error))
@@ -175,7 +175,7 @@ def exit_status() -> Iterator[None]:
         leave(INTERRUPTED if full else USAGE, f"{error.filename}: {error.strerror}" if error.filename else str(error))
     except (typer.Exit, typer.Abort, typer.BadParameter, SystemExit):
         raise
-    except BaseException as error:  # a panic of a library in Rust is no Exception
+    except BaseException as error:  # a panic of a Rust library is no Exception
         leave(UNFORESEEN, unforeseen(error))
 
 
@@ -185,7 +185,7 @@ def leave(status: int, message: str) -> NoReturn:
 
 
 def existing_run(path: Path) -> "Store":
-    """The run in `path`; a path that never was a run is a slip of the user's, not damage."""
+    """The run in `path`.  A path that is no run directory is wrong usage, not damage."""
     from mc_engine.store.opening import open_store
     from mc_engine.store.run_files import is_run_directory
 
@@ -196,7 +196,7 @@ def existing_run(path: Path) -> "Store":
 
 
 def _no_run(path: Path) -> str:
-    """What is wrong with a path where a run directory is wanted, and what to do."""
+    """Why a path is no run directory, and what to do."""
     from mc_engine.campaign.search import campaign_names
     from mc_engine.store.run_folder import runs_in
 
@@ -210,7 +210,7 @@ def _no_run(path: Path) -> str:
 
 
 def run_at(place: str) -> Path:
-    """The directory `place`; of a URL, a copy that lasts as long as this process."""
+    """The directory `place`; for a URL, a copy that is removed when this process ends."""
     from mc_engine.store.object_store import local_copy
 
     folder = local_copy(place)
@@ -224,7 +224,7 @@ def _refuse_unreadable(path: Path) -> None:
 
 
 def refuse_occupied_folder(path: Path) -> None:
-    """An occupied --out is a slip of the user's; told before anything is compiled."""
+    """End the command if --out is occupied or cannot be written to; called before anything is compiled."""
     from mc_engine.store.opening import open_store
     from mc_engine.store.run_files import JOURNAL, RUN, is_run_directory, kind_of
     from mc_engine.store.store import refuse_occupied
@@ -233,14 +233,14 @@ def refuse_occupied_folder(path: Path) -> None:
     if (path / JOURNAL).exists() and is_run_directory(path) and open_store(path).missing():
         resume = f"`mc-engine resume {shell_word(path)}`"
         leave(USAGE, f"--out {path}: holds a run that is not complete; {resume} flies the rest")
-    # of a creation that was cut short, it seems, whoever makes the run knows which files it left
-    whole = (path / JOURNAL).exists() or kind_of(path) not in (None, RUN)
-    if whole or not (path / LOCK_NAME).exists():
+    # With a lock file and no journal, a creation was interrupted; `create_store` knows which files it may have left.
+    complete = (path / JOURNAL).exists() or kind_of(path) not in (None, RUN)
+    if complete or not (path / LOCK_NAME).exists():
         try:
             refuse_occupied(path)
         except StoreError as error:
             leave(USAGE, f"--out {error}")
-    if run := next((one for one in path.absolute().parents if os.path.isfile(one / JOURNAL)), None):
+    if run := next((parent for parent in path.absolute().parents if os.path.isfile(parent / JOURNAL)), None):
         leave(USAGE, f"--out {path}: lies inside the {kind_of(run)} {run.name}; choose another folder")
     existing = next(folder for folder in (path, *path.absolute().parents) if folder.exists())
     if not (existing.is_dir() and os.access(existing, os.W_OK)):
@@ -255,16 +255,15 @@ def ranges(ranges: list[tuple[int, int]]) -> str:
     return ", ".join(f"{first} to {stop - 1}" for first, stop in ranges) or "none"
 
 
-def write_reports(path: Path, formats: tuple[str, ...], **more: Any) -> list[Path]:
-    # The engine imports nothing of the reports, so that it can be used and tested without them; only this command,
-    # which exists for the user's convenience, looks for them, and at the moment they are asked for.
+def write_reports(path: Path, formats: tuple[str, ...], **options: Any) -> list[Path]:
+    """Write the reports of a run.  The engine works without the package of reports, which is imported only here."""
     try:
-        return importlib.import_module("reports").write_reports(path, formats=formats, **more)
+        return importlib.import_module("reports").write_reports(path, formats=formats, **options)
     except DiskError as error:
         report = f"`mc-engine report {shell_word(path)}`"
         raise DiskError(f"{error}; what was flown is safe, {report} writes the reports") from error
 
 
 def replay_picture(store: Any, case: int, history: Any) -> bytes:
-    """The case's history over nominal, envelopes and limits, in the style of the reports."""
+    """A PNG of the case's history with nominal, envelopes and limits, in the style of the reports."""
     return bytes(importlib.import_module("reports").replay_picture(store, case, history))

@@ -1,8 +1,7 @@
-"""The commands that fly nothing: init, check, plan, sample, list, schema."""
+"""The commands before a flight: init, check, plan, sample, list, schema, units."""
 
 import json
 import shutil
-from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Annotated
@@ -60,24 +59,25 @@ def check(
     batch, and every declared dispersion, metric and event must matter.
     """
     from mc_engine.campaign.loading import load_campaign
-    from mc_engine.flight.contract import breaches, flight_faults
+    from mc_engine.flight.flyers import flyer_of
     from mc_engine.runner.flown_campaign import refuse_undeclared_data
 
     campaign = load_campaign(file)
-    found = breaches(campaign) if model else []
-    if model and not found:
+    flyer = flyer_of(campaign)
+    problems = flyer.faults() if model else []
+    if model and not problems:
         refuse_undeclared_data(campaign)
-        found = flight_faults(campaign, file)
-    if found:
-        leave(
-            USAGE,
-            "\n".join([f"{campaign.model_reference}: {counted(found, 'problem')}", *(f"  {one}" for one in found)]),
-        )
+        problems = flyer.faults_in_flight(file)
+    if problems:
+        heading = f"{campaign.model_reference}: {counted(problems, 'problem')}"
+        leave(USAGE, "\n".join([heading, *(f"  {problem}" for problem in problems)]))
     typer.echo(
         f"{campaign.name}: {campaign.cases:,} cases, design {campaign.design}, "
         f"{counted(campaign.dispersions, 'dispersion')}, {counted(campaign.correlations, 'correlation')}, "
         f"{counted(campaign.requirements, 'requirement')}; valid"
     )
+    for line in flyer.remarks() if model else []:
+        typer.echo(line)
 
 
 @app.command()
@@ -99,15 +99,24 @@ def plan(
 
     Give --share and --confidence, or a campaign whose requirements are planned for, one by one and together.
     """
-    from mc_engine.studies.plan import ROWS
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.studies.plan import ROWS, interval_lines, plan_lines, plan_row, table_lines
 
     numbers = range(ROWS) if failures is None else [failures]
     if file is not None:
         if share is not None or confidence is not None:
             leave(USAGE, f"{file}: says share and confidence itself; leave --share and --confidence out")
-        _plan_campaign(file, numbers, two_sided)
-        return
-    _plan_share(_probability("--share", share), _probability("--confidence", confidence), numbers, two_sided)
+        campaign = load_campaign(file)
+        if not campaign.requirements:
+            leave(USAGE, f"{file}: sets no requirement; add [requirement.NAME], or give --share and --confidence")
+        lines = [*plan_lines(campaign, numbers, two_sided)]
+    else:
+        share, confidence = _probability("--share", share), _probability("--confidence", confidence)
+        lines = [f"share {share:.10g} with confidence {confidence:.10g}", ""]
+        lines += table_lines([plan_row(share, confidence, number) for number in numbers], share, confidence)
+        lines += ["", *interval_lines(share, confidence)] if two_sided else []
+    for line in lines:
+        typer.echo(line)
 
 
 def _probability(name: str, value: float | None) -> float:
@@ -116,27 +125,6 @@ def _probability(name: str, value: float | None) -> float:
     if not LEAST_SHARE <= value <= 1.0 - LEAST_SHARE:
         leave(USAGE, f"{name} is {value:g}; it must be above 0 and below 1 by {LEAST_SHARE:g}, such as 0.9973")
     return value
-
-
-def _plan_campaign(file: str, failures: Sequence[int], two_sided: bool) -> None:
-    from mc_engine.campaign.loading import load_campaign
-    from mc_engine.studies.plan import plan_lines
-
-    campaign = load_campaign(file)
-    if not campaign.requirements:
-        leave(USAGE, f"{file}: sets no requirement; add [requirement.NAME], or give --share and --confidence")
-    for line in plan_lines(campaign, failures, two_sided):
-        typer.echo(line)
-
-
-def _plan_share(share: float, confidence: float, failures: Sequence[int], two_sided: bool) -> None:
-    from mc_engine.studies.plan import interval_lines, plan_row, table_lines
-
-    typer.echo(f"share {share:.10g} with confidence {confidence:.10g}\n")
-    for line in table_lines([plan_row(share, confidence, one) for one in failures], share, confidence):
-        typer.echo(line)
-    for line in ["", *interval_lines(share, confidence)] if two_sided else []:
-        typer.echo(line)
 
 
 @app.command()
@@ -188,3 +176,18 @@ def schema() -> None:
     from mc_engine.campaign.loading import schema as campaign_schema
 
     typer.echo(json.dumps(campaign_schema(), indent=2, ensure_ascii=False))
+
+
+@app.command()
+@exit_status()
+def units() -> None:
+    """All units that a model or a campaign file can name, by what they measure; the first of each is that of SI."""
+    from mc_engine.units import UNITS, by_quantity, other_endings
+
+    groups = by_quantity()
+    width = max(len(quantity) for quantity in groups)
+    for quantity, names in groups.items():
+        typer.echo(f"{quantity:<{width}}  {', '.join(names)}")
+    others = ", ".join(f"{suffix} for {unit}" for unit, suffix in other_endings().items())
+    typer.echo(f"\n{len(UNITS)} units; a column's name ends in its unit: {UNITS['N m'].suffix} for N m")
+    typer.echo(f"Two end otherwise: {others}")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from mc_engine.command_line.after_flight import echo_publication
 from mc_engine.command_line.app import (
     DAMAGED,
     NOT_MET,
@@ -35,13 +36,11 @@ from mc_engine.command_line.app import (
     write_reports,
 )
 from mc_engine.command_line.next_step import after_flight, is_complete
-from mc_engine.command_line.object_stores import echo_publication
-from mc_engine.interruption import advise, heed
+from mc_engine.interruption import advise, raise_if_signalled
 from mc_engine.shell_words import shell_word
 from mc_engine.status import MOST_CASES
 
 if TYPE_CHECKING:
-    from mc_engine.runner.backends import Backend
     from mc_engine.runner.shards import Shard
     from mc_engine.store.store import Store
 
@@ -93,35 +92,49 @@ def run(
     _refuse_publication(publish)
     if until not in (None, "verdict"):
         leave(USAGE, f'--until "{until}" is not known; the word is verdict')
-    _refuse_with_shard(shard, {"--until": until, "--judge": judge or None, "--out": "missing" if out is None else None})
+    if shard is not None and out is None:
+        leave(USAGE, "--shard needs --out, a folder of each shard's own")
+    if shard is not None and (until is not None or judge):
+        option = "--judge" if until is None else "--until"
+        leave(USAGE, f"--shard and {option}: a shard alone decides nothing; judge the run that `merge` makes")
     campaign = load_campaign(file, cases=cases, seed=seed, upstream=upstream)
     path = out if out is not None else default_folder(campaign.name)
     refuse_occupied_folder(path)
-    crew = _crew(path, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
-    kept = _kept(path, publish)
+    options = _worker_options(path, workers, backend, scheduler, case_seconds, memory, patience, publish)
+    publisher = _publisher(path, publish)
     if until is None:
         piece = _shard(shard)
-        store = _fly(lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **crew), kept)
+        store = _with_progress(
+            lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **options), publisher
+        )
     else:
         from mc_engine.runner.stopping import fly_until_decided, refuse_undecidable
 
         refuse_undecidable(campaign)
-        store = _fly(lambda _, note: fly_until_decided(campaign, path, progress=note, **crew), kept)
-    _finish(store, no_report, judge, max_failed, publish, file)
+        store = _with_progress(lambda _, note: fly_until_decided(campaign, path, progress=note, **options), publisher)
+    finish(store, no_report, judge, max_failed, publish, file)
 
 
-def _backend(
-    name: str, scheduler: str | None, case_seconds: float | None, memory: int | None, patience: float | None
-) -> "Backend":
+def _worker_options(
+    folder: Path,
+    workers: int | None,
+    backend: str,
+    scheduler: str | None,
+    case_seconds: float | None,
+    memory: int | None,
+    patience: float | None,
+    url: str | None = None,
+    rerun: bool = False,
+) -> dict[str, Any]:
+    """The runner's arguments on workers, from the options of a command.
+
+    From here on the message of an interruption names the command that continues the run in `folder`.
+    """
     from mc_engine.runner.backends import Backend
 
-    return Backend(name, scheduler, case_seconds, memory, patience)
-
-
-def _crew(folder: Path, workers: int | None, backend: "Backend", url: str | None = None, rerun: bool = False) -> Any:
-    """The arguments of a flight that say who flies it; from here on an interruption names the command that goes on."""
-    advise(lambda: after_flight(folder, backend.options(), url, rerun))
-    return {"workers": workers, "backend": backend}
+    chosen = Backend(backend, scheduler, case_seconds, memory, patience)
+    advise(lambda: after_flight(folder, chosen.options(), url, rerun))
+    return {"workers": workers, "backend": chosen}
 
 
 def _shard(text: str | None) -> "Shard | None":
@@ -133,26 +146,16 @@ def _shard(text: str | None) -> "Shard | None":
         leave(USAGE, f"--shard {error}")
 
 
-def _refuse_with_shard(shard: str | None, others: dict[str, Any]) -> None:
-    if shard is None:
-        return
-    if others["--out"] is not None:
-        leave(USAGE, "--shard needs --out, a folder of each shard's own")
-    for option in ("--until", "--judge"):
-        if others[option] is not None:
-            leave(USAGE, f"--shard and {option}: a shard alone decides nothing; judge the run that `merge` makes")
-
-
 def _refuse_publication(url: str | None) -> None:
-    """A URL where nothing can be listed is told before a long flight."""
+    """End the command if the URL cannot be listed; called before a long flight."""
     if url is not None:
         from mc_engine.store.object_store import refuse_unreachable
 
         refuse_unreachable(url)
 
 
-def _kept(path: Path, url: str | None) -> AbstractContextManager[Any]:
-    """Keeps a copy of the run in `path` up to date at `url`, where there is one to be."""
+def _publisher(path: Path, url: str | None) -> AbstractContextManager[Any]:
+    """Keeps a copy of the run in `path` at `url` up to date, if a URL is given."""
     if url is None:
         return nullcontext()
     from mc_engine.store.object_store import Publisher
@@ -160,19 +163,20 @@ def _kept(path: Path, url: str | None) -> AbstractContextManager[Any]:
     return Publisher(path, url)
 
 
-def _fly(fly: Callable[[Any, Any], "Store"], kept: AbstractContextManager[Any] | None = None) -> "Store":
+def _with_progress(fly: Callable[[Any, Any], "Store"], publisher: AbstractContextManager[Any] | None = None) -> "Store":
+    """What `fly(runner, progress)` returns, with the progress shown and the run published during the flight."""
     from mc_engine.runner import runner
     from mc_engine.runner.progress import Progress
 
-    with Progress() as progress, kept or nullcontext():
+    with Progress() as progress, publisher or nullcontext():
         if not progress.stream.isatty():
             typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
         store = fly(runner, progress)
-    heed()  # a signal after the last case finds nothing more to land
+    raise_if_signalled()  # by a signal after the last case, which has stopped nothing
     return store
 
 
-def _finish(
+def finish(
     store: "Store",
     no_report: bool,
     judge: bool = False,
@@ -180,8 +184,15 @@ def _finish(
     url: str | None = None,
     campaign: str | None = None,
 ) -> None:
-    """What every flight ends with: reports, a summary, and an exit status where one was asked for."""
-    from mc_engine.runner.summary import case_line, failed_cases, first_not_finite, judgement, look_line, verdict_line
+    """Write the reports of a run, print the summary, and set the exit status that --judge and --max-failed ask for."""
+    from mc_engine.runner.summary import (
+        analyses_line,
+        case_line,
+        failed_cases,
+        first_not_finite,
+        judgement,
+        verdict_line,
+    )
 
     if store.manifest.get("shard"):
         if url is not None:
@@ -191,8 +202,8 @@ def _finish(
     reports = [] if no_report else write_reports(store.path, ("html", "pdf"))
     typer.echo(f"run          {store.path}")
     typer.echo(f"cases        {case_line(store)}")
-    if looks := look_line(store):
-        typer.echo(f"looks        {looks}")
+    if analyses := analyses_line(store):
+        typer.echo(f"analyses     {analyses}")
     judged, joint = judgement(store)
     for verdict in (*judged, joint) if joint is not None else judged:
         typer.echo(f"requirement  {verdict_line(verdict, store.units)}")
@@ -241,8 +252,8 @@ def resume(
     publish: Publish = None,
 ) -> None:
     """Complete a run that was interrupted."""
-    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
-    crew["repair"] = repair
+    options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, publish)
+    options["repair"] = repair
     _refuse_publication(publish)
     if repair:
         from mc_engine.store.repair import mend_journal
@@ -255,10 +266,12 @@ def resume(
     if looks:
         from mc_engine.runner.stopping import carry_on
 
-        store = _fly(lambda _, note: carry_on(folder, progress=note, **crew), _kept(folder, publish))
+        store = _with_progress(lambda _, note: carry_on(folder, progress=note, **options), _publisher(folder, publish))
     else:
-        store = _fly(lambda runner, note: runner.resume(folder, progress=note, **crew), _kept(folder, publish))
-    _finish(store, no_report, url=publish)
+        store = _with_progress(
+            lambda runner, note: runner.resume(folder, progress=note, **options), _publisher(folder, publish)
+        )
+    finish(store, no_report, url=publish)
 
 
 def _leave_complete(folder: Path, url: str | None) -> None:
@@ -292,9 +305,11 @@ def extend(
     store = existing_run(folder)
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
         leave(USAGE, f"{folder}: {sentence}")
-    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), publish)
-    store = _fly(lambda runner, note: runner.extend(folder, cases, progress=note, **crew), _kept(folder, publish))
-    _finish(store, no_report, url=publish)
+    options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, publish)
+    store = _with_progress(
+        lambda runner, note: runner.extend(folder, cases, progress=note, **options), _publisher(folder, publish)
+    )
+    finish(store, no_report, url=publish)
 
 
 @app.command()
@@ -319,8 +334,8 @@ def rerun(
     if not store.status_counts().keys() - {"ok"}:
         typer.echo(f"{folder}: no case failed; there is nothing to fly again")
         return
-    crew = _crew(folder, workers, _backend(backend, scheduler, case_seconds, memory, patience), rerun=True)
-    _finish(_fly(lambda runner, progress: runner.rerun(folder, progress=progress, **crew)), no_report)
+    options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, rerun=True)
+    finish(_with_progress(lambda runner, progress: runner.rerun(folder, progress=progress, **options)), no_report)
 
 
 @app.command()
@@ -341,11 +356,13 @@ def merge(
         existing_run(shard)
     refuse_occupied_folder(out)
     advise(lambda: after_flight(out))
-    store = _fly(lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk))
-    _finish(store, no_report)
+    store = _with_progress(
+        lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk)
+    )
+    finish(store, no_report)
 
 
-# so that -1 is told to be no case, and not no option
+# then the message for -1 is that it is no case, instead of no option
 @app.command(context_settings={"ignore_unknown_options": True})
 @exit_status()
 def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:
@@ -357,8 +374,9 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
     from mc_engine.studies.replay_files import write_replay
 
     flight = runner.replay(folder, case)
-    for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
-        typer.echo(str(path))
+    if store.manifest.get("quantities"):  # a simulator without outputs has no history
+        for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
+            typer.echo(str(path))
     if flight.lost:
         typer.echo(flight.lost)
     if not flight.equal:

@@ -1,7 +1,6 @@
-"""What an interrupted command leaves its user with: where things stand, and the command that goes on from there.
+"""The message of an interrupted command: the state of the run, and the command that continues.
 
-Read from the journal as it lies on the disk, by the light half of the engine alone: the heavy half may be what the
-signal broke off the loading of.
+Read from the journal without numba or pandas, since the signal may have interrupted their import.
 """
 
 from pathlib import Path
@@ -10,20 +9,20 @@ from mc_engine.interruption import NOTHING_BEGUN
 from mc_engine.shell_words import shell_word
 
 _JOURNAL, _MANIFEST = "journal.jsonl", "manifest.json"
-_UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that only `finished` makes good
+_UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that `finished` has to follow
 
 
 def after_flight(run: Path | None, options: str = "", url: str | None = None, rerun: bool = False) -> str:
-    """The sentence for a flight into directory `run` (None: not chosen yet) with such options of its backend.
+    """The message for a flight into the directory `run`, or None if that was not chosen yet.
 
-    url : where the run is published.  rerun : the flight was of failed cases, once more.
+    options : those of the backend.  url : where the run is published.  rerun : the flight was of failed cases.
     """
     if run is None or not (run / _JOURNAL).is_file():
         return NOTHING_BEGUN
     import json  # not for `--help`
 
     events, manifest = _events(run), json.loads((run / _MANIFEST).read_bytes())
-    # a run that is judged on the way is complete when the verdict has come, which `resume` finds out
+    # a run with interim analyses is complete once it is decided, which `resume` finds out
     if manifest.get("looks") or not _is_finished(events):
         command = "rerun --failed" if rerun and "rerun" in events else "resume"
         return (
@@ -36,13 +35,13 @@ def after_flight(run: Path | None, options: str = "", url: str | None = None, re
 
 
 def is_complete(run: Path) -> bool:
-    """True if the run in `run` is complete, and has all files that its cases are in, and no others."""
+    """True if the run in `run` is complete, no file of it is missing, and no killed writer left files there."""
     from mc_engine.store.opening import open_store
     from mc_engine.store.writer_lock import is_left_by_dead
 
     store = open_store(run)
-    whole = _is_finished(_events(run)) and not store.missing() and not store.lost_files()
-    return whole and not is_left_by_dead(run)
+    finished = _is_finished(_events(run)) and not store.missing() and not store.lost_files()
+    return finished and not is_left_by_dead(run)
 
 
 def _events(run: Path) -> list[str]:
@@ -57,7 +56,7 @@ def _is_finished(events: list[str]) -> bool:
 
 
 def after_search(folder: Path | None, record: str, words: str) -> str:
-    """The sentence for a search whose result is the file `record` of `folder`.  words : what is there, if it is."""
+    """The message for a search whose result is the file `record` in `folder`.  words : subject of the sentence."""
     if folder is None or not (folder / record).is_file():
         return NOTHING_BEGUN
     return f"interrupted; {words} in {folder}, `mc-engine report {shell_word(folder)}` writes the report"

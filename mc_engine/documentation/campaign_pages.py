@@ -35,7 +35,9 @@ field, and in `Store.units()`. The nominal case is kept apart, in `nominal.parqu
 def pages() -> Iterator[tuple[str, str]]:
     """A page for what all runs have in common, and one a model."""
     statuses = [(code(name), escaped(STATUS_TEXT[key])) for key, name in STATUS_NAME.items()]
-    groups = {name: list(files) for name, files in groupby(list_campaigns(), lambda one: one.path.parent.name)}
+    groups = {
+        name: list(files) for name, files in groupby(list_campaigns(), lambda campaign: campaign.path.parent.name)
+    }
     names = "\n".join(f"- [{name}](campaigns/{name}.md)" for name in groups)
     toctree = "\n".join(f"campaigns/{name}" for name in groups)
     hidden = f"```{{toctree}}\n:hidden:\n\n{toctree}\n```"
@@ -48,11 +50,11 @@ def pages() -> Iterator[tuple[str, str]]:
 def campaign_page(name: str, files: Sequence[ShippedCampaign]) -> str:
     """All campaign files of the folder campaigns/`name`, and the columns of each model that they fly."""
     folder = SHIPPED / name
-    references = [model_reference(one.path) for one in files]
+    references = [model_reference(file.path) for file in files]
     models = {reference: load_model(reference, folder) for reference in dict.fromkeys(references)}
     parts = [f"# {name}"]
     for reference, model in models.items():
-        shown = [one for one, flies in zip(files, references, strict=True) if flies == reference]
+        shown = [file for file, flies in zip(files, references, strict=True) if flies == reference]
         parts += _model(model, reference, shown, len(models) == 1)
     if (folder / "published.toml").is_file():
         parts += ["## Validation against published results", campaign_table(folder / "published.toml")]
@@ -73,23 +75,26 @@ def _model(model: Model, reference: str, files: Sequence[ShippedCampaign], alone
         yield f"Source: {escaped(model.source)}."
     level = "##" if alone else "###"
     yield f"{level} Campaign files"
-    yield table(("Name", "Title"), [(code(one.name), escaped(one.title)) for one in files])
-    yield from _columns(model, level)
+    yield table(("Name", "Title"), [(code(file.name), escaped(file.title)) for file in files])
+    yield from _column_tables(model, level)
 
 
-def _columns(model: Model, level: str) -> Iterator[str]:
-    rows = [(*_meaning(one), f"{one.default:.10g}", _range(one)) for one in model.parameters]
+def _column_tables(model: Model, level: str) -> Iterator[str]:
+    rows = [
+        (*_meaning(parameter), f"{parameter.default:.10g}", _accepted_values(parameter))
+        for parameter in model.parameters
+    ]
     yield f"{level} Parameters"
     yield table(("Parameter", "Unit", "Meaning", "Nominal", "Allowed"), rows)
     if model.settings:
         yield f"{level} Settings"
         yield "The same for all cases of a run; `[parameters]` of a campaign file sets them."
-        settings = [(*_meaning(one), code(_word(one.default)), _choices(one)) for one in model.settings]
+        settings = [(*_meaning(setting), code(_word(setting.default)), _choices(setting)) for setting in model.settings]
         yield table(("Setting", "Unit", "Meaning", "Default", "Allowed"), settings)
     for title, fields in (("Metrics", model.metrics), ("States", model.states), ("Histories", model.quantities)):
         yield f"{level} {title}"
         yield _INTRODUCTION[title]
-        yield table(("Column", "Unit", "Meaning"), [_meaning(one, title == "States") for one in fields])
+        yield table(("Column", "Unit", "Meaning"), [_meaning(field, title == "States") for field in fields])
     yield f"{level} Flight"
     yield _flight(model)
 
@@ -101,22 +106,26 @@ _INTRODUCTION = {
 }
 
 
-def _meaning(one: Named, at_the_end: bool = False) -> tuple[str, str, str]:
-    return code(f"end_{one.name}" if at_the_end else one.name), escaped(one.unit) or "–", escaped(one.description)
+def _meaning(field: Named, at_the_end: bool = False) -> tuple[str, str, str]:
+    return (
+        code(f"end_{field.name}" if at_the_end else field.name),
+        escaped(field.unit) or "–",
+        escaped(field.description),
+    )
 
 
-def _range(one: Parameter | Setting) -> str:
-    if np.isinf(one.low) and np.isinf(one.high):
+def _accepted_values(item: Parameter | Setting) -> str:
+    if np.isinf(item.low) and np.isinf(item.high):
         return ""
-    if np.isinf(one.high):
-        return f"≥ {one.low:.10g}"
-    return f"≤ {one.high:.10g}" if np.isinf(one.low) else f"{one.low:.10g} … {one.high:.10g}"
+    if np.isinf(item.high):
+        return f"≥ {item.low:.10g}"
+    return f"≤ {item.high:.10g}" if np.isinf(item.low) else f"{item.low:.10g} … {item.high:.10g}"
 
 
-def _choices(one: Setting) -> str:
-    if one.date:
+def _choices(setting: Setting) -> str:
+    if setting.date:
         return "a date in UTC"
-    return ", ".join(code(word) for word in one.choices) or _range(one)
+    return ", ".join(code(word) for word in setting.choices) or _accepted_values(setting)
 
 
 def _word(value: str | bool | float) -> str:
@@ -131,8 +140,8 @@ def _flight(model: Model) -> str:
         else f"Steps of {_shown(clock.step)} on a common grid ({clock.method})"
     )
     events = [
-        (code(one.name), one.direction, "ends the case" if one.action == "stop" else "switches the model")
-        for one in model.event_list
+        (code(event.name), event.direction, "ends the case" if event.action == "stop" else "switches the model")
+        for event in model.event_list
     ]
     listed = "\n\n" + table(("Event", "Crossing", "Then"), events) if events else ""
     return f"{stepping}, up to {_shown(clock.until)}.{listed}"

@@ -30,28 +30,28 @@ def page() -> str:
 
 
 def _verb(name: str, command: Any) -> Iterator[str]:
-    arguments = [_value(one) for one in command.params if one.param_type_name == "argument"]
+    arguments = [_option_value(param) for param in command.params if param.param_type_name == "argument"]
     usage = " ".join(["mc-engine", name, *arguments, "[OPTIONS]"])
     yield f"## {name}\n\n```text\n{usage}\n```\n\n{prose(command.help or '')}\n\n{prose(command.epilog or '')}\n"
-    rows = [(code(_names(one)), escaped(one.help or ""), _default(one)) for one in command.params]
+    rows = [(code(_option_names(param)), escaped(param.help or ""), _default(param)) for param in command.params]
     yield (table(("Argument or option", "Meaning", "Default"), rows) + "\n") if rows else ""
 
 
-def _value(one: Any) -> str:
+def _option_value(option: Any) -> str:
     """The word that stands for a value; of the library's own, which differ between its versions, none is used."""
-    return str(one.metavar or one.name.upper())
+    return str(option.metavar or option.name.upper())
 
 
-def _names(one: Any) -> str:
-    if one.param_type_name == "argument":
-        return _value(one)
-    words = ", ".join([*one.opts, *one.secondary_opts])
-    return words if one.is_flag else f"{words} {_value(one)}"
+def _option_names(option: Any) -> str:
+    if option.param_type_name == "argument":
+        return _option_value(option)
+    words = ", ".join([*option.opts, *option.secondary_opts])
+    return words if option.is_flag else f"{words} {_option_value(option)}"
 
 
-def _default(one: Any) -> str:
-    if one.required:
+def _default(option: Any) -> str:
+    if option.required:
         return "required"
-    if one.default is True:
-        return code(one.opts[0])
-    return "" if one.default in (None, False, (), []) or callable(one.default) else code(str(one.default))
+    if option.default is True:
+        return code(option.opts[0])
+    return "" if option.default in (None, False, (), []) or callable(option.default) else code(str(option.default))

@@ -1,6 +1,6 @@
 """How Sphinx builds the site; `mc_engine.documentation.website` calls it."""
 
-from mc_engine.runner.provenance import engine_version
+from mc_engine.runner.manifest import engine_version
 
 project = "mc-engine"
 version = release = engine_version()

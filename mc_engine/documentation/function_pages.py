@@ -12,8 +12,8 @@ SECTIONS = {
     "engine": (
         "Campaigns, runs and their results",
         "runner.runner campaign.loading campaign.search campaign.cases store.store store.opening studies.opened_run "
-        "model.fields model.record model.figures studies.tuning studies.tuning_folder studies.comparison "
-        "studies.rare_event errors status",
+        "model.declarations model.declared model.fields model.record model.simulator model.figures model.designs "
+        "studies.tuning studies.tuning_folder studies.comparison studies.rare_event errors status",
     ),
     "random": (
         "Designs, distributions and random numbers",
@@ -52,14 +52,14 @@ def files(name: str) -> list[Path]:
     assert spec is not None  # the names above are tested
     assert spec.origin is not None
     path = Path(spec.origin)
-    return [path] if path.name != "__init__.py" else [one for one in sorted(path.parent.glob("*.py")) if one != path]
+    return [path] if path.name != "__init__.py" else [file for file in sorted(path.parent.glob("*.py")) if file != path]
 
 
 def definitions(path: Path) -> list[Definition]:
     """The functions and classes of a file whose names do not begin with an underscore."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    found = [one for one in tree.body if isinstance(one, ast.FunctionDef | ast.ClassDef)]
-    return [one for one in found if not one.name.startswith("_")]
+    nodes = [node for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    return [node for node in nodes if not node.name.startswith("_")]
 
 
 def _module(path: Path) -> Iterator[str]:
@@ -68,35 +68,34 @@ def _module(path: Path) -> Iterator[str]:
     yield f"## {name}"
     yield f"```{{py:module}} {name}\n```"
     yield prose(ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "")
-    for one in definitions(path):
-        yield _entry(one, "class" if isinstance(one, ast.ClassDef) else "function")
+    for definition in definitions(path):
+        yield _entry(definition, "class" if isinstance(definition, ast.ClassDef) else "function")
 
 
-def _entry(one: Definition, kind: str) -> str:
-    inner = [prose(ast.get_docstring(one) or "")]
-    if isinstance(one, ast.ClassDef):
-        methods = [method for method in one.body if isinstance(method, ast.FunctionDef)]
-        inner += [_entry(method, "method") for method in methods if _is_shown(method)]
+def _entry(definition: Definition, kind: str) -> str:
+    inner = [prose(ast.get_docstring(definition) or "")]
+    if isinstance(definition, ast.ClassDef):
+        for method in definition.body:
+            if isinstance(method, ast.FunctionDef) and method.name[0] != "_" and ast.get_docstring(method) is not None:
+                inner.append(_entry(method, "method"))
     fence = "`" * (12 if kind == "class" else 9)  # longer than what it holds
     text = "\n\n".join(part for part in inner if part)
-    return f"{fence}{{py:{kind}}} {_signature(one, kind)}\n{text}\n{fence}"
+    return f"{fence}{{py:{kind}}} {_signature(definition, kind)}\n{text}\n{fence}"
 
 
-def _is_shown(one: ast.FunctionDef) -> bool:
-    return not one.name.startswith("_") and ast.get_docstring(one) is not None
-
-
-def _signature(one: Definition, kind: str) -> str:
-    if isinstance(one, ast.ClassDef):
-        fields = [ast.unparse(field) for field in one.body if isinstance(field, ast.AnnAssign)]
-        return f"{one.name}({', '.join(_shortened(field) for field in fields)})" if fields else one.name
-    arguments = one.args
+def _signature(definition: Definition, kind: str) -> str:
+    if isinstance(definition, ast.ClassDef):
+        fields = [ast.unparse(field) for field in definition.body if isinstance(field, ast.AnnAssign)]
+        return f"{definition.name}({', '.join(_shortened(field) for field in fields)})" if fields else definition.name
+    arguments = definition.args
     if kind == "method" and arguments.args and arguments.args[0].arg in ("self", "cls"):
         arguments.args = arguments.args[1:]
-    if any(isinstance(mark, ast.Name) and mark.id in ("property", "cached_property") for mark in one.decorator_list):
-        return one.name
-    returns = f" -> {ast.unparse(one.returns)}" if one.returns else ""
-    return f"{one.name}({ast.unparse(arguments)}){returns}"
+    if any(
+        isinstance(mark, ast.Name) and mark.id in ("property", "cached_property") for mark in definition.decorator_list
+    ):
+        return definition.name
+    returns = f" -> {ast.unparse(definition.returns)}" if definition.returns else ""
+    return f"{definition.name}({ast.unparse(arguments)}){returns}"
 
 
 def _shortened(field: str) -> str:

@@ -10,14 +10,22 @@ _FENCE = "``````"
 def escaped(text: str) -> str:
     """One line of prose; what stands between backticks is code."""
     pieces = re.split(r"(`[^`\n]+`)", text)
-    line = "".join(one if one.startswith("`") and len(one) > 1 else _MARKUP.sub(r"\\\1", one) for one in pieces)
+    line = "".join(
+        piece if piece.startswith("`") and len(piece) > 1 else _MARKUP.sub(r"\\\1", piece) for piece in pieces
+    )
     return re.sub(r"^(\s*)([-+]|\d+[.)])(?=\s)", r"\1\\\2", line)
 
 
 def prose(docstring: str) -> str:
     """Paragraphs of a docstring; those set out in columns or steps keep their layout."""
     paragraphs = re.split(r"\n\s*\n", docstring.strip("\n"))
-    return "\n\n".join(_verbatim(one) if _is_set_out(one) else _flowing(one) for one in paragraphs if one.strip())
+    return "\n\n".join(_block(paragraph) for paragraph in paragraphs if paragraph.strip())
+
+
+def _block(paragraph: str) -> str:
+    if paragraph.startswith(">>> "):
+        return f"{_FENCE}pycon\n{paragraph}\n{_FENCE}"
+    return f"{_FENCE}text\n{paragraph}\n{_FENCE}" if _is_set_out(paragraph) else _flowing(paragraph)
 
 
 def _is_set_out(paragraph: str) -> bool:
@@ -26,10 +34,6 @@ def _is_set_out(paragraph: str) -> bool:
         return False
     columns = sum(bool(re.search(r"\S {3,}\S", line)) for line in lines)
     return all(line.startswith("    ") for line in lines) or columns > 0 or any(line[:1] == " " for line in lines)
-
-
-def _verbatim(paragraph: str) -> str:
-    return f"{_FENCE}text\n{paragraph}\n{_FENCE}"
 
 
 def _flowing(paragraph: str) -> str:
@@ -43,7 +47,7 @@ def _flowing(paragraph: str) -> str:
             items.append(escaped(line.strip()))
         else:
             items[-1] += " " + escaped(line.strip())
-    return "\n".join(f"- {one}" for one in items)
+    return "\n".join(f"- {item}" for item in items)
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

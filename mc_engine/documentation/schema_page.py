@@ -21,7 +21,7 @@ def page() -> str:
     definitions = document["$defs"]
     parts = [_HEAD]
     parts += _section("A file", document, definitions)
-    for name, definition in sorted(definitions.items(), key=lambda one: one[0].endswith("Dispersion")):
+    for name, definition in sorted(definitions.items(), key=lambda entry: entry[0].endswith("Dispersion")):
         parts += _section(_title(name), definition, definitions)
     return "\n".join(parts)
 
@@ -41,47 +41,47 @@ def _section(title: str, definition: Mapping[str, Any], definitions: Mapping[str
     rows = [
         (
             code(key),
-            _kind(one, definitions),
-            "required" if key in required else _default(one),
-            escaped(one.get("description", "")),
+            _type_text(record, definitions),
+            "required" if key in required else _default(record),
+            escaped(record.get("description", "")),
         )
-        for key, one in definition.get("properties", {}).items()
+        for key, record in definition.get("properties", {}).items()
     ]
     yield table(("Key", "Value", "Default", "Meaning"), rows) + "\n"
 
 
-def _default(one: Mapping[str, Any]) -> str:
-    value = one.get("default")
+def _default(record: Mapping[str, Any]) -> str:
+    value = record.get("default")
     return "" if value in (None, "") or isinstance(value, dict) else code(json.dumps(value))
 
 
-def _kind(one: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
+def _type_text(record: Mapping[str, Any], definitions: Mapping[str, Any]) -> str:
     """What a value may be, in words."""
     for several in ("anyOf", "oneOf"):
-        if several in one:
-            words = [_kind(choice, definitions) for choice in one[several] if choice.get("type") != "null"]
+        if several in record:
+            words = [_type_text(choice, definitions) for choice in record[several] if choice.get("type") != "null"]
             return " or ".join(dict.fromkeys(words))
-    if "$ref" in one:
-        name = one["$ref"].rsplit("/", 1)[-1]
+    if "$ref" in record:
+        name = record["$ref"].rsplit("/", 1)[-1]
         title = _title(name)
         return f"[{title}](#{title.replace(' ', '-')})"
-    if "const" in one:
-        return code(json.dumps(one["const"]))
-    if "enum" in one:
-        return ", ".join(code(json.dumps(word)) for word in one["enum"])
-    if one.get("type") == "array":
-        return f"list of: {_kind(one.get('items', {}), definitions)}"
-    if one.get("type") == "object":
-        inner = one.get("additionalProperties")
-        return f"tables by name, each: {_kind(inner, definitions)}" if isinstance(inner, dict) else "table"
-    return _WORDS.get(one.get("type", ""), "any") + _range(one)
+    if "const" in record:
+        return code(json.dumps(record["const"]))
+    if "enum" in record:
+        return ", ".join(code(json.dumps(word)) for word in record["enum"])
+    if record.get("type") == "array":
+        return f"list of: {_type_text(record.get('items', {}), definitions)}"
+    if record.get("type") == "object":
+        inner = record.get("additionalProperties")
+        return f"tables by name, each: {_type_text(inner, definitions)}" if isinstance(inner, dict) else "table"
+    return _WORDS.get(record.get("type", ""), "any") + _allowed_range(record)
 
 
 _WORDS = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false"}
 _LARGEST = 1e40  # limits beyond it keep arithmetic finite and are of no interest to a reader
 
 
-def _range(one: Mapping[str, Any]) -> str:
+def _allowed_range(record: Mapping[str, Any]) -> str:
     words = {"minimum": "≥", "exclusiveMinimum": "\\>", "maximum": "≤", "exclusiveMaximum": "\\<"}
-    limits = [f"{sign} {one[key]:g}" for key, sign in words.items() if abs(one.get(key, 1e50)) < _LARGEST]
+    limits = [f"{sign} {record[key]:g}" for key, sign in words.items() if abs(record.get(key, 1e50)) < _LARGEST]
     return f" {', '.join(limits)}" if limits else ""

@@ -7,7 +7,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from mc_engine.campaign.search import SHIPPED
-from mc_engine.documentation import campaign_pages, commands_page, function_pages, schema_page, units_page, words_page
+from mc_engine.documentation import campaign_pages, commands_page, function_pages, glossary_pages, schema_page
 from mc_engine.errors import EngineError
 from mc_engine.extras import how_to_install
 
@@ -79,7 +79,7 @@ def reference_pages() -> Iterator[tuple[str, str]]:
     """(name, Markdown) of each page that comes from schema, program, models and docstrings."""
     yield "campaign_file.md", schema_page.page()
     yield "command_line.md", commands_page.page()
-    yield "units.md", units_page.page()
-    yield "words.md", words_page.page()
+    yield "units.md", glossary_pages.units_page()
+    yield "words.md", glossary_pages.terms_page()
     yield from campaign_pages.pages()
     yield from function_pages.pages()

@@ -1,6 +1,6 @@
-"""Chunks of cases: drawn, flown and written by one worker, be it a thread, a process or another machine.
+"""Chunks of consecutive cases: drawn, flown and stored by one worker, which is a thread, a process or a remote machine.
 
-What a case comes to depends on (campaign, sources, seed, case_id): chunks and workers are bookkeeping.
+A case's result depends on (campaign, sources, seed, case_id) alone, so neither chunk size nor workers change it.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -12,19 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.campaign.cases import case_table, full_inputs, nominal_row
+from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import noise_ids, upstream_ids
-from mc_engine.flight.flight import fly
-from mc_engine.flight.kernel import build_kernel, usual_width
+from mc_engine.flight.case_rows import FOLDER, RowLog
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Row, never
+from mc_engine.flight.flyers import flyer_of
 from mc_engine.model.faults import naming_faults
+from mc_engine.sampling.distributions import column
 from mc_engine.status import OK, STATUS_NAME
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, Written, read_part, revised_name, write_aside
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
 CHUNKS_PER_WORKER = 8  # enough for an even end, few enough that parts stay large
-NOMINAL_NOISE = 2**52  # the nominal draws its noise where no case does
-Columns = dict[str, np.ndarray]
 Guard = Callable[[np.ndarray], AbstractContextManager[None]]
 
 
@@ -49,14 +49,14 @@ class Lost:
     reason: str
 
 
-@dataclass(frozen=True, eq=False)  # an order is itself alone, not another one of the same words
-class Order:
-    """What a worker is asked for: the part of the cases first .. stop - 1.
+@dataclass(frozen=True, eq=False)  # compared by identity: two tasks may name the same cases
+class Task:
+    """One unit of work for a worker: fly the cases first .. stop - 1 and write their part.
 
     lost : cases that are not flown; their rows hold their inputs and the reason.
-    base : a part in which only the cases that failed are flown anew.  failed : these cases.
-    suspected : a worker has died of it; it is flown in small batches, with a note of each.
-    alone : cases that are flown first, one by one: one of them may be what the worker died of.
+    base : an existing part of which only the failed cases are flown again.  failed : these cases.
+    suspected : a worker died while it ran this task; it now flies small batches and records each of them.
+    alone : cases that fly first and one by one, because one of them may have killed the worker.
     """
 
     first: int
@@ -73,32 +73,49 @@ class Order:
         cases = cases[~np.isin(cases, [lost.case_id for lost in self.lost])]
         return cases[np.argsort(~np.isin(cases, self.alone), kind="stable")]
 
-    def suspecting(self, cases: np.ndarray) -> "Order":
-        """The same order, in which these cases fly alone, too."""
+    def isolating(self, cases: np.ndarray) -> "Task":
+        """A copy of the task, marked as suspected, in which these cases fly alone as well."""
         alone = {*self.alone, *cases.tolist()} - {lost.case_id for lost in self.lost}
         return replace(self, suspected=True, alone=tuple(sorted(alone)))
 
-    def without(self, lost: Lost) -> "Order":
-        """The same order, in which this case is not flown."""
+    def without(self, lost: Lost) -> "Task":
+        """A copy of the task in which this case is not flown."""
         return replace(self, lost=(*self.lost, lost))
 
 
-def carry_out(
-    campaign: Campaign, columns: Sequence[Column], run: Path, order: Order, guard: Guard | None = None
+def run_task(
+    campaign: Campaign,
+    columns: Sequence[Column],
+    run: Path,
+    task: Task,
+    guard: Guard | None = None,
+    stopped: Callable[[], bool] = never,
 ) -> Written:
-    """Fly an order and write its part aside in `run`.
+    """Fly the cases of a task and write their part under a temporary name in `run`.
 
-    guard : entered with the cases of each batch; batches are then no larger than the kernel is wide.
+    guard : entered with the cases of each batch; batches are then no larger than the cases that fly together.
+    Raises RunStopped once `stopped()` is true, if a case may take long.
     """
-    flown = order.flown()
-    batch = None if guard is None else usual_width(campaign.model)
-    flights = [fly_cases(campaign, flown, batch, guard or _unguarded, len(order.alone))] if flown.size else []
+    flown, flyer = task.flown(), flyer_of(campaign)
+    batch = None if guard is None else flyer.batch
+    log = RowLog(run, task.first, task.stop) if flyer.keeps_rows and task.base is None else None
+    known = log.rows() if log is not None else {}
+    fresh = flown[~np.isin(flown, [*known])]
+    flights = []
+    if fresh.size:
+        flight = fly_cases(campaign, fresh, batch, guard or _unguarded, len(task.alone), run / FOLDER, log, stopped)
+        flights.append({**flight, "case_id": fresh})
     names = [column.name for column in columns]
-    arrays: Mapping[str, Any] = {**flights[0], "case_id": flown} if flights else {}
-    if order.lost or order.alone or order.base is not None:
-        arrays = _gathered(names, [arrays, _lost_rows(campaign, order.lost, names), _base_rows(run, order, flown)])
-    file = revised_name(order.base.file) if order.base else None
-    return write_aside(run, columns, order.first, order.stop - order.first, arrays, file)
+    if known:
+        flights.append(_known_rows(campaign, known, names))
+    arrays: Mapping[str, Any] = flights[0] if flights else {}
+    if task.lost or task.alone or task.base is not None or known:
+        arrays = _gathered(names, [*flights, _lost_rows(campaign, task.lost, names), _base_rows(run, task, flown)])
+    file = revised_name(task.base.file) if task.base else None
+    written = write_aside(run, columns, task.first, task.stop - task.first, arrays, file)
+    if log is not None:
+        log.remove()
+    return written
 
 
 def _unguarded(cases: np.ndarray) -> AbstractContextManager[None]:
@@ -106,21 +123,30 @@ def _unguarded(cases: np.ndarray) -> AbstractContextManager[None]:
 
 
 def fly_cases(
-    campaign: Campaign, case_ids: np.ndarray, batch: int | None = None, guard: Guard = _unguarded, alone: int = 0
+    campaign: Campaign,
+    case_ids: np.ndarray,
+    batch: int | None = None,
+    guard: Guard = _unguarded,
+    alone: int = 0,
+    keep: Path | None = None,
+    log: RowLog | None = None,
+    stopped: Callable[[], bool] = never,
 ) -> Columns:
     """All columns but case_id of some cases.  case_ids : int64[n], n > 0.
 
-    batch : cases at a time, if not all.  alone : how many of the first ones fly one by one.
+    batch : cases at a time, if not all.  alone : how many of the first ones fly one by one.  keep : folder for what the
+    cases of a simulator leave behind.  log : of the rows of complete cases.
     """
     table = case_table(campaign, case_ids)
     edges = [*range(alone), *range(alone, case_ids.size, batch or case_ids.size), case_ids.size]
-    flights = []
+    flights, flyer = [], flyer_of(campaign)
     with naming_faults(campaign.model_reference, f"cases {case_ids.min()} to {case_ids.max()}"):
         for piece in (slice(*edge) for edge in pairwise(edges)):
             inputs = full_inputs(campaign, {name: column[piece] for name, column in table.items()})
             with guard(case_ids[piece]):
                 noise = noise_ids(campaign, case_ids[piece])
-                flights.append(fly(campaign.model, inputs, noise, campaign.seed, folder=campaign.directory))
+                on_row = None if log is None else log.adding(case_ids[piece])
+                flights.append(flyer.fly(inputs, noise, on_row, keep, stopped))
     flight = flights[0] if len(flights) == 1 else _stacked(flights)
     name_upstream(campaign, case_ids, flight)
     return {**table, **flight}
@@ -139,19 +165,21 @@ def fly_in_threads(
     """
     from joblib import Parallel, delayed
 
-    def task(rows: slice) -> Columns:
+    flyer = flyer_of(campaign)
+
+    def fly_rows(rows: slice) -> Columns:
         piece = full_inputs(campaign, {name: values[rows] for name, values in inputs.items()})
-        flown = fly(campaign.model, piece, noise[rows], campaign.seed, folder=campaign.directory)
+        flown = flyer.fly(piece, noise[rows])
         return {name: flown[name] for name in wanted}
 
-    width = usual_width(campaign.model)
-    build_kernel(campaign.model, campaign.directory, width)  # once, before several threads ask for it together
-    size = width * -(-len(noise) // (width * workers))
+    workers = min(workers, flyer.most_workers or workers)
+    flyer.make_ready()  # once, before several threads ask for it together
+    size = flyer.batch * -(-len(noise) // (flyer.batch * workers))
     pieces = [slice(first, first + size) for first in range(0, len(noise), size)]
     if len(pieces) == 1:
-        return task(pieces[0])
-    landed: Any = Parallel(n_jobs=workers, backend="threading")(delayed(task)(piece) for piece in pieces)
-    return {name: np.concatenate([columns[name] for columns in landed]) for name in wanted}
+        return fly_rows(pieces[0])
+    tables: Any = Parallel(n_jobs=workers, backend="threading")(delayed(fly_rows)(piece) for piece in pieces)
+    return {name: np.concatenate([columns[name] for columns in tables]) for name in wanted}
 
 
 def name_upstream(campaign: Campaign, case_ids: np.ndarray, flight: Columns) -> None:
@@ -175,12 +203,22 @@ def _lost_rows(campaign: Campaign, lost: Sequence[Lost], names: Sequence[str]) -
     return {name: known.get(name, np.full(ids.size, np.nan)) for name in names}
 
 
-def _base_rows(run: Path, order: Order, flown: np.ndarray) -> Mapping[str, Any]:
+def _known_rows(campaign: Campaign, rows: Mapping[int, Row], names: Sequence[str]) -> Columns:
+    """Rows that were recorded before the run was stopped, with the inputs of their cases."""
+    ids = np.array(sorted(rows), dtype=np.int64)
+    known: Columns = {"case_id": ids, **case_table(campaign, ids)}
+    return {
+        name: known[name] if name in known else column([rows[case].get(name, np.nan) for case in ids.tolist()])
+        for name in names
+    }
+
+
+def _base_rows(run: Path, task: Task, flown: np.ndarray) -> Mapping[str, Any]:
     """The rows of the part that stand: neither flown anew nor lost."""
-    if order.base is None:
+    if task.base is None:
         return {}
-    table = read_part(run, order.base)
-    anew = np.concatenate([flown, [lost.case_id for lost in order.lost]])
+    table = read_part(run, task.base)
+    anew = np.concatenate([flown, [lost.case_id for lost in task.lost]])
     stand = ~np.isin(table["case_id"].to_numpy(), anew)
     return {name: table[name].to_numpy(zero_copy_only=False)[stand] for name in table.column_names}
 
@@ -188,29 +226,29 @@ def _base_rows(run: Path, order: Order, flown: np.ndarray) -> Mapping[str, Any]:
 def _gathered(names: Sequence[str], tables: Sequence[Mapping[str, Any]]) -> Columns:
     """Rows of several tables as one, by case_id."""
     filled = [table for table in tables if table]
-    order = np.argsort(np.concatenate([table["case_id"] for table in filled]))
-    return {name: np.concatenate([table[name] for table in filled])[order] for name in names}
+    by_case = np.argsort(np.concatenate([table["case_id"] for table in filled]))
+    return {name: np.concatenate([table[name] for table in filled])[by_case] for name in names}
 
 
 def fly_nominal(campaign: Campaign) -> dict[str, Any]:
     """The nominal case by column name."""
-    inputs = nominal_row(campaign)
+    inputs = campaign.nominal
     ids = np.array([NOMINAL_NOISE])
     with naming_faults(campaign.model_reference, "the nominal case"):
-        flight = fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
-    dispersed = {one.name: inputs[one.name] for one in campaign.dispersions}
+        flight = flyer_of(campaign).fly(inputs, ids)
+    dispersed = {dispersion.name: inputs[dispersion.name] for dispersion in campaign.dispersions}
     if campaign.upstream is not None:
         dispersed |= campaign.upstream.nominal_row()
     return {**dispersed, **{name: column[0] for name, column in flight.items()}}
 
 
-def rerun_orders(run: Path, counted: Sequence[Part]) -> list[Order]:
-    """An order for every part with cases that did not complete."""
-    orders = []
+def rerun_tasks(run: Path, counted: Sequence[Part]) -> list[Task]:
+    """One task for every part that has cases which did not complete."""
+    tasks = []
     for part in counted:
         if set(part.status) - {STATUS_NAME[OK]}:
             table = read_part(run, part, CASE_COLUMNS[:2])
             failed = table["status"].to_numpy(zero_copy_only=False) != STATUS_NAME[OK]
             cases = tuple(int(case) for case in table["case_id"].to_numpy()[failed])
-            orders.append(Order(part.first, part.stop, base=part, failed=cases))
-    return orders
+            tasks.append(Task(part.first, part.stop, base=part, failed=cases))
+    return tasks

@@ -1,7 +1,7 @@
-"""What a model must keep, checked without compiling: each breach a sentence with its place and the fix.
+"""Checks of a model's contract that need no compilation.  Each breach is one sentence with its location and the fix.
 
-`mc_engine.model.reading` reads, `mc_engine.model.trial` runs the physics at the start of the nominal case.
-`mc_engine.flight.contract_flight` goes on with what only a flight can show.
+`mc_engine.model.reading` checks the source, `mc_engine.model.trial` runs the physics at the start of the nominal case.
+`mc_engine.flight.contract_flight` checks what only a flight can show.
 """
 
 import json
@@ -14,10 +14,10 @@ import numpy as np
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import EngineError, ModelError
-from mc_engine.flight.nominal_inputs import nominal_inputs
-from mc_engine.flight.repeatability import numbers
+from mc_engine.flight.repeatability import model_digests, nominal_inputs
 from mc_engine.model.faults import MORE
 from mc_engine.model.reading import is_shipped, source_faults
+from mc_engine.model.record import compiled_model
 from mc_engine.model.trial import run_through
 from mc_engine.safe_path import SAFE_PATH
 
@@ -26,14 +26,14 @@ _PATIENCE = 600.0  # s, for all flights and compilation; one case has a limit of
 
 def breaches(campaign: Campaign) -> list[str]:
     """Sentences on what is wrong with the campaign's model, as far as it shows without compiling; empty if nothing."""
-    return source_faults(campaign.model) or _trial_faults(campaign)
+    return source_faults(compiled_model(campaign.model)) or _trial_faults(campaign)
 
 
 def refuse_breaches(campaign: Campaign) -> None:
     """ModelError with the first breach, before anything of a campaign is flown or written."""
-    found = _trial_faults(campaign) if is_shipped(campaign.model) else breaches(campaign)
-    if found:
-        raise ModelError(f"{found[0]}{MORE}")
+    sentences = _trial_faults(campaign) if is_shipped(compiled_model(campaign.model)) else breaches(campaign)
+    if sentences:
+        raise ModelError(f"{sentences[0]}{MORE}")
 
 
 def _trial_faults(campaign: Campaign) -> list[str]:
@@ -41,7 +41,7 @@ def _trial_faults(campaign: Campaign) -> list[str]:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             p, o = nominal_inputs(campaign)
-            run_through(campaign.model, p, o, campaign.seed, finite=True)
+            run_through(compiled_model(campaign.model), p, o, campaign.seed, finite=True)
     except EngineError as error:
         return [str(error)]
     return []
@@ -49,8 +49,8 @@ def _trial_faults(campaign: Campaign) -> list[str]:
 
 def flight_faults(campaign: Campaign, file: str) -> list[str]:
     """What `mc_engine.flight.contract_flight` finds in a process of its own, which the model may kill or hang."""
-    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, json.dumps(numbers(campaign))]
-    path = os.pathsep.join(one or os.getcwd() for one in sys.path)  # the same packages as here
+    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, json.dumps(model_digests(campaign))]
+    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the same packages as here
     other = {"PYTHONHASHSEED": "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0", "TZ": "UTC-14"}
     environment = {**os.environ, **SAFE_PATH, **other, "PYTHONPATH": path}
     try:
@@ -61,4 +61,4 @@ def flight_faults(campaign: Campaign, file: str) -> list[str]:
     if done.returncode or not done.stdout:
         last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
         return [f"a flight of a few cases killed its process: {last}"]
-    return [str(one) for one in json.loads(done.stdout.splitlines()[-1])]
+    return [str(sentence) for sentence in json.loads(done.stdout.splitlines()[-1])]

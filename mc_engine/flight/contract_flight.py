@@ -1,8 +1,8 @@
-"""What only a flight shows of a model's contract: a few cases of the campaign, flown several times over.
+"""Checks of a model's contract by flying a few cases of its campaign several times.
 
-Results must be there, must be the same again and independent of the other cases in the batch, and every declared input,
-metric and event must matter.  `python -m mc_engine.flight.contract_flight FILE` prints the sentences as JSON; `check`
-calls it as a process of its own, which a model may kill or hang.
+Results must exist and repeat, must be independent of the other cases in the batch, and every declared input, metric and
+event must have an effect.  `python -m mc_engine.flight.contract_flight FILE` prints the sentences as JSON; `check` runs
+it as a process of its own, which the model may kill or hang.
 """
 
 import json
@@ -16,18 +16,18 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.campaign.cases import case_table, full_inputs, nominal_row
+from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
 from mc_engine.flight.chunks import NOMINAL_NOISE
 from mc_engine.flight.flight import fly, grid_of
+from mc_engine.flight.kernel_parts import watching_events
 from mc_engine.flight.lost_numbers import first_lost
-from mc_engine.flight.nominal_inputs import nominal_inputs
-from mc_engine.flight.repeatability import influences, note_environment, numbers
-from mc_engine.model.event_watch import watching_events
+from mc_engine.flight.repeatability import influences, model_digests, nominal_inputs, note_environment
 from mc_engine.model.faults import MORE, fault_of
 from mc_engine.model.fields import AdaptiveStep, FixedStep
+from mc_engine.model.record import compiled_model
 from mc_engine.model.trial import fixed_metrics
 from mc_engine.sampling.distributions import column, quantiles
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME, STATUS_TEXT
@@ -55,11 +55,11 @@ def faults(campaign: Campaign) -> list[str]:
     inputs = full_inputs(campaign, case_table(campaign, ids))
     try:
         nominal = _fly_nominal(campaign)
-        with _landing_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
-            flown = _fly(campaign, inputs, ids)
+        with _completed_within(_BLOCKS * LONGEST_S, f"the first {ids.size} cases have", campaign):
+            flown = _results(campaign, inputs, ids)
         lost = _not_finite(campaign, inputs, ids, flown, nominal)
-        found = [*(lost or _failed(campaign, flown)), *_other_bits(campaign, inputs, ids, flown)]
-        return found or [
+        faults_of_flight = [*(lost or _none_completing(campaign, flown)), *_other_bits(campaign, inputs, ids, flown)]
+        return faults_of_flight or [
             *_never_set(campaign, flown),
             *_always_the_same(campaign, flown),
             *_moving_nothing(campaign, inputs, ids),
@@ -73,20 +73,20 @@ def faults(campaign: Campaign) -> list[str]:
 
 def _fly_nominal(campaign: Campaign) -> Columns:
     """Fly the nominal case, after a single step of it that compiles the kernel; end the process with a sentence if it
-    does not land."""
-    clock, inputs, ids = campaign.model.clock, nominal_row(campaign), np.array([NOMINAL_NOISE])
+    is not completed."""
+    clock, inputs, ids = compiled_model(campaign.model).clock, campaign.nominal, np.array([NOMINAL_NOISE])
     one_step = replace(clock, attempts=1) if isinstance(clock, AdaptiveStep) else replace(clock, until=clock.step)
-    fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
-    with _landing_within(LONGEST_S, "the nominal case has", campaign):
-        return _fly(campaign, inputs, ids)
+    fly(compiled_model(campaign.model), inputs, ids, campaign.seed, folder=campaign.directory, clock=one_step)
+    with _completed_within(LONGEST_S, "the nominal case has", campaign):
+        return _results(campaign, inputs, ids)
 
 
 @contextmanager
-def _landing_within(seconds: float, who: str, campaign: Campaign) -> Iterator[None]:
+def _completed_within(seconds: float, who: str, campaign: Campaign) -> Iterator[None]:
     """A kernel cannot be broken off: where the block takes longer, the process ends with a sentence."""
 
     def give_up() -> None:
-        _answer([f"{who} not landed after {seconds:.0f} s: {_length(campaign)}"])
+        _print_sentences([f"{who} not completed after {seconds:.0f} s: {_length(campaign)}"])
         os._exit(0)
 
     timer = threading.Timer(seconds, give_up)
@@ -100,21 +100,21 @@ def _landing_within(seconds: float, who: str, campaign: Campaign) -> Iterator[No
 
 def _length(campaign: Campaign) -> str:
     """What the clock allows, and what to do about a flight that takes too long."""
-    clock, (_, settings) = campaign.model.clock, nominal_inputs(campaign)
+    clock, (_, settings) = compiled_model(campaign.model).clock, nominal_inputs(campaign)
     if isinstance(clock, FixedStep):
         n_steps, step, _ = grid_of(clock, settings)
         what, fix = f"{n_steps:,} steps of {step:g} s", "take longer steps, or an earlier `until`"
     else:
         what, fix = f"up to {clock.attempts:,} attempts", "take a larger `rtol` or fewer `attempts`"
-    stops = "; look whether its stopping event crosses zero" if campaign.model.event_list else ""
+    stops = "; look whether its stopping event crosses zero" if compiled_model(campaign.model).event_list else ""
     return f"its clock allows {what}; {fix}{stops}, or leave the flight out with `mc-engine check --no-model`"
 
 
-def _fly(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
-    return fly(campaign.model, inputs, ids, campaign.seed, folder=campaign.directory)
+def _results(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> dict[str, np.ndarray]:
+    return fly(compiled_model(campaign.model), inputs, ids, campaign.seed, folder=campaign.directory)
 
 
-def _failed(campaign: Campaign, flown: Columns) -> Iterator[str]:
+def _none_completing(campaign: Campaign, flown: Columns) -> Iterator[str]:
     """One sentence if no case at all reached its end."""
     status = flown["status"]
     if (status == STATUS_NAME[OK]).any():
@@ -124,7 +124,7 @@ def _failed(campaign: Campaign, flown: Columns) -> Iterator[str]:
     text = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}[word]
     reasons = [str(reason) for reason in flown["reason"] if reason]
     sentence = f"none of the first {status.size} cases completes: {counts.max()} are {word}"
-    stops = [f'"{event.name}"' for event in campaign.model.event_list if event.action == "stop"]
+    stops = [f'"{event.name}"' for event in compiled_model(campaign.model).event_list if event.action == "stop"]
     if word == "no-stop":
         text = f"no stopping event crosses zero before the time limit, of {', '.join(stops)}; look at its function, "
         text += "its direction and the clock's `until`"
@@ -137,20 +137,20 @@ def _not_finite(
     """One sentence with the line of the model if a flight ended not-finite: the nominal one, or the first of these."""
     word = STATUS_NAME[NOT_FINITE]
     bad = np.flatnonzero(flown["status"] == word)
-    own: tuple[Mapping[str, Any], int, str] = nominal_row(campaign), NOMINAL_NOISE, "the nominal case"
+    own: tuple[Mapping[str, Any], int, str] = campaign.nominal, NOMINAL_NOISE, "the nominal case"
     if nominal["status"][0] != word:
         if not bad.size:
             return []
         row = {name: value[bad[0]] if np.ndim(value) else value for name, value in inputs.items()}
         own = row, int(ids[bad[0]]), f"case {ids[bad[0]]}"
-    found = first_lost(campaign.model, own[0], own[1], campaign.seed, own[2])
-    return [f"{found}; {bad.size} of the first {ids.size} cases end {word}"] if found else []
+    sentence = first_lost(compiled_model(campaign.model), own[0], own[1], campaign.seed, own[2])
+    return [f"{sentence}; {bad.size} of the first {ids.size} cases end {word}"] if sentence else []
 
 
 def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, flown: Columns) -> Iterator[str]:
     """One sentence if the same cases come out differently a second time, or among other cases."""
     why = "a case must depend on its inputs and case_id alone: no global state, clock or numpy.random"
-    again = _difference(flown, _fly(campaign, inputs, ids))
+    again = _first_difference(flown, _results(campaign, inputs, ids))
     if again is not None:
         yield f'case {ids[again[0]]} has another "{again[1]}" when the same cases fly a second time; {why}'
         return
@@ -158,7 +158,8 @@ def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, 
     for part in parts:
         if part.size:
             own = {name: value[part] if np.ndim(value) else value for name, value in inputs.items()}
-            alone = _difference({name: values[part] for name, values in flown.items()}, _fly(campaign, own, ids[part]))
+            among_all = {name: values[part] for name, values in flown.items()}
+            alone = _first_difference(among_all, _results(campaign, own, ids[part]))
             if alone is not None:
                 yield (
                     f'case {ids[part[alone[0]]]} has another "{alone[1]}" when it flies among other cases; {why}, '
@@ -167,7 +168,7 @@ def _other_bits(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, 
                 return
 
 
-def _difference(a: Columns, b: Columns) -> tuple[int, str] | None:
+def _first_difference(a: Columns, b: Columns) -> tuple[int, str] | None:
     """Place and column of the first number with other bits, None if there is none."""
     for name, values in a.items():
         same = values == b[name]
@@ -181,7 +182,7 @@ def _difference(a: Columns, b: Columns) -> tuple[int, str] | None:
 def _never_set(campaign: Campaign, flown: Columns) -> Iterator[str]:
     """Metrics without a finite number in any case that flew."""
     ok = flown["status"] == STATUS_NAME[OK]
-    for metric in campaign.model.metrics:
+    for metric in compiled_model(campaign.model).metrics:
         values = flown[metric.name][ok]
         if not metric.sometimes and not np.isfinite(values).any():
             word = "infinite in all" if np.isinf(values).any() else "not a number in any"
@@ -197,8 +198,8 @@ def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
     A metric that only does not move in this campaign, such as a count that stays zero, is none of them.
     """
     ok = flown["status"] == STATUS_NAME[OK]
-    model = campaign.model
-    same = [one for one in model.metrics if not one.sometimes and np.unique(flown[one.name][ok]).size == 1]
+    model = compiled_model(campaign.model)
+    same = [metric for metric in model.metrics if not metric.sometimes and np.unique(flown[metric.name][ok]).size == 1]
     fixed = fixed_metrics(model, *nominal_inputs(campaign)) if same else {}
     for metric in same:
         if metric.name in fixed:
@@ -211,37 +212,38 @@ def _always_the_same(campaign: Campaign, flown: Columns) -> Iterator[str]:
 
 def _moving_nothing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
     """Dispersions whose values all give the same metrics: of the nominal case and of some dispersed ones."""
-    idle = [one for one in campaign.dispersions if not _moves(campaign, one, campaign.nominal)]
-    for one in idle:
+    idle = [dispersion for dispersion in campaign.dispersions if not _moves(campaign, dispersion, campaign.nominal)]
+    for dispersion in idle:
         rows = [{k: v[i] if np.ndim(v) else v for k, v in inputs.items()} for i in range(min(_PARTNERS, ids.size))]
-        if not any(_moves(campaign, one, row) for row in rows):
-            yield f'dispersion "{one.name}" moves no metric; use it in the physics, or leave it out of the campaign'
+        if not any(_moves(campaign, dispersion, row) for row in rows):
+            name = dispersion.name
+            yield f'dispersion "{name}" moves no metric; use it in the physics, or leave it out of the campaign'
 
 
-def _moves(campaign: Campaign, one: Dispersion, others: Mapping[str, Any]) -> bool:
+def _moves(campaign: Campaign, dispersion: Dispersion, others: Mapping[str, Any]) -> bool:
     """Whether some values of a dispersion give different results; one that has but one value does."""
-    places = _places(campaign, one)
+    places = _trial_values(campaign, dispersion)
     if np.unique(places).size == 1:
         return True
-    flown = _fly(campaign, {**others, one.name: places}, np.zeros(len(places), dtype=np.int64))
-    names = ["status", *(metric.name for metric in campaign.model.metrics)]
+    flown = _results(campaign, {**others, dispersion.name: places}, np.zeros(len(places), dtype=np.int64))
+    names = ["status", *(metric.name for metric in compiled_model(campaign.model).metrics)]
     rows = [{name: flown[name][[i]] for name in names} for i in range(len(places))]
-    return any(_difference(rows[0], row) is not None for row in rows[1:])
+    return any(_first_difference(rows[0], row) is not None for row in rows[1:])
 
 
-def _places(campaign: Campaign, one: Dispersion) -> np.ndarray:
+def _trial_values(campaign: Campaign, dispersion: Dispersion) -> np.ndarray:
     if campaign.upstream is None and campaign.design != "table":
-        if one.levels:
-            return column(one.levels)
-        assert one.distribution is not None  # a loaded campaign has one for every random design
-        return quantiles(one.distribution, _PLACES)
-    values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[one.name]
+        if dispersion.levels:
+            return column(dispersion.levels)
+        assert dispersion.distribution is not None  # a loaded campaign has one for every random design
+        return quantiles(dispersion.distribution, _PLACES)
+    values = case_table(campaign, np.arange(min(campaign.cases, _CASES)))[dispersion.name]
     return np.sort(values)[[0, 3 * values.size // 4, -1]]
 
 
 def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
     """Events that fire in none of the cases: their functions keep one sign."""
-    model = campaign.model
+    model = compiled_model(campaign.model)
     if all(event.rare for event in model.event_list):
         return
     reached = fly(watching_events(model), inputs, ids, campaign.seed, folder=campaign.directory)
@@ -260,15 +262,15 @@ def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarr
 def main() -> None:
     """Print the sentences on the campaign named on the command line as a JSON list.
 
-    Behind the name may stand the `numbers` of another process, as JSON.
+    Behind the name may stand the digests of another process, as JSON.
     """
     note_environment()
     campaign = load_campaign(sys.argv[1])
-    there = numbers(campaign)
-    _answer(influences(json.loads(sys.argv[2]) if sys.argv[2:] else there, there) or faults(campaign))
+    there = model_digests(campaign)
+    _print_sentences(influences(json.loads(sys.argv[2]) if sys.argv[2:] else there, there) or faults(campaign))
 
 
-def _answer(sentences: list[str]) -> None:
+def _print_sentences(sentences: list[str]) -> None:
     print(json.dumps(sentences), flush=True)
 
 

@@ -1,4 +1,4 @@
-"""From the inputs of some cases to their results: units, design, kernel, units again."""
+"""Flight of cases: converts inputs to SI, calls the model's `prepare`, runs the kernel, converts the results back."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,9 +12,10 @@ import numpy as np
 from mc_engine.campaign.columns import END_TIME
 from mc_engine.errors import ModelError
 from mc_engine.flight.kernel import build_kernel, usual_width
-from mc_engine.flight.kernel_parts import settings_class
+from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.interruption import in_another_thread
 from mc_engine.lanes.functions import TABLES
+from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
 from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model.fields import AdaptiveStep, FixedStep
@@ -60,7 +61,7 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
         refusals.add(outside, f"{parameter.name} is outside {parameter.low:g} to {parameter.high:g} {parameter.unit}")
         setattr(si, parameter.symbol, column * parameter.si_factor)
     settings = np.column_stack(
-        [_codes(setting, inputs[setting.name], n_cases) for setting in model.settings] or [np.zeros(n_cases)]
+        [_setting_codes(setting, inputs[setting.name], n_cases) for setting in model.settings] or [np.zeros(n_cases)]
     )
     columns: Mapping[str, np.ndarray] = vars(si)
     if model.prepare is not None:
@@ -70,12 +71,12 @@ def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
         raise ModelError(f"{_design(model)} gives {type(columns).__name__}; it must return a dictionary of arrays by "
                          "the fields of kernel_parameters")  # fmt: skip
     names = model.kernel_parameters._fields  # type: ignore[attr-defined]
-    rows = [_row(model, columns, name, n_cases) for name in names]
+    rows = [_parameter_row(model, columns, name, n_cases) for name in names]
     tables = np.asarray(columns.get(TABLES, np.empty(0)), dtype=np.float64).ravel()
     return Prepared(np.array(rows).reshape(len(names), n_cases), settings, refusals, tables)
 
 
-def _row(model: Model, columns: Mapping[str, Any], name: str, n_cases: int) -> np.ndarray:
+def _parameter_row(model: Model, columns: Mapping[str, Any], name: str, n_cases: int) -> np.ndarray:
     """One kernel parameter of all cases; ModelError if the design does not give it."""
     if name not in columns:
         source = (
@@ -106,7 +107,7 @@ def _design(model: Model) -> str:
     return f"{place_of(model.prepare)}: `prepare`" if model.prepare else "the model"
 
 
-def _codes(setting: Any, values: Any, n_cases: int) -> np.ndarray:
+def _setting_codes(setting: Any, values: Any, n_cases: int) -> np.ndarray:
     if np.ndim(values) == 0:
         return np.full(n_cases, setting.code(values))
     return np.array([setting.code(value) for value in values], dtype=np.float64)
@@ -134,7 +135,7 @@ def fly(
     time = np.full(n, np.nan)
     states = np.full((len(model.states), n), np.nan)
     metrics = np.full((len(model.metrics), n), np.nan)
-    for chosen in _groups(ready):
+    for chosen in _groups_by_settings(ready):
         flight = _fly_group(model, clock or model.clock, ready, chosen, case_ids, seed, folder, width)
         time[chosen], status[chosen], states[:, chosen], metrics[:, chosen] = flight
     metrics[:, status != OK] = np.nan
@@ -147,7 +148,7 @@ def fly(
     return columns | {field.name: row / field.si_factor for field, row in zip(model.metrics, metrics, strict=True)}
 
 
-def _groups(ready: Prepared) -> list[np.ndarray]:
+def _groups_by_settings(ready: Prepared) -> list[np.ndarray]:
     """Indices of the cases that can fly, one array per combination of settings."""
     able = np.flatnonzero(~ready.refusals.mask)
     if not able.size or (ready.settings == ready.settings[able[0]]).all():
@@ -157,7 +158,7 @@ def _groups(ready: Prepared) -> list[np.ndarray]:
     return [able[group == i] for i in range(int(group.max()) + 1)]
 
 
-def _number(item: float | str | Callable[[Any], float], settings: Any) -> float:
+def _clock_number(item: float | str | Callable[[Any], float], settings: Any) -> float:
     if callable(item):
         return float(item(settings))
     return float(getattr(settings, item) if isinstance(item, str) else item)
@@ -190,7 +191,7 @@ def _kernel_settings(model: Model, codes: np.ndarray, chosen: Any) -> np.ndarray
 
 def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
     """(n_steps, step [s], control_every) of one flight; the last step is the one that reaches `until`."""
-    step, until, every = (_number(one, settings) for one in (clock.step, clock.until, clock.control_every))
+    step, until, every = (_clock_number(item, settings) for item in (clock.step, clock.until, clock.control_every))
     if not (step > 0.0 and 0.0 < until <= _MOST_STEPS * step and every >= 1.0):
         raise ModelError(f"the clock has steps of {step:g} s until {until:g} s, control every {every:g} steps; all "
                          f"must be above 0, with no more than {_MOST_STEPS:,} steps")  # fmt: skip
@@ -202,7 +203,7 @@ def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
 def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tuple[np.ndarray, ...]:
     """Tables of the pair, clock and absolute tolerances, as the adaptive kernels take them."""
     pair = PAIRS[clock.method]
-    numbers = [_number(one, settings) for one in (clock.until, clock.rtol, clock.control_period)]
+    numbers = [_clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period)]
     if not all(number > 0.0 for number in numbers):
         raise ModelError("the clock has until = {:g} s, rtol = {:g}, control_period = {:g} s; all must be above 0"
                          .format(*numbers))  # fmt: skip
@@ -264,7 +265,8 @@ def _bound_kernel(
     kernel = kernel or build_kernel(model, folder, width)
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
     kernel_settings = _kernel_settings(model, settings, chosen)
-    shared = np.ascontiguousarray(parameters), kernel_settings, np.uint64(noise_key(seed)), cases
+    data = gathered(blocks_of(model))
+    shared = np.ascontiguousarray(parameters), kernel_settings, data, np.uint64(noise_key(seed)), cases
     if isinstance(clock, AdaptiveStep):
         return partial(kernel, *shared, *adaptive_arguments(model, clock, chosen), *out, history, float(pace))
     return partial(kernel, *shared, *grid_of(clock, chosen), *out, history, int(pace))
@@ -279,7 +281,7 @@ def bound_flight(
     Raises ModelError with the reason if no case can start.
     """
     ready = prepare(model, inputs, len(case_ids))
-    groups = _groups(ready)
+    groups = _groups_by_settings(ready)
     if not groups:
         raise ModelError(f"no case can start: {ready.refusals.reason[0]}")
     chosen = np.resize(groups[0], -(-groups[0].size // width) * width)

@@ -1,7 +1,7 @@
-"""The engine's own loops run by Python on the Numbers of one case: the same flight, which knows what broke it.
+"""The engine's integration loops run by Python on one case, to find the operation that made a number infinite or NaN.
 
-The loops are those that kernels are compiled of.  Only their intrinsics, which exist inside kernels alone, have a
-second meaning here, under the same names.
+The loops are the ones that kernels are compiled from.  Their intrinsics exist in compiled code only, so each has an
+interpreted twin of the same name here.
 """
 
 import functools
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
+from mc_engine.lanes.composed import ComposedFunction
 from mc_engine.lanes.functions import TABLES, fma
 from mc_engine.lanes.number import Number, Origin, calling, number
 from mc_engine.model.fields import AdaptiveStep
@@ -49,7 +50,9 @@ class InterpretedFlight:
         )
         self._model, self._settings = model, settings_class(model)
 
-    def kernel(self, parameters: np.ndarray, settings: np.ndarray, key: Any, cases: np.ndarray, *rest: Any) -> int:
+    def kernel(
+        self, parameters: np.ndarray, settings: np.ndarray, data: Any, key: Any, cases: np.ndarray, *rest: Any
+    ) -> int:
         """Fly the first case; arguments and results are those of the model's kernel."""
         model, adaptive = self._model, isinstance(self._model.clock, AdaptiveStep)
         fly = self._interpreted("adaptive_flight" if adaptive else "fixed_step")["fly"]
@@ -58,7 +61,7 @@ class InterpretedFlight:
         common, must_stop = (model.kernel_parameters, self._settings, 1), "stop" in actions
         if adaptive:
             tables, (clock, atol, *out, history, spacing) = rest[:4], rest[4:]
-            order = (np.zeros(1, dtype=np.int64), *inputs, [Number(one) for one in clock], atol, must_stop)
+            order = (np.zeros(1, dtype=np.int64), *inputs, [Number(value) for value in clock], atol, must_stop)
             return int(fly(self._functions, tables, *common, *order, out, history, spacing))
         n_steps, h, every, *out, history, stride = rest
         kinds = bool(actions), must_stop
@@ -96,8 +99,9 @@ class InterpretedFlight:
 
     def map_fields(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """function(a_i, b_i, ...) for every field i; the flight's `origin` is that of an event which is lost."""
-        first = next(one for one in arguments if isinstance(one, tuple))
-        rows = list(zip(*(one if isinstance(one, tuple) else [one] * len(first) for one in arguments), strict=True))
+        first = next(argument for argument in arguments if isinstance(argument, tuple))
+        columns = (item if isinstance(item, tuple) else [item] * len(first) for item in arguments)
+        rows = list(zip(*columns, strict=True))
         results = [function(*row) for row in rows]
         if getattr(function, "__name__", "") == "is_lost":
             self.origin = next((row[1].origin for row, lost in zip(rows, results, strict=True) if lost), self.origin)
@@ -109,6 +113,9 @@ class InterpretedFlight:
             return fields
 
         return hand_on
+
+    def composed(self, calls: Any, record: Any, picks: Any) -> Callable[..., Any]:
+        return ComposedFunction(calls, record, picks)
 
     def picker(self, cls: Any, picks: Sequence[tuple[int, float, float]], count: Any = None) -> Callable[[Any], Any]:
         def pick(fields: Any) -> Any:
@@ -129,7 +136,7 @@ def _record(cls: Any, values: Sequence[Any]) -> Any:
 
 
 def _spread(value: Any, like: Any) -> Any:
-    return _record(type(value), [number(one) for one in value]) if isinstance(value, tuple) else number(value)
+    return _record(type(value), [number(field) for field in value]) if isinstance(value, tuple) else number(value)
 
 
 def _load_scalars(cls: Any, array: np.ndarray) -> Any:
@@ -148,7 +155,7 @@ def _record_row(array: np.ndarray, row: int, t: Any, fields: Any) -> None:
 def _stage_sum(memory: list[Any], like: Any, first: int, last: int, columns: np.ndarray, weights: np.ndarray) -> Any:
     sums = [Number(0.0)] * len(like)
     for stage, weight in zip(columns[first:last], weights[first:last], strict=True):
-        sums = [fma(Number(weight), value, one) for value, one in zip(memory[stage], sums, strict=True)]
+        sums = [fma(Number(weight), value, summed) for value, summed in zip(memory[stage], sums, strict=True)]
     return _record(type(like), sums)
 
 
@@ -157,19 +164,19 @@ _INTRINSICS: dict[str, Callable[..., Any]] = {
     "least": functools.partial(functools.reduce, lambda x, y: x if x < y else y),
     "any_field": any,
     "select": lambda mask, chosen, other: chosen if mask else other,
-    "add_scaled": lambda y, h, k: _record(type(y), [fma(number(h), one, to) for one, to in zip(k, y, strict=True)]),
+    "add_scaled": lambda y, h, k: _record(type(y), [fma(number(h), slope, to) for slope, to in zip(k, y, strict=True)]),
     "joined": lambda *tuples: sum(map(tuple, tuples), ()),
     "first_fields": lambda fields, like: _record(type(like), fields[: len(like)]),
     "load": lambda array, first, width: Number(array[first]),
     "load_fields": lambda cls, array, first, width: cls(*_given(cls._fields, array[:, first])),
     "load_scalars": _load_scalars,
-    "scalars_like": lambda like, array: _record(type(like), [Number(one) for one in array]),
+    "scalars_like": lambda like, array: _record(type(like), [Number(item) for item in array]),
     "store": _store,
     "store_fields": _store,
     "store_lane": lambda array, column, value, lane: _store(array, column, value),
     "record": _record_row,
     "lane_holds": lambda mask, lane: mask,
-    "with_lane": lambda value, lane, one: number(one),
+    "with_lane": lambda value, lane, item: number(item),
     "align_stack": lambda: None,
     "stage_memory": lambda like, count: [None] * count,
     "put_stage": lambda memory, stage, derivative: memory.__setitem__(stage, derivative),

@@ -1,22 +1,20 @@
 """The compiled kernel of a model: assembled from its physics and the engine's loop, cached on disk.
 
-numba caches a function beside the file that it stands in and watches that file alone.  So every kernel gets
-a small file of its own, in a folder named by a digest of everything the kernel is made of: the engine's and
-the model's sources, the compiler's versions and the processor.  A changed source is a new folder.
+numba caches a function beside the file that defines it and watches that file alone.  So every kernel gets a small
+file of its own, in a folder named by the digest of what the kernel is compiled from (`mc_engine.flight.kernel_key`).
+Models that compile to the same code share a kernel, wherever they lie.
 """
 
 import os
-import platform
-import stat
-import sys
-import tempfile
 import threading
 from collections.abc import Callable
-from functools import cache, lru_cache
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
+from mc_engine.cache_folder import cache_folder
 from mc_engine.errors import DiskError
+from mc_engine.flight.kernel_key import Recorder, kernel_key
 from mc_engine.flight.kernel_parts import Functions, parts_of
 from mc_engine.model.fields import AdaptiveStep
 from mc_engine.model.imports import new_module
@@ -26,8 +24,8 @@ WIDTH = 8  # one register of eight doubles
 _FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
 _ENGINE = (
     "flight/kernel.py",
+    "flight/kernel_key.py",
     "flight/kernel_parts.py",
-    "model/event_watch.py",
     "model/fields.py",
     "model/record.py",
     "dates.py",
@@ -35,39 +33,45 @@ _ENGINE = (
     "status.py",
 )
 
-_FIXED = '''"""Kernel of {reference}, {width} cases at a time.  Written by the engine; edit the model instead."""
+_FIXED = '''"""A kernel for {width} cases at a time.  Written by the engine; edit the model instead."""
 
 from mc_engine.flight.kernel_parts import Functions
 from mc_engine.lanes.compiler import compile_kernel
 from mc_engine.lanes.fixed_step import fly
+from mc_engine.lanes.kernel_data import hand_over
 
-_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = PARTS
+_F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 {names} = _F
 
 
 @compile_kernel
-def kernel(parameters, settings, key, cases, n_steps, h, control_every, time, status, state, metrics, history, stride):
+def kernel(
+    parameters, settings, data, key, cases, n_steps, h, control_every, time, status, state, metrics, history, stride,
+):
+    hand_over(BLOCKS, data)
     f = Functions({names})
     grid, kinds, out = (n_steps, h, control_every), (HAS_EVENTS, MUST_STOP), (time, status, state, metrics)
     return fly(f, Parameters, Settings, {width}, parameters, settings, key, cases, grid, kinds, out, history, stride)
 '''
-_ADAPTIVE = '''"""Kernel of {reference}, {width} cases at a time.  Written by the engine; edit the model instead."""
+_ADAPTIVE = '''"""A kernel for {width} cases at a time.  Written by the engine; edit the model instead."""
 
 import numpy as np
 
 from mc_engine.flight.kernel_parts import Functions
 from mc_engine.lanes.adaptive_flight import fly
 from mc_engine.lanes.compiler import compile_kernel
+from mc_engine.lanes.kernel_data import hand_over
 
-_F, Parameters, Settings, HAS_EVENTS, MUST_STOP = PARTS
+_F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 {names} = _F
 
 
 @compile_kernel
 def kernel(
-    parameters, settings, key, cases, nodes, starts, columns, weights, clock, atol, time, status, state, metrics,
+    parameters, settings, data, key, cases, nodes, starts, columns, weights, clock, atol, time, status, state, metrics,
     history, spacing,
 ):
+    hand_over(BLOCKS, data)
     f = Functions({names})
     tables, out = (nodes, starts, columns, weights), (time, status, state, metrics)
     return fly(
@@ -78,7 +82,10 @@ def kernel(
 
 
 def source_digest(model: Model, folder: Path | None) -> str:
-    """SHA-256 over the engine's compiled sources and the model's, in a fixed order.  folder : see `sources_of`."""
+    """SHA-256 of the text of the engine's compiled sources and the model's, in a fixed order: what a run records.
+
+    folder : see `sources_of`.
+    """
     engine = Path(__file__).parents[1]
     files = [*sorted(engine.glob("lanes/*.py")), *sorted(engine.glob("physics/*.py"))]
     files += [engine / name for name in _ENGINE]
@@ -88,45 +95,6 @@ def source_digest(model: Model, folder: Path | None) -> str:
     for name, content in sources_of(model, folder).named():
         digest.update(f"{name}\n{len(content)}\n".encode() + content)
     return digest.hexdigest()
-
-
-def cache_folder() -> Path:
-    """Folder of compiled kernels: MC_ENGINE_CACHE, or the user's cache folder, or a temporary one."""
-    if chosen := os.environ.get("MC_ENGINE_CACHE"):
-        return Path(chosen)
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = base / "mc-engine"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if os.access(folder, os.W_OK):
-            return folder
-    except OSError:
-        pass  # a read-only home: kernels are then compiled once per temporary folder
-    return _own_temporary_folder()
-
-
-def _own_temporary_folder() -> Path:
-    """A temporary folder of this user alone, since what stands in it is run."""
-    user = os.getuid() if hasattr(os, "getuid") else 0  # Windows has a temporary folder for every user
-    folder = Path(tempfile.gettempdir()) / f"mc-engine-{user}"
-    try:
-        folder.mkdir(mode=0o700, exist_ok=True)
-        about = folder.lstat()
-        if not hasattr(os, "getuid") or (about.st_uid == user and stat.S_ISDIR(about.st_mode)):
-            return folder
-    except OSError:
-        pass  # somebody else's file has the name
-    return _temporary_folder_of_this_process()
-
-
-@cache
-def _temporary_folder_of_this_process() -> Path:
-    return Path(tempfile.mkdtemp(prefix="mc-engine-"))
 
 
 def usual_width(model: Model) -> int:
@@ -148,22 +116,20 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
 
     folder : see `sources_of`.  The first call compiles or loads from the cache.
     """
-    import llvmlite
-    import numba
-
     module = sources_of(model, folder).module
-    versions = f"{numba.__version__} {llvmlite.__version__} {platform.machine()} {sys.version_info[:2]} {_processor()}"
-    what = f"{module.__name__} {source_digest(model, folder)} {versions} {module.__file__} {model.watching}"
-    digest = sha256(what.encode()).hexdigest()
-    path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
     template = _ADAPTIVE if isinstance(model.clock, AdaptiveStep) else _FIXED
-    text = template.format(reference=model.reference, width=width, names=", ".join(Functions._fields)).encode()
-    _write(path, text)
+    digest, is_complete = kernel_key(parts_of(module.MODEL, model.watching, Recorder()), template)
+    if not is_complete:
+        what = f"{digest} {source_digest(model, folder)} {module.__name__} {module.__file__}"
+        digest = sha256(what.encode()).hexdigest()
+    path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
+    text = template.format(width=width, names=", ".join(Functions._fields)).encode()
+    _write_source(path, text)
     name, parts = f"mc_engine_kernel_{digest[:20]}_w{width}", parts_of(module.MODEL, model.watching)
     return new_module(name, path, text, PARTS=parts).kernel
 
 
-def _write(path: Path, text: bytes) -> None:
+def _write_source(path: Path, text: bytes) -> None:
     """Write the source of a kernel, unless it is there; DiskError with the folder's variable where the disk refuses.
 
     It is for numba, which keeps its files beside one, and for people: what runs is `text`.
@@ -178,9 +144,3 @@ def _write(path: Path, text: bytes) -> None:
     except OSError as error:
         raise DiskError(f"{path.parent}: {error.strerror or error}; compiled kernels are kept there, name another "
                         "folder in MC_ENGINE_CACHE") from error  # fmt: skip
-
-
-def _processor() -> str:
-    from llvmlite import binding
-
-    return str(binding.get_host_cpu_name())

@@ -1,13 +1,17 @@
-"""What a kernel needs of its model: the physics, completed by what the model leaves out, and picks of fields."""
+"""What a kernel takes from its model: the physics, defaults for functions left out, and selections of fields."""
 
 from collections import namedtuple
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from mc_engine.lanes import physics
+from mc_engine.lanes.block_search import blocks_in
+from mc_engine.lanes.composed import made_by
 from mc_engine.lanes.functions import TABLES
-from mc_engine.model.event_watch import watching_events
-from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum
+from mc_engine.lanes.kernel_data import Blocks, DataBlock
+from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum, Field
 from mc_engine.model.record import Model, NoMemory
 
 # The physics of a model, and intrinsics that pick or fill fields of tuples:
@@ -20,6 +24,7 @@ Functions = namedtuple(
     "initial start rhs control events switch observe evaluate peaks_of lasts_of best_of when_of smooth_of kinds_of "
     "signs_of stops_of switches_of states_of metrics_of",
 )
+_PHYSICS = Functions._fields[:8]
 NoEvents = namedtuple("NoEvents", "unused")
 
 
@@ -51,6 +56,7 @@ class Parts(NamedTuple):
     settings: type
     has_events: bool
     must_stop: bool
+    blocks: Blocks
 
 
 def settings_class(model: Model) -> type:
@@ -59,19 +65,30 @@ def settings_class(model: Model) -> type:
     return namedtuple("Settings", [*names, TABLES] if model.tables else names)
 
 
-def parts_of(model: Model, watching: bool) -> Parts:
-    """Functions, tuple classes and flags of the model that a kernel is for; `watching` : of its events."""
+def parts_of(model: Model, watching: bool, makers: Any = None) -> Parts:
+    """Functions, tuple classes and flags of the model that a kernel is for.
+
+    watching : of the model's events, see `watching_events`.  makers : see `functions_of`.
+    """
     model = watching_events(model) if watching else model
     actions = [event.action for event in model.event_list]
     settings = settings_class(model)
-    return Parts(functions_of(model), model.kernel_parameters, settings, bool(actions), "stop" in actions)
+    kinds = bool(actions), "stop" in actions
+    return Parts(functions_of(model, makers), model.kernel_parameters, settings, *kinds, Blocks(blocks_of(model)))
+
+
+@lru_cache(maxsize=64)
+def blocks_of(model: Model) -> tuple[DataBlock, ...]:
+    """The data that the physics of a model reads by their names, such as curves, in the order of its kernel."""
+    return blocks_in(getattr(model, name) for name in _PHYSICS)
 
 
 def functions_of(model: Model, makers: Any = None) -> Functions:
     """The physics of a model, and picks of its fields as `makers` makes them: intrinsics by default."""
     from mc_engine.lanes import tuples
 
-    return Functions(
+    makers = makers or tuples
+    physics_of_model = (
         model.initial,
         model.start or _no_start,
         model.rhs,
@@ -80,8 +97,8 @@ def functions_of(model: Model, makers: Any = None) -> Functions:
         model.switch or _no_switch,
         model.observe,
         model.evaluate,
-        *_picks(model, makers or tuples),
     )
+    return Functions(*(made_by(function, makers) for function in physics_of_model), *_picks(model, makers))
 
 
 def _picks(model: Model, makers: Any) -> list[Any]:
@@ -97,7 +114,8 @@ def _picks(model: Model, makers: Any) -> list[Any]:
     first_peak = n_events if isinstance(model.clock, AdaptiveStep) else 0
     best_picks, best_class = _tracked(model.extrema, peaks, lasts, first_peak, first_peak + len(peak_picks))
     smooth = [1.0 if e.smooth else 0.0 for e in peaks] or [0.0]
-    kinds = [*[EVENT] * n_events, *(PEAK if one else CORNER for one in smooth), *([LAST] * len(lasts) or [CORNER])]
+    extremum_kinds = [PEAK if is_smooth else CORNER for is_smooth in smooth] + ([LAST] * len(lasts) or [CORNER])
+    kinds = [EVENT] * n_events + extremum_kinds
     signs = [DIRECTIONS[e.direction] for e in model.event_list] or [-1.0]
     if isinstance(model.clock, AdaptiveStep):  # its events, peaks and last times are tracked as one
         signs += [-1.0] * (len(kinds) - n_events)
@@ -130,3 +148,30 @@ def _tracked(
     names = [e.name for e in extrema]
     best_class = namedtuple("Best", names or ["unused"])  # type: ignore[misc]
     return [(place[e.name], _sign(e), 0.0) for e in extrema] or [(first_peak, 1.0, 0.0)], best_class
+
+
+# ---- to check that each event can occur
+
+
+@physics
+def _reached(t, s, m, p, o, best, when):
+    return best
+
+
+def watching_events(model: Model) -> Model:
+    """The same flight, with metrics `least_<event>` and `most_<event>`: the extremes of each event's function at the
+    steps.  The model must have events."""
+    assert model.events is not None
+    names = [event.name for event in model.event_list]
+    kinds = [(f"{word}_{name}", name, kind) for name in names for word, kind in (("least", "min"), ("most", "max"))]
+    return replace(
+        model,
+        quantities=tuple(Field(name, "", "the event's function") for name in names),
+        observe=model.events,
+        extrema=tuple(Extremum(name, event, kind, smooth=False) for name, event, kind in kinds),
+        metrics=tuple(Field(name, "", "an extreme of an event's function") for name, _, _ in kinds),
+        evaluate=_reached,
+        figures=(),
+        published=(),
+        watching=True,
+    )

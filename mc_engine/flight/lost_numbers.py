@@ -1,4 +1,4 @@
-"""Where a number of a model stopped being finite, in a sentence: file, line, source, and the numbers there."""
+"""The first operation of a flight whose result is infinite or NaN, as a sentence: file, line, source and operands."""
 
 import math
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ PATIENCE_S = 60.0  # of a flight to find the line
 def may_be_lost(model: Model, flight: Mapping[str, np.ndarray]) -> bool:
     """Whether a flight of one case ended not-finite, or gave a metric that is not a number.  flight : its columns."""
     if flight["status"][0] == STATUS_NAME[OK]:
-        return any(not one.sometimes and bool(np.isnan(flight[one.name][0])) for one in model.metrics)
+        return any(not metric.sometimes and bool(np.isnan(flight[metric.name][0])) for metric in model.metrics)
     return bool(flight["status"][0] == STATUS_NAME[NOT_FINITE])
 
 

@@ -1,6 +1,8 @@
-"""What of a model differs in another process: it depends on the clock, random numbers, hashes or the environment.
+"""The nominal inputs as physics receives them, and whether they are the same in every process.
 
-`check` takes the same numbers in two processes, at two times, with other seeds for hashes and in other time zones.
+Values that differ depend on the clock, randomness or the environment.
+
+`check` computes the same digests in two processes, at two times, with different hash seeds and time zones.
 """
 
 import inspect
@@ -15,55 +17,61 @@ from typing import Any
 import numpy as np
 
 from mc_engine.campaign.loading import Campaign
-from mc_engine.flight.nominal_inputs import nominal_inputs
+from mc_engine.errors import EngineError
+from mc_engine.flight.flight import grid_of, prepare, settings_of
 from mc_engine.lanes.physics_function import PhysicsFunction
+from mc_engine.model.faults import fault_of
+from mc_engine.model.fields import FixedStep
 from mc_engine.model.imports import PACKAGES, USER
+from mc_engine.model.record import compiled_model
+from mc_engine.model.trial import FEW, Breach
 
 _WHY = "a case must depend on its inputs and case_id alone: no clock, random numbers, hashes or environment"
 _read: dict[str, str] = {}  # by environment variable: where the model reads it
 
 
-def numbers(campaign: Campaign) -> dict[str, str]:
+def model_digests(campaign: Campaign) -> dict[str, str]:
     """Digests of what the kernel of a campaign is made of, and of what its nominal case begins with, by name."""
-    model = campaign.model
+    model = compiled_model(campaign.model)
     p, o = nominal_inputs(campaign)
-    found = {f'"{name}" of the nominal case, from `prepare`,': value for name, value in zip(p._fields, p, strict=True)}
-    found |= {f"the setting `{name}`": value for name, value in zip(o._fields, o, strict=True)}
-    found |= {f"`{name}` of the clock": value for name, value in vars(model.clock).items()}
-    found |= {f"`{name}`": value for name, value in vars(model).items() if isinstance(value, PhysicsFunction)}
+    values = {f'"{name}" of the nominal case, from `prepare`,': value for name, value in zip(p._fields, p, strict=True)}
+    values |= {f"the setting `{name}`": value for name, value in zip(o._fields, o, strict=True)}
+    values |= {f"`{name}` of the clock": value for name, value in vars(model.clock).items()}
+    values |= {f"`{name}`": value for name, value in vars(model).items() if isinstance(value, PhysicsFunction)}
     seen: set[Any] = set()
-    return {key: digest for name, value in found.items() for key, digest in _digests(name, value, seen)}
+    return {key: digest for name, value in values.items() for key, digest in _digests_of(name, value, seen)}
 
 
-def _digests(name: str, value: Any, seen: set[Any]) -> Iterator[tuple[str, str]]:
+def _digests_of(name: str, value: Any, seen: set[Any]) -> Iterator[tuple[str, str]]:
     """Of all numbers and texts in a value; in a function, of those that it names outside of it."""
     inside: dict[str, Any] = {}
     if isinstance(value, tuple | list):
-        inside = {f"{name}[{i}]": one for i, one in enumerate(value)}
+        inside = {f"{name}[{i}]": item for i, item in enumerate(value)}
     elif isinstance(value, np.ndarray | np.generic | int | float | str):
         content = value.tobytes() if hasattr(value, "tobytes") else repr(value).encode()
         yield name, blake2b(content, digest_size=8).hexdigest()
     elif isinstance(value, PhysicsFunction | type) and value not in seen:
         seen.add(value)
-        inside = _named(name, value)
-    for key, one in inside.items():
-        yield from _digests(key, one, seen)
+        inside = _named_outside(name, value)
+    for key, item in inside.items():
+        yield from _digests_of(key, item, seen)
 
 
-def _named(name: str, value: PhysicsFunction | type) -> dict[str, Any]:
+def _named_outside(name: str, value: PhysicsFunction | type) -> dict[str, Any]:
     if isinstance(value, type):
-        return {f"{name}.{key}": one for key, one in vars(value).items() if not key.startswith("_")}
+        return {f"{name}.{key}": item for key, item in vars(value).items() if not key.startswith("_")}
     function = inspect.unwrap(value.function)
     outside = inspect.getclosurevars(function)
     file = Path(function.__code__.co_filename).name
-    return {f"`{key}` in {file}": one for key, one in {**outside.globals, **outside.nonlocals}.items()}
+    return {f"`{key}` in {file}": item for key, item in {**outside.globals, **outside.nonlocals}.items()}
 
 
 def influences(here: dict[str, str], there: dict[str, str]) -> list[str]:
     """Sentences on numbers that differ between two processes, and on what the model reads of the environment."""
-    found = [f"{name} differs between two processes; {_WHY}" for name in here if there.get(name, "") != here[name]]
+    different = [name for name in here if there.get(name, "") != here[name]]
     reads = [f'{place} reads the environment variable "{key}"; make it a setting' for key, place in _read.items()]
-    return [*reads, *found[:1]]  # what one cause changes is one mistake
+    # what one cause changes is one mistake
+    return [*reads, *(f"{name} differs between two processes; {_WHY}" for name in different[:1])]
 
 
 def note_environment() -> None:
@@ -83,3 +91,27 @@ class _Noting(type(os.environ)):  # type: ignore[misc]
 
 def _is_model(module: str) -> bool:
     return module.startswith(USER) or module.partition(".")[0] in PACKAGES.contents
+
+
+def nominal_inputs(campaign: Campaign) -> tuple[Any, Any]:
+    """(p, o) of a few nominal cases as physics sees them: arrays, and the numbers that all share."""
+    model = compiled_model(campaign.model)
+    try:
+        doing = "prepare"
+        ready = prepare(model, campaign.nominal, FEW)
+        doing = "tables"
+        settings = settings_of(model, ready.settings[0], ready.tables)
+    except EngineError:
+        raise
+    except SystemExit:
+        raise Breach(f"`{doing}` ends the process; a model only computes") from None
+    except Exception as error:
+        raise Breach(f"`{doing}`: {fault_of(error, 'the model')}") from None
+    if ready.refusals.mask[0]:
+        raise Breach(f"the nominal case is refused: {ready.refusals.reason[0]}")
+    for name, row in zip(model.kernel_parameters._fields, ready.parameters, strict=True):  # type: ignore[attr-defined]
+        if not np.isfinite(row).all():
+            raise Breach(f'`prepare` gives {row[0]:g} for "{name}" of the nominal case; it must be a number')
+    if isinstance(model.clock, FixedStep):
+        grid_of(model.clock, settings)
+    return model.kernel_parameters(*ready.parameters), settings

@@ -1,8 +1,11 @@
-"""Adaptive flight in lanes: every lane steps, meets events and ends by itself, then takes the next case.
+"""Adaptive flight in lanes: each lane steps, locates events and ends independently, then takes the next case.
 
-A lane is always in one of three ways: it steps; it closes in on an event, looking at shorter and shorter parts of
-the step that went over it; or it shortens a step that may have touched zero and come back.  A round of the loop is
-one attempt of every lane, so no lane waits for the events of another.
+A round of the loop is one attempt of every lane, so no lane waits for the events of another.
+
+state       attempt                        next state
+stepping    a full step                    stepping; closing if it passed an event; shortening if it may have met zero
+closing     a part of the step's length    closing; stepping once the event is located to tolerance
+shortening  a step to the likely zero      stepping; closing if it passed an event
 
 An event is a zero of a sense (see `adaptive_step`); peaks are zeros of rates, so they are as exact as events.
 """
@@ -29,6 +32,7 @@ from mc_engine.lanes.adaptive_step import (
 from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import crossed
+from mc_engine.lanes.extrema import first_time
 from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, where
 from mc_engine.lanes.lane_access import lane_holds, store_lane, with_column, with_lane
 from mc_engine.lanes.philox import Draws
@@ -127,18 +131,13 @@ def _fires_sharply(kind, armed, before, after, direction):
 
 
 @physics
-def _flag(mask, like):
+def _fired_flag(mask, like):
     return where(mask, 1.0, 0.0) + 0.0 * like
 
 
 @physics
-def _halved(kind, value, mask):
+def _halved_peak(kind, value, mask):
     return where(mask & (kind == PEAK), 0.5 * value, value)
-
-
-@physics
-def _at(value, t):
-    return t
 
 
 @physics
@@ -154,8 +153,8 @@ def _narrow(kinds, signs, bracket, seen, rates, looking):
     """
     after = any_field(map_fields(crossed, bracket.at_low, seen, signs))
     ahead, back = looking & (not after), looking & after
-    at_low = select(ahead, seen, map_fields(_halved, kinds, bracket.at_low, back & (bracket.side > 0.0)))
-    at_high = select(back, seen, map_fields(_halved, kinds, bracket.at_high, ahead & (bracket.side < 0.0)))
+    at_low = select(ahead, seen, map_fields(_halved_peak, kinds, bracket.at_low, back & (bracket.side > 0.0)))
+    at_high = select(back, seen, map_fields(_halved_peak, kinds, bracket.at_high, ahead & (bracket.side < 0.0)))
     rate_low, rate_high = select(ahead, rates, bracket.rate_low), select(back, rates, bracket.rate_high)
     side = where(back, 1.0, where(ahead, -1.0, bracket.side))
     low, high = where(ahead, bracket.look, bracket.low), where(back, bracket.look, bracket.high)
@@ -183,7 +182,7 @@ def _begin(f, p, o, key, case):
 begin = compile_callable(_begin)
 
 
-def _first(f, clock, case, s, m, p, o, atol):
+def _first_instant(f, clock, case, s, m, p, o, atol):
     """(first instant, first length) of every lane."""
     t = case * 0.0
     k = spread(f.rhs(t, s, m, p, o), t)
@@ -193,22 +192,22 @@ def _first(f, clock, case, s, m, p, o, atol):
     return sense_shared(f, t, s, m, k, p, o, _REACH * h), h
 
 
-first = compile_callable(_first)
+first = compile_callable(_first_instant)
 
 
-def _finish(f, here, best, when, p, o):
+def _metrics_at_end(f, here, best, when, p, o):
     """Metrics of every lane, were it to end here."""
     return f.metrics_of(spread(f.evaluate(here.t, here.s, here.m, p, o, f.best_of(best), f.when_of(when)), here.t))
 
 
-finish = compile_callable(_finish)
+finish = compile_callable(_metrics_at_end)
 
 
 def _changed(f, key, case, sample, here, fired, switching, sampling, p, o, reach):
     """The instant after what the model does at it: `switch` on events, `control` at samples."""
     t = here.t
     like = spread(f.events(t, here.s, here.m, p, o), t)
-    state, memory = f.switch(t, here.s, here.m, p, o, first_fields(map_fields(_flag, fired, t), like))
+    state, memory = f.switch(t, here.s, here.m, p, o, first_fields(map_fields(_fired_flag, fired, t), like))
     s, m = select(switching, spread(state, t), here.s), select(switching, spread(memory, t), here.m)
     m = select(sampling, spread(f.control(t, s, m, p, o, Draws(key, case, sample)), t), m)
     return arrive(f, t, s, m, p, o, reach)
@@ -281,7 +280,7 @@ def _fly(
     last_ideal = zero + _NONE  # of the step before this one: there is none
     closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
     bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
-    best, when = here.values, map_fields(_at, here.values, zero)
+    best, when = here.values, map_fields(first_time, here.values, zero)
     rows = 0
     if history.shape[0] > 0:
         rows = record_last(f, history, rows, here, p, o)
@@ -380,7 +379,7 @@ def _fly(
                 start, length = first(f, clock, case, s, m, p, o, atol)
                 here, h = select(new, start, here), where(new, length, h)
                 best = select(new, start.values, best)
-                when = select(new, map_fields(_at, start.values, zero), when)
+                when = select(new, map_fields(first_time, start.values, zero), when)
                 status, attempts = where(new, 0.0, status), where(new, 0.0, attempts)
                 sample, limit = where(new, 1.0, sample), where(new, _NEVER, limit)
                 last_ideal = where(new, _NONE, last_ideal)

@@ -1,8 +1,8 @@
-"""The stack of a kernel on the boundary of a vector register.
+"""Alignment of a kernel's stack to the size of a vector register.
 
-A kernel has far more values than registers, and keeps the others on its stack.  LLVM decides whether a function puts
-its stack on a boundary before it knows of these, so without an object that asks for it most of them lie across two
-cache lines, by the chance of where the caller's stack ends: three times in four, and a quarter of the time then.
+A kernel has more values than registers and keeps the others on its stack.  LLVM fixes the alignment of the stack before
+it knows of these values.  Without an object that asks for the alignment, most of them cross a cache line in three of
+four calls, depending on the caller's stack, and the kernel takes a quarter longer.
 """
 
 from llvmlite import ir

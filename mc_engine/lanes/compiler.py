@@ -1,4 +1,4 @@
-"""The one place where compiler flags stand."""
+"""Compiler flags and decorators: the only module that sets options of numba."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,10 +6,12 @@ from typing import Any
 from numba import config, njit
 
 from mc_engine.errors import ModelError
+from mc_engine.lanes import kernel_data_lowering as _kernel_data  # registers what reads the data of a kernel
 from mc_engine.lanes import lowering as _lowering  # registers the lane type and its functions
 from mc_engine.lanes import namespaces as _namespaces  # registers classes that hold constants
+from mc_engine.lanes import records as _records  # registers records of plain numbers and lanes
 from mc_engine.lanes.kernel_cache import keep_on_disk
-from mc_engine.lanes.linked import LinkedCompiler
+from mc_engine.lanes.linked import KernelCompiler, LinkedCompiler
 
 # numpy's error model: 1/0 is infinite, as in the vector instructions.  No fastmath and no contraction:
 # a case has the same bits alone and among seven others.
@@ -25,8 +27,10 @@ _UNWRAPPED: dict[str, Any] = {
 
 if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise ModelError("the environment has NUMBA_DISABLE_JIT, with which no kernel can be compiled; unset it")
+assert _kernel_data
 assert _lowering
 assert _namespaces
+assert _records
 
 
 def compile_inline(function: Callable[..., Any]) -> Any:
@@ -41,4 +45,4 @@ def compile_callable(function: Callable[..., Any]) -> Any:
 
 def compile_kernel(function: Callable[..., Any]) -> Any:
     """Dispatcher for a kernel: cached beside its file, and free of the interpreter lock while it runs."""
-    return keep_on_disk(njit(nogil=True, **STRICT)(function))
+    return keep_on_disk(njit(nogil=True, pipeline_class=KernelCompiler, **STRICT)(function))

@@ -52,19 +52,19 @@ def _secant(before, after, direction, low, high, unused):
 
 
 @physics
-def _halved(value, mask):
+def _halved_where(value, mask):
     return where(mask, 0.5 * value, value)
 
 
 @physics
-def _flag(mask, unused):
+def _one_where(mask, unused):
     return where(mask, 1.0, 0.0)
 
 
 def _locate(f, signs, t, finish, s, m, p, o, length, end, g_start, g_end, open_lanes):
     """(length, state, event values) just past the first event of each open lane inside a step from s to `finish`."""
     low, high, side = 0.0 * length, length, 0.0 * length
-    g_low, g_high, found = g_start, g_end, g_end
+    g_low, g_high, at_end = g_start, g_end, g_end
     tolerance = 4.5e-16 * (abs(t) + length)
     for iteration in range(_ITERATIONS):
         if not any_lane(open_lanes):
@@ -79,13 +79,13 @@ def _locate(f, signs, t, finish, s, m, p, o, length, end, g_start, g_end, open_l
         values = spread(f.events(minimum(t + guess, finish), state, m, p, o), t)
         after = any_field(map_fields(crossed, g_low, values, signs))
         ahead, back = open_lanes & (not after), open_lanes & after
-        g_low = select(ahead, values, map_fields(_halved, g_low, back & (side > 0.0)))
-        g_high = select(back, values, map_fields(_halved, g_high, ahead & (side < 0.0)))
+        g_low = select(ahead, values, map_fields(_halved_where, g_low, back & (side > 0.0)))
+        g_high = select(back, values, map_fields(_halved_where, g_high, ahead & (side < 0.0)))
         side = where(back, 1.0, where(ahead, -1.0, side))
         low, high = where(ahead, guess, low), where(back, guess, high)
-        end, found = select(back, state, end), select(back, values, found)
+        end, at_end = select(back, state, end), select(back, values, at_end)
         open_lanes = open_lanes & (high - low > tolerance)
-    return high, end, found
+    return high, end, at_end
 
 
 locate = compile_inline(_locate)
@@ -114,7 +114,7 @@ def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying):
         stopped = stopped | stops
         time, end = where(stops, now, time), select(stops, state, end)
         on = pending & (not stops)
-        switched, memory = f.switch(now, state, m, p, o, map_fields(_flag, fired, t))
+        switched, memory = f.switch(now, state, m, p, o, map_fields(_one_where, fired, t))
         s, m = select(on, spread(switched, t), s), select(on, spread(memory, t), m)
         t, rest = where(on, now, t), where(on, rest - length, rest)
         g_start = select(on, spread(f.events(t, s, m, p, o), t), g_start)

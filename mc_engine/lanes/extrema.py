@@ -1,10 +1,16 @@
-"""Running extrema of quantities along a flight, finer than the grid on which they are seen.
+"""Running extrema of quantities along a flight, interpolated between the grid points.
 
-A quantity that is once not a number has no extreme value; it has a last time above zero if it is seen there later.
+A quantity that is NaN once has no extreme value; it has a last time above a level if it is above it later.
 """
 
 from mc_engine.lanes.functions import where
 from mc_engine.lanes.physics_function import physics
+
+
+@physics
+def first_time(value, t):
+    """The time t of an extremum whose first value this is."""
+    return t
 
 
 @physics

@@ -47,11 +47,6 @@ def _track(flying, smooth, seen, times, lasts, best, when, last):
 track = compile_inline(_track)
 
 
-@compile_inline
-def _at(value, t):
-    return t
-
-
 def _look(f, t, s, m, p, o):
     return spread(f.observe(t, s, m, p, o), t)
 
@@ -95,7 +90,7 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
     seen = look_shared(f, t, s, m, p, o)
     v0 = v1 = best = f.peaks_of(seen)
     w1 = f.lasts_of(seen)
-    when, last = map_fields(_at, v1, t), map_fields(_at, w1, t)
+    when, last = map_fields(extrema.first_time, v1, t), map_fields(extrema.first_time, w1, t)
     t0 = t1 = t2 = t
     for k in range(n_steps):
         if k > 0 and k % control_every == 0:

@@ -1,23 +1,44 @@
-"""Machine code of kernels on disk, which is a convenience: where it cannot be read or kept, kernels are compiled again.
+"""Compiled kernels on disk.  A file that cannot be read or written costs a compilation and ends no flight.
 
-A file holds one compiled kernel behind a digest of it, and nothing of it is used before the digest is checked: damaged
-machine code would crash, or fly other numbers.  The name of a file is made of all that it is compiled for, so that
-processes that compile the same write the same file, each at once and whole.
+Each file holds one compiled kernel and its digest, which is checked before loading: damaged machine code may crash or
+give wrong numbers.  The file's name contains all that the kernel was compiled for.  Files are replaced as a whole.
+A lock per file keeps two processes from compiling the same kernel.
 """
 
 import logging
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from hashlib import blake2b
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
 from numba.core.serialize import dumps, loads
+
+try:
+    import fcntl
+except ImportError:  # Windows: processes that start together may compile the same kernel, each for itself
+    fcntl = None  # type: ignore[assignment]
 
 _DIGEST_BYTES = 32
 
 
+class _KernelData(CompileResultCacheImpl):
+    """What is kept of a compiled kernel."""
+
+    def reduce(self, result: Any) -> Any:
+        """Without the empty environments of the physics inside it.
+
+        No compiled code reads them, and each would import the model's module under the name that it had then.
+        """
+        *data, environments = super().reduce(result)
+        return (*data, tuple(environment for environment in environments if environment.consts))
+
+
 class KernelCache(FunctionCache):
     """numba's cache of one function, whose failures end no flight."""
+
+    _impl_class = _KernelData
 
     def __init__(self, function: Any):
         super().__init__(function)
@@ -40,6 +61,40 @@ class KernelCache(FunctionCache):
         except OSError as error:
             _refused(self.cache_path, error)
 
+    @contextmanager
+    def compiling(self, sig: Any, target_context: Any) -> Iterator[None]:
+        """Hold a kernel's lock unless it is on disk: of processes that ask together one compiles, the others load."""
+        path = self._cache_file.path(self._index_key(sig, target_context.codegen()))
+        if path.exists():
+            yield
+        else:
+            with _locked(path.with_suffix(".lock")):
+                yield
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Hold the system's lock on a file, which ends with its process.  Where the system has none, go on without.
+
+    The file is deleted at the end: who waits for it finds the kernel on disk when the lock is theirs.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = path.open("ab")
+    except OSError:
+        yield
+        return
+    with file:
+        with suppress(OSError, AttributeError):
+            fcntl.flock(file, fcntl.LOCK_EX)
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                path.unlink()
+            with suppress(OSError, AttributeError):  # closing alone would leave it to a child that was forked meanwhile
+                fcntl.flock(file, fcntl.LOCK_UN)
+
 
 class _Damaged(Exception):
     """A file is not what was written."""
@@ -50,7 +105,7 @@ class _Files(IndexDataCacheFile):
 
     def load(self, key: Any) -> Any:
         try:
-            content = self._path(key).read_bytes()
+            content = self.path(key).read_bytes()
         except FileNotFoundError:
             return None
         digest, data = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
@@ -60,10 +115,11 @@ class _Files(IndexDataCacheFile):
 
     def save(self, key: Any, data: Any) -> None:
         content = dumps(data)
-        with self._open_for_write(str(self._path(key))) as file:
+        with self._open_for_write(str(self.path(key))) as file:
             file.write(_digest(key, content) + content)
 
-    def _path(self, key: Any) -> Path:
+    def path(self, key: Any) -> Path:
+        """The file of a key."""
         name = self._data_name(0).removesuffix(".0.nbc")
         return Path(self._cache_path) / f"{name}.{_digest(key, b'').hex()[:16]}.nbc"
 
@@ -73,11 +129,22 @@ def _digest(key: Any, content: bytes) -> bytes:
 
 
 def keep_on_disk(dispatcher: Any) -> Any:
-    """The dispatcher, which from now on keeps what it compiles beside its file: numba's `cache=True`, but forgiving."""
+    """The dispatcher, which from now on keeps what it compiles next to its file.
+
+    As numba's `cache=True`, but a disk that fails ends no flight, and two processes never compile the same kernel.
+    """
     try:
-        dispatcher._cache = KernelCache(dispatcher.py_func)
+        dispatcher._cache = kept = KernelCache(dispatcher.py_func)
     except RuntimeError as error:  # numba finds no folder that it may write to
         _refused("kernels", error)
+        return dispatcher
+    compile_alone = dispatcher.compile
+
+    def compile_once(sig: Any) -> Any:
+        with kept.compiling(sig, dispatcher.targetctx):
+            return compile_alone(sig)
+
+    dispatcher.compile = compile_once
     return dispatcher
 
 

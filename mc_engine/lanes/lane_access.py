@@ -1,4 +1,4 @@
-"""One lane of a block: read from and written to columns of arrays, so that a finished lane can take the next case."""
+"""Access to a single lane: reads and writes columns of arrays, so that a finished lane can take the next case."""
 
 from typing import Any
 

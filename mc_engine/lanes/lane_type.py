@@ -75,8 +75,8 @@ def splat(builder: Any, value: Any, width: int) -> Any:
     if isinstance(value, ir.Constant):
         return ir.Constant(ir.VectorType(value.type, width), [value.constant] * width)
     undefined = ir.Constant(ir.VectorType(value.type, width), ir.Undefined)
-    one = builder.insert_element(undefined, value, ir.Constant(I32, 0))
-    return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(I32, width), [0] * width))
+    first = builder.insert_element(undefined, value, ir.Constant(I32, 0))
+    return builder.shuffle_vector(first, undefined, ir.Constant(ir.VectorType(I32, width), [0] * width))
 
 
 def convert(context: Any, builder: Any, value: Any, ty: Any, target: Any) -> Any:

@@ -1,9 +1,9 @@
-"""The compilation of functions that exist only inside kernels: to LLVM's language and no further.
+"""A numba pipeline for functions that are used inside kernels only: it stops at LLVM's intermediate language.
 
-numba makes every function it compiles ready to run, optimised and in machine code, and then does the same again for
-the function that it becomes part of.  A kernel's parts are never run by themselves; left raw, they are optimised once,
-with all of the kernel around them.  That halves the time of compilation; results keep their bits, flights their speed.
-The steps replaced are numba's internal ones: they stand in this file alone.
+numba optimises each function and generates its machine code, then does so again for the function that it is inlined
+into.  A kernel's parts are never called by themselves, so they are optimised once, with the kernel around them.  This
+halves the time of compilation and changes neither results nor speed.  It replaces internal steps of numba, in this
+file alone.
 """
 
 from typing import Any
@@ -11,6 +11,8 @@ from typing import Any
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
+
+from mc_engine.lanes.call_frame import KernelCalls, PartCalls, calling_by, refuse_missing_blocks
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -40,10 +42,44 @@ class LinkedCompiler(CompilerBase):
 
     def define_pipelines(self) -> list[Any]:
         """Called by numba once per function."""
-        manager = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        manager.passes = [(LinkedLowering if step is NativeLowering else step, text) for step, text in manager.passes]
-        manager.finalize()
-        return [manager]
+        calling_by(PartCalls, self.state.targetctx)
+        return [_with_last_step(self.state, LinkedLowering)]
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelLowering(NativeLowering):
+    """Lower a kernel to a library that is complete: what its parts name of one another is there."""
+
+    _name = "kernel_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Called by numba with the state of the compilation."""
+        library = state.library = state.targetctx.codegen().create_library(state.func_id.func_qualname)
+        library.enable_object_caching()
+        optimise = library._optimize_final_module
+
+        def check_and_optimise() -> None:
+            refuse_missing_blocks(library._final_module)
+            optimise()
+
+        library._optimize_final_module = check_and_optimise
+        return super().run_pass(state)
+
+
+class KernelCompiler(CompilerBase):
+    """numba's own pipeline for a kernel, which hands its data over to its parts."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Called by numba once per function."""
+        calling_by(KernelCalls, self.state.targetctx)
+        return [_with_last_step(self.state, KernelLowering)]
+
+
+def _with_last_step(state: Any, last: Any) -> Any:
+    manager = DefaultPassBuilder.define_nopython_pipeline(state)
+    manager.passes = [(last if step is NativeLowering else step, text) for step, text in manager.passes]
+    manager.finalize()
+    return manager
 
 
 def _leave_alone() -> None:

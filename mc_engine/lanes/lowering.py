@@ -74,7 +74,7 @@ def _intrinsic(base: str) -> Emit:
     return emit
 
 
-def _select(builder, width, args):
+def _choose(builder, width, args):
     mask, x, y = args
     if width == 1 and mask.type != ir.IntType(1):
         mask = builder.trunc(mask, ir.IntType(1))
@@ -142,7 +142,7 @@ _register(functions.sign_copied, 2, _intrinsic("copysign"))
 _register(functions.copysign, 2, _copysign)
 _register(functions.minimum, 2, _extreme("<"))
 _register(functions.maximum, 2, _extreme(">"))
-_register(functions.where, 2, _select, mask_first=True)
+_register(functions.where, 2, _choose, mask_first=True)
 _register(functions.two_to, 1, _two_to)
 _register(functions.exponent, 1, _exponent)
 _register(functions.mantissa, 1, _mantissa)

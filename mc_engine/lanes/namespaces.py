@@ -1,7 +1,7 @@
-"""Classes and namespaces that hold the numbers and functions of physics: read in kernels as modules are.
+"""Classes and namespaces with constants and functions of physics: compiled code reads their attributes as constants.
 
-`Earth.mu` of a class `Earth`, and `EARTH.mu` of `EARTH = SimpleNamespace(mu=...)`, are constants of a kernel, as
-`constants.mu` of a module `constants` is.
+`Earth.mu` of a class `Earth`, and `EARTH.mu` of `EARTH = SimpleNamespace(mu=...)`, work in kernels as `constants.mu` of
+a module `constants` does.
 """
 
 from types import SimpleNamespace

@@ -1,8 +1,8 @@
-"""A float for interpreted flights: it computes as kernels do, and knows where it stopped being finite.
+"""Floats for interpreted flights: they compute as kernels do and record which operation gave an infinity or NaN.
 
-1/0 is infinite, as in kernels.  A result that is infinite or not a number has an `Origin`: the operation that made it
-of finite numbers, and where.  All that is computed of it later has the same one, so that the number which breaks a
-flight tells of the first mistake.
+1/0 is infinite, as in kernels.  A result that is infinite or NaN has an `Origin`: the operation on finite numbers that
+gave it, and its source line.  Results computed from it keep the same origin, so that the number that ends a flight
+identifies the first faulty operation.
 """
 
 import functools
@@ -71,7 +71,7 @@ def number(value: Any, origin: Origin | None = None) -> Number:
 def numbers(value: Any) -> Any:
     """A number as a Number, a record with Numbers in place of its numbers; all else as it is."""
     if isinstance(value, tuple):
-        fields = [numbers(one) for one in value]
+        fields = [numbers(field) for field in value]
         return type(value)(*fields) if hasattr(value, "_fields") else tuple(fields)
     return number(value) if isinstance(value, float) else value
 
@@ -80,7 +80,7 @@ def result_of(operation: str, arguments: tuple[Any, ...], value: float) -> Numbe
     """The result of an operation as a Number."""
     made = Number(value)
     if not math.isfinite(value):
-        known = (one.origin for one in arguments if type(one) is Number and one.origin is not None)
+        known = (argument.origin for argument in arguments if type(argument) is Number and argument.origin is not None)
         made.origin = next(known, None) or _origin(operation, arguments, value)
     return made
 
@@ -96,7 +96,7 @@ def taking_numbers(function: Callable[..., Any]) -> Callable[..., Any]:
             arguments = signature.bind(*arguments, **named).args
         if Number not in map(type, arguments):
             return function(*arguments)
-        plain = [float(one) if type(one) is Number else one for one in arguments]
+        plain = [float(argument) if type(argument) is Number else argument for argument in arguments]
         return result_of(function.__name__, arguments, function(*plain))
 
     return call
@@ -108,17 +108,17 @@ def calling(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
     On floats first, which is ten times as fast, and with Numbers where that gives one that is not finite.
     """
     try:
-        result = function(*(_bare(one) for one in arguments))
+        result = function(*(_bare(argument) for argument in arguments))
         if _is_finite(result):
             return result
     except ArithmeticError:  # where kernels go on with an infinity
         pass
-    return function(*(numbers(one) for one in arguments))
+    return function(*(numbers(argument) for argument in arguments))
 
 
 def _bare(value: Any) -> Any:
     if isinstance(value, tuple):
-        fields = [_bare(one) for one in value]
+        fields = [_bare(field) for field in value]
         return type(value)(*fields) if hasattr(value, "_fields") else tuple(fields)
     return float(value) if type(value) is Number else value
 

@@ -123,11 +123,11 @@ def map_fields(typingctx, function, *args):
 @intrinsic
 def joined(typingctx, *tuples):
     """One plain tuple of the fields of all tuples."""
-    result = _tuple_type([field for one in tuples for field in one])
+    result = _tuple_type([field for fields in tuples for field in fields])
 
     def codegen(context, builder, sig, args):
         given = [_item(builder, args[0], i) for i in range(len(tuples))]
-        fields = [_item(builder, one, i) for one, ty in zip(given, tuples, strict=True) for i in range(len(ty))]
+        fields = [_item(builder, fields, i) for fields, ty in zip(given, tuples, strict=True) for i in range(len(ty))]
         return _pack(context, builder, result, fields)
 
     return result(types.StarArgTuple.from_types(tuples)), codegen
@@ -358,3 +358,40 @@ def any_of(indices: Sequence[int]) -> Any:
         return masks[0](masks), codegen
 
     return chosen
+
+
+def composed(calls: Sequence[tuple[Any, tuple[int, ...]]], record: Any, picks: Sequence[tuple[str, int, str]]) -> Any:
+    """Intrinsic that calls the functions, each with some of its arguments; see `mc_engine.lanes.composed`."""
+
+    @intrinsic
+    def call(typingctx, *args):
+        functions = [typingctx.resolve_value_type(function) for function, _ in calls]
+        chosen = [tuple(args[i] for i in indices) for _, indices in calls]
+        sigs = [function.get_call_type(typingctx, own, {}) for function, own in zip(functions, chosen, strict=True)]
+        given: dict[str, Sequence[Any]] = {"argument": args, "result": [sig.return_type for sig in sigs]}
+        places = [(source, i, _place(given[source][i], field)) for source, i, field in picks]
+        fields = [given[source][i] if place is None else given[source][i][place] for source, i, place in places]
+        result = given["result"][0] if record is None else types.BaseTuple.from_types(tuple(fields), record)
+
+        def codegen(context, builder, sig, values):
+            own = [_item(builder, values[0], i) for i in range(len(args))]
+            results = []
+            for function, call_sig, (_, indices) in zip(functions, sigs, calls, strict=True):
+                handed = [own[i] for i in indices]
+                if call_sig.args and isinstance(call_sig.args[0], types.StarArgTuple):  # of a composed function
+                    handed = [_pack(context, builder, call_sig.args[0], handed)]
+                results.append(context.get_function(function, call_sig)(builder, handed))
+            if record is None:
+                return results[0]
+            held: dict[str, Sequence[Any]] = {"argument": own, "result": results}
+            parts = [held[s][i] if place is None else _item(builder, held[s][i], place) for s, i, place in places]
+            return _pack(context, builder, result, parts)
+
+        return result(types.StarArgTuple.from_types(args)), codegen
+
+    return call
+
+
+def _place(record: Any, field: str) -> int | None:
+    """Index of a field of a named tuple's type; None where the whole is meant."""
+    return record.fields.index(field) if field else None

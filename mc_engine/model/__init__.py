@@ -1,5 +1,19 @@
 """What a model is: the names that a model file imports."""
 
+from mc_engine.model.declarations import (
+    at_end,
+    inputs,
+    last_above,
+    maximum_of,
+    metrics,
+    minimum_of,
+    outputs,
+    states,
+    time_of_maximum,
+    time_of_minimum,
+)
+from mc_engine.model.declared import model
+from mc_engine.model.designs import kept_design
 from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedStep, Named, Parameter, Setting
 from mc_engine.model.figures import (
     CorridorFigure,
@@ -28,5 +42,17 @@ __all__ = [
     "Refusals",
     "ScatterFigure",
     "Setting",
+    "at_end",
+    "inputs",
+    "kept_design",
+    "last_above",
     "load_model",
+    "maximum_of",
+    "metrics",
+    "minimum_of",
+    "model",
+    "outputs",
+    "states",
+    "time_of_maximum",
+    "time_of_minimum",
 ]

@@ -1,9 +1,10 @@
 """Errors in a model's own code as one sentence each, with the file, the line and the usual fix.
 
-Errors of physics also show the source line and end with what physics may contain: arrays of cases and the compiler
-complain in words of their own, which no user has written.
+For errors in physics the sentence adds the source line and what physics may contain, since the messages of NumPy and of
+the compiler do not mention the user's code.
 """
 
+import inspect
 import linecache
 import re
 import sysconfig
@@ -12,9 +13,11 @@ from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from traceback import walk_tb
-from types import FrameType
+from types import FrameType, FunctionType
+from typing import Any
 
 from mc_engine.errors import EngineError, ModelError
+from mc_engine.suggestions import hint, nearest
 
 MORE = "; `mc-engine check` tells more"
 PHYSICS = (
@@ -30,6 +33,8 @@ _OF_ARRAYS = re.compile(
     "truth value of an array|integer scalar arrays|interpreted as an integer|only (length-1|0-dimensional) arrays|"
     "must be real number, not|__round__|ind(ex|ices) must be integers|used as indices|boolean index"
 )
+_LEFT_OUT = re.compile(r"(\w+)\.__new__\(\) missing \d+ required positional arguments?: (.*)")
+_UNKNOWN_FIELD = re.compile(r"(\w+)\.__new__\(\) got an unexpected keyword argument '(\w+)'")
 _ARRAY = re.compile(r"'?(numpy\.)?ndarray'?( object)?")
 _COMPILER = ("numba", "llvmlite")
 _ENGINE = Path(__file__).resolve().parents[1]
@@ -67,9 +72,19 @@ def fault_of_trial(error: Exception) -> str:
     text = " ".join(str(error).split())
     if _OF_ARRAYS.search(text):
         text = _EACH_CASE
+    elif left_out := _LEFT_OUT.match(text):
+        text = f"{left_out[1]}(...) leaves out {left_out[2]}; give every field that has no default"
+    elif unknown := _UNKNOWN_FIELD.match(text):
+        text = f'{unknown[1]}(...) has no field "{unknown[2]}"{_hint_of_field(error, unknown[1], unknown[2])}'
     elif not isinstance(error, EngineError):  # which says the fix itself
         text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}; {PHYSICS}"
     return f"{source_place(frame.f_code.co_filename, line) if frame else 'the model'}: {text}"
+
+
+def _hint_of_field(error: Exception, record: str, field: str) -> str:
+    frame, _ = frame_in_model(error)
+    made = (frame.f_globals | frame.f_locals).get(record) if frame else None
+    return hint(field, getattr(made, "_fields", ()))
 
 
 def source_place(file: str, line: int) -> str:
@@ -102,14 +117,26 @@ def is_the_users(path: Path) -> bool:
 
 
 def wrong_record(error: BaseException) -> str:
-    """What is wrong with the arguments that a record of the model, such as a Field, is made with; "" for others."""
-    call = re.match(r"(\w+)\.__(?:init|new)__\(\) (.*)", str(error))
+    """What is wrong with the arguments that a record or a declaration, such as a Field, is made with; "" for others."""
+    call = re.match(r"(\w+)(?:\.__(?:init|new)__)?\(\) (.*)", str(error))
     if not isinstance(error, TypeError) or not call:
         return ""
     *_, (frame, _) = walk_tb(error.__traceback__)
     made = (frame.f_globals | frame.f_locals).get(call[1])
-    known = [item.name for item in fields(made)] if isinstance(made, type) and is_dataclass(made) else []
-    return f"{call[1]}: {call[2]}; it takes {', '.join(known)}" if known else ""
+    known = _arguments(made)
+    if not known:
+        return ""
+    wrong = re.search("unexpected keyword argument '(\\w+)'", call[2])
+    near = nearest(wrong[1], known) if wrong else None
+    return f"{call[1]}: {call[2]}" + (f'; did you mean "{near}"?' if near else "") + f"; it takes {', '.join(known)}"
+
+
+def _arguments(made: Any) -> list[str]:
+    """What a record of the engine's, or `model`, is made with; [] for anything else."""
+    if isinstance(made, type) and is_dataclass(made):
+        return [item.name for item in fields(made)]
+    engine = isinstance(made, FunctionType) and made.__module__.startswith("mc_engine.model")
+    return list(inspect.signature(made).parameters) if engine else []
 
 
 def relative_import(error: BaseException) -> str:
@@ -141,6 +168,8 @@ def _compiler_fault(text: str) -> tuple[str, str]:
     known = ((match[1] or match[3], int(match[2] or match[4])) for match in places)
     file, number = next((place for place in known if is_the_users(Path(place[0].replace("\\", "/")))), ("", 0))
     lines = [" ".join(line.split()) for line in text.splitlines()]
-    telling = (line for line in lines if line and not line.startswith(("Failed in", "- Resolution failure", "File ")))
+    idle = ("Failed in", "- Resolution failure", "File ", ">>> ", "There are ", "- Of which", "Overload ",
+            "Intrinsic in ", "With argument", "Rejected as", "TypingError: Failed in")  # fmt: skip
+    telling = (line for line in lines if line and not line.startswith(idle) and "<intrinsic " not in line)
     words = re.sub(r" at 0x\w+|(?<=\s)(?:[A-Za-z]:)?[/\\]\S*[/\\]", "", next(telling, "no reason given"))
     return source_place(file, number) if file else "", f"kernels cannot run this ({words.rstrip(':.')}); {PHYSICS}"

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -10,17 +10,40 @@ from mc_engine.dates import modified_julian_date
 from mc_engine.units import UNITS, unit_suffix
 
 Number = float | np.ndarray
+OF_NAME = "that of the name"  # in place of a unit, until the declaration has given the name
 DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}  # of events, and their signs
 
 
-@dataclass(frozen=True)
-class Named:
-    """A named number: column name ending in its unit, the unit, a one-line meaning."""
+class _TakesName(type):
+    """Accepts name and unit in front, too, as models did before 0.2: Parameter("mass_kg", "kg", "mass", 1.0)."""
+
+    def __call__(cls, *arguments: Any, **named: Any) -> Any:
+        if len(arguments) + ("default" in named) > 2 and isinstance(arguments[0], str):
+            name, unit, description, *rest = arguments
+            named |= {"name": name, "unit": unit}
+            if not rest:
+                return super().__call__(description=description, **named)
+            return super().__call__(rest[0], description, *rest[1:], **named)
+        return super().__call__(*arguments, **named)
+
+
+class Named(metaclass=_TakesName):
+    """A number with a name: what `Field`, `Parameter` and `Setting` have in common.
+
+    name : str, the column, which ends in its unit: "altitude_km".  The declaration gives it.
+    unit : str, one of `mc_engine.units.UNITS`; empty for a plain number.  By default the name's ending tells it.
+    description : str, one line
+    sometimes : bool, a metric that exists, or differs, only with some settings; `mc-engine check` does not miss it
+
+    >>> altitude = Field("altitude of the orbit", name="altitude_km", unit="km")
+    >>> altitude.symbol, altitude.si_factor
+    ('altitude', 1000.0)
+    """
 
     name: str
     unit: str
     description: str
-    sometimes: bool = field(default=False, kw_only=True)
+    sometimes: bool
 
     @property
     def symbol(self) -> str:
@@ -36,49 +59,103 @@ class Named:
 
 @dataclass(frozen=True)
 class Field(Named):
-    """A named number: column name ending in its unit, the unit, a one-line meaning.
+    """A number that comes out of a model: a state, an output along the flight, or a metric that `evaluate` gives.
 
-    Axes of figures say the name in words: `sun_angle_deg` is "sun angle [deg]"; of an input that is a symbol, such as
-    `ve_pct`, the meaning up to a comma or semicolon too.
-    sometimes : a metric that exists, or differs, only with some settings; `check` does not miss it.
-    low, high : the physical range, such as low=0.0 of an eccentricity; reports show no normal ellipse that leaves it.
+    In a declaration a text is enough, unless more is to be said:
+    outputs(altitude_km="altitude", eccentricity=Field("eccentricity", unit="", low=0.0)).
+
+    description : str, one line.  Axes of figures say the name in words, `sun_angle_deg` as "sun angle [deg]"; where it
+        is a symbol, such as `ve_pct`, the description up to a comma or semicolon too.
+    low : float, smallest physical value, such as 0.0 of an eccentricity; reports draw no normal ellipse beyond it
+    high : float, largest physical value
+    sometimes : bool, a metric that exists, or differs, only with some settings; `mc-engine check` does not miss it
+    name, unit : see `Named`
+
+    >>> apogee = Field("altitude of the apogee", low=0.0, name="apogee_altitude_km", unit="km")
+    >>> apogee.symbol, apogee.si_factor
+    ('apogee_altitude', 1000.0)
     """
 
+    description: str
     low: float = field(default=-np.inf, kw_only=True)
     high: float = field(default=np.inf, kw_only=True)
+    sometimes: bool = field(default=False, kw_only=True)
+    name: str = field(default="", kw_only=True)
+    unit: str = field(default=OF_NAME, kw_only=True)
+
+    if TYPE_CHECKING:  # both orders, see the metaclass
+
+        def __init__(self, *arguments: Any, **named: Any) -> None: ...
 
 
 @dataclass(frozen=True)
 class Parameter(Named):
-    """An input that may differ from case to case.  Values outside [low, high] are refused.
+    """An input of a model that may differ from case to case: inputs(burn_dv_m_s=Parameter(100.0, "size of the burn")).
 
-    random_draw : its value only names a random draw, as a seed does; its contribution is that of the random draws.
+    Physics sees it in SI without the unit: `burn_dv`.
+
+    default : float, nominal value in `unit`
+    description : str, one line
+    low : float, smallest value that is accepted, in `unit`
+    high : float, largest value that is accepted, in `unit`
+    random_draw : bool, the value only names a random draw, as a seed does; sensitivity counts it among the random draws
+    sometimes : bool, see `Field`
+    name, unit : see `Named`
+
+    >>> altitude = Parameter(300.0, "altitude of the orbit", low=150.0, high=2000.0, name="altitude_km", unit="km")
+    >>> altitude.default * altitude.si_factor
+    300000.0
     """
 
     default: float
+    description: str
     low: float = -np.inf
     high: float = np.inf
     random_draw: bool = field(default=False, kw_only=True)
+    sometimes: bool = field(default=False, kw_only=True)
+    name: str = field(default="", kw_only=True)
+    unit: str = field(default=OF_NAME, kw_only=True)
+
+    if TYPE_CHECKING:  # both orders, see the metaclass
+
+        def __init__(self, *arguments: Any, **named: Any) -> None: ...
 
 
 @dataclass(frozen=True)
 class Setting(Named):
-    """An input shared by all cases of one kernel call: a choice of words, a switch, a date, or a number.
+    """An input of a model that all cases of a batch share: a choice of words, a switch, a date, or a number.
 
-    In kernels a choice is the index of the word in `choices`, a switch is 0.0 or 1.0, a date is a modified Julian date
-    in UTC, a number is SI.
-    whole : only whole numbers are accepted, as for a count.
-    date : the value is a date as text, "2019-01-01T12:00:00"; low and high are modified Julian dates.
-    dispersed_by : the parameter by which a case deviates from the setting, if there is one.
+    default : str, bool or float, the nominal value
+    description : str, one line
+    choices : tuple of str, the words; physics sees the index of the one chosen
+    low : float, smallest number that is accepted, in `unit`; of a date, as modified Julian date
+    high : float, largest number that is accepted
+    whole : bool, only whole numbers are accepted, as for a count
+    date : bool, the value is a date as text, "2019-01-01T12:00:00"; physics sees the modified Julian date in UTC
+    dispersed_by : str, the parameter by which a case deviates from the setting, if there is one
+    sometimes : bool, see `Field`
+    name, unit : see `Named`; a choice, a switch and a date have no unit
+
+    >>> gravity = Setting("j2", "gravity model", choices=("point", "j2"), name="gravity", unit="")
+    >>> gravity.code("j2")
+    1.0
     """
 
     default: str | bool | float
+    description: str
     choices: tuple[str, ...] = ()
     low: float = -np.inf
     high: float = np.inf
     whole: bool = False
     date: bool = False
     dispersed_by: str = ""
+    sometimes: bool = field(default=False, kw_only=True)
+    name: str = field(default="", kw_only=True)
+    unit: str = field(default=OF_NAME, kw_only=True)
+
+    if TYPE_CHECKING:  # both orders, see the metaclass
+
+        def __init__(self, *arguments: Any, **named: Any) -> None: ...
 
     def code(self, value: str | bool | float) -> float:
         """The number that stands for `value` inside a kernel."""
@@ -91,11 +168,19 @@ class Setting(Named):
 
 @dataclass(frozen=True)
 class Extremum:
-    """A running extremum of one quantity: the symbols under which `evaluate` finds value and time.
+    """The largest or smallest value of one quantity along the flight, and its time.
 
-    kind : "max", "min", or "last_above": the last time at which the quantity stood above `level` (SI); then only
-        the time is of use.
-    smooth : between the steps the extremum is a parabola's; a quantity with corners is taken at the steps.
+    `evaluate` finds both under `name`: the value in `best`, the time [s] in `when`.
+
+    name : str, the symbol in `best` and `when`
+    quantity : str, the name of a quantity of the model
+    kind : str, "max", "min", or "last_above": the last time at which the quantity was above `level`, of which only the
+        time is of use
+    level : float, in SI; for "last_above"
+    smooth : bool, between steps the extremum is that of a parabola; a quantity with corners is taken at the steps
+
+    >>> Extremum("peak", "altitude_km").kind
+    'max'
     """
 
     name: str
@@ -105,28 +190,54 @@ class Extremum:
     smooth: bool = True
 
 
-@dataclass(frozen=True)
-class Event:
-    """A zero of one component of `events`.
+class _TakesEventName(type):
+    """Accepts the name in the place of the function, too, as models did before 0.2, which had one for all events."""
 
-    direction : "rising", "falling" or "either".  action : "stop" ends the case, "switch" calls the model's `switch`.
-    rare : it may never happen in ordinary cases, or only with some settings; `check` does not miss it.
-    In a model with a stopping event, a case that reaches the clock's `until` has not come to its end: its status is
-    no-stop, which counts as failed.  Where the time is a good end too, let it be an event, t - limit, before `until`.
+    def __call__(cls, *arguments: Any, **named: Any) -> Any:
+        if arguments and isinstance(arguments[0], str):
+            return super().__call__(None, *arguments[1:], name=arguments[0], **named)
+        return super().__call__(*arguments, **named)
+
+
+@dataclass(frozen=True)
+class Event(metaclass=_TakesEventName):
+    """A zero crossing of a function along the flight: events={"apogee": Event(climb_rate, "falling", "stop")}.
+
+    In a model with a stopping event, a case that reaches the integrator's `until` first has status no-stop, which
+    counts as failed.  Where a time is a regular end too, make it an event of its own, t - limit, before `until`.
+
+    function : physics with the arguments that it names, of t, s, m, p, o; a number that crosses zero
+    direction : str, "rising", "falling" or "either"
+    action : str, "stop" ends the case, "switch" calls the model's `switch`
+    rare : bool, it may never happen in ordinary cases, or only with some settings; `mc-engine check` does not miss it
+    name : str, given by the model
+
+    >>> Event(None, name="apogee").direction, Event(None, name="apogee").action
+    ('falling', 'stop')
     """
 
-    name: str
+    function: Callable[..., Any] | None
     direction: str = "falling"
     action: str = "stop"
     rare: bool = False
+    name: str = field(default="", kw_only=True)
+
+    if TYPE_CHECKING:  # both orders, see the metaclass
+
+        def __init__(self, *arguments: Any, **named: Any) -> None: ...
 
 
 @dataclass(frozen=True)
 class FixedStep:
-    """Classical Runge-Kutta of fourth order on a common grid; control is sampled every `control_every` steps.
+    """The classical Runge-Kutta integrator of fourth order on a time grid that all cases share.
 
-    step, until : SI numbers, or the symbols of settings that hold them; 1e9 steps at most.  `until` ends the flight;
-        in a model with a stopping event, see Event.
+    step : float, length of a step [s], or str, the symbol of a setting that holds it
+    until : float or str, end of the flight [s]; at most 1e9 steps.  In a model with a stopping event, see `Event`.
+    control_every : int or str, steps from one call of `control` to the next
+    method : str, "rk4"
+
+    >>> FixedStep(step=10.0, until=6000.0).control_every
+    1
     """
 
     step: float | str
@@ -137,16 +248,20 @@ class FixedStep:
 
 @dataclass(frozen=True)
 class AdaptiveStep:
-    """An embedded Runge-Kutta pair whose step every case chooses by itself, to the tolerances.
+    """An embedded Runge-Kutta pair; every case chooses its own steps, to the tolerances.
 
-    until : time limit [s], or the symbol of a setting that holds it; in a model with a stopping event, see Event
-    rtol : error of a step in the state's own size, or the symbol of a setting
-    atol : the same in SI, one number for all states or one for each
-    control_period : time [s] from one sample of `control` to the next, the symbol of a setting, or a function of the
-        settings; steps end there
-    method : "dop853" (order 8), or "dp54" (order 5)
-    attempts : a case that needs more steps, good or rejected, ends as step-limit; 1e9 at most
-    first_step : length [s] of the first attempt; 0 chooses it
+    until : float, time limit [s], or str, the symbol of a setting that holds it; in a model with a stopping event, see
+        `Event`
+    rtol : float or str, error allowed in a step, as a fraction of the state's own size
+    atol : float, or tuple with one for each state, error allowed in a step, in SI
+    control_period : float, str or function of the settings, time [s] from one call of `control` to the next; steps end
+        there
+    method : str, "dop853" (order 8) or "dp54" (order 5)
+    attempts : int, a case that needs more steps, accepted and rejected ones together, ends as step-limit; at most 1e9
+    first_step : float, length [s] of the first attempt; 0 chooses it
+
+    >>> AdaptiveStep(until=86_400.0, rtol=1e-10).method
+    'dop853'
     """
 
     until: float | str

@@ -1,4 +1,4 @@
-"""Files that stand in the folder of a campaign file or a model, named from there."""
+"""Files in the folder of a campaign file or a model, named relative to it."""
 
 import json
 import os

@@ -1,7 +1,7 @@
-"""Import of models, and of the sources beside them or in their packages, from contents that are read once.
+"""Import of a model and of the modules in its folder or package, from file contents that are read exactly once.
 
-The code that runs is compiled from the bytes that the digest is made of and that a run directory keeps.  Bytecode files
-are neither read nor written: Python would take one for a source's own by its size and the second of its last change.
+The code that runs is compiled from the same bytes that are digested and that the run directory keeps.  Bytecode files
+are not used: Python matches them to a source by its size and its time of change in seconds only.
 """
 
 import linecache
@@ -177,8 +177,8 @@ class _Packages(MetaPathFinder):
 
 def find_elsewhere(asking: Any, fullname: str, path: Sequence[str] | None) -> ModuleSpec | None:
     """What the first finder but the one that asks says of a module."""
-    others = (one for one in sys.meta_path if one is not asking and hasattr(one, "find_spec"))
-    return next((spec for one in others if (spec := one.find_spec(fullname, path)) is not None), None)
+    others = (finder for finder in sys.meta_path if finder is not asking and hasattr(finder, "find_spec"))
+    return next((spec for finder in others if (spec := finder.find_spec(fullname, path)) is not None), None)
 
 
 def find_unimported(reference: str) -> ModuleSpec | None:

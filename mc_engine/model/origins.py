@@ -1,4 +1,4 @@
-"""Where a number stopped being finite, in words: operation, place in the model's source, and the numbers there."""
+"""Describes where a number became infinite or NaN: operation, location in the model's source, and operands."""
 
 import math
 from pathlib import Path
@@ -13,7 +13,7 @@ _FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the ar
 def sentence(origin: Origin, who: str = "") -> str:
     """What happened, where, and when.  who : the case in words."""
     when = f"t = {origin.t:.6g} s" if math.isfinite(origin.t) else ""
-    happened = f"{_what(origin)} ({', '.join(one for one in (when, who) if one)})"
+    happened = f"{_what(origin)} ({', '.join(part for part in (when, who) if part)})"
     if not origin.places:
         return happened
     ours = [place for place in origin.places if is_the_users(Path(place.file))] or [origin.places[-1]]
@@ -28,7 +28,7 @@ def _what(origin: Origin) -> str:
     if not origin.arguments:
         return origin.operation
     result = "not a number" if math.isnan(origin.result) else "infinite"
-    values = [f"{one:.6g}" for one in origin.arguments if isinstance(one, float | int)]
+    values = [f"{argument:.6g}" for argument in origin.arguments if isinstance(argument, float | int)]
     if origin.operation in _FUNCTIONS:
         return f"{_FUNCTIONS[origin.operation]} of {values[0]} is {result}"
     if origin.operation.isidentifier():

@@ -1,4 +1,4 @@
-"""The call of a model's `prepare`, and what its mistakes mean: it has other rules than physics, being plain NumPy."""
+"""Calls a model's `prepare` and explains its errors; it is plain NumPy code, with other rules than physics."""
 
 import inspect
 from collections.abc import Iterator

@@ -1,7 +1,7 @@
-"""What physics may contain, and what else a model's physics contains, read without running it: each breach a sentence.
+"""Checks the source of a model's physics against the list of what physics may contain; each breach is one sentence.
 
-Read are the model's functions and all the physics that they call, down to the engine's own.  `_SYNTAX`, `_VALUES` and
-`_BUILTINS` are the list; the trial finds by running what the source alone does not show.
+It reads the model's functions and all physics that they call, down to the engine's own.  `_SYNTAX`, `_VALUES` and
+`_BUILTINS` are the list; `mc_engine.model.trial` finds by running what the source alone does not show.
 """
 
 import ast
@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from mc_engine.lanes.composed import ComposedFunction
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import PHYSICS, source_place
 from mc_engine.model.record import Model
@@ -104,10 +105,22 @@ def code_of(function: Callable[..., Any]) -> CodeType | None:
 
 
 def _functions(model: Model) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """The functions of the model's file, each once, with what the engine calls it."""
+    met: list[Any] = []
     for name in ARGUMENTS:
-        function = getattr(model, name)
-        if function is not None:
-            yield name, function
+        for function in _parts(getattr(model, name)):
+            if function is not None and not any(function is other for other in met):
+                met.append(function)
+                yield name, function
+
+
+def _parts(function: Any) -> Iterator[Any]:
+    """A function, or those that it is composed of."""
+    if not isinstance(function, ComposedFunction):
+        yield function
+        return
+    for part, _ in function.calls:
+        yield from _parts(part)
 
 
 def _wrong_functions(model: Model) -> Iterator[str]:
@@ -119,6 +132,8 @@ def _wrong_functions(model: Model) -> Iterator[str]:
         if name not in INTERPRETED and not isinstance(function, PhysicsFunction):
             yield f"{place_of(function)}: `{name}` is not marked; write @physics on the line above it"
             continue
+        if function is not getattr(model, name):
+            continue  # it is handed the arguments that it names
         try:
             inspect.signature(function).bind(*wanted.split(", "))
         except TypeError:
@@ -276,11 +291,9 @@ def _wrong_call(node: ast.Call, scope: _Scope) -> str:
         return "NumPy is for arrays; physics uses the functions of mc_engine.lanes"
     if not isinstance(called, type) or called in _BUILTINS or issubclass(called, np.generic | BaseException | Enum):
         return ""
-    if not hasattr(called, "_fields"):
-        return f"physics makes no objects of the class `{called.__name__}`; make it a namedtuple, and {_TUPLES}"
-    starred = any(isinstance(value, ast.Starred) for value in node.args) or any(not name.arg for name in node.keywords)
-    short = len(arguments) < len(getattr(called, "_fields", ())) and getattr(called, "_field_defaults", None)
-    return "a field of the named tuple is left to its default; write every field" if short and not starred else ""
+    if hasattr(called, "_fields"):
+        return ""
+    return f"physics makes no objects of the class `{called.__name__}`; make it a namedtuple, and {_TUPLES}"
 
 
 def _wrong_value(value: Any) -> str:

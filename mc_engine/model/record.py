@@ -21,6 +21,8 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
+from mc_engine.lanes.block_search import blocks_in
+from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import place_in_model, relative_import, wrong_record
 from mc_engine.model.fields import (
     AdaptiveStep,
@@ -43,26 +45,55 @@ NoMemory = namedtuple("NoMemory", "unused")  # of a model without `start`
 
 @dataclass(frozen=True)
 class Model:
-    """A flyable system.  All functions are physics (see `mc_engine.lanes`) by default.
+    """A system that can be flown: its inputs and outputs with their units, its physics, its events and its integrator.
 
-    prepare(inputs, settings, refusals) : NumPy, whole chunk.  In: SI arrays and setting codes, attributes by symbol,
-        `inputs.altitude` for altitude_km.  Out: a dictionary of SI arrays, or of numbers for all cases, by the field
-        names of `kernel_parameters`, such as {**vars(inputs), "burn_dv": dv}.  Cases that cannot start join by
-        refusals.add(mask, "why").  Default: pass on.
-        An array "tables" [n, k] goes behind the model's tables: a parameter must say where each case's begins.
-    initial(p, o) -> State
-    rhs(t, s, m, p, o) -> State of derivatives
-    control(t, s, m, p, o, draws) -> memory, at samples (t = 0 first, with m = start(p, o)'s memory)
-    start(p, o) -> the first memory
-    events(t, s, m, p, o) -> named tuple, one component per Event
-    switch(t, s, m, p, o, hit) -> (state, memory) after a "switch" event; hit has 1.0 where the event fired
-    observe(t, s, m, p, o) -> named tuple of the quantities
-    evaluate(t, s, m, p, o, best, when) -> named tuple of the metrics; best and when hold value and time of
-        each Extremum
-    tables(o) -> float64[n], NumPy: numbers that all cases of the same settings share, such as a reference path;
-        physics reads them with look_up(o.tables, place)
-    data : files that the model reads while it is imported, such as ("aero.csv", "tables/wind.csv"), named from the
-        model's own folder and inside it.  They count as its source and a run directory keeps copies of them.
+    A model file ends with `MODEL = Model(...)`.  Except `prepare` and `tables`, which are NumPy, the functions are
+    marked with `mc_engine.lanes.physics`.  Their arguments are the time t [s], the state s, the discrete state m, the
+    kernel parameters p and the settings o, each a named tuple of numbers in SI and radians.
+
+    name : str
+    title : str, one line for reports
+    source : str, the publication that the physics is from; may be empty
+    parameters : tuple of Parameter, inputs that may differ from case to case
+    settings : tuple of Setting, inputs that all cases of a batch share
+    states : tuple of Field, in the order of the state's named tuple
+    quantities : tuple of Field, what histories hold besides the time
+    metrics : tuple of Field, the results of a case
+    clock : FixedStep or AdaptiveStep, the integrator
+    kernel_parameters : type, the named tuple p
+    initial(p, o) : the first state
+    rhs(t, s, m, p, o) : the derivative of the state
+    observe(t, s, m, p, o) : named tuple of the quantities
+    evaluate(t, s, m, p, o, best, when) : named tuple of the metrics; best and when hold value and time of each Extremum
+    prepare(inputs, settings, refusals) : dict, by the fields of `kernel_parameters`, of SI arrays or of numbers for all
+        cases, such as {**vars(inputs), "burn_dv": dv}.  NumPy, for many cases at once: inputs and settings have an
+        attribute for each symbol, `inputs.altitude` for altitude_km.  Cases that cannot start are added to `refusals`.
+        An array "tables" [n, k] is put after the model's tables: a parameter must say where each case's begins.  By
+        default the inputs are passed on.
+    start(p, o) : the first discrete state
+    control(t, s, m, p, o, draws) : the next discrete state, at each sample, the first at t = 0
+    events(t, s, m, p, o) : named tuple with one component for each Event
+    switch(t, s, m, p, o, hit) : (state, discrete state) after an event with the action "switch"; hit has 1.0 where it
+        fired
+    event_list : tuple of Event, in the order of the components of `events`
+    extrema : tuple of Extremum
+    tables(o) : float64[n], NumPy, numbers that all cases with the same settings share, such as a reference path;
+        physics reads them with look_up(o.tables, index)
+    figures : tuple of figure records, such as `MapFigure`, that every report shows
+    data : tuple of str, files that the model reads while it is imported, such as ("aero.csv", "tables/wind.csv"),
+        inside its own folder.  They count as its source, and a run directory keeps copies of them.
+    watching : bool, set by the engine while it watches events
+    published : tuple of dict, published values to compare with
+    reference : str, set by `load_model`
+    sources : Sources, set by `load_model`
+
+    Raises ModelError where the record contradicts itself.
+
+    >>> model = load_campaign("minimal").model
+    >>> [metric.name for metric in model.metrics]
+    ['apogee_altitude_km', 'apogee_time_s', 'top_speed_m_s']
+    >>> model.input("altitude_km").default
+    300.0
     """
 
     name: str
@@ -89,7 +120,7 @@ class Model:
     tables: Callable[..., np.ndarray] | None = None
     figures: tuple[Figure, ...] = ()
     data: tuple[str, ...] = ()
-    watching: bool = False  # see mc_engine.model.event_watch
+    watching: bool = False  # see mc_engine.flight.kernel_parts.watching_events
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
     sources: Sources | None = field(default=None, compare=False, repr=False)  # of one that `load_model` gave
@@ -108,7 +139,15 @@ class Model:
 
 @dataclass
 class Refusals:
-    """Cases whose inputs the model cannot start from: a mask and one sentence per refused case."""
+    """The cases that a model cannot start from, each with one sentence: the third argument of `Model.prepare`.
+
+    reason : object[n_cases] of str, empty for a case that can start
+
+    >>> refusals = Refusals.none(3)
+    >>> refusals.add(np.array([False, True, False]), "the perigee is below the surface")
+    >>> refusals.mask.tolist()
+    [False, True, False]
+    """
 
     reason: np.ndarray
 
@@ -127,21 +166,42 @@ class Refusals:
 
 
 def load_model(reference: str, beside: Path | None = None) -> Model:
-    """The `MODEL` of a module ("campaigns.deorbit") or of a `.py` file beside the campaign file.
+    """Load the model of a campaign: the `MODEL` of a module or of a file.  This runs the model's code.
 
-    Raises ModelError with one sentence when the module, the file or its MODEL is missing or broken.
+    reference : str, a module ("campaigns.deorbit") or a file next to the campaign file ("model.py")
+    beside : Path, the folder of the campaign file; the working folder by default
+
+    Returns the Model.
+
+    Raises ModelError with one sentence where the module, the file or its MODEL is missing or broken.
+
+    >>> load_model("model.py").title
+    'Apogee raised by one burn'
     """
-    sources = _from_file(reference, beside) if reference.endswith(".py") else _from_module(reference)
+    sources = load_sources(reference, beside, "MODEL")
     model = getattr(sources.module, "MODEL", None)
     if not isinstance(model, Model):
-        raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
+        raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = model(...)')
     try:
-        sources = sources.with_data(model.data)
+        curves = blocks_in(value for value in vars(model).values() if isinstance(value, PhysicsFunction))
+        sources = sources.with_data(model.data, [block.file for block in curves if block.file])
     except ModelError as error:
         raise ModelError(f'"{reference}": {error}') from None
     object.__setattr__(model, "reference", reference)
     object.__setattr__(model, "sources", sources)
     return model
+
+
+def load_sources(reference: str, beside: Path | None, name: str) -> Sources:
+    """Import the module or file that defines `name`, MODEL or SIMULATOR; ModelError where it is missing or broken."""
+    return _from_file(reference, beside) if reference.endswith(".py") else _from_module(reference, name)
+
+
+def compiled_model(system: Any) -> Model:
+    """What a campaign flies, which is a compiled model; ModelError for a simulator, which has no kernel."""
+    if isinstance(system, Model):
+        return system
+    raise ModelError(f'"{system.reference}" is a simulator; this is for compiled models')
 
 
 def sources_of(model: Model, folder: Path | None = None) -> Sources:
@@ -160,8 +220,8 @@ def _from_file(reference: str, beside: Path | None) -> Sources:
         raise ModelError(_fault(path.name, error)) from error
 
 
-def _from_module(reference: str) -> Sources:
-    """An installed module, if it is there and its source defines MODEL: a campaign file names no other code."""
+def _from_module(reference: str, name: str) -> Sources:
+    """An installed module, if it is there and its source defines `name`: a campaign file names no other code."""
     if not re.fullmatch(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*", reference):
         raise ModelError(f'"{reference}" is neither a module such as "campaigns.deorbit" nor a .py file')
     if reference.split(".")[0] in sys.stdlib_module_names:
@@ -169,8 +229,9 @@ def _from_module(reference: str) -> Sources:
     spec = find_unimported(reference)
     if spec is None:
         raise ModelError(f'there is no module "{reference}"; a file beside the campaign ends in .py')
-    if not _defines_model(spec):
-        raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = Model(...)')
+    if not _defines(spec, name):
+        example = "model" if name == "MODEL" else "Simulator"
+        raise ModelError(f'"{reference}" has no {name}; end it with {name} = {example}(...)')
     try:
         return sources_of_module(reference, Path(spec.origin or "").parent)
     except ModuleNotFoundError as error:
@@ -179,8 +240,8 @@ def _from_module(reference: str) -> Sources:
         raise ModelError(_fault(reference, error)) from error
 
 
-def _defines_model(spec: ModuleSpec) -> bool:
-    """Whether the source of a module gives the name MODEL a value; true where it cannot be read, for the import to
+def _defines(spec: ModuleSpec, name: str) -> bool:
+    """Whether the source of a module gives `name` a value; true where it cannot be read, for the import to
     say why."""
     if not spec.has_location or spec.origin is None or not spec.origin.endswith(".py"):
         return False
@@ -190,7 +251,7 @@ def _defines_model(spec: ModuleSpec) -> bool:
         return True
     names = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
     names |= {node.asname or node.name for node in ast.walk(tree) if isinstance(node, ast.alias)}
-    return "MODEL" in names
+    return name in names
 
 
 def _fault(reference: str, error: BaseException) -> str:

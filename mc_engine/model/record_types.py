@@ -1,4 +1,4 @@
-"""Records of a model, such as a Field, a figure or the clock, whose fields must have the types that they declare."""
+"""Type checks of a model's records, such as a Field, a figure or the clock, against their declarations."""
 
 from collections.abc import Callable
 from types import NoneType, UnionType

@@ -1,4 +1,4 @@
-"""What a model's own record must keep before it flies: names, units, words of events, numbers of the clock."""
+"""Validation of a model's record before it flies: names, units, options of events, numbers of the clock."""
 
 import json
 from collections.abc import Iterable
@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import ModelError
 from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Event, Extremum, Field, FixedStep, Named, Setting
-from mc_engine.model.figure_rules import refuse_false_figures
+from mc_engine.model.figures import refuse_false_figures
 from mc_engine.model.record_types import refuse_other_types
 from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_hint, unit_suffix
 
 if TYPE_CHECKING:
     from mc_engine.model.record import Model
+    from mc_engine.model.simulator import Simulator, System
 
 _CASE_COLUMNS = ("case_id", "status", "reason", "end_time_s")  # the engine's own, of cases and of histories
 _HISTORY_COLUMNS = ("case_id", "t_s")
@@ -38,20 +39,20 @@ def refuse_contradictions(model: "Model") -> None:
         raise ModelError("kernel_parameters must be a named tuple, whose fields are the parameters' names without unit")
     _refuse_half_letters(model)
     inputs: tuple[Named, ...] = (*model.parameters, *model.settings)
-    for one in (*inputs, *model.states, *model.quantities, *model.metrics):
-        _refuse_name(one)
-    outputs: tuple[Field, ...] = (*model.metrics, *(Field(f"end_{one.name}", "", "") for one in model.states))
-    _refuse_taken("column", [one.name for one in (*inputs, *model.metrics)], _CASE_COLUMNS)
-    _refuse_taken("quantity", [one.name for one in model.quantities], _HISTORY_COLUMNS)
-    _refuse_twice("input", [one.symbol for one in inputs])
-    _refuse_twice("column", [one.name for one in (*inputs, *outputs)])
-    _refuse_twice("quantity", [one.name for one in model.quantities])
-    _refuse_twice("extremum", [one.name for one in model.extrema])
-    _refuse_twice("event", [one.name for one in model.event_list])
+    for item in (*inputs, *model.states, *model.quantities, *model.metrics):
+        _refuse_name(item)
+    outputs: tuple[Field, ...] = (*model.metrics, *(Field(f"end_{state.name}", "", "") for state in model.states))
+    _refuse_taken("column", [item.name for item in (*inputs, *model.metrics)], _CASE_COLUMNS)
+    _refuse_taken("quantity", [item.name for item in model.quantities], _HISTORY_COLUMNS)
+    _refuse_twice("input", [item.symbol for item in inputs])
+    _refuse_twice("column", [item.name for item in (*inputs, *outputs)])
+    _refuse_twice("quantity", [item.name for item in model.quantities])
+    _refuse_twice("extremum", [item.name for item in model.extrema])
+    _refuse_twice("event", [item.name for item in model.event_list])
     for setting in model.settings:
         _refuse_choice(setting)
     for extremum in model.extrema:
-        _refuse_extremum(extremum, [one.name for one in model.quantities])
+        _refuse_extremum(extremum, [quantity.name for quantity in model.quantities])
     if model.control is not None and model.start is None:
         raise ModelError("the model has `control`, but no function `start`; write start(p, o), which gives the first "
                          "memory")  # fmt: skip
@@ -60,10 +61,29 @@ def refuse_contradictions(model: "Model") -> None:
     for event in model.event_list:
         _refuse_event(event, model.switch is not None)
     refuse_false_figures(model)
-    _refuse_clock(model.clock, [one.symbol for one in model.settings], len(model.states))
+    _refuse_clock(model.clock, [setting.symbol for setting in model.settings], len(model.states))
 
 
-def _refuse_half_letters(model: "Model") -> None:
+def refuse_false_simulator(simulator: "Simulator") -> None:
+    """ModelError with one sentence if a simulator contradicts itself."""
+    named: tuple[Any, ...] = (*simulator.parameters, *simulator.settings, *simulator.outputs, *simulator.metrics)
+    for record in named:
+        refuse_other_types(record, f'{type(record).__name__} "{record.name}"')
+        _refuse_name(record)
+    if not simulator.metrics:
+        raise ModelError("`metrics` is empty; a simulator has one at least")
+    _refuse_half_letters(simulator)
+    columns = [item.name for item in (*simulator.parameters, *simulator.settings, *simulator.metrics)]
+    _refuse_taken("column", columns, _CASE_COLUMNS)
+    _refuse_taken("output", [item.name for item in simulator.outputs], _HISTORY_COLUMNS)
+    _refuse_twice("column", columns)
+    _refuse_twice("output", [item.name for item in simulator.outputs])
+    for setting in simulator.settings:
+        _refuse_choice(setting)
+    refuse_false_figures(simulator)
+
+
+def _refuse_half_letters(model: "System") -> None:
     """ModelError for text that no file can hold: half of a pair of UTF-16."""
     records = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
     texts = [model.name, model.title, model.source, model.figures, model.published, *map(vars, records)]
@@ -75,14 +95,14 @@ def _refuse_half_letters(model: "Model") -> None:
         raise ModelError(f'a text has {letter!a} after "{before}", which is no character; leave it out') from None
 
 
-def _refuse_name(one: Named) -> None:
-    if one.unit not in UNITS:
-        raise ModelError(f'"{one.name}" has the unit "{one.unit}"{unit_hint(one.unit)}')
-    suffix = unit_suffix(one.unit)
-    if not one.name.endswith(suffix):
-        raise ModelError(f'"{one.name}" has the unit "{one.unit}", so that its name must end in "{suffix}"; '
+def _refuse_name(item: Named) -> None:
+    if item.unit not in UNITS:
+        raise ModelError(f'"{item.name}" has the unit "{item.unit}"{unit_hint(item.unit)}')
+    suffix = unit_suffix(item.unit)
+    if not item.name.endswith(suffix):
+        raise ModelError(f'"{item.name}" has the unit "{item.unit}", so that its name must end in "{suffix}"; '
                          "change the name or the unit")  # fmt: skip
-    _refuse_word("name", one.symbol)
+    _refuse_word("name", item.symbol)
 
 
 def _refuse_choice(setting: Setting) -> None:
@@ -92,10 +112,10 @@ def _refuse_choice(setting: Setting) -> None:
                          f"{hint(str(setting.default), setting.choices)}")  # fmt: skip
 
 
-def _refuse_taken(what: str, names: list[str], taken: tuple[str, ...]) -> None:
+def _refuse_taken(what: str, names: list[str], reserved: tuple[str, ...]) -> None:
     """ModelError for a name that the engine's own columns have."""
     for name in names:
-        if name in taken:
+        if name in reserved:
             raise ModelError(f'the {what} "{name}" has the name of a column that every table has; take another')
 
 
@@ -107,20 +127,20 @@ def _refuse_word(what: str, name: str) -> None:
 
 
 def _refuse_extremum(extremum: Extremum, quantities: list[str]) -> None:
-    spot = f'extremum "{extremum.name}"'
+    name = f'extremum "{extremum.name}"'
     _refuse_word("extremum", extremum.name)
     if extremum.quantity not in quantities:
-        raise ModelError(f'{spot}: there is no quantity "{extremum.quantity}"{hint(extremum.quantity, quantities)}')
-    _refuse_unknown(f"{spot} has the kind", extremum.kind, _EXTREMA)
+        raise ModelError(f'{name}: there is no quantity "{extremum.quantity}"{hint(extremum.quantity, quantities)}')
+    _refuse_unknown(f"{name} has the kind", extremum.kind, _EXTREMA)
 
 
 def _refuse_event(event: Event, switches: bool) -> None:
-    spot = f'event "{event.name}"'
+    name = f'event "{event.name}"'
     _refuse_word("event", event.name)
-    _refuse_unknown(f"{spot} has the direction", event.direction, DIRECTIONS)
-    _refuse_unknown(f"{spot} has the action", event.action, _ACTIONS)
+    _refuse_unknown(f"{name} has the direction", event.direction, DIRECTIONS)
+    _refuse_unknown(f"{name} has the action", event.action, _ACTIONS)
     if event.action == "switch" and not switches:
-        raise ModelError(f'{spot} has the action "switch", but the model has no function `switch`')
+        raise ModelError(f'{name} has the action "switch", but the model has no function `switch`')
 
 
 def _refuse_unknown(what: str, word: Any, known: Iterable[str]) -> None:
@@ -147,8 +167,8 @@ def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], n_states
     tolerances = clock.atol if isinstance(clock.atol, tuple) else (clock.atol,) * n_states
     if len(tolerances) != n_states:
         raise ModelError(f"the clock's `atol` has {len(tolerances)} numbers, the model {n_states} states")
-    for one in tolerances:
-        _refuse_time("atol", one, [], least=0.0)
+    for tolerance in tolerances:
+        _refuse_time("atol", tolerance, [], least=0.0)
 
 
 def _refuse_time(name: str, value: Any, settings: list[str], least: float | None = None, most: float = 1e300) -> None:

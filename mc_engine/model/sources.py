@@ -1,7 +1,7 @@
 """The source files that decide a model's numbers: those of its package or folder, and what they import.
 
-More than the model may need; an edit of a file that it does not need costs a compilation, no wrong number.  Each file
-is read once: its content is what runs, what the digest is of, and what a run directory keeps.
+The list may hold files that the model does not need.  Each file is read once: the same content runs, is digested, and
+is kept in the run directory.
 """
 
 import sys
@@ -17,7 +17,7 @@ from mc_engine.errors import ModelError
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.files import FileFault, resolve_beside
 from mc_engine.model.imports import PACKAGES, USER, CapturedLoader, importable, new_module
-from mc_engine.model.syntax_tree import data_names, imported_names
+from mc_engine.model.syntax_tree import curve_files, data_names, imported_names
 
 _ENGINE = "mc_engine"  # its own sources are counted apart
 
@@ -27,7 +27,7 @@ class Sources:
     """A model's module and the files that it was made of, as they were read.
 
     home : folder that the names of the files begin in.  folder : the model's own.  data : contents of the files that
-    Model(data=...) names, as they were before the import.
+    Model(data=...) names and of those that curves are read from, as they were before the import.
     """
 
     module: ModuleType
@@ -43,8 +43,10 @@ class Sources:
             name = path.relative_to(self.home).as_posix() if path.is_relative_to(self.home) else path.name
             yield name, contents[path]
 
-    def with_data(self, names: Sequence[str]) -> "Sources":
+    def with_data(self, names: Sequence[str], read: Iterable[Path] = ()) -> "Sources":
         """The same with the data of the model itself; ModelError for a name that is wrong.
+
+        read : files that its curves were read from; each must stand in a call of `curve` or `surface`.
 
         The model opens its data itself while it is imported.  What lay there before the import and lies there after it
         is what the model has read.
@@ -56,7 +58,13 @@ class Sources:
         for path, name in paths.items():
             if path not in self.data:
                 raise ModelError(f'data: write "{name}" into the call itself, as in Model(..., data=("{name}",))')
-            if _content(path) != self.data[path]:
+        for path in _curves_beside(self.files):
+            paths.setdefault(path, path.name)
+        for path in read:
+            if path.resolve() not in map(Path.resolve, paths):
+                raise ModelError(f'write "{path.name}" into the call of `curve` or `surface` itself, not as a variable')
+        for path, name in paths.items():
+            if _content(path) != self.data.get(path):
                 raise ModelError(f'data: "{name}" was changed while the model was loaded; begin again')
         return replace(self, data={path: self.data[path] for path in paths})
 
@@ -70,7 +78,7 @@ def sources_of_file(path: Path) -> Sources:
     The files and packages beside it can be imported, and count as its text.
     """
     files = sources_beside(path)
-    data = _data_in(path.parent, files.values())
+    data = _data_in(path.parent, files)
     texts = (f"{file}\n{len(text)}\n".encode() + text for file, text in {**files, **data}.items())
     mark = sha256(str(path).encode() + b"".join(texts)).hexdigest()[:12]
     name = f"{USER}{path.stem}_{mark}"
@@ -81,29 +89,41 @@ def sources_of_file(path: Path) -> Sources:
     return _OF_FILES[name]
 
 
-def _data_in(folder: Path, sources: Iterable[bytes]) -> dict[Path, bytes]:
-    """Contents of the files that calls of `Model` in these sources name as their data; those that cannot be read are
-    left out."""
-    found = {}
-    for name in sorted({name for source in sources for name in data_names(source)}):
+def _data_in(folder: Path, sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
+    """Contents of the files that calls of `Model` in these sources name as their data, and of those that their curves
+    are read from; what cannot be read is left out."""
+    contents = _curves_beside(sources)
+    for name in sorted({name for source in sources.values() for name in data_names(source)}):
         with suppress(FileFault):
             path = resolve_beside(folder, name)
             if (content := _content(path)) is not None:
-                found[path] = content
-    return found
+                contents[path] = content
+    return contents
+
+
+def _curves_beside(sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
+    """Contents of the files, named from the folder of each source, that its curves and surfaces are read from."""
+    contents = {}
+    for file, source in sources.items():
+        for name in curve_files(source):
+            with suppress(FileFault):
+                path = resolve_beside(file.parent, name)
+                if (content := _content(path)) is not None:
+                    contents[path] = content
+    return dict(sorted(contents.items()))
 
 
 def sources_beside(file: Path) -> dict[Path, bytes]:
     """Sources of a model that is a file: all beside it, and the folders beside it that they import, whole."""
-    found = {**_contents(file.parent.glob("*.py")), file: file.read_bytes()}
+    contents = {**_contents(file.parent.glob("*.py")), file: file.read_bytes()}
     waiting, seen = [file], set[str]()
     while waiting:
-        for root in {name.split(".")[0] for name in imported_names(found[waiting.pop()])} - seen - {""}:
+        for root in {name.split(".")[0] for name in imported_names(contents[waiting.pop()])} - seen - {""}:
             seen.add(root)
             package = _contents((file.parent / root).rglob("*.py"))
-            found |= package
-            waiting += [*package, *([beside] if (beside := file.parent / f"{root}.py") in found else [])]
-    return dict(sorted(found.items()))
+            contents |= package
+            waiting += [*package, *([beside] if (beside := file.parent / f"{root}.py") in contents else [])]
+    return dict(sorted(contents.items()))
 
 
 def _contents(paths: Iterable[Path]) -> dict[Path, bytes]:
@@ -124,33 +144,34 @@ def sources_of_module(name: str, folder: Path) -> Sources:
     What a program has imported before, by itself, counts as what its files say now.
     """
     root = name.partition(".")[0]
-    data = _data_in(folder, _contents(folder.glob("*.py")).values())
+    data = _data_in(folder, _contents(folder.glob("*.py")))
     with PACKAGES.loading(root):
         module = import_module(name)
     assert module.__file__ is not None  # a model's module always comes from a file
     home = Path(module.__file__)
     inside_package = home.name == "__init__.py" or "." in name
     beside = home.parent.rglob("*.py") if inside_package else home.parent.glob("*.py")
-    found = {path: PACKAGES.read(root, path) for path in beside if path.is_file()}
+    contents = {path: PACKAGES.read(root, path) for path in beside if path.is_file()}
     waiting, seen = [name], {name}
     while waiting:
-        for reached in _imports(waiting.pop()):
+        for reached in _modules_imported_by(waiting.pop()):
             if reached not in seen and _decides(reached, name):
                 seen.add(reached)
                 waiting.append(reached)
-                found[Path(str(sys.modules[reached].__file__))] = _source(reached)
+                contents[Path(str(sys.modules[reached].__file__))] = _text_of_module(reached)
+    data = {**_curves_beside(contents), **data}
     base = home.parents[name.count(".") + (home.name == "__init__.py")]
-    return Sources(module, base, folder, found, data)
+    return Sources(module, base, folder, contents, data)
 
 
-def _imports(name: str) -> list[str]:
+def _modules_imported_by(name: str) -> list[str]:
     """Modules, by name, that a loaded one imports."""
     module = sys.modules[name]
     package = module.__name__ if hasattr(module, "__path__") else module.__name__.rpartition(".")[0]
-    return [one for one in imported_names(_source(name), package) if one in sys.modules]
+    return [imported for imported in imported_names(_text_of_module(name), package) if imported in sys.modules]
 
 
-def _source(name: str) -> bytes:
+def _text_of_module(name: str) -> bytes:
     """What a loaded module was made of."""
     module = sys.modules[name]
     loader = getattr(module, "__loader__", None)

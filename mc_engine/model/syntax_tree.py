@@ -1,12 +1,13 @@
-"""Python sources as syntax trees."""
+"""Syntax trees of Python sources, and the names that a source imports."""
 
 import ast
 import linecache
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 _LOCK = threading.Lock()
+_RECORDS = ("model", "Model", "Simulator")  # which name data files
 
 
 def parse(source: bytes | str) -> ast.Module:
@@ -39,24 +40,42 @@ def imported_names(source: bytes, package: str = "") -> frozenset[str]:
         tree = parse(source)
     except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: nested too deep
         return frozenset()
-    return frozenset(name for node in ast.walk(tree) for name in _names(node, package))
+    return frozenset(name for node in ast.walk(tree) for name in _names_imported_by(node, package))
 
 
 @lru_cache(maxsize=512)
 def data_names(source: bytes) -> frozenset[str]:
-    """The texts that stand in the argument `data` of a call of `Model`; none of a broken source."""
+    """The texts that stand in the argument `data` of a call of `model` or `Simulator`; none of a broken source."""
+    return _texts(_arguments(_calls(source, _RECORDS), "data"))
+
+
+@lru_cache(maxsize=512)
+def curve_files(source: bytes) -> frozenset[str]:
+    """The files that calls of `curve`, `surface` and `wind_profile` name; none of a broken source."""
+    calls = _calls(source, ("curve", "surface", "wind_profile"))
+    return _texts([*_arguments(calls, "file"), *(call.args[0] for call in calls if call.args)])
+
+
+def _arguments(calls: list[ast.Call], name: str) -> list[ast.expr]:
+    return [keyword.value for call in calls for keyword in call.keywords if keyword.arg == name]
+
+
+def _calls(source: bytes, names: tuple[str, ...]) -> list[ast.Call]:
+    """Calls of functions of these names, whatever they are attributes of."""
     try:
         tree = parse(source)
     except (SyntaxError, ValueError, MemoryError, RecursionError):
-        return frozenset()
+        return []
     calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
-    models = (call for call in calls if getattr(call.func, "attr", getattr(call.func, "id", None)) == "Model")
-    values = (keyword.value for call in models for keyword in call.keywords if keyword.arg == "data")
+    return [call for call in calls if getattr(call.func, "attr", getattr(call.func, "id", None)) in names]
+
+
+def _texts(values: Iterable[ast.AST]) -> frozenset[str]:
     texts = (node.value for value in values for node in ast.walk(value) if isinstance(node, ast.Constant))
     return frozenset(text for text in texts if isinstance(text, str))
 
 
-def _names(node: ast.AST, package: str) -> Iterator[str]:
+def _names_imported_by(node: ast.AST, package: str) -> Iterator[str]:
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
     elif isinstance(node, ast.ImportFrom):

@@ -1,8 +1,7 @@
-"""A model's physics run through once, interpreted, on the numbers of a few cases: what it gives must be what the model
-declares.
+"""Interpreted run of a model's physics on a few cases: its results must have the fields that the model declares.
 
-The numbers are arrays, as the lanes will hand them over, so that what takes one number only is found here.  A kernel
-trusts the counts that the model declares: nothing is flown that has not passed.
+The inputs are arrays, as lanes hand them over, so that code for a single number is found here.  A kernel relies on
+the declared counts, so a model that has not passed is not flown.
 """
 
 import dis
@@ -51,16 +50,16 @@ def refuse_unfit(model: Model, parameters: np.ndarray, settings: Any) -> None:
     """
     if model in _passed:
         return
-    found = [] if is_shipped(model) else source_faults(model)
-    if not found:
+    breaches = [] if is_shipped(model) else source_faults(model)
+    if not breaches:
         first = np.repeat(parameters[:, :1], FEW, axis=1)
         try:
             with np.errstate(all="ignore"):
                 run_through(model, model.kernel_parameters(*first), settings)
         except Breach as breach:
-            found = [str(breach)]
-    if found:
-        raise ModelError(f"{found[0]}{MORE}")
+            breaches = [str(breach)]
+    if breaches:
+        raise ModelError(f"{breaches[0]}{MORE}")
     _passed.add(model)
 
 
@@ -100,9 +99,9 @@ def _run_through(model: Model, p: Any, o: Any, seed: int, finite: bool) -> None:
 
 def _looks(model: Model, seen: Any) -> Any:
     """What `evaluate` is handed as `best` where the quantities stay what they are.  seen : result of `observe`."""
-    best = namedtuple("Best", [one.name for one in model.extrema] or ["unused"])  # type: ignore[misc]
+    best = namedtuple("Best", [extremum.name for extremum in model.extrema] or ["unused"])  # type: ignore[misc]
     names = [quantity.name for quantity in model.quantities]
-    return best(*[seen[names.index(one.quantity)] for one in model.extrema] or [np.zeros(FEW)])
+    return best(*[seen[names.index(extremum.quantity)] for extremum in model.extrema] or [np.zeros(FEW)])
 
 
 def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
@@ -116,25 +115,25 @@ def fixed_metrics(model: Model, p: Any, o: Any) -> dict[str, float]:
 
     def many(value: Any) -> Any:
         if hasattr(value, "_fields"):
-            return type(value)(*(many(one) for one in value))
+            return type(value)(*(many(item) for item in value))
         signs = spread.choice([-1.0, 1.0], (2, _MANY))
         near = signs[0] * np.exp(spread.normal(0.0, 3.0, _MANY))
         anywhere = signs[1] * 10.0 ** spread.uniform(*_DECADES, _MANY)
         return near * np.ravel(value)[0] + anywhere * spread.integers(0, 2, _MANY)
 
     values = []
-    for more in (0.0, 1.0, 2.0):
-        own = type(o)(*(value if name == TABLES else value + more for name, value in zip(o._fields, o, strict=True)))
+    for shift in (0.0, 1.0, 2.0):
+        own = type(o)(*(value if name == TABLES else value + shift for name, value in zip(o._fields, o, strict=True)))
         try:
             with np.errstate(all="ignore"):
                 s, m = model.initial(p, o), NoMemory(0.0) if model.start is None else model.start(p, o)
                 looks = _looks(model, model.observe(np.zeros(FEW), s, m, p, o))
                 given = model.evaluate(many(1.0), many(s), many(m), many(p), own, many(looks), many(looks))
-                values.append([np.broadcast_to(np.asarray(one, dtype=np.float64), _MANY) for one in given])
+                values.append([np.broadcast_to(np.asarray(item, dtype=np.float64), _MANY) for item in given])
         except Exception:
             return {}  # no finding: the functions are judged by the trial itself
     rows = np.concatenate(values, axis=1)  # [n_metrics, 3 * _MANY]
-    return {one.name: row[0] for one, row in zip(model.metrics, rows, strict=True) if (row == row[0]).all()}
+    return {metric.name: row[0] for metric, row in zip(model.metrics, rows, strict=True) if (row == row[0]).all()}
 
 
 def _try_events(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any) -> None:
@@ -160,6 +159,7 @@ def _same_record(function: Callable[..., Any], name: str, given: Any, source: st
 def _call(model: Model, name: str, *arguments: Any) -> Any:
     """The result of one function of the model, a named tuple with a field for each that the model declares."""
     function = getattr(model, name)
+    _refuse_short(function, name, arguments)
     result = _run(function, arguments)
     if not hasattr(result, "_fields"):
         raise _breach(function, name, "nothing" if result is None else _shape_of(result), "a named tuple")
@@ -171,6 +171,18 @@ def _call(model: Model, name: str, *arguments: Any) -> Any:
     return result
 
 
+def _refuse_short(function: Any, name: str, arguments: tuple[Any, ...]) -> None:
+    """Breach where a part of a composed function gives no record with the fields that are taken from it."""
+    for i, (part, chosen) in enumerate(getattr(function, "calls", ())):
+        taken = [field for source, index, field in function.picks if (source, index) == ("result", i) and field]
+        if not taken:
+            continue
+        given = _run(part, tuple(arguments[index] for index in chosen))
+        if not set(taken) <= set(getattr(given, "_fields", ())):
+            gives = "nothing" if given is None else _shape_of(given)
+            raise _breach(part, name, gives, f"a record with {listed(taken)}")
+
+
 def _run(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
     """What a function gives on arrays; on numbers where it negates a mask, which lanes can and arrays cannot."""
     try:
@@ -180,7 +192,7 @@ def _run(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
             except ValueError as error:
                 if not _negates(error):
                     raise
-                return function(*(_first(one) for one in arguments))
+                return function(*(_first_case(argument) for argument in arguments))
     except ZeroDivisionError as error:
         raise _ByZero from error
     except Breach:
@@ -231,14 +243,14 @@ def _negates(error: ValueError) -> bool:
         place = place.tb_next
     if place is None or "truth value of an array" not in str(error):
         return False
-    steps = [one for one in dis.get_instructions(place.tb_frame.f_code) if one.offset >= place.tb_lasti]
-    return next(one.opname for one in steps if one.opname != "TO_BOOL") == "UNARY_NOT"
+    steps = [step for step in dis.get_instructions(place.tb_frame.f_code) if step.offset >= place.tb_lasti]
+    return next(step.opname for step in steps if step.opname != "TO_BOOL") == "UNARY_NOT"
 
 
-def _first(value: Any) -> Any:
+def _first_case(value: Any) -> Any:
     """The numbers of the first case: of an array, of a named tuple of arrays, or the number itself."""
     if hasattr(value, "_fields"):
-        return value if TABLES in value._fields else type(value)(*(_first(one) for one in value))
+        return value if TABLES in value._fields else type(value)(*(_first_case(item) for item in value))
     return float(value[0]) if np.ndim(value) == 1 else value
 
 
@@ -287,7 +299,7 @@ def _refuse_infinite(
     for field, value in zip(result._fields, result, strict=True):
         if not np.isfinite(value).all():
             bad = np.ravel(value)[~np.isfinite(np.ravel(value))][0]
-            lost = getattr(calling(name, function, *(_first(one) for one in arguments)), field)
+            lost = getattr(calling(name, function, *(_first_case(argument) for argument in arguments)), field)
             first = sentence(lost.origin) if getattr(lost, "origin", None) else f"{place_of(function)}: out of range"
             raise Breach(f'{first}; so `{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal '
                          "case; keep square roots, logarithms and divisions in range")  # fmt: skip

@@ -8,7 +8,9 @@ Compiled functions take and give plain numbers; those for whole chunks of cases 
 
 import numpy as np
 
-from mc_engine.lanes import atan2, physics, sqrt
+from mc_engine.lanes import atan2, floor, physics, rint, sqrt
+
+TURN = 6.283185307179586  # rad
 
 # World Geodetic System 1984, NIMA TR8350.2, 3rd ed., table 3.1: equatorial radius [m] and flattening.
 WGS84_RADIUS = 6_378_137.0
@@ -91,6 +93,18 @@ def radius_at_altitude(
     for _ in range(6):  # altitude grows by almost a metre for a metre of radius: each step gains five digits
         r = r + altitude - over_ellipsoid(r, 1.0 / r, sin2, polar_radius, e2)[0]
     return r
+
+
+@physics
+def full_turn(angle):
+    """The angle [rad] in [0, 2 pi)."""
+    return angle - TURN * floor(angle * (1.0 / TURN))
+
+
+@physics
+def half_turn(angle):
+    """The angle [rad] in [-pi, pi]."""
+    return angle - TURN * rint(angle * (1.0 / TURN))
 
 
 @physics

@@ -1,4 +1,4 @@
-"""What a user asks for when he says who is to fly the cases; `mc_engine.runner.pools` has those who do."""
+"""The choice of a backend, with its limits.  `mc_engine.runner.pools` makes the worker pool for it."""
 
 import importlib.util
 import sys
@@ -13,12 +13,12 @@ BACKENDS = ("threading", "loky", "dask")
 
 @dataclass(frozen=True)
 class Backend:
-    """What flies the cases.
+    """The kind of workers that fly the cases, and their limits.
 
     name : "threading", "loky" or "dask".  scheduler : address of a `distributed` scheduler; without one, "dask"
-    starts a cluster of this machine for the run.
-    case_seconds : a case that takes longer is given up with status time-limit.  memory_mib : what a worker may have.
-    patience_s : how long a scheduler may be without workers, as while its jobs wait in a queue; 300 by default.
+    starts a cluster on this machine for the run.
+    case_seconds : a case that takes longer ends with the status time-limit.  memory_mib : memory limit of a worker.
+    patience_s : longest time without workers, for example while jobs wait in a queue; by default 300.
     """
 
     name: str = "threading"
@@ -44,20 +44,20 @@ class Backend:
             raise EngineError(f'the backend "dask" needs the package distributed; {how_to_install("cluster")}')
 
     def options(self) -> str:
-        """The options of the command line that ask for this backend, each with a space before it."""
+        """The options of the command line that select this backend, each with a space before it."""
         name = None if self.name == "threading" else self.name
         seconds = None if self.case_seconds is None else f"{self.case_seconds:g}"
         patience = None if self.patience_s is None else f"{self.patience_s:g}"
-        words = {
+        values = {
             "backend": name,
             "scheduler": self.scheduler,
             "case-seconds": seconds,
             "memory": self.memory_mib,
             "patience": patience,
         }
-        return "".join(f" --{key} {shell_word(str(value))}" for key, value in words.items() if value is not None)
+        return "".join(f" --{key} {shell_word(str(value))}" for key, value in values.items() if value is not None)
 
 
 def memory_can_be_limited() -> bool:
-    """True where the system limits the memory of a process, or psutil is there to look at it."""
+    """True if the system can limit the memory of a process, or psutil is installed to watch it."""
     return sys.platform.startswith("linux") or importlib.util.find_spec("psutil") is not None

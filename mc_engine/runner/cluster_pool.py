@@ -1,6 +1,6 @@
-"""The workers of a Dask cluster, as many as there are at any time.
+"""A worker pool on a Dask cluster, whose number of workers may change while the run is flying.
 
-The cluster is that of a scheduler that somebody started, or one of this machine, begun for the run and ended with it.
+The cluster belongs to a scheduler that the user started, or is a local one that this pool starts and ends.
 """
 
 import atexit
@@ -12,84 +12,83 @@ from functools import partial
 from typing import Any
 
 from mc_engine.errors import WorkersLost
-from mc_engine.flight.chunks import Order
+from mc_engine.flight.chunks import Task
 from mc_engine.runner.backends import Backend
-from mc_engine.runner.worker_process import Site, perform
-from mc_engine.runner.workers import Crew, Landing, landing_of
+from mc_engine.runner.worker_process import WorkerSetup, run_in_worker
+from mc_engine.runner.workers import Result, WorkerPool, result_of
 from mc_engine.safe_path import safe_import_path
 
-COUNT_AGAIN_S = 2.0  # a cluster grows and shrinks
-START_S = 15.0  # to find a scheduler
+COUNT_AGAIN_S = 2.0  # between two counts of the workers
+START_S = 15.0  # to connect to a scheduler
 ANSWER_S = 5.0  # for a scheduler to count its workers
-PATIENCE_S = 300.0  # without a worker, unless the user says
-END_S = 30.0  # for a cluster of our own to end
+PATIENCE_S = 300.0  # without a worker, by default
+END_S = 30.0  # for the local cluster to end
 
-# On our own cluster one death is enough to ask what the worker died of; Dask would try the same order four times.
-# Its cluster also gives a worker up that is not there 15 s after any of its deaths, be it only because it is just
-# being begun again after a later one: with a case that keeps killing, none would be left after a minute.
-OUR_CLUSTER = {"distributed.scheduler.allowed-failures": 0, "distributed.deploy.lost-worker-timeout": "1000 days"}
+# Dask would try the task of a dead worker four times; `Dispatch` decides that itself.  Dask would also drop a worker
+# that is not back 15 s after any of its deaths, so that a case that keeps killing workers would leave none.
+LOCAL_CLUSTER = {"distributed.scheduler.allowed-failures": 0, "distributed.deploy.lost-worker-timeout": "1000 days"}
 
 
-class ClusterCrew(Crew):
-    """A client of the scheduler; orders are its tasks."""
+class ClusterWorkerPool(WorkerPool):
+    """A client of the scheduler, to which each task of the run is one Dask task."""
 
-    def __init__(self, site: Site, workers: int, backend: Backend):
+    def __init__(self, setup: WorkerSetup, workers: int, backend: Backend):
         super().__init__()
-        self._site = site
+        self._site = setup
         self._patience_s = PATIENCE_S if backend.patience_s is None else backend.patience_s
-        self._futures: dict[Order, Any] = {}
+        self._futures: dict[Task, Any] = {}
         with ExitStack() as held:
-            self._ours = _LocalWorkers(workers, held) if backend.scheduler is None else None
-            self._client = held.enter_context(_client(self._ours.cluster if self._ours else backend.scheduler))
+            self._local = _LocalWorkers(workers, held) if backend.scheduler is None else None
+            self._client = held.enter_context(_client(self._local.cluster if self._local else backend.scheduler))
             self._held = held.pop_all()
-        self.shared = self._ours is None  # a worker of somebody else's may have several threads
-        self._threads, self._counted, self._manned = 0, -COUNT_AGAIN_S, time.monotonic()
+        self.shared = self._local is None  # workers of the user's scheduler may have several threads
+        self._threads, self._counted_s, self._last_worker_s = 0, -COUNT_AGAIN_S, time.monotonic()
 
     def room(self) -> int:
         self._count()
-        # No more than threads: who waits on a worker that dies shares the blame.  One where there is none: a cluster
-        # that adapts begins a worker only for work that waits.
+        # No more tasks than threads: a task that waits on a worker which dies would be suspected, too.  At least one:
+        # a cluster that adapts its size starts a worker only when a task waits.
         return max(1, self._threads)
 
     def _count(self) -> None:
         now = time.monotonic()
-        if now - self._counted < COUNT_AGAIN_S:
+        if now - self._counted_s < COUNT_AGAIN_S:
             return
-        if self._ours is not None:
-            self._ours.replace_lost()
+        if self._local is not None:
+            self._local.replace_lost()
         self._threads = _threads(self._client)
-        self._counted = time.monotonic()
+        self._counted_s = time.monotonic()
         if self._threads:
-            self._manned = self._counted
+            self._last_worker_s = self._counted_s
 
-    def deserted_s(self) -> float:
+    def without_workers_s(self) -> float:
         self._count()
-        return 0.0 if self._threads else time.monotonic() - self._manned
+        return 0.0 if self._threads else time.monotonic() - self._last_worker_s
 
-    def begin(self, order: Order) -> None:
+    def begin(self, task: Task) -> None:
         if self._client.status in ("closing", "closed"):
             raise WorkersLost("the scheduler is gone")
-        future = self._client.submit(perform, self._site, order, pure=False, key=None)
-        self._futures[order] = future  # a future that is forgotten is called off
-        future.add_done_callback(partial(self._land, order))
+        future = self._client.submit(run_in_worker, self._site, task, pure=False, key=None)
+        self._futures[task] = future  # Dask cancels a task whose future is garbage-collected
+        future.add_done_callback(partial(self._on_done, task))
 
-    def _land(self, order: Order, future: Any) -> None:
+    def _on_done(self, task: Task, future: Any) -> None:
         from distributed import KilledWorker
 
         if future.cancelled():
-            lost = WorkersLost("the scheduler has called off the work, or is gone")
-            self._landed.put(Landing(order, error=lost))
+            lost = WorkersLost("the scheduler has cancelled the work, or is gone")
+            self._results.put(Result(task, error=lost))
         else:
-            self._landed.put(landing_of(order, future, KilledWorker))
+            self._results.put(result_of(task, future, KilledWorker))
 
-    def next(self, patience_s: float) -> Landing | None:
-        landing = super().next(patience_s)
-        if landing is not None:
-            del self._futures[landing.order]
-            self._manned = time.monotonic()
-        elif self.deserted_s() > self._patience_s:
+    def next(self, patience_s: float) -> Result | None:
+        result = super().next(patience_s)
+        if result is not None:
+            del self._futures[result.task]
+            self._last_worker_s = time.monotonic()
+        elif self.without_workers_s() > self._patience_s:
             raise WorkersLost(f"the scheduler has had no worker for {self._patience_s:g} s (--patience waits longer)")
-        return landing
+        return result
 
     def close(self, at_once: bool) -> None:
         if at_once and self._client.status == "running":
@@ -99,32 +98,32 @@ class ClusterCrew(Crew):
 
 
 class _LocalWorkers:
-    """A cluster of this machine: processes of one thread, each begun again by its nanny when it dies."""
+    """A cluster on this machine: processes of one thread, each restarted by its nanny when it dies."""
 
     def __init__(self, workers: int, held: ExitStack):
         import dask
         from distributed import LocalCluster
         from distributed.deploy.spec import close_clusters
 
-        # At the end of Python it would close a cluster that a second signal left half made, and raise; ours is closed
-        # by `_close`, and its processes end with this one.
+        # At exit it would raise on a cluster that a second signal left half started.  `_close` closes this one, and
+        # its processes end with this process.
         atexit.unregister(close_clusters)
         held.enter_context(safe_import_path())
-        held.enter_context(dask.config.set(OUR_CLUSTER))
+        held.enter_context(dask.config.set(LOCAL_CLUSTER))
         self._workers = workers
         self.cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
-            dashboard_address="127.0.0.1:0",  # any port: 8787 may be that of another run
+            dashboard_address="127.0.0.1:0",  # any free port: another run may use 8787
             scheduler_kwargs={"dashboard": False},
-            silence_logs=logging.CRITICAL,  # a worker that dies is no news
-            memory_limit=0,  # Dask's own limit ends or pauses workers; `Site.memory_mib` makes allocations fail
+            silence_logs=logging.CRITICAL,  # `Dispatch` handles dead workers
+            memory_limit=0,  # Dask would kill or pause workers; `memory_mib` makes allocations fail
             preload=["mc_engine.runner.worker_process"],
         )
         held.callback(self._close)
 
     def replace_lost(self) -> None:
-        """New workers for those whose nanny has given up, as where the system allowed it no process."""
+        """Start new workers for those whose nanny has given up, for example because no process could be started."""
         from distributed.core import Status
 
         lost = [name for name, nanny in list(self.cluster.workers.items()) if nanny.status == Status.closed]
@@ -134,7 +133,7 @@ class _LocalWorkers:
             self.cluster.scale(self._workers)
 
     def _close(self) -> None:
-        with suppress(TimeoutError):  # what is left ends with this process
+        with suppress(TimeoutError):  # the remaining processes end with this one
             self.cluster.close(timeout=END_S)
 
 

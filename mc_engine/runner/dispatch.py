@@ -1,8 +1,8 @@
-"""From chunks to receipts: keeps a crew busy, and finds the cases that kill their workers.
+"""Dispatch of tasks to a worker pool, and isolation of the cases that kill their workers.
 
-A chunk whose worker died is flown again, in small batches, with a note of each.  If that worker dies too, the cases
-of its last note are flown first, one by one.  A case whose worker dies of it alone, twice, is lost: the chunk is flown
-without it, and its row says so.  So a part holds the same cases whatever happened on the way.
+A task whose worker died runs again in small batches, and the worker records each batch before it flies.  If that worker
+dies too, the cases of the last record fly first, one by one.  A case whose worker dies twice while it flies alone is
+lost: the task runs without it, and its row gives the reason.  A part therefore always holds the same cases.
 """
 
 from collections import Counter, deque
@@ -10,103 +10,121 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from mc_engine.errors import WorkersLost
-from mc_engine.flight.chunks import Lost, Order
+from mc_engine.flight.chunks import Lost, Task
+from mc_engine.flight.flyer import RunStopped
 from mc_engine.runner.worker_process import LATE, take_notes
-from mc_engine.runner.workers import Crew, Landing
+from mc_engine.runner.workers import Result, WorkerPool
 from mc_engine.status import STATUS_NAME, TIME_LIMIT, WORKER_DIED
 from mc_engine.store.parts import Written
 
-LOOK_EVERY_S = 0.2  # at whether to stop
-DRAIN_S = 10.0  # without a worker, then what is under way is under way no more
-MOST_DEATHS = 30  # before any case has come through: it is not the cases then
-MOST_UNNOTED = 10  # deaths of one order of which nobody knows what was in flight
+LOOK_EVERY_S = 0.2  # between two checks whether to stop
+DRAIN_S = 10.0  # without a worker, after which a stopped run waits for its tasks no longer
+MOST_DEATHS = 30  # before any case has completed: then the cases are not the cause
+MOST_UNNOTED = 10  # deaths of one task without a record of what was in flight
 DIED = "the process flying this case died"
 NO_MEMORY = "needed more memory than its worker may have"
 
 
 class Dispatch:
-    """Gives a crew its orders and brings what landed.
+    """Runs tasks in a worker pool and yields what the workers wrote.
 
-    case_seconds : what the workers give a case; they leave a note in `run` where one takes longer.
+    run : run directory, in which workers record what is in flight.  case_seconds : time limit of a case.
+    leaves : a run that is stopped does not wait for the tasks under way, whose workers record each complete case.
+    most : tasks under way at a time, None for as many as the pool takes.
     """
 
-    def __init__(self, crew: Crew, run: Path, case_seconds: float | None = None):
-        self._crew, self._run, self._case_seconds = crew, run, case_seconds
-        self._waiting: deque[Order] = deque()
+    def __init__(
+        self,
+        pool: WorkerPool,
+        run: Path,
+        case_seconds: float | None = None,
+        leaves: bool = False,
+        most: int | None = None,
+    ):
+        self._pool, self._run, self._case_seconds, self._leaves = pool, run, case_seconds, leaves
+        self._most = most
+        self._waiting: deque[Task] = deque()
         self._under_way = 0
-        self._apart = False  # an order is under way, and nothing may be beside it
-        self._deaths: Counter[int] = Counter()  # of a case that flew alone
-        self._unnoted: Counter[int] = Counter()  # of an order, by its first case
-        self._lost, self._came_through = 0, False
+        self._exclusive = False  # a task is under way beside which no other may run
+        self._deaths: Counter[int] = Counter()  # by case, of workers that flew it alone
+        self._unnoted: Counter[int] = Counter()  # deaths without a record, by the first case of the task
+        self._n_deaths, self._any_completed = 0, False
 
-    def receipts(self, orders: Iterable[Order], stopped: Callable[[], bool]) -> Iterator[tuple[Order, Written]]:
-        """What the workers wrote, as it lands.
+    def receipts(self, tasks: Iterable[Task], stopped: Callable[[], bool]) -> Iterator[tuple[Task, Written]]:
+        """Each task with the part that was written for it, in the order of completion.
 
-        When stopped, nothing new begins, and what is under way still lands while there are workers.
-        Raises WorkersLost when there is nobody to fly.
+        Once `stopped()` is true no further task begins; those under way complete as long as there are workers.
+        Raises WorkersLost if the workers cannot be kept alive.
         """
-        self._waiting.extend(orders)
+        self._waiting.extend(tasks)
         while self._under_way or (self._waiting and not stopped()):
             self._fill(stopped)
-            landing = self._crew.next(LOOK_EVERY_S)
-            if landing is None:
-                if stopped() and self._crew.deserted_s() > DRAIN_S:
+            result = self._pool.next(LOOK_EVERY_S)
+            if result is None:
+                if stopped() and (self._leaves_now() or self._pool.without_workers_s() > DRAIN_S):
                     return
                 continue
             self._under_way -= 1
-            self._apart = self._apart and self._under_way > 0
-            if landing.died:
-                self._on_worker_death(landing)
-            elif landing.written is None:
-                raise landing.error or AssertionError(landing)
+            self._exclusive = self._exclusive and self._under_way > 0
+            if result.died:
+                self._on_worker_death(result)
+            elif isinstance(result.error, RunStopped):
+                continue
+            elif result.written is None:
+                raise result.error or AssertionError(result)
             else:
-                self._came_through = True
-                self._fill(stopped)  # no worker waits until the receipt is dealt with
-                yield landing.order, landing.written
+                self._any_completed = True
+                self._fill(stopped)  # before the caller handles the part, so that no worker is idle meanwhile
+                yield result.task, result.written
+
+    def _leaves_now(self) -> bool:
+        """Whether tasks under way are left; threads end by themselves, and are waited for."""
+        return self._leaves and not self._pool.in_process
 
     def _fill(self, stopped: Callable[[], bool]) -> None:
         while self._waiting and not stopped() and self._may_begin(self._waiting[0]):
-            order = self._waiting.popleft()
-            self._crew.begin(order)
+            task = self._waiting.popleft()
+            self._pool.begin(task)
             self._under_way += 1
-            self._apart = self._flies_apart(order)
+            self._exclusive = self._needs_pool_alone(task)
 
-    def _may_begin(self, order: Order) -> bool:
-        if self._apart or self._flies_apart(order):
+    def _may_begin(self, task: Task) -> bool:
+        if self._exclusive or self._needs_pool_alone(task):
             return self._under_way == 0
-        return self._under_way < self._crew.room()
+        return self._under_way < min(self._pool.room(), self._most or self._pool.room())
 
-    def _flies_apart(self, order: Order) -> bool:
-        """Whether nothing may fly beside an order, so that its worker dies of nothing else."""
-        return self._crew.shared and bool(order.alone)
+    def _needs_pool_alone(self, task: Task) -> bool:
+        """Whether no other task may run beside this one, so that its worker can die of this one only."""
+        return self._pool.shared and bool(task.alone)
 
-    def _on_worker_death(self, landing: Landing) -> None:
-        """Fly the order of a dead worker again, without the case that killed it if that is known by now.
+    def _on_worker_death(self, result: Result) -> None:
+        """Queue the task of a dead worker again, without the case that killed it once that case is known.
 
-        The worker of an innocent case may be killed from outside, but hardly twice.
+        A first death may come from outside (out of memory, `kill`), so a case is lost at the second one only.
+        Raises WorkersLost if workers die before any case has completed.
         """
-        order, flown = landing.order, landing.order.flown()
+        task, flown = result.task, result.task.flown()
         kind, noted = take_notes(self._run, flown)
-        self._lost += 1
-        self._came_through = self._came_through or (noted.size > 0 and noted[0] != flown[0])
-        if self._lost >= MOST_DEATHS and not self._came_through:
-            raise WorkersLost(f"the workers die whatever they fly; the last one said: {landing.error}")
+        self._n_deaths += 1
+        self._any_completed = self._any_completed or (noted.size > 0 and noted[0] != flown[0])
+        if self._n_deaths >= MOST_DEATHS and not self._any_completed:
+            raise WorkersLost(f"{self._n_deaths} workers died before any case completed; last error: {result.error}")
         if noted.size != 1:
-            if order.suspected and not noted.size:
-                self._count_unnoted(order)
-            self._waiting.append(order.suspecting(noted))
+            if task.suspected and not noted.size:
+                self._count_unnoted(task)
+            self._waiting.append(task.isolating(noted))
             return
         case = int(noted[0])
-        self._deaths[case] += case in order.alone
+        self._deaths[case] += case in task.alone
         if kind == LATE:
-            order = order.without(Lost(case, STATUS_NAME[TIME_LIMIT], f"took longer than {self._case_seconds:g} s"))
+            task = task.without(Lost(case, STATUS_NAME[TIME_LIMIT], f"took longer than {self._case_seconds:g} s"))
         elif self._deaths[case] > 1:
-            reason = NO_MEMORY if isinstance(landing.error, MemoryError) else DIED
-            order = order.without(Lost(case, STATUS_NAME[WORKER_DIED], reason))
-        self._waiting.append(order.suspecting(noted))
+            reason = NO_MEMORY if isinstance(result.error, MemoryError) else DIED
+            task = task.without(Lost(case, STATUS_NAME[WORKER_DIED], reason))
+        self._waiting.append(task.isolating(noted))
 
-    def _count_unnoted(self, order: Order) -> None:
-        """It waited for a worker that died of another order, or was being set up; but not always."""
-        self._unnoted[order.first] += 1
-        if self._unnoted[order.first] > MOST_UNNOTED:
-            raise WorkersLost(f"cases {order.first} to {order.stop - 1}: their workers die before any of them flies")
+    def _count_unnoted(self, task: Task) -> None:
+        """Count a death without a record: the worker died while it started, or of another task."""
+        self._unnoted[task.first] += 1
+        if self._unnoted[task.first] > MOST_UNNOTED:
+            raise WorkersLost(f"cases {task.first} to {task.stop - 1}: their workers die before any of them flies")

@@ -1,4 +1,4 @@
-"""The campaign of a run directory, as it was flown: what resumes, replays and workers begin with."""
+"""The campaign of a run directory, as it was flown.  Used by resume, extend, replay, merge and worker processes."""
 
 import os
 from dataclasses import replace
@@ -10,9 +10,10 @@ from mc_engine.campaign.sensitivity_design import companion
 from mc_engine.campaign.upstream import COMPANION
 from mc_engine.durable_file import make_way, write_inside
 from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError
-from mc_engine.flight.kernel import source_digest
-from mc_engine.flight.nominal_inputs import nominal_inputs
-from mc_engine.model.record import load_model, sources_of
+from mc_engine.flight.case_rows import FOLDER
+from mc_engine.flight.flyers import flyer_of
+from mc_engine.model.record import Model, load_model, sources_of
+from mc_engine.model.simulator import Simulator, load_simulator
 from mc_engine.runner.manifest import columns_of, sampling_digest
 from mc_engine.sampling.designs import EXTENSIBLE
 from mc_engine.sampling.streams import SEED_CONTRACT
@@ -22,22 +23,27 @@ from mc_engine.store.run_files import SENSITIVITY
 from mc_engine.store.run_folder import readable
 from mc_engine.store.store import Store
 
-_OWN = (*PART_FOLDERS, SENSITIVITY, FIGURES, REPLAYS)  # folders of a run directory
+_OWN = (*PART_FOLDERS, SENSITIVITY, FIGURES, REPLAYS, FOLDER)  # folders of a run directory
 
 
 def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
-    """The campaign as it was flown, at its present length; StoreError if model or campaign have changed since.
+    """The campaign of a run, with its present number of cases.
 
-    directory : where its files lie, if not in the run directory.
+    directory : folder of the campaign's files, by default the run directory with its copies.
+    StoreError if its results were imported, or if the model, the campaign or the engine's sources have changed since
+    the run began.
     """
+    if imported := store.manifest.get("imported"):
+        why = f"its results were imported from {imported['file']}; the engine did not fly them"
+        raise StoreError(f"{store.path}: {why}")
     store.check_companions()
     recorded = store.manifest["campaign"]
     model, contract = store.manifest.get("model", {}), store.manifest.get("seed_contract")
     flown_by = model.get("digest"), model.get("sampling_digest"), contract
     if None in (*flown_by, recorded.get("digest"), recorded.get("design"), recorded.get("seed")):
         raise StoreError(f"{store.path}: its manifest does not say how the campaign was flown; run the campaign anew")
-    beside = store.manifest.get("sensitivity")
-    drawn = beside if beside is not None else {"design": recorded["design"], "cases": store.n_cases}
+    sensitivity = store.manifest.get("sensitivity")
+    drawn = sensitivity if sensitivity is not None else {"design": recorded["design"], "cases": store.n_cases}
     cases = drawn["cases"] if drawn["design"] in ("lhs", *EXTENSIBLE) else None
     campaign = load_campaign(
         recorded["name"],
@@ -45,21 +51,22 @@ def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
         seed=recorded["seed"],
         text=store.campaign_text,
         directory=directory or store.path,
-        upstream=store.path / COMPANION,  # also where the manifest has none: a run leads nowhere else
+        upstream=store.path / COMPANION,  # also without an upstream run: a run reads no other directory
     )
-    if beside is not None and campaign.sensitivity is not None:
+    if sensitivity is not None and campaign.sensitivity is not None:
         campaign = companion(campaign)
     if campaign.digest != recorded["digest"]:
         raise StoreError(f"{store.path}: a file of the campaign was edited; run the campaign anew")
-    ours = source_digest(campaign.model, campaign.directory), sampling_digest(), SEED_CONTRACT
+    ours = flyer_of(campaign).digest(), sampling_digest(), SEED_CONTRACT
     if ours != flown_by or (*CASE_COLUMNS, *columns_of(campaign)) != store.columns:
         raise StoreError(f"{store.path}: was flown by other sources of engine or model; run the campaign anew")
     return campaign
 
 
 def companions_of(campaign: Campaign) -> dict[str, bytes]:
-    """Files that the campaign reads from its own folder, by their names there: a run directory stands alone."""
-    files = {one.spec["file"] for one in campaign.dispersions if one.dist == "empirical"} | set(campaign.messages)
+    """Contents by name of the files that the campaign reads from its own folder.  The run directory keeps copies."""
+    empirical = [dispersion for dispersion in campaign.dispersions if dispersion.dist == "empirical"]
+    files = {dispersion.spec["file"] for dispersion in empirical} | set(campaign.messages)
     base = campaign.directory.resolve()
     paths = {base / file for file in files}
     if campaign.table_path is not None:
@@ -78,17 +85,20 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
 
 
 def _files_of_model(campaign: Campaign) -> dict[str, bytes]:
-    """Sources and data of a model that is a file, as they were read; nothing of an installed one."""
-    if not campaign.model_reference.endswith(".py"):
+    """Sources and data of a model that is a file, as they were read; empty for an installed model."""
+    model = campaign.model
+    if not (campaign.model_reference.endswith(".py") or (isinstance(model, Simulator) and model.program is not None)):
         return {}
-    sources, base = sources_of(campaign.model), campaign.directory.resolve()
+    sources = sources_of(model) if isinstance(model, Model) else model.sources
+    assert sources is not None  # a loaded simulator has them
+    base = campaign.directory.resolve()
     return {_name_in(base, path): content for path, content in sorted({**sources.files, **sources.data}.items())}
 
 
 def refuse_undeclared_data(campaign: Campaign) -> None:
-    """ModelError if the model, which is sound, cannot begin from the copies of its files that a run keeps.
+    """ModelError if the model does not work with the copies of its files that a run keeps.
 
-    A file that it opens by a path outside its own folder is not found out.
+    The cause is a data file that `Model(data=...)` does not name.  A file outside the model's folder is not detected.
     """
     if not (files := _files_of_model(campaign)):
         return
@@ -98,14 +108,25 @@ def refuse_undeclared_data(campaign: Campaign) -> None:
             make_way(folder, file)
             write_inside(folder, file, content)
         try:
-            nominal_inputs(replace(campaign, model=load_model(campaign.model_reference, folder)))
+            _start_from(campaign, folder)
         except EngineError as error:
             why = str(error).replace(f"{folder}{os.sep}", "")
-            kept = "a run keeps copies of the model's sources and of the files in Model(data=...), and of no others"
+            kept = "a run keeps copies only of the model's sources and of the files in Model(data=...)"
             raise ModelError(f"{why}; {kept}") from None
 
 
+def _start_from(campaign: Campaign, folder: Path) -> None:
+    """Load the model or simulator from `folder`; of a model, compute what its nominal case begins with."""
+    if isinstance(campaign.model, Simulator):
+        if campaign.model.program is None:
+            load_simulator(campaign.model_reference, folder)
+        return
+    from mc_engine.flight.repeatability import nominal_inputs  # which loads the compiler
+
+    nominal_inputs(replace(campaign, model=load_model(campaign.model_reference, folder)))
+
+
 def _name_in(folder: Path, path: Path) -> str:
-    """The name that a file has in a folder; of a link the link's, by which it is called."""
+    """The name of a file relative to a folder; for a symbolic link, the name of the link."""
     plain = Path(os.path.normpath(path))
     return (plain if plain.is_relative_to(folder) else path.resolve()).relative_to(folder).as_posix()

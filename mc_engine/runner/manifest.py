@@ -1,7 +1,10 @@
-"""The manifest of a run: all that is known before the first case flies, as plain data; and the table's columns."""
+"""The manifest of a run: all that is known before the first case flies, as plain data.  No user names, no paths."""
 
+import platform
+import subprocess
 from dataclasses import asdict
 from hashlib import sha256
+from importlib import metadata
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -10,15 +13,16 @@ from mc_engine.campaign.cases import dispersion_records
 from mc_engine.campaign.columns import case_columns
 from mc_engine.campaign.inputs import inputs_of
 from mc_engine.campaign.loading import Campaign
-from mc_engine.flight.kernel import source_digest
+from mc_engine.flight.flyers import flyer_of
 from mc_engine.model.fields import Named, Setting
 from mc_engine.model.figures import to_record
-from mc_engine.model.record import Model
-from mc_engine.runner.provenance import engine_version, environment
+from mc_engine.model.simulator import System
 from mc_engine.sampling.streams import SEED_CONTRACT
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
 from mc_engine.store.journal import utc_now
 from mc_engine.store.parts import Column
+
+PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "pandas", "pyarrow", "joblib", "pydantic")
 
 
 def sampling_digest() -> str:
@@ -32,12 +36,12 @@ def sampling_digest() -> str:
 
 def columns_of(campaign: Campaign) -> list[Column]:
     """Columns of the case table after case_id, status and reason."""
-    taken = () if campaign.upstream is None else campaign.upstream.columns
-    return case_columns(campaign.model, campaign.dispersions, taken)
+    from_upstream = () if campaign.upstream is None else campaign.upstream.columns
+    return case_columns(campaign.model, campaign.dispersions, from_upstream)
 
 
 def manifest_of(campaign: Campaign) -> dict[str, Any]:
-    """The manifest, without the columns, which the store adds."""
+    """The manifest, except its columns, which `create_store` adds."""
     model = campaign.model
     return {
         "format": 1,
@@ -57,17 +61,17 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
             "name": model.name,
             "title": model.title,
             "source": model.source,
-            "digest": source_digest(model, campaign.directory),
+            "digest": flyer_of(campaign).digest(),
             "sampling_digest": sampling_digest(),
         },
-        "inputs": [*_taken_inputs(campaign), *dispersion_records(campaign)],
-        **_shared_inputs(campaign),
-        "quantities": [_record(one) for one in model.quantities],
+        "inputs": [*_upstream_inputs(campaign), *dispersion_records(campaign)],
+        **_constant_inputs(campaign),
+        "quantities": [_description(quantity) for quantity in model.quantities],
         "ranges": _ranges(campaign.model),
-        "requirements": [asdict(one) for one in campaign.requirements],
+        "requirements": [asdict(requirement) for requirement in campaign.requirements],
         "report": campaign.report.model_dump(),
         "looks": list(campaign.looks),
-        "figures": [*(to_record(figure) for figure in model.figures), *_taken_figures(campaign)],
+        "figures": [*(to_record(figure) for figure in model.figures), *_upstream_figures(campaign)],
         "published": [dict(record) for record in model.published],
         "upstream": _upstream_facts(campaign),
         "status_texts": {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()},
@@ -76,7 +80,7 @@ def manifest_of(campaign: Campaign) -> dict[str, Any]:
 
 
 def _upstream_facts(campaign: Campaign) -> dict[str, Any] | None:
-    """Which run the campaign takes its inputs from."""
+    """Identity of the run from which the campaign takes its inputs, or None."""
     if campaign.upstream is None:
         return None
     facts = {key: campaign.upstream.rows.facts[key] for key in ("name", "title", "model", "design", "seed", "digest")}
@@ -84,8 +88,8 @@ def _upstream_facts(campaign: Campaign) -> dict[str, Any] | None:
     return {**facts, "cases": campaign.upstream.rows.n_cases, "failed": failed, "links": dict(campaign.upstream.links)}
 
 
-def _taken_inputs(campaign: Campaign) -> list[dict[str, Any]]:
-    """The dispersions of the run upstream, under the names that they have here, as its own manifest told them."""
+def _upstream_inputs(campaign: Campaign) -> list[dict[str, Any]]:
+    """The dispersions of the upstream run that are columns of this one, from its manifest."""
     if campaign.upstream is None:
         return []
     here = {column.name for column in campaign.upstream.columns}
@@ -94,8 +98,8 @@ def _taken_inputs(campaign: Campaign) -> list[dict[str, Any]]:
     return [{**record, "note": f"in the run of {name}. {record['note']}".strip()} for record in records]
 
 
-def _taken_figures(campaign: Campaign) -> list[dict[str, Any]]:
-    """Maps and scatter plots of the run upstream whose columns this table has too."""
+def _upstream_figures(campaign: Campaign) -> list[dict[str, Any]]:
+    """Maps and scatter plots of the upstream run whose columns are also columns of this one."""
     if campaign.upstream is None:
         return []
     here = {column.name for column in columns_of(campaign)}
@@ -104,27 +108,70 @@ def _taken_figures(campaign: Campaign) -> list[dict[str, Any]]:
     return [record for record in drawn if {record["x"], record["y"], record.get("metric", record["x"])} <= here]
 
 
-def _record(item: Named) -> dict[str, str]:
+def _description(item: Named) -> dict[str, str]:
     return {"name": item.name, "unit": item.unit, "description": item.description}
 
 
-def _ranges(model: Model) -> dict[str, list[float | None]]:
-    """Ends of the physical range of the metrics and quantities that have one; None for an open end."""
+def _ranges(model: System) -> dict[str, list[float | None]]:
+    """Bounds of the physical range of each metric and quantity that has one; None for an open end."""
     fields = [*model.quantities, *model.metrics]
-    ends = {one.name: [end if isfinite(end) else None for end in (one.low, one.high)] for one in fields}
+    ends = {field.name: [end if isfinite(end) else None for end in (field.low, field.high)] for field in fields}
     return {name: pair for name, pair in ends.items() if pair != [None, None]}
 
 
-def _shared_inputs(campaign: Campaign) -> dict[str, list[dict[str, Any]]]:
+def _constant_inputs(campaign: Campaign) -> dict[str, list[dict[str, Any]]]:
     """Parameters and settings that are the same in all cases."""
-    dispersed = {one.name for one in campaign.dispersions}
+    dispersed = {dispersion.name for dispersion in campaign.dispersions}
     parameters, settings = [], []
     for name, item in inputs_of(campaign.model).items():
         if name in dispersed:
             continue
-        record = {**_record(item), "value": campaign.nominal[name], "overridden": name in campaign.parameters}
+        record = {**_description(item), "value": campaign.nominal[name], "overridden": name in campaign.parameters}
         if isinstance(item, Setting):
             settings.append({**record, "choices": list(item.choices)})
         else:
             parameters.append(record)
     return {"parameters": parameters, "settings": settings}
+
+
+def engine_version() -> str:
+    """Version of the installed engine; "source" where it runs without being installed."""
+    try:
+        return metadata.version("mc-engine")
+    except metadata.PackageNotFoundError:
+        return "source"
+
+
+def environment() -> dict[str, Any]:
+    """Interpreter, platform, processor, packages, and the git state of the engine's own sources."""
+    import llvmlite.binding as llvm
+    import numba
+
+    return {
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "cpu": str(llvm.get_host_cpu_name()),
+        "packages": {name: metadata.version(name) for name in PACKAGES},
+        "numba": numba.__version__,
+        "llvm": ".".join(map(str, llvm.llvm_version_info)),
+        "git": git_state(Path(__file__).parent),
+        "seed_contract": SEED_CONTRACT,
+    }
+
+
+def git_state(folder: Path) -> dict[str, Any] | None:
+    """Last commit that changed `folder`, and whether the folder differs from it; None outside a repository."""
+    commit = _git(folder, "log", "-1", "--format=%H", "--", ".")
+    if not commit:
+        return None
+    return {"commit": commit, "dirty": bool(_git(folder, "status", "--porcelain", "--", "."))}
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    try:
+        done = subprocess.run(
+            ["git", "-C", str(folder), *arguments], capture_output=True, text=True, timeout=10.0, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""

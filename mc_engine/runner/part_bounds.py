@@ -1,6 +1,6 @@
-"""Bounds of the parts that are yet to be flown: those that the run's other parts have, or that a lost part had.
+"""Bounds of the parts that are missing: in line with the run's other parts, or as a lost part had them.
 
-So a run that was cut, repaired, merged or extended has the part files of one that was not.
+A run that was interrupted, repaired, merged or extended therefore has the same part files as one that was not.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,25 +14,28 @@ from mc_engine.store.receipts import Range
 
 @dataclass(frozen=True)
 class Stretch:
-    """Cases up to `stop`, from the stretch before, with parts of `chunk` cases; None where no session has begun it."""
+    """Cases from the end of the stretch before up to `stop`, in parts of `chunk` cases; None if not begun yet."""
 
     stop: int
     chunk: int | None
 
 
 def stretches(entries: Iterable[Entry], stop: int, end: int) -> list[Stretch]:
-    """What a run began with, up to the case `stop`, and each extension up to `end`, as its journal tells."""
-    found = [Stretch(stop, None)]
+    """The stretch with which a run began, up to the case `stop`, and one for each extension, by its journal.
+
+    end : one past the last case; the last stretch ends there, also if the line of the last extension is lost.
+    """
+    along = [Stretch(stop, None)]
     for entry in entries:
         if entry.event == "extended":
-            found.append(Stretch(entry.facts["cases"], None))
-        elif entry.event in ("started", "merged") and found[-1].chunk is None:
-            found[-1] = Stretch(found[-1].stop, entry.facts.get("chunk"))
-    return [*found[:-1], Stretch(end, found[-1].chunk)]  # where the line of the last extension is lost, it ends before
+            along.append(Stretch(entry.facts["cases"], None))
+        elif entry.event in ("started", "merged") and along[-1].chunk is None:
+            along[-1] = Stretch(along[-1].stop, entry.facts.get("chunk"))
+    return [*along[:-1], Stretch(end, along[-1].chunk)]
 
 
 def part_bounds(missing: Sequence[Range], entries: Sequence[Entry], along: Sequence[Stretch], size: int) -> list[Range]:
-    """The missing ranges cut into those of parts, in order.  size : cases of a part where `along` says nothing."""
+    """The missing ranges, divided into those of parts, in order.  size : cases of a part where `along` has no chunk."""
     bounds: list[Range] = []
     for gap in missing:
         known = _withdrawn(entries, gap)
@@ -44,15 +47,15 @@ def part_bounds(missing: Sequence[Range], entries: Sequence[Entry], along: Seque
 
 
 def _withdrawn(entries: Sequence[Entry], gap: Range) -> list[Range]:
-    """Bounds of the parts in a gap that counted once, in order; of two that overlap, the later one's."""
-    found: list[Range] = []
+    """Bounds of withdrawn parts within a gap, in order; of two that overlap, those of the later one."""
+    bounds: list[Range] = []
     for entry in reversed(entries):
         bound = cases_in_name(entry.facts["file"]) if entry.event == "part-withdrawn" else None
         if bound is None or bound[0] < gap[0] or gap[1] < bound[1]:
             continue
-        if all(bound[1] <= other[0] or other[1] <= bound[0] for other in found):
-            found.append(bound)
-    return sorted(found)
+        if all(bound[1] <= other[0] or other[1] <= bound[0] for other in bounds):
+            bounds.append(bound)
+    return sorted(bounds)
 
 
 def _cut(first: int, stop: int, along: Sequence[Stretch], size: int) -> Iterator[Range]:

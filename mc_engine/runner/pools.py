@@ -1,11 +1,10 @@
-"""Crews: who flies the chunks of a run.  Threads of this process, processes of this machine, or a Dask cluster.
+"""The worker pools of a run: threads of this process, processes of this machine, or a Dask cluster.
 
-Every crew takes orders and brings back receipts, in any order.  Workers write their own parts; in process crews
-nothing else but orders and receipts travels.
+Workers write the parts themselves; only tasks and results travel between processes.
 
-    threading   threads: no start-up, no copies; a crash of the model's own code ends the run
-    loky        processes: a worker that dies takes nothing with it; budgets of time and memory can be kept
-    dask        the same over a `distributed` scheduler, which dask-jobqueue starts on SLURM, PBS or LSF
+    threading   threads: no start-up time and no copies; a crash in model code ends the run
+    loky        processes: a crash ends one worker only; limits on time and memory can be set
+    dask        processes of a `distributed` scheduler, which dask-jobqueue starts on SLURM, PBS or LSF
 """
 
 import os
@@ -16,25 +15,27 @@ from pathlib import Path
 from typing import Any
 
 from mc_engine.campaign.loading import Campaign
-from mc_engine.flight.chunks import Order, carry_out
+from mc_engine.flight.chunks import Task, run_task
 from mc_engine.interruption import unsignalled_children
 from mc_engine.runner.backends import Backend
-from mc_engine.runner.cluster_pool import ClusterCrew
-from mc_engine.runner.worker_process import Site, begin_process, perform
-from mc_engine.runner.workers import Crew, Landing, landing_of
+from mc_engine.runner.cluster_pool import ClusterWorkerPool
+from mc_engine.runner.worker_process import WorkerSetup, begin_process, run_in_worker
+from mc_engine.runner.workers import Result, WorkerPool, result_of
 from mc_engine.safe_path import safe_import_path
 from mc_engine.store.parts import Written
 from mc_engine.store.store import Store
 
-_MOST_THREADS = 1024  # a system has room for some ten thousand, and no machine has as many cores
+_MOST_THREADS = 1024  # a system allows some ten thousand; more than its cores gain nothing
 THREADS_INSIDE = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
 
 
-def crew_of(backend: Backend, store: Store, campaign: Campaign, workers: int) -> Crew:
-    """The crew for a run, ready to take orders."""
+def pool_of(
+    backend: Backend, store: Store, campaign: Campaign, workers: int, stopped: Callable[[], bool]
+) -> WorkerPool:
+    """The worker pool that `backend` asks for, ready to take tasks.  stopped : whether the run is to end."""
     if backend.name == "threading":
-        return ThreadCrew(partial(carry_out, campaign, store.columns, store.path), workers)
-    site = Site(
+        return ThreadWorkerPool(partial(run_task, campaign, store.columns, store.path, stopped=stopped), workers)
+    setup = WorkerSetup(
         str(store.path.resolve()),
         str(Path(campaign.directory).resolve()),
         store.n_cases,
@@ -42,65 +43,67 @@ def crew_of(backend: Backend, store: Store, campaign: Campaign, workers: int) ->
         backend.memory_mib,
     )
     if backend.name == "loky":
-        return ProcessCrew(site, workers)
-    return ClusterCrew(site, workers, backend)
+        return ProcessWorkerPool(setup, workers)
+    return ClusterWorkerPool(setup, workers, backend)
 
 
-class ThreadCrew(Crew):
-    """Threads of this process; kernels hold no interpreter lock."""
+class ThreadWorkerPool(WorkerPool):
+    """Threads of this process; compiled kernels release the interpreter lock."""
 
-    def __init__(self, perform: Callable[[Order], Written], workers: int):
+    in_process = True
+
+    def __init__(self, run_in_worker: Callable[[Task], Written], workers: int):
         from multiprocessing.pool import ThreadPool
 
         super().__init__()
-        self._perform, self._workers = perform, min(workers, _MOST_THREADS)
-        self._pool = ThreadPool(self._workers)  # whose threads do not hold up the end of the process
+        self._run_task, self._workers = run_in_worker, min(workers, _MOST_THREADS)
+        self._pool = ThreadPool(self._workers)  # daemon threads: they do not delay the end of the process
 
     def room(self) -> int:
-        return self._workers + 1  # one waits, so that none of them has to
+        return self._workers + 1  # one task in the queue keeps all threads busy
 
-    def begin(self, order: Order) -> None:
+    def begin(self, task: Task) -> None:
         self._pool.apply_async(
-            self._perform,
-            (order,),
-            callback=lambda written: self._landed.put(Landing(order, written)),
-            error_callback=lambda error: self._landed.put(Landing(order, error=error)),
+            self._run_task,
+            (task,),
+            callback=lambda written: self._results.put(Result(task, written)),
+            error_callback=lambda error: self._results.put(Result(task, error=error)),
         )
 
     def close(self, at_once: bool) -> None:
         self._pool.terminate()
 
 
-class ProcessCrew(Crew):
-    """Processes of this machine, each an executor of its own: when one dies, it is known of which order."""
+class ProcessWorkerPool(WorkerPool):
+    """Processes of this machine.  Each is an executor of its own, so that a death is known to belong to one task."""
 
-    def __init__(self, site: Site, workers: int):
+    def __init__(self, setup: WorkerSetup, workers: int):
         super().__init__()
-        self._site, self._workers = site, workers
+        self._site, self._workers = setup, workers
         self._held = ExitStack()
         self._held.enter_context(safe_import_path())
         self._executors: list[Any] = []
         self._idle: list[Any] = []
-        self._busy: dict[Order, Any] = {}
+        self._busy: dict[Task, Any] = {}
 
     def room(self) -> int:
         return self._workers
 
-    def begin(self, order: Order) -> None:
+    def begin(self, task: Task) -> None:
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
-        executor = self._idle.pop() if self._idle else self._new()
+        executor = self._idle.pop() if self._idle else self._start()
         with unsignalled_children():
             try:
-                future = executor.submit(perform, self._site, order)
-            except BrokenProcessPool:  # its worker died while it had nothing to do
+                future = executor.submit(run_in_worker, self._site, task)
+            except BrokenProcessPool:  # the worker died while it was idle
                 self._drop(executor)
-                executor = self._new()
-                future = executor.submit(perform, self._site, order)
-        self._busy[order] = executor
-        future.add_done_callback(partial(self._land, order))
+                executor = self._start()
+                future = executor.submit(run_in_worker, self._site, task)
+        self._busy[task] = executor
+        future.add_done_callback(partial(self._on_done, task))
 
-    def _new(self) -> Any:
+    def _start(self) -> Any:
         from joblib.externals.loky import ProcessPoolExecutor
 
         executor = ProcessPoolExecutor(1, initializer=begin_process, initargs=(os.getpid(),), env=THREADS_INSIDE)
@@ -111,20 +114,20 @@ class ProcessCrew(Crew):
         self._executors.remove(executor)
         executor.shutdown(wait=False, kill_workers=True)
 
-    def _land(self, order: Order, future: Any) -> None:
+    def _on_done(self, task: Task, future: Any) -> None:
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
-        self._landed.put(landing_of(order, future, BrokenProcessPool))
+        self._results.put(result_of(task, future, BrokenProcessPool))
 
-    def next(self, patience_s: float) -> Landing | None:
-        landing = super().next(patience_s)
-        if landing is not None:
-            executor = self._busy.pop(landing.order)
-            if landing.died:
+    def next(self, patience_s: float) -> Result | None:
+        result = super().next(patience_s)
+        if result is not None:
+            executor = self._busy.pop(result.task)
+            if result.died:
                 self._drop(executor)
             else:
                 self._idle.append(executor)
-        return landing
+        return result
 
     def close(self, at_once: bool) -> None:
         with self._held:

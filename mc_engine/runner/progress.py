@@ -1,4 +1,4 @@
-"""Progress of a run: a bar with rate and remaining time on a terminal, a line now and then elsewhere."""
+"""Progress of a run: a bar with rate and remaining time on a terminal, otherwise a line every few seconds."""
 
 import sys
 import time
@@ -8,7 +8,7 @@ from typing import Any, TextIO
 
 from mc_engine.text import CleanStream
 
-ProgressCall = Callable[[int, int, int], None]  # cases done, wanted, failed
+ProgressCall = Callable[[int, int, int], None]  # cases done, in all, failed
 SECONDS_BETWEEN_LINES = 5.0
 
 
@@ -25,7 +25,7 @@ def pace(done: int, total: int, failed: int, rate: float | None) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A length of time for a reader: "7 s", "2 min 05 s", "3 h 10 min"."""
+    """A duration as text: "7 s", "2 min 05 s", "3 h 10 min"."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"
@@ -35,9 +35,9 @@ def duration(seconds: float) -> str:
 
 
 class Progress:
-    """Context manager to hand to the runner: called with (done, total, failed).
+    """A context manager that the runner calls with (done, total, failed).
 
-    The rate counts from the first call, so that neither compiling nor cases flown in an earlier session enter it.
+    The rate counts from the first call, so that it includes neither compilation nor cases of an earlier session.
     """
 
     def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic):
@@ -45,7 +45,7 @@ class Progress:
         self._clock = clock
         self._begin: tuple[float, int] | None = None
         self._last_line = clock()
-        self._said = ""
+        self._printed = ""
         self._text = ""
         self._bar: Any = None
         self._task: Any = None
@@ -64,10 +64,8 @@ class Progress:
         stream: Any = self.stream.steering() if isinstance(self.stream, CleanStream) else self.stream
         self._bar = Bar(*columns, console=Console(file=stream), transient=True)
         self._bar.start()
-        sys.stdout, sys.stderr = (
-            CleanStream(sys.stdout),
-            CleanStream(sys.stderr),
-        )  # the bar has taken them, until it stops
+        # The bar has replaced both streams until it stops.
+        sys.stdout, sys.stderr = CleanStream(sys.stdout), CleanStream(sys.stderr)
         self._task = self._bar.add_task("preparing", total=None)
 
     def __call__(self, done: int, total: int, failed: int) -> None:
@@ -80,16 +78,16 @@ class Progress:
             self._bar.update(self._task, completed=done, total=total, description=self._text)
         elif now - self._last_line >= SECONDS_BETWEEN_LINES:
             self._last_line = now
-            self._say()
+            self._print()
 
-    def _say(self) -> None:
-        if self._text != self._said:
+    def _print(self) -> None:
+        if self._text != self._printed:
             print(self._text, file=self.stream, flush=True)
-            self._said = self._text
+            self._printed = self._text
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._bar is not None:
             self._bar.stop()
-        self._say()
+        self._print()

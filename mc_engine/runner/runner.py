@@ -1,7 +1,7 @@
-"""Flying campaigns into stores: run, resume, extend, rerun, replay.
+"""Running of campaigns: run, resume, extend, rerun, merge, replay.
 
-A chunk is drawn, flown and written by one worker, and counted by the calling process alone.  What a case comes to
-depends on (campaign, sources, seed, case_id): chunks, workers and backends are bookkeeping.
+A worker draws, flies and writes a chunk of cases; the calling process commits it.  The result of a case depends only on
+campaign, sources, seed and case_id, and not on chunks, workers or backend.
 """
 
 import re
@@ -14,13 +14,11 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.campaign.cases import case_table, full_inputs
-from mc_engine.campaign.loading import Campaign, load_campaign
+from mc_engine.campaign.loading import Campaign, Retention, load_campaign
 from mc_engine.campaign.sensitivity_design import noise_ids
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
-from mc_engine.flight.contract import refuse_breaches
-from mc_engine.flight.flight import fly_history
-from mc_engine.flight.lost_numbers import first_lost, may_be_lost
+from mc_engine.flight.flyers import flyer_of
 from mc_engine.runner.backends import Backend
 from mc_engine.runner.flown_campaign import campaign_of, companions_of, refuse_undeclared_data
 from mc_engine.runner.histories import history_frame
@@ -41,9 +39,17 @@ THREADS = Backend()
 
 @dataclass(frozen=True)
 class Replay:
-    """One case flown again.  `differences` names each stored number that came out with other bits.
+    """One case flown again, and whether every number of it came out as stored.
 
-    lost : what made the state or a metric not finite: file, line and values; empty where all are.
+    equal : bool, every stored number has the same bits
+    differences : tuple of str, a sentence for each number that has not
+    history : DataFrame, the flight: case_id, t_s and the model's quantities
+    row : dict, the stored line of the case table, by column name
+    lost : str, file, line and values of what made the state or a metric not finite; empty where all are finite
+
+    >>> again = replay("runs/small", 3)
+    >>> again.equal, list(again.history)
+    (True, ['case_id', 't_s', 'altitude_km', 'speed_m_s'])
     """
 
     equal: bool
@@ -63,20 +69,31 @@ def run(
     backend: Backend | str = THREADS,
     shard: Shard | None = None,
 ) -> Store:
-    """Fly a campaign into the new directory `out` (default: runs/<campaign>-<time>).
+    """Run a campaign and store every case in the new directory `out`.
 
-    workers : threads or processes, all cores by default.  chunk : cases that a worker flies at a time.
-    backend : who flies, see `mc_engine.runner.pools`.  shard : only these cases; `mc_engine.runner.shards.merge` joins
-    shards.
-    A campaign that takes inputs from one that has yet to be flown has it flown first, beside `out`.
-    Raises StoreError if `out` is occupied or a URL, RunInterrupted on Ctrl-C; the store then holds whole chunks, and
-    `resume` completes it.
+    campaign : Campaign, from `load_campaign`
+    out : str or Path, must not exist or be empty; runs/<campaign>-<UTC time> by default
+    progress : function of (cases done, cases wanted, cases failed), called after each chunk
+    workers : int, threads or processes; all cores by default
+    chunk : int, cases that a worker flies at a time
+    backend : Backend, or its name: "threading", "loky" (processes: a crash in model code is isolated), or "dask"
+    shard : Shard, fly only these cases; `mc_engine.runner.runner.merge` joins the shards
+
+    Returns the Store, complete.  Its rows do not depend on workers, chunk and backend.  Where the campaign takes inputs
+    from another one that has yet to be flown, that one is flown first, into a directory next to `out`.
+
+    Raises StoreError if `out` is occupied or a URL, and RunInterrupted on Ctrl-C or a full disk; complete chunks are
+    kept, and `resume` flies the rest.
+
+    >>> store = run(load_campaign("minimal", cases=8), "runs/example")
+    >>> store.cases()["apogee_altitude_km"].median().round(1)
+    np.float64(657.5)
     """
     if out is not None and is_url(out):
         raise StoreError(f"{out}: is a URL; fly into a folder, and give that and the URL to object_store.publish")
     path = Path(out) if out is not None else default_folder(campaign.name)
     session = session_of(progress, workers, chunk, backend)
-    refuse_breaches(campaign)
+    flyer_of(campaign).refuse_faults()
     refuse_undeclared_data(campaign)
     campaign = _after_first(campaign, path, session)
     manifest = manifest_of(campaign)
@@ -87,7 +104,7 @@ def run(
 
 
 def _after_first(campaign: Campaign, path: Path, session: Session) -> Campaign:
-    """The campaign with the run that it takes inputs from, flown or completed beside `path` where it is not there."""
+    """The campaign with its upstream run, which is first made or completed next to `path` if necessary."""
     if campaign.first is None:
         return campaign
     name = re.sub(r"[^\w.-]+", "-", campaign.first.name)
@@ -125,9 +142,22 @@ def resume(
     backend: Backend | str = THREADS,
     repair: bool = False,
 ) -> Store:
-    """Complete the run in `path`; StoreError if the sources have changed since it began.
+    """Complete a run that was interrupted.
 
-    repair : what is damaged is flown again, see `mc_engine.store.repair`.
+    path : str or Path, the run directory
+    progress : function of (cases done, cases wanted, cases failed), called after each chunk
+    workers : int, threads or processes; all cores by default
+    chunk : int, cases that a worker flies at a time
+    backend : Backend, or its name, as for `run`
+    repair : bool, fly damaged parts again, too
+
+    Returns the Store, complete.
+
+    Raises StoreError if the model or the engine's sampling has changed since the run began, and RunInterrupted as `run`
+    does.
+
+    >>> resume("runs/small").missing()
+    []
     """
     if repair:
         mend_journal(Path(path))
@@ -144,14 +174,27 @@ def extend(
     chunk: int | None = None,
     backend: Backend | str = THREADS,
 ) -> Store:
-    """Give the run in `path` as many cases in all; the cases are those of a longer campaign.
+    """Give a run more cases; those it has stay as they are.
 
-    StoreError if the design cannot grow or has as many cases already, CampaignError if its blocks do not fit so many.
+    path : str or Path, the run directory
+    cases : int, the number of cases that it is to have in all
+    progress : function of (cases done, cases wanted, cases failed), called after each chunk
+    workers : int, threads or processes; all cores by default
+    chunk : int, cases that a worker flies at a time
+    backend : Backend, or its name, as for `run`
+
+    Returns the Store, complete.  Its cases are those of a campaign that had this number from the start.
+
+    Raises StoreError if the design cannot be extended or the run has as many cases, CampaignError if the number does
+    not fit the blocks of the design, and RunInterrupted as `run` does.
+
+    >>> extend("runs/small", 12).n_cases
+    12
     """
     store = open_store(path)
     if sentence := extension_problem(store.manifest, store.n_cases, cases):
         raise StoreError(f"{path}: {sentence}")
-    campaign = campaign_of(store)  # refuses changed sources before anything is written
+    campaign = campaign_of(store)  # first of all, since it refuses changed sources
     if sentence := block_problem(campaign.design, len(campaign.dispersions), cases):
         raise CampaignError(campaign.name, [Problem("cases", sentence)])
     store.note("extended", cases=cases)
@@ -165,9 +208,9 @@ def rerun(
     workers: int | None = None,
     backend: Backend | str = THREADS,
 ) -> Store:
-    """Fly the cases of a complete run again that did not complete, as after their worker died.
+    """Fly the failed cases of a complete run again, for example after their worker was killed.
 
-    All other rows stay.  A case that failed by its own physics fails again, with the same bits.
+    All other rows stay.  A case that failed because of its physics fails again, with the same bits.
     """
     store = open_store(path)
     return fly_failed(store, campaign_of(store), session_of(progress, workers, None, backend))
@@ -181,36 +224,40 @@ def merge(
     workers: int | None = None,
     chunk: int | None = None,
 ) -> Store:
-    """Make the run directory `out` of the run directories of all shards; see `mc_engine.runner.shards`."""
+    """Join the run directories of all shards of a campaign in the new run directory `out`.
+
+    StoreError if cases are missing, or if the shards are not of one campaign; see `mc_engine.runner.shards`.
+    """
     store, campaign = merge_shards(Path(out), [Path(shard) for shard in shards], chunk)
     return complete(store, campaign, session_of(progress, workers, chunk, THREADS))
 
 
 def replay(path: str | Path, case_id: int) -> Replay:
-    """Fly one case of a run alone, through the plain float64 build, and compare every stored number bit for bit."""
+    """Fly one case of a run again, alone, and compare every stored number bit for bit.
+
+    path : str or Path, the run directory
+    case_id : int, number of the case, from 0
+
+    Returns a Replay, with the history of the flight.
+
+    Raises StoreError if there is no such case, or if the model or the engine's sampling has changed since.
+
+    >>> replay("runs/small", 3).differences
+    ()
+    """
     store = open_store(path)
     campaign = campaign_of(store)
     table = case_table(campaign, np.array([case_id]))
-    inputs = full_inputs(campaign, _scalars(table))
-    flown = campaign.model, inputs, int(noise_ids(campaign, np.array([case_id]))[0]), campaign.seed
-    flight, history = fly_history(*flown, folder=campaign.directory, width=1)
+    inputs = full_inputs(campaign, {name: column[0] for name, column in table.items()})
+    flyer, noise = flyer_of(campaign), int(noise_ids(campaign, np.array([case_id]))[0])
+    flight, history = flyer.history(inputs, noise, Retention().rows, alone=True)
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
     again = {**table, **flight}
     differences = [
         f"case {case_id}, {name}: stored {stored[name]!r}, now {value!r}"
         for name, value in ((name, column[0]) for name, column in again.items())
-        if not _same_bits(stored[name], value)
+        if flyer.differs(stored[name], value)
     ]
-    lost = first_lost(*flown, f"case {case_id}") if may_be_lost(campaign.model, flight) else ""
+    lost = flyer.lost_number(inputs, noise, flight, f"case {case_id}")
     return Replay(not differences, tuple(differences), history_frame(case_id, history), stored, lost)
-
-
-def _same_bits(stored: Any, value: Any) -> bool:
-    if isinstance(value, float | np.floating):
-        return np.float64(stored).tobytes() == np.float64(value).tobytes()
-    return bool(stored == value)
-
-
-def _scalars(table: dict[str, np.ndarray]) -> dict[str, Any]:
-    return {name: column[0] for name, column in table.items()}

@@ -1,7 +1,7 @@
-"""Shards: a campaign flown in pieces that know nothing of one another, as in the job arrays of a cluster.
+"""Shards: independent pieces of a campaign, for example for the job array of a cluster.
 
-Shard k of n holds the k-th n-th of the cases in a run directory of its own.  Merged, the shards are the run that one
-process would have made: the same table, and with the same chunk the same part files.
+Shard k of n holds the k-th n-th of the cases in its own run directory.  The merged shards are equal to the run of one
+process: the same table and, with the same chunk, the same part files.
 """
 
 import os
@@ -46,18 +46,18 @@ class Shard:
         return shard
 
     def cases(self, n_cases: int) -> range:
-        """Its share of so many cases, which may be none; the shards differ by one case at most."""
+        """The cases of this shard among `n_cases`, possibly none; two shards differ by at most one case."""
         return range(n_cases * (self.number - 1) // self.of, n_cases * self.number // self.of)
 
     def record(self, n_cases: int) -> dict[str, int]:
-        """What the manifest says of it."""
+        """The shard's record in the manifest."""
         cases = self.cases(n_cases)
         return {"number": self.number, "of": self.of, "first": cases.start, "stop": cases.stop}
 
 
 @dataclass(frozen=True)
 class Piece:
-    """Cases first .. stop - 1, which stand in a part of a shard."""
+    """The cases first .. stop - 1 of a part of a shard."""
 
     store: Store
     part: Part
@@ -69,21 +69,21 @@ class Piece:
         return parts.read_part(self.store.path, self.part).slice(self.first - self.part.first, self.stop - self.first)
 
     def between(self, first: int, stop: int) -> "Piece":
-        """What it has of the cases first .. stop - 1."""
+        """The part of this piece that lies in the cases first .. stop - 1."""
         return Piece(self.store, self.part, max(first, self.first), min(stop, self.stop))
 
 
 def merge_shards(out: Path, folders: Sequence[Path], chunk: int | None = None) -> tuple[Store, Campaign]:
-    """A new run directory with the cases of all shards, and its campaign; nominal and histories are yet to be flown.
+    """Make a run directory with the cases of all shards.  Returns it and its campaign; `complete` adds the rest.
 
-    folders : run directories of shards, in any order, some perhaps twice or unfinished.  chunk : cases of a part; by
-    default as many as a run on all cores of this machine would have.
+    folders : run directories of shards, in any order; they may overlap or be incomplete.  chunk : cases of a part, by
+    default as in a run on all cores of this machine.
     StoreError if cases are missing, if two directories differ on a case, or if they are not of one campaign.
     """
     stores = [open_store(folder) for folder in folders]
     _check_one_campaign(stores)
     _check_nothing_missing(stores)
-    _check_parts(stores)  # before anything is made that would be in the way of the next attempt
+    _check_parts(stores)  # before `out` is made
     pieces = list(_cover(stores))
     campaign = campaign_of(stores[0])
     run = create_store(out, manifest_of(campaign), campaign.text, columns_of(campaign), companions_of(campaign))
@@ -115,7 +115,7 @@ def _check_one_campaign(stores: Sequence[Store]) -> None:
 
 
 def _check_parts(stores: Sequence[Store]) -> None:
-    """StoreError that names the first part that is damaged, or is no part of these tables."""
+    """StoreError that names the first part that is damaged or has other columns."""
     for store in stores:
         for part in store.parts:
             parts.read_part(store.path, part, stores[0].columns)
@@ -134,8 +134,8 @@ def _check_nothing_missing(stores: Sequence[Store]) -> None:
     raise StoreError(f"cases {cases} are missing; fly them with " + ", ".join(lines))
 
 
-def _within(missing: Sequence[tuple[int, int]], wanted: range) -> bool:
-    return any(first < wanted.stop and wanted.start < stop for first, stop in missing)
+def _within(missing: Sequence[tuple[int, int]], expected: range) -> bool:
+    return any(first < expected.stop and expected.start < stop for first, stop in missing)
 
 
 def _commands_of_absent(stores: Sequence[Store], missing: Sequence[tuple[int, int]]) -> list[str]:
@@ -169,7 +169,7 @@ def _shards_of(of: int, ranges: Sequence[tuple[int, int]], n_cases: int) -> Iter
 
 
 def _cover(stores: Sequence[Store]) -> Iterator[Piece]:
-    """Pieces that hold every case once, in order; what stands twice is compared, row for row."""
+    """Pieces with every case once, in order.  Cases that are in several shards are compared row by row."""
     pieces = [Piece(store, part, part.first, part.stop) for store in stores for part in store.parts]
     kept: list[Piece] = []
     for piece in sorted(pieces, key=lambda piece: (piece.first, -piece.stop)):
@@ -177,20 +177,20 @@ def _cover(stores: Sequence[Store]) -> Iterator[Piece]:
         for before in reversed(kept):
             if before.stop <= piece.first:
                 break
-            _check_same(before.between(piece.first, piece.stop), piece.between(before.first, before.stop))
+            _check_equal(before.between(piece.first, piece.stop), piece.between(before.first, before.stop))
         if piece.stop > covered:
             kept.append(piece.between(covered, piece.stop))
             yield kept[-1]
 
 
-def _check_same(one: Piece, other: Piece) -> None:
-    if one.part.sha256 == other.part.sha256:
+def _check_equal(a: Piece, b: Piece) -> None:
+    if a.part.sha256 == b.part.sha256:
         return
-    if parts.parquet_bytes(one.table()) != parts.parquet_bytes(other.table()):
-        differ = np.flatnonzero([a != b for a, b in zip(_rows(one), _rows(other), strict=True)])
-        where = f"{one.store.path} and {other.store.path}"
-        raise StoreError(f"{where}: differ on case {one.first + int(differ[0])}; fly one of them anew")
+    if parts.parquet_bytes(a.table()) != parts.parquet_bytes(b.table()):
+        differ = np.flatnonzero([row_a != row_b for row_a, row_b in zip(_row_texts(a), _row_texts(b), strict=True)])
+        where = f"{a.store.path} and {b.store.path}"
+        raise StoreError(f"{where}: differ on case {a.first + int(differ[0])}; fly one of them anew")
 
 
-def _rows(piece: Piece) -> list[str]:
+def _row_texts(piece: Piece) -> list[str]:
     return [repr(row) for row in piece.table().to_pylist()]

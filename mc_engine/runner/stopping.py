@@ -1,16 +1,13 @@
-"""Flying until every requirement is decided: batches by a stated schedule, and a look at the verdicts after each.
+"""Sequential testing: a run in batches, with an interim analysis after each, until every requirement is decided.
 
-The schedule stands in the manifest before the first case flies.  Runs of this kind, and runs that were given more
-cases after the first had been seen, are judged by limits that hold at every number of cases at once
-(`statistics.time_uniform`), so that stopping early, going on after all, or extending by hand takes nothing from the
-confidence.  Only for the design "mc": cases of "lhs" are a sample as a whole only, and those of "sobol"
-depend on one another, which the limits do not allow for.
+The schedule is in the manifest before the first case flies.  Such runs, and runs that were extended after results were
+seen, are judged by time-uniform bounds (`statistics.time_uniform`), which hold at every number of cases at once:
+neither early stopping nor extension reduces the confidence.  Only for the design "mc", since the bounds need
+independent cases.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import CampaignError, Problem
@@ -21,8 +18,8 @@ from mc_engine.runner.summary import judgement
 from mc_engine.store.opening import open_store
 from mc_engine.store.store import Store
 
-FIRST_LOOK = 100  # cases; a design that fails often is recognised with fewer still, and that soon costs nothing
-GROWTH = 1.5  # from look to look: at most half as many cases again as were needed
+FIRST_LOOK = 100  # cases before the first interim analysis
+GROWTH = 1.5  # from one analysis to the next: a run has at most half as many cases again as it needed
 DESIGN = "mc"
 
 
@@ -34,16 +31,16 @@ def fly_until_decided(
     workers: int | None = None,
     backend: Backend | str = "threading",
 ) -> Store:
-    """Fly into the new directory `out` until every requirement passes or fails, `campaign.cases` at most.
+    """Run into the new directory `out` until every requirement passes or fails, with at most `campaign.cases` cases.
 
-    Raises CampaignError if the campaign has nothing to decide or its cases cannot be judged on the way, and
-    RunInterrupted as `runner.run` does; `carry_on` then goes on by the same schedule.
+    Raises CampaignError if the campaign has no requirement or does not allow interim analyses, and RunInterrupted as
+    `runner.run` does; `carry_on` then continues by the same schedule.
     """
     refuse_undecidable(campaign)
     looks = schedule(campaign)
     begun = replace(campaign, cases=looks[0], looks=looks)
     store = runner.run(begun, out, progress=progress, workers=workers, backend=backend)
-    return _by_looks(store, progress, workers, backend)
+    return _by_schedule(store, progress, workers, backend)
 
 
 def carry_on(
@@ -54,14 +51,14 @@ def carry_on(
     backend: Backend | str = "threading",
     repair: bool = False,
 ) -> Store:
-    """Complete a run: one that `fly_until_decided` began up to the look that decides, others to their last case."""
+    """Complete a run: one by `fly_until_decided` until its requirements are decided, others to their last case."""
     store = runner.resume(path, progress=progress, workers=workers, backend=backend, repair=repair)
-    return _by_looks(store, progress, workers, backend)
+    return _by_schedule(store, progress, workers, backend)
 
 
-def _by_looks(store: Store, progress: ProgressCall | None, workers: int | None, backend: Backend | str) -> Store:
+def _by_schedule(store: Store, progress: ProgressCall | None, workers: int | None, backend: Backend | str) -> Store:
     while not decided(store):
-        later = [look for look in looks_of(store.manifest) if look > store.n_cases]
+        later = [int(look) for look in store.manifest.get("looks", []) if look > store.n_cases]
         if not later:
             break
         runner.extend(store.path, later[0], progress=progress, workers=workers, backend=backend)
@@ -75,7 +72,7 @@ def refuse_undecidable(campaign: Campaign) -> None:
     if not campaign.requirements:
         problems.append(Problem("requirement", "there is none to decide; add [requirement.NAME], or fly all cases"))
     if campaign.design != DESIGN:
-        message = f'cases of "{campaign.design}" are not independent and cannot be judged on the way; use "{DESIGN}", '
+        message = f'cases of "{campaign.design}" are not independent, as interim analyses need; use "{DESIGN}", '
         problems.append(Problem("campaign.design", f"{message}or fly all cases"))
     if campaign.upstream is not None or campaign.first is not None:
         problems.append(Problem("inputs", "there are as many cases as the run upstream has; fly all cases"))
@@ -84,24 +81,20 @@ def refuse_undecidable(campaign: Campaign) -> None:
 
 
 def schedule(campaign: Campaign) -> tuple[int, ...]:
-    """The numbers of cases at which the verdicts are looked at; the last is all that the campaign has.
+    """Numbers of cases of the interim analyses; the last is the number of cases of the campaign.
 
-    From FIRST_LOOK on by GROWTH, and where every requirement passes if no case fails.
+    A geometric series from FIRST_LOOK by GROWTH, and the number at which all requirements pass if no case fails.
     """
     from mc_engine.statistics.time_uniform import smallest_sample
 
     most = campaign.cases
-    looks = {most, max(smallest_sample(one.share, one.confidence) for one in campaign.requirements)}
+    without_failures = [smallest_sample(required.share, required.confidence) for required in campaign.requirements]
+    looks = {most, max(without_failures)}
     look = FIRST_LOOK
     while look < most:
         looks.add(look)
         look = int(look * GROWTH)
     return tuple(sorted(look for look in looks if look <= most))
-
-
-def looks_of(manifest: Mapping[str, Any]) -> list[int]:
-    """The schedule that a run was begun with; empty if it was to fly all its cases."""
-    return [int(look) for look in manifest.get("looks", [])]
 
 
 def decided(store: Store) -> bool:

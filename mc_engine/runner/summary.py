@@ -1,10 +1,11 @@
-"""What a run amounts to, in a few lines for a terminal.  The reports say the rest."""
+"""Summary of a run in a few lines for a terminal: cases, verdicts on requirements, statistics of metrics."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import StoreError
+from mc_engine.section import ReportSection
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, read_part
 from mc_engine.store.store import Store
@@ -20,12 +21,12 @@ PARTS_AHEAD = 2
 
 
 def failed_cases(store: Store) -> int:
-    """How many committed cases did not complete."""
+    """Number of committed cases that did not complete."""
     return sum(count for word, count in store.status_counts().items() if word != STATUS_NAME[OK])
 
 
 def first_not_finite(store: Store) -> int | None:
-    """The first committed case that ended not-finite, if one did."""
+    """The first committed case with the status not-finite, or None."""
     for part in store.parts:
         if part.status.get(STATUS_NAME[NOT_FINITE]):
             table = read_part(store.path, part, CASE_COLUMNS[:2])
@@ -41,21 +42,18 @@ def case_line(store: Store) -> str:
     return f"{sum(counts.values()):,} of {store.n_cases:,} cases" + (f": {words}" if words else "")
 
 
-def verdicts(store: Store) -> "list[Verdict]":
-    """Every requirement of the run, judged on the cases at hand."""
-    return judgement(store)[0]
-
-
 def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":
-    """The verdicts on all requirements of the run, and the joint one where there are several."""
+    """The verdicts on all requirements of the run, and the joint verdict if there are several."""
     requirements = store.manifest.get("requirements", [])
+    if not requirements:
+        return [], None
     metrics = list(dict.fromkeys(str(record["metric"]) for record in requirements))
-    found = streamed(store, metrics, requirements) if requirements else None
-    return ([], None) if found is None else (found.verdicts, found.joint)
+    statistics = streamed(store, metrics, requirements)
+    return statistics.verdicts, statistics.joint
 
 
-def look_line(store: Store) -> str:
-    """How the number of cases came about, where it was not fixed in advance; else empty."""
+def analyses_line(store: Store) -> str:
+    """How the number of cases was determined, if it was not fixed in advance; else empty."""
     from mc_engine.statistics import was_looked_at
 
     if not was_looked_at(store.manifest, store.n_cases):
@@ -64,37 +62,40 @@ def look_line(store: Store) -> str:
     begun = store.manifest["campaign"]["cases"]
     if looks:
         scheduled = sum(look <= store.n_cases for look in looks)
-        times = "once" if scheduled == 1 else f"{scheduled} times"
-        story = f"judged {times} on the way, at {store.n_cases:,} cases last, of at most {looks[-1]:,}"
+        analyses = f"{scheduled} interim {'analysis' if scheduled == 1 else 'analyses'}"
+        history = f"{analyses}, the last at {store.n_cases:,} of at most {looks[-1]:,} cases"
     else:
-        story = f"extended from {begun:,} to {store.n_cases:,} cases"
-    return f"{story}; the verdicts hold at every number of cases at once"
+        history = f"extended from {begun:,} to {store.n_cases:,} cases"
+    return f"{history}; the verdicts hold at every number of cases at once"
 
 
 def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
-    """Such as "fuel: pass, propellant_kg ≤ 2.5 kg in 9,998 of 10,000 cases (wanted 99.73 % with 90 % confidence)"."""
+    """Such as "fuel: pass, mass_kg ≤ 2.5 kg in 9,998 of 10,000 cases (required: 99.73 % with 90 % confidence)"."""
     limits = [
         f"{sign} {limit:g} {units.get(verdict.metric, '')}".rstrip()
         for sign, limit in (("≤", verdict.at_most), ("≥", verdict.at_least))
         if limit is not None
     ]
-    wanted = f"wanted {100 * verdict.share:.6g} % with {100 * verdict.confidence:.6g} % confidence"
+    required = f"required: {100 * verdict.share:.6g} % with {100 * verdict.confidence:.6g} % confidence"
     inside = f"in {verdict.passed:,} of {verdict.tried:,} cases"
-    asked = f"{verdict.metric} {' and '.join(limits)}" if limits else "every limit kept"
-    return f"{verdict.name}: {verdict.outcome}, {asked} {inside} ({wanted})"
+    asked = f"{verdict.metric} {' and '.join(limits)}" if limits else "all limits met"
+    return f"{verdict.name}: {verdict.outcome}, {asked} {inside} ({required})"
 
 
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":
-    """Summary of every metric, or of those named.
+    """Summary of every metric, or of those named; StoreError for a name that is no metric.
 
-    StoreError for a name that is no column.  A failed case has no number, whatever stands in its row.
+    Each bound of a quantile holds with the confidence of [report].
+
+    A failed case has no value, whatever its row contains.
     """
     known = [column.name for column in store.columns if column.role == "metric"]
     names = known if metrics is None else list(metrics)
     for name in names:
         if name not in known:
             raise StoreError(f'{store.path}: there is no metric "{name}"; there are {", ".join(known) or "none"}')
-    return streamed(store, names).summaries
+    confidence = ReportSection(**store.manifest.get("report", {})).confidence
+    return streamed(store, names, confidence=2.0 * confidence - 1.0).summaries
 
 
 def streamed(
@@ -105,16 +106,16 @@ def streamed(
     probabilities: tuple[float, ...] | None = None,
     confidence: float = 0.90,
 ) -> "Streamed":
-    """Summaries and verdicts of a run of any size: it is read part by part, never whole.
+    """Summaries and verdicts of a run of any size, which is read part by part.
 
-    passes : gives the parts a pass; by default `metric_parts`.
+    passes : yields the metrics of each part, once for each pass; by default from `metric_parts`.
     """
     from mc_engine.statistics import was_looked_at
     from mc_engine.statistics.order_statistics import QUANTILES
     from mc_engine.statistics.streaming import stream
 
     return stream(
-        passes or (lambda names: (found for _, found in metric_parts(store, names))),
+        passes or (lambda names: (numbers for _, numbers in metric_parts(store, names))),
         metrics,
         requirements=requirements,
         design=store.manifest["campaign"].get("design", "mc"),
@@ -125,13 +126,13 @@ def streamed(
 
 
 def metric_parts(
-    store: Store, metrics: Sequence[str], more: Sequence[str] = ()
+    store: Store, metrics: Sequence[str], others: Sequence[str] = ()
 ) -> "Iterator[tuple[pa.Table, dict[str, np.ndarray]]]":
-    """All parts in order: a table of the columns named, and the metrics, NaN for cases that were not completed.
+    """All parts in order: a table with these columns, and the metrics, NaN for cases that did not complete.
 
-    While one part is in use, the next is read.
+    others : columns of the table besides the metrics and the status.  The next part is read in the background.
     """
-    columns = [column for column in store.columns if column.name in ("status", *metrics, *more)]
+    columns = [column for column in store.columns if column.name in ("status", *metrics, *others)]
     with ThreadPoolExecutor(1) as pool:
         ahead: list[Future[tuple[pa.Table, dict[str, np.ndarray]]]] = []
         for part in store.parts:
@@ -148,10 +149,10 @@ def _metrics_of(
     import numpy as np
     import pyarrow.compute as pc
 
-    whole = part.status == {STATUS_NAME[OK]: part.rows}  # the receipt says that no case failed: no word is read
-    table = read_part(store.path, part, [one for one in columns if not whole or one.name != "status"])
+    all_ok = part.status == {STATUS_NAME[OK]: part.rows}  # by the receipt, so that the status need not be read
+    table = read_part(store.path, part, [column for column in columns if not all_ok or column.name != "status"])
     numbers = {name: table[name].to_numpy().astype(np.float64, copy=False) for name in metrics}
-    if whole:
+    if all_ok:
         return table, numbers
     ok = pc.equal(table["status"], STATUS_NAME[OK]).to_numpy()
     return table, {name: np.where(ok, values, np.nan) for name, values in numbers.items()}

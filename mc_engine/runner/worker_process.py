@@ -1,4 +1,4 @@
-"""Inside a worker process: the campaign of its run, the limits it keeps, and its end with the process that began it."""
+"""Code that runs inside a worker process: loads the campaign, applies limits, and ends with the parent process."""
 
 import os
 import re
@@ -17,23 +17,24 @@ import numpy as np
 from mc_engine.campaign.loading import Campaign
 from mc_engine.durable_file import leave, names_in, publish, remove_file, temporary_name
 from mc_engine.errors import StoreError
-from mc_engine.flight.chunks import Order, carry_out, fly_nominal
-from mc_engine.interruption import SIGNALS
+from mc_engine.flight.chunks import Task, run_task
+from mc_engine.flight.flyers import flyer_of
+from mc_engine.interruption import ignore_signals
 from mc_engine.runner.flown_campaign import campaign_of
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import Column, Written
 
-LOOK_EVERY_S = 0.5  # at the parent process, and at the memory where the system keeps no limit
+LOOK_EVERY_S = 0.5  # between two checks of the parent process, and of the memory where the system sets no limit
 _MIB = 2**20
 
 
 @dataclass(frozen=True)
-class Site:
-    """Where a worker finds its campaign.  All paths are absolute, and the same for all workers.
+class WorkerSetup:
+    """What a worker process needs to know.  All paths are absolute, and the same for all workers.
 
-    directory : folder of the campaign's files; the run directory has copies where that one is not to be seen.
-    n_cases : how many cases the campaign has.  case_seconds : time that one case may take, or no limit.
-    memory_mib : what the worker's process may have, or no limit of ours.
+    run : run directory.  directory : folder of the campaign's files; if a worker cannot see it, it uses the copies in
+    the run directory.  n_cases : number of cases of the campaign.  case_seconds : time limit of a case, or None.
+    memory_mib : memory limit of the process, or None.
     """
 
     run: str
@@ -43,43 +44,43 @@ class Site:
     memory_mib: int | None = None
 
 
-def perform(site: Site, order: Order) -> Written:
-    """Carry out one order in this process."""
-    if site.memory_mib is not None:
-        _limit_memory(site.memory_mib)
-    campaign, columns = _campaign(site)
+def run_in_worker(setup: WorkerSetup, task: Task) -> Written:
+    """Run one task in this process.  Raises MemoryError if it needs more memory than the limit."""
+    if setup.memory_mib is not None:
+        _limit_memory(setup.memory_mib)
+    campaign, columns = _campaign(setup)
     guard = None
-    if site.case_seconds is not None or order.suspected:
-        guard = Watch(Path(site.run), site.case_seconds).over
+    if setup.case_seconds is not None or task.suspected:
+        guard = Watch(Path(setup.run), setup.case_seconds).over
     try:
-        return carry_out(campaign, columns, Path(site.run), order, guard)
+        return run_task(campaign, columns, Path(setup.run), task, guard)
     except Exception as error:
-        if is_out_of_memory(error):  # causes do not travel
+        if is_out_of_memory(error):  # the cause of an error is not sent to the parent process
             raise MemoryError(str(error)) from None
         raise
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:
-    """True for a MemoryError, also as the cause of another."""
+    """True for a MemoryError, or an error caused by one."""
     return error is not None and (isinstance(error, MemoryError) or is_out_of_memory(error.__cause__))
 
 
 @lru_cache(maxsize=4)
-def _campaign(site: Site) -> tuple[Campaign, tuple[Column, ...]]:
-    """The campaign, checked against the run's digests, with its kernel compiled or loaded."""
-    store = open_store(site.run)
-    if store.n_cases != site.n_cases:
-        raise StoreError(f"{site.run}: a worker sees {store.n_cases} cases here, where there are {site.n_cases}")
-    directory = Path(site.directory)
+def _campaign(setup: WorkerSetup) -> tuple[Campaign, tuple[Column, ...]]:
+    """The campaign and its columns, checked against the run's digests; its kernel is compiled or loaded."""
+    store = open_store(setup.run)
+    if store.n_cases != setup.n_cases:
+        raise StoreError(f"{setup.run}: a worker reads {store.n_cases} cases here, and the run has {setup.n_cases}")
+    directory = Path(setup.directory)
     campaign = campaign_of(store, directory if directory.is_dir() else None)
-    fly_nominal(campaign)
+    flyer_of(campaign).make_ready()
     return campaign, store.columns
 
 
 class Watch:
-    """Leaves a note in the run directory of which cases are in flight, and ends this process where they take too long.
+    """Records in the run directory which cases are in flight, and ends this process if they exceed the time limit.
 
-    A worker that dies leaves its last note behind.
+    A worker that dies leaves its last record behind, which `take_notes` reads.
     """
 
     def __init__(self, run: Path, seconds: float | None):
@@ -87,7 +88,7 @@ class Watch:
 
     @contextmanager
     def over(self, case_ids: np.ndarray) -> Iterator[None]:
-        """The cases of a batch fly side by side, so that the batch takes as long as its longest case."""
+        """Watch one batch.  Its cases fly in parallel, so that the limit of a case is the limit of the batch."""
         first, last = int(case_ids[0]), int(case_ids[-1])
         note = _note(IN_FLIGHT, first, last)
         leave(self._run, note)
@@ -105,52 +106,52 @@ class Watch:
         try:
             publish(self._run, in_flight, late)
         finally:
-            os._exit(1)  # nothing else ends a thread that flies
+            os._exit(1)  # a thread in compiled code cannot be ended otherwise
 
 
 IN_FLIGHT, LATE = "in_flight", "late"
 
 
 def _note(kind: str, first: int, last: int) -> str:
-    return temporary_name(f"cases/{kind}-{first}-{last}")  # a name that the next writer sweeps away
+    return temporary_name(f"cases/{kind}-{first}-{last}")  # temporary, so that the next writer removes it
 
 
 def take_notes(run: Path, case_ids: np.ndarray) -> tuple[str, np.ndarray]:
-    """What dead workers noted of some of these cases: "late", "in_flight" or nothing, and which.  Takes the notes away.
+    """Read and remove the records that dead workers left on some of these cases.
 
-    case_ids : int64[n], what the workers were flying.
+    case_ids : int64[n], the cases that the workers were to fly.
+    Returns the kind of the records, "late", "in_flight" or "" for none, and the cases in them.
     """
-    found = {kind: _noted(run, kind, case_ids) for kind in (LATE, IN_FLIGHT)}
-    return next(((kind, noted) for kind, noted in found.items() if noted.size), ("", case_ids[:0]))
+    records = {kind: _noted(run, kind, case_ids) for kind in (LATE, IN_FLIGHT)}
+    return next(((kind, noted) for kind, noted in records.items() if noted.size), ("", case_ids[:0]))
 
 
 def _noted(run: Path, kind: str, case_ids: np.ndarray) -> np.ndarray:
     noted = np.zeros(case_ids.size, dtype=bool)
     for name in names_in(run, "cases"):
-        found = re.fullmatch(rf"\.{kind}-([0-9]{{1,18}})-([0-9]{{1,18}})\.tmp", name)
-        if found is None:
+        match = re.fullmatch(rf"\.{kind}-([0-9]{{1,18}})-([0-9]{{1,18}})\.tmp", name)
+        if match is None:
             continue
-        these = (case_ids >= int(found[1])) & (case_ids <= int(found[2]))
-        if these.any():
+        in_record = (case_ids >= int(match[1])) & (case_ids <= int(match[2]))
+        if in_record.any():
             remove_file(run, f"cases/{name}")
-            noted |= these
+            noted |= in_record
     return case_ids[noted]
 
 
 def begin_process(parent: int) -> None:
     """Set up this process as a worker of process `parent`."""
-    for number in SIGNALS:  # a Ctrl-C goes to all processes of a terminal; the one that asked us decides
-        signal.signal(number, signal.SIG_IGN)
+    ignore_signals()  # Ctrl-C reaches all processes of a terminal; the parent decides what to do
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
 def dask_setup(worker: object) -> None:
-    """Called in a Dask worker that has this module among its preloads: a terminal's Ctrl-C is not for it."""
+    """Ignore Ctrl-C in a Dask worker; Dask calls this function in workers that preload this module."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _end_with(parent: int) -> None:
-    """Leave when the parent is gone.  Windows keeps the number of a dead parent; idle workers leave by themselves."""
+    """End this process when its parent has died.  Windows keeps the parent's number; there, idle workers time out."""
     while os.getppid() == parent:
         time.sleep(LOOK_EVERY_S)
     os._exit(1)
@@ -158,7 +159,7 @@ def _end_with(parent: int) -> None:
 
 @lru_cache(maxsize=1)
 def _limit_memory(mib: int) -> None:
-    """Let allocations beyond `mib` fail, or where the system cannot, end the process that has more."""
+    """Make allocations beyond `mib` fail; where the system has no such limit, end the process that exceeds it."""
     if sys.platform.startswith("linux"):
         import resource
 

@@ -1,65 +1,67 @@
-"""What a crew is: workers that take orders and bring back what became of them, in any order."""
+"""The interface of a worker pool, and the result of a task.  `mc_engine.runner.pools` has the implementations."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any
 
-from mc_engine.flight.chunks import Order
+from mc_engine.flight.chunks import Task
 from mc_engine.store.parts import Written
 
 
 @dataclass(frozen=True)
-class Landing:
-    """What became of an order: its receipt, or the error that ended it.
+class Result:
+    """Outcome of a task: the part that was written, or the error that ended the task.
 
-    died : the worker is gone, or had not the memory; nothing is wrong with the order as far as is known.
+    died : the worker process died, or ran out of memory; the task itself may be sound.
     """
 
-    order: Order
+    task: Task
     written: Written | None = None
     error: BaseException | None = None
     died: bool = False
 
 
-class Crew(ABC):
-    """Workers that carry out orders.  `begin` only while there is room; one thread asks.
+class WorkerPool(ABC):
+    """Workers that run tasks and return their results in any order.  Used from one thread.
 
-    shared : orders may fly beside each other in one process, so that one can die of another.
+    shared : one process may run several tasks at once, so that a task can die because of another one.
+    in_process : the workers are threads of this process, which see by themselves that a run is stopped.
     """
 
     shared = False
+    in_process = False
 
     def __init__(self) -> None:
-        self._landed: SimpleQueue[Landing] = SimpleQueue()
+        self._results: SimpleQueue[Result] = SimpleQueue()
 
     @abstractmethod
     def room(self) -> int:
-        """How many orders may be under way at once, now."""
+        """How many tasks may run or be queued at this moment."""
 
     @abstractmethod
-    def begin(self, order: Order) -> None:
-        """Hand an order to a worker."""
+    def begin(self, task: Task) -> None:
+        """Submit a task; only while fewer than `room()` tasks are under way."""
 
-    def next(self, patience_s: float) -> Landing | None:
-        """The next order that has come to an end; None if none has in time."""
+    def next(self, patience_s: float) -> Result | None:
+        """The next result, or None if no task ends within `patience_s` seconds."""
         try:
-            return self._landed.get(timeout=patience_s)
+            return self._results.get(timeout=patience_s)
         except Empty:
             return None
 
-    def deserted_s(self) -> float:
-        """For how long there has been no worker [s]; none of this for a crew that makes its own."""
+    def without_workers_s(self) -> float:
+        """How long the pool has had no worker [s]; always 0 for a pool that starts its own."""
         return 0.0
 
     @abstractmethod
     def close(self, at_once: bool) -> None:
-        """Let the workers go; at once: whatever they are doing."""
+        """End the workers; at_once : without waiting for their tasks."""
 
 
-def landing_of(order: Order, future: Any, deaths: type[Exception]) -> Landing:
-    """What a future that is done says of its order.  deaths : what it raises when its worker is gone."""
+def result_of(task: Task, future: Any, deaths: type[Exception]) -> Result:
+    """The result of a task from its finished future.  deaths : what the future raises if its worker died."""
     try:
-        return Landing(order, future.result())
-    except Exception as error:  # also of a result that does not travel: an order that never lands is waited for
-        return Landing(order, error=error, died=isinstance(error, deaths | MemoryError))
+        return Result(task, future.result())
+    except Exception as error:  # any: a result that cannot be sent back would otherwise be waited for without end
+        return Result(task, error=error, died=isinstance(error, deaths | MemoryError))

@@ -1,4 +1,4 @@
-"""How the cases of a pick-freeze design lie in blocks (`statistics.pick_freeze`); loads nothing but NumPy."""
+"""The layout of the cases of a pick-freeze design in blocks (see `statistics.pick_freeze`); imports NumPy alone."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -27,11 +27,11 @@ class BlockLayout:
 
     def points(self, group: str) -> np.ndarray:
         """int64[size]: the point, A, B or C, that each row takes the group from."""
-        found = np.full(self.size, A)
-        found[[self.groups.index(group) + 1, len(self.groups) + 1]] = B
+        points = np.full(self.size, A)
+        points[[self.groups.index(group) + 1, len(self.groups) + 1]] = B
         if group in self.repeated:
-            found[self._repetition(group)] = C
-        return found
+            points[self._repetition(group)] = C
+        return points
 
     def _repetition(self, group: str) -> int:
         return len(self.groups) + 2 + self.repeated.index(group)

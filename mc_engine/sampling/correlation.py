@@ -1,12 +1,12 @@
-"""Rank (Spearman) correlation between dispersions, laid on their uniform numbers before the quantiles.
+"""Rank (Spearman) correlation between dispersions, imposed on their uniform numbers before the quantile functions.
 
-`gaussian_copula` works case by case and serves the designs that can be extended; `iman_conover` re-pairs a
-whole Latin hypercube, which keeps its strata.  Both leave the first column, and every dispersion that no
-correlation names, as they were; both aim at rank correlations, so the distributions may be anything.
+`gaussian_copula` works case by case and serves the designs that can be extended; `iman_conover` re-pairs a whole Latin
+hypercube, which keeps its strata.  Both leave the first column, and every dispersion without a correlation, as they
+were; both aim at rank correlations, so the distributions may be anything.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -36,6 +36,20 @@ def group_matrix(names: Sequence[str], pairs: Iterable[tuple[str, str, float]]) 
     for first, second, rank in pairs:
         matrix[row[first], row[second]] = matrix[row[second], row[first]] = rank
     return members, matrix
+
+
+def correlated(
+    method: Callable[[list[np.ndarray], np.ndarray], list[np.ndarray]],
+    columns: list[np.ndarray],
+    names: Sequence[str],
+    pairs: Iterable[tuple[str, str, float]],
+) -> list[np.ndarray]:
+    """The columns, those of correlated names as the method returns them: `gaussian_copula` or `iman_conover`."""
+    members, matrix = group_matrix(names, pairs)
+    if members:
+        for place, column in zip(members, method([columns[place] for place in members], matrix), strict=True):
+            columns[place] = column
+    return columns
 
 
 def is_positive_definite(rank_matrix: np.ndarray) -> bool:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.sampling import correlation
+from mc_engine.sampling.correlation import correlated, gaussian_copula, iman_conover
 from mc_engine.sampling.sobol import scrambled_sobol
 from mc_engine.sampling.streams import uniforms
 from mc_engine.status import MOST_CASES
@@ -41,27 +41,18 @@ def unit_cube(
     if design in IN_BLOCKS:
         block, row = np.divmod(np.asarray(case_ids, dtype=np.int64), block_size(design, len(names)))
         return _saltelli(seed, names, block, row) if design == "saltelli" else _morris(seed, names, block, row)
-    columns = [_column(design, seed, name, dimension, case_ids) for dimension, name in enumerate(names)]
-    return _correlated(correlation.gaussian_copula, columns, names, pairs)
-
-
-def _column(design: str, seed: int, name: str, dimension: int, case_ids: np.ndarray) -> np.ndarray:
-    if design == "mc":
-        return uniforms(seed, name, case_ids)
-    return scrambled_sobol(sobol_key(f"{seed}/{name}/sobol"), dimension, case_ids)
+    columns = [
+        uniforms(seed, name, case_ids)
+        if design == "mc"
+        else scrambled_sobol(sobol_key(f"{seed}/{name}/sobol"), dimension, case_ids)
+        for dimension, name in enumerate(names)
+    ]
+    return correlated(gaussian_copula, columns, names, pairs)
 
 
 def sobol_key(words: str) -> int:
     """The key that scrambles a Sobol' sequence, from its address."""
     return int.from_bytes(sha256(words.encode()).digest()[:8], "little")
-
-
-def _correlated(method, columns: list[np.ndarray], names: Sequence[str], pairs: Pairs) -> list[np.ndarray]:
-    members, matrix = correlation.group_matrix(names, pairs)
-    if members:
-        for place, column in zip(members, method([columns[place] for place in members], matrix), strict=True):
-            columns[place] = column
-    return columns
 
 
 def block_size(design: str, n_dispersions: int) -> int:
@@ -140,7 +131,7 @@ def _latin_hypercube(seed: int, names: tuple[str, ...], n_cases: int, pairs: Pai
         # The ranks of uniform draws are a random permutation, the same in every version of numpy.
         order = np.argsort(uniforms(seed, f"{name}/lhs/{n_cases}", cases), kind="stable")
         columns.append((order + uniforms(seed, name, cases)) / n_cases)
-    return _correlated(correlation.iman_conover, columns, names, pairs)
+    return correlated(iman_conover, columns, names, pairs)
 
 
 def level_count(design: str, sizes: Sequence[int]) -> int:

@@ -1,7 +1,7 @@
-"""The Sobol sequence with Owen scrambling, reachable point by point.
+"""The Sobol sequence with Owen scrambling, with random access to any point.
 
-A point is a function of (key, dimension, index): more points, or more dimensions behind, change nothing.
-Good to 128 dimensions and 2**32 points; beyond, use the design "mc".
+A point is a function of (key, dimension, index): more points, or more dimensions after it, do not change it.  Valid up
+to 128 dimensions and 2**32 points; beyond, use the design "mc".
 """
 
 from functools import cache

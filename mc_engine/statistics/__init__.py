@@ -1,6 +1,6 @@
-"""What a table of cases means: summaries, requirement verdicts, maps.  Tables in, plain records out."""
+"""Statistics of the case table of a run: summaries, verdicts on requirements, maps.  Arrays in, plain records out."""
 
-from mc_engine.statistics.binomial import clopper_pearson, lower_bound, upper_bound
+from mc_engine.statistics.binomial import clopper_pearson, lower_bound, pass_probability, upper_bound
 from mc_engine.statistics.maps import SurfaceMap, map_metric
 from mc_engine.statistics.normality import Normality, normality
 from mc_engine.statistics.order_statistics import QUANTILES, Quantile, quantile, quantile_ranks
@@ -9,7 +9,6 @@ from mc_engine.statistics.requirements import (
     Verdict,
     judge,
     judge_all,
-    pass_probability,
     was_looked_at,
 )
 from mc_engine.statistics.summary import Summary, summarize

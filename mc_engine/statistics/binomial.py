@@ -1,14 +1,13 @@
-"""Exact limits on the share of passing cases, for a number of cases that was fixed in advance.
+"""Exact confidence bounds on the probability that a case passes, for a number of cases that was fixed in advance.
 
-Valid for independent cases drawn from the dispersions (design `mc`).  For `lhs` and `sobol` the
-spread of a share is smaller than binomial, so the limits are then on the safe side; for `grid` and
-`one_at_a_time` a share of cases is no probability and none of this applies.  Where the number of cases was decided
-by looking at them, `time_uniform` has the limits that hold.
+Valid for independent cases drawn from the dispersions (design `mc`).  For `lhs` and `sobol` the scatter of the passing
+fraction is smaller than binomial, so the bounds are conservative; for `grid` and `one_at_a_time` a fraction of cases is
+no probability and none of this applies.  Where the number of cases was decided by looking at them, use `time_uniform`.
 
-k of N: with at most k failures among N cases a share is demonstrated.  The same numbers are those of distribution-free
-tolerance limits (Wilks, Ann. Math. Statist. 12 (1941), 91-96): the (k + 1)-th largest of N values is an upper limit to
-the share, and the interval between two order statistics that leaves r values out at each end, those two among them,
-takes as many cases as 2 r - 1 failures.
+k of N: with at most k failures among N cases a probability is demonstrated.  The same numbers are those of
+distribution-free tolerance limits (Wilks, Ann. Math. Statist. 12 (1941), 91-96): the (k + 1)-th largest of N values is
+an upper tolerance limit, and the interval between two order statistics that leaves r values out at each end, those two
+among them, takes as many cases as 2 r - 1 failures.
 
 Clopper & Pearson, Biometrika 26 (1934), 404-413.
 """
@@ -20,22 +19,82 @@ from scipy.special import bdtr, betainc, betaincinv, gammaln
 
 
 def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
-    """One-sided lower confidence bound on the passing share; 0.0 when nothing passed or nothing was tried."""
+    """One-sided lower confidence bound on the probability that a case passes (Clopper-Pearson).
+
+    passed : int, number of cases that passed
+    tried : int, number of independent cases, fixed in advance
+    confidence : float in (0, 1)
+
+    Returns a float in [0, 1]; 0.0 when nothing passed or nothing was tried.
+
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
+    >>> round(lower_bound(2302, 2302), 4)
+    0.999
+    """
     check_counts(passed, tried, confidence)
     return float(betaincinv(passed, tried - passed + 1, 1.0 - confidence)) if passed else 0.0
 
 
 def upper_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
-    """One-sided upper confidence bound on the passing share; 1.0 when all passed or nothing was tried."""
+    """One-sided upper confidence bound on the probability that a case passes (Clopper-Pearson).
+
+    passed : int, number of cases that passed
+    tried : int, number of independent cases, fixed in advance
+    confidence : float in (0, 1)
+
+    Returns a float in [0, 1]; 1.0 when all passed or nothing was tried.
+
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
+    >>> round(upper_bound(90, 100), 3)
+    0.937
+    """
     check_counts(passed, tried, confidence)
     return float(betaincinv(passed + 1, tried - passed, confidence)) if passed < tried else 1.0
 
 
 def clopper_pearson(count: int, tried: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Two-sided interval on a share, each tail holding (1 - confidence)/2."""
+    """Two-sided confidence interval on a probability; each tail holds (1 - confidence)/2.
+
+    count : int, number of cases counted
+    tried : int, number of independent cases, fixed in advance
+    confidence : float in (0, 1)
+
+    Returns (lower, upper).
+
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
+    Clopper & Pearson, Biometrika 26 (1934), 404-413.
+
+    >>> [round(limit, 3) for limit in clopper_pearson(90, 100)]
+    [0.824, 0.951]
+    """
     check_counts(count, tried, confidence)
     one_sided = 0.5 * (1.0 + confidence)
     return lower_bound(count, tried, one_sided), upper_bound(count, tried, one_sided)
+
+
+def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple[float, float]:
+    """Fraction of passing cases with its exact lower confidence bound.
+
+    passed : int, 0 <= passed <= tried
+    tried : int, above 0; failed cases count as tried
+    confidence : float in (0, 1)
+
+    Returns (estimate, lower).  With nothing failed, lower = (1 - confidence)**(1/tried).
+
+    Raises ValueError for counts that are not possible, or a confidence outside (0, 1).
+
+    Clopper & Pearson, Biometrika 26 (1934), 404-413.
+
+    >>> estimate, lower = pass_probability(2302, 2302)
+    >>> estimate, lower >= 0.999
+    (1.0, True)
+    """
+    if tried <= 0:
+        raise ValueError("no case was tried")
+    return passed / tried, lower_bound(passed, tried, confidence)
 
 
 def pass_chance(tried: int, accepted: int | None, true_share: float) -> float:
@@ -107,13 +166,13 @@ def half_rate_share(share: float) -> float:
     return 0.5 * (1.0 + share)
 
 
-def hypergeometric_tails(total: int, marked: int, drawn: int, found: int) -> tuple[float, float]:
-    """Probabilities of at most, and of at least, `found` marked ones among `drawn` of `total`, of which some are."""
+def hypergeometric_tails(total: int, marked: int, drawn: int, count: int) -> tuple[float, float]:
+    """Probabilities of at most, and of at least, `count` marked ones among `drawn` of `total`, of which some are."""
     k = np.arange(max(0, drawn - (total - marked)), min(marked, drawn) + 1)
     chance = -gammaln(k + 1.0) - gammaln(marked - k + 1.0)
     chance -= gammaln(drawn - k + 1.0) + gammaln(total - marked - drawn + k + 1.0)
     chance = np.exp(chance - chance.max())
-    return float(chance[k <= found].sum() / chance.sum()), float(chance[k >= found].sum() / chance.sum())
+    return float(chance[k <= count].sum() / chance.sum()), float(chance[k >= count].sum() / chance.sum())
 
 
 def check_counts(passed: int, tried: int, confidence: float) -> None:

@@ -122,7 +122,7 @@ def metric_change(
         a, b = a[np.isfinite(a)], b[np.isfinite(b)]
     used = (a.size, b.size)
     if min(used) == 0:
-        return MetricChange(metric, used, tried, 0 if paired else None, _of(np.mean, a, b), _of(np.std, a, b),
+        return MetricChange(metric, used, tried, 0 if paired else None, _by_run(np.mean, a, b), _by_run(np.std, a, b),
                             UNKNOWN, UNKNOWN, np.nan, np.nan)  # fmt: skip
     both, exponent = near_one(np.concatenate([a, b]))
     a, b = both[: a.size], both[a.size :]
@@ -133,22 +133,22 @@ def metric_change(
     def back(pair: Sequence[float]) -> tuple[float, float]:
         return float(in_units(float(pair[0]), exponent)), float(in_units(float(pair[1]), exponent))
 
-    mean, deviation = _of(np.mean, a, b), _of(_deviation, a, b)
-    told = metric, used, tried, differing, back(mean), back(deviation)
+    mean, deviation = _by_run(np.mean, a, b), _by_run(_deviation, a, b)
+    described = metric, used, tried, differing, back(mean), back(deviation)
     if min(used) < FEWEST:
-        return MetricChange(*told, Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf), UNKNOWN, np.nan,
-                            np.nan)  # fmt: skip
-    a, b = (one[:: -(-one.size // MOST_CASES)] for one in (a, b))
+        shift = Estimate(float(in_units(mean[1] - mean[0], exponent)), -inf, inf)
+        return MetricChange(*described, shift, UNKNOWN, np.nan, np.nan)
+    a, b = (values[:: -(-values.size // MOST_CASES)] for values in (a, b))
     z = float(norm.ppf(0.5 + 0.5 * confidence))
     if max(np.ptp(a), np.ptp(b), abs(a[0] - b[0])) <= unit:  # the same constant
         same = float(in_units(float(np.median(b) - np.median(a)), exponent))
-        return MetricChange(*told, Estimate(same, same, same), UNKNOWN, np.nan, np.nan)
+        return MetricChange(*described, Estimate(same, same, same), UNKNOWN, np.nan, np.nan)
     shift, shift_p = _shift(a, b, paired, unit, z)
-    ratio, spread_p = _ratio(a, b, paired, unit, z)
+    ratio, spread_p = _spread_ratio(a, b, paired, unit, z)
     if min(deviation) <= _ROUNDING * scale:
         ratio = UNKNOWN
-    shift = Estimate(*(float(in_units(one, exponent)) for one in astuple(shift)))
-    return MetricChange(*told, shift, ratio, shift_p, spread_p)
+    shift = Estimate(*(float(in_units(end, exponent)) for end in astuple(shift)))
+    return MetricChange(*described, shift, ratio, shift_p, spread_p)
 
 
 def share_change(name: str, a: np.ndarray, b: np.ndarray, *, paired: bool, confidence: float = 0.95) -> ShareChange:
@@ -179,8 +179,8 @@ def holm(p_values: Sequence[float]) -> np.ndarray:
     return adjusted
 
 
-def _of(function, a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
-    return tuple(float(function(one)) if one.size else np.nan for one in (a, b))  # type: ignore[return-value]
+def _by_run(function, a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
+    return tuple(float(function(values)) if values.size else np.nan for values in (a, b))  # type: ignore[return-value]
 
 
 def _deviation(values: np.ndarray) -> float:
@@ -199,28 +199,26 @@ def _shift(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) ->
     return _inverted(lambda shift: _signed_ranks(moved - shift), float(np.median(moved)), step, z)
 
 
-def _ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) -> tuple[Estimate, float]:
+def _spread_ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: float) -> tuple[Estimate, float]:
     """The ratio of the distances to each run's own median with its interval, and the p-value of 1."""
-    one, other = (np.abs(values - np.median(values)) for values in (a, b))
-    if max(np.ptp(one), np.ptp(other)) <= unit:
+    before, other = (np.abs(values - np.median(values)) for values in (a, b))
+    if max(np.ptp(before), np.ptp(other)) <= unit:
         return UNKNOWN, np.nan if np.ptp(a) > unit else 1.0
     if paired:
-        moved = np.abs(other - one) > unit
+        moved = np.abs(other - before) > unit
         if not moved.any():
             return Estimate(1.0, 1.0, 1.0), 1.0
-        one, other = one[moved], other[moved]
-    if min(one.mean(), other.mean()) <= unit:
-        return UNKNOWN, _p_value(_mean_score(one, other))
-    score = _log_ratio_score(one, other, paired)
-    start = float(np.log(other.mean() / one.mean()))
-    found, p_value = _inverted(score, start, 1.0 / sqrt(min(one.size, other.size)), z)
-    return Estimate(*(float(np.exp(end)) for end in (found.value, found.lower, found.upper))), p_value
+        before, other = before[moved], other[moved]
+    if min(before.mean(), other.mean()) <= unit:
+        return UNKNOWN, _p_value(_mean_score(before, other))
 
+    def score(ratio: float) -> float:
+        scaled = other * np.exp(-ratio)
+        return _signed_ranks(scaled - before) if paired else _mean_score(before, scaled)
 
-def _log_ratio_score(one: np.ndarray, other: np.ndarray, paired: bool) -> Callable[[float], float]:
-    if paired:
-        return lambda ratio: _signed_ranks(other * np.exp(-ratio) - one)
-    return lambda ratio: _mean_score(one, other * np.exp(-ratio))
+    start = float(np.log(other.mean() / before.mean()))
+    logarithm, p_value = _inverted(score, start, 1.0 / sqrt(min(before.size, other.size)), z)
+    return Estimate(*(float(np.exp(end)) for end in (logarithm.value, logarithm.lower, logarithm.upper))), p_value
 
 
 def _inverted(score: Callable[[float], float], start: float, step: float, z: float) -> tuple[Estimate, float]:
@@ -269,11 +267,6 @@ def _mean_score(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.sign(statistic) * norm.isf(max(t.sf(abs(statistic), freedom), 1e-300)))
 
 
-def _about(value: float, error: float, confidence: float) -> Estimate:
-    reach = float(norm.ppf(0.5 + 0.5 * confidence)) * error
-    return Estimate(value, value - reach, value + reach)
-
-
 def _newcombe(counted: tuple[int, int], tried: tuple[int, int], confidence: float) -> Estimate:
     """Difference of two shares, from Wilson's limits of each: Newcombe, Stat. Med. 17 (1998), 873-890, method 10."""
     (a, b), (low_a, low_b), (high_a, high_b) = zip(
@@ -294,10 +287,10 @@ def _paired_share(lost: int, gained: int, n: int, confidence: float) -> Estimate
     """Difference of paired shares: Agresti & Min, Stat. Med. 24 (2005), 729-740, half a case added to each cell."""
     up, down, all_cases = gained + 0.5, lost + 0.5, n + 2.0
     error = sqrt(up + down - (up - down) ** 2 / all_cases) / all_cases
-    around = _about((up - down) / all_cases, error, confidence)
-    return Estimate((gained - lost) / n, max(around.lower, -1.0), min(around.upper, 1.0))
+    middle, reach = (up - down) / all_cases, float(norm.ppf(0.5 + 0.5 * confidence)) * error
+    return Estimate((gained - lost) / n, max(middle - reach, -1.0), min(middle + reach, 1.0))
 
 
 def finite(estimate: Estimate) -> bool:
-    """Whether the number itself is defined."""
+    """Whether the estimate is defined."""
     return isfinite(estimate.value)

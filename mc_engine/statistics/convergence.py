@@ -1,12 +1,13 @@
-"""How an estimate came to its value with the number of cases, and whether it has settled.
+"""Running estimates: how a mean or quantile develops with the number of cases, and whether it has converged.
 
-Settled means two things at once, of the estimate from all cases:
-- its interval reaches no farther from it than a stated part of the metric's standard deviation
-  (`CLOSE_MEAN`, `CLOSE_QUANTILE`), so that more cases cannot move it by much;
-- the first and the second half of the cases tell no difference beyond chance (`DRIFT`), so that it does not wander
-  with the case number, which independent cases never do.
-The order is that of the case numbers.  The first n cases of `lhs` are no Latin hypercube of n: their intervals,
-those of independent draws, are on the safe side.
+An estimate from all cases has converged if both hold:
+- its interval reaches no farther from it than a stated part of the metric's standard deviation (`CLOSE_MEAN`,
+  `CLOSE_QUANTILE`), so that more cases cannot change it much;
+- the first and the second half of the cases differ no more than by chance (`DRIFT`), so that it does not drift with the
+  case number, which independent cases never do.
+
+The order is that of the case numbers.  The first n cases of `lhs` are no Latin hypercube of n: their intervals, those
+of independent draws, are conservative.
 """
 
 from dataclasses import dataclass
@@ -46,12 +47,12 @@ class RunningEstimate:
 
     @property
     def close(self) -> float:
-        """What `reach` must not exceed."""
+        """The largest `reach` of a converged estimate, in standard deviations."""
         return CLOSE_MEAN if self.probability is None else CLOSE_QUANTILE
 
     @property
     def settled(self) -> bool:
-        """As the module says."""
+        """Whether the estimate has converged, as the module defines it."""
         return self.reach is not None and self.reach <= self.close and self.halves_p >= DRIFT
 
     @property
@@ -70,7 +71,7 @@ def running_mean(values: np.ndarray, confidence: float = 0.90) -> RunningEstimat
 
     None for fewer than 20 numbers, or a constant.
     """
-    cases, used = _places(values)
+    cases, used = _sampled_counts(values)
     finite = _numbers(values)
     if finite is None:
         return None
@@ -102,13 +103,14 @@ def running_quantile(values: np.ndarray, probability: float, confidence: float =
 
     The halves are compared by how many of each lie above the quantile of all (Fisher's exact test).
     """
-    cases, used = _places(values)
+    cases, used = _sampled_counts(values)
     finite = _numbers(values)
     if finite is None:
         return None
-    found = [quantile(np.sort(finite[:n]), probability, confidence) for n in used]
+    quantiles = [quantile(np.sort(finite[:n]), probability, confidence) for n in used]
     estimate, lower, upper = (
-        np.array([getattr(one, name) for one in found], dtype=np.float64) for name in ("value", "lower", "upper")
+        np.array([getattr(interval, name) for interval in quantiles], dtype=np.float64)
+        for name in ("value", "lower", "upper")
     )
     ends = np.array([estimate[-1] - lower[-1], upper[-1] - estimate[-1]])
     scale = float(np.abs(finite).max())
@@ -127,7 +129,7 @@ def _numbers(values: np.ndarray) -> np.ndarray | None:
     return finite
 
 
-def _places(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _sampled_counts(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of cases at which the estimate is looked at, evenly in their logarithm, and how many have a number."""
     numbers = np.isfinite(values).cumsum()
     if not numbers.size or numbers[-1] < FEWEST:

@@ -65,25 +65,30 @@ def designed_indices(
         if n_used[k] < FEWEST_BLOCKS or np.ptp(y) <= 1e-12 * np.abs(y).max():
             continue
         if design == "saltelli":
-            found = _saltelli(tuple(inputs), y, confidence)
+            indices = _saltelli(tuple(inputs), y, confidence)
         else:
-            found = _morris(tuple(inputs), coded[flown], y, confidence)
-        for name, (value, half) in found.items():
+            indices = _morris(tuple(inputs), coded[flown], y, confidence)
+        for name, (value, half) in indices.items():
             values[name][:, k], reach[name][:, k] = value, half
     return DesignedIndices(design, tuple(inputs), tuple(metrics), values, reach, n_used, len(rows))
 
 
-def _problem(names: tuple[str, ...]) -> dict[str, Any]:
+def _salib_problem(names: tuple[str, ...]) -> dict[str, Any]:
     return {"num_vars": len(names), "names": list(names), "bounds": [[0.0, 1.0]] * len(names)}
 
 
 def _saltelli(names: tuple[str, ...], y: np.ndarray, confidence: float) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     from SALib.analyze import sobol  # imports matplotlib and pandas
 
-    found = sobol.analyze(
-        _problem(names), y.ravel(), calc_second_order=False, num_resamples=RESAMPLES, conf_level=confidence, seed=_SEED
+    indices = sobol.analyze(
+        _salib_problem(names),
+        y.ravel(),
+        calc_second_order=False,
+        num_resamples=RESAMPLES,
+        conf_level=confidence,
+        seed=_SEED,
     )
-    return {"first_order": (found["S1"], found["S1_conf"]), "total": (found["ST"], found["ST_conf"])}
+    return {"first_order": (indices["S1"], indices["S1_conf"]), "total": (indices["ST"], indices["ST_conf"])}
 
 
 def _morris(
@@ -92,8 +97,8 @@ def _morris(
     """Of the inputs SALib takes only which one moved, and whether up; a move to an equal value has no effect."""
     from SALib.analyze import morris
 
-    found = morris.analyze(
-        _problem(names),
+    effects = morris.analyze(
+        _salib_problem(names),
         coded.reshape(-1, len(names)),
         y.ravel(),
         num_levels=MORRIS_LEVELS,
@@ -103,7 +108,7 @@ def _morris(
     )
     unknown = np.full(len(names), np.nan)
     return {
-        "mu_star": (np.asarray(found["mu_star"]), np.asarray(found["mu_star_conf"])),
-        "mu": (np.asarray(found["mu"]), unknown),
-        "sigma": (np.asarray(found["sigma"]), unknown),
+        "mu_star": (np.asarray(effects["mu_star"]), np.asarray(effects["mu_star_conf"])),
+        "mu": (np.asarray(effects["mu"]), unknown),
+        "sigma": (np.asarray(effects["sigma"]), unknown),
     }

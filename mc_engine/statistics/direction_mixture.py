@@ -1,11 +1,11 @@
 """Densities for importance sampling in standard normal space: mixtures over directions and distances.
 
-One component draws a direction about a mean one (von Mises-Fisher) and a distance from a chi distribution, whose
-degrees of freedom nu need not be the number of inputs.  Directions and distances apart is what works in many inputs:
-Wang & Song, Structural Safety 59 (2016), 42-52; Papaioannou, Geyer & Straub, Reliability Engineering & System Safety
-191 (2019) 106564, who take a Nakagami distribution of two parameters for the distance.  Fitted to failures that
+One component draws a direction about a mean direction (von Mises-Fisher) and a distance from a chi distribution, whose
+degrees of freedom nu need not be the number of inputs.  Separate directions and distances are what works for many
+inputs: Wang & Song, Structural Safety 59 (2016), 42-52; Papaioannou, Geyer & Straub, Reliability Engineering & System
+Safety 191 (2019) 106564, who take a Nakagami distribution of two parameters for the distance.  Fitted to failures that
 distribution is narrow, and the weights far out have no finite variance; a chi distribution with nu >= n_inputs, its
-case m = Omega / 2, keeps them bounded far out.
+case m = Omega / 2, keeps them bounded.
 """
 
 import math

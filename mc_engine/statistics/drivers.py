@@ -1,12 +1,12 @@
-"""Which inputs, and which pairs of them, tell the failed cases from the passed ones.
+"""Which inputs, and which pairs of them, separate the failed cases from the passed ones.
 
-For a single input of numbers two rank tests: are failed cases at one end of it, are they at both ends (or in its
-middle).  For a word or a switch: does a level hold more failed cases than its share.  For a pair: does the product of
-the two rank scores tell more than each of the two alone; "more" is meant of the share of failed cases, to which
-single inputs may add as a straight line and a parabola.  Of all tests of a kind, over all inputs and requirements,
-those are reported whose false-discovery rate is held.
+For a number, two rank tests: are failed cases at one end of its range, or at both ends (or in the middle).  For a word
+or a switch: does a level hold more than its share of the failed cases.  For a pair: does the product of the two rank
+scores explain failures beyond a straight line and a parabola of each input.  The false-discovery rate is controlled
+over all tests of a kind, over all inputs and requirements.
 
-A driver is a difference between two groups of cases, not a cause: an input that is correlated with one is one as well.
+A driver is a difference between two groups of cases, not a cause: an input that is correlated with a driver is one,
+too.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -49,7 +49,7 @@ class Driver:
 
 @dataclass(frozen=True)
 class Drivers:
-    """singles and pairs found, strongest evidence first; how many were tested; which requirements could not be.
+    """Singles and pairs found, strongest evidence first, and how many of each were tested.
 
     undecided : requirements with fewer than FEWEST failed or passed cases.
     """
@@ -85,24 +85,24 @@ def failure_drivers(
 
     Benjamini & Hochberg, J. R. Stat. Soc. B 57 (1995), 289-300, over all tests of singles, and over all of pairs.
     """
-    every = np.array([np.asarray(one, dtype=bool) for one in failed.values()])
-    decided = [k for k, one in enumerate(every) if min(one.sum(), (~one).sum()) >= FEWEST]
+    every = np.array([np.asarray(cases, dtype=bool) for cases in failed.values()])
+    decided = [k for k, lost in enumerate(every) if min(lost.sum(), (~lost).sum()) >= FEWEST]
     names = list(failed)
     undecided = tuple(name for k, name in enumerate(names) if k not in decided)
     if not decided:
         return Drivers((), (), 0, 0, undecided)
     columns = input_columns(inputs)
     rows = _tested_rows(every[decided], finite_rows(columns, every.shape[1]))
-    columns = [one for one in (column.at(rows) for column in columns) if one.varies]
+    columns = [part for part in (column.at(rows) for column in columns) if part.varies]
     # rows without an input may have taken failed cases away
     tested = {names[k]: every[k, rows] for k in decided if _fewer_group(every[k, rows]) >= FEWEST}
-    singles = [_single(name, column, lost) for name, lost in tested.items() for column in columns]
+    singles = [_rank_test(name, column, lost) for name, lost in tested.items() for column in columns]
     rich = {name: lost for name, lost in tested.items() if _fewer_group(lost) >= FEWEST_FOR_PAIRS}
-    pairs = list(_pairs(columns, rich)) if rich and len(columns) > 1 else []
+    pairs = list(_pair_tests(columns, rich)) if rich and len(columns) > 1 else []
     by_name = {column.name: column for column in columns}
     located = tuple(
-        _located(one, by_name[one.inputs[0]], by_name[one.inputs[1]], rich[one.requirement])
-        for one in _discovered(pairs, rate)
+        _located(pair, by_name[pair.inputs[0]], by_name[pair.inputs[1]], rich[pair.requirement])
+        for pair in _discovered(pairs, rate)
     )
     return Drivers(_discovered(singles, rate), located, len(singles), len(pairs), undecided)
 
@@ -138,9 +138,9 @@ def success_along(values: Any, passed: np.ndarray, confidence: float = 0.95, bin
 
 
 def _tested_rows(failed: np.ndarray, usable: np.ndarray) -> np.ndarray:
-    """Rows of the cases that are tested: all, or of very many the failed ones and some of the others.
+    """Rows of the cases that are tested: all, or of very many the failed ones and an even choice of the others.
 
-    A test between two groups does not mind how large each of them is.
+    The test compares two groups, so their sizes do not bias it.
     """
     rows = np.flatnonzero(usable)
     if rows.size <= MOST_ROWS:
@@ -156,9 +156,11 @@ def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
 def _discovered(tested: list[Driver], rate: float) -> tuple[Driver, ...]:
     if not tested:
         return ()
-    adjusted = _adjusted(np.array([one.p_value for one in tested]))
-    found = [replace(one, adjusted=float(value)) for one, value in zip(tested, adjusted, strict=True) if value <= rate]
-    return tuple(sorted(found, key=lambda one: (one.p_value, -one.effect)))
+    adjusted = _adjusted(np.array([driver.p_value for driver in tested]))
+    discovered = [
+        replace(driver, adjusted=float(value)) for driver, value in zip(tested, adjusted, strict=True) if value <= rate
+    ]
+    return tuple(sorted(discovered, key=lambda driver: (driver.p_value, -driver.effect)))
 
 
 def _adjusted(p_values: np.ndarray) -> np.ndarray:
@@ -170,9 +172,9 @@ def _adjusted(p_values: np.ndarray) -> np.ndarray:
     return adjusted
 
 
-def _single(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
+def _rank_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
     if column.levels:
-        return _group(requirement, column, failed)
+        return _level_test(requirement, column, failed)
     ranks = average_ranks(column.values)
     ends = average_ranks(np.abs(ranks - 0.5 * (ranks.size + 1)))
     (trend, p_trend), (spread, p_spread) = _separation(ranks, failed), _separation(ends, failed)
@@ -199,14 +201,16 @@ def _separation(ranks: np.ndarray, failed: np.ndarray) -> tuple[float, float]:
     return 2.0 * excess / (n_failed * n_passed), float(2.0 * ndtr(-abs(excess) / np.sqrt(variance)))
 
 
-def _group(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
-    """The level that failed cases prefer or avoid most: Fisher's exact test of each level against all others."""
+def _level_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
+    """The level with most or fewest failed cases for its size: Fisher's exact test of each level against all others."""
     levels = np.unique(column.values).astype(np.int64)
     n, n_failed = failed.size, int(failed.sum())
     size = np.array([np.count_nonzero(column.values == level) for level in levels])
     hits = np.array([np.count_nonzero(failed & (column.values == level)) for level in levels])
     drawn = zip(size.tolist(), hits.tolist(), strict=True)
-    tail = np.array([min(hypergeometric_tails(n, n_failed, one, found)) for one, found in drawn])
+    tail = np.array(
+        [min(hypergeometric_tails(n, n_failed, level_size, level_hits)) for level_size, level_hits in drawn]
+    )
     effects = hits / n_failed - (size - hits) / (n - n_failed)
     best = int(np.lexsort((-effects, tail))[0])
     # of two levels one test says all
@@ -230,10 +234,10 @@ def _scores(column: InputColumn) -> list[np.ndarray]:
         ranks = average_ranks(column.values)
         return [2.0 * ranks / (ranks.size + 1) - 1.0]
     indicators = [(column.values == level).astype(np.float64) for level in np.unique(column.values)]
-    return [one - one.mean() for one in indicators]
+    return [indicator - indicator.mean() for indicator in indicators]
 
 
-def _pairs(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> Iterator[Driver]:
+def _pair_tests(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> Iterator[Driver]:
     """The test of every pair of inputs, for each requirement; where its cases fail is not yet looked for.
 
     The score of a pair and the failures are both freed from what the single inputs give (regression on scores and
@@ -250,7 +254,7 @@ def _pairs(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]) -> 
     basis = basis[:, sizes > 1e-9 * sizes[0]]
     if n < 3 * basis.shape[1]:
         return
-    lost = np.column_stack([one.astype(np.float64) for one in failed.values()])
+    lost = np.column_stack([cases.astype(np.float64) for cases in failed.values()])
     freed = lost - basis @ (basis.T @ lost)
     z: dict[tuple[str, str], list[np.ndarray]] = {}
     for k, (name, score) in enumerate(scored):

@@ -1,11 +1,19 @@
-"""First-order indices from the cases at hand: the share of a metric's variance between the bins of an input."""
+"""First-order Sobol' indices from any random cases: variance of a metric between the bins of an input.
+
+`contributors` ranks the inputs of a metric by them.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
 
-from mc_engine.statistics.input_columns import InputColumn, equal_bins
+from mc_engine.statistics.input_columns import InputColumn, equal_bins, finite_rows, input_columns
 
 MOST_BINS = 100
+FEWEST_CASES = 20
+MOST_CASES = 20_000  # above, so many are picked evenly
 
 
 def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -35,3 +43,29 @@ def standardised(table: np.ndarray) -> np.ndarray:
     scaled = table / np.abs(table).max(axis=0)
     centred = scaled - scaled.mean(axis=0)
     return centred / centred.std(axis=0)
+
+
+class Contributor(NamedTuple):
+    """An input and its first-order index: the fraction of the metric's variance that it explains alone.
+
+    NaN for too few cases.
+    """
+
+    name: str
+    share: float
+
+
+def contributors(inputs: Mapping[str, Any], values: np.ndarray) -> list[Contributor]:
+    """The inputs that differ between the cases, the strongest contributor first; of too few cases in their own order.
+
+    inputs : numbers, switches or words, by name;  values : float64[n], the metric, NaN for a case without a number.
+    """
+    columns = input_columns(inputs)
+    rows = np.flatnonzero(np.isfinite(values) & finite_rows(columns, len(values)))
+    rows = rows[:: -(-rows.size // MOST_CASES) or 1]
+    live = [column for column in (input_column.at(rows) for input_column in columns) if column.varies]
+    table = np.asarray(values, dtype=np.float64)[rows, None]
+    if rows.size < FEWEST_CASES or not np.ptp(table) > 1e-12 * np.abs(table).max():
+        return [Contributor(column.name, np.nan) for column in live]
+    shares = [Contributor(column.name, float(first_order(column, table)[0][0])) for column in live]
+    return sorted(shares, key=lambda contributor: -np.nan_to_num(contributor.share, nan=-1.0))

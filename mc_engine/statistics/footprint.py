@@ -1,4 +1,4 @@
-"""The footprint of a campaign: where its flights end, and the regions that hold them."""
+"""The footprint of a campaign: impact points in a local plane, and the regions that contain them."""
 
 from dataclasses import dataclass
 

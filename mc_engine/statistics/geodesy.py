@@ -1,8 +1,8 @@
-"""Places on a planet in a plane about their middle: where footprints are measured.
+"""Impact points in a plane about their centre, in metres east and north.
 
-The plane is the azimuthal equidistant one: every point lies at its true geodesic distance and direction from the
-middle, so the date line and the poles are places like any other.  Lengths across the direction to the middle are
-too large by the factor (s/R) / sin(s/R) at the distance s: 0.1 % at 500 km, 1.7 % at 2000 km.
+The plane is the azimuthal equidistant projection: every point lies at its true geodesic distance and direction from the
+centre, so the date line and the poles need no special treatment.  Lengths across the direction to the centre are too
+large by the factor (s/R) / sin(s/R) at the distance s: 0.1 % at 500 km, 1.7 % at 2000 km.
 
 Geodesics on the ellipsoid: C. F. F. Karney, Journal of Geodesy 87 (2013), 43-55, by the library PROJ.
 """

@@ -1,15 +1,15 @@
-"""Importance sampling by cross entropy: cases drawn where failures are, each with the weight that makes up for it.
+"""Importance sampling by cross entropy: cases are drawn where failures are, and weighted by the ratio of the densities.
 
-The density to draw from is found in levels: at each, the hard limit is softened to Phi(-margin / softness), just so
-much that the next density is within reach of the present one, and a mixture is fitted to the softened failures.  When
-the softened limit is as good as the hard one, the mixture is frozen and fresh cases are drawn from it: the estimate
-rests on these alone, so it has no bias, and its interval is that of a mean.
+The density to draw from is found in levels: at each, the indicator of failure is smoothed to Phi(-margin / softness),
+just so much that the next density can be estimated from the present cases, and a mixture is fitted to the weighted
+cases. When the smoothed indicator is as good as the exact one, the mixture is frozen and fresh cases are drawn from it:
+the estimate uses these alone, so it is unbiased, and its interval is that of a mean.
 
-Papaioannou, Geyer & Straub, Improved cross entropy-based importance sampling with a flexible mixture model,
-Reliability Engineering & System Safety 191 (2019) 106564.
+Papaioannou, Geyer & Straub, Improved cross entropy-based importance sampling with a flexible mixture model, Reliability
+Engineering & System Safety 191 (2019) 106564.
 
-Valid up to some hundred inputs; with noise of the flight that decides the failures, few weights carry the sum, and
-that is said.  A region of failures that no case pointed to has no weight in the interval.
+Valid up to some hundred inputs.  Where noise in flight decides the failures, few weights dominate the sum, which a
+remark says.  A region of failures that no case came near is not covered by the interval.
 """
 
 import math
@@ -48,18 +48,12 @@ def cross_entropy(
     if cases_per_level < 500:
         raise ValueError(f"{cases_per_level} cases per level are too few; 500 are the least")
     # One input has no directions: a second one, which the margin does not see, gives it some.
-    flights = Flights(_first_columns(margin, n_inputs, noise), noise)
+    flights = Flights(lambda u, *addresses: margin(u[:, :n_inputs], *addresses), noise)
     rng = stream(seed, "cross entropy", 0)
     mixture, levels, ended = _approach(flights, cases_per_level, max(n_inputs, 2), rng)
     if mixture is None:
         return plain_count(flights, tuple(levels), confidence)
     return _estimate(flights, mixture, levels, ended, cases_per_level, rng, confidence, n_inputs)
-
-
-def _first_columns(margin: Margin, n_inputs: int, noise: bool) -> Margin:
-    if noise:
-        return lambda u, addresses: margin(u[:, :n_inputs], addresses)
-    return lambda u: margin(u[:, :n_inputs])
 
 
 def _approach(
@@ -78,14 +72,14 @@ def _approach(
         target = weight * failed
         good = min(_variation(failed / _softened(margin, softness)), _variation(target)) <= _VARIATION
         if good or (stalled and _effective(target) >= _ENOUGH * n):
-            levels.append(_record(margin, target, log_weight))
+            levels.append(_level_record(margin, target, log_weight))
             return (fit_mixture(u, target, rng) if number else None), levels, True
         if stalled == _PATIENCE or np.ptp(np.clip(margin, -1e300, 1e300)) == 0.0:
             return mixture, levels, False
         before, softness = softness, _next_softness(weight, margin, softness)
         stalled = stalled + 1 if softness > _HALT * before else 0
         target = weight * _softened(margin, softness)
-        levels.append(_record(margin, target, log_weight))
+        levels.append(_level_record(margin, target, log_weight))
         mixture = fit_mixture(u, target, rng)
     return mixture, levels, False
 
@@ -128,7 +122,7 @@ def _next_softness(weight: np.ndarray, margin: np.ndarray, softness: float) -> f
     return math.exp(high)
 
 
-def _record(margin: np.ndarray, target: np.ndarray, log_weight: np.ndarray) -> Level:
+def _level_record(margin: np.ndarray, target: np.ndarray, log_weight: np.ndarray) -> Level:
     """The level as its table shows it: the median margin of what the next density is fitted to, and its probability.
 
     At the last level, where that median has failed, the limit itself.

@@ -1,4 +1,4 @@
-"""Dispersed inputs as statistics take them: numbers as they are, words and switches as levels of a group."""
+"""Dispersed inputs as columns of numbers: numbers as they are, words and switches as the index of their level."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class InputColumn:
-    """values : float64[n], the numbers, or the index of each case's level.  levels : empty for numbers."""
+    """One dispersed input.
+
+    values : float64[n], the numbers, or the index of each case's level.  levels : the words; empty for numbers.
+    """
 
     name: str
     values: np.ndarray
@@ -17,15 +20,17 @@ class InputColumn:
 
     @property
     def ordered(self) -> bool:
-        """Whether larger and smaller mean something: numbers, and groups of two."""
+        """Whether the values have an order: numbers, and inputs with two levels."""
         return len(self.levels) in (0, 2)
 
     @property
     def varies(self) -> bool:
+        """Whether the input differs between cases."""
         finite = self.values[np.isfinite(self.values)]
         return bool(finite.size and finite.min() < finite.max())
 
     def at(self, rows: np.ndarray) -> "InputColumn":
+        """The column of the cases in `rows`."""
         return InputColumn(self.name, self.values[rows], self.levels)
 
 

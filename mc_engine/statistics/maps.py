@@ -1,17 +1,16 @@
 """A metric over two inputs: exact from a full grid, smoothed from scattered cases.
 
-Scattered cases: at each point of a picture grid, a quadratic surface through the nearest cases, weighted by
-distance (local regression, Cleveland & Devlin, J. Am. Stat. Assoc. 83 (1988), 596-610).  How many cases are near is
-for the data to say: the number with the smallest squared error of cases left out one at a time, so that few are
-taken where the metric follows the two inputs closely, and many where the other inputs scatter it.
+Scattered cases: at each point of a plotting grid, a quadratic surface is fitted to the nearest cases, weighted by
+distance (local regression, Cleveland & Devlin, J. Am. Stat. Assoc. 83 (1988), 596-610).  The number of neighbours is
+the one with the smallest leave-one-out error: few where the metric follows the two inputs closely, many where other
+inputs scatter it.
 
-The error given has two parts.  One is the standard error of the fitted value: it holds the scatter of the cases about
-the surface, among it all that the other inputs do.  The other is the bias of a surface that bends within one
-neighbourhood, for which the step to a cubic surface through the same cases stands (the correction of Calonico,
-Cattaneo & Farrell, J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).
-Points outside the hull of the cases, in a hole between them, or where the error is large, are NaN: a map is no
-extrapolation.  Where the two inputs explain less than `LEAST_EXPLAINED` of the metric's variance, in cross-validation
-by the same cases left out one at a time, no point has a value: contours would be those of noise.
+The error has two parts.  One is the standard error of the fitted value, from the scatter of the cases about the
+surface, which includes the effect of all other inputs.  The other is the bias of a surface that bends within one
+neighbourhood, estimated by the step to a cubic surface through the same cases (the correction of Calonico, Cattaneo &
+Farrell, J. Am. Stat. Assoc. 113 (2018), 767-779, here added to the error and not to the value).  Points outside the
+hull of the cases, in a hole between them, or with a large error are NaN: a map does not extrapolate.  Where the two
+inputs explain less than `LEAST_EXPLAINED` of the metric's variance in cross-validation, no point has a value.
 """
 
 from dataclasses import dataclass, replace
@@ -38,12 +37,24 @@ POINTS_AT_ONCE = 256
 
 @dataclass(frozen=True)
 class SurfaceMap:
-    """value[iy, ix] over x and y (both ascending); NaN outside the support.  error : standard error, or None.
+    """A metric over two inputs, on a grid: what `map_metric` returns.
 
-    exact : the nodes are cases themselves.  cases_per_node : 1 for an exact grid; more when other inputs vary
-    between cases of one node, and value is then their mean; 0 for scattered cases.  n_smoothed : of the n_used
-    cases with numbers, those that a smoothed surface is made of.  explained : share of the metric's variance that the
-    surface predicts of cases left out; 1 for an exact grid.
+    x : float64[nx], ascending
+    y : float64[ny], ascending
+    value : float64[ny, nx], NaN where the cases support no value
+    error : float64[ny, nx], standard error of the value, or None where each node is one case
+    exact : bool, the nodes are cases themselves
+    cases_per_node : int, 1 for an exact grid; more where other inputs vary between the cases of a node, and value is
+        their mean; 0 for scattered cases
+    neighbours : int, cases that each point of a smoothed surface is fitted to
+    n_used : int, cases with numbers
+    n_tried : int, all cases
+    n_smoothed : int, of the n_used cases, those that the surface was made of
+    explained : float, fraction of the metric's variance that the surface predicts in cross-validation; 1 for an exact
+        grid
+
+    >>> map_metric(np.tile([0.0, 1.0], 2), np.repeat([0.0, 1.0], 2), np.arange(4.0)).exact
+    True
     """
 
     x: np.ndarray
@@ -60,21 +71,34 @@ class SurfaceMap:
 
 
 def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -> SurfaceMap | None:
-    """Map of z over x and y (float64[n_tried] each, NaN for a case without a number).
+    """Map of a metric over two inputs: exact from a full grid, smoothed by local regression from scattered cases.
 
-    None when there are too few cases, or when they lie on a line, for a map to mean anything.
+    x : float64[n_tried], NaN for a case without a number
+    y : float64[n_tried]
+    z : float64[n_tried], the metric
+    points : int, grid points of a smoothed map along each axis
+
+    Returns a SurfaceMap, or None where the cases are too few, or lie on a line.
+
+    Raises nothing for numbers of any size.
+
+    >>> x, y = np.meshgrid([0.0, 1.0, 2.0], [0.0, 1.0])
+    >>> map_metric(x.ravel(), y.ravel(), (x + 10.0 * y).ravel()).value.tolist()
+    [[0.0, 1.0, 2.0], [10.0, 11.0, 12.0]]
     """
     pairs = [near_one(np.asarray(values, dtype=np.float64)) for values in (x, y, z)]
-    found = _map(pairs[0][0], pairs[1][0], pairs[2][0], points)
-    if found is None:
+    surface = _surface_map(pairs[0][0], pairs[1][0], pairs[2][0], points)
+    if surface is None:
         return None
-    x, y, value = (in_units(*one) for one in zip((found.x, found.y, found.value), (e for _, e in pairs), strict=True))
+    x, y, value = (
+        in_units(*scaled) for scaled in zip((surface.x, surface.y, surface.value), (e for _, e in pairs), strict=True)
+    )
     return replace(
-        found, x=x, y=y, value=value, error=None if found.error is None else in_units(found.error, pairs[2][1])
+        surface, x=x, y=y, value=value, error=None if surface.error is None else in_units(surface.error, pairs[2][1])
     )
 
 
-def _map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap | None:
+def _surface_map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap | None:
     grid = _full_grid(x, y, z)
     if grid is not None:
         return grid
@@ -85,9 +109,12 @@ def _map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap
 
 
 def explained_share(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
-    """The share of the variance of z that a smooth surface over x and y predicts of cases left out; NaN for too few."""
-    found = map_metric(x, y, z, points=2)
-    return np.nan if found is None else found.explained
+    """Fraction of the variance of z that a smooth surface over x and y predicts; NaN for too few cases.
+
+    By cross-validation, with cases left out one at a time.
+    """
+    surface = map_metric(x, y, z, points=2)
+    return np.nan if surface is None else surface.explained
 
 
 def _spread(values: np.ndarray) -> bool:
@@ -175,8 +202,10 @@ def _hull(cloud: np.ndarray) -> np.ndarray | None:
 
 
 def _chosen_neighbours(tree: cKDTree, cloud: np.ndarray, z: np.ndarray) -> tuple[int, float]:
-    """The number of neighbours that predicts left-out cases best, or a smaller one that is as good; and the share of
-    the variance of z that it predicts."""
+    """(number of neighbours, fraction of the variance of z that it predicts), by leaving cases out one at a time.
+
+    A smaller number is chosen where it predicts as well.
+    """
     rows = np.unique(np.linspace(0, len(cloud) - 1, min(len(cloud), LEFT_OUT)).astype(np.int64))
     choices = [number for number in NEIGHBOURS if number < len(cloud)]
     if len(choices) < 2:
@@ -258,8 +287,8 @@ class _Fit:
         weighted = design * self.weight[:, :, None]
         right = np.swapaxes(weighted, 1, 2) @ z[self.near][:, :, None]
         residual = z[self.near] - (design @ np.linalg.solve(self.normal, right))[:, :, 0]
-        taken = np.linalg.solve(self.normal, np.swapaxes(weighted, 1, 2) @ weighted)
-        freedom = self.weight.sum(axis=1) - np.trace(taken, axis1=1, axis2=2)
+        hat = np.linalg.solve(self.normal, np.swapaxes(weighted, 1, 2) @ weighted)
+        freedom = self.weight.sum(axis=1) - np.trace(hat, axis1=1, axis2=2)
         enough = freedom > 0.5
         variance = (self.weight * residual**2).sum(axis=1) / np.where(enough, freedom, 1.0)
         error = np.sqrt(variance * (self._smoother(self.row) ** 2).sum(axis=1))
@@ -269,5 +298,7 @@ class _Fit:
 def _value_row(normal: np.ndarray) -> np.ndarray:
     """First row of the inverses of normal matrices; terms that the cases do not tell apart are left out."""
     widths, vectors = np.linalg.eigh(normal)
-    told = widths > 1e-10 * widths[:, -1:]
-    return np.einsum("mij,mj->mi", vectors, np.where(told, vectors[:, 0, :] / np.where(told, widths, 1.0), 0.0))
+    determined = widths > 1e-10 * widths[:, -1:]
+    return np.einsum(
+        "mij,mj->mi", vectors, np.where(determined, vectors[:, 0, :] / np.where(determined, widths, 1.0), 0.0)
+    )

@@ -2,14 +2,23 @@
 
 First pass (`Tally`): number, smallest, largest and exact sum.  Second pass (`Spread`): exact sums of the powers of
 the distances from the mean; each power is rounded on its own, which depends on the case alone.  Both merge.
+
+An exact sum (`ExactSum`) is one whole number of units of 2**-1074, the smallest float64.  Blocks of values are cut into
+slices of a few leading bits, so short that adding up a slice of a whole block rounds nothing: the error-free vector
+transformation of S. M. Rump, T. Ogita & S. Oishi, SIAM J. Sci. Comput. 31 (2008), 189-224, section 3.
 """
 
 from math import frexp, ldexp, sqrt
 
 import numpy as np
 
-from mc_engine.statistics.exact_sums import ExactSum
 from mc_engine.statistics.normality import Normality, normality_of
+
+UNIT_BITS = 1074
+BLOCK = 1 << 16
+HEADROOM = 17  # bits above the largest value of a block: those of its length, and one for the rounding of a slice
+HUGE = 2.0**960  # from here on a slice's own headroom would overflow
+HUGE_SHIFT = 64
 
 
 def finite_values(values: np.ndarray) -> np.ndarray:
@@ -19,22 +28,61 @@ def finite_values(values: np.ndarray) -> np.ndarray:
 
 
 def near_one(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`values` (float64[n] or [n, k]) in units of a power of two near the largest of each column; and its exponent.
+    """`values` (float64[n] or [n, k]) divided by a power of two near the largest of each column; and its exponent.
 
-    It rounds nothing.  Squares and differences of what comes out neither overflow nor vanish.
+    The division is exact.  Squares and differences of the result neither overflow nor vanish.
     """
     exponent = np.frexp(np.abs(np.where(np.isfinite(values), values, 0.0)).max(axis=0, initial=0.0))[1]
     return np.ldexp(values, -exponent), exponent
 
 
 def in_units(values: np.ndarray | float, exponent: np.ndarray) -> np.ndarray:
-    """What `near_one` has made small, in its own unit again; infinite, and no warning, beyond float64."""
+    """The inverse of `near_one`: values in their own unit again; infinite, without a warning, beyond float64."""
     with np.errstate(over="ignore"):
         return np.ldexp(values, exponent)
 
 
+class ExactSum:
+    """The sum of all finite values put in; `units` is its exact value times 2**1074."""
+
+    def __init__(self, units: int = 0):
+        self.units = units
+
+    def add(self, values: np.ndarray) -> None:
+        """Put in float64[n], all finite."""
+        for first in range(0, values.size, BLOCK):
+            block = values[first : first + BLOCK]
+            huge = np.abs(block) >= HUGE
+            if huge.any():
+                self.units += _block_units(block[huge] * 2.0**-HUGE_SHIFT) << HUGE_SHIFT
+                block = block[~huge]
+            self.units += _block_units(block)
+
+    def merge(self, other: "ExactSum") -> None:
+        """Put in all that another sum holds."""
+        self.units += other.units
+
+    def over(self, count: int) -> float:
+        """The sum divided by a whole number, rounded once; OverflowError beyond float64."""
+        return self.units / (count << UNIT_BITS)  # Python divides whole numbers with one rounding
+
+
+def _block_units(values: np.ndarray) -> int:
+    rest, units = values.copy(), 0
+    while rest.size:
+        largest = float(np.abs(rest).max())
+        if largest == 0.0:
+            break
+        anchor = ldexp(1.0, frexp(largest)[1] + HEADROOM)
+        leading = (anchor + rest) - anchor  # the bits of each value that the anchor's last place reaches
+        rest -= leading
+        numerator, denominator = float(leading.sum()).as_integer_ratio()
+        units += numerator << (UNIT_BITS + 1 - denominator.bit_length())
+    return units
+
+
 class Tally:
-    """First pass.  n_used : finite values of n_tried."""
+    """First pass: number, extremes and exact sum.  n_used : finite values of n_tried."""
 
     def __init__(self) -> None:
         self.n_used = self.n_tried = 0
@@ -67,7 +115,7 @@ class Tally:
 
 
 class Spread:
-    """Second pass, about the mean of a tally that has seen all values, of which it needs one at least."""
+    """Second pass: powers of the distances from the mean of a complete `Tally` with at least one value."""
 
     def __init__(self, tally: Tally):
         self.tally = tally
@@ -108,7 +156,7 @@ class Spread:
 
     @property
     def shape(self) -> Normality | None:
-        """Shape against the normal; None for fewer than 20 values, or (nearly) constant ones."""
+        """Skewness and kurtosis; None for fewer than 20 values, or (nearly) constant ones."""
         if self.unit <= 1e-13 or self.tally.minimum == self.tally.maximum:
             return None
         n = self.tally.n_used

@@ -1,7 +1,7 @@
-"""A hint whether a metric may be treated as normal: skewness, excess kurtosis and an omnibus test.
+"""Whether a metric may be treated as normal: skewness, excess kurtosis and an omnibus test.
 
-With thousands of cases the test finds deviations that matter to nobody; read the size of skewness and kurtosis
-first.  Below 20 values nothing is said.
+With thousands of cases the test finds deviations that do not matter; look at skewness and kurtosis first.  Needs 20
+values.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,15 @@ FEWEST = 20
 
 @dataclass(frozen=True)
 class Normality:
-    """skewness and excess kurtosis are 0 for a normal; p_value is that of the D'Agostino-Pearson K^2 test."""
+    """Skewness and kurtosis of a metric, and a test whether both agree with a normal distribution.
+
+    skewness : float, 0 for a normal distribution
+    excess_kurtosis : float, 0 for a normal distribution
+    p_value : float, of the K^2 test of D'Agostino and Pearson
+
+    >>> Normality(skewness=0.02, excess_kurtosis=-0.05, p_value=0.6).looks_normal
+    True
+    """
 
     skewness: float
     excess_kurtosis: float
@@ -27,9 +35,18 @@ class Normality:
 
 
 def normality(values: np.ndarray) -> Normality | None:
-    """Shape of finite values (float64[n]) against the normal; None for n < 20 or (nearly) constant values.
+    """Skewness, kurtosis and omnibus test of normality.
+
+    values : float64[n], finite
+
+    Returns a Normality, or None for n < 20 or (nearly) constant values.
+
+    Raises nothing.
 
     D'Agostino, Belanger & D'Agostino, Amer. Statist. 44 (1990), 316-321.
+
+    >>> round(normality(np.arange(100.0)).excess_kurtosis, 2)
+    -1.2
     """
     n = values.size
     if n < FEWEST:

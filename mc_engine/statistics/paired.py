@@ -1,4 +1,4 @@
-"""Levels of a choice compared on the same cases: pairs that differ in nothing else, and their differences."""
+"""Paired comparison of the levels of a choice: cases that differ in nothing else, and their differences."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

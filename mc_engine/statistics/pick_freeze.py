@@ -1,9 +1,9 @@
-"""First-order and total Sobol' indices of groups of inputs, from cases that were flown in pairs for this purpose.
+"""First-order and total Sobol' indices of groups of inputs, from the pick-freeze cases of [sensitivity].
 
 The cases of a block share a point A, with its random draws, and an independent point B.  A_B(g) is A with group g taken
-from B.  What A_B(g) and B have in common is group g alone, so that their correlation is the first-order index of g;
-A_B(g) and A differ in group g alone, and 1 less their correlation is its total index.  The draws made in flight are a
-group like any other.  Inputs that are correlated with one another have to be in one group.
+from B.  A_B(g) and B have group g alone in common, so that their correlation is the first-order index of g; A_B(g) and
+A differ in group g alone, and 1 minus their correlation is its total index.  Random draws made in flight are one group.
+Inputs that are correlated with one another have to be in one group.
 
 Janon, Klein, Lagnoux, Nodet & Prieur, ESAIM: Probab. Stat. 18 (2014), 342-364, eq. (6) (first order, pooled mean and
 variance) and section 2.3 (its asymptotic variance, by the delta method); Jansen, Comput. Phys. Commun. 117 (1999),
@@ -22,7 +22,7 @@ FEWEST_BLOCKS = 20
 
 
 def layout_of(record: Mapping[str, Any]) -> BlockLayout:
-    """The layout that the manifest of the flights, under "sensitivity", tells of."""
+    """The block layout that a companion's manifest records under "sensitivity"."""
     return BlockLayout(tuple(group["name"] for group in record["groups"]), tuple(record["repeated"]))
 
 

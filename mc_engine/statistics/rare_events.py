@@ -1,12 +1,11 @@
-"""Probabilities far below what plain cases can show: the record of an estimate, and its interval.
+"""Estimates of small probabilities: their record, their interval, and the cases behind them.
 
-The question is put in standard normal space: a vector u of independent standard normal numbers stands for the inputs
-of a case, and `margin` says how far the case is inside its limit.  A case has failed where the margin is zero, below
-zero, or not a number.  `subset_simulation` and `importance_sampling` estimate the share of failed cases.
+A limit state in standard normal space: a vector u of independent standard normal numbers stands for the inputs of a
+case, and `margin` is the distance inside the limit.  A case has failed where the margin is zero, negative or not a
+number.  `subset_simulation` and `importance_sampling` estimate the probability of failure.
 
-Noise of the flight: where the margin depends on more than u, it is called as margin(u, noise), and `noise` addresses
-the rest of the case.  What is estimated is then the share of failed cases over inputs and noise together, which is
-what plain cases estimate.
+Noise in flight: where the margin depends on more than u, it is called as margin(u, noise), and `noise` addresses the
+random draws of the case.  The estimate is then the probability over inputs and noise together, as for plain cases.
 """
 
 import math
@@ -95,7 +94,7 @@ class RareEvent:
 
 
 class Flights:
-    """The margin with a memory: every case that was asked for, numbered in order."""
+    """Calls the margin function and keeps every case in the order flown."""
 
     def __init__(self, margin: Margin, noise: bool):
         self._margin, self._noisy = margin, noise
@@ -115,6 +114,7 @@ class Flights:
         return margin, case, noise
 
     def evaluated(self, weight: np.ndarray) -> Evaluated:
+        """All cases flown so far, with these weights."""
         u, margin, level, noise = (np.concatenate(parts) for parts in zip(*self._kept, strict=True))
         return Evaluated(u, margin, level, noise, weight)
 
@@ -141,7 +141,7 @@ def interval_of_mean(estimates: np.ndarray, confidence: float) -> tuple[float, f
 
 
 def plain_count(flights: Flights, levels: tuple[Level, ...], confidence: float) -> RareEvent:
-    """The failed among plain cases, with the exact interval: where failures are frequent, or nothing points to them."""
+    """The estimate from plain cases with the exact interval, for frequent failures or margins without a direction."""
     cases = flights.evaluated(np.full(flights.n, 1.0 / flights.n))
     failed = int(cases.failed.sum())
     lower, upper = clopper_pearson(failed, flights.n, confidence)

@@ -1,8 +1,7 @@
-"""Regions of a plane that hold a stated share of a cloud of points: covariance ellipses, and regions of any shape.
+"""Regions of a plane that contain a stated fraction of points: covariance ellipses, and distribution-free regions.
 
-A covariance ellipse holds its stated share of a normal distribution whose covariance is known; clouds are seldom
-normal, so the share of the cases that really lie inside is counted.  `density_region` assumes nothing but that the
-cases are independent draws.
+A covariance ellipse contains its stated fraction of a normal distribution with known covariance; real scatter is seldom
+normal, so the cases inside are counted.  `density_regions` assumes only independent draws.
 """
 
 from dataclasses import dataclass
@@ -72,15 +71,15 @@ def covariance_ellipses(
     None of them for fewer than three points, and for points on a line: a standard deviation across it of no more
     than `thinnest` (in the unit of the points), or than a billionth of that along it.
     """
-    frame = _principal_frame(points, thinnest)
+    frame = _principal_axes(points, thinnest)
     if frame is None:
         return ()
     centre, spread, axes = frame
     squares = np.sum(((points - centre) @ axes / spread) ** 2, axis=1)
-    found = []
+    ellipses = []
     for content in contents:
         k = chi_square_scale(content)
-        found.append(
+        ellipses.append(
             Ellipse(
                 content=content,
                 scale=k,
@@ -91,10 +90,10 @@ def covariance_ellipses(
                 n=len(points),
             )
         )
-    return tuple(found)
+    return tuple(ellipses)
 
 
-def _principal_frame(points: np.ndarray, thinnest: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+def _principal_axes(points: np.ndarray, thinnest: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """Centre, standard deviations (larger first) and directions (columns); None for points that have no width."""
     if len(points) < FEWEST:
         return None
@@ -122,7 +121,7 @@ class Density:
 
     @classmethod
     def of(cls, points: np.ndarray, thinnest: float = 0.0) -> "Density | None":
-        frame = _principal_frame(points, thinnest)
+        frame = _principal_axes(points, thinnest)
         if frame is None or len(points) < FEWEST_SMOOTHED:
             return None
         centre, spread, axes = frame
@@ -190,12 +189,12 @@ def density_regions(
         return ()
     values = smoothed.at(points)
     ranked = np.sort(values[1::2])
-    found = []
+    regions = []
     for content in contents:
         rank = quantile_ranks(ranked.size, 1.0 - content, 2.0 * confidence - 1.0)[0]
         if rank is None or ranked[rank - 1] <= 0.0:
             continue
         level = float(ranked[rank - 1])
         inside = int(np.count_nonzero(values >= level))
-        found.append(DensityRegion(content, confidence, smoothed, level, inside, len(points)))
-    return tuple(found)
+        regions.append(DensityRegion(content, confidence, smoothed, level, inside, len(points)))
+    return tuple(regions)

@@ -1,23 +1,22 @@
-"""Requirement verdicts: is the wanted share of cases inside the limit, shown with the wanted confidence?
+"""Verdicts on requirements: is the required probability of being inside the limit demonstrated?
 
-pass              the lower confidence bound on the passing share reaches the wanted share
-fail              even the upper confidence bound stays below it
+pass              the lower confidence bound on the probability reaches the required one
+fail              even the upper confidence bound is below it
 not demonstrable  the number of cases decides neither way, or the design gives no probabilities
 
 A case that failed, or whose metric is not a number, counts as not inside the limit.
 
 Where the number of cases was decided while looking at them (`looked`), the bounds are those of `time_uniform`, which
-hold at every number of cases at once; else those of `binomial`, which hold for the number fixed in advance.
+hold at every number of cases; else those of `binomial`, which hold for a number fixed in advance.
 
-Several requirements.  Each verdict has the confidence that its requirement asks for.  The joint one counts the cases
-that are inside every limit at once, and wants of them 1 less what each requirement may miss: if each is met, so is
-that (Boole).  It passes if that share is shown and every requirement passes, which then holds with the smallest of
-their confidences (Berger, Technometrics 24 (1982), 295-300).  It fails if one of these tests fails with the error
-allowed, 1 - confidence, divided by their number (Bonferroni); `shared_outcome` is each verdict at that confidence, and
-those hold all at once.
+Several requirements.  Each verdict has the confidence that its requirement asks for.  The joint verdict counts the
+cases inside every limit at once, and requires of them 1 minus the sum of what each requirement may miss: if each is
+met, so is that (Boole).  It passes if that probability is demonstrated and every requirement passes, which then holds
+with the smallest of their confidences (Berger, Technometrics 24 (1982), 295-300).  It fails if one of these tests fails
+with the error allowed, 1 - confidence, divided by their number (Bonferroni); `shared_outcome` is each verdict at that
+confidence, and those hold all at once.
 """
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -46,16 +45,37 @@ class ShareLimits(Protocol):
 
 @dataclass(frozen=True)
 class Verdict:
-    """One requirement judged.  `estimate`, `lower`, `upper` are shares; None without a case.
+    """One requirement judged on the cases of a run, or, without metric and limits, all requirements at once.
 
-    The joint verdict is one, too: without metric and limits.
-    demonstrated : the limit that the cases at hand do show with share and confidence, None if they show none
-        (or if the requirement has two limits).  enclosed : the same for two limits.
-    needed : cases that would show the share if no further one failed; None if it is shown or refuted.
-    accepted : the most failures with which so many cases pass, None if they cannot.
-    consumer_risk : probability of passing a system that just misses the share.  producer_risk : of not passing one
-        that fails half as often as it may.  Both None where the number of cases was decided on the way; the
-        consumer's is then at most 1 - confidence.
+    name : str, of the requirement
+    metric : str, column that is limited
+    at_most : float or None, upper limit
+    at_least : float or None, lower limit
+    share : float, required probability of being inside the limits
+    confidence : float, required of the demonstration
+    outcome : str, "pass", "fail" or "not demonstrable"
+    passed : int, cases inside the limits
+    tried : int, all cases
+    no_number : int, cases that failed or have no finite metric; they count as not inside
+    estimate : float or None, passed / tried
+    lower : float or None, one-sided lower confidence bound on the probability
+    upper : float or None, one-sided upper confidence bound
+    demonstrated : float or None, the limit that the cases do demonstrate with share and confidence (tolerance limit);
+        None with two limits
+    enclosed : tuple or None, the two limits that they demonstrate, for a requirement with two
+    needed : int or None, cases that would demonstrate the share if no further one failed; None if it is decided
+    accepted : int or None, most failures with which so many cases pass; None if they cannot
+    consumer_risk : float or None, probability of passing a system that just misses the share; None where the number of
+        cases was decided along the way, and then it is at most 1 - confidence
+    producer_risk : float or None, probability of not passing a system that fails half as often as it may
+    shared_outcome : str, the outcome at the confidence that makes all verdicts of a campaign hold together
+    random : bool, the cases are a random sample, so that a fraction of them estimates a probability
+    looked : bool, the number of cases was decided by looking at them
+
+    >>> requirement = {"name": "fuel", "metric": "fuel_kg", "at_most": 2.5, "share": 0.9, "confidence": 0.9}
+    >>> verdict = judge(requirement, np.linspace(1.0, 2.0, 40), np.ones(40, dtype=bool))
+    >>> verdict.outcome, verdict.demonstrated, verdict.margin
+    ('pass', 1.9743589743589745, 0.5256410256410255)
     """
 
     name: str
@@ -90,20 +110,7 @@ class Verdict:
         low, high = self.enclosed if self.enclosed is not None else (self.demonstrated, self.demonstrated)
         above = None if self.at_most is None or high is None else self.at_most - high
         below = None if self.at_least is None or low is None else low - self.at_least
-        return min((one for one in (above, below) if one is not None), default=None)
-
-
-def pass_probability(passed: int, tried: int, confidence: float = 0.90) -> tuple[float, float]:
-    """Share of passing cases with its exact lower confidence bound.
-
-    passed, tried : int, 0 <= passed <= tried, tried > 0.  Failed cases count as tried.
-    Returns (estimate, lower).  With nothing failed, lower = (1 - confidence)**(1/tried).
-
-    Clopper & Pearson, Biometrika 26 (1934), 404-413.
-    """
-    if tried <= 0:
-        raise ValueError("no case was tried")
-    return passed / tried, binomial.lower_bound(passed, tried, confidence)
+        return min((distance for distance in (above, below) if distance is not None), default=None)
 
 
 class LimitCounts:
@@ -115,33 +122,27 @@ class LimitCounts:
     def __init__(self, requirements: Sequence[Mapping[str, Any]]):
         self.requirements = requirements
         self.tried = 0
-        self._outside: Counter[int] = Counter()  # by the set of requirements, as the bits of a whole number
-        self._lost: Counter[int] = Counter()
+        self._outside, self._lost = np.zeros((2, len(requirements) + 1), dtype=np.int64)  # last: of any requirement
 
     def add(self, column: Callable[[str], np.ndarray], ok: np.ndarray) -> None:
         """Count cases.  column : metric to float64[n].  ok : bool[n]."""
         self.tried += ok.size
-        kept = [inside_all([one], column, ok) for one in self.requirements]
-        numbers = [ok & np.isfinite(np.asarray(column(str(one["metric"])), np.float64)) for one in self.requirements]
-        for found, good in ((self._outside, kept), (self._lost, numbers)):
+        kept = [inside_all([requirement], column, ok) for requirement in self.requirements]
+        numbers = [
+            ok & np.isfinite(np.asarray(column(str(requirement["metric"])), np.float64))
+            for requirement in self.requirements
+        ]
+        for counts, good in ((self._outside, kept), (self._lost, numbers)):
             beyond = ~np.array(good, dtype=bool).reshape(len(good), ok.size)
-            some = beyond[:, beyond.any(axis=0)]
-            if some.size:
-                codes, cases = np.unique(np.packbits(some, axis=0, bitorder="little").T, axis=0, return_counts=True)
-                for code, n in zip(codes, cases.tolist(), strict=True):
-                    found[int.from_bytes(code.tobytes(), "little")] += n
+            counts += [*beyond.sum(axis=1), beyond.any(axis=0).sum()]
 
-    def outside(self, requirements: Iterable[int] | None = None) -> int:
-        """Cases outside any of these requirements, of all by default; they are named by their index."""
-        return self._any(self._outside, requirements)
+    def outside(self, requirement: int = -1) -> int:
+        """Cases outside one requirement, named by its index, or outside any of them."""
+        return int(self._outside[requirement])
 
-    def without_number(self, requirements: Iterable[int] | None = None) -> int:
-        """Cases without a number for any of them."""
-        return self._any(self._lost, requirements)
-
-    def _any(self, found: Counter[int], requirements: Iterable[int] | None) -> int:
-        asked = sum(1 << k for k in (range(len(self.requirements)) if requirements is None else requirements))
-        return sum(cases for code, cases in found.items() if code & asked)
+    def without_number(self, requirement: int = -1) -> int:
+        """Cases without a number for one requirement, or for any of them."""
+        return int(self._lost[requirement])
 
 
 def judge_all(
@@ -151,9 +152,22 @@ def judge_all(
     design: str = "mc",
     looked: bool = False,
 ) -> tuple[list[Verdict], Verdict | None]:
-    """The verdict on each requirement record, and the joint one; see `judge_counted`.
+    """Judge every requirement of a campaign, and all of them at once.
 
-    column : metric to float64[n_tried].  ok : bool[n_tried], whether the case was completed.
+    requirements : sequence of dict ("name", "metric", "at_most", "at_least", "share", "confidence"), as in a manifest
+    column : function from a metric's name to float64[n_tried]
+    ok : bool[n_tried], whether the case was completed
+    design : str, of the campaign; only for `SAMPLING_DESIGNS` does a fraction of cases estimate a probability
+    looked : bool, whether the number of cases was decided by looking at them; see `was_looked_at`
+
+    Returns (verdicts, joint): a list of Verdict, and the joint Verdict, or None for fewer than two requirements.
+
+    Raises ValueError for a confidence outside (0, 1).
+
+    >>> requirements = [{"name": "fuel", "metric": "fuel_kg", "at_most": 2.5, "share": 0.9, "confidence": 0.9}]
+    >>> verdicts, joint = judge_all(requirements, lambda metric: np.linspace(1.0, 2.0, 40), np.ones(40, dtype=bool))
+    >>> verdicts[0].outcome, joint
+    ('pass', None)
     """
     ok = np.asarray(ok, dtype=bool)
     counts = LimitCounts(requirements)
@@ -179,14 +193,18 @@ def judge_counted(
     to be asked for.  Its confidence is the smallest of theirs.
     """
     requirements = counts.requirements
-    share = joint_share([float(one["share"]) for one in requirements]) if len(requirements) > 1 else None
+    share = (
+        joint_share([float(requirement["share"]) for requirement in requirements]) if len(requirements) > 1 else None
+    )
     among = len(requirements) + (share is not None)
-    verdicts = [_verdict(one, counts, (k,), ranked, design, looked, among) for k, one in enumerate(requirements)]
+    verdicts = [
+        _verdict(requirement, counts, k, ranked, design, looked, among) for k, requirement in enumerate(requirements)
+    ]
     if share is None:
         return verdicts, None
     confidence = min(verdict.confidence for verdict in verdicts)
     asked = {"name": JOINT, "metric": "", "share": share, "confidence": confidence}
-    alone = _verdict(asked, counts, None, ranked, design, looked, among)
+    alone = _verdict(asked, counts, -1, ranked, design, looked, among)
     return verdicts, _joined(alone, [*verdicts, alone])
 
 
@@ -213,9 +231,21 @@ def joint_share(shares: Sequence[float]) -> float | None:
 def judge(
     requirement: Mapping[str, Any], values: np.ndarray, ok: np.ndarray, design: str = "mc", looked: bool = False
 ) -> Verdict:
-    """Verdict on one requirement record ("name", "metric", "at_most", "at_least", "share", "confidence").
+    """Judge one requirement.
 
-    values : float64[n_tried], the metric; ok : bool[n_tried], whether the case was completed.
+    requirement : dict ("name", "metric", "at_most", "at_least", "share", "confidence"), as in a manifest
+    values : float64[n_tried], the metric
+    ok : bool[n_tried], whether the case was completed
+    design : str, of the campaign
+    looked : bool, whether the number of cases was decided by looking at them
+
+    Returns a Verdict.
+
+    Raises ValueError for a confidence outside (0, 1).
+
+    >>> requirement = {"name": "fuel", "metric": "fuel_kg", "at_most": 2.5, "share": 0.9, "confidence": 0.9}
+    >>> judge(requirement, np.linspace(2.0, 3.0, 40), np.ones(40, dtype=bool)).outcome
+    'fail'
     """
     return judge_all([requirement], lambda _: values, ok, design, looked)[0][0]
 
@@ -223,7 +253,7 @@ def judge(
 def _verdict(
     requirement: Mapping[str, Any],
     counts: LimitCounts,
-    which: tuple[int, ...] | None,
+    which: int,
     ranked: Callable[[str, int], float],
     design: str,
     looked: bool,
@@ -265,7 +295,7 @@ def _verdict(
         random=random,
         looked=looked,
     )
-    return _with_limits_shown(verdict, ranked, limits) if which is not None and known else verdict
+    return _with_limits_shown(verdict, ranked, limits) if which >= 0 and known else verdict
 
 
 _UNKNOWN: tuple[str, float | None, float | None] = (NOT_DEMONSTRABLE, None, None)
@@ -307,9 +337,17 @@ def _with_limits_shown(verdict: Verdict, ranked: Callable[[str, int], float], li
 
 
 def was_looked_at(manifest: Mapping[str, Any], n_cases: int) -> bool:
-    """True if the number of cases was not fixed before the first flew: `run --until verdict`, or extended since.
+    """Whether the number of cases was not fixed before the first flew: `run --until verdict`, or extended since.
 
-    n_cases : how many are wanted now.
+    manifest : dict, of the run
+    n_cases : int, cases that the run is to have now
+
+    Returns a bool, the argument `looked` of `judge_all`.
+
+    Raises nothing.
+
+    >>> was_looked_at({"campaign": {"cases": 1000}}, 2000)
+    True
     """
     return bool(manifest.get("looks")) or n_cases > manifest.get("campaign", {}).get("cases", n_cases)
 
@@ -327,9 +365,9 @@ def inside_all(
     column : metric to float64[n].  ok : bool[n].  Without a requirement every completed case is inside.
     """
     inside = np.array(ok, dtype=bool)
-    for one in requirements:
-        values = np.asarray(column(str(one["metric"])), dtype=np.float64)
-        inside &= inside_limits(values, _limit(one, "at_most"), _limit(one, "at_least"))
+    for requirement in requirements:
+        values = np.asarray(column(str(requirement["metric"])), dtype=np.float64)
+        inside &= inside_limits(values, _limit(requirement, "at_most"), _limit(requirement, "at_least"))
     return inside
 
 

@@ -1,9 +1,10 @@
-"""Order statistics of values that are seen part by part: exact, in two to four passes, whatever the order of parts.
+"""Exact order statistics of values that are read part by part, in two to four passes and any order of the parts.
 
-The bits of a float64, read as a whole number of 64 bits, can be made to sort as the values do.  Each pass counts 16
-of these bits, from the leading ones on, among the values that agree with a wanted one so far (radix selection:
-D. E. Knuth, The Art of Computer Programming, vol. 3, 2nd ed., 5.2.5 and 5.3.3); once they are few, the next pass
-keeps and sorts them, and is the last.  Counts of parts are added.
+The bits of a float64, read as a 64-bit integer, can be made to sort as the values do.  Each pass counts 16 of these
+bits, beginning with the leading ones, among the values that agree with a wanted one so far (radix selection: D. E.
+Knuth, The Art of Computer Programming, vol. 3, 2nd ed., 5.2.5 and 5.3.3); once few values are left, the next pass keeps
+and sorts them, and is the last.  Counts of parts are added.
+
 Memory: 65 536 counts per wanted rank, or FEW values, whatever the number of values.
 """
 
@@ -81,25 +82,25 @@ class Selection:
         if self.few:
             return self._found()
         running = self.counts.cumsum(axis=1)
-        found, sizes = {}, {}
+        narrowed, sizes = {}, {}
         for rank, (beginning, left) in wanted.items():
             row = running[np.searchsorted(self.beginnings, np.uint64(beginning))]
             digit = int(np.searchsorted(row, left))
             before = int(row[digit - 1]) if digit else 0
-            found[rank] = ((beginning << DIGIT_BITS) | digit, left - before)
-            sizes[found[rank][0]] = int(row[digit]) - before
+            narrowed[rank] = ((beginning << DIGIT_BITS) | digit, left - before)
+            sizes[narrowed[rank][0]] = int(row[digit]) - before
         last = self.digit + 1 == PASSES
-        return Selection(found, self.digit + 1, few=not last and sum(sizes.values()) <= FEW)
+        return Selection(narrowed, self.digit + 1, few=not last and sum(sizes.values()) <= FEW)
 
     def _found(self) -> "Selection":
         """The end: whole keys, from those kept."""
         keys = np.sort(np.concatenate([np.zeros(0, dtype=np.uint64), *self.kept]))
         below = 64 - DIGIT_BITS * self.digit
-        found = {}
+        whole_keys = {}
         for rank, (beginning, left) in self.wanted.items():
             first = int(np.searchsorted(keys, np.uint64(beginning << below)))
-            found[rank] = (int(keys[first + left - 1]), 1)
-        return Selection(found, PASSES)
+            whole_keys[rank] = (int(keys[first + left - 1]), 1)
+        return Selection(whole_keys, PASSES)
 
     @property
     def values(self) -> dict[int, float]:

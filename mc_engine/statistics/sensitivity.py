@@ -84,10 +84,10 @@ def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) ->
     table = np.column_stack([np.asarray(metrics[name], dtype=np.float64) for name in names]) if names else None
     tried = len(next(iter([*metrics.values(), *inputs.values()]), ()))
     shape = (len(columns), len(names))
-    found: dict[str, np.ndarray] = {
+    indices: dict[str, np.ndarray] = {
         f"{index}{end}": np.full(shape, np.nan) for index in _INDICES for end in ("", "_error")
     }
-    found |= {share: np.full(len(names), np.nan) for share in ("r_squared", "unexplained")}
+    indices |= {share: np.full(len(names), np.nan) for share in ("r_squared", "unexplained")}
     n_used = np.zeros(len(names), dtype=np.int64)
     strongest = _strongest_correlation(columns, tried)
     independent = strongest is None or not beyond_chance(strongest[2], tried)
@@ -96,12 +96,12 @@ def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) ->
         n_used[:] = used.sum(axis=0)
         # Most metrics are numbers in the same cases, so that inputs are ranked and sorted once for all of them.
         _, pattern = np.unique(used, axis=1, return_inverse=True)
-        for one in np.unique(pattern):
-            where = np.flatnonzero(pattern == one)
+        for group in np.unique(pattern):
+            where = np.flatnonzero(pattern == group)
             rows = np.flatnonzero(used[:, where[0]])
             part, _ = near_one(table[np.ix_(rows, where)])
-            _fill(found, [column.at(rows) for column in columns], part, where, independent)
-    return Sensitivity(tuple(inputs), names, n_used, int(tried), correlated=strongest, **found)
+            _fill(indices, [column.at(rows) for column in columns], part, where, independent)
+    return Sensitivity(tuple(inputs), names, n_used, int(tried), correlated=strongest, **indices)
 
 
 def beyond_chance(rank_correlation: float, n_cases: int) -> bool:
@@ -110,7 +110,7 @@ def beyond_chance(rank_correlation: float, n_cases: int) -> bool:
 
 
 def _fill(
-    found: dict[str, np.ndarray],
+    indices: dict[str, np.ndarray],
     columns: Sequence[InputColumn],
     table: np.ndarray,
     where: np.ndarray,
@@ -124,37 +124,33 @@ def _fill(
         return
     varying, where = table[:, moving], where[moving]
     for k in live:
-        found["first_order"][k, where], found["first_order_error"][k, where] = first_order(columns[k], varying)
+        indices["first_order"][k, where], indices["first_order_error"][k, where] = first_order(columns[k], varying)
     if independent:
         alive = np.ix_(np.array(live), where)
-        found["total"][alive], found["total_error"][alive], found["unexplained"][where] = total_order(
+        indices["total"][alive], indices["total_error"][alive], indices["unexplained"][where] = total_order(
             [columns[k] for k in live], varying
         )
     ordered = [k for k in live if columns[k].ordered]
     if not ordered:
         return
-    groups = _indicators([columns[k] for k in live if not columns[k].ordered])
+    unordered = [columns[k].values for k in live if not columns[k].ordered]
+    groups = [(values == level).astype(np.float64) for values in unordered for level in np.unique(values)[1:]]
     place = np.ix_(np.array(ordered), where)
     plain = np.column_stack([columns[k].values for k in ordered])
     ranks, metric_ranks = average_ranks(plain), average_ranks(varying)
     rho = standardised(ranks).T @ standardised(metric_ranks) / n
-    found["spearman"][place] = rho
+    indices["spearman"][place] = rho
     # Bonett & Wright, Psychometrika 65 (2000), 23-28, carried from Fisher's z to the correlation.
-    found["spearman_error"][place] = (1.0 - rho**2) * np.sqrt((1.0 + 0.5 * rho**2) / (n - 3))
+    indices["spearman_error"][place] = (1.0 - rho**2) * np.sqrt((1.0 + 0.5 * rho**2) / (n - 3))
     fit = _regression(np.column_stack([plain, *groups]), varying)
     if fit is not None:
-        found["src"][place] = fit.coefficient[: len(ordered)]
-        found["src_error"][place] = _coefficient_error(fit, len(ordered))
-        found["r_squared"][where] = fit.r_squared
+        indices["src"][place] = fit.coefficient[: len(ordered)]
+        indices["src_error"][place] = _coefficient_error(fit, len(ordered))
+        indices["r_squared"][where] = fit.r_squared
     fit = _regression(np.column_stack([ranks, *groups]), metric_ranks)
     if fit is not None:
-        found["prcc"][place] = fit.partial[: len(ordered)]
-        found["prcc_error"][place] = _partial_error(fit, len(ordered))
-
-
-def _indicators(groups: Sequence[InputColumn]) -> list[np.ndarray]:
-    """0 and 1 for all levels that occur but the first, of each group."""
-    return [(group.values == level).astype(np.float64) for group in groups for level in np.unique(group.values)[1:]]
+        indices["prcc"][place] = fit.partial[: len(ordered)]
+        indices["prcc_error"][place] = _partial_error(fit, len(ordered))
 
 
 def _regression(columns: np.ndarray, table: np.ndarray) -> _Fit | None:
@@ -206,7 +202,7 @@ def _partial_error(fit: _Fit, count: int) -> np.ndarray:
 
 def _strongest_correlation(columns: Sequence[InputColumn], n: int) -> tuple[str, str, float] | None:
     rows = np.flatnonzero(finite_rows(columns, n)) if columns else np.zeros(0, dtype=np.int64)
-    usable = [one for one in (column.at(rows) for column in columns) if one.ordered and one.varies]
+    usable = [part for part in (column.at(rows) for column in columns) if part.ordered and part.varies]
     if len(usable) < 2 or rows.size < FEWEST_CASES:
         return None
     ranks = standardised(average_ranks(np.column_stack([column.values for column in usable])))

@@ -1,7 +1,7 @@
-"""Statistics of a table of cases that is read part by part and never held: the same, to the last bit, as of the whole.
+"""Summaries and verdicts from a case table that is read part by part; bit-identical to those of the whole table.
 
-Two to four passes: the first counts, and finds means and ends; the second has the moments, and with the later ones
-the order statistics that quantiles, their limits and the verdicts on requirements ask for.
+Two to four passes: the first counts, and finds means and extremes; the second computes the moments, and with the later
+ones the order statistics for quantiles, their intervals and the verdicts.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,7 +21,7 @@ Passes = Callable[[Sequence[str]], Iterable[Mapping[str, np.ndarray]]]
 
 @dataclass(frozen=True)
 class Streamed:
-    """What all cases come to: a summary of every metric, the counts of limits, and the verdicts."""
+    """The result over all cases: a summary of every metric, the counts of limits, and the verdicts."""
 
     summaries: dict[str, Summary]
     counts: LimitCounts
@@ -74,7 +74,7 @@ def stream(
                     spreads[name].add(finite)
         digits.update({name: digits[name].next() for name in unsettled})
         unsettled, second = [name for name in unsettled if not digits[name].done], False
-    ranked = {name: one.values for name, one in digits.items()}
+    ranked = {name: selection.values for name, selection in digits.items()}
     summaries = {}
     for name, tally in tallies.items():
         if name not in spreads:
@@ -86,4 +86,4 @@ def stream(
 
 
 def _ranks(n: int, probabilities: Iterable[float], confidence: float) -> set[int]:
-    return set().union(*(ranks_read(n, one, confidence) for one in probabilities))
+    return set().union(*(ranks_read(n, probability, confidence) for probability in probabilities))

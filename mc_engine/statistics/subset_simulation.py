@@ -56,10 +56,10 @@ class Members(NamedTuple):
 
 
 class Climb(NamedTuple):
-    """Where the levels led to.
+    """The last level reached.
 
-    reached : float64[runs], each run's probability of the last level, which `members` stand for.  weight : float64, of
-    every case flown.  flat : whether ties of the margin ended it.
+    reached : float64[runs], each run's probability of the last level, which `members` represent.  weight : float64, of
+        every case flown.  flat : whether equal margins ended the levels.
     """
 
     members: Members
@@ -89,7 +89,7 @@ def subset_simulation(
     if runs < 3 or per_run * SHARE < FEWEST_SEEDS:
         raise ValueError(f"{cases_per_level} cases per level are too few for {runs} runs; 3 runs of 50 are the least")
     flights, rng = Flights(margin, noise), stream(seed, "subset simulation", 0)
-    climb = _climb(flights, rng, n_inputs, runs, per_run)
+    climb = _run_levels(flights, rng, n_inputs, runs, per_run)
     if len(climb.levels) == 1:
         return plain_count(flights, climb.levels, confidence)
     estimates = climb.reached * _shares(climb.members.run[climb.members.margin <= 0.0], runs, per_run)
@@ -103,8 +103,8 @@ def subset_simulation(
     return RareEvent("subset", mean, lower, upper, confidence, error, climb.levels, cases, remarks)
 
 
-def _climb(flights: Flights, rng: np.random.Generator, n_inputs: int, runs: int, per_run: int) -> Climb:
-    """Level by level to the failures, or to where there is no further level."""
+def _run_levels(flights: Flights, rng: np.random.Generator, n_inputs: int, runs: int, per_run: int) -> Climb:
+    """Level by level to the failures, or until there is no further level."""
     n = per_run * runs
     fresh, run = np.full(n, FRESH), np.repeat(np.arange(runs), per_run)
     members = _flown(flights, rng.standard_normal((n, n_inputs)), fresh, run, 0)
@@ -169,10 +169,10 @@ def _chains(
         u = np.sqrt(1.0 - sigma * sigma) * state.u + sigma * rng.standard_normal(state.u.shape)
         noise = np.where(rng.random(length.size) < _KEEPS_NOISE, state.noise, FRESH)
         flown = _flown(flights, u, noise, state.run, level)
-        taken = flown.margin <= threshold
-        state = _chosen(taken, flown, state)
+        accepted = flown.margin <= threshold
+        state = _chosen(accepted, flown, state)
         kept.append(state)
-        shares.append(float(taken.mean()))
+        shares.append(float(accepted.mean()))
         scale = min(max(scale * math.exp((shares[-1] - _WANTED_ACCEPTANCE) / math.sqrt(len(shares))), 1e-3), 10.0)
     members = Members(*(np.concatenate(values) for values in zip(*kept, strict=True)))
     return members, float(np.mean(shares)), scale
@@ -188,9 +188,10 @@ def _shared_out(seeds: Members, per_run: int) -> tuple[Members, np.ndarray]:
     return seeds, per_run // each + (place < per_run % each)
 
 
-def _chosen(taken: np.ndarray, new: Members, old: Members) -> Members:
+def _chosen(accepted: np.ndarray, new: Members, old: Members) -> Members:
     return Members(
-        np.where(taken[:, None], new.u, old.u), *(np.where(taken, a, b) for a, b in zip(new[1:], old[1:], strict=True))
+        np.where(accepted[:, None], new.u, old.u),
+        *(np.where(accepted, a, b) for a, b in zip(new[1:], old[1:], strict=True)),
     )
 
 

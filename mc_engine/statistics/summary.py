@@ -1,8 +1,8 @@
-"""Summary of one metric over the cases: how many numbers there are, where they lie, how surely.
+"""Summary of one metric over the cases: moments, extremes and quantiles with their confidence intervals.
 
-Every summary says n_used of n_tried: failed cases and NaN have no number, and are never dropped silently.
-Nothing in it is an approximation of a stream: mean and quantiles are exact whether the values are at hand
-(`summarize`) or seen part by part (`streaming`), and no bit depends on the order or the size of the parts.
+Every summary states n_used of n_tried: failed cases and NaN have no number, and are never dropped silently.  Mean and
+quantiles are exact, whether the values are in memory (`summarize`) or read part by part (`streaming`), and no bit
+depends on the order or the size of the parts.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,21 @@ def nearly_equal(low: float, high: float) -> bool:
 
 @dataclass(frozen=True)
 class Summary:
-    """Statistics of the finite values of a metric; what n_used is too small for is None (or no quantile)."""
+    """Statistics of one metric; what n_used is too small for is None, or an empty tuple.
+
+    n_used : int, cases with a finite value
+    n_tried : int, all cases
+    mean : float or None
+    sd : float or None, standard deviation with n - 1 in its denominator
+    minimum : float or None
+    maximum : float or None
+    quantiles : tuple of Quantile, in the order asked for
+    confidence : float, of the quantiles' intervals
+    shape : Normality or None
+
+    >>> summarize(np.array([1.0, 2.0, 3.0, np.nan])).sd
+    1.0
+    """
 
     n_used: int
     n_tried: int
@@ -38,13 +52,12 @@ class Summary:
 
     @property
     def constant(self) -> bool:
-        """All values that there are are the same, but for rounding."""
+        """Whether all values are the same, but for rounding."""
         return self.minimum is not None and self.maximum is not None and nearly_equal(self.minimum, self.maximum)
 
     @property
     def spread(self) -> float | None:
-        """sd, or None where it is that of rounding or nothing: the digits of a number that it would ask for mean
-        nothing."""
+        """The standard deviation, or None where it is only rounding."""
         return None if self.constant else self.sd
 
     def at(self, probability: float) -> Quantile | None:
@@ -53,10 +66,19 @@ class Summary:
 
 
 def summarize(values: np.ndarray, *, probabilities: tuple[float, ...] = QUANTILES, confidence: float = 0.90) -> Summary:
-    """Summary of `values` (float64[n_tried]; NaN and infinite values count as tried, not as used).
+    """Moments and quantiles of a metric, the same to the last bit in any order of the cases.
 
-    sd has n - 1 in its denominator and is None below two values.  Each quantile limit holds with a
-    probability of 1 - (1 - confidence)/2.  No bit of it depends on the order of the values.
+    values : float64[n_tried]; NaN and infinite values count as tried, not as used
+    probabilities : tuple of float, of the quantiles
+    confidence : float in (0, 1), of the two-sided intervals on the quantiles
+
+    Returns a Summary.
+
+    Raises nothing: without a finite value its numbers are None.
+
+    >>> summary = summarize(np.arange(1001.0))
+    >>> summary.mean, summary.at(0.5).value
+    (500.0, 500.0)
     """
     tally = Tally()
     finite = tally.add(np.asarray(values, dtype=np.float64))
@@ -65,7 +87,9 @@ def summarize(values: np.ndarray, *, probabilities: tuple[float, ...] = QUANTILE
     spread = Spread(tally)
     spread.add(finite)
     ordered = np.sort(finite)
-    return summary_of(spread, tuple(quantile(ordered, one, confidence) for one in probabilities), confidence)
+    return summary_of(
+        spread, tuple(quantile(ordered, probability, confidence) for probability in probabilities), confidence
+    )
 
 
 def without_number(tally: Tally, confidence: float) -> Summary:

@@ -1,19 +1,19 @@
-"""Limits on the share of passing cases that hold at every number of cases at once, whoever stops when and why.
+"""Confidence bounds on the probability that a case passes that hold at every number of cases at once (anytime-valid).
 
-Clopper-Pearson limits hold for a number of cases that was fixed in advance.  Looked at again and again until they
-say what one hopes for, they are wrong more often than promised.  The limits here may be looked at after every case:
-with the stated confidence they hold at all of them.  They are wider; near 99.73 % with 90 % confidence and no
-failure, 1104 cases take the place of 852.
+Clopper-Pearson bounds hold for a number of cases that was fixed in advance.  Checked repeatedly until they show what
+one hopes for, they are wrong more often than stated.  These bounds may be checked after every case and hold at all of
+them with the stated confidence.  They are wider; near 99.73 % with 90 % confidence and no failure, 1104 cases are
+needed instead of 852.
 
-A failure rate q0 is given up once the mixed likelihood ratio
+A failure rate q0 is rejected once the mixed likelihood ratio
 
     e(q0) = integral of w(q) (q / q0)^k ((1 - q) / (1 - q0))^(n - k) dq       k failures in n cases
 
-reaches 1 / (1 - confidence).  Under q0 it is a martingale that starts at 1, so it ever gets there with a probability
-of at most 1 - confidence (Ville, Etude critique de la notion de collectif, 1939; Robbins, Ann. Math. Statist. 41
-(1970), 1397-1409; Howard, Ramdas, McAuliffe & Sekhon, Ann. Statist. 49 (2021), 1055-1080).  The weights w(q) go as
-q^(-1/2) on the side that would refute q0, below it for the lower limit on the passing share and above it for the
-upper one, and as nothing on the other.  Valid for independent cases (design `mc`).
+reaches 1 / (1 - confidence).  Under q0 it is a martingale that starts at 1, so it ever gets there with a probability of
+at most 1 - confidence (Ville, Etude critique de la notion de collectif, 1939; Robbins, Ann. Math. Statist. 41 (1970),
+1397-1409; Howard, Ramdas, McAuliffe & Sekhon, Ann. Statist. 49 (2021), 1055-1080).  The weights w(q) are proportional
+to q^(-1/2) on the side that would refute q0, below it for the lower bound on the passing probability and above it for
+the upper one, and zero on the other.  Valid for independent cases (design `mc`).
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
     if passed == 0:
         return 0.0
     failures, wanted = tried - passed, -log(1.0 - confidence)
-    return 1.0 - _crossing(lambda q: _evidence_below(failures, tried, q) >= wanted, failures / tried, 1.0)
+    return 1.0 - _crossing(lambda q: _evidence(failures, tried, q, below=True) >= wanted, failures / tried, 1.0)
 
 
 def upper_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
@@ -43,7 +43,7 @@ def upper_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
     if passed == tried:
         return 1.0
     failures, wanted = tried - passed, -log(1.0 - confidence)
-    return 1.0 - _crossing(lambda q: _evidence_above(failures, tried, q) >= wanted, failures / tried, 0.0)
+    return 1.0 - _crossing(lambda q: _evidence(failures, tried, q, below=False) >= wanted, failures / tried, 0.0)
 
 
 def acceptance_number(tried: int, share: float, confidence: float) -> int | None:
@@ -69,18 +69,12 @@ def _crossing(refuted: Callable[[float], bool], kept: float, end: float) -> floa
     return end
 
 
-def _evidence_below(failures: int, tried: int, rate: float) -> float:
-    """log e(rate), the weights on failure rates below `rate`."""
+def _evidence(failures: int, tried: int, rate: float, below: bool) -> float:
+    """log e(rate), the weights on failure rates below `rate`, or above it."""
     a, b = failures + _POWER, tried - failures + 1.0
-    mass = log(_POWER) - _POWER * log(rate)
-    return float(mass + betaln(a, b) + np.log(betainc(a, b, rate)) - _log_likelihood(failures, tried, rate))
-
-
-def _evidence_above(failures: int, tried: int, rate: float) -> float:
-    """log e(rate), the weights on failure rates above `rate`."""
-    a, b = failures + _POWER, tried - failures + 1.0
-    mass = log(_POWER) - np.log1p(-(rate**_POWER))
-    return float(mass + betaln(a, b) + np.log(betaincc(a, b, rate)) - _log_likelihood(failures, tried, rate))
+    mass = log(_POWER) - (_POWER * log(rate) if below else np.log1p(-(rate**_POWER)))
+    share = betainc(a, b, rate) if below else betaincc(a, b, rate)
+    return float(mass + betaln(a, b) + np.log(share) - _log_likelihood(failures, tried, rate))
 
 
 def _log_likelihood(failures: int, tried: int, rate: float) -> float:

@@ -1,13 +1,13 @@
-"""Tolerance limits: the limits that the cases at hand do show, whatever was required, distribution-free.
+"""Ranks of distribution-free tolerance limits: the limits that the cases at hand demonstrate, whatever was required.
 
-An upper limit is the (A + 1)-th largest value when A is the most failures with which so many cases still show the
-share (Wilks, Ann. Math. Statist. 12 (1941), 91-96).  Two limits leave A + 1 values out in all, its own two among
-them; which end loses the next one may depend on those lost before (Tukey, Ann. Math. Statist. 18 (1947), 529-539;
-Fraser, Ann. Math. Statist. 22 (1951), 372-381).  Cases without a number are worse than every number and are lost
-first.  A limit that would need more cases than there are is None, never a guess.
+An upper limit is the (A + 1)-th largest value when A is the most failures with which so many cases still demonstrate
+the probability (Wilks, Ann. Math. Statist. 12 (1941), 91-96).  Two limits leave A + 1 values out in all, their own two
+among them; which end loses the next one may depend on those lost before (Tukey, Ann. Math. Statist. 18 (1947), 529-539;
+Fraser, Ann. Math. Statist. 22 (1951), 372-381).  Cases without a number are worse than every number and are lost first.
+A limit that would need more cases than there are is None.
 
-Everywhere, `usable` is how many cases have a number, and `accepted` the acceptance number of these and of the
-`no_number` others, None if there is none.  Ranks are those of order statistics, 1 ... usable.
+usable : cases with a number.  accepted : acceptance number of these and of the `no_number` others, None if there is
+    none.  Ranks are those of order statistics, 1 ... usable.
 """
 
 

@@ -1,15 +1,15 @@
-"""Total indices from the cases at hand: what an input does to a metric alone and together with others.
+"""Total Sobol' indices from any random cases: the effect of an input alone and together with others.
 
     total[i] = E[Var(metric | all inputs but i)] / Var(metric)
 
 A surrogate of the metric is fitted to the cases: a sum of products of orthonormal functions of one, two and (between
-inputs that were found to act in pairs) three inputs, only those products that the cases show beyond chance.  Of such
-a sum every variance is the sum of the squared coefficients.  Steps of a single input, which polynomials follow badly,
-are added from the means of its bins.
+inputs that were found to act in pairs) three inputs, with only those products that are significant.  The variance of
+such a sum is the sum of the squared coefficients.  Steps in a single input, which polynomials follow badly, are added
+from the means of its bins.
 
-Holds for inputs that are independent of each other.  What the surrogate does not explain (noise in flight, sharp
-corners of three and more inputs, an edge between passed and failed cases) belongs to no input: `unexplained` says how
-much of the variance that is, and a total index may lie higher by up to it.
+Valid for independent inputs.  What the surrogate does not explain (noise in flight, sharp corners of three and more
+inputs, an edge between passed and failed cases) belongs to no input: `unexplained` is its fraction of the variance, and
+a total index may be larger by up to it.
 
 Sudret, Reliab. Eng. Syst. Saf. 93 (2008), 964-979 (indices from polynomial chaos); Blatman & Sudret, Prob. Eng. Mech.
 25 (2010), 183-197 (sparse, chosen by the data).
@@ -60,29 +60,24 @@ def total_order(columns: Sequence[InputColumn], table: np.ndarray) -> tuple[np.n
     columns : that vary, without a missing value.  table : float64[n, n_metrics], finite, none constant.  The error is
     that of chance in the cases and the fit; what is unexplained is not part of it.
     """
-    rows = _some_rows(len(table), len(columns))
+    most = max(MOST_VALUES // len(columns), FEWEST_PICKED)
+    rows = np.linspace(0, len(table) - 1, min(most, len(table))).astype(np.int64)
     columns, table = [column.at(rows) for column in columns], table[rows]
     n, n_metrics = table.shape
     basis = [_functions(column, n) for column in columns]
-    low = np.column_stack([one.values[:, one.degree <= SCREENED_DEGREE] for one in basis])
+    low = np.column_stack([functions.values[:, functions.degree <= SCREENED_DEGREE] for functions in basis])
     shape = (len(columns), n_metrics)
     total, error = np.zeros(shape), np.zeros(shape)
     centred = (table - table.mean(axis=0)) / table.std(axis=0)
     left, noise = np.empty_like(centred), np.empty(n_metrics)
     for metric in range(n_metrics):
-        fit = _fit(basis, low, centred[:, metric])
+        fit = _surrogate(basis, low, centred[:, metric])
         left[:, metric], noise[metric] = fit.left, fit.noise
         total[:, metric], error[:, metric] = _indices(basis, fit)
     steps, steps_error = _steps(columns, left)
     unexplained = noise / np.maximum(1.0, noise)
     total, error = total + unexplained * steps, np.hypot(error, unexplained * steps_error)
     return total, error, np.maximum(unexplained * (1.0 - steps.sum(axis=0)), 0.0)
-
-
-def _some_rows(n: int, n_inputs: int) -> np.ndarray:
-    """All rows, or of very many an even choice: the functions of all inputs stand in memory together."""
-    most = max(MOST_VALUES // n_inputs, FEWEST_PICKED)
-    return np.arange(n) if n <= most else np.linspace(0, n - 1, most).astype(np.int64)
 
 
 # ---- functions of one input
@@ -100,7 +95,7 @@ def _functions(column: InputColumn, n: int) -> _Functions:
     u = (2.0 * average_ranks(column.values) - 1.0) / n - 1.0
     raw = [(z**k, k) for k in range(1, min(degree, PLAIN_DEGREE) + 1)]
     raw += [(eval_legendre(k, u), k) for k in range(1, degree + 1)]
-    raw.sort(key=lambda one: one[1])  # of a degree, the power comes first
+    raw.sort(key=lambda power: power[1])  # of a degree, the power comes first
     return _orthonormal([values for values, _ in raw[: max(distinct - 1, 1)]], [k for _, k in raw])
 
 
@@ -128,8 +123,8 @@ def _steps(columns: Sequence[InputColumn], left: np.ndarray) -> tuple[np.ndarray
     """Share of what is left that single inputs give after all, by their bins, with its error; 0 if within chance."""
     share, error = np.zeros((2, len(columns), left.shape[1]))
     open_ = left.var(axis=0) > _NEARLY_ALL
-    for one, column in enumerate(columns if open_.any() else []):
-        share[one, open_], error[one, open_] = np.nan_to_num(first_order(column, left[:, open_]))
+    for index, column in enumerate(columns if open_.any() else []):
+        share[index, open_], error[index, open_] = np.nan_to_num(first_order(column, left[:, open_]))
     sure = share > float(-ndtri(0.05 / len(columns))) * error
     share = np.where(sure, share, 0.0)
     share /= np.maximum(share.sum(axis=0), 1.0)
@@ -155,9 +150,9 @@ class _Fit:
         return float((self.left**2).sum() / max(len(self.y) - 1 - len(self.terms), 1))
 
 
-def _fit(basis: Sequence[_Functions], low: np.ndarray, y: np.ndarray) -> _Fit:
+def _surrogate(basis: Sequence[_Functions], low: np.ndarray, y: np.ndarray) -> _Fit:
     """First single inputs, then pairs that what is left depends on, then triples of inputs that act in pairs."""
-    groups: list[Group] = [(one,) for one in range(len(basis))]
+    groups: list[Group] = [(index,) for index in range(len(basis))]
     fit = _extended(basis, _refit(basis, _Fit((), np.empty((y.size, 0)), np.empty(0), y, y), []), groups)
     pairs: set[Group] = set()
     for _ in range(_PASSES):
@@ -197,10 +192,10 @@ def _candidates(
     terms: list[Term] = []
     scores = []
     for group in groups:
-        functions = [basis[one] for one in group]
-        degree, sums = functions[0].degree, _sums([one.values for one in functions], left)
-        for one in functions[1:]:
-            degree = np.add.outer(degree, one.degree)
+        functions = [basis[index] for index in group]
+        degree, sums = functions[0].degree, _sums([function.values for function in functions], left)
+        for function in functions[1:]:
+            degree = np.add.outer(degree, function.degree)
         places = np.argwhere(degree <= MOST_DEGREE)
         terms += [tuple(zip(group, which, strict=True)) for which in places.tolist()]
         scores.append(sums[tuple(places.T)])
@@ -217,7 +212,7 @@ def _sums(functions: Sequence[np.ndarray], left: np.ndarray) -> np.ndarray:
 
 
 def _column(basis: Sequence[_Functions], term: Term) -> np.ndarray:
-    return np.prod([basis[one].values[:, which] for one, which in term], axis=0)
+    return np.prod([basis[index].values[:, which] for index, which in term], axis=0)
 
 
 def _has_no_tail(column: np.ndarray) -> bool:
@@ -241,20 +236,22 @@ def _acting_pairs(basis: Sequence[_Functions], low: np.ndarray, left: np.ndarray
     low : their functions of low degree side by side.  Without a pair the sum of the squared scores of its products
     is chi-squared; Bonferroni over all pairs.
     """
-    owner = np.repeat(np.arange(len(basis)), [np.count_nonzero(one.degree <= SCREENED_DEGREE) for one in basis])
+    owner = np.repeat(
+        np.arange(len(basis)), [np.count_nonzero(functions.degree <= SCREENED_DEGREE) for functions in basis]
+    )
     member = (owner[:, None] == np.arange(len(basis))).astype(np.float64)
     squares = member.T @ (low.T @ (low * left[:, None])) ** 2 @ member / (left**2).sum()
-    one, two = np.triu_indices(len(basis), 1)
+    first, two = np.triu_indices(len(basis), 1)
     freedom = member.sum(axis=0)
-    p_value = chdtrc(freedom[one] * freedom[two], squares[one, two])
-    found = np.flatnonzero(p_value < FALSE_PAIRS / max(one.size, 1))
-    order = found[np.lexsort((-squares[one, two][found], p_value[found]))][:MOST_PAIRS]
-    return [(int(one[k]), int(two[k])) for k in order]
+    p_value = chdtrc(freedom[first] * freedom[two], squares[first, two])
+    significant = np.flatnonzero(p_value < FALSE_PAIRS / max(first.size, 1))
+    order = significant[np.lexsort((-squares[first, two][significant], p_value[significant]))][:MOST_PAIRS]
+    return [(int(first[k]), int(two[k])) for k in order]
 
 
 def _triples(pairs: set[Group]) -> list[Group]:
     """Three inputs that act in pairs, each with each other."""
-    inputs = sorted({one for pair in pairs for one in pair})
+    inputs = sorted({index for pair in pairs for index in pair})
     acting: list[Group] = [
         three for three in combinations(inputs, 3) if all(two in pairs for two in combinations(three, 2))
     ]
@@ -274,7 +271,7 @@ def _indices(basis: Sequence[_Functions], fit: _Fit) -> tuple[np.ndarray, np.nda
     n, n_inputs = fit.y.size, len(basis)
     member = np.zeros((len(fit.terms), n_inputs))
     for k, term in enumerate(fit.terms):
-        member[k, [one for one, _ in term]] = 1.0
+        member[k, [index for index, _ in term]] = 1.0
     active = np.flatnonzero(member.any(axis=0))
     share, error = np.zeros(n_inputs), np.full(n_inputs, 1.0 / n)
     if not active.size:
@@ -286,7 +283,7 @@ def _indices(basis: Sequence[_Functions], fit: _Fit) -> tuple[np.ndarray, np.nda
     explained = (fit.y - fit.left)[:, None]
     left = fit.left[:, None]
     of_cases = part**2 - share[active] * explained**2
-    low = np.column_stack([basis[one].values[:, basis[one].degree <= _ERROR_DEGREE] for one in active.tolist()])
+    low = np.column_stack([basis[index].values[:, basis[index].degree <= _ERROR_DEGREE] for index in active.tolist()])
     influence = low @ (low.T @ of_cases) / n
     influence += 2.0 * part * left - share[active] * (2.0 * explained * left + left**2)
     error[active] = influence.std(axis=0) / (whole * np.sqrt(n))

@@ -1,7 +1,7 @@
 """The worst cases of a metric: those with the smallest margin to the nearest limit that a requirement sets.
 
-A metric without a requirement has no bad side of its own: its worst cases are then those with the largest values, or
-with the smallest where somebody asks for them.  Failed cases have no number and are listed apart.
+Without a requirement, the largest values are the worst, or the smallest where the campaign file asks for them.  Failed
+cases have no number and are listed separately.
 """
 
 from collections.abc import Iterable, Mapping
@@ -43,9 +43,9 @@ class Limits(NamedTuple):
 
 def limits_on(metric: str, requirements: Iterable[Mapping[str, Any]]) -> Limits:
     """The tightest limits that these records ("metric", "at_most", "at_least") set on a metric."""
-    records = [one for one in requirements if one["metric"] == metric]
-    upper = [float(one["at_most"]) for one in records if one.get("at_most") is not None]
-    lower = [float(one["at_least"]) for one in records if one.get("at_least") is not None]
+    records = [requirement for requirement in requirements if requirement["metric"] == metric]
+    upper = [float(record["at_most"]) for record in records if record.get("at_most") is not None]
+    lower = [float(record["at_least"]) for record in records if record.get("at_least") is not None]
     return Limits(min(upper, default=None), max(lower, default=None))
 
 
@@ -59,10 +59,20 @@ def _goodness(values: np.ndarray, largest: bool, limits: Limits | None) -> np.nd
 def worst_cases(
     values: np.ndarray, ok: np.ndarray, count: int, largest: bool = True, limits: Limits | None = None
 ) -> np.ndarray:
-    """Row numbers (int64[<= count]), worst first, ties in row order.
+    """The worst cases of a metric, worst first.
 
-    values : float64[n], ok : bool[n].  limits : the worst have the smallest margin to the nearest of them; without
-    any, the largest values are the worst, or the smallest.
+    values : float64[n], the metric
+    ok : bool[n], whether the case was completed
+    count : int, how many cases
+    largest : bool, without limits, whether the largest values are the worst
+    limits : Limits or None; with limits, the worst cases have the smallest margin to the nearest of them
+
+    Returns row numbers, int64, `count` at most; ties in row order.  Cases without a finite value are left out.
+
+    Raises nothing.
+
+    >>> worst_cases(np.array([3.0, 9.0, np.nan, 5.0]), np.ones(4, dtype=bool), 2).tolist()
+    [1, 3]
     """
     values = np.asarray(values, dtype=np.float64)
     rows = np.flatnonzero(np.asarray(ok, dtype=bool) & np.isfinite(values))
@@ -74,7 +84,10 @@ def worst_cases(
 
 
 class WorstSoFar:
-    """The same of cases that are seen part by part, in the order of their numbers.  case_ids : of the worst, int64."""
+    """As `worst_cases`, for cases that are read part by part in the order of their numbers.
+
+    case_ids : int64, of the worst.
+    """
 
     def __init__(self, count: int, limits: Limits):
         self.count, self.limits = count, limits
@@ -82,11 +95,11 @@ class WorstSoFar:
 
     def add(self, values: np.ndarray, first: int) -> None:
         """values : float64[n] of the cases `first` and on, NaN for one that was not completed."""
-        found = np.isfinite(values)
-        goodness = _goodness(values if found.all() else np.where(found, values, np.nan), True, self.limits)
+        candidates = np.isfinite(values)
+        goodness = _goodness(values if candidates.all() else np.where(candidates, values, np.nan), True, self.limits)
         if self.case_ids.size == self.count:
-            found &= goodness < self._goodness[-1]
-        rows = np.flatnonzero(found)
+            candidates &= goodness < self._goodness[-1]
+        rows = np.flatnonzero(candidates)
         if rows.size:
             rows = rows[worst_cases(-goodness[rows], np.ones(rows.size, dtype=bool), self.count)]
             together = np.concatenate([self._goodness, goodness[rows]])

@@ -1,11 +1,11 @@
-"""Files that count by a journal, each of whose lines names some with their bytes and SHA-256.
+"""Sets of files that a journal records, so that files written together are replaced together.
 
     {"n": 2, ..., "event": "files", "files": [{"file": "report.html", "bytes": 4711, "sha256": ...}], "removed": []}
 
-The directories of `tune` and `rare` are kept so, and in every directory the reports and replays made of it.  Files that
-are written together change together: each stands complete under a temporary name when the line is written that names
-them all, and takes its own name afterwards.  A kill leaves the old files or the new ones: one that counts and still
-has its temporary name is read there, and the next writer names it.
+Used for the results of `tune` and `rare`, and for reports and replays in any directory.  Each file is first written
+completely under a temporary name, then one journal line records them all, then each file is renamed.  After a kill
+either the old or the new files are valid: a recorded file that still has its temporary name is read under that name,
+and the next writer renames it.
 """
 
 import os
@@ -56,18 +56,18 @@ class _Line(BaseModel):
 
 @dataclass(frozen=True)
 class _State:
-    """What counts by the content of a journal.  damage : what is wrong with a line, by its number."""
+    """Content of a journal, the receipts of the files that it records, and by line number what is damaged."""
 
     content: bytes
-    found: Scan
+    lines: Scan
     receipts: Mapping[str, _Receipt]
     damage: Mapping[int, str]
 
 
 class CountedFiles:
-    """The files of the directory `root` that the journal of this name counts.
+    """The files of the directory `root` that the journal of this name records.
 
-    names : what they can be called, with slashes.  folders : those in the directory that hold nothing else.
+    names : pattern of the files' names, relative to `root`.  folders : folders in `root` that hold only such files.
     """
 
     def __init__(
@@ -77,52 +77,54 @@ class CountedFiles:
         self._names, self._lock = names, lock
 
     def are_called(self, name: str) -> bool:
-        """Can one of these files have this name, or is it what they are kept with?"""
-        return name in (self.journal, self._lock, *self.folders) or self._is_one(name)
+        """True for names that such files can have, and for the journal, its lock and the folders."""
+        return name in (self.journal, self._lock, *self.folders) or self._is_name(name)
 
-    def _is_one(self, name: str) -> bool:
+    def _is_name(self, name: str) -> bool:
         return self._names.fullmatch(name) is not None
 
     # ---- reading
 
     def read(self, names: Iterable[str] | None = None) -> dict[str, bytes]:
-        """The contents of these files, or of all that count, as they were together at one moment.
+        """Contents by name of these files, or of all recorded ones, as of one state of the journal.
 
-        StoreError naming one that is damaged, or does not count.
+        StoreError that names a file which is damaged or not recorded.
         """
         while True:
             state = self._state()
-            looked = {name: self._look(state, name) for name in (state.receipts if names is None else names)}
-            wrong = [(name, why) for name, (_, why) in looked.items() if why]
-            if not wrong:
-                return {name: content for name, (content, _) in looked.items()}
-            if self._bytes() == state.content:  # nobody has replaced them meanwhile
-                raise StoreError(f"{self.root / wrong[0][0]}: {wrong[0][1]}")
+            files = {name: self._verified(state, name) for name in (state.receipts if names is None else names)}
+            problems = [(name, problem) for name, (_, problem) in files.items() if problem]
+            if not problems:
+                return {name: content for name, (content, _) in files.items()}
+            if self._bytes() == state.content:  # else another process has replaced the files meanwhile
+                raise StoreError(f"{self.root / problems[0][0]}: {problems[0][1]}")
 
     def read_with_journal(self) -> dict[str, bytes]:
-        """All that counts, and last the journal that says so; empty without one."""
+        """Contents by name of all recorded files, and last of the journal; empty if there is no journal."""
         while True:
             before, contents = self._bytes(), self.read()
             if self._bytes() == before:
                 return {**contents, self.journal: before} if before else {}
 
     def problems(self, others: Collection[str] = ()) -> list[tuple[str, str]]:
-        """All that is wrong: the name of a file of the directory, and what it is.
+        """All problems, each as the name of a file and what is wrong with it.
 
-        others : files that lie in the folders for another reason.
+        others : files that may lie in the folders although the journal does not record them.
         """
         while True:
             try:
                 state, busy = self._state(), holder(self.root, self._lock, self.journal) is not None
             except StoreError as error:  # no regular file
-                return [self._parted(error)]
-            found = [(f"{self.journal}, line {number}", f"damaged{why}") for number, why in state.damage.items()]
-            if state.found.torn and not busy:
-                found.append((f"{self.journal}, line {len(state.found.entries) + 1}", "damaged, or torn by a crash"))
-            found += [(name, why) for name in state.receipts if (why := self._look(state, name)[1])]
-            found += [] if busy else [one for one in self._strays(state) if one[0] not in others]
-            if not found or self._bytes() == state.content:
-                return found
+                return [self._name_and_problem(error)]
+            problems = [(f"{self.journal}, line {number}", f"damaged{why}") for number, why in state.damage.items()]
+            if state.lines.torn and not busy:
+                last = f"{self.journal}, line {len(state.lines.entries) + 1}"
+                problems.append((last, "damaged, or torn by a crash"))
+            problems += [(name, why) for name in state.receipts if (why := self._verified(state, name)[1])]
+            if not busy:
+                problems += [(name, why) for name, why in self._unrecorded(state) if name not in others]
+            if not problems or self._bytes() == state.content:
+                return problems
 
     def _bytes(self) -> bytes:
         path = self.root / self.journal
@@ -130,23 +132,23 @@ class CountedFiles:
 
     def _state(self) -> _State:
         content = self._bytes()
-        found, receipts = scan(content), dict[str, _Receipt]()
-        damage = dict.fromkeys(found.damaged, "")
-        for entry in found.entries:
+        lines, receipts = scan(content), dict[str, _Receipt]()
+        damage = dict.fromkeys(lines.damaged, "")
+        for entry in lines.entries:
             try:
                 line = _Line.model_validate(entry.facts)
             except ValidationError:
                 line = None
-            if line is None or not all(self._is_one(one.file) for one in line.files):
+            if line is None or not all(self._is_name(receipt.file) for receipt in line.files):
                 damage[entry.number] = ", as no engine writes it"
                 continue
-            receipts.update({one.file: one for one in line.files})
+            receipts.update({receipt.file: receipt for receipt in line.files})
             for name in line.removed:
                 receipts.pop(name, None)
-        return _State(content, found, receipts, damage)
+        return _State(content, lines, receipts, damage)
 
-    def _look(self, state: _State, name: str) -> tuple[bytes, str]:
-        """The content of a file that counts, or else what is wrong with it."""
+    def _verified(self, state: _State, name: str) -> tuple[bytes, str]:
+        """The content of a recorded file and "", or b"" and what is wrong with the file."""
         receipt, why = state.receipts.get(name), ""
         if receipt is None:
             return b"", f"does not count, {self.journal} does not name it"
@@ -161,53 +163,53 @@ class CountedFiles:
             why = why or f"damaged, its SHA-256 is not the one in {self.journal}"
         return b"", why
 
-    def _strays(self, state: _State) -> Iterator[tuple[str, str]]:
+    def _unrecorded(self, state: _State) -> Iterator[tuple[str, str]]:
         try:
-            for name in self._lying():
+            for name in self._present():
                 if not is_temporary(name.rpartition("/")[2]) and name not in state.receipts:
                     yield name, f"does not count, {self.journal} does not name it"
         except StoreError as error:  # a folder that is a symbolic link
-            yield self._parted(error)
+            yield self._name_and_problem(error)
 
-    def _parted(self, error: StoreError) -> tuple[str, str]:
-        """Name and sentence of an error that begins with a path in the directory."""
+    def _name_and_problem(self, error: StoreError) -> tuple[str, str]:
+        """An error that begins with a path in the directory, as the file's name and the problem."""
         name, _, why = str(error).removeprefix(f"{self.root}/").partition(": ")
         return name, why
 
-    def _lying(self) -> Iterator[str]:
-        """All that lies in the folders, and in the directory what these files are called."""
+    def _present(self) -> Iterator[str]:
+        """Names of all files in the folders, and of those in the directory that have a name of such a file."""
         for name in names_in(self.root):
             if name in self.folders:
                 yield from (f"{name}/{inner}" for inner in names_in(self.root, name))
-            elif self._is_one(_final(name)):
+            elif self._is_name(_final(name)):
                 yield name
 
     # ---- writing
 
     def write(self, files: Mapping[str, bytes], alone_in: str | None = None, lock: WriterLock | None = None) -> None:
-        """Let these files count, in place of those of the same names; and in the folder `alone_in` no others.
+        """Write and record these files, in place of those with the same names.
 
-        lock : of the directory, where the caller has it.
+        alone_in : a folder from which all other files are removed.  lock : the directory's, if the caller holds it.
         """
         if lock is not None:
             lock.check()
         with nullcontext() if lock is not None else WriterLock(self.root, self._lock, self.journal):
-            self._settle()
-            lying = [name for name in self._lying() if name.partition("/")[0] == alone_in]
-            gone = [name for name in lying if name not in files and self._is_one(name)]
-            self._write_aside(files)
-            self._append({name: _receipt(name, content) for name, content in files.items()}, gone)
+            self._complete_interrupted_write()
+            present = [name for name in self._present() if name.partition("/")[0] == alone_in]
+            obsolete = [name for name in present if name not in files and self._is_name(name)]
+            self._write_temporary(files)
+            self._record({name: _receipt(name, content) for name, content in files.items()}, obsolete)
             for name in files:
                 publish(self.root, temporary_name(name), name)
-            for name in gone:
+            for name in obsolete:
                 remove_file(self.root, name)
 
-    def _settle(self) -> None:
-        """Finish what a writer that was killed began: name what counts already, remove what does not."""
+    def _complete_interrupted_write(self) -> None:
+        """Rename the recorded files that a killed writer left under temporary names, and remove the others."""
         state = self._state()
-        for name in list(self._lying()):
+        for name in list(self._present()):
             file = _final(name)
-            if file == name or not self._is_one(file):
+            if file == name or not self._is_name(file):
                 continue
             receipt = state.receipts.get(file)
             with suppress(StoreError):
@@ -216,7 +218,7 @@ class CountedFiles:
                     continue
             remove_file(self.root, name)
 
-    def _write_aside(self, files: Mapping[str, bytes]) -> None:
+    def _write_temporary(self, files: Mapping[str, bytes]) -> None:
         try:
             for name, content in files.items():
                 make_way(self.root, name)
@@ -227,16 +229,16 @@ class CountedFiles:
                     remove_file(self.root, temporary_name(name))
             raise
 
-    def _append(self, receipts: Mapping[str, _Receipt], gone: Collection[str]) -> None:
-        """One line more; where another is damaged, a new journal of all that counts."""
+    def _record(self, receipts: Mapping[str, _Receipt], obsolete: Collection[str]) -> None:
+        """Append a line to the journal; if one is damaged, write a new journal of all recorded files."""
         state, journal = self._state(), (self.root, self.journal)
-        if state.found.entries and not state.damage:
-            line = _Line(files=[*receipts.values()], removed=[*gone])
-            content = encode(len(state.found.entries) + 1, utc_now(), _EVENT, line.model_dump())
-            append_synced(*journal, state.found.length, content)
+        if state.lines.entries and not state.damage:
+            line = _Line(files=[*receipts.values()], removed=[*obsolete])
+            content = encode(len(state.lines.entries) + 1, utc_now(), _EVENT, line.model_dump())
+            append_synced(*journal, state.lines.length, content)
         else:
-            counted = {**state.receipts, **receipts}
-            line = _Line(files=[one for name, one in counted.items() if name not in gone])
+            recorded = {**state.receipts, **receipts}
+            line = _Line(files=[receipt for name, receipt in recorded.items() if name not in obsolete])
             write_inside(*journal, encode(1, utc_now(), _EVENT, line.model_dump()))
 
 
@@ -245,6 +247,6 @@ def _receipt(name: str, content: bytes) -> _Receipt:
 
 
 def _final(name: str) -> str:
-    """The name that a file is to have, from its own or its temporary one."""
+    """The final name of a file, from its final or its temporary name."""
     folder, slash, last = name.rpartition("/")
     return f"{folder}{slash}{last[1:].removesuffix('.tmp')}" if is_temporary(last) else name

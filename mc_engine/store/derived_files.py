@@ -1,6 +1,6 @@
-"""Files made from the results of a run, a tuning or a rare event: reports and replays, which `derived.jsonl` counts.
+"""Reports and replays: files that are made from the results of a run, a tuning or a rare event.
 
-They are made again whenever one wants, also while the run still flies; so their journal is one of their own.
+They can be made at any time, also while the run is flying, and so have a journal of their own, `derived.jsonl`.
 """
 
 import re
@@ -23,7 +23,7 @@ def derived_files(folder: Path) -> CountedFiles:
 
 
 def remade_by(name: str) -> str:
-    """What mends a file of this name, with the directory and the file in braces."""
+    """What to do about a damaged file of this name; {0} stands for the directory, and {1} for the file."""
     match = _NAMES.fullmatch(name)
     if match is None and not name.startswith(f"{DERIVED}, "):
         return STRANGE

@@ -1,7 +1,7 @@
-"""Parts that workers had finished when their run was killed, before it came to count them.
+"""Recovery of parts that workers had written when the run was killed, but that the journal does not record yet.
 
-Such a part stands under a temporary name that ends in half its SHA-256, or has its own name already and a receipt
-beside it.  Where its bytes have their digest it is whole, and its cases need not be flown again.
+The name of such a part is temporary and ends in half its SHA-256; or it is final, and a receipt is next to it.  A part
+whose bytes match is complete, and its cases are not flown again.
 """
 
 import json
@@ -29,16 +29,16 @@ _RECEIPT = "cases/.receipt.tmp"
 
 
 def leave_receipt(run: Path, part: Part) -> None:
-    """Note which part gets its name and its line next.
+    """Write which part is renamed and recorded next.
 
-    Not synced, and not missed where the disk refuses: it saves a part after a kill, and nothing rests on it.
+    Not synced, and errors are ignored: without it a kill can cost one part, which is then flown again.
     """
     with suppress(StoreError):
         leave(run, _RECEIPT, json.dumps(asdict(part)).encode())
 
 
 def count_finished(store: "Store") -> None:
-    """Commit what is whole among the parts that a killed writer did not come to count; for the holder of the lock."""
+    """Commit the complete parts that a killed writer left unrecorded.  The caller holds the lock."""
     for written in finished_parts(store.path):
         cases = (written.part.first, written.part.stop)
         if store.missing(range(*cases)) == [cases] and cases[1] <= store.wanted.stop:
@@ -46,7 +46,7 @@ def count_finished(store: "Store") -> None:
 
 
 def finished_parts(run: Path) -> Iterator[Written]:
-    """What is whole among the parts of `run` that it did not come to count; their bytes are on the disk."""
+    """The complete, unrecorded parts of `run`; on return their bytes are synced to the disk."""
     noted = _noted(run)  # first: to commit a part writes another receipt
     if noted is not None and (part := _whole(run, noted.file, noted.file, noted.sha256)):
         yield Written(part, part.file)
@@ -57,15 +57,15 @@ def finished_parts(run: Path) -> Iterator[Written]:
 
 
 def _noted(run: Path) -> Part | None:
-    """The part of the last receipt; None if there is none, or it was cut off while it was written."""
+    """The part in the last receipt; None if there is none, or it is incomplete."""
     try:
         return receipt_of(json.loads(read_inside(run, _RECEIPT, limit=MOST_OF_TEXT)))
     except (StoreError, ValueError, RecursionError):
         return None
 
 
-def _whole(run: Path, place: str, file: str, digest: str) -> Part | None:
-    """The receipt of the part `file`, which lies in `place`; None if it was killed, or cut off, while it was written.
+def _whole(run: Path, present_name: str, file: str, digest: str) -> Part | None:
+    """The receipt of the part `file`, whose present name is given; None if the part is incomplete or missing.
 
     digest : its SHA-256, or the beginning of it.
     """
@@ -73,13 +73,13 @@ def _whole(run: Path, place: str, file: str, digest: str) -> Part | None:
     if cases is None:
         return None
     try:
-        content = read_inside(run, place)
-    except StoreError:  # not there, no file, or longer than any
+        content = read_inside(run, present_name)
+    except StoreError:  # missing, no regular file, or too long
         return None
     ours = sha256(content).hexdigest()
     if not ours.startswith(digest):
         return None
-    sync_file(run, place)
+    sync_file(run, present_name)
     try:
         status = parquet_table(content, ["status"])["status"].to_pylist()
         facts = {"file": file, "first": cases[0], "rows": len(status), "bytes": len(content), "sha256": ours}

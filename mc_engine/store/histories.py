@@ -1,4 +1,4 @@
-"""Histories as tables: case_id, time, and the quantities of the model with their units."""
+"""Tables of saved time histories: case_id, t_s, and the model's quantities with their units."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -37,7 +37,7 @@ def history_table(
 
 
 def read_histories(run: Path, part: Part, quantities: Sequence[Mapping[str, str]]) -> pa.Table:
-    """The histories that a run keeps; StoreError naming the file if a byte of it changed, or it holds no histories."""
+    """The saved time histories of a run; StoreError that names the file if it changed or holds no histories."""
     table = parts.read_part(run, part)
     problem = history_problem(table, quantities)
     if problem:
@@ -48,8 +48,8 @@ def read_histories(run: Path, part: Part, quantities: Sequence[Mapping[str, str]
 def history_problem(table: pa.Table, quantities: Sequence[Mapping[str, str]]) -> str:
     """What is wrong with the columns of a table of histories; empty if they are case_id, t_s and quantities."""
     names, known = table.column_names, {"case_id", "t_s", *(quantity["name"] for quantity in quantities)}
-    strange = {*names} - known if quantities else {}
-    wanted = parts.arrow_schema(history_columns(names, quantities))
-    if strange or not {"case_id", "t_s"} <= {*names} or not table.schema.equals(wanted, check_metadata=True):
+    unknown = {*names} - known if quantities else {}
+    expected = parts.arrow_schema(history_columns(names, quantities))
+    if unknown or not {"case_id", "t_s"} <= {*names} or not table.schema.equals(expected, check_metadata=True):
         return "its columns are not those of histories"
     return ""

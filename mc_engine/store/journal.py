@@ -1,8 +1,8 @@
-"""The journal of a run directory: what happened, one JSON line an event, in order.
+"""The journal of a run directory: one JSON line per event, in order.
 
-A line is `{"n": 7, "at": ..., "event": ..., facts..., "crc": "89abcdef"}`: its number counts from 1, its CRC-32
-covers every byte before the last member.  A line counts once it is synced.  The last line may be torn by a crash:
-readers ignore it and the next writer cuts it off.  Any other damaged line is refused with its number.
+A line is `{"n": 7, "at": ..., "event": ..., facts..., "crc": "89abcdef"}`: numbered from 1, with a CRC-32 of every byte
+before the last member.  A line is valid once it is synced.  The last line may be torn by a crash: readers ignore it and
+the next writer removes it.  Any other damaged line is an error that gives its number.
 """
 
 import json
@@ -35,9 +35,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Scan:
-    """What a journal file holds: the good entries, the bytes up to the last good line, and what is wrong.
+    """Content of a journal file.
 
-    damaged : numbers of the lines that cannot be trusted, the torn last one apart.
+    entries : the valid lines.  length : bytes up to the last valid line.  torn : the last line is incomplete.
+    damaged : numbers of the other lines that are not valid.
     """
 
     entries: tuple[Entry, ...]
@@ -69,16 +70,16 @@ def _decoded(line: bytes) -> Entry | None:
         facts = json.loads(body + b"}")
         number, at, event = facts.pop("n"), facts.pop("at"), facts.pop("event")
     except (ValueError, KeyError, AttributeError, TypeError, RecursionError):
-        return None  # a checksum that holds over something that is no event
+        return None  # the checksum is right, and the line is no event
     plausible = type(number) is int and isinstance(at, str) and isinstance(event, str)
     return Entry(number, at, event, facts) if plausible else None
 
 
 def scan(content: bytes) -> Scan:
-    """Judge every line of a journal's bytes.
+    """Check every line of a journal.
 
-    A flipped bit can join two lines, or cut one: the numbers that the lines have tell which are lost, and one that
-    counts on from the last good one is good wherever it stands.
+    A flipped bit can join two lines or split one.  The numbers in the lines tell which are lost; a line whose number
+    continues from the last valid one is valid wherever it is in the file.
     """
     lines = content.split(b"\n")
     rest = lines.pop()  # after the last newline: empty, or a torn line
@@ -87,7 +88,7 @@ def scan(content: bytes) -> Scan:
     last = unread = 0  # number of the last good line, lines since then
     for line in lines:
         entry = _decoded(line)
-        # The last condition bounds what a number that someone made up can cost.
+        # The last condition bounds the list of damaged lines where a line has an absurd number.
         if entry is None or entry.number < last + 1 + (unread > 0) or entry.number * _SHORTEST > len(content):
             unread += 1
             continue
@@ -97,7 +98,7 @@ def scan(content: bytes) -> Scan:
     torn = bool(rest)
     length = len(content) - len(rest)
     if not torn and unread:
-        # The newline of a torn write can reach the disk before the sectors in front of it.
+        # The newline of a torn write can reach the disk before the bytes in front of it.
         torn = True
         length -= len(lines[-1]) + 1
         unread -= 1
@@ -106,34 +107,34 @@ def scan(content: bytes) -> Scan:
 
 
 def read_journal(path: Path) -> bytes:
-    """The bytes of a journal file; StoreError if it is longer than any."""
+    """The bytes of a journal file; StoreError if it is too long to be one."""
     return read_file(path, limit=MOST_OF_JOURNAL)
 
 
 class Journal:
-    """A journal file, read whole; `append` adds one synced line.  Appending needs the directory's writer lock."""
+    """A journal file, read completely.  `append` adds a synced line, and needs the writer lock of the directory."""
 
     def __init__(self, path: Path):
         """Read `path`; StoreError with the line's number if a line that is not the last is damaged."""
         self.path = path
         content = read_journal(path)
-        found = scan(content)
-        if found.damaged:
-            number = found.damaged[0]
-            raise damaged_line(path, number, "its checksum or its number does not hold")
-        self.entries = list(found.entries)
-        self.torn = found.torn
-        self.certain = True  # False from an append that failed on: the file may hold a line that is not in `entries`
-        self._length, self._size = found.length, len(content)  # up to the last good line, and in all
+        lines = scan(content)
+        if lines.damaged:
+            number = lines.damaged[0]
+            raise damaged_line(path, number, "its checksum or its number is wrong")
+        self.entries = list(lines.entries)
+        self.torn = lines.torn
+        self.certain = True  # False after an append that failed: the file may hold a line that is not in `entries`
+        self._length, self._size = lines.length, len(content)  # up to the last valid line, and in all
 
     def append(self, event: str, facts: dict[str, Any]) -> Entry:
-        """Write and sync one line.  After an error the line does not count and `append` may be tried again."""
+        """Write and sync one line.  After an error the line is not valid, and `append` may be tried again."""
         number = len(self.entries) + 1
         line = encode(number, utc_now(), event, facts)
         entry = decode(line[:-1], number)
         assert entry is not None  # just encoded
         if self.certain and os.path.getsize(self.path) != self._size:
-            raise StoreError(f"{self.path}: another process has written here; this one stops, and adds nothing")
+            raise StoreError(f"{self.path}: another process has written here; this process stops and writes nothing")
         self.certain = False
         append_synced(self.path.parent, self.path.name, self._length, line)  # over a torn line, or one that failed
         self._length = self._size = self._length + len(line)
@@ -143,18 +144,18 @@ class Journal:
 
 
 def damaged_line(path: Path, number: int, why: str) -> StoreError:
-    """What to raise of a line that cannot be trusted, with the way out where there is one."""
-    way_out = f"; `mc-engine resume --repair {shell_word(path.parent)}` drops it and flies again what it told of"
+    """The error for a line that is not valid, with the command that repairs the run; line 1 cannot be repaired."""
+    way_out = f"; `mc-engine resume --repair {shell_word(path.parent)}` drops it and flies again what it recorded"
     return StoreError(f"{path}, line {number}: damaged, {why}{way_out * (number > 1)}")
 
 
 def utc_now() -> str:
-    """Time of day for a reader's eyes, to the millisecond."""
+    """The time in UTC as text, to the millisecond, for readers; the engine computes nothing from it."""
     return datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def plain(value: Any) -> Any:
-    """NumPy scalars and arrays as what JSON knows; TypeError for anything else."""
+    """NumPy scalars and arrays as types that JSON has; TypeError for anything else."""
     if hasattr(value, "tolist"):
         return value.tolist()
-    raise TypeError(f"{type(value).__name__} cannot stand in a run directory's JSON")
+    raise TypeError(f"{type(value).__name__} cannot be written as JSON in a run directory")

@@ -1,20 +1,20 @@
-"""The manifest of a run as it is read: whatever wrote the file, what comes out is what the engine works with.
+"""Reading and checking of a run's manifest: every member that the engine uses has its type and range.
 
-What is in it when the engine writes it, `mc_engine.runner.manifest` says.
+`mc_engine.runner.manifest` makes the content when a run begins.
 """
 
 import json
 from collections.abc import Iterator, Mapping
+from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import from_json
 
-from mc_engine.durable_file import sha256_inside
+from mc_engine.durable_file import read_inside
 from mc_engine.errors import ModelError, StoreError
-from mc_engine.model.figure_rules import refuse_kinds
-from mc_engine.model.figures import KINDS, from_record
+from mc_engine.model.figures import KINDS, from_record, refuse_kinds
 from mc_engine.section import ReportSection, Share
 from mc_engine.status import MOST_CASES
 from mc_engine.store.journal import plain
@@ -29,7 +29,7 @@ Value = float | str | bool  # of an input
 
 
 class Record(BaseModel):
-    """A record of a file of ours: declared members have their types, and an engine of tomorrow may add others."""
+    """A record in a JSON file of the engine.  Unknown members are kept, since newer versions may add some."""
 
     model_config = ConfigDict(strict=True, extra="allow", allow_inf_nan=False)
 
@@ -105,7 +105,7 @@ class _Figure(Record):
     @model_validator(mode="after")
     def _can_be_drawn(self) -> "_Figure":
         try:
-            if self.kind in KINDS:  # of another kind, an engine of tomorrow knows what it is
+            if self.kind in KINDS:  # other kinds belong to newer versions
                 refuse_kinds(from_record(self.model_dump()), "it")
         except (ModelError, TypeError) as error:
             raise ValueError(f"is no figure: {error}") from None
@@ -119,10 +119,14 @@ class _Published(Record):
     source: str = ""
     status: str = ""
     note: str = ""
+    reason: str = ""
     column: str | None = None
-    ours: Value | None = None
     at: dict[str, Value] | None = None
     tolerance: float | None = None
+    at_least: float | None = None
+    at_most: float | None = None
+    better: Literal["less", "more"] | None = None
+    below: str | None = None
     statistic: str | None = None
     of: str = ""
     over: list[str] = []
@@ -158,7 +162,7 @@ def _each_once(columns: list[_Column]) -> list[_Column]:
 
 
 class Head(Record):
-    """What the manifest of a run has in common with the records of a tuning and of a rare event."""
+    """Members that the manifest of a run shares with the records of a tuning and of a rare event."""
 
     format: Annotated[int, Field(ge=1)] = FORMAT
     engine: str = ""
@@ -187,13 +191,13 @@ class _Manifest(Head):
     @model_validator(mode="after")
     def _requires_of_its_columns(self) -> "_Manifest":
         numbers = {column.name for column in self.columns if column.kind == "number"}
-        if strange := [one.name for one in self.requirements if one.metric not in numbers]:
-            raise ValueError(f"the requirement {strange[0]!a} is on no column of numbers")
+        if unmatched := [required.name for required in self.requirements if required.metric not in numbers]:
+            raise ValueError(f"the metric of the requirement {unmatched[0]!a} is no column of numbers")
         return self
 
 
 class _UpstreamFacts(_Campaign):
-    """What a copy of the run upstream says of itself; a case, also the nominal one, may have NaN for a metric."""
+    """Metadata of the copied upstream run.  A metric may be NaN, also that of the nominal case."""
 
     cases: CaseNumber = 0
     columns: Annotated[list[_Column], AfterValidator(_each_once)]
@@ -205,22 +209,22 @@ class _UpstreamFacts(_Campaign):
 
 
 def parse_manifest(content: bytes | str) -> dict[str, Any]:
-    """What the bytes of a manifest say; ValueError with a sentence if no engine can have written them."""
+    """The manifest in these bytes; ValueError with a sentence if it is no valid manifest."""
     return checked_record(content, _Manifest, FORMAT)[0]
 
 
 def manifest_bytes(record: Mapping[str, Any]) -> bytes:
-    """The bytes of a manifest; ModelError where no engine would read it, for what the model says of itself."""
+    """The bytes of a manifest; ModelError if the model's description would make an invalid one."""
     try:
         content = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False, default=plain).encode()
         _checked(_Manifest, from_json(content))
     except ValueError as error:
-        raise ModelError(f"what the model says of itself fits into no manifest: {error}") from error
+        raise ModelError(f"the model's description cannot be written to a manifest: {error}") from error
     return content
 
 
 def parse_upstream(content: bytes | str) -> dict[str, Any]:
-    """What a copy of the run upstream says of itself; ValueError with a sentence if no engine can have written it."""
+    """The metadata of the copied upstream run; ValueError with a sentence if they are not valid."""
     return _checked(_UpstreamFacts, from_json(content))[0]
 
 
@@ -228,7 +232,10 @@ _Kind = TypeVar("_Kind", bound=Record)
 
 
 def checked_record(content: bytes | str, kind: type[_Kind], newest: int) -> tuple[dict[str, Any], _Kind]:
-    """A JSON record as it stands and as it was understood; ValueError with a sentence if it is none of this kind."""
+    """A JSON record as a dict and as a `kind`; ValueError with a sentence if it is not valid.
+
+    newest : the newest format that this version reads.
+    """
     record = from_json(content, allow_inf_nan=False)
     if isinstance(record, dict) and isinstance(record.get("format"), int) and record["format"] > newest:
         raise ValueError(f"was written by a newer engine; this one reads format {newest}")
@@ -237,20 +244,20 @@ def checked_record(content: bytes | str, kind: type[_Kind], newest: int) -> tupl
 
 def _checked(kind: type[_Kind], record: Any) -> tuple[dict[str, Any], _Kind]:
     try:
-        understood = kind.model_validate(record)
+        validated = kind.model_validate(record)
     except ValidationError as error:
         raise ValueError(first_mistake(error)) from None
-    return dict(record), understood
+    return dict(record), validated
 
 
 def cases_in(manifest: dict[str, Any], n_cases: int) -> range:
-    """The cases that a run of `n_cases` holds in its directory: all of them, or those of its shard."""
+    """The cases that the directory of a run of `n_cases` holds: all, or those of its shard."""
     shard = manifest.get("shard")
     return range(shard["first"], shard["stop"]) if shard else range(n_cases)
 
 
 def columns_in(manifest: Mapping[str, Any]) -> tuple[Column, ...]:
-    """Columns of the case table by a manifest that `parse_manifest` let pass."""
+    """Columns of a table, from a checked record with the member "columns", such as a manifest."""
     known = Column.__dataclass_fields__
     return tuple(
         Column(**{key: value for key, value in record.items() if key in known}) for record in manifest["columns"]
@@ -258,10 +265,10 @@ def columns_in(manifest: Mapping[str, Any]) -> tuple[Column, ...]:
 
 
 def edited_files(run: Path, digests: Mapping[str, str]) -> Iterator[str]:
-    """A sentence for every one of these files that is gone or edited.  digests : SHA-256 by name."""
+    """A sentence for each of these files that is missing or changed.  digests : SHA-256 by name."""
     for name, digest in digests.items():
         try:
-            if sha256_inside(run, name) != digest:
+            if sha256(read_inside(run, name)).hexdigest() != digest:
                 yield f"{name}: damaged or edited, its SHA-256 is not the one in the journal"
         except StoreError as error:
             yield str(error).removeprefix(f"{run}/")

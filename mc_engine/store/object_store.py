@@ -1,10 +1,10 @@
-"""Run directories on object stores: published after commit, fetched to be read.  s3://, gs://, memory://, file://, ...
+"""Copies of run directories on object stores: `publish` and `fetch`.  s3://, gs://, memory://, file://, ...
 
-A run is flown in a local directory, where files can be synced and renamed; an object store can do neither.  What the
-journal counts is copied: parts first, then campaign and manifest, then the journal that names them, reports last.  So
-the copy can be loaded at every moment, also while the run still flies, and one that was cut short is completed by
-publishing again: only what is missing or differs travels.  What lies there is listed and read back before it counts
-as published.  Credentials come from the environment, as fsspec and the packages below it read them.
+A run is flown in a local directory, since an object store can neither sync nor rename.  The files that the journal
+records are copied: first parts, then campaign and manifest, then the journal, then reports.  The copy is therefore
+valid at any moment, also during the flight, and publishing again completes one that was interrupted: only files that
+are missing or differ are sent.  Each file is read back, and all are listed, before `publish` returns.  Credentials come
+from the environment, as fsspec and its packages read them.
 """
 
 import atexit
@@ -22,7 +22,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Self
 
-from mc_engine.durable_file import is_temporary, make_folder, naming, read_file, sync_folder, write_durably
+from mc_engine.durable_file import disk_errors, is_temporary, make_folder, read_file, sync_folder, write_durably
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.extras import how_to_install
 from mc_engine.shell_words import shell_word
@@ -35,12 +35,12 @@ from mc_engine.store.run_files import CAMPAIGN, JOURNAL, MANIFEST, is_run_direct
 from mc_engine.store.urls import is_url, store_url
 from mc_engine.store.writer_lock import LOCK_FILES, WriterLock
 
-PATIENCE = 10.0  # waits so many times as long as the last copy took, so that copying takes at most a tenth of the time
+PATIENCE = 10.0  # the wait after a copy, in multiples of the time that the copy took
 
 
 @dataclass(frozen=True)
 class Publication:
-    """What was sent to `url`: names and bytes; and how many files lay there already."""
+    """What was sent to `url`: names of files and number of bytes; kept : number of files that were there already."""
 
     url: str
     sent: tuple[str, ...]
@@ -49,11 +49,11 @@ class Publication:
 
 
 def publish(run: Path, url: str, trusting: bool = False) -> Publication:
-    """Copy the run in directory `run` to `url`; on return all of it is listed there, and was read back from there.
+    """Copy the run in directory `run` to `url`; on return every file is listed there and was read back.
 
-    trusting : of what lies there already under the digest in its journal, only the size is looked at, for a copy
-    that is kept up to date.  Parts up there that the journal counts no more are removed.  StoreError if the store
-    cannot be reached, or holds anything else than an earlier state of this run; EngineError if `url` is incomplete.
+    trusting : compare only the size of files that the journal there records with the same digest; for repeated copies.
+    Parts there that the journal no longer records are removed.  StoreError if the store cannot be reached, or holds
+    anything but an earlier state of this run; EngineError if `url` is incomplete.
     """
     if not is_run_directory(run):
         raise StoreError(f"{run}: is no run directory")
@@ -71,7 +71,7 @@ def publish(run: Path, url: str, trusting: bool = False) -> Publication:
         for name in contents:
             content = made[name] if name in made else read_file(run / name)
             if name == JOURNAL:
-                content = content[: journal.length]  # the run may have flown on since
+                content = content[: journal.length]  # the run may have added lines since
             digest = sha256(content).hexdigest()
             if counted.get(name, digest) != digest:
                 raise StoreError(f"{run / name}: damaged; `mc-engine verify {shell_word(run)}` names all damage")
@@ -84,22 +84,22 @@ def publish(run: Path, url: str, trusting: bool = False) -> Publication:
                 remote.remove(name)
         listed = remote.listed()
     if lost := [name for name, size in sizes.items() if listed.get(name) != size]:
-        raise StoreError(f"{remote.url}/{lost[0]}: was sent and does not lie there; publish again")
+        raise StoreError(f"{remote.url}/{lost[0]}: was sent and is not there; publish again")
     return Publication(remote.url, tuple(sent), sum(sizes[name] for name in sent), len(contents) - len(sent))
 
 
 def fetch(url: str, folder: Path) -> Path:
     """Copy the run at `url` to the new directory `folder`, with its reports; the checksum of every part is verified.
 
-    The copy has another name until it is whole, so that one that failed leaves nothing in the way.  What one that was
-    killed has left is cleared away by the next; StoreError while another process copies to the same place.
+    The copy is made under a temporary name, so that one that fails leaves no `folder`.  The next `fetch` removes what a
+    killed one left.  StoreError while another process copies to the same folder.
     """
     url = store_url(url)
     if folder.exists() and any(folder.iterdir()):
         raise StoreError(f"{folder}: is not empty; choose another folder")
     with _scratch(folder) as scratch:
         _copy(url, scratch)
-        with naming(folder):
+        with disk_errors(folder):
             if folder.exists():
                 folder.rmdir()
             os.replace(scratch, folder)
@@ -109,22 +109,22 @@ def fetch(url: str, folder: Path) -> Path:
 
 @contextmanager
 def _scratch(folder: Path) -> Iterator[Path]:
-    """Where a copy lies until it becomes `folder`; what processes that were killed have left beside it is removed."""
+    """A temporary folder next to `folder`; those that killed processes left there are removed."""
     prefix, suffix = f".{folder.name}.", ".tmp"
     make_folder(folder.parent)
-    with naming(folder):
-        left = [one for one in folder.parent.iterdir() if one.name.startswith(prefix) and one.suffix == suffix]
-        around = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=folder.parent))
-    for one in left:
-        with suppress(StoreError), _locked(one):  # of a process that is at work it cannot be
+    with disk_errors(folder):
+        others = [path for path in folder.parent.iterdir() if path.name.startswith(prefix) and path.suffix == suffix]
+        own = Path(tempfile.mkdtemp(prefix=prefix, suffix=suffix, dir=folder.parent))
+    for other in others:
+        with suppress(StoreError), _locked(other):  # refused if its process is still running
             pass
-    with _locked(around):
-        yield around / "run"
+    with _locked(own):
+        yield own / "run"
 
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """A folder of this process alone, which goes with the block."""
+    """Lock a folder within the block, and remove it at the end."""
     lock = WriterLock(folder)
     lock.acquire()
     try:
@@ -146,39 +146,39 @@ def _copy(url: str, folder: Path) -> None:
             content = remote.read(name)
             if counted.get(name, "") not in ("", sha256(content).hexdigest()):
                 raise StoreError(f"{url}/{name}: damaged, its SHA-256 is not the one in the journal")
-            _place(folder, name, content, url)
-        _place(folder, JOURNAL, remote.read(JOURNAL)[: journal.length], url)
+            _write_fetched(folder, name, content, url)
+        _write_fetched(folder, JOURNAL, remote.read(JOURNAL)[: journal.length], url)
     for part_folder in PART_FOLDERS:
         make_folder(folder / part_folder)
 
 
 def fetched(url: str) -> Path:
-    """A copy of the run at `url` in a directory that lasts as long as this process."""
+    """A copy of the run at `url`, in a directory that is removed when this process ends."""
     scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))
     atexit.register(shutil.rmtree, scratch, ignore_errors=True)
     return fetch(url, scratch / url.rstrip("/").rpartition("/")[2])
 
 
 def local_copy(place: str | Path) -> Path:
-    """The directory that is named; of a URL, a copy that lasts as long as this process."""
+    """The directory `place`; for a URL, a copy that is removed when this process ends."""
     return fetched(str(place)) if is_url(place) else Path(place)
 
 
 def refuse_unreachable(url: str) -> None:
-    """StoreError if nothing can be listed at `url`; to be asked before a long flight."""
+    """StoreError if `url` cannot be listed; called before a long flight."""
     with _reaching(url):
         _Remote(url)
 
 
 def _counted(entries: tuple[Entry, ...]) -> dict[str, str]:
-    """SHA-256 by name of all that a run consists of by its journal, in the order in which it is to be sent."""
+    """SHA-256 by name of the files that the journal records, in the order in which they are sent."""
     created = entries[0].facts
     heads = {**created.get("companions", {}), CAMPAIGN: created["campaign"], MANIFEST: created["manifest"]}
     return {**{part.file: part.sha256 for part in receipts_of(entries)[0].all_parts()}, **heads}
 
 
 def _others(run: Path, counted: Mapping[str, str], derived: CountedFiles) -> list[str]:
-    """All that lies in the run directory and is no part, no report or replay, no lock, no file half written."""
+    """Names of the other files in the run directory: no parts, reports, replays, locks or temporary files."""
     paths = [path for path in sorted(run.rglob("*")) if path.is_file() and not path.is_symlink()]
     files = [path.relative_to(run).as_posix() for path in paths]
     ours = {*counted, JOURNAL, *LOCK_FILES}
@@ -186,12 +186,13 @@ def _others(run: Path, counted: Mapping[str, str], derived: CountedFiles) -> lis
     return [name for name in left if not is_temporary(Path(name).name)]
 
 
-def _sound(found: Scan, place: Path | str) -> Scan:
-    if found.damaged or not found.entries or found.entries[0].event != "created":
-        raise StoreError(f"{place}, line {found.damaged[0] if found.damaged else 1}: damaged")
-    for number, why in receipts_of(found.entries)[1].items():
+def _sound(journal: Scan, place: Path | str) -> Scan:
+    """The journal itself; StoreError if a line of it is damaged."""
+    if journal.damaged or not journal.entries or journal.entries[0].event != "created":
+        raise StoreError(f"{place}, line {journal.damaged[0] if journal.damaged else 1}: damaged")
+    for number, why in receipts_of(journal.entries)[1].items():
         raise StoreError(f"{place}, line {number}: damaged, {why}")
-    return found
+    return journal
 
 
 def _refuse_another_run(remote: "_Remote", before: Scan | None, journal: Scan, ours: set[str]) -> None:
@@ -205,16 +206,16 @@ def _refuse_another_run(remote: "_Remote", before: Scan | None, journal: Scan, o
         raise StoreError(f"{remote.url}: holds {foreign[0]} and no run; choose another place")
 
 
-def _place(folder: Path, name: str, content: bytes, url: str) -> None:
+def _write_fetched(folder: Path, name: str, content: bytes, url: str) -> None:
     path = folder / name
-    if not path.resolve().is_relative_to(folder.resolve()):  # what lies in a store may come from anyone
+    if not path.resolve().is_relative_to(folder.resolve()):  # an object store may hold any names
         raise StoreError(f"{url}: {json.dumps(name)} lies outside the run")
     make_folder(path.parent)
     write_durably(path, content)
 
 
 class _Remote:
-    """The objects below a URL; `sizes` has their lengths by name, as listed when it was made."""
+    """The objects below a URL.  sizes : their lengths by name, as listed when this object was made."""
 
     def __init__(self, url: str):
         from fsspec.core import url_to_fs
@@ -225,33 +226,33 @@ class _Remote:
         self.sizes = self.listed()
 
     def listed(self) -> dict[str, int]:
-        """What lies there at this moment."""
+        """Lengths by name of the objects at this moment."""
         self._files.invalidate_cache()
         listed: dict[str, dict[str, Any]] = self._files.find(self._root, detail=True)
         return {path[len(self._root) :].lstrip("/"): int(facts["size"]) for path, facts in listed.items()}
 
     def journal(self) -> Scan | None:
-        """The journal that lies there, or None."""
+        """The journal at the URL, or None."""
         if JOURNAL not in self.sizes:
             return None
-        found = scan(self.read(JOURNAL))
-        if not found.entries and not found.damaged:  # the sending of it was cut short in its first line
+        journal = scan(self.read(JOURNAL))
+        if not journal.entries and not journal.damaged:  # sending was interrupted within the first line
             return None
-        return _sound(found, f"{self.url}/{JOURNAL}")
+        return _sound(journal, f"{self.url}/{JOURNAL}")
 
     def read(self, name: str) -> bytes:
         return bytes(self._files.cat_file(f"{self._root}/{name}"))
 
     def holds(self, name: str, content: bytes, trusted: bool) -> bool:
-        """True if these bytes lie there; where the journal up there vouches for them, by their number alone."""
+        """True if the object has this content.  trusted : compare its length only."""
         return self.sizes.get(name) == len(content) and (trusted or self.read(name) == content)
 
     def write(self, name: str, content: bytes) -> None:
         path = f"{self._root}/{name}"
-        self._files.makedirs(path.rpartition("/")[0], exist_ok=True)  # nothing, where folders are only names
+        self._files.makedirs(path.rpartition("/")[0], exist_ok=True)  # no effect in stores without folders
         self._files.pipe_file(path, content)
         if self.read(name) != content:
-            raise StoreError(f"{self.url}/{name}: what was sent is not what lies there; publish again")
+            raise StoreError(f"{self.url}/{name}: the content there differs from what was sent; publish again")
 
     def remove(self, name: str) -> None:
         self._files.rm_file(f"{self._root}/{name}")
@@ -259,22 +260,22 @@ class _Remote:
 
 @contextmanager
 def _reaching(url: str) -> Iterator[None]:
-    """Turn what a store's package raises into a StoreError that begins with the URL."""
+    """Turn any error of a store's package into a StoreError that begins with the URL."""
     try:
         yield
     except EngineError:
         raise
     except ImportError as error:
         raise StoreError(f"{url}: needs a package: {error}; {how_to_install('cloud')}") from error
-    except Exception as error:  # every store's package has errors of its own
+    except Exception as error:  # each store's package has its own errors
         raise StoreError(f"{url}: {type(error).__name__}: {error}") from error
 
 
 class Publisher:
-    """Within `with`, copies what the run in `run` has committed to `url`, every `every_s` seconds and at the end.
+    """Within a `with` block, copies the committed state of `run` to `url`, every `every_s` seconds and at the end.
 
-    A machine that is lost takes at most what was committed since with it.  A copy that fails is tried again; what the
-    last one failed of is told on standard error, and the flight goes on.
+    A copy that fails is tried again at the next interval and does not stop the flight; the error of the last copy is
+    written to standard error.
     """
 
     def __init__(self, run: Path, url: str, every_s: float = 30.0):

@@ -1,4 +1,4 @@
-"""Opening a run for reading, wherever it lies."""
+"""Opening of a run, in a directory or on an object store."""
 
 from pathlib import Path
 
@@ -7,5 +7,15 @@ from mc_engine.store.store import Store
 
 
 def open_store(path: str | Path) -> Store:
-    """The run in directory `path`, or a copy of the one at that URL, for reading; writing methods take the lock."""
+    """Open a run directory, or a copy of the published run at a URL.
+
+    path : str or Path
+
+    Returns a Store.  It is open for reading; methods that write take the directory's lock.
+
+    Raises StoreError if there is no run, or it is damaged.
+
+    >>> open_store("runs/small").nominal()["status"]
+    'ok'
+    """
     return Store(local_copy(path))

@@ -1,8 +1,8 @@
-"""Parts: the Parquet files of a run directory, one range of cases or one set of histories each.
+"""Parts: the Parquet files of a run directory, each with one range of cases or one set of time histories.
 
-The same columns give the same bytes.  Unit, role and meaning of a column stand in its Arrow field's metadata, and
-once more where `pandas.read_parquet` looks for `DataFrame.attrs`.  Numbers are written without dictionaries, words
-with; every page has a checksum.  A part is read through its SHA-256: damaged bytes are an error, never a table.
+Equal columns give equal bytes.  Unit, role and description of a column are in the metadata of its Arrow field, and in
+the place from which `pandas.read_parquet` fills `DataFrame.attrs`.  Numbers are written without dictionaries, words
+with them; every page has a checksum.  The SHA-256 of a part is verified before it is read.
 """
 
 import json
@@ -24,7 +24,7 @@ from mc_engine.errors import DiskError, StoreError
 from mc_engine.shell_words import shell_word
 from mc_engine.status import STATUS_NAME
 
-MOST_CELLS = 2**30  # of a Parquet file that is read whole
+MOST_CELLS = 2**30  # of a Parquet file that is read at once
 PART_FOLDERS = ("cases", "history")  # of a run directory
 _SEE = "; `mc-engine verify"
 _CASE_PART = re.compile(r"cases/part-([0-9]{10,18})-([0-9]{10,18})(?:\.r[1-9][0-9]{0,8})?\.parquet")
@@ -48,7 +48,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Part:
-    """Receipt of a part that is on the disk: what its journal line says.  `file` is relative to the run directory."""
+    """Receipt of a part on the disk, as in its journal line.  file : name relative to the run directory."""
 
     file: str
     first: int
@@ -79,7 +79,7 @@ CASE_COLUMNS = (
 
 
 def attributes(columns: Sequence[Column]) -> dict[str, dict[str, str]]:
-    """What a table's `DataFrame.attrs` holds: units, descriptions and roles by column name."""
+    """The `DataFrame.attrs` of a table: units, descriptions and roles by column name."""
     return {
         "units": {column.name: column.unit for column in columns},
         "descriptions": {column.name: column.description for column in columns},
@@ -126,7 +126,7 @@ def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
     if column.kind == "word":
         return pa.array(values, pa.string()).fill_null("")
     if column.kind == "number":
-        return pa.array(values.astype(np.float64, copy=False))  # NaN stays NaN: it is no missing value
+        return pa.array(values.astype(np.float64, copy=False))  # NaN stays NaN and does not become null
     return pa.array(values, ARROW_TYPES[column.kind])
 
 
@@ -157,7 +157,7 @@ def is_history_file(file: str) -> bool:
 
 
 def cases_in_name(file: str) -> tuple[int, int] | None:
-    """The cases (first, stop) that a part has by its name, relative to the run; None if it is no name of one."""
+    """The cases (first, stop) of a part by its name, relative to the run directory; None for any other name."""
     match = _CASE_PART.fullmatch(file)
     if match is None:
         return None
@@ -171,81 +171,76 @@ def part_name(first: int, rows: int) -> str:
 
 
 def revised_name(file: str) -> str:
-    """The name of a part that takes the place of `file`: part-….parquet, part-….r1.parquet, part-….r2.parquet."""
+    """The name of the part that replaces `file`: part-….r1.parquet for part-….parquet, then part-….r2.parquet."""
     stem, revision = re.fullmatch(r"(.*?)(?:\.r(\d+))?\.parquet", file).groups()  # type: ignore[union-attr]
     return f"{stem}.r{int(revision or 0) + 1}.parquet"
-
-
-def write_part(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> Part:
-    """Put one range of cases durably into `run`/cases; it counts once its receipt is in the journal."""
-    table = _part_table(run, columns, first, count, arrays)
-    return write_table(run, f"cases/{part_name(first, count)}", table, first, _status_counts(table))
 
 
 def write_aside(
     run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any], file: str | None = None
 ) -> Written:
-    """Write one range of cases under a temporary name of its own, for the writer of the run to publish.
+    """Write one range of cases under a temporary name, for the writer of the run to publish.
 
-    Needs no lock and no journal: workers of any kind write their parts so, and send the receipt alone.  The name is
-    new each time, since a chunk may be flown twice at once where a worker is taken for dead; it ends in the first
-    half of the SHA-256, by which `finished_parts` knows a part that is whole.  (Windows counts 260 letters of a path.)
+    Needs neither lock nor journal; workers write their parts so and send only the receipt.  The name is unique, since
+    two workers may write the same chunk if one was taken for dead.  It ends in the first half of the SHA-256, by which
+    `finished_parts` recognises a complete part (half, because Windows limits a path to 260 characters).
     file : name of the part, relative to the run directory, if not the usual one.
     """
     table = _part_table(run, columns, first, count, arrays)
     content = parquet_bytes(table)
     file = file or f"cases/{part_name(first, count)}"
-    digest = sha256(content).hexdigest()
+    digest, status = sha256(content).hexdigest(), dict(sorted(Counter(table.column("status").to_pylist()).items()))
     temporary = temporary_name(f"{file}.{uuid.uuid4().hex[:8]}.{digest[:32]}")
     write_synced(run, temporary, content, file)
-    return Written(Part(file, first, count, len(content), digest, _status_counts(table)), temporary)
+    return Written(Part(file, first, count, len(content), digest, status), temporary)
 
 
 def _part_table(run: Path, columns: Sequence[Column], first: int, count: int, arrays: Mapping[str, Any]) -> pa.Table:
     if first < 0 or count < 1:
-        raise StoreError(f"{run}: a part of {count} cases from {first} cannot be")
+        raise StoreError(f"{run}: a part cannot have {count} cases from case {first}")
     case_ids = np.arange(first, first + count, dtype=np.int64)
     if "case_id" in arrays and not np.array_equal(arrays["case_id"], case_ids):
         raise StoreError(f"{run}: case_id does not count from {first} to {first + count - 1}")
     return arrow_table(columns, {**arrays, "case_id": case_ids}, count, run)
 
 
-def _status_counts(table: pa.Table) -> dict[str, int]:
-    return dict(sorted(Counter(table.column("status").to_pylist()).items()))
-
-
-def write_table(run: Path, file: str, table: pa.Table, first: int = 0, status: dict[str, int] | None = None) -> Part:
-    """Write any table durably as `run`/`file`."""
+def write_table(run: Path, file: str, table: pa.Table, first: int = 0) -> Part:
+    """Write the table of the nominal case or of time histories durably as `run`/`file`."""
     content = parquet_bytes(table)
     write_inside(run, file, content)
-    return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), status or {})
+    return Part(file, first, table.num_rows, len(content), sha256(content).hexdigest(), {})
 
 
 def read_part(run: Path, part: Part, columns: Sequence[Column] | None = None) -> pa.Table:
-    """The table of a part, all it has or these columns; StoreError naming the file if a byte of it changed.
+    """The table of a part, with all its columns or with these.
 
-    The same where the bytes are those that were written, and the table is not what receipt and columns say.
+    StoreError that names the file if a byte of it changed, if a column is missing, or if rows or columns are others
+    than the receipt and `columns` say.
     """
-    path, more = run / part.file, f"{_SEE} {shell_word(run)}` names all damage"
+    path, advice = run / part.file, f"{_SEE} {shell_word(run)}` names all damage"
     try:
         content = read_inside(run, part.file, part.bytes + 1)
     except DiskError:
         raise
     except StoreError as error:
-        raise StoreError(f"{error}{more}") from None
+        raise StoreError(f"{error}{advice}") from None
     if problem := content_problem(content, part):
-        raise StoreError(f"{path}: {problem}{more}")
+        raise StoreError(f"{path}: {problem}{advice}")
+    names = None if columns is None else [column.name for column in columns]
     try:
-        table = parquet_table(content, None if columns is None else [column.name for column in columns])
+        table = parquet_table(content, names)
     except ValueError as error:
-        raise StoreError(f"{path}: {error}{more}") from None
+        raise StoreError(f"{path}: {error}{advice}") from None
+    if missing := [name for name in names or () if name not in table.column_names]:
+        named = "; ".join(f'the column "{name}" is missing' for name in missing)
+        raise StoreError(f"{path}: {named}{advice}")
     if table.num_rows != part.rows or not (columns is None or table.schema.equals(arrow_schema(columns))):
-        raise StoreError(f"{path}: is no part of this run, it has other rows or columns{more}")
+        raise StoreError(f"{path}: is no part of this run, it has other rows or columns{advice}")
     return table
 
 
 def problem_of(path: Path, read: Callable[[], object]) -> str:
-    """What `read` says is wrong with the part in `path`; empty if it can be read."""
+    """The problem that `read` raises for the part in `path`; empty if it can be read."""
     try:
         read()
     except StoreError as error:
@@ -254,11 +249,12 @@ def problem_of(path: Path, read: Callable[[], object]) -> str:
 
 
 def parquet_table(content: Any, names: Sequence[str] | None = None, most: int = MOST_CELLS) -> pa.Table:
-    """The table in a Parquet file, its bytes or open; all columns or those of `names` that it has.
+    """The table in a Parquet file, with all columns or those of `names` that it has.
 
-    ValueError if it is none, or has more cells than `most` by its own account, which is read before all else.
-    `pyarrow.parquet.read_table` would leave a thread behind, which can abort a process that is about to end.
+    content : its bytes, or an open file.  ValueError if it is no Parquet file, or if its metadata, which are read
+    first, give more cells than `most`.
     """
+    # Not `pyarrow.parquet.read_table`: it leaves a thread behind, which can abort a process that is about to end.
     try:
         source = pa.BufferReader(content) if isinstance(content, bytes) else content
         file = pq.ParquetFile(source, pre_buffer=False, page_checksum_verification=True)
@@ -278,7 +274,7 @@ def _refuse_size(metadata: Any, most: int) -> None:
 
 def content_problem(content: bytes, part: Part) -> str:
     """What is wrong with the bytes of a part; empty if they are those that were written."""
-    if len(content) > part.bytes:  # a reader stops there
+    if len(content) > part.bytes:  # `read_part` reads one byte more than the receipt gives
         return f"damaged, more than the {part.bytes} bytes that were written"
     if len(content) < part.bytes:
         return f"damaged, {len(content)} bytes where {part.bytes} were written"

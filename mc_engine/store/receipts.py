@@ -1,8 +1,8 @@
-"""What counts in a run directory after all that its journal tells.
+"""The committed files of a run directory, as its journal lines give them.
 
-A part counts from its line on, until a line replaces or withdraws it; of the nominal case and of the histories the
-last line counts.  Lines have the types that an engine gives them, so that names of files are those of parts.  Numbers
-that someone made up, and computed a checksum for, are taken as they are: checksums detect damage, not forgery.
+A part is committed from its line on, until another line replaces or withdraws it; for the nominal case and the
+histories the last line holds.  The types of all members are checked, and names of files must be those of parts.
+Checksums detect damage, not forgery.
 """
 
 from bisect import bisect_left, bisect_right
@@ -82,7 +82,7 @@ _EVENTS: Mapping[str, type[_Event]] = {
 
 
 def receipt_of(facts: Any) -> Part:
-    """The receipt of a part from the facts that its line has; ValueError with a sentence if it can be none."""
+    """The receipt of a part from the facts of its line; ValueError with a sentence if they are not valid."""
     return _part(_checked(_Receipt, facts))
 
 
@@ -94,9 +94,9 @@ def _checked(kind: type[_Event], facts: Any) -> Any:
 
 
 def first_mistake(error: ValidationError) -> str:
-    """Where the first mistake of a record stands, and what it is, in a sentence without the record's own text."""
+    """Place and kind of the first mistake in a record, as a sentence without text from the record."""
     first = error.errors(include_url=False, include_input=False, include_context=False)[0]
-    place = ".".join(str(one) for one in first["loc"] if one != "[key]")
+    place = ".".join(str(key) for key in first["loc"] if key != "[key]")
     message = first["msg"].removeprefix("Value error, ")
     return f"{place!a}: {message[:1].lower()}{message[1:]}"
 
@@ -106,11 +106,10 @@ def _part(record: _Receipt) -> Part:
 
 
 class Receipts:
-    """What counts after the lines taken so far.
+    """The committed files after the journal lines taken so far.
 
-    parts : receipts of the parts of cases, by their first case; no case stands twice.
-    begun_with : cases by the manifest, if that is known.
-    nominal, histories : the receipts that count, or None.
+    parts : receipts of the parts of cases, by their first case, without overlap.
+    begun_with : number of cases in the manifest, if known.  nominal, histories : their receipts, or None.
     """
 
     def __init__(self, begun_with: int | None = None):
@@ -121,12 +120,12 @@ class Receipts:
 
     @property
     def cases(self) -> int | None:
-        """How many are wanted: by the last line that says so, and up to the last part where that line is lost."""
+        """Number of cases of the run, from the manifest or the last extension; at least those of the last part."""
         flown = self.parts[-1].stop if self.parts else 0
         return None if self._asked is None else max(self._asked, flown)
 
     def take(self, entry: Entry) -> None:
-        """Let one more line count; ValueError with a sentence, and nothing changed, if no engine writes such."""
+        """Apply one more line; ValueError with a sentence, without any change, if the line is not valid."""
         kind = _EVENTS.get(entry.event)
         record: Any = None if kind is None else _checked(kind, entry.facts)
         if (entry.event == "created") != (entry.number == 1):
@@ -145,14 +144,14 @@ class Receipts:
             self._asked = record.cases
 
     def _count(self, part: Part) -> None:
-        """In place of what has the same cases: a part that was replaced, or whose withdrawal is lost."""
+        """Add a part, in place of parts with any of its cases: one is being replaced, or its withdrawal was lost."""
         if cases_in_name(part.file) != (part.first, part.stop):
             raise ValueError("its file has the name of other cases")
         before = bisect_right(self.parts, part.first, key=lambda other: other.stop)
         self.parts[before : bisect_left(self.parts, part.stop, key=lambda other: other.first)] = [part]
 
     def committed(self) -> list[Range]:
-        """The cases that count, as merged ranges in order."""
+        """The committed cases, as merged ranges in order."""
         merged: list[Range] = []
         for part in self.parts:
             if merged and part.first == merged[-1][1]:
@@ -161,29 +160,29 @@ class Receipts:
                 merged.append((part.first, part.stop))
         return merged
 
-    def missing(self, wanted: range) -> list[Range]:
-        """The ranges among the wanted cases that do not count."""
-        return gaps(self.committed(), wanted)
+    def missing(self, expected: range) -> list[Range]:
+        """The ranges among the expected cases that are not committed."""
+        return gaps(self.committed(), expected)
 
     def all_parts(self) -> list[Part]:
-        """Receipts of every file that counts: parts of cases, nominal case, histories."""
+        """Receipts of all committed files: parts of cases, nominal case, histories."""
         return [*self.parts, *(part for part in (self.nominal, self.histories) if part is not None)]
 
 
-def gaps(ranges: Iterable[Range], wanted: range) -> list[Range]:
-    """The ranges of wanted cases that are in none of these, which may overlap."""
-    found, begin = [], wanted.start
-    for first, stop in [*sorted(ranges), (wanted.stop, wanted.stop)]:
-        if min(first, wanted.stop) > begin:
-            found.append((begin, min(first, wanted.stop)))
+def gaps(ranges: Iterable[Range], expected: range) -> list[Range]:
+    """The ranges of expected cases that are in none of `ranges`, which may overlap."""
+    between, begin = [], expected.start
+    for first, stop in [*sorted(ranges), (expected.stop, expected.stop)]:
+        if min(first, expected.stop) > begin:
+            between.append((begin, min(first, expected.stop)))
         begin = max(begin, stop)
-    return found
+    return between
 
 
 def receipts_of(entries: Iterable[Entry], begun_with: int | None = None) -> tuple[Receipts, dict[int, str]]:
-    """What counts after all the lines that an engine can have written; and what is wrong with the others, by number.
+    """The committed files after all valid lines, and by line number what is wrong with the others.
 
-    begun_with : cases by the manifest, where that can be read.
+    begun_with : number of cases in the manifest, if that can be read.
     """
     counted, wrong = Receipts(begun_with), {}
     for entry in entries:

@@ -1,7 +1,6 @@
-"""Repair of a run directory: what is damaged counts no more, so that it is missing and can be flown again.
+"""Repair of a run directory: damaged parts and journal lines are removed, so that their cases can be flown again.
 
-Parts, the nominal case and histories can be flown again; damaged lines of the journal are dropped, and what only they
-told of with them.  Campaign, manifest and the journal's first line say what the run is: nothing here replaces them.
+Campaign, manifest and the first line of the journal define the run; if one of them is damaged, it cannot be repaired.
 """
 
 from pathlib import Path
@@ -16,9 +15,9 @@ from mc_engine.store.writer_lock import WriterLock
 
 
 def mend_journal(run: Path) -> None:
-    """Drop the damaged lines of a journal, with a note of their numbers; nothing where none is, or the first one is.
+    """Remove the damaged lines of a journal and record their numbers.  No change if none is damaged, or the first is.
 
-    StoreError if another writer is at work.
+    StoreError if another process is writing.
     """
     if is_run_directory(run):
         for folder in PART_FOLDERS:
@@ -26,11 +25,11 @@ def mend_journal(run: Path) -> None:
     if not (run / JOURNAL).is_file() or not _lost(scan(read_journal(run / JOURNAL))):
         return
     with (lock := WriterLock(run)) as dead:
-        found = scan(read_journal(run / JOURNAL))  # again: another writer may have been here
-        lost = _lost(found)
+        journal = scan(read_journal(run / JOURNAL))  # again: another process may have written since
+        lost = _lost(journal)
         if not lost:
             return
-        events = [(entry.at, entry.event, entry.facts) for entry in found.entries if entry.number not in lost]
+        events = [(entry.at, entry.event, entry.facts) for entry in journal.entries if entry.number not in lost]
         events += [(utc_now(), "lock-taken-over", {"from": dead})] if dead is not None else []
         events += [(utc_now(), "mended", {"lost": lost})]
         lines = [encode(number, *event) for number, event in enumerate(events, start=1)]
@@ -38,14 +37,14 @@ def mend_journal(run: Path) -> None:
         write_inside(run, JOURNAL, b"".join(lines))
 
 
-def _lost(found: Scan) -> list[int]:
-    """Numbers of the lines that cannot be trusted; none if the first one is among them, for which nothing stands in."""
-    lost = sorted({*found.damaged, *receipts_of(found.entries)[1]})
+def _lost(journal: Scan) -> list[int]:
+    """Numbers of the lines that are not valid; empty if line 1 is among them, since nothing can replace it."""
+    lost = sorted({*journal.damaged, *receipts_of(journal.entries)[1]})
     return lost if lost and lost[0] > 1 else []
 
 
 def withdraw_damaged(store: Store) -> None:
-    """Let the parts count no more that are not as they were written."""
+    """Withdraw every part of cases that cannot be read as it was written."""
     for part in store.parts:
         if problem_of(store.path / part.file, lambda: read_part(store.path, part, store.columns)):  # noqa: B023
             store.withdraw(part)

@@ -1,8 +1,8 @@
-"""What the directories of a tuning and of a rare event have in common: a record, tables, and the campaign's text.
+"""The directory of a tuning or of a rare event: a record, tables, and the text of the campaign.
 
-    <stem>.toml   <stem>.json   <table>.parquet ...   journal.jsonl      and what is derived of them, such as reports
+    <stem>.toml   <stem>.json   <table>.parquet ...   journal.jsonl      and reports made from them
 
-The journal counts them all with their SHA-256, see `counted_files`.
+The journal records each file with its SHA-256, see `counted_files`.
 """
 
 import json
@@ -19,6 +19,7 @@ from mc_engine.durable_file import make_folder
 from mc_engine.errors import StoreError
 from mc_engine.store.counted_files import CountedFiles
 from mc_engine.store.journal import plain
+from mc_engine.store.manifest_file import columns_in
 from mc_engine.store.parts import Column, arrow_schema, arrow_table, attributes, parquet_bytes, parquet_table
 from mc_engine.store.result_records import FORMAT, TABLES, parse_result
 from mc_engine.store.run_files import JOURNAL, RARE_EVENT, STEMS, TUNING, kind_of
@@ -43,7 +44,7 @@ def write_result(
     tables: Mapping[str, ColumnsAndArrays],
     lock: WriterLock | None = None,
 ) -> None:
-    """Write a result into `path`, in place of what is there of the same search.  lock : of `path`, if it is held."""
+    """Write a result into `path`, in place of an earlier one.  lock : that of `path`, if the caller holds it."""
     make_folder(path)
     files, about = {f"{STEMS[kind]}.toml": text.encode()}, {}
     for name, (columns, arrays) in tables.items():
@@ -56,7 +57,7 @@ def write_result(
 
 
 def read_result(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, pd.DataFrame]]:
-    """Record and tables of the result in `path`; StoreError if there is none, or a byte of it changed."""
+    """Record and tables of the result in `path`; StoreError if there is none, or a byte has changed."""
     again = f"`mc-engine {COMMANDS[kind]}` makes one"
     if kind_of(path) != kind:
         raise StoreError(f"{path}: {f'holds no {kind}; {again}' if path.exists() else 'there is no such folder'}")
@@ -70,13 +71,11 @@ def read_result(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, pd.Dat
         record = parse_result(contents[f"{stem}.json"], kind)
     except ValueError as error:
         raise StoreError(f"{path / stem}.json: {error}") from None
-    return record, {name: _table(path, name, contents, record) for name in TABLES[kind]}
+    return record, {name: _result_table(path, name, contents, record) for name in TABLES[kind]}
 
 
-def _table(path: Path, name: str, contents: Mapping[str, bytes], record: Mapping[str, Any]) -> pd.DataFrame:
-    known = Column.__dataclass_fields__
-    listed = record["tables"][name]["columns"]
-    columns = [Column(**{key: value for key, value in one.items() if key in known}) for one in listed]
+def _result_table(path: Path, name: str, contents: Mapping[str, bytes], record: Mapping[str, Any]) -> pd.DataFrame:
+    columns = columns_in(record["tables"][name])
     try:
         table = parquet_table(contents[f"{name}.parquet"])
         if not table.schema.equals(arrow_schema(columns)):

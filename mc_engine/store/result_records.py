@@ -1,6 +1,6 @@
-"""The records `tuning.json` and `rare.json` as they are read: what comes out is what status and reports work with.
+"""Reading and checking of the records `tuning.json` and `rare.json`, for `status` and the reports.
 
-The shapes below are those of the files; a pydantic model is made of each.  (kind, value) is a key that may be missing.
+The shapes below are those of the files; each becomes a pydantic model.  A pair (type, value) is a key with a default.
 """
 
 from typing import Annotated, Any, Literal
@@ -57,14 +57,14 @@ _ESTIMATE: Shape = {
 
 
 def _kind(shape: Any) -> Any:
-    """The type of what has this shape."""
+    """The type that a shape describes."""
     if isinstance(shape, list):
         return list[_kind(shape[0])]  # type: ignore[misc]
     return _model(shape) if isinstance(shape, dict) else shape
 
 
 def _model(shape: Shape, base: type[Record] = Record) -> Any:
-    given = {key: one if isinstance(one, tuple) else (one, ...) for key, one in shape.items()}
+    given = {key: value if isinstance(value, tuple) else (value, ...) for key, value in shape.items()}
     fields: Shape = {key: (_kind(kind), value) for key, (kind, value) in given.items()}
     return create_model("Record", __base__=base, **fields)
 
@@ -74,24 +74,24 @@ _SHAPES: dict[str, Shape] = {TUNING: {"tuning": _SEARCH}, RARE_EVENT: {"rare_eve
 
 
 def parse_result(content: bytes, kind: str) -> dict[str, Any]:
-    """What the bytes of a record say, defaults put in; ValueError with a sentence if no engine can have written it."""
+    """The record in these bytes, with defaults filled in; ValueError with a sentence if it is not valid."""
     tables = {"tables": dict.fromkeys(TABLES[kind], _TABLE)}
     record = checked_record(content, _model({**_HEAD, **_SHAPES[kind], **tables}, Head), FORMAT)[1].model_dump()
     if kind == TUNING:
         _refuse_other_columns(record)
-    elif len({one[key] is None for one in record["rare_event"]["inputs"] for key in ("across", "across_sigma")}) > 1:
-        raise ValueError("its inputs do not tell the same")
+    elif len({item[key] is None for item in record["rare_event"]["inputs"] for key in ("across", "across_sigma")}) > 1:
+        raise ValueError("across and across_sigma must be given for all inputs or for none")
     return record
 
 
 def _refuse_other_columns(record: dict[str, Any]) -> None:
-    asked = record["tuning"]
+    search = record["tuning"]
     own = {"candidate", "violation", "feasible", "failed_cases", "commonest_failure"}
-    names = own | {one["name"] for key in ("parameters", "objectives", "constraints") for one in asked[key]}
+    names = own | {item["name"] for key in ("parameters", "objectives", "constraints") for item in search[key]}
     for table in ("evaluations", "front"):
         if missing := names - {column["name"] for column in record["tables"][table]["columns"]}:
             raise ValueError(f"its table of the {table} has no column {min(missing)!a}")
-    if not asked["parameters"] or not asked["objectives"]:
-        raise ValueError("nothing is tuned, or for nothing")
-    if any({*point["values"]} != {one["name"] for one in asked["objectives"]} for point in asked["published"]):
+    if not search["parameters"] or not search["objectives"]:
+        raise ValueError("it has no parameters or no objectives")
+    if any({*point["values"]} != {item["name"] for item in search["objectives"]} for point in search["published"]):
         raise ValueError("a published point has other objectives")

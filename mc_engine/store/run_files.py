@@ -1,4 +1,4 @@
-"""Names of the files in directories of results, and what a directory holds by them.  Nothing is read."""
+"""Names of the files in directories of results, and the kind of a directory by these names.  No file is read."""
 
 from pathlib import Path
 

@@ -1,11 +1,11 @@
-"""The run directory: what a campaign's run leaves behind, and the only meeting point of engine and reports.
+"""The run directory: the results of a run, and the only interface between engine and reports.
 
     campaign.toml   manifest.json   journal.jsonl   nominal.parquet   cases/part-*.parquet   history/part-*.parquet
 
-A part exists once its journal line is synced.  A file without a line is what a kill left: readers here ignore it,
-the next writer removes it.  (`pandas.read_parquet(run / "cases")` knows no journal and would show such a part;
-its rows are right, but not yet counted.)  Manifest and campaign are never changed: what came later is in the
-journal.  A `Store` is for one thread; one process at a time may write.
+A part is committed once its journal line is synced.  A part without a line was left by a kill: readers ignore it, and
+the next writer removes it.  (`pandas.read_parquet(run / "cases")` does not read the journal and includes such a part,
+whose rows are correct.)  Manifest and campaign file never change; later events are in the journal.  A `Store` is for
+one thread, and one process at a time may write.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -45,9 +45,9 @@ def create_store(
 ) -> "Store":
     """Make `path` the directory of a new run; its `manifest["columns"]` are set from `columns`.
 
-    companions : files that the campaign reads from its own folder, by their names there; they are kept beside it.
-    case_id, status and reason come first, whether or not `columns` has them.  Refuses a directory that holds
-    anything, except what a creation that was cut short left there.
+    columns : of the case table; case_id, status and reason are put first if they are not in it.
+    companions : contents by name of files that the campaign reads from its own folder; the run keeps copies.
+    StoreError if the directory is not empty, unless an interrupted creation left the files in it.
     """
     path, companions = Path(path), companions or {}
     with writer_of_new(path, lambda: refuse_occupied(path, companions)) as lock:
@@ -63,7 +63,7 @@ def create_store(
         disk.write_inside(path, MANIFEST, content)
         for folder in PART_FOLDERS:
             disk.make_way(path, f"{folder}/*")
-        # The journal comes last: with it the store exists.
+        # The journal is written last: a directory without it is no run.
         digests: dict[str, Any] = {"manifest": sha256(content).hexdigest(), "campaign": sha256(text).hexdigest()}
         digests["companions"] = {name: sha256(companion).hexdigest() for name, companion in companions.items()}
         lock.check()
@@ -72,12 +72,12 @@ def create_store(
 
 
 def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
-    """StoreError if no new run can be made in `path`: it holds a run, or anything else.
+    """StoreError if `path` holds a run or any other files, so that no new run can be made there.
 
-    companions : files that an earlier attempt, cut short, may have left there.
+    companions : names of files that an interrupted attempt may have left there.
     """
     expected = _OURS_BEFORE_THE_JOURNAL | {Path(name).parts[0] for name in companions}
-    with disk.naming(path):
+    with disk.disk_errors(path):
         names = {entry.name for entry in path.iterdir()} if path.exists() else set()
     if JOURNAL in names and is_run_directory(path):
         raise StoreError(f"{path}: holds a run already; `resume` or `extend` it, or choose another folder")
@@ -87,7 +87,19 @@ def refuse_occupied(path: Path, companions: Iterable[str] = ()) -> None:
 
 
 class Store:
-    """One run directory.  Ranges of cases are half open: (first, stop)."""
+    """A run directory: the case table, the saved time histories, and the journal that says which of them count.
+
+    Its methods raise StoreError for what is not there or is damaged.  A Store is for one thread, and one process at a
+    time may write.  Ranges of cases are half open: (first, stop).
+
+    path : Path, the run directory; `open_store` also takes the URL of a published run
+
+    >>> store = open_store("runs/small")
+    >>> store.n_cases, store.missing(), store.status_counts()
+    (8, [], {'ok': 8})
+    >>> store.cases(["case_id", "apogee_altitude_km"]).attrs["units"]
+    {'case_id': '', 'apogee_altitude_km': 'km'}
+    """
 
     def __init__(self, path: Path):
         self.path = path
@@ -111,10 +123,10 @@ class Store:
 
     def _read_journal(self) -> None:
         if not (self.path / JOURNAL).exists():
-            raise StoreError(f"{self.path}: has no {JOURNAL}, and so no case that counts; `run` the campaign anew")
+            raise StoreError(f"{self.path}: has no {JOURNAL}, and so no committed case; `run` the campaign anew")
         self._journal = Journal(self.path / JOURNAL)
         if not self._journal.entries or self._journal.entries[0].event != "created":
-            raise StoreError(f"{self.path / JOURNAL}, line 1: damaged, a journal begins with its creation")
+            raise StoreError(f'{self.path / JOURNAL}, line 1: damaged, it is not the event "created"')
         self._count(self._counted.begun_with)
 
     def _count(self, begun_with: int | None) -> None:
@@ -129,18 +141,18 @@ class Store:
 
     @property
     def campaign_text(self) -> str:
-        """The campaign file as it was flown; StoreError if someone changed it since."""
+        """The campaign file as it was flown; StoreError if it has changed since."""
         try:
             return self._original(CAMPAIGN, "campaign").decode()
         except UnicodeDecodeError as error:
             raise StoreError(f"{self.path / CAMPAIGN}: is no text: {error}") from None
 
     def check_companions(self) -> None:
-        """StoreError if a file that the campaign reads from its own folder is no more the one it was flown with."""
+        """StoreError if a copy of a file that the campaign reads has changed since the run began."""
         for problem in edited_files(self.path, self._created.get("companions", {})):
             raise StoreError(f"{self.path}/{problem}; put the original back")
 
-    # ---- what the journal says
+    # ---- the state of the run, from the journal
 
     @property
     def parts(self) -> list[Part]:
@@ -163,25 +175,25 @@ class Store:
 
     @property
     def n_cases(self) -> int:
-        """How many cases are wanted, after all extensions."""
+        """Number of cases of the run, after all extensions."""
         return int(self._counted.cases or self.manifest["campaign"]["cases"])
 
     @property
     def wanted(self) -> range:
-        """The cases that this directory is to hold: all of the campaign's, or those of a shard."""
+        """The cases that this directory holds when it is complete: all cases, or those of its shard."""
         return cases_in(self.manifest, self.n_cases)
 
     def committed(self) -> list[Range]:
-        """The cases on the disk, as merged ranges in order."""
+        """The committed cases, as merged ranges in order."""
         return self._counted.committed()
 
     def missing(self, cases: int | range | None = None) -> list[Range]:
-        """The ranges not committed among `cases`: the first so many, a range, or all wanted ones."""
-        wanted = self.wanted if cases is None else cases if isinstance(cases, range) else range(cases)
-        return self._counted.missing(wanted)
+        """The ranges that are not committed among `cases`: so many first ones, a range, or None for all expected."""
+        expected = self.wanted if cases is None else cases if isinstance(cases, range) else range(cases)
+        return self._counted.missing(expected)
 
     def status_counts(self) -> dict[str, int]:
-        """Committed cases by status word, without reading a part."""
+        """Number of committed cases by status, from the journal alone."""
         counts: dict[str, int] = {}
         for part in self.parts:
             for word, count in part.status.items():
@@ -189,7 +201,7 @@ class Store:
         return counts
 
     def lost_files(self) -> list[str]:
-        """Folders, and parts that the journal counts, that are gone; `verify` looks for all other damage too."""
+        """Names of committed parts and of folders that are missing; `verify` finds all other damage, too."""
         files = [*PART_FOLDERS, *(part.file for part in self._counted.all_parts())]
         return [file for file in files if not (self.path / file).exists()]
 
@@ -201,13 +213,13 @@ class Store:
     # ---- reading
 
     def cases(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
-        """One row per committed case, by case_id; all columns or the named ones, each once.
+        """The case table: one row per committed case, by case_id, with all columns or the named ones.
 
-        `attrs["units"]`, `["descriptions"]` and `["roles"]` hold what the columns are.
+        `attrs["units"]`, `["descriptions"]` and `["roles"]` describe the columns.  StoreError if a part is damaged.
         """
-        wanted = self.columns if columns is None else tuple(self._column(name) for name in dict.fromkeys(columns))
-        tables = [parts.read_part(self.path, part, wanted) for part in self.parts]
-        return _frame(tables, wanted)
+        chosen = self.columns if columns is None else tuple(self._column(name) for name in dict.fromkeys(columns))
+        tables = [parts.read_part(self.path, part, chosen) for part in self.parts]
+        return _data_frame(tables, chosen)
 
     def _column(self, name: str) -> Column:
         if named := [column for column in self.columns if column.name == name]:
@@ -215,7 +227,7 @@ class Store:
         raise StoreError(f'{self.path}: there is no column "{name}"; there are {", ".join(self.units)}')
 
     def row(self, case_id: int) -> dict[str, Any]:
-        """One case by column name; StoreError if it is not there."""
+        """The row of one case, by column name; StoreError if the case is not committed."""
         for part in self.parts:
             if part.first <= case_id < part.stop:
                 return parts.read_part(self.path, part, self.columns).slice(case_id - part.first, 1).to_pylist()[0]
@@ -231,23 +243,23 @@ class Store:
         quantities, receipt = self.manifest.get("quantities", []), self.history_part
         tables = [read_histories(self.path, receipt, quantities)] if receipt else []
         names = tables[0].column_names if tables else [quantity["name"] for quantity in quantities]
-        return _frame(tables, history_columns(names, quantities))
+        return _data_frame(tables, history_columns(names, quantities))
 
     # ---- writing
 
     @contextmanager
     def lock(self) -> Iterator["Store"]:
-        """Be the one writer of this directory for the length of the block; may be nested.
+        """Hold the writer lock of this directory within the block; blocks may be nested.
 
-        On the way in, parts that a killed writer's workers had finished are counted, and all else that it left is
-        removed; StoreError if another writer is at work.
+        First the complete parts that a killed writer left are committed, and its other files removed.  StoreError if
+        another process is writing.
         """
         if self._lock.held:
             self._lock.check()
             yield self
             return
         with self._lock as dead:
-            self._read_journal()  # another writer may have been here since this object was made
+            self._read_journal()  # another process may have written since this object was made
             if dead is not None:
                 self._record("lock-taken-over", {"from": dead})
                 count_finished(self)
@@ -255,10 +267,10 @@ class Store:
             yield self
 
     def sweep(self) -> None:
-        """Remove temporary files and parts without a journal line; for the holder of the lock."""
+        """Remove temporary files and parts without a journal line.  The caller holds the lock."""
         self._lock.check()
         if not self._journal.certain:
-            self._read_journal()  # what an append that failed left there decides what counts
+            self._read_journal()  # after a failed append, only the file tells which parts are committed
         counted = {part.file for part in self._counted.all_parts()}
         for folder in PART_FOLDERS:
             if not (self.path / folder).exists():
@@ -267,44 +279,40 @@ class Store:
             for file in (f"{folder}/{name}" for name in disk.names_in(self.path, folder)):
                 if disk.is_temporary(Path(file).name) or (is_part_file(file) and file not in counted):
                     disk.remove_file(self.path, file)
-        for name in CUT_SHORT:  # not all temporary files: another process may be writing reports
+        for name in CUT_SHORT:  # not every temporary file: another process may be writing reports
             disk.remove_file(self.path, name)
 
     def append(self, first: int, count: int, columns: Mapping[str, Any]) -> None:
         """Commit the cases first .. first + count - 1; on return they survive a power cut.
 
-        columns : arrays of `count` for every column but case_id; status in words or codes.
+        columns : an array of `count` values for each column but case_id; status as words or codes.
         """
         with self.lock():
             self._refuse_overlap(first, count)
-            self.commit(parts.write_part(self.path, self.columns, first, count, columns))
-
-    def commit(self, part: Part) -> None:
-        """Count a part that `parts.write_part` put into this directory."""
-        with self.lock():
-            self._refuse_overlap(part.first, part.rows)
-            self._record("part", asdict(part))
+            written = parts.write_aside(self.path, self.columns, first, count, columns)
+            self._rename(written)
+            self._record("part", asdict(written.part))
 
     def publish(self, written: Written) -> None:
-        """Commit a part that a worker wrote aside in this directory; on return it survives a power cut."""
+        """Commit a part that a worker wrote by `parts.write_aside`; on return it survives a power cut."""
         with self.lock():
             self._refuse_overlap(written.part.first, written.part.rows)
             leave_receipt(self.path, written.part)
-            self._name(written)
+            self._rename(written)
             self._record("part", asdict(written.part))
 
     def replace(self, before: Part, written: Written) -> None:
-        """Let a part written aside, of the same cases and another name, count in place of `before`."""
+        """Commit a part by `parts.write_aside` in place of `before`, which has the same cases and another name."""
         with self.lock():
-            self._name(written)
+            self._rename(written)
             self._record("part-replaced", {**asdict(written.part), "replaces": before.file})
             self._remove(before)
 
     def _remove(self, before: Part) -> None:
-        with suppress(StoreError):  # it no longer counts, and the next writer tries again
+        with suppress(StoreError):  # it is withdrawn already, and the next writer tries again
             disk.remove_file(self.path, before.file)
 
-    def _name(self, written: Written) -> None:
+    def _rename(self, written: Written) -> None:
         if not (self.path / written.temporary).exists():
             raise StoreError(
                 f"{self.path / written.part.file}: a worker has written it, and it is not here; all workers must see "
@@ -313,7 +321,7 @@ class Store:
         disk.publish(self.path, written.temporary, written.part.file)
 
     def withdraw(self, part: Part) -> None:
-        """Count a part no more, so that its cases are missing again."""
+        """Withdraw a part, so that its cases are missing again."""
         with self.lock():
             self._record("part-withdrawn", {"file": part.file})
             self._remove(part)
@@ -323,22 +331,22 @@ class Store:
             raise StoreError(f"{self.path}: some of the cases {first} to {first + count - 1} are committed already")
 
     def note(self, event: str, /, **facts: Any) -> None:
-        """Put an event that is no part into the journal: "started", "finished", "extended" (with cases), ..."""
+        """Append another event to the journal: "started", "finished", "extended" (with cases), ..."""
         with self.lock():
             self._record(event, facts)
 
     def write_nominal(self, row: Mapping[str, Any]) -> None:
-        """Keep the nominal case: a value for every column but case_id."""
+        """Commit the nominal case.  row : a value for each column but case_id."""
         arrays = {name: np.asarray([value]) for name, value in {**row, "case_id": -1}.items()}
         table = parts.arrow_table(self.columns, arrays, 1, self.path / NOMINAL)
         with self.lock():
             if self.nominal_part is not None:
-                # A kill between the new file and its line must not leave the old line with the new file.
+                # Otherwise a kill between file and line would leave the new file with the old line.
                 self._record("nominal-withdrawn", {})
             self._record("nominal", asdict(parts.write_table(self.path, NOMINAL, table, first=-1)))
 
     def write_histories(self, table: "pd.DataFrame | Mapping[str, Any]") -> None:
-        """Keep these histories (case_id, t_s and quantities, one row per sample) in place of any kept before."""
+        """Commit time histories (case_id, t_s and quantities, one row per sample) in place of earlier ones."""
         arrow = history_table(table, self.manifest.get("quantities", []), self.path / "history")
         with self.lock():
             before = self.history_part
@@ -348,7 +356,7 @@ class Store:
                 self._remove(before)
 
 
-def _frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> pd.DataFrame:
+def _data_frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> pd.DataFrame:
     table = pa.concat_tables(tables) if tables else parts.arrow_schema(columns).empty_table()
     frame = table.to_pandas(use_threads=False)
     frame.attrs.update(parts.attributes(columns))

@@ -1,4 +1,4 @@
-"""URLs of object stores: what is one, which are complete, and how one is shown.  Read here and nowhere else."""
+"""URLs of object stores: recognition, checking, and display without secrets.  All URLs are parsed here."""
 
 import re
 from pathlib import Path
@@ -13,12 +13,12 @@ _HOST_OPTIONAL = (*_ON_DISK, "memory", "hdfs", "dbfs")
 
 
 def is_url(place: str | Path) -> bool:
-    """True for what names an object store, if perhaps not well, and no local path."""
+    """True for the URL of an object store, also an incomplete one; False for a local path."""
     return "://" in str(place) or bool(_BEGIN.match(str(place)))
 
 
 def without_secrets(text: str) -> str:
-    """A URL as it may be shown: without what stands before an @, and behind a ? or #.  A path stays as it is."""
+    """A URL without what precedes an @ and what follows a ? or #, so that it can be shown.  A path is unchanged."""
     if not is_url(text):
         return text
     shown = re.sub(r"(:/+).*@", r"\1***@", text, flags=re.DOTALL)
@@ -26,9 +26,9 @@ def without_secrets(text: str) -> str:
 
 
 def store_url(text: str | Path) -> str:
-    """The URL of a place in an object store, its scheme in small letters and without a slash at its end.
+    """A checked URL, its scheme in lower case and without a slash at the end.
 
-    EngineError, without anything that may be secret, if it is incomplete, ambiguous, or of no store that is known.
+    EngineError, whose text holds no secrets, if the URL is incomplete, ambiguous, or of an unknown store.
     """
     scheme, mark, rest = str(text).partition("://")
     scheme, rest = scheme.lower(), rest.rstrip("/")
@@ -54,7 +54,7 @@ def _problem(scheme: str, rest: str) -> str:
 
 
 def _is_known(scheme: str) -> bool:
-    """Whether fsspec has a store of that name; true where it is not there to ask, and whoever needs it says so."""
+    """True if fsspec has a store for this scheme, or is not installed; whoever opens the URL then reports that."""
     try:
         from fsspec.registry import known_implementations, registry
     except ImportError:

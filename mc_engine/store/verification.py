@@ -1,7 +1,7 @@
-"""Verification of a run, a tuning or a rare event: every byte against what the journals say was written.
+"""Verification of a run, a tuning or a rare event: all files are compared with the checksums in the journals.
 
-Reads only, and runs no code of the campaign.  Unlike opening a directory, it goes on after the first damage and reports
-all of it.  Checksums detect damage, not forgery: who computes new ones can have the journals say anything.
+It only reads, and runs no code of the campaign.  Unlike opening a directory, it reports all damage, not the first.
+Checksums detect damage, not forgery.
 """
 
 import os
@@ -33,18 +33,19 @@ from mc_engine.store.run_files import (
 )
 from mc_engine.store.writer_lock import LOCK_NAME, holder, is_left_by_dead
 
-# What mends a damage, with the directory in braces, and its file.
+# Remedies of damage: {0} stands for the directory, and {1} for the files.
 REPAIR = "`mc-engine resume {0} --repair` flies bad parts again, and removes what does not count"
 ORIGINAL = "put back the original of {1}, or fetch a copy of the run; without it no repair can fly anything again"
 IN_THE_WAY = "move {1} out of the run, then `mc-engine resume {0} --repair`: no writer can go on with it in its way"
 RESUME = "left by an interrupted writer; the next `resume` removes it, and flies the rest"  # no damage
 AWAY = "move {1} out of the run: whatever reads its folder takes it for cases"
 AGAIN = "put back the original of {1}, or let `mc-engine %s` make the result again, in another folder"
+_SESSION = ("started", "rerun", "finished", "interrupted")
 
 
 @dataclass(frozen=True)
 class Damage:
-    """What is wrong with a file of the directory, in words that begin with its name, and what mends it."""
+    """What is wrong with a file, in a sentence that begins with the file's name, and the remedy."""
 
     what: str
     mended_by: str
@@ -56,38 +57,39 @@ class Damage:
 
 
 def damage(folder: Path) -> list[str]:
-    """A sentence per damage, beginning with the file's name in `folder`; empty if all is as written.
+    """A sentence for each damage, beginning with the file's name in `folder`; empty if there is none.
 
-    While a writer is at work, a torn last line and parts without a line are its own business and not reported.
-    Neither are they after a writer was killed: the next one removes them.
+    A torn last line and parts without a line are not reported while a process is writing, nor after it was killed: the
+    next writer removes them.
     """
-    return [one.what for one in damages(folder) if one.mended_by != RESUME]
+    return [item.what for item in damages(folder) if item.mended_by != RESUME]
 
 
-def remedies(folder: Path | str, found: list[Damage]) -> list[str]:
-    """A sentence for each kind of damage with what mends it; first what has to be done before all else."""
+def remedies(folder: Path | str, problems: list[Damage]) -> list[str]:
+    """A sentence for each kind of remedy, in the order in which they have to be applied."""
     files: dict[str, list[str]] = {remedy: [] for remedy in (ORIGINAL, AWAY, STRANGE, IN_THE_WAY, REPAIR)}
-    for one in found:
-        files.setdefault(one.mended_by, []).append(one.file)
+    for problem in problems:
+        files.setdefault(problem.mended_by, []).append(problem.file)
     named = {remedy: ", ".join(dict.fromkeys(names)) for remedy, names in files.items() if names}
     return [remedy.format(shell_word(folder), names) for remedy, names in named.items()]
 
 
 def damages(folder: Path) -> list[Damage]:
-    """All damage in the directory, and what an interrupted writer left, with what mends it."""
+    """All damage in the directory, and the files that an interrupted writer left, with the remedies."""
     kind = kind_of(folder)
     if kind is None:
         raise StoreError(f"{folder}: is no run directory")
     others: Collection[str] = ()
     if kind == RUN:
-        found, others = _run_damages(folder)
+        problems, others = _run_damages(folder)
     else:
-        found = _result_damages(folder, kind)
-    return found + [Damage(f"{name}: {why}", remade_by(name)) for name, why in derived_files(folder).problems(others)]
+        problems = _result_damages(folder, kind)
+    derived = derived_files(folder).problems(others)
+    return problems + [Damage(f"{name}: {why}", remade_by(name)) for name, why in derived]
 
 
-def _inner(folder: Path, error: StoreError) -> str:
-    """The sentence of an error, with the file's name in the directory."""
+def _without_folder(folder: Path, error: StoreError) -> str:
+    """The sentence of an error, with the file's name relative to the directory."""
     return str(error).removeprefix(f"{folder}/")
 
 
@@ -96,58 +98,59 @@ def _inner(folder: Path, error: StoreError) -> str:
 
 def _result_damages(folder: Path, kind: str) -> list[Damage]:
     ours, derived, again = result_files(folder, kind), derived_files(folder), AGAIN % COMMANDS[kind]
-    found = [Damage(f"{name}: {why}", again) for name, why in ours.problems()] if (folder / JOURNAL).exists() else []
+    recorded = ours.problems() if (folder / JOURNAL).exists() else []
+    problems = [Damage(f"{name}: {why}", again) for name, why in recorded]
     for name in names_in(folder):
         if not (ours.are_called(name) or derived.are_called(name) or is_temporary(name)):
-            found.append(Damage(f"{name}: is not of this {kind}", STRANGE))
+            problems.append(Damage(f"{name}: is not of this {kind}", STRANGE))
     try:
-        if not found:
+        if not problems:
             read_result(folder, kind)
     except StoreError as error:
-        found.append(Damage(_inner(folder, error), again))
-    return found
+        problems.append(Damage(_without_folder(folder, error), again))
+    return problems
 
 
 # ---- runs
 
 
 def _run_damages(run: Path) -> tuple[list[Damage], Collection[str]]:
-    """What is wrong with the run itself; and the files that it was made with."""
+    """All damage of the run itself, and the names of the files with which it began."""
     busy = holder(run) is not None
-    lying = sorted(_lying(run))  # before the journal: a part committed in between has its line by then
+    present = sorted(_present(run))  # before the journal is read, so that a part committed meanwhile has its line
     try:
         journal = scan(read_journal(run / JOURNAL))
     except StoreError as error:
-        return [Damage(_inner(run, error), ORIGINAL)], ()
+        return [Damage(_without_folder(run, error), ORIGINAL)], ()
     begun, problems = _begun_with(journal), [Damage(text, ORIGINAL) for text in _head_problems(run, journal)]
     manifest = None if problems else parse_manifest(read_short(run / MANIFEST))
     counted, wrong = receipts_of(journal.entries, None if manifest is None else manifest["campaign"]["cases"])
     killed = not busy and is_left_by_dead(run) and not (journal.damaged or wrong)
-    remedy = RESUME if killed else REPAIR  # a part without a line is damage where a line is: it may be that one's
+    remedy = RESUME if killed else REPAIR  # where a line is damaged, a part without a line may be that line's
     problems += _line_problems(journal, wrong, busy, remedy)
     problems += _part_problems(run, counted, manifest)
     problems += _obstacles(run)
     if not busy:
-        problems += _uncounted(run, lying, counted, remedy)
+        problems += _unrecorded(run, present, counted, remedy)
         problems += _unfinished(journal, counted, manifest, remedy)
-        problems += _beside(run, journal)
+        problems += _companion_problems(run, journal)
     if killed:
         problems += _half_written(run)
     return problems, begun
 
 
-def _beside(run: Path, journal: Scan) -> Iterator[Damage]:
-    """What is wrong with the flights beside the run, which its last session made or completed."""
+def _companion_problems(run: Path, journal: Scan) -> Iterator[Damage]:
+    """Damage of the flights for sensitivities, which are a run directory inside the run."""
     flown = any(entry.event == "companion" for entry in journal.entries)
     if flown and not _is_folder(run / SENSITIVITY):
         yield Damage(f"{SENSITIVITY}: {NO_FOLDER}", REPAIR)
     elif _is_folder(run / SENSITIVITY):
-        for one in damages(run / SENSITIVITY) if kind_of(run / SENSITIVITY) == RUN else ():
-            yield Damage(f"{SENSITIVITY}/{one.what}", one.mended_by)
+        for item in damages(run / SENSITIVITY) if kind_of(run / SENSITIVITY) == RUN else ():
+            yield Damage(f"{SENSITIVITY}/{item.what}", item.mended_by)
 
 
 def _begun_with(journal: Scan) -> dict[str, str]:
-    """SHA-256 by name of the files that the run was made with; empty where the line that says so is lost."""
+    """SHA-256 by name of the files with which the run began; empty if the journal's first line is lost."""
     if not journal.entries or journal.entries[0].number != 1 or receipts_of(journal.entries[:1])[1]:
         return {}
     created = journal.entries[0].facts
@@ -155,7 +158,7 @@ def _begun_with(journal: Scan) -> dict[str, str]:
 
 
 def _head_problems(run: Path, journal: Scan) -> Iterator[str]:
-    """Manifest, campaign and the files beside it against the digests in the journal's first line."""
+    """Damage of manifest, campaign file and companions, by the digests in the journal's first line."""
     begun = _begun_with(journal)
     if not begun:
         yield f"{JOURNAL}: its first line, the creation, is lost; {MANIFEST} and {CAMPAIGN} cannot be verified"
@@ -196,8 +199,8 @@ def _obstacles(run: Path) -> Iterator[Damage]:
             yield Damage(f"{name}: is a folder", IN_THE_WAY)
 
 
-def _lying(run: Path) -> Iterator[str]:
-    """All that lies where parts do, but for what the next writer removes."""
+def _present(run: Path) -> Iterator[str]:
+    """Names of all that is in the folders of parts, except what the next writer removes."""
     if (run / NOMINAL).exists():
         yield NOMINAL
     for folder in PART_FOLDERS:
@@ -215,9 +218,9 @@ def _half_written(run: Path) -> Iterator[Damage]:
             yield Damage(f"{path.relative_to(run).as_posix()}: is a temporary file", RESUME)
 
 
-def _uncounted(run: Path, lying: list[str], counted: Receipts, remedy: str) -> Iterator[Damage]:
+def _unrecorded(run: Path, present: list[str], counted: Receipts, remedy: str) -> Iterator[Damage]:
     files = {part.file for part in counted.all_parts()}
-    for file in lying:
+    for file in present:
         if file in PART_FOLDERS and not os.path.lexists(run / file):
             yield Damage(f"{file}: {NO_FOLDER}", REPAIR)
         elif file in PART_FOLDERS:
@@ -225,15 +228,15 @@ def _uncounted(run: Path, lying: list[str], counted: Receipts, remedy: str) -> I
         elif file not in files and (file == NOMINAL or is_part_file(file)) and _is_folder(run / file):
             yield Damage(f"{file}: is a folder", IN_THE_WAY)
         elif file not in files and (file == NOMINAL or is_part_file(file)):
-            yield Damage(f"{file}: has no line in the journal and does not count", remedy)
+            yield Damage(f"{file}: has no line in the journal and is not part of the run", remedy)
         elif file not in files:
             yield Damage(f"{file}: is not of this run", AWAY)
 
 
 def _unfinished(journal: Scan, counted: Receipts, manifest: dict[str, Any] | None, remedy: str) -> Iterator[Damage]:
-    """A run that has all its cases, and whose session neither finished nor said that it was interrupted."""
-    told = [entry.event for entry in journal.entries if entry.event in ("started", "rerun", "finished", "interrupted")]
-    if manifest is None or counted.cases is None or not told or told[-1] in ("finished", "interrupted"):
+    """A run that has all its cases, but no line "finished" or "interrupted" of its last session."""
+    events = [entry.event for entry in journal.entries if entry.event in _SESSION]
+    if manifest is None or counted.cases is None or not events or events[-1] in ("finished", "interrupted"):
         return
     if not counted.missing(cases_in(manifest, counted.cases)):
         yield Damage(f"{JOURNAL}: all cases are there, and no line says that the run was finished", remedy)

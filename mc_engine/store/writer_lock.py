@@ -1,13 +1,13 @@
-"""One writer per directory of a run, a tuning or a rare event.
+"""The writer lock: at most one process writes to the directory of a run, a tuning or a rare event.
 
-The lock is the operating system's own, on the file `.lock` and, where there is one, on the journal: deleting `.lock`
-lets nobody in.  It falls with its process.  `.lock` holds the writer's record, for messages and for whoever takes over
-after a kill, and is empty when nobody writes.
+It is a lock of the operating system on the file `.lock` and, if there is one, on the journal, so that deleting `.lock`
+does not release it.  It ends with its process.  `.lock` contains the writer's record, for messages and for the writer
+that takes over after a kill; the file is empty while nobody writes.
 
-On file systems without locks (some cluster mounts) that record is the lock.  Who makes the file `.lock.claim`, which
-the system lets one process do, may judge the record and put its own in place.  A writer whose process is over does not
-count; one that cannot be seen from here keeps its lock until a person deletes the file.  A writer looks before each
-step whether the lock is still its own.
+On file systems without locks (some cluster mounts) the record itself is the lock.  The process that creates the file
+`.lock.claim`, exclusively, may check the record and replace it by its own.  The record of a process that has ended is
+ignored; that of a process on another machine holds until a person deletes the file.  A writer checks before each step
+that it still has the lock.
 """
 
 import errno
@@ -20,20 +20,20 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
-from mc_engine.durable_file import make_folder, naming, open_regular, read_short
+from mc_engine.durable_file import disk_errors, make_folder, open_regular, read_short
 from mc_engine.errors import StoreError
 from mc_engine.store.journal import utc_now
 from mc_engine.store.run_files import JOURNAL
 
 LOCK_NAME, CLAIM = ".lock", ".lock.claim"
 LOCK_FILES = frozenset({LOCK_NAME, CLAIM})
-PATIENCE_S = 0.25  # a reader asking `holder` has the lock for an instant; a writer has it for longer
+PATIENCE_S = 0.25  # `holder` takes the lock for an instant, which must not be taken for a writer
 _UNSUPPORTED = {errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK, errno.ENOTSUP}
 _CONTESTED = {errno.EAGAIN, errno.EACCES, errno.EDEADLK}
 
 
 class _BusyError(Exception):
-    """Somebody else has the lock."""
+    """Another process has the lock."""
 
 
 class WriterLock:
@@ -59,14 +59,14 @@ class WriterLock:
         return bool(self._record)
 
     def acquire(self) -> dict[str, Any] | None:
-        """Take the lock; the record of its last holder if that one died with it, else None.
+        """Take the lock.  Returns the record of the last writer if it was killed, else None.
 
-        Raises StoreError within a second, naming the path, if another writer is at work.
+        Raises StoreError, which names the path, within a second if another process is writing.
         """
         deadline = time.monotonic() + PATIENCE_S
         while True:
             try:
-                with naming(self.path):
+                with disk_errors(self.path):
                     return self._take()
             except _BusyError as error:
                 if time.monotonic() > deadline:
@@ -88,8 +88,8 @@ class WriterLock:
         return before
 
     def check(self) -> None:
-        """StoreError if this object took the lock, and the lock is no more that of the directory."""
-        with naming(self.path):
+        """StoreError if this object took the lock and has lost it since."""
+        with disk_errors(self.path):
             if not self.held or self._is_ours():
                 return
         lost = f"was moved or removed, or its {self.path.name} was deleted or taken over"
@@ -101,7 +101,7 @@ class WriterLock:
         return self.path.exists() and read_short(self.path) == self._record
 
     def release(self) -> None:
-        """Give the lock back.  It falls even if the record cannot be emptied; that of a lock lost is left as it is."""
+        """Release the lock, even if the record cannot be emptied.  The record of another writer is not changed."""
         with self._held, suppress(OSError, StoreError):
             if self.held and self._is_ours():
                 _overwrite(self.path, self._locked, b"")
@@ -110,14 +110,14 @@ class WriterLock:
 
 @contextmanager
 def writer_of_new(folder: Path, refuse: Callable[[], None]) -> Iterator[WriterLock]:
-    """Be the one writer of the new directory `folder`, which is gone again if the block leaves nothing there.
+    """Create the directory `folder` and hold its lock within the block; it is removed if the block leaves it empty.
 
-    refuse : raises StoreError where it is occupied.
+    refuse : raises StoreError if the directory is occupied.
     """
     refuse()
     make_folder(folder)
     with (lock := WriterLock(folder)):
-        refuse()  # again: two may have come this far
+        refuse()  # again, with the lock: another process may have been faster
         done = False
         try:
             yield lock
@@ -130,8 +130,8 @@ def writer_of_new(folder: Path, refuse: Callable[[], None]) -> Iterator[WriterLo
 
 
 def holder(folder: Path, name: str = LOCK_NAME, journal: str = JOURNAL) -> dict[str, Any] | None:
-    """The record of the writer now at work in `folder`; None if there is none."""
-    with suppress(OSError, StoreError), ExitStack() as held:  # a directory we may only read: nobody to be told of
+    """The record of the process that is writing in `folder`; None if there is none."""
+    with suppress(OSError, StoreError), ExitStack() as held:  # no rights to lock: the writer cannot be determined
         try:
             locked = _system_locks(folder, _locked_files(name, journal), held)
         except _BusyError:
@@ -142,24 +142,25 @@ def holder(folder: Path, name: str = LOCK_NAME, journal: str = JOURNAL) -> dict[
 
 
 def is_left_by_dead(folder: Path) -> bool:
-    """True if the last writer in `folder`, where none is at work now, was killed."""
+    """True if the last writer in `folder` was killed; called while no process writes there."""
     with suppress(StoreError):
         return _read(folder / LOCK_NAME) is not None
     return False
 
 
 def _system_locks(folder: Path, names: tuple[str, ...], held: ExitStack, flags: int = 0) -> list[int]:
-    """Descriptors with the system's lock, of the lock file and the journal; none on a file system without locks.
+    """Descriptors of the lock file and the journal, with the system's lock; none on a file system without locks.
 
-    flags : O_CREAT, to make the lock file where it is not there.  held : closed to let them go.
+    flags : O_CREAT, to create the lock file if it is missing.  held : closing it releases the locks.
     """
     locked: list[int] = []
-    for name, more in ((name, flags * (name == names[0])) for name in names):
+    for name in names:
         path = folder / name
-        if not more and not path.exists():
+        creation = flags if name == names[0] else 0
+        if not creation and not path.exists():
             continue
-        with naming(path):
-            descriptor = open_regular(path, os.O_RDWR | more)
+        with disk_errors(path):
+            descriptor = open_regular(path, os.O_RDWR | creation)
         held.callback(_let_go, descriptor)
         try:
             _system_lock(descriptor, take=True)
@@ -170,14 +171,14 @@ def _system_locks(folder: Path, names: tuple[str, ...], held: ExitStack, flags: 
                 raise
             raise _BusyError(f"{described(_read(folder / names[0]))} is writing here") from None
         if not _is_at(path, descriptor):
-            raise _BusyError("another writer is writing here")  # it replaced the file before the lock was ours
+            raise _BusyError("another writer is writing here")  # it replaced the file before we had the lock
         locked.append(descriptor)
     return locked
 
 
 @contextmanager
 def _claimed(path: Path) -> Iterator[None]:
-    """Have made the file `path`, which one process can."""
+    """Create the file `path`, which only one process can do, and remove it at the end of the block."""
     try:
         os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
     except FileExistsError:
@@ -190,7 +191,7 @@ def _claimed(path: Path) -> Iterator[None]:
 
 
 def _is_at(path: Path, descriptor: int) -> bool:
-    """Whether the open file is the one that has this name now."""
+    """Whether `path` is the name of the open file."""
     try:
         return os.path.samestat(os.stat(path, follow_symlinks=False), os.fstat(descriptor))
     except FileNotFoundError:
@@ -210,7 +211,7 @@ if os.name == "nt":
         return (name,)  # an open file can neither be deleted nor replaced here
 
     def _system_lock(descriptor: int, take: bool) -> None:
-        # Windows locks bytes against reading too: one far behind the record leaves the record readable.
+        # Windows locks bytes against reading, too: a byte far behind the record keeps the record readable.
         os.lseek(descriptor, 1 << 20, os.SEEK_SET)
         msvcrt.locking(descriptor, msvcrt.LK_NBLCK if take else msvcrt.LK_UNLCK, 1)  # type: ignore[attr-defined, unused-ignore]
 else:
@@ -224,11 +225,11 @@ else:
 
 
 def _is_at_work(record: dict[str, Any] | None, locked: list[int]) -> bool:
-    """Whether the writer of a record may be at work, as it cannot be if it had the system's locks that are ours now."""
+    """Whether the writer of a record may be running.  locked : the system's locks, if this process has them."""
     if record is None or (locked and record.get("locks", True)):
         return False
     elsewhere = any(record.get(key, value) != value for key, value in _here().items())
-    if elsewhere or os.name == "nt":  # where to ask for a process may end it
+    if elsewhere or os.name == "nt":  # on Windows `os.kill` would end the process
         return True
     try:
         pid = int(record["pid"])
@@ -237,12 +238,12 @@ def _is_at_work(record: dict[str, Any] | None, locked: list[int]) -> bool:
         return False
     except (OSError, KeyError, ValueError, TypeError, OverflowError):
         return True
-    start = _start(pid)  # its number may have been given to another process since
+    start = _start(pid)  # the number may belong to a later process
     return start is None or start == record.get("start", start)
 
 
 def _here() -> dict[str, str]:
-    """Where a process number means what it does here: on this machine, and in its container."""
+    """What identifies the space of process numbers: this machine, and the container on it."""
     host = {"host": socket.gethostname()}
     with suppress(OSError):
         return {**host, "numbers": os.readlink("/proc/self/ns/pid")}
@@ -250,7 +251,7 @@ def _here() -> dict[str, str]:
 
 
 def _start(pid: int) -> int | None:
-    """When a process began, in ticks since its machine did; -1 if it is dead, None where the system does not say."""
+    """Start of a process in ticks since the start of its machine; -1 if it has ended, None without /proc."""
     try:
         fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()
     except OSError:
@@ -259,13 +260,13 @@ def _start(pid: int) -> int | None:
 
 
 def _read(path: Path) -> dict[str, Any] | None:
-    """The record in a lock file; {} if it holds anything else, None if nothing."""
+    """The record in a lock file; None if the file is empty, {} if it holds anything else."""
     try:
         content = read_short(path) if os.path.lexists(path) else b""
     except StoreError:
         if os.path.lexists(path):
             raise
-        content = b""  # somebody deleted it meanwhile
+        content = b""  # it was deleted meanwhile
     try:
         record = json.loads(content) if content.strip(b"\0 \n") else None
     except (ValueError, RecursionError):
@@ -274,7 +275,7 @@ def _read(path: Path) -> dict[str, Any] | None:
 
 
 def _overwrite(path: Path, locked: list[int], content: bytes) -> None:
-    # Windows lets only the descriptor with the lock write.
+    # On Windows only the descriptor that has the lock can write.
     descriptor = locked[0] if locked else open_regular(path, os.O_WRONLY)
     try:
         os.ftruncate(descriptor, 0)
@@ -287,7 +288,7 @@ def _overwrite(path: Path, locked: list[int], content: bytes) -> None:
 
 
 def described(record: dict[str, Any] | None) -> str:
-    """The holder of a lock in words."""
+    """The holder of a lock, for messages."""
     if not record:
         return "another writer"
     pid, host, since = (json.dumps(str(record.get(name))[:100])[1:-1] for name in ("pid", "host", "since"))

@@ -1,7 +1,8 @@
-"""Candidates of a tuning: choices of the tuned parameters, flown side by side and measured.
+"""Candidates of a tuning: sets of values of the tuned parameters, flown together and scored.
 
-A generation of candidates, times the dispersed cases where a quantile is wanted, is one table of cases for the lane
-engine.  Every candidate flies the same cases with the same noise, so that two candidates differ by their choice alone.
+All candidates of a generation, times the dispersed cases where a quantile is asked for, are flown as one table of
+cases. Every candidate flies the same cases with the same noise, so that two candidates differ by their parameters
+alone.
 """
 
 from collections import Counter
@@ -23,12 +24,13 @@ _MEANING = {name: STATUS_TEXT[code] for code, name in STATUS_NAME.items()}
 
 @dataclass(frozen=True)
 class Scores:
-    """What n candidates come to, in declared units.  NaN: the nominal case, or too many of the others, failed.
+    """Scores of n candidates, in declared units.  NaN: the nominal case, or too many of the dispersed ones, failed.
 
-    objectives : float64[n, n_objectives];  limited : float64[n, n_constraints], the metrics under constraints
-    excess : float64[n, n_constraints], how far each is beyond its limit, in shares of that limit; 0 inside
-    failed : int64[n], cases that did not fly to their end;  reasons : object[n], how and why most of these ended, in
-        words, empty where none failed
+    objectives : float64[n, n_objectives]
+    limited : float64[n, n_constraints], the metrics under constraints
+    excess : float64[n, n_constraints], how far each is beyond its limit, as a fraction of that limit; 0 inside
+    failed : int64[n], cases that did not complete
+    reasons : object[n] of str, the commonest failure of each candidate; empty where none failed
     """
 
     objectives: np.ndarray
@@ -58,44 +60,49 @@ def fly_candidates(campaign: Campaign, tuning: Tuning, candidates: np.ndarray, w
     n, per = len(candidates), cases_per_candidate(campaign, tuning)
     ids, table = _shared_cases(campaign, tuning)
     inputs = {name: np.tile(values, n) for name, values in table.items()}
-    inputs |= {one.name: np.repeat(candidates[:, k], per) for k, one in enumerate(tuning.parameters)}
-    names = list(dict.fromkeys(one.metric for one in tuning.measures))
+    inputs |= {parameter.name: np.repeat(candidates[:, k], per) for k, parameter in enumerate(tuning.parameters)}
+    names = list(dict.fromkeys(measure.metric for measure in tuning.measures))
     with naming_faults(campaign.model_reference, "a candidate"):
         flown = fly_in_threads(campaign, inputs, np.tile(ids, n), ["status", "reason", *names], workers)
     ok = (flown["status"] == STATUS_NAME[OK]).reshape(n, per)
     metrics = {name: np.where(ok, flown[name].reshape(n, per), np.nan) for name in names}
     measured = [
-        _measured(metrics[one.metric], one.quantile, one.large_is_bad, tuning.nominal) for one in tuning.measures
+        _measured(metrics[measure.metric], measure.quantile, measure.large_is_bad, tuning.nominal)
+        for measure in tuning.measures
     ]
     objectives, limited = measured[: len(tuning.objectives)], measured[len(tuning.objectives) :]
-    excess = [_excess(values, one) for values, one in zip(limited, tuning.constraints, strict=True)]
+    excess = [_excess(values, constraint) for values, constraint in zip(limited, tuning.constraints, strict=True)]
     status, reason = (flown[name].reshape(n, per) for name in ("status", "reason"))
-    reasons = [commonest_failure(status[one][~ok[one]], reason[one][~ok[one]]) for one in range(n)]
+    reasons = [
+        commonest_failure(status[candidate][~ok[candidate]], reason[candidate][~ok[candidate]])
+        for candidate in range(n)
+    ]
     return Scores(
-        _columns(objectives, n),
-        _columns(limited, n),
-        _columns(excess, n),
+        _side_by_side(objectives, n),
+        _side_by_side(limited, n),
+        _side_by_side(excess, n),
         np.count_nonzero(~ok, axis=1),
         np.array(reasons, dtype=object),
     )
 
 
 def commonest_failure(status: Iterable[str], reason: Iterable[str]) -> str:
-    """How and why most of some failed cases ended, as "refused: ..."; of equally many the first, empty without any.
+    """The commonest status and reason among failed cases, as "refused: ..."; empty without any.
 
-    status, reason : of each failed case; without a reason of its own, what the status means.
+    status, reason : of each failed case; without a reason, the meaning of the status is used.  Of equally common ones,
+        the first.
     """
     ends = Counter(f"{how}: {why or _MEANING[how]}" for how, why in zip(status, reason, strict=True))
     return ends.most_common(1)[0][0] if ends else ""
 
 
-def _columns(values: list[np.ndarray], n: int) -> np.ndarray:
+def _side_by_side(values: list[np.ndarray], n: int) -> np.ndarray:
     return np.column_stack(values) if values else np.empty((n, 0))
 
 
 def _shared_cases(campaign: Campaign, tuning: Tuning) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """(case numbers, dispersed inputs) that every candidate flies; the nominal case is the first, if it is wanted."""
-    nominal = {one.name: column([campaign.nominal[one.name]]) for one in campaign.dispersions}
+    nominal = {dispersion.name: column([campaign.nominal[dispersion.name]]) for dispersion in campaign.dispersions}
     if not tuning.robust:
         return np.array([NOMINAL_NOISE]), nominal
     ids = np.arange(campaign.cases, dtype=np.int64)
@@ -114,8 +121,8 @@ def _measured(values: np.ndarray, quantile: float | None, large_is_bad: bool, no
         return values[:, 0]
     dispersed = values[:, int(nominal_first) :]
     ranked = np.sort(np.where(np.isnan(dispersed), np.inf if large_is_bad else -np.inf, dispersed), axis=1)
-    found = ranked[:, quantile_rank(quantile, ranked.shape[1], large_is_bad)]
-    return np.where(np.isfinite(found), found, np.nan)
+    chosen = ranked[:, quantile_rank(quantile, ranked.shape[1], large_is_bad)]
+    return np.where(np.isfinite(chosen), chosen, np.nan)
 
 
 def quantile_rank(quantile: float, n_cases: int, large_is_bad: bool) -> int:

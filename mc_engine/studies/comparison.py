@@ -8,12 +8,13 @@ each metric, the fraction of cases completed, the fraction inside each requireme
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from mc_engine.errors import EngineError
+from mc_engine.section import ReportSection
 from mc_engine.statistics.change_tests import MetricChange, ShareChange, holm, metric_change, share_change
 from mc_engine.statistics.requirements import (
     FAIL,
@@ -26,23 +27,13 @@ from mc_engine.statistics.requirements import (
     was_looked_at,
 )
 from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store.store import Store
 from mc_engine.studies.run_changes import Difference, campaign_diff, campaign_differences, code_differences
 
 ALPHA = 0.003  # one false alarm in some 300 comparisons; 0.3 sigma is still found with 1000 cases and dozens of metrics
 TOLERANCE = 1e-6  # standard deviations: smaller differences of a pair are rounding
-CONFIDENCE = 0.95
 FLOWN = "completed"
 _RANK = {PASS: 0, NOT_DEMONSTRABLE: 1, FAIL: 2}
-
-
-class ComparedRun(Protocol):
-    """What a comparison needs of a store."""
-
-    @property
-    def manifest(self) -> dict[str, Any]: ...
-    @property
-    def campaign_text(self) -> str: ...
-    def cases(self) -> pd.DataFrame: ...
 
 
 @dataclass(frozen=True)
@@ -69,7 +60,7 @@ class VerdictChange:
     @property
     def words(self) -> str:
         """Such as "fail → pass", or "pass in both runs"."""
-        ends = [one or "not required" for one in (self.before, self.after)]
+        ends = [outcome or "not required" for outcome in (self.before, self.after)]
         return " → ".join(ends) if ends[0] != ends[1] else f"{ends[0]} in both runs"
 
     def inside_words(self, counted: Callable[[int], str]) -> str:
@@ -91,6 +82,7 @@ class VerdictChange:
 class Comparison:
     """Run A (before) and run B (after).  cases, ok : by run, all cases, and those flown to their end.
 
+    confidence : of every interval, that of B's [report].
     metrics in the order of B's columns; units by metric; left_out : metrics that are not compared, and why.
     """
 
@@ -102,6 +94,7 @@ class Comparison:
     pairing: Pairing
     alpha: float
     tolerance: float
+    confidence: float
     metrics: tuple[MetricChange, ...]
     shares: tuple[ShareChange, ...]
     verdicts: tuple[VerdictChange, ...]
@@ -118,20 +111,20 @@ class Comparison:
 
     @property
     def shifted(self) -> tuple[MetricChange, ...]:
-        return tuple(one for one in self.metrics if one.shift_adjusted <= self.alpha)
+        return tuple(metric for metric in self.metrics if metric.shift_adjusted <= self.alpha)
 
     @property
     def spread(self) -> tuple[MetricChange, ...]:
-        return tuple(one for one in self.metrics if one.spread_adjusted <= self.alpha)
+        return tuple(metric for metric in self.metrics if metric.spread_adjusted <= self.alpha)
 
     @property
     def moved_shares(self) -> tuple[ShareChange, ...]:
-        return tuple(one for one in self.shares if one.adjusted <= self.alpha)
+        return tuple(share for share in self.shares if share.adjusted <= self.alpha)
 
     @property
     def worse_verdicts(self) -> tuple[VerdictChange, ...]:
         """Requirements with a worse verdict on the same cases; on other cases chance alone may change a verdict."""
-        return tuple(one for one in self.verdicts if one.worse) if self.pairing.paired else ()
+        return tuple(verdict for verdict in self.verdicts if verdict.worse) if self.pairing.paired else ()
 
     @property
     def changed(self) -> bool:
@@ -140,7 +133,7 @@ class Comparison:
 
 
 def compare_runs(
-    a: ComparedRun, b: ComparedRun, names: tuple[str, str], *, alpha: float = ALPHA, tolerance: float = TOLERANCE
+    a: Store, b: Store, names: tuple[str, str], *, alpha: float = ALPHA, tolerance: float = TOLERANCE
 ) -> Comparison:
     """Run `a` (before) against run `b` (after).  names : what to call them, for example their directories.
 
@@ -148,7 +141,7 @@ def compare_runs(
     """
     manifests = a.manifest, b.manifest
     tables = a.cases(), b.cases()
-    facts = tuple({one["name"]: one for one in manifest["columns"]} for manifest in manifests)
+    facts = tuple({fact["name"]: fact for fact in manifest["columns"]} for manifest in manifests)
     pairing = pair_cases(tables, (_of_role(facts[0], "dispersion"), _of_role(facts[1], "dispersion")))
     metrics, left_out = _shared_metrics(*facts)
     if left_out and not metrics:
@@ -159,29 +152,35 @@ def compare_runs(
         for table, flown in zip(tables, ok, strict=True)
     ]
     first, second = pairing.rows
+    confidence = ReportSection(**manifests[1].get("report", {})).confidence
     changes = [
         metric_change(name, values[0][name][first], values[1][name][second], paired=pairing.paired,
-                      confidence=CONFIDENCE, tolerance=tolerance)
+                      confidence=confidence, tolerance=tolerance)
         for name in metrics
     ]  # fmt: skip
-    counted = {FLOWN: ok, **_inside(manifests[1], values, ok)}
+    counted = {FLOWN: ok, **_cases_inside(manifests[1], values, ok)}
     shares = [
-        share_change(name, one[first], other[second], paired=pairing.paired, confidence=CONFIDENCE)
-        for name, (one, other) in counted.items()
+        share_change(name, before[first], other[second], paired=pairing.paired, confidence=confidence)
+        for name, (before, other) in counted.items()
     ]
     adjusted = iter(holm(_p_values(changes, shares)).tolist())
     return Comparison(
         names=names,
-        titles=_each(manifests, lambda one: str(one["campaign"].get("title") or one["campaign"].get("name", ""))),
-        created=_each(manifests, lambda one: str(one.get("created_utc", ""))),
-        cases=_each(tables, len),
-        ok=_each(ok, lambda one: int(one.sum())),
+        titles=_both(
+            manifests, lambda manifest: str(manifest["campaign"].get("title") or manifest["campaign"].get("name", ""))
+        ),
+        created=_both(manifests, lambda manifest: str(manifest.get("created_utc", ""))),
+        cases=_both(tables, len),
+        ok=_both(ok, lambda flown: int(flown.sum())),
         pairing=pairing,
         alpha=alpha,
         tolerance=tolerance,
-        metrics=tuple(replace(one, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for one in changes),
-        shares=tuple(replace(one, adjusted=next(adjusted)) for one in shares),
-        verdicts=_verdicts(manifests, tables, ok),
+        confidence=confidence,
+        metrics=tuple(
+            replace(change, shift_adjusted=next(adjusted), spread_adjusted=next(adjusted)) for change in changes
+        ),
+        shares=tuple(replace(share, adjusted=next(adjusted)) for share in shares),
+        verdicts=_verdict_changes(manifests, tables, ok),
         units={name: str(facts[1][name].get("unit", "")) for name in metrics},
         left_out=left_out,
         code=code_differences(*manifests),
@@ -211,8 +210,8 @@ def pair_cases(tables: tuple[pd.DataFrame, pd.DataFrame], inputs: tuple[list[str
         return Pairing(False, everything, f"not paired: {why}")
     n = int(same.sum())
     rest = len(tables[0]) + len(tables[1]) - 2 * n
-    more = f"; {rest} cases that only one run has, or with other inputs, are left out" if rest else ""
-    return Pairing(True, (first[same], second[same]), f"paired: {n} cases have the same inputs in both runs{more}")
+    remainder = f"; {rest} cases that only one run has, or with other inputs, are left out" if rest else ""
+    return Pairing(True, (first[same], second[same]), f"paired: {n} cases have the same inputs in both runs{remainder}")
 
 
 def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -222,7 +221,7 @@ def _equal(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _of_role(facts: Mapping[str, Mapping[str, Any]], role: str) -> list[str]:
-    return [name for name, one in facts.items() if one.get("role") == role]
+    return [name for name, fact in facts.items() if fact.get("role") == role]
 
 
 def _shared_metrics(
@@ -234,45 +233,43 @@ def _shared_metrics(
     left_out += [f"{name}: only in B" for name in ours if name not in theirs]
     shared = [name for name in ours if name in theirs]
     units = {name: (a[name].get("unit", ""), b[name].get("unit", "")) for name in shared}
-    left_out += [f"{name}: in {one} in A, in {two} in B" for name, (one, two) in units.items() if one != two]
+    left_out += [f"{name}: in {unit} in A, in {two} in B" for name, (unit, two) in units.items() if unit != two]
     return [name for name in shared if units[name][0] == units[name][1]], tuple(left_out)
 
 
-def _inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok: Any) -> dict[str, Any]:
+def _cases_inside(manifest: Mapping[str, Any], values: list[dict[str, np.ndarray]], ok: Any) -> dict[str, Any]:
     """bool[n] of both runs for each requirement of B: inside its limits."""
     return {
         str(record["name"]): tuple(
-            inside_all([record], one.__getitem__, flown) for one, flown in zip(values, ok, strict=True)
+            inside_all([record], columns.__getitem__, flown) for columns, flown in zip(values, ok, strict=True)
         )
         for record in manifest.get("requirements", [])
         if record["metric"] in values[0]
     }
 
 
-def _verdicts(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
-    found: list[dict[str, Verdict]] = []
+def _verdict_changes(manifests: Any, tables: Any, ok: Any) -> tuple[VerdictChange, ...]:
+    judged_runs: list[dict[str, Verdict]] = []
     for manifest, table, flown in zip(manifests, tables, ok, strict=True):
         design = str(manifest["campaign"].get("design", "mc"))
         records = manifest.get("requirements", []) if design in SAMPLING_DESIGNS else []
         looked = was_looked_at(manifest, len(table))
-        columns = {one["metric"]: table[one["metric"]].to_numpy(dtype=np.float64) for one in records}
+        columns = {record["metric"]: table[record["metric"]].to_numpy(dtype=np.float64) for record in records}
         judged, joint = judge_all(records, columns.__getitem__, flown, design, looked)
-        found.append({verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]})
+        judged_runs.append({verdict.name: verdict for verdict in [*judged, *([joint] if joint else [])]})
     changes = []
-    for name in dict.fromkeys([*found[0], *found[1]]):
-        a, b = (_told(one.get(name)) for one in found)
-        changes.append(VerdictChange(name, a[0], b[0], (a[1], b[1])))
+    for name in dict.fromkeys([*judged_runs[0], *judged_runs[1]]):
+        ends = [verdicts.get(name) for verdicts in judged_runs]
+        before, after = (None if verdict is None else verdict.outcome for verdict in ends)
+        a, b = (None if verdict is None else (verdict.passed, verdict.tried) for verdict in ends)
+        changes.append(VerdictChange(name, before, after, (a, b)))
     return tuple(changes)
 
 
-def _told(verdict: Verdict | None) -> tuple[str | None, tuple[int, int] | None]:
-    return (None, None) if verdict is None else (verdict.outcome, (verdict.passed, verdict.tried))
-
-
 def _p_values(metrics: Any, shares: Any) -> list[float]:
-    of_metrics = [p for one in metrics for p in (one.shift_p, one.spread_p)]
-    return of_metrics + [one.p_value for one in shares]
+    of_metrics = [p for metric in metrics for p in (metric.shift_p, metric.spread_p)]
+    return of_metrics + [share.p_value for share in shares]
 
 
-def _each(pair: Any, function: Any) -> Any:
-    return tuple(function(one) for one in pair)
+def _both(pair: Any, function: Any) -> Any:
+    return tuple(function(item) for item in pair)

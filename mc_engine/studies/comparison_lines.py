@@ -12,94 +12,97 @@ _LEAST_P = 1e-12  # a smaller p-value means no more
 _HEADINGS = ("metric", "shift", "in sigma of A", "adjusted p", "spread B/A", "adjusted p", "used A, B")
 
 
-def comparison_lines(found: Comparison) -> Iterator[str]:
+def comparison_lines(comparison: Comparison) -> Iterator[str]:
     """All that a reader needs to act on, the answer last."""
-    for letter, name, cases, ok in zip("AB", found.names, found.cases, found.ok, strict=True):
+    for letter, name, cases, ok in zip("AB", comparison.names, comparison.cases, comparison.ok, strict=True):
         yield f"{letter}  {name}: {cases:,} cases, {ok:,} completed"
-    yield found.pairing.reason
-    for one in found.verdicts:
-        inside = one.inside_words("{:,}".format)
-        yield f"requirement {one.name}: {one.words}{', ' if inside else ''}{inside}"
-    yield from _changes(found)
-    yield from _table(found)
-    yield from (f"not compared: {sentence}" for sentence in found.left_out)
-    yield from (_share_line(one, found.alpha) for one in found.shares)
-    yield answer(found)
+    yield comparison.pairing.reason
+    for verdict in comparison.verdicts:
+        inside = verdict.inside_words("{:,}".format)
+        yield f"requirement {verdict.name}: {verdict.words}{', ' if inside else ''}{inside}"
+    yield from _source_changes(comparison)
+    yield from _metric_table(comparison)
+    yield from (f"not compared: {sentence}" for sentence in comparison.left_out)
+    yield from (_share_line(share, comparison.alpha) for share in comparison.shares)
+    yield answer(comparison)
 
 
-def answer(found: Comparison) -> str:
+def answer(comparison: Comparison) -> str:
     """The whole comparison in a sentence."""
-    held = f"{found.n_tests} tests, at most one chance in {1.0 / found.alpha:.0f} of any false alarm"
-    if not found.changed:
+    held = f"{comparison.n_tests} tests, at most one chance in {1.0 / comparison.alpha:.0f} of any false alarm"
+    if not comparison.changed:
         return f"no significant change ({held})"
     parts = [
-        _named("shift of", [one.metric for one in found.shifted]),
-        _named("spread of", [one.metric for one in found.spread]),
-        _named("fraction", [one.name for one in found.moved_shares]),
-        _named("requirement worse:", [one.name for one in found.worse_verdicts]),
+        _kind_and_names("shift of", [metric.metric for metric in comparison.shifted]),
+        _kind_and_names("spread of", [metric.metric for metric in comparison.spread]),
+        _kind_and_names("fraction", [share.name for share in comparison.moved_shares]),
+        _kind_and_names("requirement worse:", [verdict.name for verdict in comparison.worse_verdicts]),
     ]
     return f"changed: {'; '.join(part for part in parts if part)} ({held})"
 
 
-def _named(what: str, names: list[str]) -> str:
-    return f"{what} {', '.join(names)}" if names else ""
+def _kind_and_names(kind: str, names: list[str]) -> str:
+    return f"{kind} {', '.join(names)}" if names else ""
 
 
-def _changes(found: Comparison) -> Iterator[str]:
-    yield f"code: {'unchanged' if not found.code else ''}".rstrip()
-    yield from (f"  {line}" for line in changed_lines(found.code))
-    same = not found.campaign and not found.diff
+def _source_changes(comparison: Comparison) -> Iterator[str]:
+    yield f"code: {'unchanged' if not comparison.code else ''}".rstrip()
+    yield from (f"  {line}" for line in changed_lines(comparison.code))
+    same = not comparison.campaign and not comparison.diff
     yield f"campaign: {'unchanged' if same else ''}".rstrip()
-    yield from (f"  {line}" for line in changed_lines(found.campaign))
-    if found.diff and not found.campaign:
-        yield from (f"  {line}" for line in found.diff)
+    yield from (f"  {line}" for line in changed_lines(comparison.campaign))
+    if comparison.diff and not comparison.campaign:
+        yield from (f"  {line}" for line in comparison.diff)
 
 
-def _table(found: Comparison) -> Iterator[str]:
-    same = [one.metric for one in found.metrics if one.same]
-    moved = sorted((one for one in found.metrics if not one.same and finite(one.shift)), key=lambda one: -one.effect)
-    rows = [_HEADINGS, *(_row(one, found) for one in moved)]
+def _metric_table(comparison: Comparison) -> Iterator[str]:
+    same = [metric.metric for metric in comparison.metrics if metric.same]
+    moved = sorted(
+        (metric for metric in comparison.metrics if not metric.same and finite(metric.shift)),
+        key=lambda change: -change.effect,
+    )
+    rows = [_HEADINGS, *(_metric_cells(change, comparison) for change in moved)]
     widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADINGS))]
     for row in rows if len(rows) > 1 else []:
         cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         yield "  ".join(cells).rstrip()
     if same:
         yield f"the same in both runs: {', '.join(same)}"
-    absent = [one.metric for one in found.metrics if not one.same and not finite(one.shift)]
+    absent = [metric.metric for metric in comparison.metrics if not metric.same and not finite(metric.shift)]
     if absent:
         yield f"without a number in one of the runs: {', '.join(absent)}"
 
 
-def _row(one: MetricChange, found: Comparison) -> tuple[str, ...]:
-    unit = found.units[one.metric]
+def _metric_cells(change: MetricChange, comparison: Comparison) -> tuple[str, ...]:
+    unit = comparison.units[change.metric]
     return (
-        f"{one.metric}{f' [{unit}]' if unit else ''}",
-        _number(one.shift.value),
-        _with_interval(one.shift_in_sigma),
-        _p(one.shift_adjusted, found.alpha),
-        _with_interval(one.ratio),
-        _p(one.spread_adjusted, found.alpha),
-        f"{one.n_used[0]:,}, {one.n_used[1]:,}",
+        f"{change.metric}{f' [{unit}]' if unit else ''}",
+        _four_digits(change.shift.value),
+        _with_interval(change.shift_in_sigma),
+        _p_value_text(change.shift_adjusted, comparison.alpha),
+        _with_interval(change.ratio),
+        _p_value_text(change.spread_adjusted, comparison.alpha),
+        f"{change.n_used[0]:,}, {change.n_used[1]:,}",
     )
 
 
-def _share_line(one: ShareChange, alpha: float) -> str:
-    counts = " -> ".join(f"{k:,} of {n:,}" for k, n in zip(one.counted, one.tried, strict=True))
-    pairs = f", {one.lost:,} lost and {one.gained:,} gained" if one.lost is not None else ""
-    return f"{one.name}: {counts}{pairs}, adjusted p {_p(one.adjusted, alpha)}"
+def _share_line(share: ShareChange, alpha: float) -> str:
+    counts = " -> ".join(f"{k:,} of {n:,}" for k, n in zip(share.counted, share.tried, strict=True))
+    pairs = f", {share.lost:,} lost and {share.gained:,} gained" if share.lost is not None else ""
+    return f"{share.name}: {counts}{pairs}, adjusted p {_p_value_text(share.adjusted, alpha)}"
 
 
-def _with_interval(one: Estimate) -> str:
-    if not np.isfinite(one.value):
+def _with_interval(estimate: Estimate) -> str:
+    if not np.isfinite(estimate.value):
         return "-"
-    return f"{one.value:.3g} [{one.lower:.3g}, {one.upper:.3g}]"
+    return f"{estimate.value:.3g} [{estimate.lower:.3g}, {estimate.upper:.3g}]"
 
 
-def _number(value: float) -> str:
+def _four_digits(value: float) -> str:
     return f"{value:.4g}" if np.isfinite(value) else "-"
 
 
-def _p(value: float, alpha: float) -> str:
+def _p_value_text(value: float, alpha: float) -> str:
     """The p-value, a star where it is significant."""
     if not np.isfinite(value):
         return "no test"

@@ -1,4 +1,4 @@
-"""The end states of a run for other tools: as CSV, and as ephemerides of one point a case (CCSDS OEM, KVN).
+"""End states of a run exported as CSV, or as ephemerides with one point for each case (CCSDS OEM, KVN).
 
 CCSDS 502.0-B-3, Orbit Data Messages (2023), section 5.
 """
@@ -49,7 +49,9 @@ def write_oem(store: Store, columns: Sequence[str], out: Path, epoch: str, frame
     table = store.cases(["case_id", "status", END_TIME, *columns])
     flown = table[table["status"] == STATUS_NAME[OK]]
     states = np.column_stack([_in_unit(store, flown, name, to) for name, to in zip(columns, _OEM_UNITS, strict=True)])
-    name = "".join(one if one.isalnum() else "_" for one in str(store.manifest["campaign"].get("name", "case"))).upper()
+    name = "".join(
+        letter if letter.isalnum() else "_" for letter in str(store.manifest["campaign"].get("name", "case"))
+    ).upper()
     lines = [
         "CCSDS_OEM_VERS = 3.0",
         f"CREATION_DATE = {datetime.now(UTC).strftime('%Y-%m-%dT%H:%M:%S')}",

@@ -1,7 +1,7 @@
-"""The search behind `mc-engine tune`: NSGA-II of pymoo, asked for candidates and told what they came to.
+"""The search of `mc-engine tune`: NSGA-II of pymoo, through its ask-and-tell interface.
 
 K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary Computation 6 (2002), 182-197; its
-constraints: a feasible candidate beats any other, of two others the one with the smaller violation.
+constraint handling: a feasible candidate beats any other, of two infeasible ones the one with the smaller violation.
 """
 
 from typing import Any
@@ -19,19 +19,19 @@ _CROSSOVER_INDEX, _MUTATION_INDEX = 15.0, 20.0  # Deb's distribution indices: ho
 
 
 class GeneticSearch:
-    """One search; `ask` and `tell` in turn.  The same seed and the same answers give the same candidates."""
+    """One search: call `ask` and `tell` in turn.  The same seed and scores give the same candidates."""
 
     def __init__(self, tuning: Tuning, population: int, seed: int):
         """EngineError in a sentence if pymoo is not installed."""
         pymoo = _pymoo()
         n_tuned = len(tuning.parameters)
-        self._signs = np.array([1.0 if one.large_is_bad else -1.0 for one in tuning.objectives])
+        self._signs = np.array([1.0 if objective.large_is_bad else -1.0 for objective in tuning.objectives])
         self._problem = pymoo["Problem"](
             n_var=n_tuned,
             n_obj=len(tuning.objectives),
             n_ieq_constr=len(tuning.constraints) + 1,
-            xl=np.array([one.lower for one in tuning.parameters]),
-            xu=np.array([one.upper for one in tuning.parameters]),
+            xl=np.array([parameter.lower for parameter in tuning.parameters]),
+            xu=np.array([parameter.upper for parameter in tuning.parameters]),
         )
         self._evaluate, self._static = pymoo["Evaluator"]().eval, pymoo["StaticProblem"]
         self._algorithm = pymoo["NSGA2"](
@@ -44,14 +44,14 @@ class GeneticSearch:
         self._asked: Any = None
 
     def ask(self) -> np.ndarray:
-        """The next generation, float64[n, n_tuned]; no rows where the search makes no child that is new to it."""
+        """The next generation, float64[n, n_tuned]; no rows where the search finds no new candidate."""
         self._asked = self._algorithm.ask()
         if self._asked is None or not len(self._asked):
             return np.empty((0, self._problem.n_var))
         return np.array(self._asked.get("X"), dtype=np.float64)
 
     def tell(self, scores: Scores) -> None:
-        """What the candidates of the last `ask` came to."""
+        """Report the scores of the candidates of the last `ask`."""
         dead = ~np.isfinite(scores.violation)
         objectives = np.where(np.isfinite(scores.objectives), scores.objectives * self._signs, _WORST)
         excess = np.column_stack([np.nan_to_num(scores.excess, nan=0.0), np.where(dead, _DEAD, 0.0)])
@@ -74,7 +74,7 @@ def _pymoo() -> dict[str, Any]:
             raise
         raise EngineError(f"tuning needs pymoo, which is not installed; {how_to_install('tune')}") from None
     names = (NSGA2, Evaluator, Problem, SBX, PM, LHS, StaticProblem)
-    return {one.__name__: one for one in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}
+    return {cls.__name__: cls for cls in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}
 
 
 def non_dominated(values: np.ndarray) -> np.ndarray:

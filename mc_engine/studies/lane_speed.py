@@ -1,7 +1,7 @@
-"""How fast a model flies on one thread, one case at a time and in lanes: the time of the kernel calls alone.
+"""Speed of a model on one thread, one case at a time and in SIMD batches: the time of the kernel calls alone.
 
-Compiling, or loading the compiled kernel, is kept apart.  The builds take turns at short flights and the shortest time
-of each counts, so that other work on the machine disturbs little.
+Compiling, or loading the compiled kernel, is timed separately.  The builds take turns at short flights and the shortest
+time of each counts, so that other work on the machine has little influence.
 """
 
 import time
@@ -16,7 +16,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.flight import flight
 from mc_engine.flight.kernel import usual_width
 from mc_engine.model.fields import AdaptiveStep
-from mc_engine.model.record import Model
+from mc_engine.model.record import Model, compiled_model
 
 _MOST_CASES = 256
 _SHORT = 0.15  # s, about, of a flight one case at a time; a longer one is only disturbed more often
@@ -56,17 +56,18 @@ def campaign_flight(campaign: Campaign, n_cases: int | None = None) -> Flight:
     """The first cases of a campaign, by default as many as fly in a short time; its nominal, `n_cases` times,
     where the inputs come from another run.
     """
+    model = compiled_model(campaign.model)
 
     def of(n: int) -> Flight:
         table = {} if campaign.first is not None else case_table(campaign, np.arange(min(n, campaign.cases)))
         n = n if campaign.first is not None else min(n, campaign.cases)
         inputs = full_inputs(campaign, table)
-        return Flight(campaign.name, campaign.model, campaign.directory, inputs, n, campaign.seed)
+        return Flight(campaign.name, model, campaign.directory, inputs, n, campaign.seed)
 
     if n_cases is not None:
         return of(n_cases)
     trial = of(_TRIAL)
-    alone = _SLOWEST * measure(trial, [usual_width(campaign.model)], repeats=2).case_s[usual_width(campaign.model)]
+    alone = _SLOWEST * measure(trial, [usual_width(model)], repeats=2).case_s[usual_width(model)]
     return of(int(np.clip(_SHORT / alone // _TRIAL * _TRIAL, _TRIAL, _MOST_CASES)))
 
 

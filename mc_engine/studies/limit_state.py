@@ -1,11 +1,11 @@
-"""A campaign as a limit state: from standard normal numbers to the margin that a flown case has to a requirement.
+"""A campaign as a limit state function: from standard normal numbers to the margin of a case to a requirement.
 
-Each dispersed input has one standard normal number u, independent of the others.  Its share of the distribution is
-Phi(u), correlations are laid on as the campaign's designs lay them on, and the quantile of the share is the input.
-So the cases have the distribution that the campaign file says, for any of its random designs.
+Each dispersed input has one independent standard normal number u.  Phi(u) is its probability, the campaign's
+correlations are applied to these, and the input is the quantile.  The cases so have the distribution that the campaign
+file describes.
 
-Noise of the flight belongs to the number of a case.  Cases here are numbered from FIRST_NOISE on, so that none shares
-its noise with a case of the campaign's own runs.
+Noise in flight is addressed by the number of a case.  Numbers here begin at FIRST_NOISE, so that no case has the noise
+of a case of the campaign's own runs.
 """
 
 import os
@@ -19,7 +19,7 @@ from mc_engine.campaign.parts import Requirement, rank_pairs
 from mc_engine.errors import CampaignError, Problem
 from mc_engine.flight.chunks import fly_in_threads
 from mc_engine.model.faults import naming_faults
-from mc_engine.sampling.correlation import gaussian_copula, group_matrix
+from mc_engine.sampling.correlation import correlated, gaussian_copula
 from mc_engine.sampling.designs import RANDOM
 from mc_engine.sampling.distributions import Constant, Discrete, Empirical, quantiles
 from mc_engine.statistics.requirements import inside_limits
@@ -46,7 +46,9 @@ class LimitState:
     ):
         refuse_unmappable(campaign)
         self.campaign, self.requirement = campaign, requirement
-        self.names = [one.name for one in campaign.dispersions if not isinstance(one.distribution, Constant)]
+        self.names = [
+            dispersion.name for dispersion in campaign.dispersions if not isinstance(dispersion.distribution, Constant)
+        ]
         self.status: list[np.ndarray] = []
         self.metric: list[np.ndarray] = []
         self._workers, self._watch = workers or os.cpu_count() or 1, watch
@@ -56,18 +58,20 @@ class LimitState:
         """float64[n]: distance inside the nearer limit, in the metric's unit; -inf for a case without a number."""
         if self._watch is not None:
             self._watch(self._n, self._failed)
-        one, ids = self.requirement, FIRST_NOISE + noise
+        requirement, ids = self.requirement, FIRST_NOISE + noise
         with naming_faults(self.campaign.model_reference, "a case"):
-            flown = fly_in_threads(self.campaign, self.inputs(u), ids, ["status", one.metric], self._workers)
-        status, metric = flown["status"], flown[one.metric]
+            flown = fly_in_threads(self.campaign, self.inputs(u), ids, ["status", requirement.metric], self._workers)
+        status, metric = flown["status"], flown[requirement.metric]
         able = (status == STATUS_NAME[OK]) & np.isfinite(metric)
         with np.errstate(invalid="ignore"):
             sides = [
-                limit for limit in (_below(one.at_most, metric), _below(metric, one.at_least)) if limit is not None
+                limit
+                for limit in (_below(requirement.at_most, metric), _below(metric, requirement.at_least))
+                if limit is not None
             ]
             margin = np.where(able, np.min(sides, axis=0), -np.inf)
         # a case right at its limit is inside: the engine's word for it, safe from rounding of the difference
-        inside = able & inside_limits(metric, one.at_most, one.at_least)
+        inside = able & inside_limits(metric, requirement.at_most, requirement.at_least)
         margin = np.where(inside, np.maximum(margin, _LEAST), np.minimum(margin, 0.0))
         self.status.append(status)
         self.metric.append(metric)
@@ -77,12 +81,7 @@ class LimitState:
     def shares(self, u: np.ndarray) -> list[np.ndarray]:
         """One column float64[n] per name: the share of its distribution that lies below each input."""
         columns = [ndtr(column) for column in u.T]
-        members, matrix = group_matrix(self.names, rank_pairs(self.campaign.correlations))
-        if members:
-            mixed = gaussian_copula([columns[place] for place in members], matrix)
-            for place, column in zip(members, mixed, strict=True):
-                columns[place] = column
-        return columns
+        return correlated(gaussian_copula, columns, self.names, rank_pairs(self.campaign.correlations))
 
     def sigmas(self, u: np.ndarray) -> np.ndarray:
         """float64[n, n_names]: each input as the standard normal number of the same share, its distance in sigmas."""
@@ -93,9 +92,11 @@ class LimitState:
         """A column per dispersion of the campaign, in declared units."""
         shares = dict(zip(self.names, self.shares(u), strict=True))
         table = {}
-        for one in self.campaign.dispersions:
-            assert one.distribution is not None  # a loaded campaign has one for every random design
-            table[one.name] = quantiles(one.distribution, shares.get(one.name, np.full(len(u), 0.5)))
+        for dispersion in self.campaign.dispersions:
+            assert dispersion.distribution is not None  # a loaded campaign has one for every random design
+            table[dispersion.name] = quantiles(
+                dispersion.distribution, shares.get(dispersion.name, np.full(len(u), 0.5))
+            )
         return table
 
 
@@ -105,7 +106,7 @@ def _below(upper: np.ndarray | float | None, lower: np.ndarray | float | None) -
 
 def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:
     """The requirement of that name, or the only one."""
-    names = [one.name for one in campaign.requirements]
+    names = [requirement.name for requirement in campaign.requirements]
     if not names:
         message = "is missing: a rare event is a requirement not met; add one with a metric and a limit"
         raise CampaignError(campaign.name, [Problem("requirement", message)])
@@ -114,11 +115,11 @@ def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:
     if name is not None and name not in names:
         message = f'"{name}" is not a requirement of this campaign{hint(name, names)}'
         raise CampaignError(campaign.name, [Problem("requirement", message)])
-    return next(one for one in campaign.requirements if name in (None, one.name))
+    return next(requirement for requirement in campaign.requirements if name in (None, requirement.name))
 
 
 def refuse_unmappable(campaign: Campaign) -> None:
-    """CampaignError for a campaign whose inputs are no continuous function of normal numbers."""
+    """Raise CampaignError for a campaign whose inputs are not continuous functions of standard normal numbers."""
     problems = []
     if campaign.upstream is not None or campaign.first is not None:
         message = "takes inputs from another run, whose cases cannot be moved towards failure; give distributions"
@@ -126,17 +127,17 @@ def refuse_unmappable(campaign: Campaign) -> None:
     if campaign.design not in RANDOM:
         message = f'"{campaign.design}" gives its cases no probabilities; use {listed(RANDOM)}'
         problems.append(Problem("campaign.design", message))
-    for one in campaign.dispersions if not problems else ():
-        if isinstance(one.distribution, Discrete):
+    for dispersion in campaign.dispersions if not problems else ():
+        if isinstance(dispersion.distribution, Discrete):
             message = (
                 "has no values between its own, so no chain can move through it; make one campaign a value, and add "
                 "up their probabilities by weight"
             )
-            problems.append(Problem(f"dispersion.{one.name}", message))
-        if isinstance(one.distribution, Empirical):
+            problems.append(Problem(f"dispersion.{dispersion.name}", message))
+        if isinstance(dispersion.distribution, Empirical):
             message = "measured values say nothing beyond the largest of them; give a distribution fitted to them"
-            problems.append(Problem(f"dispersion.{one.name}", message))
-    if not problems and all(isinstance(one.distribution, Constant) for one in campaign.dispersions):
+            problems.append(Problem(f"dispersion.{dispersion.name}", message))
+    if not problems and all(isinstance(dispersion.distribution, Constant) for dispersion in campaign.dispersions):
         problems.append(Problem("dispersion", "nothing is dispersed, so there is no probability to estimate"))
     if problems:
         raise CampaignError(campaign.name, problems)

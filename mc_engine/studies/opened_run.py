@@ -1,11 +1,11 @@
-"""A run and its cases for an interactive session: what was asked, what came out, and how each case went.
+"""Runs and cases for an interactive session or a notebook: verdicts, statistics, case table, time histories.
 
     run = open_run("runs/deorbit")
     run.verdicts                  every requirement, judged
     run.cases                     the case table, a pandas DataFrame
-    run.case(17).history()        its flight, from the store or flown again
+    run.case(17).history()        its time history, from the store or flown again
 
-`Run` and `Case` show themselves as tables in a notebook.  They read; what writes is in `mc_engine.store.store`.
+They only read; methods that write are in `mc_engine.store.store`.
 """
 
 from base64 import b64encode
@@ -37,15 +37,26 @@ _DIGITS = 6
 
 
 def open_run(path: str | Path) -> "Run":
-    """The run in directory `path`; StoreError if there is none, or it is damaged."""
+    """Open a run to look at its results, interactively or in a notebook.
+
+    path : str or Path, the run directory, or the URL of a published run
+
+    Returns a Run.
+
+    Raises StoreError if there is no run, or it is damaged.
+
+    >>> run = open_run("runs/small")
+    >>> run.statuses
+    {'ok': 8}
+    """
     return Run(open_store(path))
 
 
 class _Metrics(dict[str, "Summary"]):
     """Summaries by metric; a name that is not there is answered with the nearest."""
 
-    def __init__(self, path: Path, found: "dict[str, Summary]"):
-        super().__init__(found)
+    def __init__(self, path: Path, by_name: "dict[str, Summary]"):
+        super().__init__(by_name)
         self._path = path
 
     def __missing__(self, name: str) -> "Summary":
@@ -54,7 +65,20 @@ class _Metrics(dict[str, "Summary"]):
 
 @dataclass(frozen=True)
 class Run:
-    """A run directory as it stands when it is first asked; open it again to see what was flown since."""
+    """The results of a run, as they are when they are first asked for; open it again to see cases flown since.
+
+    In a notebook it shows itself as tables of verdicts and metrics.
+
+    store : Store, the run directory
+
+    >>> run = open_run("runs/small")
+    >>> run.metrics["apogee_altitude_km"].n_used
+    8
+    >>> run.verdicts[0].outcome
+    'not demonstrable'
+    >>> run.case(3).metrics["apogee_altitude_km"].round(1)
+    np.float64(656.9)
+    """
 
     store: Store
 
@@ -108,29 +132,53 @@ class Run:
 
     def __repr__(self) -> str:
         lines = [f"Run {self.path}: {self.title}", f"  {case_line(self.store)}"]
-        return clean("\n".join([*lines, *(f"  {verdict_line(one, self.store.units)}" for one in self.verdicts)]))
+        return clean(
+            "\n".join([*lines, *(f"  {verdict_line(verdict, self.store.units)}" for verdict in self.verdicts)])
+        )
 
     def _repr_html_(self) -> str:
         units = self.store.units
         verdicts = [
-            [one.name, one.outcome, verdict_line(one, units).split(f"{one.outcome}, ", 1)[-1]] for one in self.verdicts
+            [verdict.name, verdict.outcome, verdict_line(verdict, units).split(f"{verdict.outcome}, ", 1)[-1]]
+            for verdict in self.verdicts
         ]
         metrics = [
-            [name, units[name], f"{one.n_used:,} of {one.n_tried:,}", one.mean, one.sd, one.minimum, one.maximum]
-            for name, one in self.metrics.items()
+            [
+                name,
+                units[name],
+                f"{summary.n_used:,} of {summary.n_tried:,}",
+                summary.mean,
+                summary.sd,
+                summary.minimum,
+                summary.maximum,
+            ]
+            for name, summary in self.metrics.items()
         ]
         return "".join(
             [
                 f"<h4>{_html(self.title)}</h4><p>{_html(case_line(self.store))}</p>",
-                _table(["requirement", "verdict", "on which cases"], verdicts),
-                _table(["metric", "unit", "cases with a number", "mean", "sd", "smallest", "largest"], metrics),
+                _html_table(["requirement", "verdict", "on which cases"], verdicts),
+                _html_table(["metric", "unit", "cases with a number", "mean", "sd", "smallest", "largest"], metrics),
             ]
         )
 
 
 @dataclass(frozen=True)
 class Case:
-    """One case of a run: `row` is its line of the case table, by column name."""
+    """One case of a run: its inputs, its results and its flight.
+
+    In a notebook it shows itself as a table, with a picture of the history if that was saved.
+
+    store : Store, the run directory
+    case_id : int, its number; -1 for the nominal case
+    row : dict, its line of the case table, by column name
+
+    >>> case = open_run("runs/small").case(3)
+    >>> case.status
+    'ok'
+    >>> case.inputs.round(3).to_dict()
+    {'magnitude_error_pct': -0.106, 'pitch_error_deg': 0.647}
+    """
 
     store: Store
     case_id: int
@@ -204,11 +252,11 @@ class Case:
 
     def _repr_html_(self) -> str:
         units = self.store.units
-        rows = [[what, name, value, units[name]] for what, columns in (("input", self.inputs), ("metric", self.metrics))
+        rows = [[role, name, value, units[name]] for role, columns in (("input", self.inputs), ("metric", self.metrics))
                 for name, value in columns.items()]  # fmt: skip
         why = f" ({_html(self.reason)})" if self.reason else ""
         head = f"<h4>{_html(self.name)}: {_html(self.status)}{why}</h4>"
-        return head + _table(["", "column", "value", "unit"], rows) + self._picture()
+        return head + _html_table(["", "column", "value", "unit"], rows) + self._picture()
 
     def _picture(self) -> str:
         """The kept history as a small picture; nothing is flown for being shown."""
@@ -226,10 +274,10 @@ def _html(text: str) -> str:
     return escape(clean(text))
 
 
-def _table(heads: list[str], rows: list[list[Any]]) -> str:
+def _html_table(heads: list[str], rows: list[list[Any]]) -> str:
     if not rows:
         return ""
-    head = "".join(f"<th>{_html(one)}</th>" for one in heads)
+    head = "".join(f"<th>{_html(head)}</th>" for head in heads)
     body = "".join("<tr>" + "".join(f"<td>{_html(_text(cell))}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 

@@ -1,4 +1,4 @@
-"""How many cases demonstrate a required probability: tables for one, and for the requirements of a campaign."""
+"""Test planning: how many cases demonstrate a required probability, for one requirement and for those of a campaign."""
 
 from collections.abc import Iterator, Sequence
 from itertools import groupby
@@ -21,9 +21,10 @@ ROWS = 6  # failures 0 to 5
 
 
 class PlanRow(NamedTuple):
-    """failures allowed among `cases`; `shown` is the share that they still demonstrate.
+    """`cases` is the smallest number of cases that demonstrates the required probability with `failures` failures.
 
-    half_rate : probability that so many cases pass a system that fails half as often as it may.
+    shown : probability that they demonstrate (lower confidence bound)
+    half_rate : probability that so many cases pass a system that fails half as often as required
     """
 
     failures: int
@@ -75,51 +76,56 @@ def plan_lines(campaign: Campaign, failures: Sequence[int] = range(ROWS), two_si
         yield f'shares of cases of design "{campaign.design}" are no probabilities: what follows is for "mc"'
     asked = sorted(campaign.requirements, key=_wanted, reverse=True)
     for (share, confidence), group in groupby(asked, key=_wanted):
-        yield from _block(", ".join(one.name for one in group), share, confidence, failures, campaign.cases, two_sided)
+        yield from _requirement_block(
+            ", ".join(requirement.name for requirement in group), share, confidence, failures, campaign.cases, two_sided
+        )
     if len(asked) > 1:
-        yield from _together(campaign, failures)
+        yield from _joint_block(campaign, failures)
 
 
 def _wanted(requirement: Requirement) -> tuple[float, float]:
     return requirement.share, requirement.confidence
 
 
-def _block(
+def _requirement_block(
     names: str, share: float, confidence: float, failures: Sequence[int], cases: int, two_sided: bool
 ) -> Iterator[str]:
     yield ""
     yield f"{names}: share {share:.10g} with confidence {confidence:.10g}"
-    yield from table_lines([plan_row(share, confidence, one) for one in failures], share, confidence)
+    yield from table_lines([plan_row(share, confidence, number) for number in failures], share, confidence)
     yield _allowance(cases, share, confidence)
     if two_sided:
         yield from ["", *interval_lines(share, confidence)]
 
 
 def _allowance(cases: int, share: float, confidence: float) -> str:
-    """What the file's own number of cases comes to."""
+    """How many failures the campaign's own number of cases allows."""
     accepted = acceptance_number(cases, share, confidence)
     if accepted is None:
         needed = plan_row(share, confidence, 0).cases
         return f"  {cases:,} in the file are too few, even if none fails: {needed:,} are needed"
-    just, half = (pass_chance(cases, accepted, one) for one in (share, half_rate_share(share)))
+    just, half = (pass_chance(cases, accepted, true_share) for true_share in (share, half_rate_share(share)))
     return (
         f"  {cases:,} cases allow {accepted:,} failures; they pass a system that just misses the share with "
         f"{100.0 * just:.1f} %, one that fails half as often as it may with {100.0 * half:.1f} %"
     )
 
 
-def _together(campaign: Campaign, failures: Sequence[int]) -> Iterator[str]:
+def _joint_block(campaign: Campaign, failures: Sequence[int]) -> Iterator[str]:
     """All requirements: the cases that show each, the joint share, and each with the confidence shared."""
     asked = campaign.requirements
-    confidence = min(one.confidence for one in asked)
-    share = joint_share([one.share for one in asked])
+    confidence = min(requirement.confidence for requirement in asked)
+    share = joint_share([requirement.share for requirement in asked])
     among = len(asked) + (share is not None)  # as the joint verdict shares it
     yield ""
     yield f"every requirement: if each passes, all are met with confidence {confidence:.10g} (Berger 1982)"
     yield f"{'failures':>8}  {'cases':>9}  cases with the confidence shared among {among} (Bonferroni)"
     for number in failures:
-        each = max(plan_row(one.share, one.confidence, number).cases for one in asked)
-        shared = max(plan_row(one.share, 1.0 - (1.0 - one.confidence) / among, number).cases for one in asked)
+        each = max(plan_row(requirement.share, requirement.confidence, number).cases for requirement in asked)
+        shared = max(
+            plan_row(requirement.share, 1.0 - (1.0 - requirement.confidence) / among, number).cases
+            for requirement in asked
+        )
         yield f"{number:>8}  {each:>9}  {shared}"
     if share is not None:
-        yield from _block(JOINT, share, confidence, failures, campaign.cases, two_sided=False)
+        yield from _requirement_block(JOINT, share, confidence, failures, campaign.cases, two_sided=False)

@@ -2,13 +2,22 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from decimal import Decimal
 from pathlib import Path
-from typing import Any
 
 from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import EngineError
-from mc_engine.studies.published import NOT_REACHED, OUTCOMES, REACHED, outcome, read_published, read_source
+from mc_engine.studies.published import (
+    NOT_REACHED,
+    OUTCOMES,
+    REACHED,
+    WITH_REASON,
+    Record,
+    Value,
+    outcome,
+    read_source,
+    shown_digits,
+    with_ours,
+)
 
 _BEGIN, _END = "<!-- published -->", "<!-- end -->"
 
@@ -27,36 +36,58 @@ def published_file(name: str) -> Path:
     raise EngineError(f"{name}: no published.toml there; campaigns that have one: {known}")
 
 
-def campaign_table(path: Path) -> str:
-    """Every record of one campaign: quantity, place in the source, both numbers, outcome."""
-    records = read_published(path)
+def campaign_table(path: Path, values: Mapping[str, Value] | None = None) -> str:
+    """Every record of one campaign: quantity, place in the source, both numbers, outcome.
+
+    values : ours by quantity, by default those of the lock file.  Records of another and better computation than the
+    source's are in a table of their own.
+    """
+    records = with_ours(path, values)
     source = read_source(path)
     head = f"{source.campaign}: {source.work}".removesuffix(": ")
     lines = [f"{head}. {_counted(records)}.", "", *_head("Quantity", "Source", "Published", "Ours", "Outcome")]
-    for one in records:
-        lines.append(_row(one["quantity"], one.get("source", ""), *_numbers(one), _verdict(one, records)))
-    return "\n".join(lines)
+    for record in records:
+        if "better" not in record:
+            lines.append(
+                _row(record["quantity"], record.get("source", ""), *_numbers(record), _verdict(record, records))
+            )
+    return "\n".join([*lines, *_improvements(records)])
+
+
+def _improvements(records: Sequence[Record]) -> Iterator[str]:
+    """The table of what another computation than the source's improves, and by how much."""
+    ours = [record for record in records if "better" in record]
+    if not ours:
+        return
+    yield from ("", "Improved by another computation than that of the source:", "")
+    yield from _head("Quantity", "Source", "Published", "Ours", "Improved by", "Outcome")
+    for record in ours:
+        share = 100.0 * abs(record["ours"] / record["published"] - 1.0)
+        by = f"{share:.2g} %" if outcome(record, records) != NOT_REACHED else "–"
+        place = record.get("source", "")
+        yield _row(record["quantity"], place, *_numbers(record), by, _verdict(record, records))
 
 
 def headline_table(paths: Sequence[Path]) -> str:
-    """How many records of each campaign are reached, and the records that are headlines."""
+    """How many records of each campaign have which outcome, and the records that are headlines."""
     counts, rows = (
         _head("Campaign", "Source", "Values", *OUTCOMES),
         _head("Campaign", "", "Published", "Ours", "Outcome"),
     )
     for path in paths:
-        records, source = read_published(path), read_source(path)
+        records, source = with_ours(path), read_source(path)
         link = f"[{source.campaign}](campaigns/{path.parent.name}/README.md)"
-        found = [outcome(one, records) for one in records]
-        counts.append(_row(link, source.work, str(len(records)), *(str(found.count(one)) for one in OUTCOMES)))
+        outcomes = [outcome(record, records) for record in records]
+        numbers = (str(outcomes.count(verdict)) for verdict in OUTCOMES)
+        counts.append(_row(link, source.work, str(len(records)), *numbers))
         rows += _headlines(source.campaign, records)
     return "\n".join([*counts, "", *rows])
 
 
-def _headlines(campaign: str, records: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    for one in records:
-        if one.get("headline"):
-            yield _row(campaign, one["quantity"], *_numbers(one), _verdict(one, records))
+def _headlines(campaign: str, records: Sequence[Record]) -> Iterator[str]:
+    for record in records:
+        if record.get("headline"):
+            yield _row(campaign, record["quantity"], *_numbers(record), _verdict(record, records))
             campaign = ""
 
 
@@ -69,25 +100,26 @@ def written_into(path: Path, table: str) -> str:
     return pattern.sub(lambda _: f"{_BEGIN}\n{table}\n{_END}", text)
 
 
-def _counted(records: Sequence[Mapping[str, Any]]) -> str:
-    found = [outcome(one, records) for one in records]
-    return f"{len(found)} values: " + ", ".join(f"{found.count(one)} {one}" for one in OUTCOMES)
+def _counted(records: Sequence[Record]) -> str:
+    outcomes = [outcome(record, records) for record in records]
+    numbers = ", ".join(f"{outcomes.count(verdict)} {verdict}" for verdict in OUTCOMES)
+    return f"{len(outcomes)} values: {numbers}"
 
 
-def _verdict(record: Mapping[str, Any], records: Sequence[Mapping[str, Any]]) -> str:
-    """The outcome; why not, where it is not reached; how the print was read, where it is."""
-    found, status, note = outcome(record, records), record.get("status", ""), record.get("note", "")
-    if found == REACHED:
-        return found if status == "legible" else f"{found} ({status})"
-    shown = f"**{found}**" if found == NOT_REACHED else found
-    return f"{shown}: {note or status}"
+def _verdict(record: Record, records: Sequence[Record]) -> str:
+    """The outcome; why, where it is not reached; how the print was read, where it is."""
+    verdict, status = outcome(record, records), record.get("status", "")
+    if verdict == REACHED:
+        return verdict if status == "legible" else f"{verdict} ({status})"
+    shown = f"**{verdict}**" if verdict == NOT_REACHED else verdict
+    return f"{shown}: {record['reason'] if verdict in WITH_REASON else record.get('note') or status}"
 
 
-def _numbers(record: Mapping[str, Any]) -> tuple[str, str]:
+def _numbers(record: Record) -> tuple[str, str]:
     """The printed number or words, and ours to as many digits, six at least."""
     unit, published = record.get("unit", ""), record["published"]
-    digits = 6 if isinstance(published, str) else max(6, len(Decimal(repr(published)).normalize().as_tuple().digits))
-    return _with_unit(published, unit, 17), _with_unit(record.get("ours", "–"), unit, digits)
+    ours = record.get("ours", "–")
+    return _with_unit(published, unit, 17), _with_unit(ours, unit, shown_digits(published))
 
 
 def _with_unit(value: str | float, unit: str, digits: int) -> str:

@@ -1,8 +1,8 @@
-"""The probability that a campaign's requirement is not met, far below what its plain cases can show.
+"""Probability that a campaign violates a requirement, far below what its plain cases can show.
 
-The campaign is flown as it stands, on its own model, distributions and correlations; only where in their space the
-cases lie is chosen, by `statistics.subset_simulation` or `statistics.importance_sampling`.  The same campaign, method,
-numbers and seed give the same result, whatever the number of threads.
+Model, distributions and correlations are the campaign's own; only the sampling differs: `statistics.subset_simulation`
+or `statistics.importance_sampling`.  The same campaign, method, settings and seed give the same result on any number of
+threads.
 """
 
 import math
@@ -49,10 +49,11 @@ def estimate_rare_event(
     """Estimate the probability of not meeting a requirement and leave the result in the new directory `out`.
 
     requirement : its name; the only one by default.  method : one of METHODS.  progress : called with the numbers of
-    cases flown and failed.  Raises RunInterrupted on Ctrl-C; nothing is stored then.
+    cases flown and failed.  The interval holds with the confidence of the campaign's [report].  Raises RunInterrupted
+    on Ctrl-C; nothing is stored then.
     """
     path = Path(out) if out is not None else default_folder(f"{campaign.name}-rare")
-    one = chosen_requirement(campaign, requirement)
+    chosen = chosen_requirement(campaign, requirement)
     manifest = manifest_of(campaign)
     with writer_of_new(path, lambda: refuse_occupied(path)) as lock, stop_signal() as stop:
 
@@ -65,23 +66,28 @@ def estimate_rare_event(
             if progress is not None:
                 progress(flown, failed)
 
-        limit = LimitState(campaign, one, workers, watch)
+        limit = LimitState(campaign, chosen, workers, watch)
         try:
-            found = METHODS[method](
-                limit, len(limit.names), cases_per_level=cases_per_level, seed=campaign.seed, noise=True
+            estimate = METHODS[method](
+                limit,
+                len(limit.names),
+                cases_per_level=cases_per_level,
+                seed=campaign.seed,
+                noise=True,
+                confidence=campaign.report.confidence,
             )
         except ValueError as error:
             raise CampaignError(campaign.name, [Problem("--cases-per-level", str(error))]) from None
-        columns, arrays = _case_table(limit, found)
-        facts = {"asked": {"method": method, "cases_per_level": cases_per_level}, **_facts(limit, found)}
+        columns, arrays = _flown_cases(limit, estimate)
+        facts = {"asked": {"method": method, "cases_per_level": cases_per_level}, **_result_record(limit, estimate)}
         record = {**manifest, "rare_event": facts}
         write_result(path, RARE_EVENT, campaign.text, record, {"cases": (columns, arrays)}, lock)
     return open_rare_event(path)
 
 
-def _case_table(limit: LimitState, found: RareEvent) -> tuple[list[Column], dict[str, np.ndarray]]:
-    campaign, cases = limit.campaign, found.cases
-    metric = next(one for one in campaign.model.metrics if one.name == limit.requirement.metric)
+def _flown_cases(limit: LimitState, estimate: RareEvent) -> tuple[list[Column], dict[str, np.ndarray]]:
+    campaign, cases = limit.campaign, estimate.cases
+    metric = next(candidate for candidate in campaign.model.metrics if candidate.name == limit.requirement.metric)
     inputs = limit.inputs(cases.u)
     columns = [
         Column("case_id", "", "case", "number of the case, in the order flown", "integer"),
@@ -95,7 +101,7 @@ def _case_table(limit: LimitState, found: RareEvent) -> tuple[list[Column], dict
         Column("margin", metric.unit, "case", "distance inside the limit; minus infinity without a number"),
     ]
     arrays = {
-        "case_id": np.arange(found.n_cases),
+        "case_id": np.arange(estimate.n_cases),
         "level": cases.level,
         "noise_id": cases.noise,
         "weight": cases.weight,
@@ -108,40 +114,40 @@ def _case_table(limit: LimitState, found: RareEvent) -> tuple[list[Column], dict
     return columns, arrays
 
 
-def _facts(limit: LimitState, found: RareEvent) -> dict[str, Any]:
-    """The result as JSON knows it: None for what is infinite."""
-    metric = next(one for one in limit.campaign.model.metrics if one.name == limit.requirement.metric)
-    inputs, remark = _failed_inputs(limit, found)
+def _result_record(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
+    """The result as JSON; None for infinite values."""
+    metric = next(candidate for candidate in limit.campaign.model.metrics if candidate.name == limit.requirement.metric)
+    inputs, remark = _failed_inputs(limit, estimate)
     return {
         "requirement": asdict(limit.requirement),
         "metric": {"name": metric.name, "unit": metric.unit, "description": metric.description},
-        "method": found.method,
-        "probability": found.probability,
-        "lower": found.lower,
-        "upper": found.upper,
-        "confidence": found.confidence,
-        "relative_error": _finite(found.relative_error),
-        "plain_cases": _finite(found.plain_cases),
-        "cases": found.n_cases,
-        "failed": int(found.cases.failed.sum()),
-        "no_number": int(np.isneginf(found.cases.margin).sum()),
-        "levels": [{**asdict(level), "margin": _finite(level.margin)} for level in found.levels],
+        "method": estimate.method,
+        "probability": estimate.probability,
+        "lower": estimate.lower,
+        "upper": estimate.upper,
+        "confidence": estimate.confidence,
+        "relative_error": _finite(estimate.relative_error),
+        "plain_cases": _finite(estimate.plain_cases),
+        "cases": estimate.n_cases,
+        "failed": int(estimate.cases.failed.sum()),
+        "no_number": int(np.isneginf(estimate.cases.margin).sum()),
+        "levels": [{**asdict(level), "margin": _finite(level.margin)} for level in estimate.levels],
         "inputs": inputs,
-        "remarks": [*found.remarks, *remark],
+        "remarks": [*estimate.remarks, *remark],
     }
 
 
-def _failed_inputs(limit: LimitState, found: RareEvent) -> tuple[list[dict[str, Any]], list[str]]:
-    """(where failures are, a record an input; a remark where one mean does not describe them).
+def _failed_inputs(limit: LimitState, estimate: RareEvent) -> tuple[list[dict[str, Any]], list[str]]:
+    """Where failures lie: one record for each input, and a remark where one mean does not describe them.
 
     The likeliest failed case is the one nearest to the origin of standard normal space, where the density is greatest:
-    the design point of structural reliability, as near as the cases came to it.  Where failures lie apart, the
-    likeliest one on the other side of the origin is added, if there is one.
+    the design point of structural reliability, as near as the cases came to it.  Where failures lie in several regions,
+    the likeliest failed case on the opposite side of the origin is added, if there is one.
     """
-    failed = np.flatnonzero(found.cases.failed)
+    failed = np.flatnonzero(estimate.cases.failed)
     if not failed.size:
         return [], []
-    u, weight = found.cases.u[failed], found.cases.weight[failed]
+    u, weight = estimate.cases.u[failed], estimate.cases.weight[failed]
     nearest = int(np.argmin((u * u).sum(axis=1)))
     share = weight / weight.sum()
     apart = float(np.linalg.norm(share @ u)) < _APART * float(np.linalg.norm(u[nearest]))
@@ -159,8 +165,8 @@ def _failed_inputs(limit: LimitState, found: RareEvent) -> tuple[list[dict[str, 
             "description": limit.campaign.model.input(name).description,
             "mean_sigma": mean[k],
             "spread_sigma": spread[k],
-            **{f"{what}_sigma": sigmas[row, k] for what, row in shown.items()},
-            **{what: values[name][place] for place, what in enumerate(shown)},
+            **{f"{case}_sigma": sigmas[row, k] for case, row in shown.items()},
+            **{case: values[name][place] for place, case in enumerate(shown)},
         }
         for k, name in enumerate(limit.names)
     ]

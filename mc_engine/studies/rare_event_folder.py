@@ -1,10 +1,11 @@
-"""The directory of a rare event's estimate: what `mc-engine rare` leaves behind.
+"""The directory that `mc-engine rare` writes, and its result as text.
 
     rare.toml   rare.json   cases.parquet   journal.jsonl
 
-Which of them count, and with which bytes, the journal says; see `result_folder`.
+The journal holds the checksums of the other files; see `store.result_folder`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,10 +15,16 @@ import pandas as pd
 from mc_engine.store.result_folder import read_result
 from mc_engine.store.run_files import RARE_EVENT
 
+METHOD_WORDS = {
+    "subset": "subset simulation",
+    "cross-entropy": "importance sampling by cross entropy",
+    "plain": "plain cases counted",
+}
+
 
 @dataclass(frozen=True)
 class RareEventRecord:
-    """An estimate: record is what rare.json holds, cases every case flown for it, in order."""
+    """A rare-event estimate: `record` is the content of rare.json, `cases` every case flown for it, in order."""
 
     path: Path
     record: dict[str, Any]
@@ -32,3 +39,72 @@ def open_rare_event(path: str | Path) -> RareEventRecord:
     """The estimate in directory `path`; StoreError if there is none, or a byte of it changed."""
     record, tables = read_result(Path(path), RARE_EVENT)
     return RareEventRecord(Path(path), record, tables["cases"])
+
+
+def rare_event_lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result, line by line; `result` is `RareEventRecord.result`."""
+    yield f"requirement  {requirement_words(result)}"
+    yield f"probability  {probability_words(result)}"
+    yield f"cases        {cost_words(result)}"
+    yield from _level_lines(result)
+    yield from _input_lines(result)
+    for remark in result["remarks"]:
+        yield f"note         {remark}"
+
+
+def requirement_words(result: dict[str, Any]) -> str:
+    requirement, unit = result["requirement"], result["metric"]["unit"]
+    limits = [("at least", requirement["at_least"]), ("at most", requirement["at_most"])]
+    texts = [f"{word} {limit:g}{' ' * bool(unit)}{unit}" for word, limit in limits if limit is not None]
+    return f"{requirement['name']}: {requirement['metric']} {' and '.join(texts)}"
+
+
+def probability_words(result: dict[str, Any]) -> str:
+    """The estimate, its interval, and what the requirement allows."""
+    allowed = 1.0 - result["requirement"]["share"]
+    if not result["probability"]:
+        return f"below {result['upper']:.2g}; no case failed (the requirement allows {allowed:.3g})"
+    interval = f"{100.0 * result['confidence']:.6g} % interval {result['lower']:.3g} to {result['upper']:.3g}"
+    return (
+        f"{result['probability']:.3g} of not meeting it, {interval}, by {METHOD_WORDS[result['method']]}; the "
+        f"requirement allows {allowed:.3g}, so it is {standing(result)}"
+    )
+
+
+def standing(result: dict[str, Any]) -> str:
+    """Met, not met, or open: where the interval lies against the share of failures that the requirement allows."""
+    allowed = 1.0 - result["requirement"]["share"]
+    return "met" if result["upper"] <= allowed else "not met" if result["lower"] > allowed else "open"
+
+
+def cost_words(result: dict[str, Any]) -> str:
+    text = f"{result['cases']:,} flown, {result['failed']:,} of them failed"
+    if result["no_number"]:
+        text += f" ({result['no_number']:,} without a number)"
+    if result["plain_cases"] is None or result["method"] == "plain":
+        return text
+    return f"{text}; {result['plain_cases']:,.0f} plain ones would tell it with the same error"
+
+
+def _level_lines(result: dict[str, Any]) -> Iterator[str]:
+    unit = result["metric"]["unit"]
+    yield f"{'level':<13}{'margin' + (f' [{unit}]' if unit else ''):>16}{'probability':>13}{'cases':>9}{'accepted':>10}"
+    for number, level in enumerate(result["levels"]):
+        margin = "all" if level["margin"] is None else f"{level['margin']:.4g}"
+        yield (f"{number:<13}{margin:>16}{level['probability']:>13.3g}{level['cases']:>9,}{level['accepted']:>10.0%}")
+
+
+def _input_lines(result: dict[str, Any]) -> Iterator[str]:
+    if not result["inputs"]:
+        return
+    width = max(len(record["name"]) for record in result["inputs"])
+    across = result["inputs"][0].get("across") is not None
+    yield f"failed cases, by input: mean and spread in sigmas; the likeliest{', and the one across' * across}"
+    for record in sorted(result["inputs"], key=lambda item: -abs(item["likeliest_sigma"])):
+        texts = [
+            f"{record[case]:.5g}{' ' * bool(record['unit'])}{record['unit']} ({record[f'{case}_sigma']:+.2f} σ)"
+            for case in ("likeliest", "across")
+            if record.get(case) is not None
+        ]
+        mean, spread = record["mean_sigma"], record["spread_sigma"]
+        yield f"  {record['name']:<{width}}  {mean:+.2f} ± {spread:.2f} σ;  {'; '.join(texts)}"

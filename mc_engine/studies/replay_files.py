@@ -1,4 +1,4 @@
-"""What `replay` leaves in a run: the history of one case as Parquet, and a picture of it."""
+"""The files of `mc-engine replay` in a run directory: the time history of one case as Parquet, and a plot of it."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -24,26 +24,26 @@ _LARGEST = 1e100  # of any unit; what a flight that is lost holds beyond it, no 
 
 def write_replay(store: Store, case_id: int, history: pd.DataFrame, picture: bytes) -> list[Path]:
     """Write `RUN/replay/case-<id>.parquet` and `.png`, of which `picture` is the content; the two paths."""
-    table, image = _table(case_id), f"{REPLAYS}/case-{case_id}.png"
+    table, image = _history_file(case_id), f"{REPLAYS}/case-{case_id}.png"
     content = parquet_bytes(history_table(history, store.manifest.get("quantities", []), store.path / table))
     derived_files(store.path).write({table: content, image: picture})
     return [store.path / table, store.path / image]
 
 
-def _table(case_id: int) -> str:
+def _history_file(case_id: int) -> str:
     return f"{REPLAYS}/case-{case_id}.parquet"
 
 
 def replayed_cases(run: Path) -> list[int]:
     """The cases of which a replay lies in the run, in order."""
     names = names_in(run, REPLAYS) if (run / REPLAYS).exists() else []
-    found = [re.fullmatch(r"case-([0-9]{1,10})\.parquet", name) for name in names]
-    return sorted(int(match[1]) for match in found if match)
+    matches = [re.fullmatch(r"case-([0-9]{1,10})\.parquet", name) for name in names]
+    return sorted(int(match[1]) for match in matches if match)
 
 
 def read_replay(run: Path, case_id: int, quantities: Sequence[Mapping[str, str]]) -> pd.DataFrame:
     """The history of a case that was replayed; StoreError if a byte of it changed."""
-    name = _table(case_id)
+    name = _history_file(case_id)
     try:
         table = parquet_table(derived_files(run).read([name])[name])
         problem = history_problem(table, quantities)

@@ -1,4 +1,4 @@
-"""What changed in code and campaign between two runs, as their manifests and campaign files tell it."""
+"""Differences in code and campaign between two runs, from their manifests and campaign files."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ class Difference:
 
 def code_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Difference, ...]:
     """Engine, model, sampling, packages and processor, of two manifests; empty if all of them agree."""
-    return _differences(_code(a), _code(b))
+    return _differences(_code_facts(a), _code_facts(b))
 
 
 def campaign_differences(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[Difference, ...]:
     """Design, seed, number of cases, dispersions, parameters, settings and requirements, of two manifests."""
-    return _differences(_campaign(a), _campaign(b))
+    return _differences(_campaign_facts(a), _campaign_facts(b))
 
 
 def campaign_diff(a: str, b: str) -> tuple[str, ...]:
@@ -42,7 +42,7 @@ def _differences(a: Mapping[str, str], b: Mapping[str, str]) -> tuple[Difference
     )
 
 
-def _code(manifest: Mapping[str, Any]) -> dict[str, str]:
+def _code_facts(manifest: Mapping[str, Any]) -> dict[str, str]:
     model, made = manifest.get("model", {}), manifest.get("provenance", {})
     facts = {
         "engine": str(manifest.get("engine", "")),
@@ -57,7 +57,7 @@ def _code(manifest: Mapping[str, Any]) -> dict[str, str]:
     return {**facts, **{f"package {name}": str(version) for name, version in packages.items()}}
 
 
-def _campaign(manifest: Mapping[str, Any]) -> dict[str, str]:
+def _campaign_facts(manifest: Mapping[str, Any]) -> dict[str, str]:
     campaign = manifest.get("campaign", {})
     facts = {key: str(campaign.get(key, "")) for key in ("model", "design", "seed", "cases")}
     for record in manifest.get("inputs", []):
@@ -97,5 +97,5 @@ def _git(state: Mapping[str, Any] | None) -> str:
 
 def changed_lines(differences: tuple[Difference, ...]) -> Iterator[str]:
     """A line each, for the terminal."""
-    for one in differences:
-        yield f"{one.what}: {one.before} -> {one.after}"
+    for difference in differences:
+        yield f"{difference.what}: {difference.before} -> {difference.after}"

@@ -1,12 +1,11 @@
-"""Tuning: a search for the parameters with the best metrics, nominal or over dispersed cases, within limits.
+"""Tuning: a search for the parameters with the best metrics, nominal or over dispersed cases, within constraints.
 
-A generation is flown as one table of cases; see `candidates`.  What is kept is every candidate that was flown, and the
-front is taken from all of them, not from the last generation alone.
+A generation is flown as one table of cases; see `candidates`.  Every candidate flown is kept, and the front is computed
+from all of them, not from the last generation alone.
 """
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,6 +18,7 @@ from mc_engine.errors import CampaignError, Problem, RunInterrupted
 from mc_engine.interruption import stop_signal
 from mc_engine.runner.manifest import manifest_of
 from mc_engine.runner.runner import ProgressCall
+from mc_engine.section import Section
 from mc_engine.store.parts import Column
 from mc_engine.store.result_folder import ColumnsAndArrays, write_result
 from mc_engine.store.run_files import TUNING
@@ -55,11 +55,26 @@ def tune(
     workers: int | None = None,
     progress: ProgressCall | None = None,
 ) -> TuningRecord:
-    """Search as the campaign's [tuning] says and leave the result in the new directory `out`.
+    """Search for the parameters that the campaign's section [tuning] asks for, by NSGA-II, and store the result.
 
-    seed, generations, population : in place of the file's.  workers : threads, all cores by default.
-    Raises RunInterrupted on Ctrl-C, after the generation in flight; what was found till then is in the directory, as
-    it is after each generation: a search that is killed loses the one in flight.
+    Needs the extra `tune` (pymoo).  The result is stored after every generation.
+
+    campaign : Campaign with a [tuning]
+    out : Path, the new directory; runs/<campaign>-<UTC time> by default
+    seed : int, of the search, in place of the file's
+    generations : int, in place of the file's
+    population : int, candidates in a generation, in place of the file's
+    workers : int, threads; all cores by default.  The result does not depend on it.
+    progress : function of (flights done, flights wanted, flights failed), called after each generation
+
+    Returns a TuningRecord.
+
+    Raises CampaignError without a [tuning], EngineError without pymoo, StoreError if `out` is occupied, and
+    RunInterrupted after the generation in which Ctrl-C was pressed; the generations completed by then are stored.
+
+    >>> record = tune(load_campaign("apogee.toml"), "runs/apogee", generations=2, population=4)
+    >>> len(record.evaluations)
+    8
     """
     tuning = campaign.tuning
     if tuning is None:
@@ -85,8 +100,8 @@ def tune(
     manifest["provenance"]["packages"]["pymoo"] = version("pymoo")
 
     def keep(flown: list[Generation], end: str) -> None:
-        about = {**plan, "flown": len(flown), "end": end, **_wording(campaign, tuning)}
-        _write(path, campaign, tuning, flown, {**manifest, "tuning": about}, lock)
+        about = {**plan, "flown": len(flown), "end": end, **_search_record(campaign, tuning)}
+        _write_tables(path, campaign, tuning, flown, {**manifest, "tuning": about}, lock)
 
     with writer_of_new(path, lambda: refuse_occupied(path)) as lock:
         flown, end = _search(campaign, tuning, plan, search, workers or os.cpu_count() or 1, keep, progress)
@@ -119,9 +134,9 @@ def _search(
             flown.append(_generation(candidates, scores, before, signs))
             keep(flown, UNFINISHED)
             if progress is not None:
-                failed = sum(int(one.scores.failed.sum()) for one in flown)
+                failed = sum(int(generation.scores.failed.sum()) for generation in flown)
                 progress(
-                    per * sum(len(one.candidates) for one in flown),
+                    per * sum(len(generation.candidates) for generation in flown),
                     per * plan["population"] * plan["generations"],
                     failed,
                 )
@@ -133,7 +148,7 @@ def _search(
 
 
 def _signs(tuning: Tuning) -> np.ndarray:
-    return np.array([1.0 if one.large_is_bad else -1.0 for one in tuning.objectives])
+    return np.array([1.0 if objective.large_is_bad else -1.0 for objective in tuning.objectives])
 
 
 def _generation(candidates: np.ndarray, scores: Scores, before: Generation | None, signs: np.ndarray) -> Generation:
@@ -171,7 +186,7 @@ def dominated_shares(fronts: Sequence[np.ndarray]) -> np.ndarray:
 # ---- the tables
 
 
-def _write(
+def _write_tables(
     path: Path,
     campaign: Campaign,
     tuning: Tuning,
@@ -180,7 +195,7 @@ def _write(
     lock: WriterLock,
 ) -> None:
     columns, arrays = _evaluations(campaign, tuning, flown)
-    small = _signs(tuning) * np.column_stack([arrays[one.name] for one in tuning.objectives])
+    small = _signs(tuning) * np.column_stack([arrays[objective.name] for objective in tuning.objectives])
     front = np.flatnonzero(non_dominated(np.where(arrays["feasible"][:, None], small, np.nan)))
     front = front[np.argsort(small[front, 0], kind="stable")]
     ended = manifest["tuning"]["end"] != UNFINISHED
@@ -195,38 +210,45 @@ def _write(
 def _evaluations(
     campaign: Campaign, tuning: Tuning, flown: list[Generation]
 ) -> tuple[list[Column], dict[str, np.ndarray]]:
-    model, violation = campaign.model, np.concatenate([one.scores.violation for one in flown])
-    inputs = [model.input(one.name) for one in tuning.parameters]
+    model, violation = campaign.model, np.concatenate([generation.scores.violation for generation in flown])
+    inputs = [model.input(parameter.name) for parameter in tuning.parameters]
     columns = [
         Column("candidate", "", "candidate", "number of the candidate, from 0", "integer"),
         Column("generation", "", "candidate", "generation that it came in, from 0", "integer"),
-        *(Column(one.name, one.unit, "tuned", one.description) for one in inputs),
-        *(_measure_column(campaign, one, "objective") for one in tuning.objectives),
-        *(_measure_column(campaign, one, "constraint") for one in tuning.constraints),
+        *(Column(input.name, input.unit, "tuned", input.description) for input in inputs),
+        *(_measure_column(campaign, objective, "objective") for objective in tuning.objectives),
+        *(_measure_column(campaign, constraint, "constraint") for constraint in tuning.constraints),
         Column("violation", "", "candidate", "how far beyond the limits, in shares of them, added up"),
         Column("feasible", "", "candidate", "whether it is inside all limits", "switch"),
         Column("failed_cases", "", "candidate", "its cases that did not complete", "integer"),
         Column("commonest_failure", "", "candidate", "how and why most of these ended", "word"),
     ]
-    numbers = np.vstack([np.hstack([one.candidates, one.scores.objectives, one.scores.limited]) for one in flown])
+    numbers = np.vstack(
+        [
+            np.hstack([generation.candidates, generation.scores.objectives, generation.scores.limited])
+            for generation in flown
+        ]
+    )
     arrays = {
         "candidate": np.arange(len(numbers)),
-        "generation": np.repeat(np.arange(len(flown)), [len(one.candidates) for one in flown]),
+        "generation": np.repeat(np.arange(len(flown)), [len(generation.candidates) for generation in flown]),
         **{column.name: numbers[:, k] for k, column in enumerate(columns[2:-4])},
         "violation": violation,
         "feasible": violation == 0.0,
-        "failed_cases": np.concatenate([one.scores.failed for one in flown]),
-        "commonest_failure": np.concatenate([one.scores.reasons for one in flown]),
+        "failed_cases": np.concatenate([generation.scores.failed for generation in flown]),
+        "commonest_failure": np.concatenate([generation.scores.reasons for generation in flown]),
     }
     return columns, arrays
 
 
-def _measure_column(campaign: Campaign, one: Objective | Constraint, role: str) -> Column:
-    metric = next(metric for metric in campaign.model.metrics if metric.name == one.metric)
+def _measure_column(campaign: Campaign, measure: Objective | Constraint, role: str) -> Column:
+    metric = next(metric for metric in campaign.model.metrics if metric.name == measure.metric)
     of = (
-        "the nominal case" if one.quantile is None else f"quantile {one.quantile:g} of {campaign.cases} dispersed cases"
+        "the nominal case"
+        if measure.quantile is None
+        else f"quantile {measure.quantile:g} of {campaign.cases} dispersed cases"
     )
-    return Column(one.name, metric.unit, role, f"{metric.description}; {of}")
+    return Column(measure.name, metric.unit, role, f"{metric.description}; {of}")
 
 
 def _generations(flown: list[Generation], ended: bool) -> tuple[list[Column], dict[str, np.ndarray]]:
@@ -241,23 +263,31 @@ def _generations(flown: list[Generation], ended: bool) -> tuple[list[Column], di
     ]
     arrays = {
         "generation": np.arange(len(flown)),
-        "evaluations": np.cumsum([len(one.candidates) for one in flown]),
-        "feasible_so_far": np.cumsum([np.count_nonzero(one.scores.violation == 0.0) for one in flown]),
-        "front_size": np.array([len(one.front) for one in flown]),
-        "least_violation": np.array([one.least_violation for one in flown]),
-        "dominated_share": dominated_shares([one.front for one in flown]) if ended else np.full(len(flown), np.nan),
+        "evaluations": np.cumsum([len(generation.candidates) for generation in flown]),
+        "feasible_so_far": np.cumsum([np.count_nonzero(generation.scores.violation == 0.0) for generation in flown]),
+        "front_size": np.array([len(generation.front) for generation in flown]),
+        "least_violation": np.array([generation.least_violation for generation in flown]),
+        "dominated_share": dominated_shares([generation.front for generation in flown])
+        if ended
+        else np.full(len(flown), np.nan),
     }
     return columns, arrays
 
 
-def _wording(campaign: Campaign, tuning: Tuning) -> dict[str, Any]:
+def _search_record(campaign: Campaign, tuning: Tuning) -> dict[str, Any]:
     """What was searched, as plain data for the report."""
     return {
         "cases": campaign.cases if tuning.robust else 1,
-        "parameters": [asdict(one) | {"nominal": campaign.nominal[one.name]} for one in tuning.parameters],
-        "objectives": [asdict(one) for one in tuning.objectives],
-        "constraints": [asdict(one) for one in tuning.constraints],
-        "published": [asdict(one) for one in tuning.published],
+        "parameters": [
+            _record(parameter) | {"nominal": campaign.nominal[parameter.name]} for parameter in tuning.parameters
+        ],
+        "objectives": [_record(objective) for objective in tuning.objectives],
+        "constraints": [_record(constraint) for constraint in tuning.constraints],
+        "published": [_record(point) for point in tuning.published],
         "crossover": tuning.crossover,
         "mutation": tuning.mutation or 1.0 / len(tuning.parameters),
     }
+
+
+def _record(section: Section) -> dict[str, Any]:
+    return section.model_dump(exclude={"note"})

@@ -1,8 +1,8 @@
-"""The directory of a tuning: what `mc-engine tune` leaves behind.
+"""The directory that `mc-engine tune` writes, and its result as text.
 
     tuning.toml   tuning.json   evaluations.parquet   generations.parquet   front.parquet   journal.jsonl
 
-All of them are replaced together after each generation: whenever the search is killed, what counts is whole.
+All files are replaced together after each generation, so that a killed search leaves the result of a whole generation.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,17 @@ UNFINISHED = "not ended"  # instead of why the search ended
 
 @dataclass(frozen=True)
 class TuningRecord:
-    """A tuning: all of it, or what there is of one that has not ended.
+    """The result of a search by `tune`: complete, or as far as an interrupted one came.
 
-    evaluations : every candidate flown, in order.  front : those of them inside all limits that no other one of these
-        beats; no rows if none is inside.  generations : how the search went on.
+    path : Path, its directory
+    manifest : dict, what was searched, with which sources; ["tuning"] has the settings of the search and how it ended
+    evaluations : DataFrame, every candidate in the order flown, a row each
+    generations : DataFrame, the progress of the search, a row for each generation
+    front : DataFrame, the feasible candidates that no other one dominates; empty if none is feasible
+
+    >>> record = open_tuning("runs/tuned")
+    >>> record.feasible, list(record.front)[:4]
+    (True, ['candidate', 'generation', 'altitude_km', 'burn_dv_m_s'])
     """
 
     path: Path
@@ -39,12 +46,22 @@ class TuningRecord:
 
 
 def open_tuning(path: str | Path) -> TuningRecord:
-    """The tuning in directory `path`; StoreError if there is none, or a byte of it changed."""
+    """Open the result of a search by `tune`.
+
+    path : str or Path, its directory
+
+    Returns a TuningRecord.
+
+    Raises StoreError if there is none, or a file of it was damaged.
+
+    >>> open_tuning("runs/tuned").manifest["tuning"]["end"]
+    'all generations'
+    """
     manifest, tables = read_result(Path(path), TUNING)
     return TuningRecord(Path(path), manifest, **tables)
 
 
-def outcome_lines(record: TuningRecord) -> list[str]:
+def tuning_lines(record: TuningRecord) -> list[str]:
     """How the search ended, for the command line."""
     tuning, evaluations = record.manifest["tuning"], record.evaluations
     inside = int(evaluations["feasible"].sum())
@@ -55,9 +72,11 @@ def outcome_lines(record: TuningRecord) -> list[str]:
         return [*lines, f"front        {infeasibility(record)}"]
     lines.append(f"front        {len(record.front)} candidates")
     units = record.front.attrs["units"]
-    for one in tuning["objectives"]:
-        values = record.front[one["name"]]
-        lines.append(f"  {one['name']}  {values.min():.6g} to {values.max():.6g} {units[one['name']]}".rstrip())
+    for objective in tuning["objectives"]:
+        values = record.front[objective["name"]]
+        lines.append(
+            f"  {objective['name']}  {values.min():.6g} to {values.max():.6g} {units[objective['name']]}".rstrip()
+        )
     return lines
 
 
@@ -69,11 +88,13 @@ def infeasibility(record: TuningRecord) -> str:
         return f"{tried}; none of them has a number for every metric{_commonest(record.evaluations)}"
     units = record.evaluations.attrs["units"]
     broken = []
-    for one in record.manifest["tuning"]["constraints"]:
-        value, unit = float(row[one["name"]]), units[one["name"]]
-        for word, limit, sign in (("at most", one["at_most"], 1.0), ("at least", one["at_least"], -1.0)):
+    for constraint in record.manifest["tuning"]["constraints"]:
+        value, unit = float(row[constraint["name"]]), units[constraint["name"]]
+        for word, limit, sign in (("at most", constraint["at_most"], 1.0), ("at least", constraint["at_least"], -1.0)):
             if limit is not None and sign * (value - limit) > 0.0:
-                broken.append(f"{one['name']} {value:.4g}{' ' * bool(unit)}{unit} where {word} {limit:g} is allowed")
+                broken.append(
+                    f"{constraint['name']} {value:.4g}{' ' * bool(unit)}{unit} where {word} {limit:g} is allowed"
+                )
     return f"{tried}; the least violation found is {float(row['violation']):.4g}: {', '.join(broken)}"
 
 

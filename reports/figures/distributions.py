@@ -1,69 +1,119 @@
-"""Histograms as small multiples: quantiles, their distribution-free intervals, nominal, limits, printed laws."""
+"""Histograms with quantiles, their distribution-free intervals, the nominal, limits and printed distributions."""
 
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from textwrap import fill
 
 import numpy as np
 
 from mc_engine.statistics import Quantile, Summary
-from reports.figures.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
-from reports.figures.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
-from reports.numbers import count, interval, number, percent
+from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
+from reports.drawing.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
+from reports.text.numbers import count, interval, number, percent
 
 FEWEST_BINS, MOST_BINS = 8, 48
 CENTRAL = (0.005, 0.995)  # what a histogram must show well
 SPOILT = 3.0  # times the width of the central part: a wider range is cut
 FAR = 10.0  # times the width of all bins: a nominal or limit farther away is told, not drawn
-LAW_REACH, LAW_POINTS = 4.0, 81  # standard deviations on either side, places of the curve
+NORMAL_REACH, NORMAL_POINTS = 4.0, 81  # standard deviations on either side, places of a printed distribution
 TITLE_WIDTH = 28  # characters above a narrow panel
 
 
-@dataclass(frozen=True)
-class DistributionPanel:
-    """One metric: finite values (float64[n]), its summary, nominal value and required limits.
+def histogram(
+    values: np.ndarray,
+    label: str,
+    summary: Summary,
+    outer: Sequence[float],
+    *,
+    title: str = "",
+    nominal: float | None = None,
+    limits: Sequence[float] = (),
+    normal: tuple[float, float] | None = None,
+    column: str = "",
+    with_intervals: bool = False,
+    height: float = 240.0,
+) -> Plot:
+    """Finite values float64[n] of a metric, with the median and the quantiles of the probabilities `outer`.
 
-    law : mean and standard deviation of the normal law that the source prints for such cases
-    column : the metric's name in the table of cases
+    normal : mean and standard deviation of the normal distribution that the source prints for such cases.
+    column : the metric's name in the table of cases.
     """
+    low, high = shown_range(values)
+    edges = bin_edges(values[(values >= low) & (values <= high)])
+    counts = np.histogram(values, edges)[0]
+    curve = _normal_curve(normal, values.size * (edges[1] - edges[0])) if normal else np.empty((2, 0))
+    top = 1.06 * max([float(counts.max()), *curve[1]])
+    drawn = _quantiles_within(summary, (0.5, *outer), edges)
+    texts = [
+        f"{number(a)} to {number(b)}: {count(int(n))} cases" for (a, b), n in zip(pairwise(edges), counts, strict=True)
+    ]
+    marks: list[Mark] = list(_bounds(drawn, summary.confidence, top)) if with_intervals else []
+    bottom = np.zeros(counts.size)
+    marks.append(Bar(edges[:-1], edges[1:], bottom, counts, SKY, texts=texts, column=column, key="cases"))
+    marks += _percentile_lines(drawn, outer, with_intervals)
+    beyond = [count(values.size - int(counts.sum()))] if counts.sum() < values.size else []
+    if nominal is not None and _near(nominal, edges):
+        marks.append(Limit(nominal, "x", INK, f"nominal {number(nominal)}", "dot", key="nominal"))
+    elif nominal is not None:
+        beyond.append(f"nominal {number(nominal)}")
+    far = [number(limit) for limit in limits if not _near(limit, edges)]
+    beyond += [f"limit{'s' * (len(far) > 1)} {' and '.join(far)}"] if far else []
+    for limit in limits:
+        if _near(limit, edges):
+            marks.append(Limit(limit, "x", VERMILION, f"required limit {number(limit)}", key="required limit"))
+    if normal:
+        words = f"printed normal distribution, {number(normal[0])} ± {number(normal[1])} (1 σ)"
+        key = "normal distribution that the source prints"
+        marks.append(Line(curve[0], curve[1], GREEN, width=2.0, text=words, key=key))
+    told = fill(f"{', '.join(beyond)} beyond the axis", TITLE_WIDTH) if beyond else ""
+    x = Axis(label, most=5, whole=bool(edges[1] - edges[0] == 1.0), grid=False, margin=0.03)
+    y = Axis("cases", reach=(0.0, top), most=4, whole=True)
+    return Plot(tuple(marks), x, y, "\n".join(filter(None, (title, told))), height)
 
-    title: str
-    label: str
-    values: np.ndarray
-    summary: Summary
-    nominal: float | None
-    limits: tuple[float, ...]
-    law: tuple[float, float] | None = None
-    column: str = ""
 
-    @cached_property
-    def edges(self) -> np.ndarray:
-        """Edges of the bins."""
-        low, high = shown_range(self.values)
-        return bin_edges(self.values[(self.values >= low) & (self.values <= high)])
+def _near(place: float, edges: np.ndarray) -> bool:
+    """Whether a place is so near to the bins that an axis with both still shows their shape."""
+    reach = FAR * (edges[-1] - edges[0])
+    return bool(edges[0] - reach <= place <= edges[-1] + reach)
 
-    @cached_property
-    def counts(self) -> np.ndarray:
-        """Cases in each bin."""
-        return np.histogram(self.values, self.edges)[0]
 
-    @property
-    def beyond(self) -> str:
-        """What lies outside the axis, in words: how many cases (how far, the table says), nominal and limits."""
-        outside = self.values.size - int(self.counts.sum())
-        limits = [number(limit) for limit in self.limits if not self.near(limit)]
-        said = [count(outside)] if outside else []
-        if self.nominal is not None and not self.near(self.nominal):
-            said.append(f"nominal {number(self.nominal)}")
-        if limits:
-            said.append(f"limit{'s' * (len(limits) > 1)} {' and '.join(limits)}")
-        return f"{', '.join(said)} beyond the axis" if said else ""
+def _normal_curve(normal: tuple[float, float], cases_times_width: float) -> np.ndarray:
+    """float64[2, n]: places, and cases in a bin there if as many cases had the normal distribution."""
+    z = np.linspace(-NORMAL_REACH, NORMAL_REACH, NORMAL_POINTS)
+    density = np.exp(-0.5 * z * z) / (normal[1] * np.sqrt(2.0 * np.pi))
+    return np.array([normal[0] + normal[1] * z, cases_times_width * density])
 
-    def near(self, place: float) -> bool:
-        """Whether a place is so near to the bins that an axis with both still shows their shape."""
-        low, high = (float(end) for end in self.edges[[0, -1]])
-        return low - FAR * (high - low) <= place <= high + FAR * (high - low)
+
+def _quantiles_within(summary: Summary, probabilities: Sequence[float], edges: np.ndarray) -> list[Quantile]:
+    """The quantiles with no part outside a range that was cut; the others are in the table."""
+    known = [quantile for p in probabilities if (quantile := summary.at(p)) is not None]
+    low, high = edges[[0, -1]]
+    return [q for q in known if all(end is None or low <= end <= high for end in (q.value, q.lower, q.upper))]
+
+
+def _bounds(quantiles: Sequence[Quantile], confidence: float, top: float) -> Iterator[Bar]:
+    """Intervals of the quantiles, as high as the panel."""
+    key = f"{percent(0.5 * (1.0 + confidence))} confidence bounds of a percentile, distribution-free"
+    for quantile in quantiles:
+        if quantile.lower is not None and quantile.upper is not None:
+            left, right = np.array([[quantile.lower], [quantile.upper]])
+            yield Bar(left, right, np.zeros(1), np.array([top]), BLUE, 0.3, key=key)
+
+
+def _percentile_lines(quantiles: Sequence[Quantile], outer: Sequence[float], with_intervals: bool) -> Iterator[Limit]:
+    both = f"{' and '.join(percent(p, 3) for p in outer)} percentiles"
+    for quantile in quantiles:
+        bounds = f" {interval(quantile.lower, quantile.upper)}" if with_intervals else ""
+        words = f"{percent(quantile.probability, 3)} percentile {number(quantile.value)}{bounds}"
+        if quantile.probability == 0.5:
+            yield Limit(quantile.value, "x", ORANGE, words, key="median")
+        else:
+            yield Limit(quantile.value, "x", BLUE, words, "dash", key=both)
+
+
+def histograms(plots: Sequence[Plot]) -> Drawing:
+    """Histograms as small multiples."""
+    return Drawing("Histograms", tuple(plots), 4)
 
 
 def shown_range(values: np.ndarray) -> tuple[float, float]:
@@ -94,102 +144,3 @@ def bin_edges(values: np.ndarray) -> np.ndarray:
     width = 2.0 * spread / values.size ** (1.0 / 3.0)
     bins = int(np.ceil((high - low) / width)) if width * MOST_BINS > high - low else MOST_BINS
     return np.linspace(low, high, min(max(bins, FEWEST_BINS), MOST_BINS) + 1)
-
-
-def law_curve(panel: DistributionPanel, edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(places, cases per bin) of the printed normal law, if it had made as many cases; empty without one."""
-    if panel.law is None:
-        return np.empty(0), np.empty(0)
-    mean, deviation = panel.law
-    z = np.linspace(-LAW_REACH, LAW_REACH, LAW_POINTS)
-    cases_per_bin = panel.values.size * (edges[1] - edges[0])
-    return mean + deviation * z, cases_per_bin * np.exp(-0.5 * z * z) / (deviation * np.sqrt(2.0 * np.pi))
-
-
-@dataclass(frozen=True)
-class Distributions(Drawing):
-    """Panels of histograms.  outer : the probabilities whose quantiles are drawn beside the median."""
-
-    panels: tuple[DistributionPanel, ...]
-    outer: tuple[float, ...]
-    with_intervals: bool
-    height: float = 240.0
-    across = 4
-
-    @property
-    def alternative(self) -> str:
-        parts = []
-        for panel in self.panels:
-            summary, median = panel.summary, panel.summary.at(0.5)
-            middle = f", median {number(median.value)}" if median else ""
-            mean, deviation = panel.law or (0.0, 0.0)
-            law = f", printed law {number(mean)} ± {number(deviation)} (1 σ)" if panel.law else ""
-            parts.append(
-                f"{panel.label}: {count(summary.n_used)} of {count(summary.n_tried)} cases from "
-                f"{number(summary.minimum)} to {number(summary.maximum)}{middle}{law}"
-            )
-        return f"Histograms. {'; '.join(parts)}."
-
-    @property
-    def plots(self) -> tuple[Plot, ...]:
-        return tuple(self._plot(panel) for panel in self.panels)
-
-    def _plot(self, panel: DistributionPanel) -> Plot:
-        edges, counts = panel.edges, panel.counts
-        x_law, y_law = law_curve(panel, edges)
-        top = 1.06 * max([float(counts.max()), *y_law])
-        told = tuple(
-            f"{number(a)} to {number(b)}: {count(int(n))} cases"
-            for (a, b), n in zip(pairwise(edges), counts, strict=True)
-        )
-        marks: list[Mark] = [self._box(panel, low, high, top) for low, high in self._bands(panel)]
-        sides = edges[:-1], edges[1:], np.zeros(counts.size), counts
-        marks.append(Bar(*sides, SKY, texts=told, column=panel.column, key="cases"))
-        marks += [Limit(at, "x", colour, what, dash, key=key) for at, colour, dash, what, key in self._lines(panel)]
-        if panel.law:
-            what = f"printed normal law, {number(panel.law[0])} ± {number(panel.law[1])} (1 σ)"
-            marks.append(Line(x_law, y_law, GREEN, width=2.0, text=what, key="normal law that the source prints"))
-        title = "\n".join(filter(None, (panel.title, fill(panel.beyond, TITLE_WIDTH))))
-        whole = bool(edges[1] - edges[0] == 1.0)
-        return Plot(
-            tuple(marks),
-            Axis(panel.label, most=5, whole=whole, grid=False, margin=0.03),
-            Axis("cases", reach=(0.0, top), most=4, whole=True),
-            title,
-            self.height,
-        )
-
-    def _bands(self, panel: DistributionPanel) -> list[tuple[float, float]]:
-        if not self.with_intervals:
-            return []
-        drawn = self._quantiles(panel)
-        return [(q.lower, q.upper) for q in drawn if q.lower is not None and q.upper is not None]
-
-    def _quantiles(self, panel: DistributionPanel) -> list[Quantile]:
-        """The quantiles to draw: those with no part outside a range that was cut; the others stand in the table."""
-        found = [quantile for p in (0.5, *self.outer) if (quantile := panel.summary.at(p)) is not None]
-        low, high = panel.edges[[0, -1]]
-        return [
-            one for one in found if all(end is None or low <= end <= high for end in (one.value, one.lower, one.upper))
-        ]
-
-    def _lines(self, panel: DistributionPanel) -> list[tuple[float, str, str, str, str]]:
-        """(place, colour, dash, what, key) of every upright line of a panel."""
-        lines = []
-        for found in self._quantiles(panel):
-            colour, dash = (ORANGE, "solid") if found.probability == 0.5 else (BLUE, "dash")
-            bounds = f" {interval(found.lower, found.upper)}" if self.with_intervals else ""
-            what = f"{percent(found.probability, 3)} percentile {number(found.value)}{bounds}"
-            outer = f"{' and '.join(percent(p, 3) for p in self.outer)} percentiles"
-            lines.append((found.value, colour, dash, what, "median" if found.probability == 0.5 else outer))
-        if panel.nominal is not None and panel.near(panel.nominal):
-            lines.append((panel.nominal, INK, "dot", f"nominal {number(panel.nominal)}", "nominal"))
-        near = [limit for limit in panel.limits if panel.near(limit)]
-        lines += [(limit, VERMILION, "solid", f"required limit {number(limit)}", "required limit") for limit in near]
-        return lines
-
-    def _box(self, panel: DistributionPanel, low: float, high: float, top: float) -> Bar:
-        """An interval of a quantile, as high as the panel."""
-        each = percent(0.5 * (1.0 + panel.summary.confidence))
-        key = f"{each} confidence bounds of a percentile, distribution-free"
-        return Bar(np.array([low]), np.array([high]), np.zeros(1), np.array([top]), BLUE, 0.3, key=key)

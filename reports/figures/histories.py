@@ -1,16 +1,16 @@
-"""Quantities along the flight: percentile bands, the nominal and the worst of the retained cases, a panel each."""
+"""Quantities along the flight, against time or one another: envelopes, the nominal and the worst of the saved cases."""
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from reports.figures.marks import Axis, Drawing, Limit, Line, Mark, Plot, between
-from reports.figures.palette import BLUE, DASHES, INK, LINES, MUTED, SKY, VERMILION
-from reports.numbers import count, number, percent
+from reports.drawing.marks import Axis, Band, Drawing, Limit, Line, Mark, Plot, between
+from reports.drawing.palette import BLUE, DASHES, INK, LINES, MUTED, SKY, VERMILION
+from reports.text.numbers import count, number, percent
 
 SAMPLES = 400  # on the screen and on paper; extremes between them are kept
-OUTER, INNER = 0.25, 0.45  # opacity of the wider and of the narrower band
+OPACITIES = (0.25, 0.45)  # of the wider and of the narrower band
 MEDIAN = "median"
 FAR = 3.0  # times the range of a panel: a limit farther away is told, not drawn
 
@@ -29,25 +29,85 @@ class HistoryLine:
 
 
 @dataclass(frozen=True)
-class HistoryBand:
-    """Quantiles of one quantity over n_cases: float64[n] by probability at the times t; pairs of them are bands."""
+class Envelope:
+    """Quantiles of a quantity over n_cases: float64[n] by probability, at the times or levels `at` float64[n].
 
-    t: np.ndarray
+    rising : of one at the levels of another quantity, whether the flights come to them from below.
+    """
+
+    at: np.ndarray
     curves: dict[float, np.ndarray]
     n_cases: int
+    rising: bool = False
 
-    @property
-    def pairs(self) -> list[tuple[float, float, float]]:
-        """(lower, upper, opacity) of each band, the widest first."""
-        return band_pairs(self.curves)
+    def bands(self) -> Iterator[tuple[np.ndarray, np.ndarray, float, str]]:
+        """Lower and upper curve, opacity and words of each band, the widest first."""
+        known = sorted(self.curves)
+        for low, high, opacity in zip(known, known[::-1], OPACITIES, strict=False):
+            reach = "smallest to largest" if low == 0.0 else f"{percent(low, 3)} to {percent(high, 3)}"
+            words = f"{reach} of {count(self.n_cases)} saved cases"
+            yield self.curves[low], self.curves[high], opacity, words
 
 
-def band_pairs(curves: Iterable[float]) -> list[tuple[float, float, float]]:
-    """(lower, upper, opacity) of each band between curves of these probabilities, the widest first."""
-    known = sorted(curves)
-    low = [p for p in known if p < 0.5]
-    # 1 - 0.05 is not 0.95 to the last bit
-    return [(p, max(q for q in known if abs(p + q - 1.0) < 1e-9), o) for p, o in zip(low, (OUTER, INNER), strict=False)]
+def history_plot(
+    name: str,
+    label: str,
+    time: str,
+    lines: Sequence[HistoryLine],
+    envelope: Envelope | None = None,
+    limits: Sequence[tuple[float, str]] = (),
+) -> Plot:
+    """A quantity against the time.  limits : required limits with their words."""
+    marks: list[Mark] = []
+    if envelope is not None:
+        for low, high, opacity, words in envelope.bands():
+            marks.append(between(envelope.at, low, high, SKY, opacity, words, words))
+        words = f"{MEDIAN} of them"
+        marks.append(Line(envelope.at, envelope.curves[0.5], BLUE, words, "dash", 1.6, key=words))
+    marks += case_lines(lines, lambda line: thinned(line.t, line.quantities[name]))
+    bottom, top = Plot(tuple(marks), Axis(), Axis()).ends[1]
+    far = []
+    for at, words in limits:
+        near = bottom - FAR * (top - bottom) <= at <= top + FAR * (top - bottom)
+        marks.append(Limit(at, "y", VERMILION, words, "solid", 2.0, near, "required limit" if near else ""))
+        far += [] if near else [f"limit {number(at)} beyond the axis"]
+    axes = Axis(time, margin=0.0), Axis(name=label, most=5)
+    return Plot(tuple(marks), *axes, "\n".join([label, *far]), 260.0, quantity=name)
+
+
+def history_figure(plots: Sequence[Plot]) -> Drawing:
+    """Quantities against the time, a panel each."""
+    return Drawing("Curves against time, the nominal case among them", tuple(plots), 3)
+
+
+def profile_figure(
+    names: tuple[str, str], labels: tuple[str, str], lines: Sequence[HistoryLine], envelopes: Sequence[Envelope]
+) -> Drawing:
+    """One quantity against another, as altitude against speed, with envelopes of the first at levels of the second."""
+    marks: list[Mark] = []
+    for envelope in envelopes:
+        way = f", {'up' if envelope.rising else 'down'}" if len(envelopes) > 1 else ""
+        for low, high, opacity, words in envelope.bands():
+            x, y = np.r_[low, high[::-1]], np.r_[envelope.at, envelope.at[::-1]]
+            marks.append(Band(x, y, SKY, opacity, words + way, key=words + way))
+    marks += case_lines(lines, lambda line: thinned_curve(line.quantities[names[0]], line.quantities[names[1]]))
+    plot = Plot(tuple(marks), Axis(labels[0]), Axis(labels[1]), height=440.0)
+    return Drawing("Curves along flights, the nominal case among them", (plot,))
+
+
+def case_lines(
+    lines: Sequence[HistoryLine], curve: Callable[[HistoryLine], tuple[np.ndarray, np.ndarray]]
+) -> Iterator[Line]:
+    """The curves of cases from back to front: grey ones, coloured ones, the nominal."""
+    others = f"{sum(line.rank is None for line in lines)} other saved cases"
+    for line in sorted(lines, key=lambda line: -1e9 if line.rank is None else -line.rank):
+        if line.rank is None:
+            yield Line(*curve(line), MUTED, line.name, width=1.0, opacity=0.6, key=others)
+        elif line.rank == 0:
+            yield Line(*curve(line), INK, line.name, width=2.0, key=line.name)
+        else:
+            turn, place = divmod(line.rank - 1, len(LINES))
+            yield Line(*curve(line), LINES[place], line.name, DASHES[turn % len(DASHES)], 1.6, key=line.name)
 
 
 def thinned(t: np.ndarray, y: np.ndarray, samples: int = SAMPLES) -> tuple[np.ndarray, np.ndarray]:
@@ -64,76 +124,14 @@ def thinned(t: np.ndarray, y: np.ndarray, samples: int = SAMPLES) -> tuple[np.nd
     return t[rows], y[rows]
 
 
-def line_style(rank: int | None) -> tuple[str, str, float]:
-    """Colour, dash and width of a line."""
-    if rank is None:
-        return MUTED, "solid", 1.0
-    if rank == 0:
-        return INK, "solid", 2.0
-    return LINES[(rank - 1) % len(LINES)], DASHES[(rank - 1) // len(LINES) % len(DASHES)], 1.6
+def thinned_curve(x: np.ndarray, y: np.ndarray, samples: int = SAMPLES) -> tuple[np.ndarray, np.ndarray]:
+    """The curve with about `samples` points, evenly along its length in the units of its two ranges.
 
-
-def back_to_front(lines: Sequence[HistoryLine]) -> list[HistoryLine]:
-    """Grey lines, coloured ones, the nominal on top."""
-    return sorted(lines, key=lambda line: -1e9 if line.rank is None else -line.rank)
-
-
-def band_name(low: float, high: float, n_cases: int) -> str:
-    reach = "smallest to largest" if low == 0.0 else f"{percent(low, 3)} to {percent(high, 3)}"
-    return f"{reach} of {count(n_cases)} saved cases"
-
-
-def case_lines(
-    lines: Sequence[HistoryLine], curve: Callable[[HistoryLine], tuple[np.ndarray, np.ndarray]]
-) -> list[Line]:
-    """The curves of cases in their styles, from back to front."""
-    others = f"{sum(line.rank is None for line in lines)} other saved cases"
-    found = []
-    for line in back_to_front(lines):
-        colour, dash, width = line_style(line.rank)
-        grey = line.rank is None
-        found.append(
-            Line(*curve(line), colour, line.name, dash, width, 0.6 if grey else 1.0, key=others if grey else line.name)
-        )
-    return found
-
-
-@dataclass(frozen=True)
-class Histories(Drawing):
-    """Lines of retained cases; labels : axis label per quantity, in the order of the panels; bands by quantity.
-
-    limits : of a quantity by its name: required limits with their words.
+    Even in time, most points would lie at the end, where the flight is slow.
     """
-
-    lines: tuple[HistoryLine, ...]
-    labels: dict[str, str]
-    bands: dict[str, HistoryBand] = field(default_factory=dict)
-    limits: dict[str, tuple[tuple[float, str], ...]] = field(default_factory=dict)
-    time: str = "time [s]"
-    across = 3
-    form = "Curves against time, the nominal case among them"
-
-    @property
-    def plots(self) -> tuple[Plot, ...]:
-        return tuple(self._plot(name, label) for name, label in self.labels.items())
-
-    def _plot(self, name: str, label: str) -> Plot:
-        marks: list[Mark] = []
-        band = self.bands.get(name)
-        if band is not None:
-            for low, high, opacity in band.pairs:
-                said = band_name(low, high, band.n_cases)
-                marks.append(between(band.t, band.curves[low], band.curves[high], SKY, opacity, said, said))
-            said = f"{MEDIAN} of them"
-            marks.append(Line(band.t, band.curves[0.5], BLUE, said, "dash", 1.6, key=said))
-        marks += case_lines(self.lines, lambda line: thinned(line.t, line.quantities[name]))
-        ends = Plot(tuple(marks), Axis(), Axis()).ends[1]
-        room = FAR * (ends[1] - ends[0])
-        far = []
-        for at, said in self.limits.get(name, ()):
-            near = ends[0] - room <= at <= ends[1] + room
-            marks.append(Limit(at, "y", VERMILION, said, "solid", 2.0, near, key="required limit" if near else ""))
-            far += [] if near else [f"limit {number(at)} beyond the axis"]
-        return Plot(
-            tuple(marks), Axis(self.time, margin=0.0), Axis(name=label, most=5), "\n".join([label, *far]), 260.0
-        )
+    if x.size <= samples:
+        return x, y
+    steps = [np.diff(values) / (np.nanmax(values) - np.nanmin(values) or 1.0) for values in (x, y)]
+    length = np.r_[0.0, np.cumsum(np.nan_to_num(np.hypot(*steps)))]
+    rows = np.unique(np.searchsorted(length, np.linspace(0.0, length[-1], samples)).clip(0, x.size - 1))
+    return x[rows], y[rows]

@@ -18,12 +18,13 @@ import pandas as pd
 from mc_engine.errors import EngineError
 from mc_engine.statistics import map_metric, summarize
 from mc_engine.status import OK, STATUS_NAME
-from reports.figures import paper
-from reports.figures.distributions import DistributionPanel, Distributions
-from reports.figures.maps import MapDrawing
-from reports.figures.marks import Drawing
-from reports.figures.scatter import ScatterDrawing
-from reports.numbers import axis_label, count, words
+from reports.drawing import paper
+from reports.drawing.marks import Drawing, Points
+from reports.drawing.pictures import render_picture
+from reports.figures import distributions
+from reports.figures.clouds import case_scatter
+from reports.figures.maps import metric_map
+from reports.text.numbers import axis_label, count, words
 
 OUTER = (0.00135, 0.99865)  # quantiles drawn beside the median
 POINTS_ON_MAP = 2000
@@ -44,8 +45,6 @@ class Picture:
 
     def savefig(self, file: str | Path) -> None:
         """Write it as SVG, PDF or PNG, as the file's ending says; EngineError for another."""
-        from reports.pdf import render_picture
-
         kind = Path(file).suffix.removeprefix(".").lower()
         if kind == "svg":
             Path(file).write_bytes(self.svg.encode())
@@ -60,32 +59,23 @@ def histogram(table: pd.DataFrame, column: str) -> Picture:
 
     EngineError if there is no such column of numbers, or fewer than two cases have one.
     """
-    values = _values(table, column)
+    values = _numbers(table, column)
     finite = values[np.isfinite(values)]
     _refuse_few(finite.size, 2, column)
     used = f"{count(finite.size)} of {count(values.size)} cases"
-    panel = DistributionPanel(used, _label(table, column), finite, summarize(values), None, ())
-    return Picture(Distributions((panel,), OUTER, False))
+    plot = distributions.histogram(finite, _column_label(table, column), summarize(values), OUTER, title=used)
+    return Picture(distributions.histograms([plot]))
 
 
 def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
     """One column against another, a point a case.  EngineError as for `histogram`."""
-    a, b = _values(table, x), _values(table, y)
+    a, b = _numbers(table, x), _numbers(table, y)
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b))
     _refuse_few(used.size, 1, f"{x} and {y}")
-    drawing = ScatterDrawing(
-        x=a[used],
-        y=b[used],
-        case_ids=_case_ids(table)[used],
-        x_label=_label(table, x),
-        y_label=_label(table, y),
-        n_used=int(used.size),
-        n_tried=len(table),
-        nominal=None,
-        outcome=np.zeros(used.size, dtype=np.int8),
-        outcomes=(("cases with both numbers", int(used.size)),),
-    )
-    return Picture(drawing)
+    cloud = Points(a[used], b[used], "", cases=_case_ids(table)[used])
+    classes = [("cases with both numbers", int(used.size))]
+    axes = _column_label(table, x), _column_label(table, y)
+    return Picture(case_scatter(cloud, np.zeros(used.size, dtype=np.int8), classes, axes, len(table)))
 
 
 def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:
@@ -94,28 +84,20 @@ def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:
     Blank where the cases do not support a surface; see `mc_engine.statistics.map_metric`.  EngineError where the cases
     are too few, or lie on a line.
     """
-    a, b, c = (_values(table, name) for name in (x, y, metric))
+    a, b, c = (_numbers(table, name) for name in (x, y, metric))
     surface = map_metric(a, b, c)
     if surface is None or not np.isfinite(surface.value).any():
         raise EngineError(f"{metric}: too few cases over {x} and {y} for a map; draw a scatter instead")
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b) & np.isfinite(c))
     shown = used[np.linspace(0, used.size - 1, min(used.size, POINTS_ON_MAP)).astype(np.int64)]
-    drawing = MapDrawing(
-        surface=surface,
-        x_label=_label(table, x),
-        y_label=_label(table, y),
-        metric_label=_label(table, metric),
-        unit=_unit(table, metric),
-        points=np.column_stack([a[shown], b[shown]]),
-        case_ids=_case_ids(table)[shown],
-        point_values=c[shown],
-        n_points=int(used.size),
-        nominal=None,
+    labels = _column_label(table, x), _column_label(table, y), _column_label(table, metric)
+    points, unit = np.column_stack([a[shown], b[shown]]), _column_unit(table, metric)
+    return Picture(
+        metric_map(surface, points, c[shown], _case_ids(table)[shown], labels, unit, n_points=int(used.size))
     )
-    return Picture(drawing)
 
 
-def _values(table: pd.DataFrame, column: str) -> np.ndarray:
+def _numbers(table: pd.DataFrame, column: str) -> np.ndarray:
     """float64[n]: the column, NaN where a case has no number."""
     if column not in table:
         raise EngineError(f'the table has no column "{column}"; it has {", ".join(map(str, table.columns))}')
@@ -131,12 +113,12 @@ def _refuse_few(n_used: int, needed: int, what: str) -> None:
         raise EngineError(f"{what}: {n_used} cases have a number; the figure needs {needed}")
 
 
-def _unit(table: pd.DataFrame, column: str) -> str:
+def _column_unit(table: pd.DataFrame, column: str) -> str:
     return str(table.attrs.get("units", {}).get(column, ""))
 
 
-def _label(table: pd.DataFrame, column: str) -> str:
-    unit = _unit(table, column)
+def _column_label(table: pd.DataFrame, column: str) -> str:
+    unit = _column_unit(table, column)
     return axis_label(words(column, unit), unit)
 
 

@@ -161,11 +161,11 @@ template <class Problem> void fly_cases(const double* p, double* out, long n, lo
 // n must be a multiple of the number of lanes
 template <class Problem> void fly(const double* p, double* out, long n, long steps, double h, int threads) {
     const long blocks = n / W, share = (blocks + threads - 1) / threads * W;
-    std::vector<std::thread> crew;
+    std::vector<std::thread> workers;
     for (long begin = share; begin < n; begin += share)
-        crew.emplace_back(fly_cases<Problem>, p, out, n, begin, std::min(begin + share, n), steps, h);
+        workers.emplace_back(fly_cases<Problem>, p, out, n, begin, std::min(begin + share, n), steps, h);
     fly_cases<Problem>(p, out, n, 0, std::min(share, n), steps, h);
-    for (auto& one : crew) one.join();
+    for (auto& one : workers) one.join();
 }
 
 }  // namespace

@@ -28,11 +28,11 @@ def seconds(campaign: Campaign, workers: int) -> float:
 def scaling(name: str, cases: int, turns: int = 5) -> dict[int, float]:
     """Threads -> seconds of the shortest run."""
     campaign = replace(load_campaign(name, cases=cases), retention=Retention(nominal=False))
-    crews = sorted({1, min(2, os.cpu_count() or 1), os.cpu_count() or 1})
+    thread_counts = sorted({1, min(2, os.cpu_count() or 1), os.cpu_count() or 1})
     seconds(replace(campaign, cases=64), 1)  # compiles
-    best = dict.fromkeys(crews, float("inf"))
+    best = dict.fromkeys(thread_counts, float("inf"))
     for _ in range(turns):
-        for workers in crews:
+        for workers in thread_counts:
             best[workers] = min(best[workers], seconds(campaign, workers))
     return best
 

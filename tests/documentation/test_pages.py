@@ -15,11 +15,20 @@ from mc_engine.documentation.website import HOME
 from mc_engine.flight.chunks import fly_nominal
 from mc_engine.flight.contract import breaches
 from mc_engine.status import STATUS_NAME
+from mc_engine.studies.published import read_published
 
 RECIPES = [
     HOME / "how_to" / f"{name}.md"
-    for name in ("tables", "notebook", "correlated_covariances", "own_distributions", "prepare_and_end_cases")
+    for name in (
+        "tables",
+        "notebook",
+        "correlated_covariances",
+        "own_distributions",
+        "prepare_and_end_cases",
+        "curves_rotations_frames_air",
+    )
 ]
+PUBLISHED = HOME / "how_to" / "published_results.md"
 HEAD = '[campaign]\nmodel = "{model}"\ncases = 1000\ndesign = "mc"\nseed = 1\n\n'
 
 
@@ -133,14 +142,14 @@ def test_the_page_on_how_cases_end_knows_every_status():
 
 
 def test_the_prepared_campaign_keeps_the_contract_and_reaches_its_target(tmp_path):
-    """The page's function and parameter in the smallest model."""
-    (function, parameter, *_) = (text for text, _ in blocks(HOME / "how_to" / "prepare_and_end_cases.md", "python"))
+    """The page's function and inputs in the smallest model."""
+    (function, declared, *_) = (text for text, _ in blocks(HOME / "how_to" / "prepare_and_end_cases.md", "python"))
     text = (SHIPPED / "minimal" / "model.py").read_text()
-    (burn,) = [line for line in text.splitlines() if 'Parameter("burn_dv_m_s"' in line]
+    own = text[text.index("Inputs = inputs(") : text.index("State = states(")]
     for old, new in (
-        (burn, f"        {parameter.splitlines()[-1]},"),
+        (own, f"{declared}\n"),
         ("@physics\ndef initial", f"{function}\n\n@physics\ndef initial"),
-        ("    initial=initial,", "    prepare=prepare,\n    initial=initial,"),
+        ("initial=initial,", "initial=initial, prepare=prepare, kernel_parameters=Parameters,"),
     ):
         assert old in text
         text = text.replace(old, new)
@@ -153,10 +162,24 @@ def test_the_prepared_campaign_keeps_the_contract_and_reaches_its_target(tmp_pat
 
 
 @parametrize(
-    [page for page in PAGES if page not in RECIPES and page.parent.name != "tutorial" and blocks(page, "toml")]
+    [
+        page
+        for page in PAGES
+        if page not in (*RECIPES, PUBLISHED) and page.parent.name != "tutorial" and blocks(page, "toml")
+    ]
 )
 def test_every_campaign_file_on_a_page_loads(page, tmp_path):
     check_campaigns(page, tmp_path)
+
+
+def test_the_records_of_the_page_on_published_results_are_read_and_show_each_way_to_compute(tmp_path):
+    path = tmp_path / "published.toml"
+    ((text, _),) = blocks(PUBLISHED, "toml")
+    path.write_text(text, encoding="utf-8")
+    records = read_published(path)
+    assert [next(way for way in ("column", "statistic", "compute") if way in record) for record in records] == [
+        "column", "statistic", "compute",
+    ]  # fmt: skip
 
 
 def check_campaigns(page, folder):

@@ -9,7 +9,7 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 
 from mc_engine import durable_file
-from mc_engine.flight.chunks import Lost, Order
+from mc_engine.flight.chunks import Lost, Task
 from mc_engine.runner import dispatch
 from mc_engine.store import parts, store
 from mc_engine.store.writer_lock import WriterLock
@@ -28,7 +28,7 @@ def line_before_part(patch):
 
 def dead_worker_forgotten(patch):
     """Nobody flies again what a dead worker was flying."""
-    patch(dispatch.Dispatch, "_on_worker_death", lambda self, landing: None)
+    patch(dispatch.Dispatch, "_on_worker_death", lambda self, result: None)
 
 
 def suspects_given_up(patch):
@@ -38,7 +38,7 @@ def suspects_given_up(patch):
         lost = tuple(Lost(int(case), "worker-died", dispatch.DIED) for case in cases)
         return replace(self, suspected=True, lost=(*self.lost, *lost))
 
-    patch(Order, "suspecting", without_all)
+    patch(Task, "isolating", without_all)
 
 
 def disk_unheard(patch):

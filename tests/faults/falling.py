@@ -9,13 +9,14 @@ _LEFT_OUT = ("PYTHONDONTWRITEBYTECODE", "PYTHONSAFEPATH")
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name not in _LEFT_OUT}
 ENGINE = str(Path(__file__).resolve().parents[2])
 
-MODEL = """from collections import namedtuple
-
-from mc_engine.lanes import physics
-from mc_engine.model import Field, FixedStep, Model, Parameter
+MODEL = """from mc_engine.lanes import physics
+from mc_engine.model import FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
 
 FACTOR = 1.0
-State = namedtuple("State", "v")
+Inputs = inputs(gravity_m_s2=Parameter(9.0, "acceleration"))
+State = states(v_m_s="speed")
+Outputs = outputs(v_m_s="speed")
+Metrics = metrics(speed_m_s=at_end("v_m_s", "speed"))
 
 
 def prepare(inputs, settings, refusals):
@@ -24,31 +25,23 @@ def prepare(inputs, settings, refusals):
 
 
 @physics
-def initial(p, o):
-    return State(0.0)
+def initial():
+    return State(v=0.0)
 
 
 @physics
-def rhs(t, s, m, p, o):
-    return State(FACTOR * p.gravity)
+def rhs(p):
+    return State(v=FACTOR * p.gravity)
 
 
 @physics
-def observe(t, s, m, p, o):
-    return State(s.v)
+def observe(s):
+    return Outputs(v=s.v)
 
 
-@physics
-def evaluate(t, s, m, p, o, best, when):
-    return State(s.v)
-
-
-MODEL = Model(
-    name="fall", title="Fall", source="", settings=(), kernel_parameters=namedtuple("Parameters", "gravity"),
-    parameters=(Parameter("gravity_m_s2", "m/s^2", "acceleration", 9.0),),
-    states=(Field("v_m_s", "m/s", "speed"),), quantities=(Field("v_m_s", "m/s", "speed"),),
-    metrics=(Field("speed_m_s", "m/s", "speed"),), clock=FixedStep(0.5, 2.0), prepare=prepare,
-    initial=initial, rhs=rhs, observe=observe, evaluate=evaluate,
+MODEL = model(
+    name="fall", title="Fall", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
+    clock=FixedStep(0.5, 2.0), prepare=prepare, initial=initial, rhs=rhs, observe=observe,
 )
 """
 CAMPAIGN = """[campaign]

@@ -18,9 +18,8 @@ import json, os, sys, time
 from pathlib import Path
 import broken_builds
 from mc_engine import load_campaign
-from mc_engine.runner import pools as crews
+from mc_engine.runner import pools
 from mc_engine.runner import runner
-from mc_engine.campaign.cases import nominal_row
 from mc_engine.flight.chunks import NOMINAL_NOISE, fly_nominal
 from mc_engine.flight.flight import fly_history
 
@@ -29,14 +28,14 @@ if len(sys.argv) > 4:
     broken_builds.BREAKS[sys.argv[4]](setattr)
 campaign = load_campaign(folder / "campaign.toml")
 fly_nominal(campaign)
-fly_history(campaign.model, nominal_row(campaign), NOMINAL_NOISE, campaign.seed, folder=campaign.directory)
-carry_out = crews.carry_out
+fly_history(campaign.model, campaign.nominal, NOMINAL_NOISE, campaign.seed, folder=campaign.directory)
+run_task = pools.run_task
 
-def noted(campaign, columns, run, order, guard=None):
-    os.write(log, b"%d\\n" % order.first)
-    return carry_out(campaign, columns, run, order, guard)
+def noted(campaign, columns, run, task, **named):
+    os.write(log, b"%d\\n" % task.first)
+    return run_task(campaign, columns, run, task, **named)
 
-crews.carry_out = noted
+pools.run_task = noted
 print(json.dumps("ready"), flush=True)
 for line in sys.stdin:
     run = Path(json.loads(line))

@@ -5,7 +5,6 @@ Every mutation is a function of a seed alone, so that a number in a failed test 
 
 import re
 import shutil
-from dataclasses import dataclass
 
 from mc_engine.campaign.loading import SHIPPED
 
@@ -104,19 +103,6 @@ log_sigma = 0.01
 """,
 }
 
-_FREE = ("title", "note", "source", "epoch_utc", "table", "file", "column")
-_TOKEN = re.compile(r"[A-Za-z_]\w*")
-_VALUE = re.compile(r'"([^"]*)"')
-
-
-@dataclass(frozen=True)
-class Slip:
-    """A campaign file with one letter wrong: what the word was, and what it is now."""
-
-    text: str
-    meant: str
-    written: str
-
 
 def lay_out(folder):
     """Copies of all bases in `folder`, with the files that they read; base -> (path, text)."""
@@ -128,83 +114,6 @@ def lay_out(folder):
     texts = {base: (SHIPPED / f"{base}.toml").read_text(encoding="utf-8") for base in BASES} | OWN
     return {base: (folder / base.split("/")[0] / "mutated.toml", text) for base, text in texts.items()}
 
-
-# ---- one letter
-
-
-def sites(text):
-    """(first, stop) of every word of the file that the engine must know: keys, sections, names, units, choices."""
-    found, begin, header = [], 0, []
-    for line in text.splitlines(keepends=True):
-        code = _without_comment(line)
-        if code.lstrip().startswith("["):
-            header = [match.group() for match in _TOKEN.finditer(code)]
-            found += [(begin + m.start(), begin + m.end()) for m in _known_in_header(code)]
-        else:
-            found += [(begin + first, begin + stop) for first, stop in _known_in_line(code, header)]
-        begin += len(line)
-    return found
-
-
-def _without_comment(line):
-    quoted = False
-    for i, letter in enumerate(line):
-        quoted ^= letter == '"'
-        if letter == "#" and not quoted:
-            return line[:i]
-    return line
-
-
-def _known_in_header(code):
-    words = list(_TOKEN.finditer(code))
-    free = {"requirement": 1, "tuning": 2}.get(words[0].group(), len(words))
-    if words[0].group() == "tuning" and len(words) > 1 and words[1].group() == "parameter":
-        free = len(words)
-    return words[:free]
-
-
-def _known_in_line(code, header):
-    keys = [match.span() for match in re.finditer(r"[A-Za-z_]\w*(?=\s*=)", _blanked(code))]
-    values = []
-    if header[:2] != ["tuning", "published"]:
-        for match in _VALUE.finditer(code):
-            before = re.findall(r"([A-Za-z_]\w*)\s*=\s*[\[{]?[^={}]*$", _blanked(code[: match.start()]))
-            if before and before[-1] not in _FREE and match.group(1):
-                values.append(match.span(1))
-    return keys + values
-
-
-def _blanked(code):
-    return _VALUE.sub(lambda match: '"' + " " * len(match.group(1)) + '"', code)
-
-
-def slip(text, rng):
-    """The text with one letter of one known word deleted, doubled, changed, added, or swapped with the next."""
-    places = sites(text)
-    first, stop = places[rng.integers(len(places))]
-    meant = text[first:stop]
-    written = meant
-    while written == meant or not written:
-        written = _one_letter_off(meant, rng)
-    return Slip(text[:first] + written + text[stop:], meant, written)
-
-
-def _one_letter_off(word, rng):
-    place = int(rng.integers(len(word)))
-    letter = "abcdefghijklmnopqrstuvwxyz_"[rng.integers(27)]
-    kind = rng.integers(5)
-    if kind == 0:
-        return word[:place] + word[place + 1 :]
-    if kind == 1:
-        return word[:place] + word[place] + word[place:]
-    if kind == 2:
-        return word[:place] + letter + word[place + 1 :]
-    if kind == 3:
-        return word[:place] + letter + word[place:]
-    return word[:place] + word[place : place + 2][::-1] + word[place + 2 :]
-
-
-# ---- everything else
 
 _EXTREMES = (
     "1e400", "-1e400", "nan", "inf", "-inf", "9" * 6000, "-" + "9" * 400, "1e-320", "-0.0", "0", "-1", "1e51", "1e308",

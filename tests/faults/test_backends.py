@@ -8,13 +8,11 @@ from trapped import campaign_folder, files_of, trapped
 
 from mc_engine import load_campaign
 from mc_engine.errors import CampaignError, EngineError, RunInterrupted, StoreError
-from mc_engine.flight.chunks import Order
-from mc_engine.runner import cluster_pool as cluster_crew
-from mc_engine.runner import runner
+from mc_engine.flight.chunks import Task
+from mc_engine.runner import cluster_pool, runner
 from mc_engine.runner.backends import Backend
-from mc_engine.runner.pools import ThreadCrew
 from mc_engine.runner.shards import Shard
-from mc_engine.runner.worker_process import Site, perform
+from mc_engine.runner.worker_process import WorkerSetup, run_in_worker
 from mc_engine.store.verification import damage
 
 CASES, CHUNK = 1500, 100
@@ -35,13 +33,6 @@ def test_processes_write_the_bytes_of_threads(campaign, whole, tmp_path, record_
     store = runner.run(campaign, tmp_path / "run", workers=2, chunk=CHUNK, backend="loky")
     assert files_of(store.path) == files_of(whole.path)
     record_property("files equal byte by byte", len(files_of(whole.path)))
-
-
-def test_a_model_in_a_file_flies_in_processes(tmp_path):
-    campaign = load_campaign("minimal", cases=300)
-    store = runner.run(campaign, tmp_path / "run", workers=2, backend="loky")
-    plain = runner.run(campaign, tmp_path / "plain", workers=2)
-    assert files_of(store.path) == files_of(plain.path)
 
 
 def test_a_cluster_that_loses_a_worker_and_gains_one_writes_the_bytes_of_threads(
@@ -111,17 +102,6 @@ def test_missing_shards_are_named_with_the_commands_that_fly_them(campaign, tmp_
     assert not (tmp_path / "merged").exists()
 
 
-def test_the_absent_of_a_hundred_million_shards_are_named_at_once(tmp_path):
-    campaign = load_campaign("minimal", cases=500)
-    runner.run(campaign, tmp_path / "one", workers=1, shard=Shard(1, 10**8))
-    with pytest.raises(StoreError) as caught:
-        runner.merge(tmp_path / "merged", [tmp_path / "one"])
-    text = str(caught.value)
-    assert "cases 0 to 499 are missing" in text
-    assert "--shard 200000/100000000 --out DIR`" in text  # the first that has a case
-    assert text.endswith("and more")
-
-
 def test_shards_that_differ_or_are_of_another_campaign_are_not_merged(campaign, tmp_path):
     for number in (1, 2):
         runner.run(campaign, tmp_path / f"{number}", shard=Shard(number, 2))
@@ -165,19 +145,6 @@ def test_a_shard_is_no_run_to_extend_or_to_take_inputs_from(campaign, tmp_path):
         load_campaign("chain", text=text, directory=tmp_path)
 
 
-@pytest.mark.parametrize("text", ["0/3", "4/3", "3", "-1/3", "1/2/3", "x/y", "", "１/３"])
-def test_what_is_no_shard_is_told(text):
-    with pytest.raises(ValueError, match="the third of twenty is 3/20"):
-        Shard.parse(text)
-
-
-def test_shards_share_all_cases_evenly():
-    for cases, of in ((1500, 20), (7, 3), (2, 5)):
-        shares = [Shard(number, of).cases(cases) for number in range(1, of + 1)]
-        assert [case for share in shares for case in share] == list(range(cases))
-        assert max(map(len, shares)) - min(map(len, shares)) <= 1
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -193,20 +160,6 @@ def test_backends_that_cannot_be_are_told(arguments, words):
         Backend(*arguments)
 
 
-def test_a_damaged_part_is_flown_again_and_only_that(campaign, whole, tmp_path):
-    shutil.copytree(whole.path, tmp_path / "run")
-    victim, lost = (tmp_path / "run" / part.file for part in whole.parts[3:5])
-    victim.write_bytes(victim.read_bytes()[:-1] + b"?")
-    lost.unlink()
-    times = {path: path.stat().st_mtime_ns for path in (tmp_path / "run" / "cases").iterdir()}
-    store = runner.resume(tmp_path / "run", repair=True)
-    assert damage(store.path) == []
-    assert files_of(store.path) == files_of(whole.path)
-    assert store.cases().equals(whole.cases())
-    changed = {path.name for path, time in times.items() if path.stat().st_mtime_ns != time}
-    assert changed == {victim.name}
-
-
 def test_a_grid_without_a_seed_can_be_resumed_and_replayed(tmp_path):
     folder = campaign_folder(tmp_path / "stones", 50)
     text = (folder / "campaign.toml").read_text().replace("seed = 1\n", "")
@@ -216,7 +169,7 @@ def test_a_grid_without_a_seed_can_be_resumed_and_replayed(tmp_path):
 
 @pytest.mark.parametrize("address", ["no such:x", "tcp://127.0.0.1:1"])
 def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign, tmp_path, monkeypatch, address):
-    monkeypatch.setattr(cluster_crew, "START_S", 0.5)
+    monkeypatch.setattr(cluster_pool, "START_S", 0.5)
     with pytest.raises(RunInterrupted, match=r"there is no scheduler: .*`mc-engine resume .*--backend dask"):
         runner.run(campaign, tmp_path / "run", chunk=CHUNK, backend=Backend("dask", address))
     assert runner.resume(tmp_path / "run").status_counts() == {"ok": CASES}
@@ -224,17 +177,9 @@ def test_a_scheduler_that_is_not_there_leaves_a_run_that_can_be_resumed(campaign
 
 def test_a_worker_of_other_sources_is_refused(campaign, whole):
     """A machine with another engine would write other numbers: it says so, and writes none."""
-    site = Site(str(whole.path), str(campaign.directory), CASES)
+    setup = WorkerSetup(str(whole.path), str(campaign.directory), CASES)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("mc_engine.runner.flown_campaign.sampling_digest", lambda: "another")
         with pytest.raises(StoreError, match="was flown by other sources"):
-            perform(site, Order(0, 10))
-    assert perform(site, Order(0, 10)).part.rows == 10
-
-
-def test_threads_by_the_hundred_thousand_are_as_many_as_a_system_has_room_for(tmp_path):
-    crew = ThreadCrew(lambda order: None, 100_000)
-    try:
-        assert 2 < crew.room() < 10_000
-    finally:
-        crew.close(at_once=True)
+            run_in_worker(setup, Task(0, 10))
+    assert run_in_worker(setup, Task(0, 10)).part.rows == 10

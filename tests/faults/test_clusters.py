@@ -1,6 +1,5 @@
 """Clusters whose workers leave, die beside each other, or never come: the run goes on, or ends and can be resumed."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -12,13 +11,9 @@ from distributed import LocalCluster
 from trapped import ENVIRONMENT, campaign_folder, files_of, trapped
 
 from mc_engine.errors import RunInterrupted
-from mc_engine.flight.chunks import Order
 from mc_engine.runner import runner
 from mc_engine.runner.backends import Backend
-from mc_engine.runner.dispatch import DRAIN_S, Dispatch
-from mc_engine.runner.workers import Crew, Landing
-from mc_engine.store.parts import Part, Written
-from mc_engine.store.verification import damage
+from mc_engine.runner.dispatch import DRAIN_S
 
 CASES, CHUNK = 400, 50
 PATIENCE_S = 2.0
@@ -96,48 +91,12 @@ def ended(process, within_s):
 def test_one_signal_ends_a_run_that_has_no_worker(tmp_path):
     with LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as cluster:
         process = waiting(tmp_path, cluster.scheduler_address)
-        time.sleep(3.0)  # its order lies with the scheduler
+        time.sleep(3.0)  # its task lies with the scheduler
         process.send_signal(signal.SIGTERM)
         errors = ended(process, DRAIN_S + 20.0)
     again = f"`mc-engine resume {tmp_path / 'run'} --backend dask --scheduler {cluster.scheduler_address}`"
     assert f"interrupted with 0 of 400 cases; {again} flies the rest" in errors
     assert runner.resume(tmp_path / "run").status_counts() == {"ok": CASES}
-
-
-SCHEDULER = """
-import sys
-from distributed import LocalCluster
-
-if __name__ == "__main__":
-    with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as cluster:
-        print(cluster.scheduler_address, flush=True)
-        sys.stdin.read()
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not hasattr(signal, "SIGSTOP"), reason="processes cannot be halted here")
-def test_a_scheduler_that_answers_no_more_ends_the_run_and_its_drain(tmp_path):
-    (tmp_path / "scheduler.py").write_text(SCHEDULER)
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    environment = {**ENVIRONMENT, "STONES_SLEEP_S": "2.0"}
-    scheduler = subprocess.Popen([sys.executable, str(tmp_path / "scheduler.py")], env=environment, **pipes)
-    address = scheduler.stdout.readline().strip()
-    try:
-        for name, send in (("patience", False), ("signal", True)):
-            (tmp_path / name).mkdir()
-            process = waiting(tmp_path / name, address, "--patience", 3)
-            time.sleep(5.0)
-            os.kill(scheduler.pid, signal.SIGSTOP)
-            if send:
-                process.send_signal(signal.SIGTERM)
-            errors = ended(process, 60.0)
-            assert f"`mc-engine resume {tmp_path / name / 'run'} --backend dask" in errors
-            assert damage(tmp_path / name / "run") == []
-            os.kill(scheduler.pid, signal.SIGCONT)
-    finally:
-        scheduler.send_signal(signal.SIGCONT)
-        scheduler.communicate("", timeout=60.0)
 
 
 def test_signals_end_a_run_on_our_own_cluster_while_its_workers_die(tmp_path):
@@ -166,62 +125,3 @@ def test_killers_on_workers_with_two_threads_are_found_and_their_neighbours_are_
     frame = run.cases()
     assert list(frame["case_id"][frame["status"] == "worker-died"]) == killers
     assert run.status_counts() == {"ok": 197, "worker-died": 3}
-
-
-class OneProcess(Crew):
-    """A pretended crew of two threads in one process, which dies of any killer, with all that is under way.
-
-    unbegun : of orders that are under way, the second only waits, and so leaves no note.
-    """
-
-    def __init__(self, folder, killers, unbegun):
-        super().__init__()
-        self.shared = not unbegun
-        self._folder, self._killers, self._unbegun = folder, killers, unbegun
-        self.under_way = []
-
-    def room(self):
-        return 2
-
-    def begin(self, order):
-        self.under_way.append(order)
-
-    def next(self, patience_s):
-        if self._landed.empty():
-            self._fly()
-        return super().next(0.0)
-
-    def _fly(self):
-        """All that is under way dies together, or the first of it lands."""
-        flying = self.under_way[:1] if self._unbegun else self.under_way
-        dies = any(self._killers & set(order.flown().tolist()) for order in flying)
-        for order in flying if dies else ():
-            if order.suspected:
-                first, last = self._in_flight(order)
-                (self._folder / "cases" / f".in_flight-{first}-{last}.tmp").touch()
-        fallen = self.under_way if dies else self.under_way[:1]
-        for order in fallen:
-            written = Written(Part("", order.first, order.stop - order.first, 0, "", {}), "")
-            self._landed.put(Landing(order, died=True) if dies else Landing(order, written))
-        self.under_way = [order for order in self.under_way if order not in fallen]
-
-    def _in_flight(self, order):
-        """First and last case of what is flown at a time when a killer is among it, or at first."""
-        cases = order.flown().tolist()
-        pieces = [[case] for case in cases[: len(order.alone)]] + [cases[len(order.alone) :]]
-        piece = next((piece for piece in pieces if self._killers & set(piece)), pieces[0])
-        return min(piece), max(piece)
-
-    def close(self, at_once):
-        pass
-
-
-@pytest.mark.parametrize("unbegun", [False, True])
-def test_cases_beside_a_killer_in_the_same_process_are_not_blamed(tmp_path, unbegun):
-    (tmp_path / "cases").mkdir()
-    killers = {3, 4, 40, 70}
-    dispatch = Dispatch(OneProcess(tmp_path, killers, unbegun), tmp_path)
-    orders = [Order(first, first + 20) for first in range(0, 100, 20)]
-    landed = [order for order, _ in dispatch.receipts(orders, lambda: False)]
-    assert sorted(order.first for order in landed) == [0, 20, 40, 60, 80]
-    assert sorted(lost.case_id for order in landed for lost in order.lost) == sorted(killers)

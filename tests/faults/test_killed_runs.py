@@ -66,16 +66,11 @@ def _chunks_lost(run, table):
     return len(set(begun(run)) - kept)
 
 
-def test_a_killed_run_loses_a_chunk_per_worker_at_most_and_is_resumed_to_the_same_bytes(tmp_path, record_property):
-    lost = check_kills(tmp_path, kills=6, seed=1)
-    record_property("killed runs completed to the same bytes", len(lost))
-    record_property("chunks lost", lost)
-    assert max(lost) <= WORKERS
-
-
-@pytest.mark.slow
-def test_two_hundred_kills_leave_two_hundred_whole_runs(tmp_path, record_property):
-    lost = check_kills(tmp_path, kills=200, seed=2)
+@pytest.mark.parametrize("kills", [6, pytest.param(200, marks=pytest.mark.slow)])
+def test_a_killed_run_loses_a_chunk_per_worker_at_most_and_is_resumed_to_the_same_bytes(
+    tmp_path, kills, record_property
+):
+    lost = check_kills(tmp_path, kills, seed=1)
     record_property("killed runs completed to the same bytes", len(lost))
     record_property("chunks lost", lost)
     assert max(lost) <= WORKERS

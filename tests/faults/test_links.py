@@ -134,7 +134,14 @@ WRITES = re.compile(
 )
 ELSEWHERE = {
     "mc_engine/durable_file.py": "the one place",
+    "mc_engine/cache_folder.py": "the folder of compiled kernels and kept designs",
+    "mc_engine/flight/case_process.py": "what the process of a simulator's case printed",
+    "mc_engine/flight/case_rows.py": "what failed cases of a simulator printed",
+    "mc_engine/flight/case_worker.py": "the folder of a simulator's case",
     "mc_engine/flight/kernel.py": "the cache of compiled kernels",
+    "mc_engine/flight/program_flight.py": "input files of a program, in the folder of its case",
+    "mc_engine/lanes/kernel_cache.py": "locks of kernels under compilation",
+    "mc_engine/model/program.py": "looks for the program",
     "mc_engine/store/object_store.py": "scratch folders beside a fetched copy",
     "mc_engine/text.py": "the null device",
     "mc_engine/command_line/before_flight.py": "init makes a folder that the user named",

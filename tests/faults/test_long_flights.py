@@ -11,14 +11,15 @@ from trapped import ENVIRONMENT
 
 from mc_engine.campaign.loading import SHIPPED, load_campaign
 from mc_engine.flight.chunks import fly_nominal
-from mc_engine.interruption import LANDING
+from mc_engine.interruption import COMPLETING
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
 
 # 1e9 steps, unless the error of the burn's direction is none: then a stop after a millisecond, or at once
 EDITS = (
     ("FixedStep(step=10.0, until=10_000.0)", "FixedStep(step=1e-5, until=10_000.0)"),
-    ("Events(s.x * s.vx + s.y * s.vy)", "Events(where(p.pitch_error == 0.0, p.burn_dv - t / 1e-3, 1.0))"),
+    ("def climb(s)", "def climb(t, p)"),
+    ("return s.x * s.vx + s.y * s.vy", "return where(p.pitch_error == 0.0, p.burn_dv - t / 1e-3, 1.0)"),
     ("import cos, physics, sin, sqrt", "import cos, physics, sin, sqrt, where"),
 )
 NEVER, SOON = 1e7, 1.0  # burns [m/s] whose nominal case flies for minutes, or for a millisecond
@@ -72,7 +73,7 @@ def test_a_first_signal_is_answered_while_a_kernel_flies_and_a_second_one_ends_i
         rest = process.communicate(timeout=15.0)[1]
     finally:
         process.kill()
-    assert said == f"{LANDING}\n"
+    assert said == f"{COMPLETING}\n"
     assert process.returncode == 4
     assert rest.splitlines()[-1].endswith(f"`mc-engine resume {run}` flies the rest")
 
@@ -87,5 +88,5 @@ def test_check_answers_with_the_clock_where_a_case_takes_minutes(model, burn, wh
     done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
     (sentence,) = json.loads(done.stdout)
-    assert sentence.startswith(f"{who} not landed after ")
+    assert sentence.startswith(f"{who} not completed after ")
     assert "its clock allows 1,000,000,000 steps of 1e-05 s; take longer steps" in sentence

@@ -91,11 +91,15 @@ def check(samples, settled, record_property):
     assert growth <= 1.0 * MIB
 
 
-def test_the_main_process_grows_by_less_than_a_mib_over_a_hundred_thousand_cases(tmp_path, record_property):
-    check(resident(tmp_path, 150_000, "loky"), 50_000, record_property)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("backend", ["loky", "threading"])
-def test_a_million_cases_of_forty_metrics_fit_into_a_gib(tmp_path, backend, record_property):
-    check(resident(tmp_path, 1_000_000, backend), 200_000, record_property)
+@pytest.mark.parametrize(
+    ("backend", "cases", "settled"),
+    [
+        ("loky", 150_000, 50_000),
+        pytest.param("loky", 1_000_000, 200_000, marks=pytest.mark.slow),
+        pytest.param("threading", 1_000_000, 200_000, marks=pytest.mark.slow),
+    ],
+)
+def test_the_main_process_grows_by_less_than_a_mib_over_a_hundred_thousand_cases(
+    tmp_path, backend, cases, settled, record_property
+):
+    check(resident(tmp_path, cases, backend), settled, record_property)

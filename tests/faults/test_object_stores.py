@@ -14,7 +14,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mc_engine"))
 from small_run import block, created, filled
 from stones import stones
 
-from mc_engine import run as fly
 from mc_engine.command_line.commands import app
 from mc_engine.errors import StoreError
 from mc_engine.store.derived_files import derived_files
@@ -74,22 +73,6 @@ def test_a_run_comes_back_from_s3_byte_by_byte(s3, run, tmp_path):
     assert damage(back) == []
 
 
-def test_what_lies_on_s3_already_does_not_travel_again(s3, run):
-    assert len(publish(run, f"{s3}/again").sent) == 9
-    assert publish(run, f"{s3}/again").sent == ()
-    derived_files(run).write({"report.html": b"<p>anew</p>"})
-    open_store(run).note("finished")
-    assert publish(run, f"{s3}/again").sent == ("journal.jsonl", "report.html", "derived.jsonl")
-
-
-def test_the_verbs_take_a_run_to_s3_and_report_on_it_there(s3, run, tmp_path):
-    for verb in (["publish", run, f"{s3}/verbs"], ["fetch", f"{s3}/verbs", tmp_path / "back"]):
-        answer = CliRunner().invoke(app, [str(word) for word in verb])
-        assert answer.exit_code == 0, answer.output
-    assert digests(tmp_path / "back") == digests(run)
-    assert len(open_store(f"{s3}/verbs").cases()) == 40
-
-
 def test_a_run_that_flies_keeps_its_copy_on_s3_and_a_report_on_it_is_written_there(s3, tmp_path):
     stones(tmp_path, 60)
     answer = run_verb("run", tmp_path / "campaign.toml", "--out", tmp_path / "run", "--publish", f"{s3}/flown")
@@ -126,13 +109,6 @@ def test_what_is_committed_is_sent_while_the_run_flies_and_when_it_breaks_off(me
     assert copied(memory) == 30
 
 
-def test_a_run_is_not_flown_into_a_url(memory, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(StoreError, match=r"^memory://runs: is a URL; fly into a folder"):
-        fly(stones(tmp_path / "campaign", 4), memory)
-    assert [path.name for path in tmp_path.iterdir()] == ["campaign"]
-
-
 def copied(url):
     """How many cases the copy at `url` has; none before its journal is there."""
     try:
@@ -141,31 +117,11 @@ def copied(url):
         return 0
 
 
-def test_a_copy_that_fails_is_told_and_the_flight_goes_on(memory, run, capsys, monkeypatch):
-    def cut(*_):
-        raise ConnectionError("the line is cut")
-
-    monkeypatch.setattr(_Remote, "write", cut)
-    with Publisher(run, memory, every_s=0.01):
-        time.sleep(0.1)
-    assert capsys.readouterr().err == f"not published: {memory}: ConnectionError: the line is cut\n"
-
-
 def test_a_bucket_that_is_not_there_is_a_sentence_and_damage(s3, run):
     answer = CliRunner().invoke(app, ["publish", str(run), "s3://no-such-bucket/x"])
     assert answer.exit_code == 5
     assert answer.output.startswith("s3://no-such-bucket/x: ")
     assert answer.output.count("\n") == 1
-
-
-def test_a_server_that_cannot_be_reached_is_a_sentence(run, monkeypatch):
-    pytest.importorskip("s3fs").S3FileSystem.clear_instance_cache()
-    monkeypatch.setenv("AWS_ENDPOINT_URL", "http://127.0.0.1:9")
-    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "key")
-    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "secret")
-    monkeypatch.setenv("AWS_MAX_ATTEMPTS", "1")
-    with pytest.raises(StoreError, match=r"^s3://runs/x: "):
-        publish(run, "s3://runs/x")
 
 
 def test_an_upload_that_breaks_off_anywhere_is_completed_and_never_loads_wrong(memory, run, tmp_path, monkeypatch):
@@ -195,25 +151,6 @@ def test_an_upload_that_breaks_off_anywhere_is_completed_and_never_loads_wrong(m
                 fetch(url, tmp_path / "none")
         assert len(publish(run, url).sent) == len(whole) - stop
         assert digests(fetch(url, tmp_path / f"back-{stop}")) == whole
-
-
-def test_a_copy_of_a_run_that_still_flies_holds_what_was_committed(memory, tmp_path):
-    store = created(tmp_path / "run")
-    for first in range(0, 40, 10):
-        store.append(first, 10, block(first, 10))
-        with open(store.path / "journal.jsonl", "ab") as journal:
-            journal.write(b'{"n": 99, torn')
-        publish(store.path, memory)
-        assert len(open_store(memory).cases()) == first + 10
-
-
-def test_a_part_that_no_longer_counts_is_removed_up_there(memory, run):
-    publish(run, memory)
-    store = open_store(run)
-    store.withdraw(store.parts[0])
-    publish(run, memory)
-    assert len(fsspec.filesystem("memory").find("runs/cases")) == 3
-    assert len(open_store(memory).cases()) == 30
 
 
 def test_another_run_or_other_files_or_a_later_state_are_not_overwritten(memory, run, tmp_path):
@@ -295,11 +232,3 @@ def test_a_url_where_something_is_written_is_refused_with_what_to_do_instead(tmp
     assert instead.replace("URL", url) in answer.output
     assert answer.output.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("url", ["here", "/tmp/x", "nosuch://x/y"])
-def test_what_is_no_url_or_of_no_known_store_is_refused(run, url):
-    answer = CliRunner().invoke(app, ["publish", str(run), url])
-    assert answer.exit_code in (2, 5)
-    assert url in answer.output
-    assert "Traceback" not in answer.output

@@ -57,7 +57,7 @@ def test_success_is_said_only_of_what_is_listed_and_read_back(run, away, lie, mo
             monkeypatch.setattr(_Remote, "listed", lambda remote: dict.fromkeys(sent, 1) | sizes(remote))
     done = call("publish", run, f"file://{away}")
     assert done.exit_code == 5
-    assert "does not lie there; publish again" in done.stderr
+    assert "is not there; publish again" in done.stderr
     assert "published" not in done.stdout
 
 
@@ -97,7 +97,7 @@ def test_a_copy_that_is_kept_up_to_date_reads_back_what_it_sends_and_no_more(run
 KILLED = """
 import sys, time
 from mc_engine.store import object_store
-object_store._place = lambda *_: (print("copying", flush=True), time.sleep(60))
+object_store._write_fetched = lambda *_: (print("copying", flush=True), time.sleep(60))
 object_store.fetch(sys.argv[1], object_store.Path(sys.argv[2]))
 """
 
@@ -160,8 +160,8 @@ def test_a_fetch_leaves_another_that_is_at_work_alone(run, away, tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="there are no such signals")
 def test_a_fetch_that_is_stopped_leaves_nothing_behind(run, away, tmp_path):
     publish(run, f"file://{away}")
-    script = KILLED.replace("object_store.fetch(", "from mc_engine.interruption import listen, under_way\nlisten()\n"
-                            "with under_way(): object_store.fetch(")  # fmt: skip
+    handled = "from mc_engine.interruption import install_handlers, under_way\ninstall_handlers()\n"
+    script = KILLED.replace("object_store.fetch(", f"{handled}with under_way(): object_store.fetch(")
     command = [sys.executable, "-c", script, f"file://{away}", str(tmp_path / "back")]
     process = begun(command)
     time.sleep(0.1)

@@ -34,14 +34,11 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the racers are 
 SERVER = """
 import json, mmap, os, sys, time
 from pathlib import Path
-import broken_builds
 from mc_engine import load_campaign
 from mc_engine.runner import runner
 from mc_engine.flight.chunks import fly_nominal
 from mc_engine.errors import EngineError
 
-if len(sys.argv) > 3:
-    broken_builds.BREAKS[sys.argv[3]](setattr)
 campaign, chunk = load_campaign(Path(sys.argv[1]) / "campaign.toml"), int(sys.argv[2])
 fly_nominal(campaign)
 print(json.dumps("ready"), flush=True)
@@ -84,9 +81,9 @@ for line in sys.stdin:
 
 
 class Races:
-    def __init__(self, folder, broken=(), locks=True):
+    def __init__(self, folder, locks=True):
         """locks : False for a file system that has none, as the racers and all that they start see it."""
-        command = [sys.executable, "-c", SERVER, str(folder), str(CHUNK), *broken]
+        command = [sys.executable, "-c", SERVER, str(folder), str(CHUNK)]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
         (folder / "sitecustomize.py").write_text("" if locks else WITHOUT_LOCKS)
         path = os.pathsep.join([str(folder), FORKING["PYTHONPATH"]])
@@ -111,11 +108,11 @@ class Races:
         self._server.wait(timeout=30.0)
 
 
-def check_races(folder, count, seed, broken=()):
+def check_races(folder, count, seed):
     """So many races; how long the refused ones waited [s]."""
     campaign = stones(folder / "campaign", CASES)
     whole = results(runner.run(campaign, folder / "whole", workers=2, chunk=CHUNK).path)
-    races, rng, waited = Races(folder / "campaign", broken), np.random.default_rng(seed), []
+    races, rng, waited = Races(folder / "campaign"), np.random.default_rng(seed), []
     try:
         for number in range(count):
             run = folder / f"run-{number}"
@@ -131,16 +128,9 @@ def check_races(folder, count, seed, broken=()):
     return waited
 
 
-def test_of_two_runs_in_one_directory_one_is_refused_and_the_other_is_whole(tmp_path, record_property):
-    waited = check_races(tmp_path, 5, seed=1)
-    record_property("races", len(waited))
-    record_property("seconds till the second was refused", waited)
-    assert max(waited) < 1.0
-
-
-@pytest.mark.slow
-def test_a_hundred_races_corrupt_nothing(tmp_path, record_property):
-    waited = check_races(tmp_path, 100, seed=2)
+@pytest.mark.parametrize("count", [5, pytest.param(100, marks=pytest.mark.slow)])
+def test_of_two_runs_in_one_directory_one_is_refused_and_the_other_is_whole(tmp_path, count, record_property):
+    waited = check_races(tmp_path, count, seed=1)
     record_property("races", len(waited))
     record_property("seconds till the second was refused", waited)
     assert max(waited) < 1.0
@@ -228,26 +218,19 @@ def delete_lock(run):
     (run / ".lock").unlink(missing_ok=True)
 
 
-def test_of_three_at_once_one_writes_without_locks_of_the_system(long_run, tmp_path, record_property):
-    told = check_three_at_once(long_run, tmp_path, 2, locks=False)
+SOME = [2, pytest.param(20, marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("count", SOME)
+def test_of_three_at_once_one_writes_without_locks_of_the_system(long_run, tmp_path, count, record_property):
+    told = check_three_at_once(long_run, tmp_path, count, locks=False)
     record_property("racers refused", len(told))
     words = ("is writing here", "is about to begin here", "holds a run already")
-    assert all(any(one in said for one in words) for said in told), told
+    assert all(any(word in said for word in words) for said in told), told
 
 
-@pytest.mark.slow
-def test_of_three_at_once_one_writes_without_locks_of_the_system_twenty_times(long_run, tmp_path, record_property):
-    record_property("racers refused", len(check_three_at_once(long_run, tmp_path, 20, locks=False)))
-
-
-def test_a_lock_deleted_in_flight_lets_nobody_in(long_run, tmp_path, record_property):
-    told = check_three_at_once(long_run, tmp_path, 2, locks=True, meanwhile=delete_lock)
+@pytest.mark.parametrize("count", SOME)
+def test_a_lock_deleted_in_flight_lets_nobody_in(long_run, tmp_path, count, record_property):
+    told = check_three_at_once(long_run, tmp_path, count, locks=True, meanwhile=delete_lock)
     record_property("racers refused", len(told))
     assert all("is writing here" in said for said in told), told
-
-
-@pytest.mark.slow
-def test_a_lock_deleted_in_flight_lets_nobody_in_twenty_times(long_run, tmp_path, record_property):
-    record_property(
-        "racers refused", len(check_three_at_once(long_run, tmp_path, 20, locks=True, meanwhile=delete_lock))
-    )

@@ -15,7 +15,7 @@ def checked(folder, *words):
     [
         ("hash('gravity') % 1000 / 1000.0", f"`FACTOR` in model.py {SAME}"),
         pytest.param("__import__('time').time()", f"`FACTOR` in model.py {SAME}", marks=pytest.mark.slow),
-        ("float(__import__('os').environ.get('FACTOR', 1.0))", 'model.py, line 6 reads the environment variable "FACT'),
+        ("float(__import__('os').environ.get('FACTOR', 1.0))", 'model.py, line 4 reads the environment variable "FACT'),
     ],
 )
 def test_a_constant_that_another_process_has_otherwise_is_named(factor, sentence, tmp_path):

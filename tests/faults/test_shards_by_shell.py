@@ -70,14 +70,3 @@ def test_shards_of_the_shell_in_random_order_merge_to_the_bytes_of_one_run(
     for what, number in (("shards", of), ("killed", killed), ("flown twice", repeated)):
         record_property(what, number)
     record_property("files equal byte by byte", len(files_of(whole.path)))
-
-
-def test_a_shard_alone_is_neither_judged_nor_reported(tmp_path):
-    campaign = campaign_folder(tmp_path / "stones", 100)
-    for option, words in (("--judge", "a shard alone decides nothing"), ("--until=verdict", "decides nothing")):
-        process = engine("run", campaign, "--shard", "1/2", "--out", tmp_path / "x", option, env=ENVIRONMENT)
-        assert words in process.communicate()[1]
-        assert process.returncode == 2
-    process = engine("run", campaign, "--shard", "3/2", "--out", tmp_path / "x", env=ENVIRONMENT)
-    assert "the third of twenty is 3/20" in process.communicate()[1]
-    assert process.returncode == 2

@@ -113,8 +113,8 @@ def test_the_second_signal_ends_at_once(tmp_path, backend, record_property):
 # The command line, which says when it has begun to hear; before that Python itself begins, which does not.
 LISTENING = """
 import sys
-from mc_engine.interruption import listen
-listen()
+from mc_engine.interruption import install_handlers
+install_handlers()
 print("listening", flush=True)
 from mc_engine.__main__ import main
 sys.argv[0] = "mc-engine"

@@ -56,14 +56,14 @@ def completed(process, longest_s=LONGEST_S):
 
 def workers_of(process, backend):
     """The worker processes of a command."""
-    found = []
+    workers = []
     for child in psutil.Process(process.pid).children():
         try:
             if WORKERS[backend] in " ".join(child.cmdline()):
-                found.append(child)
+                workers.append(child)
         except psutil.NoSuchProcess:
             pass
-    return found
+    return workers
 
 
 def kill_at_random(process, run, backend, seed, kills):
@@ -97,16 +97,18 @@ def check_kills(folder, backend, seed, kills, cases, broken=""):
     assert damage(run) == []
 
 
-def test_workers_killed_at_random_instants_lose_nothing_and_repeat_nothing(tmp_path, record_property):
-    check_kills(tmp_path, "loky", seed=1, kills=5, cases=1500)
-    record_property("kills", 5)
-    record_property("cases lost or doubled", "0 of 1500")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("backend", "kills", "cases"), [("loky", 100, 30_000), ("dask", 30, 9_000)])
-def test_many_kills_of_workers_lose_nothing(tmp_path, backend, kills, cases, record_property):
-    check_kills(tmp_path, backend, seed=2, kills=kills, cases=cases)
+@pytest.mark.parametrize(
+    ("backend", "kills", "cases"),
+    [
+        ("loky", 5, 1500),
+        pytest.param("loky", 100, 30_000, marks=pytest.mark.slow),
+        pytest.param("dask", 30, 9_000, marks=pytest.mark.slow),
+    ],
+)
+def test_workers_killed_at_random_instants_lose_nothing_and_repeat_nothing(
+    tmp_path, backend, kills, cases, record_property
+):
+    check_kills(tmp_path, backend, seed=1, kills=kills, cases=cases)
     record_property("kills", kills)
     record_property("cases lost or doubled", f"0 of {cases}")
 

@@ -1,7 +1,6 @@
 """What `bench` times is the flight of `run`, and it says how fast in words that compare."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,11 +8,9 @@ from typer.testing import CliRunner
 
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.columns import END_TIME
-from mc_engine.campaign.loading import SHIPPED, load_campaign
+from mc_engine.campaign.loading import load_campaign
 from mc_engine.command_line.commands import app
-from mc_engine.errors import ModelError
 from mc_engine.flight.flight import bound_flight, fly
-from mc_engine.studies.lane_speed import Timing, campaign_flight, measure
 
 
 @pytest.fixture(scope="module")
@@ -30,33 +27,6 @@ def test_the_timed_kernel_flies_the_cases_of_a_run(minimal, width):
     assert ends.size % width == 0
     wanted = fly(minimal.model, inputs, ids, minimal.seed, folder=minimal.directory)[END_TIME]
     np.testing.assert_array_equal(ends, np.resize(wanted, ends.size))
-
-
-def test_where_no_case_can_start_the_reason_is_told(minimal):
-    inputs = {**minimal.nominal, "altitude_km": 1.0}
-    with pytest.raises(ModelError, match="no case can start: altitude_km is outside 150 to 2000 km"):
-        bound_flight(minimal.model, inputs, np.arange(3), 1, width=8, folder=minimal.directory)
-
-
-def test_a_flight_has_as_many_cases_as_the_campaign_at_most(minimal):
-    assert campaign_flight(replace(minimal, cases=5), 9).n_cases == 5
-    assert campaign_flight(minimal, 9).n_cases == 9
-
-
-def test_without_common_steps_there_is_no_time_of_a_step(minimal, tmp_path):
-    assert measure(campaign_flight(minimal, 8), [1], 1).ns.keys() == {1}
-    model = (SHIPPED / "minimal" / "model.py").read_text()
-    (tmp_path / "model.py").write_text(
-        model.replace("FixedStep(step=10.0, until", "AdaptiveStep(until").replace("FixedStep", "AdaptiveStep")
-    )
-    (tmp_path / "campaign.toml").write_text((SHIPPED / "minimal" / "campaign.toml").read_text())
-    adaptive = measure(campaign_flight(load_campaign(tmp_path), 8), [1], 1)
-    assert adaptive.case_s.keys() == {1}
-    assert adaptive.ns == {}
-
-
-def test_the_ratio_is_that_of_the_times_of_a_case():
-    assert Timing(case_s={1: 8e-5, 8: 1e-5}).ratio() == pytest.approx(8.0)
 
 
 def test_bench_prints_cases_a_second_nanoseconds_a_step_and_the_ratio():

@@ -37,11 +37,6 @@ def test_all_together_take_the_most_of_each_and_the_joint_share_less():
     assert not any(line.startswith(("every", "all at once")) for line in plan(RANGE))
 
 
-def test_requirements_that_want_the_same_stand_together():
-    lines = plan(RANGE + FUEL.replace("0.95", "0.9973").replace("confidence = 0.9973", "confidence = 0.9"))
-    assert "range, fuel: share 0.9973 with confidence 0.9" in lines
-
-
 @pytest.mark.parametrize(
     ("cases", "words"),
     [
@@ -51,14 +46,3 @@ def test_requirements_that_want_the_same_stand_together():
 )
 def test_the_files_own_number_of_cases_is_held_against_the_plan(cases, words):
     assert any(line.strip().startswith(words) for line in plan(RANGE, cases=cases))
-
-
-def test_two_sided_limits_are_planned_where_asked():
-    assert any(line.split()[-1:] == ["1440"] and "smallest and the largest" in line
-               for line in plan(RANGE, two_sided=True))  # fmt: skip
-    assert not any("smallest and" in line for line in plan(RANGE))
-
-
-def test_a_grid_is_told_that_its_shares_are_no_probabilities():
-    lines = list(plan_lines(load("[dispersion.speed_pct]\nvalues = [-1.0, 0.0, 1.0]\n" + RANGE, "grid")))
-    assert 'shares of cases of design "grid" are no probabilities' in lines[1]

@@ -4,23 +4,18 @@ import os
 import re
 import shlex
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
-from small_run import ENVIRONMENT
 
 from mc_engine.campaign.loading import SHIPPED
 from mc_engine.command_line.next_step import after_flight, after_search
-from mc_engine.errors import DiskError, EngineError, StoreError
-from mc_engine.runner import sessions
-from mc_engine.shell_words import shell_word
+from mc_engine.errors import DiskError, StoreError
 from mc_engine.store import store
 from mc_engine.store.journal import damaged_line
 from mc_engine.store.opening import open_store
-from mc_engine.studies import tuning
 
 
 @pytest.fixture
@@ -104,38 +99,7 @@ def test_a_part_that_is_gone_is_named_with_the_verb_that_names_all_damage(here):
         open_store(here / "flown").cases()
 
 
-def test_a_repair_that_the_disk_broke_off_is_to_be_repeated_as_a_repair(here, monkeypatch):
-    def full(_):
-        raise DiskError("journal.jsonl: No space left on device")
-
-    assert call("run", "minimal", "--cases", "8", "--no-report", "--out", "flown").exit_code == 0
-    monkeypatch.setattr(sessions, "withdraw_damaged", full)
-    fails_with(4, call("resume", "--repair", "flown"), "`mc-engine resume --repair flown` flies the rest")
-
-
-def test_without_a_failed_case_nothing_is_flown_again(here):
-    answer = call("run", "minimal", "--cases", 20, "--out", "flown", "--no-report")
-    assert answer.exit_code == 0, answer.output
-    assert call("rerun", "--failed", "flown").stdout == "flown: no case failed; there is nothing to fly again\n"
-
-
-def test_a_run_without_a_case_that_flew_names_the_check_of_its_model(here, monkeypatch):
-    monkeypatch.setattr("mc_engine.runner.summary.failed_cases", lambda store: 20)
-    answer = call("run", "minimal", "--cases", 20, "--out", "flown", "--no-report")
-    assert answer.exit_code == 0, answer.output
-    assert "no case completed; `mc-engine check minimal` looks for the reason in the model" in answer.stderr
-    monkeypatch.undo()
-    monkeypatch.chdir(here)
-    assert "no case flew" not in call("run", "minimal", "--cases", 20, "--out", "again", "--no-report").stderr
-
-
 posix = pytest.mark.skipif(sys.platform == "win32", reason="Windows' shells quote in another way")
-PLAIN = ["runs/deorbit-20260101T000000Z", "/tmp/a.b_c", "../x", "s3://bucket/runs/x", "flexible_satellite/stage_1"]
-
-
-@pytest.mark.parametrize("name", PLAIN)
-def test_a_plain_name_is_a_word_of_the_shell_as_it_is(name):
-    assert shell_word(name) == name
 
 
 def commands_in(text):
@@ -169,39 +133,3 @@ def test_a_command_that_is_named_can_be_given_as_it_stands_whatever_the_folder_i
     for command in commands:
         assert f"./{name}" in command or (name in command and not name.startswith("-"))
     assert commands[5][-1] == "s3://b/x y"
-
-
-def test_tuning_without_its_package_is_a_sentence(here, monkeypatch):
-    from importlib.metadata import PackageNotFoundError
-
-    def missing(name):
-        raise PackageNotFoundError(name)
-
-    def refused(*words):
-        raise EngineError("tuning needs pymoo, which is not installed")
-
-    monkeypatch.setattr(tuning, "version", missing)
-    monkeypatch.setattr(tuning, "GeneticSearch", refused)
-    fails_with(2, call("tune", "flexible_satellite/stage_1", "--out", "tuned"), "tuning needs pymoo")
-    assert not (here / "tuned").exists()
-
-
-@pytest.mark.parametrize(
-    ("line", "offered"),
-    [
-        ("run cart --backend ", ["threading", "loky", "dask"]),
-        ("report x --format h", ["html"]),
-        ("export x --format ", ["csv", "oem"]),
-        ("rare cart --requirement ", ["reach", "stop"]),
-        ("rare nowhere --requirement ", []),
-        ("rare cart --method c", ["cross-entropy"]),
-        ("published d", ["deorbit"]),
-    ],
-)
-def test_the_shell_completes_the_words_of_options(here, line, offered):
-    words = f"mc-engine {line}"
-    shell = {"_MC_ENGINE_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split(" ")) - 1)}
-    done = subprocess.run(
-        [sys.executable, "-m", "mc_engine"], capture_output=True, text=True, env={**ENVIRONMENT, **shell}
-    )
-    assert done.stdout.split() == offered

@@ -68,15 +68,6 @@ def test_noise_in_flight_and_parameters_that_name_a_draw_are_one_group_of_their_
     assert {name: total for name, (_, total) in found["line"].items()} == pytest.approx(exact, abs=0.02)
 
 
-def test_inputs_that_are_correlated_have_one_contribution(tmp_path):
-    pair = '[[correlation]]\nbetween = ["x1", "x2"]\nrank = 0.5\n[sensitivity]\ncases = 4096\n'
-    runner.run(campaign(tmp_path, pair), tmp_path / "run")
-    found = indices(tmp_path / "run")["line"]
-    own = (2.0 + 2.0 * 0.5) / 12.0  # of x1 + x2: a rank correlation of uniform numbers is their correlation
-    assert list(found) == ["x1, x2", "x3", "x4", "random draws"]
-    assert found["x1, x2"] == pytest.approx((own / (own + 4.0 / 12.0 + 1.0),) * 2, abs=0.03)
-
-
 def test_the_cases_are_the_same_with_and_without_them(flown, tmp_path):
     runner.run(campaign(tmp_path), tmp_path / "run")
     assert not (tmp_path / "run" / "sensitivity").exists()
@@ -121,9 +112,3 @@ def test_what_cannot_be_computed_is_told_with_its_place(tmp_path, more, sentence
     with pytest.raises(CampaignError, match="sensitivity") as error:
         campaign(tmp_path, more)
     assert sentence in str(error.value)
-
-
-def test_a_design_that_draws_nothing_has_no_contributions(tmp_path):
-    head = HEAD.replace('"mc"', '"saltelli"').replace("100", "7")
-    with pytest.raises(CampaignError, match="draws nothing from distributions"):
-        campaign(tmp_path, "[sensitivity]\ncases = 64\n", head)

@@ -1,17 +1,14 @@
 """Dates of settings: text in campaign files and case tables, modified Julian dates inside."""
 
 import erfa
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mc_engine.campaign.case_table import _dates
-from mc_engine.campaign.inputs import accepted_range, check_value
+from mc_engine.campaign.inputs import check_value
 from mc_engine.campaign.reading import Findings
 from mc_engine.dates import date_text, modified_julian_date
 from mc_engine.model import Setting
-from mc_engine.model.files import FileFault
 
 EPOCH = Setting("epoch_utc", "", "start", "2019-01-01T12:00:00", (), 33282.0, 88068.0, date=True)
 
@@ -20,11 +17,6 @@ def test_a_date_is_the_modified_julian_date_of_the_standard_library_of_astronomy
     day, hours = erfa.dtf2d("UTC", 2019, 12, 11, 6, 30, 15.25)
     assert modified_julian_date("2019-12-11T06:30:15.25") == pytest.approx(day - 2_400_000.5 + hours, abs=1e-10)
     assert modified_julian_date("2019-01-01T12:00:00") == 58484.5
-
-
-@pytest.mark.parametrize("text", ["2019-01-01T15:00:00+03:00", "2019-01-01 12:00", "2019-01-01T12:00:00Z"])
-def test_offsets_and_short_forms_are_understood(text):
-    assert modified_julian_date(text) == 58484.5
 
 
 @given(st.floats(33282.0, 88068.0))
@@ -45,17 +37,3 @@ def test_what_is_no_date_is_said_with_an_example(value):
     found = Findings()
     assert check_value(value, EPOCH, found, "here") is None
     assert 'is not a date; write it in UTC as "2019-01-01T12:00:00"' in found.problems[0].message
-
-
-def test_dates_outside_the_models_range_are_said_with_it():
-    found = Findings()
-    assert check_value("1900-01-01", EPOCH, found, "") is None
-    assert accepted_range(EPOCH) == "1950-01-01T00:00:00 to 2099-12-31T00:00:00"
-    assert accepted_range(EPOCH) in found.problems[0].message
-
-
-def test_a_column_of_dates_is_read_row_by_row(tmp_path):
-    cells = np.array(["2019-01-01", "2020-02-29T06:00"], dtype=object)
-    assert _dates(tmp_path / "cases.csv", EPOCH, cells).tolist() == ["2019-01-01T00:00:00", "2020-02-29T06:00:00"]
-    with pytest.raises(FileFault, match=r'"cases\.csv", row 2, column "epoch_utc": "soon" is not a date'):
-        _dates(tmp_path / "cases.csv", EPOCH, np.array(["2019-01-01", "soon"], dtype=object))

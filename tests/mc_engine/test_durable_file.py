@@ -10,13 +10,6 @@ from mc_engine.errors import StoreError
 links = pytest.mark.skipif(sys.platform == "win32", reason="links need rights")
 
 
-def test_a_file_is_read_whole_or_as_far_as_asked(tmp_path):
-    write_durably(tmp_path / "a", b"0123456789")
-    assert read_file(tmp_path / "a") == b"0123456789"
-    assert read_file(tmp_path / "a", 4) == b"0123"
-    assert read_inside(tmp_path, "a", 2**60) == b"0123456789"
-
-
 @links
 def test_neither_reading_nor_writing_follows_a_link(tmp_path):
     (tmp_path / "outside").write_bytes(b"mine")

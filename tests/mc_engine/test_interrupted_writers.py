@@ -15,7 +15,8 @@ STRAY = "cases/part-0000000010-0000000019.parquet"
 def leave(store, name):
     """A file as the run's own writer makes it, without a line in the journal."""
     if name == STRAY:
-        parts.write_part(store.path, store.columns, 10, 10, block(10, 10))
+        written = parts.write_aside(store.path, store.columns, 10, 10, block(10, 10))
+        (store.path / written.temporary).rename(store.path / written.part.file)
     else:
         (store.path / name).write_bytes(b"PAR1")
 
@@ -45,7 +46,7 @@ def test_what_a_kill_leaves_is_told_and_is_no_damage(killed, name):
 def test_a_part_without_a_line_is_damage_where_no_writer_was_killed(killed):
     (killed.path / ".lock").write_bytes(b"")
     leave(killed, STRAY)
-    assert damage(killed.path) == [f"{STRAY}: has no line in the journal and does not count"]
+    assert damage(killed.path) == [f"{STRAY}: has no line in the journal and is not part of the run"]
     assert call("verify", killed.path).exit_code == 5
 
 
@@ -60,4 +61,4 @@ def test_a_part_whose_line_is_damaged_is_damage_also_after_a_kill(killed):
     done = call("verify", killed.path)
     assert done.exit_code == 5
     assert f"journal.jsonl, line {len(lines) - 1}: damaged" in done.stderr
-    assert f"{STRAY}: has no line in the journal and does not count" in done.stderr
+    assert f"{STRAY}: has no line in the journal and is not part of the run" in done.stderr

@@ -7,13 +7,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import pytest
-from cart import small_store
 from small_run import ENVIRONMENT
 
-from mc_engine import load_campaign
-from mc_engine.command_line.next_step import after_flight, after_search, is_complete
-from mc_engine.interruption import LANDING, NOTHING_BEGUN, ONCE_MORE
-from mc_engine.runner import runner
+from mc_engine.command_line.next_step import is_complete
+from mc_engine.interruption import COMPLETING, NOTHING_BEGUN, ONCE_MORE
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows sends no signals from process to process")
 
@@ -106,35 +103,11 @@ def test_two_signals_end_a_kernel_that_python_cannot_interrupt(tmp_path):
     done = command(KERNEL, "return lambda: work(0.5, 1.0)", "run", "minimal", "--out", run)
     rest = f"interrupted; what was committed is safe, `mc-engine resume {run}` flies the rest"
     assert done.returncode == 4
-    assert done.stderr.splitlines()[-2:] == [LANDING, rest]
-
-
-def test_one_signal_ends_a_kernel_of_a_command_that_keeps_nothing(tmp_path):
-    runner.run(load_campaign("minimal", cases=8), tmp_path / "flown")
-    done = command(KERNEL, "return lambda: work(0.5)", "replay", tmp_path / "flown", 3)
-    assert (done.returncode, done.stderr.splitlines()[-1]) == (4, ONCE_MORE)
-
-
-def test_a_signal_that_is_sent_twice_at_once_is_one(tmp_path):
-    """As by `timeout`, to the process and to its group: what flies still lands."""
-    flight = "original(*arguments, **options)"
-    body = f"return lambda: (work(0.2, 0.0, rounds=4_000_000), {flight}())[1]"
-    run = tmp_path / "run"
-    status, said = ended(KERNEL, body, "run", "minimal", "--cases", 20, "--out", run)
-    assert (status, said) == (4, f"interrupted with 0 of 20 cases; `mc-engine resume {run}` flies the rest")
-    assert (run / "nominal.parquet").exists()
-
-
-def test_a_signal_after_all_was_said_changes_nothing(tmp_path):
-    small_store(tmp_path / "flown").note("finished")
-    later = "import atexit\natexit.register(send)"
-    done = command(CAMPAIGN, "pass", "status", tmp_path / "flown", then=later)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.endswith("complete\n")
+    assert done.stderr.splitlines()[-2:] == [COMPLETING, rest]
 
 
 def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun():
-    """The first module of it that is loaded after `listen` never comes to its end."""
+    """The first module of it that is loaded after `install_handlers` never comes to its end."""
     script = (
         "import os, signal, sys, time\n"
         "class Finder:\n"
@@ -149,36 +122,4 @@ def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun()
     assert (done.returncode, done.stderr) == (4, f"{NOTHING_BEGUN}\n")
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
-def test_last_words_that_nobody_can_be_told_leave_the_exit_status_as_it_is():
-    script = "import os, signal\nfrom mc_engine.interruption import listen\nlisten()\n"
-    script += "os.kill(os.getpid(), signal.SIGTERM)\nsignal.pause()\n"
-    with open("/dev/full", "w") as full:
-        done = subprocess.run([sys.executable, "-c", script], stderr=full, env=ENVIRONMENT, timeout=60)
-    assert done.returncode == 4
-
-
 # ---- what the journal says
-
-
-def test_the_words_follow_the_journal(tmp_path):
-    assert after_flight(None) == after_flight(tmp_path / "none") == NOTHING_BEGUN
-    run = tmp_path / "run"
-    store = small_store(run)
-    assert after_flight(run, " --backend loky").endswith(f"`mc-engine resume {run} --backend loky` flies the rest")
-    store.note("finished")
-    assert f"`mc-engine report {run}` writes the reports" in after_flight(run)
-    assert f"`mc-engine publish {run} s3://b/x` sends" in after_flight(run, url="s3://b/x")
-    store.note("extended", cases=60)
-    assert f"`mc-engine resume {run}`" in after_flight(run)
-    store.note("finished")
-    store.note("rerun", cases=4)
-    assert f"`mc-engine rerun --failed {run}` flies the rest" in after_flight(run, rerun=True)
-
-
-def test_the_words_on_a_search_follow_its_record(tmp_path):
-    assert after_search(tmp_path, "tuning.json", "the generations are") == NOTHING_BEGUN
-    (tmp_path / "tuning.json").write_text("{}")
-    assert f"the generations are in {tmp_path}, `mc-engine report" in after_search(
-        tmp_path, "tuning.json", "the generations are"
-    )

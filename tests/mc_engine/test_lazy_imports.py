@@ -42,8 +42,3 @@ def test_check_and_status_load_neither_numba_nor_matplotlib(here):
     small_store(here / "flown")
     for arguments in (["check", "--no-model", here / "cart"], ["check", "minimal"], ["status", here / "flown"]):
         assert not {"numba", "matplotlib", "reports"} & loaded_by(*arguments)
-
-
-def test_a_report_loads_neither_numba_nor_matplotlib_nor_scipy_stats(here):
-    small_store(here / "flown")
-    assert not {"numba", "matplotlib", "scipy.stats"} & loaded_by("report", here / "flown")

@@ -13,18 +13,6 @@ def test_plan_reads_the_requirements_of_a_campaign(here):
     assert "20 in the file are too few, even if none fails: 852 are needed" in result.stdout
 
 
-def test_plan_gives_two_sided_limits(here):
-    lines = call("plan", "--share", "0.95", "--confidence", "0.95", "--two-sided").stdout.splitlines()
-    assert ["smallest", "and", "the", "largest", "93"] in [line.split() for line in lines]
-
-
-def test_plan_refuses_what_it_cannot_answer(here):
-    fails_with(2, call("plan", "--share", "0.9"), "--confidence is missing")
-    fails_with(2, call("plan", "cart", "--share", "0.9"), "says share and confidence itself")
-    (here / "cart" / "campaign.toml").write_text(CAMPAIGN.split("[requirement")[0])
-    fails_with(2, call("plan", "cart"), "sets no requirement")
-
-
 def test_until_takes_one_word_and_a_campaign_that_can_be_judged_on_the_way(here):
     fails_with(2, call("run", "cart", "--until", "tomorrow"), '"tomorrow" is not known')
     (here / "cart" / "campaign.toml").write_text(CAMPAIGN.replace('"mc"', '"lhs"'))

@@ -4,26 +4,13 @@ import os
 import subprocess
 import sys
 from contextlib import contextmanager
-from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from cart import call, fails_with
 from small_run import ENVIRONMENT
 
-import mc_engine
 from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
-
-
-def test_list_names_the_source_of_each_system_once_below_its_campaigns():
-    lines = call("list").stdout.splitlines()
-    sources = [(above.split()[0].split("/")[0], line.split("source: ")[1]) for above, line in pairwise(lines)
-               if line.startswith(" ")]  # fmt: skip
-    assert [folder for folder, _ in sources] == [
-        "deorbit", "flexible_satellite", "geo_injection", "geo_servicing", "reentry"
-    ]  # fmt: skip
-    assert sources[0][1] == mc_engine.load_campaign("deorbit").model.source
 
 
 @pytest.mark.parametrize(
@@ -56,13 +43,6 @@ def test_help_takes_less_than_150_ms_of_a_processor(words):
     command = [sys.executable, "-c", script]
     tries = [subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT).stdout for _ in range(5)]
     assert min(float(text.split()[-1]) for text in tries) < 0.150
-
-
-def test_a_sentence_about_what_is_missing_names_the_next_command(tmp_path):
-    fails_with(2, call("check", "no_such_campaign_anywhere"), "`mc-engine list` names the campaigns")
-    fails_with(2, call("status", tmp_path), "`mc-engine run` makes one")
-    made = call("init", tmp_path / "new")
-    assert f"`mc-engine check {tmp_path / 'new'}`" in made.output
 
 
 # ---- streams that refuse what is written to them
@@ -125,14 +105,3 @@ def test_streams_that_the_shell_closed_are_those_of_no_file(tmp_path):
     closed = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", *command]
     assert subprocess.run(closed, env=ENVIRONMENT, timeout=60).returncode == 0
     assert damage(tmp_path / "run") == []
-
-
-def test_words_that_are_gathered_in_memory_are_those_of_the_command_line():
-    script = (
-        "import contextlib, io, runpy, sys\nsys.argv = ['mc-engine', 'units']\nwords = io.StringIO()\n"
-        "with contextlib.redirect_stdout(words), contextlib.suppress(SystemExit):\n"
-        "    runpy.run_module('mc_engine', run_name='__main__')\nprint(len(words.getvalue().splitlines()))"
-    )
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert int(done.stdout) > 20

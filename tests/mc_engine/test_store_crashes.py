@@ -8,7 +8,6 @@ import pytest
 from small_run import COLUMNS, ENVIRONMENT, MANIFEST, TEXT, block, filled
 
 from mc_engine.errors import StoreError
-from mc_engine.store import parts
 from mc_engine.store.opening import open_store
 from mc_engine.store.store import create_store
 from mc_engine.store.verification import damage
@@ -74,39 +73,6 @@ def test_a_part_is_synced_renamed_and_its_folder_synced_before_its_journal_line(
         os.stat(store.path / name).st_ino for name in (store.parts[0].file, "cases", "journal.jsonl")
     )
     assert done == [("sync", part), ("rename", part), ("sync", folder), ("sync", journal)]
-
-
-def test_a_part_without_its_journal_line_is_ignored_and_then_removed(store):
-    store.append(0, 10, block(0, 10))
-    stray = parts.write_part(store.path, store.columns, 10, 7, block(10, 7))
-    again = open_store(store.path)
-    assert again.committed() == [(0, 10)]
-    assert len(again.cases()) == 10
-    again.append(10, 10, block(10, 10))
-    assert not (store.path / stray.file).exists()
-    assert len(pd.read_parquet(store.path / "cases")) == 20
-
-
-def test_a_torn_last_line_takes_its_part_with_it_and_the_next_writer_mends_both(store):
-    filled(store)
-    journal = store.path / "journal.jsonl"
-    journal.write_bytes(journal.read_bytes()[:-9])
-    again = open_store(store.path)
-    assert again.missing() == [(30, 40)]
-    assert any("torn" in problem for problem in damage(again.path))
-    again.append(30, 10, block(30, 10))
-    assert damage(again.path) == []
-    assert again.cases()["ve_pct"].tolist() == block(0, 40)["ve_pct"].tolist()
-
-
-def test_a_torn_middle_line_is_refused_with_its_number(store):
-    filled(store)
-    journal = store.path / "journal.jsonl"
-    lines = journal.read_bytes().splitlines(keepends=True)
-    lines[2] = lines[2][:30] + b"\n"
-    journal.write_bytes(b"".join(lines))
-    with pytest.raises(StoreError, match=r"journal\.jsonl, line 3: damaged"):
-        open_store(store.path)
 
 
 KILLED = """

@@ -19,7 +19,6 @@ NEVER = {
     "list": [],
     "schema": [],
     "units": [],
-    "published": [],
     "report": ["RUN", "--format", "html"],
     "status": ["RUN"],
     "summary": ["RUN"],

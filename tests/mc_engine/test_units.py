@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from mc_engine.command_line.commands import app
-from mc_engine.model import Field
-from mc_engine.units import UNITS, by_quantity, compatible, convert, nearest_unit, unit_hint
+from mc_engine.units import UNITS, compatible, convert, nearest_unit, unit_hint
 
 
 @pytest.mark.parametrize(
@@ -42,48 +41,6 @@ def test_there_and_back_is_the_same_number(value, unit, data):
 def test_only_units_of_the_same_quantity_are_compatible():
     assert compatible("kN") == ["N", "uN", "mN", "kN"]
     assert set(compatible("deg")) == {"rad", "urad", "mrad", "deg", "arcmin", "arcsec", "rev"}
-
-
-def test_a_whole_column_is_converted():
-    assert convert(np.array([1.0, 2.0]), "km", "m").tolist() == [1000.0, 2000.0]
-
-
-@pytest.mark.parametrize(
-    "unit",
-    [
-        "J",
-        "W",
-        "V",
-        "A",
-        "mrad",
-        "arcsec",
-        "T",
-        "m^3",
-        "kg/m",
-        "N m/rad",
-        "deg/h",
-        "A m^2",
-        "mg/s",
-        "mN s",
-        "mN m s",
-        "nT/s",
-        "keV",
-        "kV",
-    ],
-)
-def test_what_a_gnc_engineer_writes_is_there(unit):
-    assert unit in UNITS
-
-
-def test_names_differ_in_more_than_the_size_of_letters_and_the_first_of_a_quantity_is_si():
-    assert len({name.lower() for name in UNITS}) == len(UNITS)
-    assert [names[0] for names in by_quantity().values() if UNITS[names[0]].factor != 1.0] == ["%", "deg/rev"]
-
-
-def test_the_end_of_a_name_is_its_unit_in_letters():
-    assert UNITS["W/(m^2 K)"].suffix == "_w_m2_k"
-    assert (UNITS["%"].suffix, UNITS["day"].suffix, UNITS[""].suffix) == ("_pct", "_days", "")
-    assert Field("drift_deg_sqrt_h", "deg/sqrt(h)", "angle random walk").symbol == "drift"
 
 
 @pytest.mark.parametrize(

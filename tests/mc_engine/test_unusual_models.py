@@ -132,10 +132,6 @@ def test_the_unusual_ways_fly(tmp_path):
     assert faults(campaign_with(tmp_path, *(e for i, e in enumerate(edits) if e != WHERE or i == flag))) == []
 
 
-def test_an_excess_that_no_case_has_is_no_fixed_metric(tmp_path):
-    assert faults(campaign_with(tmp_path, *UNUSUAL["an excess that no case has"])) == []
-
-
 # (lines in `rhs`, what stands before it)
 LINES = [
     ("if MU_EARTH < 0.0:\n        raise ValueError", ""),

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import mc_engine
 from reports.contents import build
-from reports.document import Document, FigureBlock, Table, Terms, Text
+from reports.document.blocks import Document, FigureBlock, Table, Terms, Text
 
 GOLDEN = Path(__file__).with_name("golden")
 CAMPAIGNS = Path(__file__).parents[2] / "campaigns"

@@ -180,10 +180,10 @@ def manifest(**changes: Any) -> dict[str, Any]:
                 "published": 3.8,
                 "unit": "kg",
                 "source": "section 5",
-                "ours": 2.188,
+                "compute": "campaigns.deorbit.published:f",
                 "tolerance": 0.05,
-                "status": "not reproduced",
-                "note": "needs VE = 40 %",
+                "status": "legible",
+                "reason": "needs VE = 40 %",
             },
             {
                 "quantity": "entry speed",

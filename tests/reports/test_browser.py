@@ -7,7 +7,7 @@ from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_html
-from reports.document import FigureBlock, blocks_of
+from reports.document.blocks import FigureBlock, blocks_of
 
 pytestmark = pytest.mark.skipif(not INSTALLED, reason="needs the Debian package chromium")
 COUNT = "document.getElementById('selection-count').textContent"
@@ -255,7 +255,7 @@ def test_a_box_over_a_footprint_chooses_the_flights_that_come_down_there(browser
     )
     low, high = box_over(browser, figure, 0.4, 0.7)
     drawing = next(block.drawing for block in blocks_of(build(run, "run"), FigureBlock) if block.drawing.places)
-    east = drawing.everywhere[:, 0]
+    east = drawing.places["place: east of the mean [km]"][2]
     assert browser.run(CHOSEN) == pytest.approx(int(((east >= low) & (east <= high)).sum()), abs=3)
     browser.run("document.getElementById('selection-close').click()")
     assert browser.logged == []

@@ -13,10 +13,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "mc_engine"))
 from told import HIDDEN, LONE, PAYLOAD, STEERING
 
 from reports import build, render_html, render_pdf
-from reports.document import Document, Section, Text
-from reports.html import plotly_script
-from reports.markdown import figure_files, render_markdown
-from reports.user_sections import run_facts, with_own_sections
+from reports.document.blocks import Document, Section, Text
+from reports.formats.html import plotly_script
+from reports.formats.markdown import figure_files, render_markdown
+from reports.user_sections.sections import run_facts, with_own_sections
 
 REFUSED = STEERING | HIDDEN | {LONE}
 SHOWN = r"\u202eevil\u2066\u200b\u2028"
@@ -60,7 +60,7 @@ def test_markdown_and_its_pictures_have_no_such_character(document):
 
 def test_values_in_a_section_of_the_users_own_are_clean(document, tmp_path):
     flown_run = hostile(PAYLOAD)
-    from reports.flown import Flown
+    from reports.run.flown import Flown
 
     facts = run_facts(Flown(flown_run, PAYLOAD), PAYLOAD)
     template = tmp_path / "own.md"

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from figure_marks import drawings
 from synthetic_run import synthetic_run
 
 from mc_engine.model.figures import (
@@ -13,8 +14,7 @@ from mc_engine.model.figures import (
     to_record,
 )
 from reports.contents import build
-from reports.document import FigureBlock, Table, blocks_of
-from reports.figures import MapDrawing
+from reports.document.blocks import FigureBlock, Table, blocks_of
 
 RUN = "deorbit-20260421-101500"
 
@@ -94,7 +94,7 @@ def test_the_worst_case_comes_with_the_command_that_repeats_it(document):
 
 
 def test_the_map_says_that_it_is_smoothed_and_from_how_many_cases(document):
-    drawing = next(block.drawing for block in blocks_of(document, FigureBlock) if isinstance(block.drawing, MapDrawing))
+    drawing = drawings(document, "map")[0]
     key = " ".join(entry.text for entry in drawing.key)
     assert "local quadratic regression on the 24 nearest of 9\u202f988 of 10\u202f000 cases" in key
     assert "; error 3.98·10⁻⁵ (median) to 0.013\u202fkg (largest)" in key

@@ -6,37 +6,33 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from figure_marks import drawings, marks_of
 from landing_run import FOOTPRINT, landing_run
 from PIL import Image
 from scipy import stats
 from synthetic_run import synthetic_run
 
 from mc_engine.statistics.geodesy import LocalPlane
-from reports.coastlines import coastlines, nearest_coast
-from reports.companion_section import sigma_contribution
 from reports.contents import build
-from reports.contributions import Contributor
-from reports.contributor_figures import strongest
-from reports.diagnostics import rank_correlations
-from reports.document import FigureBlock, Table, blocks_of
-from reports.figures import FootprintDrawing, Histories
-from reports.figures.marks import Bar, Limit, Line, Points
-from reports.figures.probability_plots import plotting_positions, probability_plot, shown_ranks
-from reports.flown import Flown
-from reports.history_bands import OUTER, history_bands, outer_percentile
-from reports.history_limits import history_limits
-from reports.numbers import number
+from reports.contributors.companion import sigma_contribution
+from reports.contributors.tornado_figure import strongest
+from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.drawing.marks import Bar, Limit, Line, Points
+from reports.figures.statistics import plotting_positions, probability_plot, shown_ranks
+from reports.footprint.coastlines import coastlines, nearest_coast
 from reports.replays import replay_drawing, replay_picture
+from reports.run.contributions import Contributor
+from reports.run.flown import Flown
+from reports.run.history_bands import OUTER, history_envelopes, outer_percentile
+from reports.run.history_limits import history_limits
+from reports.sections.diagnostics import rank_correlations
+from reports.text.numbers import number
 
 TIMES = np.linspace(0.0, 10.0, 101)
 
 
 def section(run, anchor):
     return next(one for one in build(run, "run").sections if one.anchor == anchor)
-
-
-def drawn(run, kind):
-    return next(one.drawing for one in blocks_of(build(run, "run"), FigureBlock) if isinstance(one.drawing, kind))
 
 
 # ---- contributors
@@ -82,7 +78,7 @@ PEAKS = np.linspace(50.0, 90.0, 40)
 
 
 def test_a_limit_is_drawn_where_the_metric_is_the_extreme_of_the_quantity_in_all_saved_cases():
-    drawing = drawn(peaked(PEAKS), Histories)
+    drawing = drawings(build(peaked(PEAKS), "run"), "histories")[0]
     (limit,) = [mark for mark in drawing.plots[0].marks if isinstance(mark, Limit)]
     assert (limit.at, limit.axis, limit.key) == (100.0, "y", "required limit")
 
@@ -97,7 +93,7 @@ def test_an_envelope_reaches_to_the_percentile_that_its_cases_support():
     slopes = np.random.Generator(np.random.Philox(key=7)).normal(size=800)
     rows = pd.DataFrame({"case_id": np.repeat(np.arange(800), 2), "t_s": np.tile([0.0, 1.0], 800)})
     rows["x_m"] = np.column_stack([0.0 * slopes, slopes]).ravel()
-    curves = history_bands(rows, range(800), ["x_m"])["x_m"].curves
+    curves = history_envelopes(rows, range(800), ["x_m"])["x_m"].curves
     for p in (0.0, OUTER[0], 0.5, 1.0 - OUTER[0], 1.0):
         assert curves[p][-1] == pytest.approx(np.quantile(slopes, p), rel=1e-12)
 
@@ -136,28 +132,27 @@ def footprint(target_limit=None, place=(36.0, -5.35)):
         one = {"name": "landing", "metric": "miss_km", "at_most": target_limit, "at_least": None, "share": 0.9}
         changes = {"requirements": [*run.manifest["requirements"], {**one, "confidence": 0.9}]}
     run.manifest.update(changes)
-    return drawn(run, FootprintDrawing)
+    return drawings(build(run, "run"), "footprint")[0]
 
 
 def test_the_circular_error_probable_holds_half_of_the_cases_and_the_limit_is_a_circle():
     drawing = footprint(target_limit=40.0)
-    circles = {curve.kind: curve.outlines[0] for curve in drawing.curves if curve.kind in ("CEP", "target")}
-    aim = np.array(drawing.aim[1])
-    radii = {kind: np.hypot(*(outline - aim).T) for kind, outline in circles.items()}
-    inside = np.hypot(*(drawing.everywhere - aim).T) <= radii["CEP"].mean()
+    circles = {kind: marks_of(drawing, Line, kind)[0] for kind in ("CEP", "required")}
+    (aim,) = marks_of(drawing, Points, "target")
+    radii = {kind: np.hypot(line.x - aim.x, line.y - aim.y) for kind, line in circles.items()}
+    east, north = (values for _, _, values in drawing.places.values())
+    inside = np.hypot(east - aim.x, north - aim.y) <= radii["CEP"].mean()
     assert inside.mean() == pytest.approx(0.5, abs=0.01)
-    np.testing.assert_allclose(radii["target"], 40.0, rtol=1e-9)
-    assert not [curve for curve in footprint().curves if curve.kind == "target"]
+    np.testing.assert_allclose(radii["required"], 40.0, rtol=1e-9)
+    assert not marks_of(footprint(), Line, "required")
 
 
 def test_a_coast_in_the_window_is_on_the_map_and_a_far_one_on_a_wider_map():
     strait, ocean = footprint(), footprint(place=(-47.0, -120.0))
-    assert strait.coasts
-    assert not strait.around
     assert len(ocean.plots) == len(strait.plots) + 1
-    assert not ocean.coasts
+    assert [len(marks_of(one, Line, "coastline")) for one in (strait, ocean)] == [1, 1]
     plane = LocalPlane(-47.0, -120.0)
-    assert nearest_coast(plane) / 1000.0 < ocean.around_reach
+    assert nearest_coast(plane) / 1000.0 < ocean.plots[-1].y.reach[1]
     for plot in (strait.plots[0], ocean.plots[-1]):
         coast = plot.marks[0]
         inside = [low <= x <= high for x, (low, high) in zip(coast_near(coast), plot.ends, strict=True)]

@@ -5,7 +5,7 @@ import pytest
 from synthetic_run import synthetic_run
 
 from reports import build, render_html, render_pdf
-from reports.markdown import figure_files, render_markdown
+from reports.formats.markdown import figure_files, render_markdown
 
 
 def constant(run):

@@ -5,18 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from figure_marks import classes, marks_of
 from synthetic_run import synthetic_run
 
 import reports
 from mc_engine.model.figures import MapFigure, ScatterFigure, to_record
-from mc_engine.statistics.contributors import contributors
+from mc_engine.statistics.first_order import contributors
 from mc_engine.statistics.maps import explained_share
 from mc_engine.statistics.worst import Limits, limits_on
 from reports.contents import build
-from reports.document import FigureBlock, Table, blocks_of
-from reports.drawings import FEWEST_SHOWN
-from reports.figures import MapDrawing, ScatterDrawing, screen
-from reports.numbers import column_texts
+from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.drawing import screen
+from reports.drawing.marks import Line, Points
+from reports.sections.figure_blocks import FEWEST_SHOWN
+from reports.text.numbers import column_texts
 
 METRIC = "correction_impulse_m_s"  # here: an error of either sign
 
@@ -91,15 +93,15 @@ def test_both_outcomes_are_drawn_in_proportion_and_the_larger_one_beneath(share)
     limit = float(run.table["propellant_kg"].quantile(share))
     run.manifest["requirements"] = [requirement("fuel", "propellant_kg", limit, None)]
     drawing = scatter(run).drawing
-    assert isinstance(drawing, ScatterDrawing)
-    n = [cases for _, cases in drawing.outcomes[:2]]
-    assert n[0] == (run.table["propellant_kg"] <= limit).sum()
-    shown = [int((drawing.outcome == k).sum()) for k in (0, 1)]
+    n = [int((run.table["propellant_kg"] <= limit).sum()), int((run.table["propellant_kg"] > limit).sum())]
+    assert sorted(classes(drawing).values()) == sorted(n)
+    clouds = [mark for mark in marks_of(drawing, Points) if mark.cases is not None]
+    shown = [one.x.size for one in sorted(clouds, key=lambda one: not one.name.startswith("inside"))]
     for k in (0, 1):
         assert shown[k] >= min(FEWEST_SHOWN, n[k])
         if n[k] >= 5 * FEWEST_SHOWN:
             assert shown[k] / n[k] == pytest.approx(0.2, abs=0.01)
-    assert [k for k, _, _ in drawing.drawn] == sorted((0, 1), key=lambda k: -n[k])
+    assert clouds[0].name.startswith("inside") == (n[0] >= n[1])
     beneath, above = screen.specifications(drawing)[0]["data"][:2]
     assert beneath["marker"]["opacity"] < above["marker"]["opacity"]
 
@@ -107,14 +109,15 @@ def test_both_outcomes_are_drawn_in_proportion_and_the_larger_one_beneath(share)
 def test_a_normal_ellipse_that_leaves_the_physical_range_is_left_out():
     run = synthetic_run(2000, failed=0)
     inside = scatter(run, METRIC, "settling_time_s")
-    assert any(region.elliptic for region in inside.drawing.regions)
+    assert any("ellipse" in line.text for line in marks_of(inside.drawing, Line))
     run.manifest["ranges"] = {METRIC: [0.0, None]}
     bounded = scatter(run, METRIC, "settling_time_s")
-    assert bounded.drawing.regions
-    assert not any(region.elliptic for region in bounded.drawing.regions)
+    regions = marks_of(bounded.drawing, Line)
+    assert regions
+    assert not any("ellipse" in region.text for region in regions)
     assert "physical range" in bounded.caption
-    assert min(outline[:, 0].min() for region in bounded.drawing.regions for outline in region.outlines) >= 0.0
-    lowest = min(outline[:, 0].min() for region in inside.drawing.regions for outline in region.outlines)
+    assert min(np.nanmin(region.x) for region in regions) >= 0.0
+    lowest = min(np.nanmin(region.x) for region in marks_of(inside.drawing, Line))
     assert lowest < 0.0 <= run.table[METRIC].min()
 
 
@@ -133,7 +136,7 @@ def test_a_map_of_two_inputs_that_explain_little_is_a_sentence_that_names_those_
     assert re.search(r"Noise: not drawn; ve and oe together explain \d\u202f% of the variance of entry speed", said)
     assert "the two inputs that explain most are" in said
     assert {"wind factor", "mass factor"} <= set(re.findall(r"(\w+ factor)", said))
-    (drawn,) = [one for one in section.blocks if isinstance(getattr(one, "drawing", None), MapDrawing)]
+    (drawn,) = [one for one in section.blocks if getattr(one, "drawing", None)]
     assert drawn.caption.startswith("Signal")
     assert explained_share(wind.to_numpy(), mass.to_numpy(), run.table["entry_speed_m_s"].to_numpy()) > 0.95
 

@@ -86,9 +86,9 @@ def _turns(entrant: Entrant, value: float, threads: int, turn: float) -> _Turns:
     return _Turns(entrant, value, threads, n, _build(entrant, value, threads, n), 1e9, 0.0)
 
 
-def _interleave(crew: list[_Turns], turns: int) -> None:
+def _interleave(entrants: list[_Turns], turns: int) -> None:
     for turn in range(turns):
-        for one in crew:
+        for one in entrants:
             if turn < 3 or one.last < LONG:
                 one.fly()
 

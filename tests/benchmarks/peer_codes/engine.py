@@ -4,7 +4,8 @@ import numpy as np
 
 from mc_engine.flight import flight
 from mc_engine.flight.kernel import build_kernel, usual_width
-from mc_engine.flight.kernel_parts import settings_class
+from mc_engine.flight.kernel_parts import blocks_of, settings_class
+from mc_engine.lanes.kernel_data import gathered
 from mc_engine.model import AdaptiveStep, Model, load_model
 from tests.benchmarks.peer_codes.entrant import TOLERANCES, Entrant, Flight, portions, shared
 from tests.benchmarks.peer_codes.problems import Problem
@@ -60,10 +61,10 @@ def kernel_flight(problem: Problem, method: str, value: float | None, width: int
     time, status, states = np.empty(n), np.empty(n), np.empty((len(model.states), n))
     out = (time, status, states, np.empty((len(model.metrics), n)))
     kernel, key, cases = build_kernel(model, None, width), np.uint64(1), np.arange(float(n))
-    nothing, pace = np.empty((0, 0)), 1.0 if adaptive else 1
+    nothing, pace, data = np.empty((0, 0)), 1.0 if adaptive else 1, gathered(blocks_of(model))
 
     def fly() -> np.ndarray:
-        kernel(ready.parameters, settings, key, cases, *clock, *out, nothing, pace)
+        kernel(ready.parameters, settings, data, key, cases, *clock, *out, nothing, pace)
         return states
 
     return fly

@@ -59,7 +59,7 @@ class Entrant:
 
 
 @cache
-def crew(threads: int) -> ThreadPoolExecutor:
+def thread_pool(threads: int) -> ThreadPoolExecutor:
     """Threads that stay, so that no flight pays for starting them."""
     return ThreadPoolExecutor(threads)
 
@@ -68,7 +68,7 @@ def shared(flights: list[Flight]) -> Flight:
     """One flight that flies several at the same time, a thread each."""
     if len(flights) == 1:
         return flights[0]
-    pool = crew(len(flights))
+    pool = thread_pool(len(flights))
     return lambda: np.concatenate(list(pool.map(lambda fly: fly(), flights)), axis=1)
 
 

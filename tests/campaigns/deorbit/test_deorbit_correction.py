@@ -2,21 +2,10 @@
 
 import numpy as np
 import pytest
-from deorbit_flights import DEMONSTRATION, fly_cases, fly_grid, fly_one, history
+from deorbit_flights import fly_cases, fly_grid, fly_one, history
 
-# The published case, VE = -20 % and OE = +10 %, recomputed from the source's equations with its constants.
-# Relative tolerances of the digits that a figure can hold; times and overshoots in their own unit.
-PUBLISHED_CASE = [
-    ("correction_impulse_m_s", 47.6080, {"rel": 1e-3}),
-    ("propellant_kg", 1.9541, {"rel": 1e-3}),
-    ("peak_force_n", 131.221, {"rel": 5e-4}),
-    ("max_position_error_m", 788.138, {"rel": 1e-4}),
-    ("max_position_error_time_s", 57.14, {"rel": 0.0, "abs": 0.1}),
-    ("overshoot_a_pct", 11.127, {"rel": 0.0, "abs": 0.05}),
-    ("overshoot_e_pct", 11.768, {"rel": 0.0, "abs": 0.05}),
-    ("overshoot_omega_pct", 13.178, {"rel": 0.0, "abs": 0.05}),
-    ("settling_time_s", 352.3, {"rel": 0.0, "abs": 1.0}),
-]
+from campaigns.deorbit.published import DEMONSTRATION
+
 ALONE = 1.0 + 2.0 * np.exp(-2.0)  # S / |dv0| of the law without gravity, whatever its gain
 
 
@@ -30,44 +19,8 @@ def published_history():
     return history(**DEMONSTRATION)
 
 
-@pytest.mark.parametrize(("column", "value", "tolerance"), PUBLISHED_CASE)
-def test_the_published_case_comes_out_as_recomputed(published_case, column, value, tolerance):
-    assert published_case[column] == pytest.approx(value, **tolerance)
-
-
-def test_after_350_s_the_craft_is_29_m_from_its_place(published_history):
-    t, error = published_history["t_s"], published_history["position_error_m"]
-    assert error[t == 350.0] == pytest.approx(28.704, rel=1e-3)
-
-
-@pytest.mark.parametrize(("element", "settled"), [("a", 327.2), ("e", 337.6), ("omega", 352.3)])
-def test_each_element_comes_within_one_percent_at_its_own_time(published_history, element, settled):
-    t, left = published_history["t_s"], np.abs(published_history[f"{element}_remaining_pct"])
-    last = np.flatnonzero(left > 1.0)[-1]
-    crossing = np.interp(-1.0, -left[last : last + 2], t[last : last + 2])
-    assert crossing == pytest.approx(settled, rel=0.0, abs=1.0)
-
-
-def test_the_force_almost_rests_at_twice_the_time_constant_and_returns_as_a_small_lobe(published_history):
-    """|u| = k |v0| exp(-k t) |2 - k t| without gravity: nothing at 2/k = 114 s, a second top at 3/k = 171 s."""
-    t, force = published_history["t_s"], published_history["force_n"]
-    assert abs(t[np.argmin(np.where(t < 140.0, force, np.inf))] - 2.0 / 0.0175) < 2.0
-    lobe = np.where((t > 120.0) & (t < 250.0), force, 0.0)
-    assert t[np.argmax(lobe)] == pytest.approx(171.0, abs=3.0)
-    assert lobe.max() == pytest.approx(3.3, abs=0.05)
-
-
 def test_the_force_stays_in_the_orbital_plane_as_printed(published_history):
     assert np.abs(published_history["force_normal_n"]).max() < 1e-9
-
-
-# VE [%], OE [%], S [m/s]
-IMPULSES = [(20, 15, 53.3800), (20, 10, 48.9344), (-20, 15, 50.6625), (20, 0, 45.0309)]
-
-
-@pytest.mark.parametrize(("ve", "oe", "impulse"), IMPULSES)
-def test_the_impulse_of_each_corner_comes_out_as_recomputed(ve, oe, impulse):
-    assert fly_one(ve_pct=float(ve), oe_pct=float(oe))["correction_impulse_m_s"] == pytest.approx(impulse, rel=1e-3)
 
 
 def test_a_faultless_burn_needs_no_correction():
@@ -81,13 +34,6 @@ def test_the_impulse_is_1_27_times_the_velocity_error_over_the_whole_map():
     assert ratio.min() == pytest.approx(1.2695, rel=0.0, abs=5e-5)
     assert ratio.max() == pytest.approx(1.2727, rel=0.0, abs=5e-5)
     assert ratio.min() < ALONE < ratio.max()
-
-
-@pytest.mark.parametrize("gain", [0.012, 0.0175, 0.03])
-def test_the_gain_hardly_matters_to_the_fuel(gain):
-    """The closed form without gravity does not hold the gain at all; gravity leaves 0.3 %."""
-    row = fly_one(gain_1_s=gain, **DEMONSTRATION)
-    assert row["correction_impulse_m_s"] == pytest.approx(ALONE * row["initial_velocity_error_m_s"], rel=3e-3)
 
 
 def test_the_peak_force_is_the_damping_of_the_first_velocity_error(published_case):
@@ -124,11 +70,6 @@ def test_without_control_the_craft_enters_late_fast_and_shallow(column, value):
     assert fly_one(control="off", **DEMONSTRATION)[column] == pytest.approx(value, rel=1e-5)
 
 
-def test_without_control_nothing_is_spent():
-    row = fly_one(control="off", **DEMONSTRATION)
-    assert (row["correction_impulse_m_s"], row["propellant_kg"], row["peak_force_n"]) == (0.0, 0.0, 0.0)
-
-
 @pytest.fixture(scope="module")
 def clipped():
     return fly_one(control="clipped", **DEMONSTRATION)
@@ -141,17 +82,6 @@ def test_clipped_at_30_n_the_correction_takes_longer_and_costs_more(clipped):
     assert clipped["settling_time_s"] == pytest.approx(490.0, abs=1.0)  # "about 490 s"
 
 
-def test_clipped_at_30_n_the_worst_corner_takes_79_m_s():
-    row = fly_one(control="clipped", ve_pct=20.0, oe_pct=15.0)
-    assert row["correction_impulse_m_s"] == pytest.approx(79.375, rel=1e-3)
-    assert row["propellant_kg"] == pytest.approx(3.237, abs=5e-4)
-
-
-def test_a_limit_above_the_peak_clips_nothing(published_case):
-    row = fly_one(control="clipped", thrust_limit_n=132.0, **DEMONSTRATION)
-    assert row["correction_impulse_m_s"] == pytest.approx(published_case["correction_impulse_m_s"], rel=1e-12)
-
-
 @pytest.fixture(scope="module")
 def fuel_map():
     """The grid of map.toml: 41 x 31 cases, a percent apart."""
@@ -162,49 +92,6 @@ def test_the_dearest_case_of_the_map_is_its_corner_of_too_large_and_too_far_turn
     dearest = np.argmax(fuel_map["propellant_kg"])
     assert (fuel_map["ve_pct"][dearest], fuel_map["oe_pct"][dearest]) == (20.0, 15.0)
     assert fuel_map["propellant_kg"][dearest] == pytest.approx(2.188, abs=5e-4)
-
-
-def test_for_an_undersized_burn_the_negative_turn_is_the_slightly_dearer_one():
-    flown = fly_grid([-20.0, 20.0], [-10.0, 10.0])["propellant_kg"].reshape(2, 2)
-    (under_negative, under_positive), (over_negative, over_positive) = flown
-    assert under_negative > under_positive
-    assert over_positive > over_negative
-
-
-def test_the_printed_overshoot_of_8_5_percent_is_not_reached(published_case, clipped):
-    """The source prints 8.5 % as the largest overshoot of the elements; we reach 11.1 to 13.2 %.
-
-    Suspected cause: the source's figures were read or drawn otherwise.  The law itself leaves no room: without
-    gravity the velocity error is v0 (1 - kt) exp(-kt), whose overshoot is exp(-2) = 13.5 % whatever the gain.
-    Clipping, of which the source says nothing, takes the elements further away, to 29-36 %.
-    """
-    unclipped = [published_case[f"overshoot_{element}_pct"] for element in ("a", "e", "omega")]
-    assert all(8.55 < overshoot < 100.0 * np.exp(-2.0) for overshoot in unclipped)
-    assert all(28.5 < clipped[f"overshoot_{element}_pct"] < 36.5 for element in ("a", "e", "omega"))
-
-
-def test_the_printed_3_8_kg_are_not_reached_within_the_errors_of_the_abstract(fuel_map):
-    """The source prints 3.8 kg as the worst of its fuel map at OE = +10 % and a VE that is lost.
-
-    Within the 20 % and 15 % of its abstract the worst is 2.19 kg.  Suspected cause: a wider map.  VE = +40 % and
-    OE = +10 % gives 3.759 kg, which rounds to the print; a second reading is a specific impulse of 124.6 s.
-    """
-    assert fuel_map["propellant_kg"].max() < 3.75 - 1.5
-    wide = fly_one(ve_pct=40.0, oe_pct=10.0)
-    assert wide["propellant_kg"] == pytest.approx(3.759, abs=5e-4)
-    assert wide["correction_impulse_m_s"] == pytest.approx(92.43, abs=5e-3)
-    assert fly_one(isp_s=124.6, **DEMONSTRATION)["propellant_kg"] == pytest.approx(3.821, abs=5e-4)
-
-
-# VE [%], OE [%], propellant [kg] with a specific impulse of 246 s: the other readings of 3.8 kg
-READINGS = [(20, 10, 2.008), (-40, 10, 3.703), (40, 15, 3.872)]
-
-
-@pytest.mark.parametrize(("ve", "oe", "propellant"), READINGS)
-def test_the_other_readings_of_the_worst_case_miss_the_print(ve, oe, propellant):
-    ours = fly_one(ve_pct=float(ve), oe_pct=float(oe))["propellant_kg"]
-    assert ours == pytest.approx(propellant, abs=5e-4)
-    assert abs(ours - 3.8) > 0.05
 
 
 def test_cases_of_all_control_modes_may_be_flown_together():

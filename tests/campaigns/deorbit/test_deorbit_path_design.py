@@ -2,30 +2,13 @@
 
 import numpy as np
 import pytest
-from deorbit_flights import DEMONSTRATION, NOMINAL, fly_cases, fly_one, table_2_entry
+from deorbit_flights import NOMINAL, fly_cases, fly_one
+
+from campaigns.deorbit.published import DEMONSTRATION, rounded_entry
 
 MU = 3.986004418e14
 R, V, GAMMA, THETA = 6491e3, 7800.0, np.radians(2.0), 60.0  # the entry state that the path is designed for
 R_INITIAL = 6639e3
-
-# S. Divsalar, R. Nadafi, M. Kabganian (2016), recomputed from the exact design inputs: (column, value, tolerance).
-# The tolerances are half a metre and better: far inside the digits of Table 2, so no reading of a formula hides.
-DESIGN = [
-    ("desired_semi_major_axis_km", 6431.4934, 0.001),
-    ("desired_eccentricity", 0.03610370, 1e-7),
-    ("desired_perigee_argument_deg", 166.83973, 1e-4),
-    ("burn_latitude_argument_deg", 12.59010, 1e-4),
-    ("burn_dv_m_s", 177.20997, 1e-3),
-    ("burn_angle_deg", 44.20833, 1e-3),
-    ("planned_entry_time_s", 706.6268, 0.005),
-    ("entry_time_s", 706.6268, 0.005),
-]
-# Table 3: the path that follows a burn with VE = -20 %, OE = +10 %.
-ACTUAL = [
-    ("actual_semi_major_axis_km", 6484.3467),
-    ("actual_eccentricity", 0.02760167),
-    ("actual_perigee_argument_deg", 163.15547),
-]
 
 
 @pytest.fixture(scope="module")
@@ -36,20 +19,6 @@ def nominal():
 @pytest.fixture(scope="module")
 def ascending():
     return fly_one(burn_point="ascending")
-
-
-@pytest.mark.parametrize(("column", "value", "tolerance"), DESIGN)
-def test_the_design_gives_the_published_path_and_burn(nominal, column, value, tolerance):
-    assert nominal[column] == pytest.approx(value, rel=0.0, abs=tolerance)
-
-
-@pytest.mark.parametrize(("column", "value"), ACTUAL)
-def test_the_erroneous_burn_leads_to_the_path_of_table_3(column, value):
-    assert fly_one(**DEMONSTRATION)[column] == pytest.approx(value, rel=1e-6)
-
-
-def test_the_ascending_crossing_lies_before_the_perigee(ascending):
-    assert ascending["burn_latitude_argument_deg"] == pytest.approx(321.08937, rel=0.0, abs=1e-4)
 
 
 def test_the_crossings_mirror_each_other_in_the_line_of_apsides(nominal, ascending):
@@ -84,7 +53,7 @@ def test_the_burn_closes_the_velocity_triangle(point):
 
 def test_the_rounded_elements_of_table_2_come_back_from_their_own_entry_state():
     """The entry state of the printed ellipse gives its elements again, and the burn of the digest for them."""
-    row = fly_one(**table_2_entry(), **DEMONSTRATION)
+    row = fly_one(**rounded_entry(), **DEMONSTRATION)
     assert row["desired_semi_major_axis_km"] == pytest.approx(6431.5, rel=1e-12)
     assert row["desired_eccentricity"] == pytest.approx(0.0361, rel=1e-12)
     assert row["desired_perigee_argument_deg"] == pytest.approx(166.8, rel=1e-12)
@@ -113,10 +82,6 @@ def test_the_first_velocity_error_is_the_third_side_of_the_burn_triangle(nominal
     s, turn = 1.0 + ve / 100.0, np.radians(nominal["burn_angle_deg"]) * oe / 100.0
     side = nominal["burn_dv_m_s"] * np.sqrt((1.0 - s) ** 2 + 4.0 * s * np.sin(0.5 * turn) ** 2)
     assert fly_one(ve_pct=ve, oe_pct=oe)["initial_velocity_error_m_s"] == pytest.approx(side, rel=1e-10)
-
-
-def test_the_first_velocity_error_of_the_published_case_is_37_49_m_s():
-    assert fly_one(**DEMONSTRATION)["initial_velocity_error_m_s"] == pytest.approx(37.49167, rel=0.0, abs=1e-4)
 
 
 ESCAPE = float(np.sqrt(2.0 * MU / R))
@@ -168,14 +133,6 @@ def test_a_step_too_long_for_the_gain_is_refused():
 
 def test_an_entry_above_the_horizon_is_refused():
     assert "target_flight_path_angle_deg is outside" in fly_one(target_flight_path_angle_deg=-2.0)["reason"]
-
-
-def test_just_below_escape_the_entry_state_can_still_be_reached():
-    assert fly_one(target_speed_m_s=ESCAPE * (1.0 - 1e-4))["status"] == "ok"
-
-
-def test_just_under_the_apogee_of_the_path_the_orbits_still_cross():
-    assert fly_one(initial_semi_major_axis_km=6663.6)["status"] == "ok"
 
 
 def test_a_burn_that_never_fires_leaves_an_uncontrolled_craft_in_orbit():

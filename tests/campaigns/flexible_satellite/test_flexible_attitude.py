@@ -62,10 +62,6 @@ def test_the_quaternion_of_a_rotation_vector_is_scipys(v):
     )
 
 
-def test_no_rotation_at_all_is_no_division_by_zero():
-    np.testing.assert_array_equal(rotation_quaternion(np.zeros((3, 1)))[:, 0], [1.0, 0.0, 0.0, 0.0])
-
-
 @given(numbers, vectors)
 def test_a_small_turn_is_the_further_rotation_to_first_order(q, v):
     q, v = unit(q), 1e-4 * np.array(v)

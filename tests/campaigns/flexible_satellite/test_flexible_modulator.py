@@ -4,47 +4,19 @@ from collections import namedtuple
 
 import numpy as np
 import pytest
-from flexible_flights import MODEL, NOMINAL, SEED, TABLE_4, TABLE_8, TABLE_9, fly_cases, fly_one, history
+from flexible_flights import MODEL, NOMINAL, SEED, TABLE_8, fly_cases, fly_one, history
 from scipy.integrate import solve_ivp
 
 from mc_engine.flight.flight import fly
 from mc_engine.physics.pulse_modulators import at_rest, sampled_pulses
-from tests.campaigns.pulse_trains import dead_band, first_on_time, pause_time, pulse_time, shortest_pulse
+from tests.campaigns.pulse_trains import dead_band, first_on_time, pause_time, pulse_time
 
 _BOUNDS = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
 GAIN, TAU, OFF, HYSTERESIS, LEVEL = 7.39, 0.713, 0.117, 0.225, 1.07  # Table 8
 ON = OFF + HYSTERESIS
 
 
-def modulator_of(table):
-    """(gain, time constant, level, on, off)."""
-    off = table["pwpf_u_off"]
-    return table["pwpf_gain"], table["pwpf_time_constant_s"], table["thrust_level"], off + table["pwpf_hysteresis"], off
-
-
 # ---- closed forms
-
-
-@pytest.mark.parametrize(
-    ("table", "shortest"), [(TABLE_4, 0.019589), (TABLE_8, 0.020582), (TABLE_9, 0.047669)], ids=["4", "8", "9"]
-)
-def test_the_shortest_pulse_of_each_table_is_that_of_equation_19(table, shortest):
-    assert shortest_pulse(*modulator_of(table)) == pytest.approx(shortest, abs=1e-6)
-
-
-def test_only_the_level_itself_as_output_gives_the_printed_0_021_s():
-    gain, tau, level, on, off = modulator_of(TABLE_8)
-    assert round(float(shortest_pulse(gain, tau, level, on, off)), 3) == 0.021
-    assert shortest_pulse(gain, tau, 1.0, on, off) == pytest.approx(0.0220, abs=5e-5)
-    assert shortest_pulse(gain, tau, 0.5 * level, on, off) == pytest.approx(0.0418, abs=5e-5)
-
-
-def test_the_closed_forms_of_table_8_under_0_3():
-    on, off = pulse_time(0.3, GAIN, TAU, LEVEL, ON, OFF), pause_time(0.3, GAIN, TAU, ON, OFF)
-    assert on == pytest.approx(0.027103, abs=1e-6)
-    assert off == pytest.approx(0.080803, abs=1e-6)
-    assert LEVEL * on / (on + off) == pytest.approx(0.26875, abs=1e-5)
-    assert dead_band(GAIN, ON) == pytest.approx(0.04628, abs=5e-6)
 
 
 # ---- the campaign under a constant torque
@@ -72,12 +44,6 @@ def test_flown_pulses_and_pauses_are_those_of_the_closed_forms(period):
     assert row["min_pulse_x_s"] == pytest.approx(0.027103, abs=1e-6)
     assert row["on_time_x_s"] / pulses == pytest.approx(0.027103, rel=1e-3)
     assert (t - first - row["on_time_x_s"]) / pulses == pytest.approx(0.080803, rel=1e-3)
-
-
-def test_the_mean_output_is_that_of_the_closed_forms():
-    row = fly_one(**asking(0.3))
-    assert LEVEL * row["on_time_x_s"] / 120.0 == pytest.approx(0.26875, rel=0.01)
-    assert row["impulse_x_n_m_s"] / 120.0 == pytest.approx(0.5 * 0.26875, rel=0.01)  # pairing B
 
 
 def test_flown_over_the_whole_range_the_closed_forms_hold():
@@ -112,11 +78,6 @@ def test_a_torque_of_the_other_sign_fires_the_other_thrusters_alike():
     assert seen.max() <= 0.0
 
 
-def test_an_axis_that_asks_for_nothing_stays_silent():
-    row = fly_one(**asking(0.3))
-    assert (row["pulse_count_y"], row["pulse_count_z"], row["impulse_y_n_m_s"]) == (0.0, 0.0, 0.0)
-
-
 # ---- valves that open and close late
 
 
@@ -127,7 +88,7 @@ def test_a_late_valve_moves_every_pulse_by_its_delay_and_keeps_its_impulse(delay
     first, second = (seen["torque_x_n_m"][:-1] for seen in (on_time, late))
     window = (t > 0.1) & (t < 0.3)  # two whole pulses, pauses about them
     assert second[window].sum() == pytest.approx(first[window].sum(), rel=1e-9)
-    centre = [np.sum(t[window] * one[window]) / np.sum(one[window]) for one in (first, second)]
+    centre = [np.sum(t[window] * torque[window]) / np.sum(torque[window]) for torque in (first, second)]
     assert centre[1] - centre[0] == pytest.approx(delay, abs=1e-12)
 
 
@@ -213,10 +174,9 @@ def test_cases_with_many_pulses_in_a_sample_have_the_same_bits_alone_and_among_o
     inputs = asking(np.array([0.0, 0.05, 0.1, 0.2, 0.3, 0.45, 0.49, -0.4])) | {"steps_per_sample": 100.0}
     together = fly_cases(**inputs)
     assert set(np.sign(together["pulse_count_x"] - 100.0)) == {-1.0, 1.0}
-    for width in (1, 16):
-        alone = fly(MODEL, NOMINAL | inputs, np.arange(8), SEED, width=width)
-        for name in ("impulse_x_n_m_s", "pulse_count_x", "min_pulse_x_s", "q1"):
-            np.testing.assert_array_equal(alone[name], together[name])
+    alone = fly(MODEL, NOMINAL | inputs, np.arange(8), SEED, width=1)
+    for name in ("impulse_x_n_m_s", "pulse_count_x", "min_pulse_x_s", "q1"):
+        np.testing.assert_array_equal(alone[name], together[name])
 
 
 def test_the_fastest_modulator_of_table_2_flies_alike_with_steps_of_5_ms_and_of_a_half():

@@ -2,26 +2,7 @@
 
 import numpy as np
 import pytest
-from flexible_flights import END, fly_cases, fly_one, history
-
-# Recomputed from the source's equations in the reading "fit"; tolerances of the digest's digits
-NOMINAL_END = [
-    ("q0", 0.999635, {"abs": 2e-5}),
-    ("q1", -6.496e-3, {"abs": 2e-5}),
-    ("q2", -6.699e-3, {"abs": 2e-5}),
-    ("q3", 0.025352, {"abs": 2e-5}),
-    ("omega_x_rad_s", -5.88e-5, {"abs": 5e-7}),
-    ("omega_y_rad_s", -1.0781e-3, {"abs": 5e-7}),
-    ("omega_z_rad_s", -1.94e-5, {"abs": 5e-7}),
-    ("eta_1", -5.21e-5, {"rel": 0.02}),
-    ("eta_2", -2.250e-4, {"rel": 0.02}),
-    ("eta_3", 8.24e-6, {"rel": 0.02}),
-    ("eta_4", -2.50e-6, {"rel": 0.02}),
-    ("peak_modal_displacement", 0.0653, {"rel": 0.05}),
-    ("settling_time_s", 53.7, {"abs": 1.0}),
-    ("control_effort_n_m_s", 37.99, {"rel": 0.01}),
-    ("attitude_effort_s", 49.03, {"rel": 0.01}),
-]
+from flexible_flights import END, fly_one, history
 
 
 @pytest.fixture(scope="module")
@@ -32,11 +13,6 @@ def nominal():
 @pytest.fixture(scope="module")
 def seen():
     return history()
-
-
-@pytest.mark.parametrize(("column", "value", "tolerance"), NOMINAL_END, ids=[row[0] for row in NOMINAL_END])
-def test_the_nominal_manoeuvre_ends_as_recomputed(nominal, column, value, tolerance):
-    assert nominal[column] == pytest.approx(value, **{"rel": 0.0, "abs": 0.0} | tolerance)
 
 
 def test_the_rate_is_held_at_its_limit(nominal):
@@ -53,53 +29,7 @@ def test_neither_the_step_nor_the_sampling_moves_the_end(nominal, grid):
     assert row["settling_time_s"] == pytest.approx(nominal["settling_time_s"], abs=0.05)
 
 
-def test_the_step_alone_moves_nothing_at_all(nominal):
-    """The same samples, two steps each: only the error of Runge-Kutta steps of 10 ms is left."""
-    row = fly_one(step_s=0.005, steps_per_sample=2.0)
-    np.testing.assert_allclose([row[name] for name in END], [nominal[name] for name in END], rtol=1e-5, atol=1e-9)
-
-
-# ---- what the source prints of this manoeuvre
-
-
-def test_the_printed_peak_of_the_modes_is_ours_to_its_digit(nominal):
-    assert round(nominal["peak_modal_displacement"], 2) == 0.07
-
-
-def test_the_vibration_is_damped_within_the_printed_100_s(nominal):
-    assert nominal["damping_time_s"] < 100.0
-
-
-def test_the_attitude_is_reached_sooner_than_the_printed_80_s(nominal, seen):
-    """The source reads "after 80 s" off a curve; 1 - q0 comes below the printed accuracy of 0.001 at 53.8 s.
-
-    Suspected cause: a curve on paper looks settled later.  At 80 s our 1 - q0 is within 2e-5 of its end.
-    """
-    assert nominal["settling_time_s"] == pytest.approx(53.75, abs=0.05)
-    assert 80.0 - nominal["settling_time_s"] > 20.0
-    assert seen["scalar_error"][seen["t_s"] == 80.0] == pytest.approx(1.0 - nominal["q0"], abs=2.1e-5)
-
-
-def test_the_accuracy_of_0_001_is_one_of_the_scalar_part_only(nominal):
-    assert 1.0 - nominal["q0"] == pytest.approx(3.65e-4, abs=1e-6)
-    assert abs(nominal["q3"]) > 25.0 * 0.001
-
-
-def test_the_gains_of_table_1_cannot_reach_the_bound_of_table_5(nominal):
-    """|q_v| < 0.005 at the end: the integral decays with a time constant of hours.  Table 12 itself has 0.027."""
-    assert nominal["q_vector_norm"] == pytest.approx(0.0270, abs=1e-4)
-    assert nominal["eta_norm"] < 0.005
-
-
 # ---- what the digest says of the readings
-
-# multiple of q_v - q_v(0) taken off the integral, q3 at 300 s
-GAMMA = [(0.5, 0.009), (1.0, 0.017), (1.5, 0.0254)]
-
-
-@pytest.mark.parametrize(("gamma", "q3"), GAMMA)
-def test_the_multiple_in_the_integral_decides_where_q3_ends(gamma, q3):
-    assert fly_one(integral_gamma=gamma)["q3"] == pytest.approx(q3, abs=2e-4)
 
 
 def test_with_the_orbital_rate_in_the_law_q2_is_wrong_by_a_factor_of_two():
@@ -120,26 +50,6 @@ def test_the_end_of_the_modes_is_the_answer_to_the_wave_of_the_disturbance(nomin
     """Mode 2 rings at 1 rad/s, as the disturbance does: half a period later its displacement is the opposite."""
     later = fly_one(duration_s=300.0 + np.pi)
     assert later["eta_2"] == pytest.approx(-nominal["eta_2"], rel=0.05)
-
-
-def test_the_offset_of_the_disturbance_matters_little():
-    ends = fly_cases(disturbance_offset=np.array([0.0, 1.0]))
-    shift = np.sqrt(sum((ends[f"q{i}"][1] - ends[f"q{i}"][0]) ** 2 for i in (1, 2, 3)))
-    assert shift == pytest.approx(np.sqrt(3.0) * 5.7e-5, rel=0.02)
-    assert abs(ends["q3"][1] - ends["q3"][0]) == pytest.approx(5.7e-5, rel=0.02)
-
-
-def test_a_fresh_draw_every_sample_is_half_on_average(nominal):
-    fresh = fly_one(disturbance_draw="sample")
-    assert fresh["q3"] != nominal["q3"]
-    assert fresh["q3"] == pytest.approx(nominal["q3"], abs=5e-6)
-    assert fresh["q3"] != fly_cases(disturbance_draw="sample", kp=np.array([5.0, 5.0]))["q3"][1]
-
-
-def test_the_switching_torque_moves_the_end_by_no_more_than_its_share_of_kp(nominal):
-    row = fly_one(dbar_n_m=1e-3)
-    moved = np.abs([row[f"q{i}"] - nominal[f"q{i}"] for i in (1, 2, 3)])
-    assert 1e-4 < moved.max() <= 1.05 * 1e-3 / 5.0
 
 
 # ---- the law along the way
@@ -195,9 +105,3 @@ def test_the_propellant_is_the_impulse_over_arm_and_exhaust_speed(nominal):
 def test_the_attitude_error_is_the_angle_of_the_quaternion(nominal):
     assert nominal["attitude_error_deg"] == pytest.approx(2.0 * np.degrees(np.arccos(nominal["q0"])), rel=1e-6)
     assert nominal["q_vector_norm"] == pytest.approx(np.sin(np.radians(nominal["attitude_error_deg"]) / 2.0), rel=1e-9)
-
-
-def test_an_ideal_actuator_fires_no_pulses(nominal):
-    assert nominal["pulse_count"] == 0.0
-    assert np.isnan(nominal["min_pulse_s"])
-    assert nominal["on_time_x_s"] == 0.0

@@ -22,37 +22,6 @@ def seen():
     return history(rows=60_000, **TABLE_8)
 
 
-def test_table_8_comes_out_as_recomputed(table_8):
-    assert table_8[SETTLED] == pytest.approx(168.0, abs=4.0)
-    assert table_8["peak_modal_displacement"] == pytest.approx(0.038, rel=0.1)
-    assert table_8[IMPULSE] == pytest.approx(50.4, rel=0.02)
-    assert table_8[ATTITUDE] == pytest.approx(133.8, rel=0.02)
-
-
-def test_a_pulse_of_table_8_has_the_printed_torque_of_0_535(seen):
-    torques = np.abs([seen[f"torque_{axis}_n_m"] for axis in AXES])
-    assert torques.max() == 0.535
-
-
-def test_table_4_comes_out_as_recomputed():
-    row = fly_one(**TABLE_4)
-    assert row[IMPULSE] == pytest.approx(50.25, rel=0.02)
-    assert row[ATTITUDE] == pytest.approx(135.0, rel=0.02)
-    assert row[SETTLED] == pytest.approx(170.0, abs=4.0)
-
-
-def test_table_9_comes_out_as_recomputed(table_9):
-    assert table_9[IMPULSE] == pytest.approx(42.6, rel=0.02)
-    assert table_9[ATTITUDE] == pytest.approx(113.8, rel=0.02)
-
-
-def test_table_9_is_better_than_table_8_in_both_objectives_and_fires_less_as_the_source_says(table_8, table_9):
-    assert table_9[IMPULSE] < 0.9 * table_8[IMPULSE]
-    assert table_9[ATTITUDE] < 0.9 * table_8[ATTITUDE]
-    assert table_9["pulse_count"] < 0.5 * table_8["pulse_count"]
-    assert table_9[SETTLED] < table_8[SETTLED]
-
-
 def test_the_printed_k_p_of_table_9_cannot_be_right(table_8):
     """0.2: the craft is nowhere near its attitude after 300 s.  A lost digit (5.2 or 6.2) restores the claims."""
     assert fly_one(**TABLE_9 | {"actuator": "ideal", "kp": 0.2})["q_vector_norm"] == pytest.approx(0.48, abs=0.005)
@@ -61,51 +30,6 @@ def test_the_printed_k_p_of_table_9_cannot_be_right(table_8):
     assert printed[ATTITUDE] > 2.0 * table_8[ATTITUDE]
     other = fly_one(**TABLE_9 | {"kp": 6.2})
     assert (other[IMPULSE], other[ATTITUDE]) < (table_8[IMPULSE], table_8[ATTITUDE])
-
-
-def test_only_the_small_integral_gain_comes_near_the_bound_of_table_5(table_9):
-    """Without thrusters 0.0054; the limit cycle of pairing B adds a hundredth."""
-    assert fly_one(**TABLE_9 | {"actuator": "ideal"})["q_vector_norm"] == pytest.approx(0.0054, abs=1e-4)
-    assert table_9["q_vector_norm"] == pytest.approx(0.015, abs=0.003)
-    assert table_9["eta_norm"] < 0.005
-
-
-@pytest.mark.parametrize("table", [TABLE_8, TABLE_9], ids=["Table 8", "Table 9"])
-def test_modes_and_rate_stay_below_their_printed_bounds(table):
-    row = fly_one(**table)
-    assert row["peak_modal_displacement"] < 0.08
-    assert row["peak_rate_rad_s"] < 0.1
-
-
-def test_with_thrusters_the_attitude_is_reached_later_than_the_printed_150_s(table_8):
-    """Suspected cause: "after 150 s" is read off a curve; the other two pairings settle at 61 s."""
-    assert table_8[SETTLED] == pytest.approx(168.35, abs=0.5)
-    assert fly_one()[SETTLED] < table_8[SETTLED]  # "with thrusters it takes longer": this holds
-
-
-@pytest.mark.parametrize(("step", "size"), [(0.005, 0.0100), (0.0025, 0.0050), (0.001, 0.0041)])
-def test_what_is_left_at_the_end_is_a_place_on_a_limit_cycle_that_moves_with_the_sample(step, size):
-    """Table 9 with pairing A: 0.004, as recomputed in the digest, with samples of 1 ms alone."""
-    row = fly_one(**TABLE_9 | {"step_s": step}, pwpf_pairing="A")
-    assert row["q_vector_norm"] == pytest.approx(size, abs=5e-5)
-
-
-# pairing, settled [s], largest modal displacement: recomputed in the digest
-PAIRINGS = [("A", 61.0, 0.086), ("B", 168.0, 0.038), ("C", 61.0, 0.086)]
-
-
-@pytest.mark.parametrize(("pairing", "settled", "peak"), PAIRINGS)
-def test_each_pairing_settles_as_recomputed(pairing, settled, peak):
-    row = fly_one(**TABLE_8, pwpf_pairing=pairing)
-    assert row[SETTLED] == pytest.approx(settled, abs=1.0)
-    assert row["peak_modal_displacement"] == pytest.approx(peak, rel=0.03)
-
-
-@pytest.mark.parametrize(("pairing", "level"), [("A", 1.07), ("B", 0.535), ("C", 0.535)])
-def test_each_pairing_has_its_torque(pairing, level):
-    seen = history(**TABLE_8, pwpf_pairing=pairing, duration_s=3.0)
-    torques = np.abs([seen[f"torque_{axis}_n_m"] for axis in AXES])
-    assert torques.max() == pytest.approx(level, rel=1e-12)
 
 
 @pytest.mark.parametrize("grid", [(0.01, 1), (0.005, 2), (0.0025, 1), (0.001, 1)])
@@ -122,16 +46,6 @@ def test_settling_effort_and_peaks_do_not_depend_on_step_and_sampling(table_8, g
 # ---- bookkeeping
 
 
-def test_the_bookkeeping_of_pulses_agrees_with_itself(table_8):
-    for axis in AXES:
-        assert table_8[f"impulse_{axis}_n_m_s"] == pytest.approx(0.535 * table_8[f"on_time_{axis}_s"], rel=1e-12)
-        assert table_8[f"on_time_{axis}_s"] > table_8[f"pulse_count_{axis}"] * table_8[f"min_pulse_{axis}_s"]
-    for total, part in [("pulse_count", "pulse_count_{}"), (IMPULSE, "impulse_{}_n_m_s")]:
-        assert table_8[total] == pytest.approx(sum(table_8[part.format(axis)] for axis in AXES), rel=1e-12)
-    assert table_8["min_pulse_s"] == min(table_8[f"min_pulse_{axis}_s"] for axis in AXES)
-    assert table_8["propellant_kg"] == pytest.approx(table_8[IMPULSE] / (0.5 * 220.0 * 9.80665), rel=1e-12)
-
-
 def test_the_bookkeeping_agrees_with_the_history(table_8, seen):
     for axis in AXES:
         torque = seen[f"torque_{axis}_n_m"][:-1]
@@ -142,10 +56,6 @@ def test_the_bookkeeping_agrees_with_the_history(table_8, seen):
         assert counted[-1] == table_8[f"pulse_count_{axis}"]
         # pauses are longer than a sample, so each pulse is a train of samples of its own
         assert table_8[f"pulse_count_{axis}"] == np.sum(firing[1:] & ~firing[:-1])
-
-
-def test_the_shortest_pulse_is_that_of_equation_19_to_a_fifth_of_a_percent(table_8):
-    assert table_8["min_pulse_s"] == pytest.approx(0.020582, rel=3e-3)
 
 
 def test_a_dead_thruster_pair_fires_without_effect():
@@ -161,9 +71,3 @@ def test_the_thrusters_of_the_table_file_are_those_of_the_print(table_8, table_9
     np.testing.assert_array_equal(flown[IMPULSE][[1, 4]], [table_8[IMPULSE], table_9[IMPULSE]])
     assert flown[IMPULSE][3] == fly_one(**TABLE_4)[IMPULSE]
     assert flown[SETTLED][6] == 300.0
-
-
-def test_the_thruster_campaign_flies_table_8(table_8):
-    flown = fly_campaign("pwpf.toml", 64)
-    assert flown[SETTLED].mean() == pytest.approx(table_8[SETTLED], abs=4.0)
-    assert flown[SETTLED].std() == pytest.approx(7.2, abs=2.0)

@@ -9,7 +9,7 @@ MODEL = load_model("campaigns.geo_injection")
 NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settings)}
 
 
-def fly_cases(width=8, ids=None, **inputs):
+def fly_cases(width=None, ids=None, **inputs):
     """Columns of as many cases as the longest input has values."""
     n_cases = max((np.size(value) for value in inputs.values()), default=1)
     return fly(MODEL, NOMINAL | inputs, np.arange(n_cases) if ids is None else ids, 1, width=width)

@@ -4,8 +4,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from campaigns.geo_injection.continuation import optimum
-from campaigns.geo_injection.sequence import Sequence
+from campaigns.geo_injection.design.continuation import optimum
+from campaigns.geo_injection.design.sequence import Sequence
 
 GEO, PARKING = 42_164_137.0, 6_578_137.0
 THRUST, FLOW, MASS = 20_000.0, 6.14, 22_170.0

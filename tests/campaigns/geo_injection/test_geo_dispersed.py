@@ -2,8 +2,12 @@
 
 import numpy as np
 import pytest
-from geo_flights import MODEL, NOMINAL, fly_cases, fly_one
+from geo_flights import NOMINAL, fly_cases, fly_one
+from geo_sequences import GEO, MU, PARKING, elements
+from geo_twin import fly_twin
 
+from campaigns.geo_injection.design.kept_programs import SEQUENCES as KEPT
+from campaigns.geo_injection.design.programs import program_for
 from campaigns.geo_injection.linear_prediction import predicted_sigmas
 
 THREE_STAGED = {"method": "staged", "burns": 3}
@@ -36,7 +40,7 @@ def test_the_nominal_replay_reaches_the_final_circle(inputs, guidance, shutdown)
     assert abs(row["radius_error_km"]) < 0.1
 
 
-# first burn [s] of the orbits that the source goes over, where no orbit is given
+# first burn [s] to the orbits that the source goes over where no other is given, as re-solved in the digest, section 7
 STAGED = [
     ({}, 2051.2),
     ({"planar": True}, 2027.9),
@@ -60,25 +64,40 @@ def test_another_orbit_between_two_staged_burns_is_gone_over():
     assert "transfer_1_semi_major_axis_km is below the Earth's radius" in sunk["reason"]
 
 
-def test_one_thousandth_more_thrust():
-    row = fly_one(thrust_factor=1.001)
-    assert row["semi_major_axis_km"] == pytest.approx(42_555.77, abs=1.0)
-    assert row["eccentricity"] == pytest.approx(0.006396, abs=2e-5)
-    assert row["inclination_deg"] == pytest.approx(0.1749, abs=5e-4)
-    assert row["longitude_drift_deg_day"] == pytest.approx(-4.972, abs=0.01)
-    assert row["correction_dv_m_s"] == pytest.approx(16.98, abs=0.05)
+def speed(at, other):
+    """Speed [m/s] at one apsis of an ellipse whose other apsis is given, by vis-viva."""
+    return np.sqrt(2.0 * MU * other / (at * (at + other)))
 
 
-def test_half_a_degree_of_pitch():
-    row = fly_one(pitch_error_deg=0.5)
-    assert row["eccentricity"] == pytest.approx(0.00277, abs=2e-5)
-    assert row["inclination_deg"] == pytest.approx(0.12768, abs=5e-4)
+def orbit_of_twin(**errors):
+    """Where an independent flight of the nominal program ends, and what its correction costs, by column name."""
+    state = fly_twin(program_for(KEPT["two_burns_28_5"]), **errors)
+    a_km, e, inclination_deg = elements(np.append(state[:3] / PARKING, state[3:6] / np.sqrt(MU / PARKING)))
+    low, high = 1e3 * a_km * (1.0 - e), 1e3 * a_km * (1.0 + e)
+    circular = speed(GEO, GEO)
+    orders = [
+        abs(speed(first, GEO) - speed(first, second)) + abs(circular - speed(GEO, first))
+        for first, second in ((low, high), (high, low))
+    ]
+    plane = 2.0 * circular * np.sin(0.5 * np.radians(inclination_deg))
+    return {
+        "semi_major_axis_km": a_km,
+        "eccentricity": e,
+        "inclination_deg": inclination_deg,
+        "longitude_drift_deg_day": np.degrees(86_400.0 * (np.sqrt(MU / (1e3 * a_km) ** 3) - np.sqrt(MU / GEO**3))),
+        "correction_dv_m_s": np.hypot(min(orders), plane),
+    }
 
 
-def test_half_a_degree_of_yaw():
-    row = fly_one(yaw_error_deg=0.5)
-    assert row["semi_major_axis_km"] == pytest.approx(42_092.2, abs=1.0)
-    assert row["inclination_deg"] == pytest.approx(0.26411, abs=5e-4)
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("thrust_factor", 1.001), ("pitch_error_deg", 0.5), ("yaw_error_deg", 0.5), ("ignition_delay_1_s", 10.0)],
+)
+def test_one_error_leads_where_an_independent_flight_leads(name, value):
+    row = fly_one(**{name: value})
+    for metric, expected in orbit_of_twin(**{name: value}).items():
+        assert row[metric] == pytest.approx(expected, rel=1e-5, abs=1e-7), metric
+    assert row["correction_dv_m_s"] > 5.0
 
 
 def test_pointing_errors_of_all_burns_are_those_of_each():
@@ -88,16 +107,8 @@ def test_pointing_errors_of_all_burns_are_those_of_each():
     assert fly_one(yaw_error_1_deg=0.3)["inclination_deg"] != fly_one(yaw_error_2_deg=0.3)["inclination_deg"]
 
 
-def test_a_first_ignition_ten_seconds_late():
-    row = fly_one(ignition_delay_1_s=10.0)
-    assert row["semi_major_axis_km"] == pytest.approx(42_157.06, abs=0.2)
-    assert row["eccentricity"] == pytest.approx(0.001386, abs=1e-5)
-    assert row["inclination_deg"] == pytest.approx(0.12064, abs=2e-4)
-
-
 def test_thrust_and_mass_that_grow_alike_leave_the_orbit_and_scale_the_propellant():
     row, nominal = fly_one(thrust_factor=1.01, initial_mass_factor=1.01), fly_one()
-    assert row["propellant_kg"] == pytest.approx(16_647.81, abs=0.5)
     assert row["propellant_kg"] == pytest.approx(1.01 * nominal["propellant_kg"], rel=1e-12)
     assert row["semi_major_axis_km"] == pytest.approx(nominal["semi_major_axis_km"], abs=1e-6)
     assert row["last_burn_out_s"] == pytest.approx(nominal["last_burn_out_s"], abs=1e-6)
@@ -117,12 +128,6 @@ def test_all_ignitions_late_by_as_much_is_the_orbit_turned_in_time():
     assert late["semi_major_axis_km"] == pytest.approx(ahead["semi_major_axis_km"], abs=0.01)
     assert late["inclination_deg"] == pytest.approx(ahead["inclination_deg"], abs=1e-6)
     assert late["last_burn_out_s"] == pytest.approx(ahead["last_burn_out_s"] + 5.0, abs=1e-6)
-
-
-def test_delays_do_not_accumulate_and_may_be_negative():
-    nominal, early = fly_one(), fly_one(ignition_delay_1_s=-10.0, ignition_delay_2_s=3.0)
-    assert early["burn_out_1_s"] == pytest.approx(nominal["burn_out_1_s"] - 10.0, abs=1e-9)
-    assert early["last_burn_out_s"] == pytest.approx(nominal["last_burn_out_s"] + 3.0, abs=1e-9)
 
 
 def test_an_ignition_inside_the_burn_before_it_is_refused_with_the_reason():
@@ -162,19 +167,20 @@ def drawn(n, **inputs):
     )
 
 
-def test_the_scatter_of_the_semi_major_axis_and_of_the_propellant():
-    """2155 km and 96.1 kg, 1 sigma; six percent is what 1000 cases may be off, twice."""
-    flown = drawn(2000)
-    assert (flown["status"] == "ok").all()
-    assert flown["semi_major_axis_km"].std(ddof=1) == pytest.approx(2155.0, rel=0.06)
-    assert flown["propellant_kg"].std(ddof=1) == pytest.approx(96.1, rel=0.05)
-
-
-def test_linear_theory_predicts_the_scatter():
+def test_linear_theory_is_that_of_an_independent_flight_and_predicts_the_scatter():
+    """2000 cases: a deviation is good to 1.6 %, and the second order of the errors adds some percent."""
     flown, linear = drawn(2000), predicted_sigmas(NOMINAL, SIGMAS)
-    assert linear["propellant_kg"] == pytest.approx(96.1, abs=0.1)
+    assert (flown["status"] == "ok").all()
+    changes = []
+    for name, sigma in SIGMAS.items():
+        ends = [orbit_of_twin(**{name: NOMINAL[name] + side * 0.1 * sigma}) for side in (1.0, -1.0)]
+        changes.append((ends[0]["semi_major_axis_km"] - ends[1]["semi_major_axis_km"]) / 0.2)
+    assert linear["semi_major_axis_km"] == pytest.approx(np.linalg.norm(changes), rel=1e-4)
+    # the propellant is that of the nominal burns times thrust over specific impulse
+    shares = SIGMAS["thrust_factor"], SIGMAS["isp_factor"]
+    assert linear["propellant_kg"] == pytest.approx(fly_one()["propellant_kg"] * np.hypot(*shares), rel=1e-4)
     for metric in ("semi_major_axis_km", "propellant_kg", "radius_error_km"):
-        assert flown[metric].std(ddof=1) == pytest.approx(linear[metric], rel=0.08)
+        assert flown[metric].std(ddof=1) == pytest.approx(linear[metric], rel=0.06), metric
 
 
 def test_aiming_the_last_burn_again_takes_the_correction_to_a_fifth_and_the_drift_away():
@@ -193,19 +199,7 @@ def test_a_planar_last_burn_is_aimed_from_the_perigee_where_there_is_no_node():
     assert aimed["plane_error_deg"] < 1e-9
 
 
-def test_propellant_goes_with_thrust_over_specific_impulse():
-    row = fly_one(thrust_factor=1.02, isp_factor=0.99)
-    assert row["propellant_kg"] == pytest.approx(fly_one()["propellant_kg"] * 1.02 / 0.99, rel=1e-9)
-    assert row["propellant_margin_kg"] == pytest.approx(16_775.0 - row["propellant_kg"], abs=1e-6)
-
-
 def test_a_sequence_that_has_no_design_is_refused_with_how_far_the_search_got():
     row = fly_one(thrust_n=300.0)  # at the mass flow of the large engine: 49 m/s of exhaust speed
     assert row["status"] == "refused"
     assert "the search for" in row["reason"]
-
-
-def test_every_metric_of_a_flown_case_is_a_number():
-    row = fly_one(thrust_factor=1.003, burns=3)
-    assert all(np.isfinite(row[field.name]) for field in MODEL.metrics)
-    assert row["burn_out_1_s"] < row["burn_out_2_s"] < row["last_burn_out_s"]

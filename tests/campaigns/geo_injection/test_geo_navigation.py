@@ -6,9 +6,9 @@ from geo_flights import fly_one
 from geo_sequences import MU
 
 from campaigns.geo_injection.aiming import known
-from campaigns.geo_injection.design import program_for
+from campaigns.geo_injection.design.kept_programs import SEQUENCES
+from campaigns.geo_injection.design.programs import program_for
 from campaigns.geo_injection.dynamics import State
-from campaigns.geo_injection.kept_programs import SEQUENCES
 
 CLOSED = {"guidance": "re_aimed", "shutdown": "sensed_velocity"}
 

@@ -7,8 +7,8 @@ import pytest
 from geo_flights import fly_cases
 from geo_twin import fly_twin
 
-from campaigns.geo_injection import design
-from campaigns.geo_injection.kept_programs import SEQUENCES
+from campaigns.geo_injection.design import programs as design
+from campaigns.geo_injection.design.kept_programs import SEQUENCES
 
 MICROSECONDS_A_FLIGHT = 2 * 5.0 / 100_000 * 1e6  # 100 000 flights in 5 s on two cores
 SECONDS_A_DESIGN = 30.0

@@ -5,7 +5,8 @@ Numbers in brackets are equations of the source (`model.SOURCE`).
 
 import numpy as np
 
-from campaigns.geo_servicing.dynamics import R0, RATE, SIDEREAL_DAY, TURN
+from campaigns.geo_servicing.dynamics import R0, RATE, SIDEREAL_DAY
+from mc_engine.physics.frames import TURN
 
 
 def longitude_after(y, v, e, anomaly, flown):

@@ -160,8 +160,6 @@ def test_with_the_gain_of_the_ideal_case_one_trial_in_eight_leaves_the_sources_b
     chi1 = np.full(1000, 0.85)
     share = held(fly_cases(**INSPECTION | GOOD_FIXES | EXECUTION, chi1=chi1)).mean()
     assert share == pytest.approx(0.88, abs=0.03)
-    (record,) = [one for one in MODEL.published if "keep the steady range" in one["quantity"]]
-    assert 100.0 * share == pytest.approx(record["ours"], abs=0.05)
     assert held(fly_cases(**INSPECTION | GOOD_FIXES, chi1=chi1)).mean() == pytest.approx(0.845, abs=0.035)
 
 
@@ -172,16 +170,11 @@ def test_corrections_in_pairs_hold_the_sources_band_in_every_trial():
         assert held(fly_cases(**pairs, chi1=np.full(200, chi1))).all()
 
 
-def test_single_fixes_with_the_printed_errors_hold_nothing():
-    raw = INSPECTION | EXECUTION | PRINTED_FIXES | {"navigation": "raw"}
-    assert held(fly_cases(**raw, chi1=np.full(200, 0.85))).mean() == 0.0
-
-
 def test_fixes_of_both_craft_err_as_one_relative_fix_of_their_root_sum_square():
     both = {"nav_position_m": 0.06, "target_nav_position_m": 0.08, "nav_velocity_m_s": 6e-6} | FIVE_DAYS
     row = fly_one(**INSPECTION | {"navigation": "raw"} | both | {"target_nav_velocity_m_s": 8e-6})
-    one = fly_one(**INSPECTION | GOOD_FIXES | FIVE_DAYS)
-    assert row["delta_v_m_s"] == pytest.approx(one["delta_v_m_s"], rel=1e-9)
+    relative_fix = fly_one(**INSPECTION | GOOD_FIXES | FIVE_DAYS)
+    assert row["delta_v_m_s"] == pytest.approx(relative_fix["delta_v_m_s"], rel=1e-9)
     assert row["delta_v_m_s"] != fly_one(**INSPECTION | {"navigation": "raw"} | both)["delta_v_m_s"]
 
 
@@ -215,21 +208,3 @@ def test_a_fly_around_stays_between_its_ranges_and_goes_around():
     late = seen["t_s"] > 20.0 * DAY
     turns = np.unwrap(np.arctan2(seen["radial_m"][late], seen["along_track_m"][late]))
     assert abs(turns[-1] - turns[0]) / (2.0 * np.pi) == pytest.approx(10.0 * DAY / SIDEREAL_DAY, abs=0.2)
-
-
-def test_a_difference_of_sunlight_moves_the_module_from_its_place():
-    """Five per cent of area over mass between the craft: the ellipse grows by 1e-7 between two pairs."""
-    lit = INSPECTION | {"inspection_law": "pairs", "sunlight": True}
-    alike, unlike = fly_one(**lit), fly_one(**lit, target_area_to_mass_factor=0.95)
-    assert alike["settled_max_range_m"] - alike["settled_min_range_m"] < 1.0
-    assert unlike["settled_max_range_m"] - unlike["settled_min_range_m"] > 10.0
-
-
-def test_both_coasts_and_ranges_count_from_the_same_flight():
-    row, seen = fly_one(**INSPECTION), history(**INSPECTION, rows=8641)
-    assert row["max_range_m"] == pytest.approx(seen["range_m"].max(), rel=1e-3)
-    late = seen["t_s"] > 15.0 * DAY
-    assert row["settled_min_range_m"] == pytest.approx(seen["range_m"][late].min(), abs=0.05)
-    assert row["settled_max_range_m"] == pytest.approx(seen["range_m"][late].max(), abs=0.05)
-    apart = np.hypot(seen["along_track_m"], seen["radial_m"])
-    assert apart == pytest.approx(seen["range_m"], rel=1e-3, abs=0.1)

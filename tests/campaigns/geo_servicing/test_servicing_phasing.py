@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from servicing_flights import KEPLER, PUBLISHED, fly_cases, fly_one, history, normal
+from servicing_flights import KEPLER, PUBLISHED, fly_cases, fly_one, normal
 
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.flight.flight import fly
 
-N = 2000
+N = 500  # a deviation of the sample is then good to 3 %
 ERRORS = ("thrust_error_pct", "out_of_plane_deg", "radial_deg")
 FEEDBACK = PUBLISHED | {"feedback": True}
 
@@ -25,56 +25,11 @@ def spread(row, *names):
     return [row[name].std() for name in names]
 
 
-@pytest.fixture(scope="module")
-def published():
-    return fly_one(**PUBLISHED)
-
-
 def test_kepler_alone_ends_where_the_digest_has_it():
     row = fly_one(**PUBLISHED | KEPLER)
     assert row["mean_longitude_deviation_deg"] == pytest.approx(-0.0388, abs=5e-4)
     assert row["drift_rate_deg_rev"] == pytest.approx(-0.00411, abs=1e-4)
     assert row["eccentricity"] == pytest.approx(2.422e-4, abs=1e-6)
-
-
-def test_the_full_dynamics_end_where_the_digest_has_them(published):
-    assert published["longitude_deviation_deg"] == pytest.approx(-0.0268, abs=1e-3)
-    assert published["mean_longitude_deviation_deg"] == pytest.approx(-0.0008, abs=1e-3)
-    assert published["drift_rate_deg_rev"] == pytest.approx(-0.0100, abs=5e-4)
-    assert published["actual_drift_rate_deg_rev"] == pytest.approx(0.0133, abs=5e-4)
-    assert published["eccentricity"] == pytest.approx(2.351e-4, abs=2e-6)
-    assert published["transfer_time_s"] == pytest.approx(199_296.0, abs=1e-6)
-    assert published["delta_v_m_s"] == pytest.approx(5.43, abs=0.01)
-    assert published["corrections"] == 3.0
-
-
-def test_after_the_first_burn_the_eccentricity_is_the_digests():
-    """1.520e-3 as the second burn begins; Moon and Sun carry it from 1.516e-3 over 1.543e-3 on the way."""
-    seen = history(**PUBLISHED | {"duration_days": 3.0}, rows=5185)
-    at = np.interp([131_480.0, 169_171.0], seen["t_s"], seen["eccentricity"])
-    assert at[1] == pytest.approx(1.520e-3, abs=5e-6)
-    assert at[0] == pytest.approx(1.520e-3, abs=5e-6)
-    assert fly_one(**PUBLISHED)["peak_eccentricity"] == pytest.approx(1.543e-3, abs=5e-6)
-
-
-def test_the_printed_terminal_values_are_not_reached(published):
-    """Printed: mean deviation -0.016 deg, drift 0.0036 deg/rev, eccentricity 0.000322, all at once.
-
-    By no definition are they what the printed burns lead to; two independent integrations agree with ours.  Suspected:
-    averages that are not stated, other luni-solar positions, or burns that are rounded from a converged set.
-    """
-    readings = {"longitude_deviation_deg", "mean_longitude_deviation_deg", "daily_mean_longitude_deviation_deg"}
-    assert all(abs(published[name] + 0.016) > 0.005 for name in readings)
-    assert abs(published["drift_rate_deg_rev"] - 0.0036) > 0.005
-    assert abs(published["actual_drift_rate_deg_rev"] - 0.0036) > 0.005
-    assert 322e-6 - published["eccentricity"] > 5e-5
-
-
-def test_the_printed_claim_holds_all_tolerances_are_met(published):
-    assert all(abs(published[f"{name}longitude_deviation_deg"]) < 0.05 for name in ("", "mean_", "daily_mean_"))
-    assert abs(published["period_error_s"]) < 5.0
-    assert abs(published["actual_period_error_s"]) < 5.0
-    assert published["eccentricity"] < 4e-4
 
 
 def test_errors_fresh_in_every_burn_spread_the_end_as_the_digest_says():
@@ -87,12 +42,6 @@ def test_one_error_a_run_spreads_the_end_as_the_digest_says():
     row = fly_cases(**PUBLISHED, **per_run())
     names = ("mean_longitude_deviation_deg", "drift_rate_deg_rev", "eccentricity")
     assert spread(row, *names) == pytest.approx([0.0057, 0.0077, 3.4e-6], rel=0.12)
-
-
-def test_feedback_on_single_fixes_leaves_the_drift_that_the_digest_says():
-    """0.1 m/s at the last ignition: 0.035 deg/rev."""
-    row = fly_cases(**FEEDBACK | {"navigation": "raw"}, nav_position_m=np.full(N, 10.0))
-    assert spread(row, "drift_rate_deg_rev") == pytest.approx([0.035], rel=0.15)
 
 
 def test_a_filter_makes_feedback_useful():
@@ -114,11 +63,11 @@ def test_perfect_feedback_leaves_only_the_last_burns_error():
 def test_the_dispersed_campaign_meets_every_tolerance(aim):
     """All dispersions of the campaign file, 2000 cases; with the drift half-way, by both readings of the period."""
     campaign = load_campaign("geo_servicing")
-    rng, inputs = np.random.default_rng(11), dict(campaign.nominal)
-    for one in campaign.dispersions:
-        inputs[one.name] = one.distribution.ppf(rng.random(N))
+    rng, inputs, n = np.random.default_rng(11), dict(campaign.nominal), 2000
+    for dispersion in campaign.dispersions:
+        inputs[dispersion.name] = dispersion.distribution.ppf(rng.random(n))
     inputs["aim_drift_deg_rev"] = aim
-    row = fly(campaign.model, inputs, np.arange(N), campaign.seed)
+    row = fly(campaign.model, inputs, np.arange(n), campaign.seed)
     good = (row["status"] == "ok") & (np.abs(row["daily_mean_longitude_deviation_deg"]) < 0.05)
     good &= (np.abs(row["actual_period_error_s"]) < 5.0) & (row["eccentricity"] < 4e-4)
     good &= row["transfer_time_s"] < 864_000.0
@@ -134,8 +83,3 @@ def test_tilts_of_the_thrust_out_of_the_plane_move_the_inclination_and_nothing_e
     change = tilted["drift_rate_deg_rev"] - straight["drift_rate_deg_rev"]
     assert change == pytest.approx((np.cos(np.radians(2.0)) - 1.0) * -1.546, rel=0.05)
     assert tilted["delta_v_m_s"] == pytest.approx(straight["delta_v_m_s"], rel=1e-9)
-
-
-def test_a_thrust_error_counts_in_the_velocity_that_is_spent():
-    row = fly_one(**PUBLISHED, burn_2_thrust_error_pct=10.0)
-    assert row["delta_v_m_s"] - fly_one(**PUBLISHED)["delta_v_m_s"] == pytest.approx(0.18281, rel=2e-3)

@@ -8,8 +8,6 @@ from typer.testing import CliRunner
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.command_line.commands import app
 
-FILE_LINES, MODEL_LINES = 20, 75
-
 
 def call(*words):
     done = CliRunner().invoke(app, [str(word) for word in words])
@@ -22,11 +20,6 @@ def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("newcomer") / "my_case"
     call("init", folder)
     return folder
-
-
-def test_it_is_short(made):
-    assert len((made / "campaign.toml").read_text().splitlines()) <= FILE_LINES
-    assert len((made / "model.py").read_text().splitlines()) <= MODEL_LINES
 
 
 def test_it_shows_parameters_dispersions_a_requirement_an_event_and_retention(made):

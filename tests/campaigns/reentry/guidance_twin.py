@@ -5,7 +5,14 @@ from reentry_flights import MU, RADIUS
 from reentry_twin import standard_density
 from scipy.integrate import solve_ivp
 
-from campaigns.reentry.reference import RANGE_SET, Planner, fly_reference, linear_system, riccati_gains, steered_part
+from campaigns.reentry.guidance.reference import (
+    RANGE_SET,
+    Planner,
+    fly_reference,
+    linear_system,
+    riccati_gains,
+    steered_part,
+)
 
 G0 = 9.80665
 TRIGGER, LAST, SCALE_HEIGHT, FELT = 0.15 * G0, 400.0, 7000.0, 0.05 * G0

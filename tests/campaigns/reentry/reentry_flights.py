@@ -6,7 +6,7 @@ import numpy as np
 
 from campaigns.reentry.airframe import airframe_of
 from campaigns.reentry.entry_state import entry_of, world_of
-from campaigns.reentry.plan import Plan, planned_entry, plans_of
+from campaigns.reentry.guidance.plan import Plan, planned_entry, plans_of
 from mc_engine.flight.flight import fly, fly_history
 from mc_engine.model import Refusals, load_model
 
@@ -45,6 +45,18 @@ def fly_cases(width=8, ids=None, **inputs):
     return fly(MODEL, NOMINAL | inputs, np.arange(n_cases) if ids is None else ids, 1, width=width)
 
 
+def assert_same_bits_alone(together, picked, width=8, each=(), **inputs):
+    """The picked cases have the bits of their rows among the others where each flies alone.
+
+    each : input -> a value for every case;  inputs : what all cases share.
+    """
+    for case in picked:
+        own = {name: values[case] for name, values in dict(each).items()}
+        alone = fly_cases(width=width, ids=np.array([case]), **inputs, **own)
+        for name, column in together.items():
+            assert column[case : case + 1].tolist() == alone[name].tolist() or np.isnan(column[case]), (case, name)
+
+
 def fly_one(**inputs):
     """The row of one case: a number or a word by column name."""
     return {name: column[0] for name, column in fly_cases(**inputs).items()}
@@ -53,8 +65,12 @@ def fly_one(**inputs):
 def plan_of(**inputs):
     """The plan of one case, as plain numbers."""
     inputs = NOMINAL | inputs
-    i = SimpleNamespace(**{one.symbol: np.array([inputs[one.name] * one.si_factor]) for one in MODEL.parameters})
-    o = SimpleNamespace(**{one.symbol: np.array([one.code(inputs[one.name])]) for one in MODEL.settings})
+    i = SimpleNamespace(
+        **{parameter.symbol: np.array([inputs[parameter.name] * parameter.si_factor]) for parameter in MODEL.parameters}
+    )
+    o = SimpleNamespace(
+        **{setting.symbol: np.array([setting.code(inputs[setting.name])]) for setting in MODEL.settings}
+    )
     refusals = Refusals.none(1)
     world = world_of(i, o)
     planned = planned_entry(o, world, entry_of(i, o, world, refusals), refusals)

@@ -34,10 +34,6 @@ def test_a_steady_command_is_followed_late_by_the_lag():
     assert 0.01 * 40.0 - bank == pytest.approx(0.01 * lag, rel=0.01)
 
 
-def test_without_a_lag_the_command_is_there_at_once():
-    assert followed(1.0, 0.2, -2.0, 0.0, 0.3, 1.0) == (-2.0, 0.0)
-
-
 @given(bank=number, rate=st.floats(-0.35, 0.35), command=number, lag=st.floats(0.2, 3.0), limit=st.floats(0.36, 1.0))
 def test_between_samples_the_rate_goes_over_its_limit_by_less_than_a_third(bank, rate, command, lag, limit):
     period = 1.0
@@ -49,14 +45,6 @@ def test_between_samples_the_rate_goes_over_its_limit_by_less_than_a_third(bank,
     assert course[-1] == pytest.approx(end, abs=1e-12)
     assert np.abs(np.diff(course) / np.diff(t)).max() < 1.3 * limit
     assert abs(later) <= limit
-
-
-@given(bank=number, command=number)
-def test_the_bank_comes_to_its_command(bank, command):
-    rate = 0.0
-    for _ in range(60):
-        bank, rate = followed(bank, rate, command, 1.5, 0.35, 1.0)
-    assert (bank, rate) == pytest.approx((command, 0.0), abs=1e-6)
 
 
 def test_the_side_changes_only_where_the_miss_leaves_its_band():

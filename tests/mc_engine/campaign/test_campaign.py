@@ -1,12 +1,10 @@
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from toy import HERE, MODEL, load, problems
+from toy import HERE, load, problems
 
 from mc_engine.campaign.cases import case_table, dispersion_records
 from mc_engine.campaign.loading import load_campaign
@@ -39,11 +37,9 @@ def test_a_campaign_is_read_from_its_file(folder):
     assert (campaign.design, campaign.cases, campaign.seed, campaign.title) == ("sobol", 64, 0, "Stones")
     assert (campaign.name, campaign.text, campaign.directory) == (folder.name, TEXT, folder)
     assert (campaign.model.name, campaign.model_reference) == ("toy", "toy.py")
-    assert [(one.name, one.dist, one.source) for one in campaign.dispersions] == [("speed_pct", "normal", "thrower")]
-
-
-def test_the_title_of_the_model_stands_in_for_a_missing_one():
-    assert load("").title == MODEL.title
+    assert [(dispersion.name, dispersion.dist, dispersion.source) for dispersion in campaign.dispersions] == [
+        ("speed_pct", "normal", "thrower")
+    ]
 
 
 def test_cases_and_seed_can_be_given_from_outside():
@@ -69,7 +65,7 @@ def test_numbers_from_outside_are_checked_like_those_of_the_file(option, place):
 
 
 def test_every_mistake_is_reported_at_once_against_the_model_too():
-    found = problems("""
+    messages = problems("""
         [parameters]
         mass_kg = -1
         [dispersion.sped_pct]
@@ -84,7 +80,7 @@ def test_every_mistake_is_reported_at_once_against_the_model_too():
         [retention]
         histories = { worst = { metric = "fuel" } }
     """)
-    assert found == {
+    assert messages == {
         "parameters.mass_kg": "-1 is not allowed; the model accepts 0 kg and above",
         "dispersion.sped_pct": 'is not a parameter of toy; did you mean "speed_pct"?',
         "dispersion.angle_deg.lower": "20 is not below upper = 10",
@@ -92,17 +88,6 @@ def test_every_mistake_is_reported_at_once_against_the_model_too():
         "requirement.range": "has no limit; give at_most, at_least or both",
         "retention.histories.worst.metric": '"fuel" is not a metric of toy; known are "range_m", "propellant_kg"',
     }
-
-
-def test_the_text_of_the_error_reads_like_a_list(folder):
-    (folder / "campaign.toml").write_text(TEXT.replace("normal", "nromal").replace("cases = 64", "cases = 0"))
-    with pytest.raises(CampaignError) as caught:
-        load_campaign(folder)
-    assert str(caught.value) == (
-        "campaign.toml: 2 problems\n"
-        "  campaign.cases: 0 is not allowed; it must be at least 1\n"
-        '  dispersion.speed_pct.dist: "nromal" is not known; did you mean "normal"?'
-    )
 
 
 @pytest.mark.parametrize(
@@ -117,34 +102,18 @@ def test_the_text_of_the_error_reads_like_a_list(folder):
 )
 def test_a_model_that_is_not_there_is_refused_with_the_rest_of_the_mistakes(model, message):
     head = f'[campaign]\nmodel = "{model}"\ndesign = "mc"\nseed = 1\ncases = true\n'
-    found = problems("", head=head)
-    assert set(found) == {"campaign.model", "campaign.cases"}
-    assert message in found["campaign.model"]
-
-
-def test_a_misspelt_shipped_model_is_recognised():
-    head = '[campaign]\nmodel = "campaigns.deorbitt"\ndesign = "mc"\nseed = 1\ncases = 1\n'
-    assert problems("", head=head)["campaign.model"].endswith('did you mean "campaigns.deorbit"?')
+    messages = problems("", head=head)
+    assert set(messages) == {"campaign.model", "campaign.cases"}
+    assert message in messages["campaign.model"]
 
 
 @pytest.mark.parametrize("design", ["mc", "lhs", "sobol"])
 def test_a_random_design_needs_cases_and_a_seed(design):
-    found = problems("", design, head='[campaign]\nmodel = "toy.py"\ndesign = "{design}"\n#cases\n')
-    assert list(found) == ["campaign.cases", "campaign.seed"]
-
-
-def test_a_design_that_is_gone_names_the_one_to_use():
-    assert problems("", "halton")["campaign.design"] == '"halton" is no longer offered; use "sobol"'
+    messages = problems("", design, head='[campaign]\nmodel = "toy.py"\ndesign = "{design}"\n#cases\n')
+    assert list(messages) == ["campaign.cases", "campaign.seed"]
 
 
 GRID = "[dispersion.speed_pct]\nhalf_range = 1\nlevels = 3\n[dispersion.height_km]\nvalues = [1, 2]\n"
-
-
-def test_a_grid_counts_its_cases_itself():
-    assert load(GRID, "grid").cases == 6
-    assert load(GRID, "one_at_a_time").cases == 6
-    assert load("", "grid").cases == 1
-    assert load("cases = 6\n" + GRID, "grid").cases == 6
 
 
 def test_a_grid_with_another_number_of_cases_is_refused():
@@ -160,28 +129,10 @@ def test_a_grid_of_more_than_a_thousand_million_cases_is_refused_unbuilt():
     assert problems(body, "grid") == {"campaign.design": "10000000000 cases; at most 1000000000 are possible"}
 
 
-def test_a_latin_hypercube_that_does_not_fit_into_memory_is_refused():
-    assert list(problems("cases = 20_000_000\n", "lhs")) == ["campaign.cases"]
-    assert problems("cases = 20_000_000\n", "sobol") == {}
-
-
-def test_a_file_over_five_megabytes_is_refused(folder):
-    (folder / "campaign.toml").write_text(TEXT + "#" * 5_000_000)
-    with pytest.raises(CampaignError, match="larger than 250 kB"):
-        load_campaign(folder)
-
-
 def test_a_file_that_is_not_utf8_is_refused_with_its_line(folder):
     (folder / "campaign.toml").write_bytes(b"# ok\n# \xff\n")
     with pytest.raises(CampaignError, match="line 2: is not text in UTF-8"):
         load_campaign(folder)
-
-
-def test_windows_line_ends_and_a_byte_order_mark_do_no_harm(folder):
-    before = load_campaign(folder)
-    (folder / "campaign.toml").write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n").encode())
-    after = load_campaign(folder)
-    assert (after.digest, after.dispersions) == (before.digest, before.dispersions)
 
 
 def digest(old="", new="", **options):
@@ -199,19 +150,8 @@ def test_the_digest_tells_campaigns_apart_by_content_and_not_by_layout():
 
 
 def test_the_digest_follows_the_order_of_dispersions_which_are_dimensions():
-    one, other = (f'[dispersion.{n}]\ndist = "uniform"\nhalf_range = 1\n' for n in ("speed_pct", "height_km"))
-    assert load(one + other).digest != load(other + one).digest
-
-
-def test_loading_imports_no_heavy_library():
-    code = (
-        "import sys; sys.path.insert(0, '.'); from toy import load;"
-        "load('[dispersion.mass_kg]\\ndist = \"normal\"\\nsigma = 5\\nlower = 60');"
-        "print({'numba', 'scipy', 'matplotlib', 'pandas', 'pyarrow'} & sys.modules.keys() or 'none')"
-    )
-    environment = {"PYTHONPATH": str(HERE.parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run([sys.executable, "-c", code], cwd=HERE, env=environment, capture_output=True, text=True)
-    assert done.stdout.strip() == "none", done.stderr
+    item, other = (f'[dispersion.{n}]\ndist = "uniform"\nhalf_range = 1\n' for n in ("speed_pct", "height_km"))
+    assert load(item + other).digest != load(other + item).digest
 
 
 SHAPES = [
@@ -250,36 +190,6 @@ def test_a_dispersion_is_either_refused_or_draws_what_the_model_accepts(design, 
     assert ((values >= item.low) & (values <= item.high)).all()
     assert np.isfinite(values).all()
     assert dispersion_records(campaign)[0]["distribution"].startswith((dist, "3 levels", "2 levels", "1 level"))
-
-
-def test_a_wrong_key_in_campaign_hides_no_mistake_further_down():
-    """The design is still known, so bounds and names of the dispersions are read against it."""
-    text = """
-[campaign]
-model = "campaigns.minimal.model"
-cases = 10
-design = "mc"
-seed = 1
-color = "red"
-
-[dispersion.pitch_error_deg]
-dist = "normal"
-sigma = 1.0
-lower = 5.0
-upper = -5.0
-
-[dispersion.burn_dv]
-dist = "normal"
-sigma = nan
-"""
-    with pytest.raises(CampaignError) as caught:
-        load_campaign("slips.toml", text=text)
-    told = str(caught.value)
-    assert "4 problems" in told
-    assert "campaign.color" in told
-    assert "dispersion.pitch_error_deg.lower: 5 is not below upper = -5" in told
-    assert "dispersion.burn_dv.sigma: nan is not a finite number" in told
-    assert 'dispersion.burn_dv: is not a parameter of minimal; did you mean "burn_dv_m_s"?' in told
 
 
 @pytest.mark.parametrize(("design", "cases", "nearest"), [("saltelli", 10, "8 or 12"), ("morris", 10, "9 or 12")])

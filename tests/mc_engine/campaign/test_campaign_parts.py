@@ -1,7 +1,7 @@
 import pytest
 from toy import load, problems
 
-from mc_engine.campaign.loading import Correlation, Requirement, Retention, Worst
+from mc_engine.campaign.loading import Requirement, Retention, Worst
 
 TWO = """
 [dispersion.speed_pct]
@@ -38,11 +38,6 @@ def test_parameters_override_numbers_words_and_switches():
 )
 def test_a_wrong_nominal_value_is_refused(line, place, message):
     assert problems(f"[parameters]\n{line}\n") == {place: message}
-
-
-def test_correlations_are_kept_in_file_order():
-    campaign = load(TWO + CORRELATION)
-    assert campaign.correlations == (Correlation("speed_pct", "height_km", 0.3),)
 
 
 def _with(partner, rank="0.3"):
@@ -94,11 +89,6 @@ def test_requirements_have_the_share_and_confidence_of_three_sigma_unless_said()
     assert campaign.requirements == (Requirement("fuel", "propellant_kg", 2.5, None, 0.9973, 0.90, "tank"),)
 
 
-def test_a_requirement_may_hold_a_metric_between_two_limits():
-    campaign = load('[requirement.r]\nmetric = "range_m"\nat_most = 2\nat_least = -1\nshare = 0.5')
-    assert campaign.requirements == (Requirement("r", "range_m", 2.0, -1.0, 0.5, 0.90),)
-
-
 @pytest.mark.parametrize(
     ("body", "place", "message"),
     [
@@ -113,10 +103,6 @@ def test_a_requirement_may_hold_a_metric_between_two_limits():
 )
 def test_a_requirement_that_cannot_be_judged_is_refused(body, place, message):
     assert problems(f"[requirement.r]\n{body}") == {f"requirement.r{place}": message}
-
-
-def test_without_a_word_only_the_nominal_history_is_kept():
-    assert load("").retention == Retention(nominal=True, first=0, worst=(), cases=())
 
 
 def test_retention_names_first_worst_and_single_cases():
@@ -148,8 +134,3 @@ def test_retention_of_what_is_not_there_is_refused(histories, place, message):
     found = problems(f"[retention]\nhistories = {{ {histories} }}")
     assert list(found) == [f"retention.histories.{place}"]
     assert found[f"retention.histories.{place}"].startswith(message)
-
-
-def test_fewer_cases_on_the_command_line_drop_the_histories_beyond():
-    body = "[retention]\nhistories = { cases = [3, 99] }"
-    assert load(body, cases=50).retention.cases == (3,)

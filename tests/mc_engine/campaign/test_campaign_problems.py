@@ -5,20 +5,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mc_engine.campaign.reading import Findings, parse_toml, read_sections, shown
+from mc_engine.campaign.reading import Findings, parse_toml, read_sections
 from mc_engine.errors import CampaignError
 
 CAMPAIGN = '[campaign]\nmodel = "m.py"\ndesign = "mc"\ncases = 5\nseed = 0\n'
 
 
 def read(text):
-    found = Findings()
-    sections = read_sections(tomllib.loads(text), found)
-    return sections, {problem.place: problem.message for problem in found.problems}
+    findings = Findings()
+    sections = read_sections(tomllib.loads(text), findings)
+    return sections, {problem.place: problem.message for problem in findings.problems}
 
 
 def test_all_mistakes_are_found_in_one_pass():
-    _, found = read("""
+    _, messages = read("""
         retentoin = {}
         [campaign]
         modle = "m.py"
@@ -41,7 +41,7 @@ def test_all_mistakes_are_found_in_one_pass():
         share = 1.0
         confidence = 0
     """)
-    assert found == {
+    assert messages == {
         "retentoin": 'is not a section; did you mean "retention"?',
         "campaign.model": 'is missing: a module such as "campaigns.deorbit", or "model.py" beside this file',
         "campaign.modle": 'is not a known key; did you mean "model"?',
@@ -73,39 +73,8 @@ def test_all_mistakes_are_found_in_one_pass():
     ],
 )
 def test_a_number_of_cases_that_is_none_is_refused(key, message):
-    _, found = read(CAMPAIGN.replace("cases = 5", key))
-    assert found == {"campaign.cases": message}
-
-
-def test_zero_is_a_seed():
-    sections, found = read(CAMPAIGN)
-    assert (sections.campaign.seed, found) == (0, {})
-
-
-@pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
-def test_a_number_that_is_not_finite_is_refused_everywhere(number):
-    text = f"""
-        [parameters]
-        a = {number}
-        [dispersion.b]
-        dist = "normal"
-        mean = {number}
-        sigma = 1
-        [dispersion.c]
-        dist = "discrete"
-        values = [1, {number}]
-        [requirement.d]
-        metric = "m"
-        at_most = {number}
-    """
-    _, found = read(CAMPAIGN + text)
-    assert list(found) == ["parameters.a", "dispersion.b.mean", "dispersion.c.values 2", "requirement.d.at_most"]
-    assert set(found.values()) == {f"{number} is not a finite number"}
-
-
-def test_numbers_of_astronomical_size_are_refused_before_they_overflow():
-    _, found = read(CAMPAIGN + '[parameters]\na = 1e60\n[dispersion.b]\ndist = "normal"\nsigma = 1e-90\nmean = -1e90')
-    assert list(found) == ["parameters.a", "dispersion.b.mean", "dispersion.b.sigma"]
+    _, messages = read(CAMPAIGN.replace("cases = 5", key))
+    assert messages == {"campaign.cases": message}
 
 
 @pytest.mark.parametrize(
@@ -122,52 +91,6 @@ def test_broken_toml_is_reported_with_line_and_column(text, place):
     with pytest.raises(CampaignError, match="this is not TOML") as caught:
         parse_toml(text, "x.toml")
     assert caught.value.problems[0].place == place
-
-
-@pytest.mark.parametrize("text", ["a = " + "9" * 5000, "a = " + "[" * 100_000])
-def test_toml_that_overwhelms_the_reader_is_refused(text):
-    with pytest.raises(CampaignError, match="not TOML that can be read"):
-        parse_toml(text, "x.toml")
-
-
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("campaign = 3", "campaign"),
-        ("parameters = []", "parameters"),
-        ("dispersion = 1", "dispersion"),
-        ("requirement = 'x'", "requirement"),
-        ("correlation = {}", "correlation"),
-        ("retention = 1", "retention"),
-        ("[dispersion]\na = 3", "dispersion.a"),
-        ("[dispersion]\na = {dist = 3}", "dispersion.a.dist"),
-        ("[retention]\nhistories = 3", "retention.histories"),
-    ],
-)
-def test_a_section_that_is_no_table_is_refused(text, place):
-    _, found = read(text)
-    assert place in found
-
-
-def test_entries_of_a_list_are_counted_from_one():
-    text = CAMPAIGN + '[retention]\nhistories = { worst = [{ metric = "a" }, { metrc = "b", side = "big" }] }'
-    _, found = read(text)
-    assert found == {
-        "retention.histories.worst 2.metric": "is missing: a metric of the model",
-        "retention.histories.worst 2.metrc": 'is not a known key; did you mean "metric"?',
-        "retention.histories.worst 2.side": '"big" is not known; known are "largest", "smallest"',
-    }
-
-
-def test_a_single_worst_has_no_number_in_its_place():
-    _, found = read(CAMPAIGN + '[retention]\nhistories = { worst = { metric = "a", count = 0 } }')
-    assert found == {"retention.histories.worst.count": "0 is not allowed; it must be at least 1"}
-
-
-def test_an_unprintable_name_does_not_reach_the_terminal():
-    _, found = read(CAMPAIGN + '[dispersion."\\u001b[2J"]\ndist = "x"')
-    assert list(found) == ['dispersion."\\u001b[2J".dist']
-    assert shown("\x1b[2J") == '"\\u001b[2J"'
 
 
 JSON = st.recursive(
@@ -188,7 +111,7 @@ DOCUMENTS = st.recursive(
 
 @given(document=st.dictionaries(KEYS, DOCUMENTS, max_size=6))
 def test_no_document_makes_the_reader_stumble(document):
-    found = Findings()
-    read_sections(document, found)
-    assert found.problems
-    assert all(problem.message and json.dumps(str(problem)) for problem in found.problems)
+    findings = Findings()
+    read_sections(document, findings)
+    assert findings.problems
+    assert all(problem.message and json.dumps(str(problem)) for problem in findings.problems)

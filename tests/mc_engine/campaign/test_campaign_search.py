@@ -3,7 +3,7 @@ import tomllib
 import pytest
 
 from mc_engine.campaign.reading import Findings, read_sections
-from mc_engine.campaign.search import SHIPPED, campaign_name, find_campaign, list_campaigns
+from mc_engine.campaign.search import SHIPPED, find_campaign, list_campaigns
 from mc_engine.errors import CampaignError
 
 
@@ -38,12 +38,6 @@ def test_a_campaign_that_is_not_there_is_refused(tmp_path, monkeypatch, referenc
     monkeypatch.chdir(tmp_path)
     with pytest.raises(CampaignError, match=message):
         find_campaign(reference)
-
-
-def test_a_campaign_is_called_as_it_is_found_or_after_its_file(tmp_path):
-    assert campaign_name(SHIPPED / "deorbit" / "map.toml") == "deorbit/map"
-    assert campaign_name(tmp_path / "entry.toml") == "entry"
-    assert campaign_name(tmp_path / "entry" / "campaign.toml") == "entry"
 
 
 def test_every_shipped_campaign_has_a_title_and_no_mistake_in_its_words():

@@ -5,7 +5,7 @@ import pandas
 import pytest
 from toy import load, problems
 
-from mc_engine.campaign.cases import case_table, dispersion_records, nominal_row
+from mc_engine.campaign.cases import case_table, dispersion_records
 
 HEAD = '[campaign]\nmodel = "toy.py"\ndesign = "{design}"\ntable = "cases.csv"\n'
 CSV = "case_id,speed_pct,control,drag,height_km\n0,1.5,off,true,10\n1,-2,clipped,false,20\n2,3,off,TRUE,30\n"
@@ -44,11 +44,6 @@ def test_parquet_is_read_like_csv(folder):
     theirs = load("", "table", head=HEAD, directory=folder)
     for name, values in case_table(ours, np.arange(3)).items():
         assert values.tolist() == case_table(theirs, np.arange(3))[name].tolist()
-
-
-def test_the_nominal_case_is_not_a_row_of_the_table(folder):
-    campaign = load("[parameters]\nspeed_pct = 7", "table", head=HEAD, directory=folder)
-    assert nominal_row(campaign)["speed_pct"] == 7.0
 
 
 @pytest.mark.parametrize(

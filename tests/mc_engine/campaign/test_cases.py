@@ -5,9 +5,8 @@ from hypothesis import strategies as st
 from scipy.stats import kstest, norm, spearmanr
 from toy import load
 
-from mc_engine.campaign.cases import case_table, dispersion_records, full_inputs, nominal_row
-from mc_engine.errors import CampaignError
-from mc_engine.sampling.designs import EXTENSIBLE, RANDOM
+from mc_engine.campaign.cases import case_table, dispersion_records, full_inputs
+from mc_engine.sampling.designs import RANDOM
 from mc_engine.sampling.streams import stream
 
 BODY = """
@@ -67,27 +66,6 @@ def test_the_order_of_asking_does_not_matter(design, order):
         assert values.tolist() == straight[name][np.argsort(np.argsort(order))].tolist()
 
 
-@pytest.mark.parametrize("design", [one for one in EXTENSIBLE if one in RANDOM])
-def test_a_thousand_cases_extended_to_two_thousand_equal_a_fresh_two_thousand(design):
-    short, long = load(BODY, design, cases=1000), load(BODY, design, cases=2000)
-    first, rest = case_table(short, np.arange(1000)), case_table(long, np.arange(1000, 2000))
-    extended = {name: np.concatenate([first[name], rest[name]]) for name in NAMES}
-    assert same(extended, case_table(long, np.arange(2000)))
-
-
-@pytest.mark.parametrize("design", RANDOM)
-def test_a_dispersion_added_at_the_end_leaves_the_others_as_they_were(design):
-    before, after = (case_table(load(body, design), np.arange(100)) for body in (BODY, BODY + MORE))
-    assert same(after, before)
-    assert list(after) == [*NAMES, "angle_deg"]
-
-
-@pytest.mark.parametrize("design", RANDOM)
-def test_another_seed_changes_every_draw(design):
-    ours, theirs = (case_table(load(BODY, design, seed), np.arange(100)) for seed in (0, 1))
-    assert all((ours[name] != theirs[name]).all() for name in NAMES[:4])
-
-
 def test_monte_carlo_draws_are_the_quantiles_of_the_addressed_streams():
     table = case_table(load(BODY, seed=7), np.arange(50))
     u = np.array([stream(7, "speed_pct", case).random() for case in range(50)])
@@ -106,38 +84,12 @@ def test_the_draws_follow_the_distributions_and_the_correlation(design):
     assert spearmanr(table["speed_pct"], table["delay_s"]).statistic == pytest.approx(0.0, abs=0.05)
 
 
-def test_a_grid_runs_through_all_combinations_the_last_dispersion_fastest():
-    axes = '[dispersion.speed_pct]\nhalf_range = 10\nlevels = 3\n[dispersion.control]\nvalues = ["off", "clipped"]\n'
-    campaign = load(axes, "grid")
-    table = case_table(campaign, np.arange(campaign.cases))
-    assert table["speed_pct"].tolist() == [-10.0, -10.0, 0.0, 0.0, 10.0, 10.0]
-    assert table["control"].tolist() == ["off", "clipped"] * 3
-
-
-def test_one_at_a_time_starts_nominal_and_moves_one_input_a_case():
-    axes = "[dispersion.speed_pct]\nhalf_range = 10\n[dispersion.drag]\nvalues = [false]\n"
-    campaign = load("[parameters]\nspeed_pct = 1\n" + axes, "one_at_a_time")
-    table = case_table(campaign, np.arange(campaign.cases))
-    assert table["speed_pct"].tolist() == [1.0, -9.0, 11.0, 1.0]
-    assert table["drag"].tolist() == [True, True, True, False]
-
-
 def test_all_inputs_are_the_nominal_ones_but_for_the_dispersed_columns():
     campaign = load("[parameters]\nheight_km = 3\n" + MORE)
     inputs = full_inputs(campaign, case_table(campaign, np.arange(4)))
-    assert set(inputs) == set(nominal_row(campaign))
+    assert set(inputs) == set(campaign.nominal)
     assert inputs["angle_deg"].shape == (4,)
     assert (inputs["height_km"], inputs["control"], inputs["drag"]) == (3.0, "continuous", True)
-
-
-@pytest.mark.parametrize(("design", "case"), [("lhs", 100), ("mc", -1), ("sobol", -5)])
-def test_a_case_that_is_not_in_the_design_is_refused(design, case):
-    with pytest.raises(CampaignError, match=f"there is no case {case}; they are 0 to 99"):
-        case_table(load(BODY, design), np.array([0, case]))
-
-
-def test_a_campaign_without_dispersions_has_an_empty_case_table():
-    assert case_table(load(""), np.arange(3)) == {}
 
 
 def test_records_say_each_dispersion_as_its_review_table_would():
@@ -159,12 +111,6 @@ def test_records_say_each_dispersion_as_its_review_table_would():
     assert texts["mass_kg"] == ("lognormal, σ of ln = 0.1", "")
     assert texts["delay_s"] == ("exponential, scale = 3 s", "up to 10 s")
     assert texts["control"] == ("discrete, values = off, clipped, weights = 1, 3", "")
-
-
-def test_records_of_a_grid_count_its_levels():
-    axes = "[dispersion.speed_pct]\nhalf_range = 10\nlevels = 21\n[dispersion.drag]\nvalues = [false, true]\n"
-    texts = [record["distribution"] for record in dispersion_records(load(axes, "grid"))]
-    assert texts == ["21 levels: -10, -9, ..., 10 %", "2 levels: false, true"]
 
 
 @pytest.mark.benchmark

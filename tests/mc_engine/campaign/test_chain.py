@@ -1,7 +1,6 @@
 """A chain: every case takes its inputs from the same case of another run, and keeps that case's columns."""
 
 import json
-import os
 import shutil
 from hashlib import sha256
 
@@ -154,14 +153,6 @@ def test_a_case_that_failed_upstream_keeps_its_row_and_says_why(cases):
     assert second["gravity_m_s2"][failed].notna().all()
 
 
-def test_a_run_in_a_chain_stands_alone(folder, tmp_path):
-    """Replay needs neither the campaign's folder nor the run upstream."""
-    shutil.copytree(folder / "runs" / "second", tmp_path / "moved")
-    assert replay(tmp_path / "moved", 3).equal
-    assert resume(tmp_path / "moved").n_cases == 40
-    assert damage(tmp_path / "moved") == []
-
-
 @pytest.mark.parametrize("kind", ["gone", "flipped"])
 def test_what_was_taken_is_verified_before_it_is_used(folder, tmp_path, kind):
     shutil.copytree(folder / "runs" / "second", tmp_path / "run")
@@ -174,26 +165,6 @@ def test_what_was_taken_is_verified_before_it_is_used(folder, tmp_path, kind):
     for use in (replay, lambda path, case: resume(path)):
         with pytest.raises(StoreError, match=rf"upstream.parquet: {word}"):
             use(tmp_path / "run", 3)
-
-
-def test_a_case_that_failed_upstream_replays_the_same(folder, cases):
-    failed = int(np.flatnonzero(cases[0]["status"] != "ok")[0])
-    assert replay(folder / "runs" / "second", failed).differences == ()
-
-
-def test_the_reports_of_a_chain_with_failed_cases_are_written(folder):
-    from reports import write_reports
-
-    files = write_reports(folder / "runs" / "second", formats=("html", "pdf"))
-    assert {"report.html", "report.pdf"} <= {file.name for file in files}
-
-
-def test_a_run_whose_nominal_case_failed_is_no_start_of_a_chain(folder, tmp_path):
-    text = (folder / "first" / "campaign.toml").read_text() + "[parameters]\nspeed_m_s = 60\n"  # 6 s up, 5 s allowed
-    run(load_campaign("high", text=text, directory=folder / "first"), tmp_path / "high")
-    chain = (folder / "second" / "campaign.toml").read_text()
-    with pytest.raises(CampaignError, match="the nominal case of that run ended as no-stop; choose one that flies"):
-        load_campaign("second", text=chain, directory=folder / "second", upstream=tmp_path / "high")
 
 
 def test_neither_chunks_nor_the_number_of_cases_change_a_case(folder, cases, tmp_path):
@@ -246,7 +217,7 @@ def with_files(folder, **contents):
         (folder / name.replace("_", ".")).write_bytes(content)
         events[0].facts[name.split("_")[0]] = sha256(content).hexdigest()
     events[0].facts["companions"].pop("upstream.parquet", None)
-    lines = [encode(number, one.at, one.event, one.facts) for number, one in enumerate(events, start=1)]
+    lines = [encode(number, entry.at, entry.event, entry.facts) for number, entry in enumerate(events, start=1)]
     (folder / "journal.jsonl").write_bytes(b"".join(lines))
 
 
@@ -284,18 +255,6 @@ def test_the_campaign_file_of_a_run_leads_to_no_other_run_and_no_other_campaign(
         with pytest.raises(EngineError, match=r"upstream\.parquet: No such file"):
             use(theirs)
     assert not mark.exists()
-
-
-@pytest.mark.skipif(os.name == "nt", reason="links need rights")
-@pytest.mark.parametrize("target", ["run", "copy"])
-def test_a_link_in_place_of_the_copy_is_not_followed(theirs, folder, tmp_path, target):
-    shutil.copy(theirs / "upstream.parquet", tmp_path / "copy")
-    (theirs / "upstream.parquet").unlink()
-    (theirs / "upstream.parquet").symlink_to(tmp_path / "copy" if target == "copy" else folder / "runs" / "first")
-    with_files(theirs)
-    for use in USES:
-        with pytest.raises(EngineError, match=r"upstream\.parquet: "):
-            use(theirs)
 
 
 def test_the_campaign_file_of_a_run_is_read_with_the_copy_that_the_run_keeps(theirs):

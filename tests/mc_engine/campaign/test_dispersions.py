@@ -106,15 +106,6 @@ def test_a_wrong_dispersion_is_refused_with_the_reason(body, key, message):
     assert problem(body) == {key: message}
 
 
-def test_a_lognormal_about_a_nominal_of_zero_is_refused():
-    found = problem('dist = "lognormal"\nlog_sigma = 0.1', "delay_s")
-    assert found == {"median": "the nominal value 0 is not above 0, as a log-normal must be"}
-
-
-def test_without_a_distribution_a_random_design_asks_for_one():
-    assert problem("half_range = 3")["dist"].startswith('is missing; the design "mc" needs one of "normal", "uniform"')
-
-
 @pytest.mark.parametrize(
     ("body", "message"),
     [
@@ -175,16 +166,6 @@ def test_a_grid_takes_values_or_equal_steps_between_bounds(body, expected):
     assert levels(body) == pytest.approx(expected)
 
 
-def test_words_and_switches_are_levels_too():
-    assert levels('values = ["off", "clipped"]', name="control") == ("off", "clipped")
-    assert levels("values = [false, true]", name="drag") == (False, True)
-
-
-def test_one_at_a_time_goes_to_both_ends_unless_more_is_asked_for():
-    assert levels('dist = "normal"\nsigma = 1', "one_at_a_time") == (7.0, 13.0)
-    assert levels("half_range = 2\nlevels = 3", "one_at_a_time") == (8.0, 10.0, 12.0)
-
-
 @pytest.mark.parametrize(
     ("body", "key", "message"),
     [
@@ -199,13 +180,3 @@ def test_one_at_a_time_goes_to_both_ends_unless_more_is_asked_for():
 )
 def test_a_wrong_axis_of_a_grid_is_refused(body, key, message):
     assert problem(body, design="grid") == {key: message}
-
-
-def test_a_grid_beyond_the_range_of_the_parameter_is_refused():
-    found = problem("half_range = 50\nlevels = 3", "angle_deg", "grid")
-    assert found == {"": "95 is not allowed; the model accepts 0 to 90 deg"}
-
-
-def test_a_setting_on_a_grid_needs_its_words():
-    found = problem("levels = 3", "control", "grid")
-    assert found == {"values": "is missing; a setting takes its levels from values = [...]"}

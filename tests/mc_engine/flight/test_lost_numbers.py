@@ -49,9 +49,9 @@ ADAPTED = ("FixedStep, Model", "AdaptiveStep, Model")
 
 
 def rocket(folder, *edits):
-    """The tutorial's rocket with each (text, other text) of its model exchanged, and the line of the last edit."""
+    """The tutorial's campaign, flown by `rocket_model.py` with each (text, other text) of it exchanged."""
     shutil.copytree(ROCKET, folder, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
-    text = (folder / "model.py").read_text()
+    text = Path(__file__).with_name("rocket_model.py").read_text()
     for old, new in edits:
         assert old in text, old
         text = text.replace(old, new)

@@ -139,7 +139,7 @@ def test_a_model_that_kills_its_process_is_a_sentence_unless_only_the_file_is_re
     assert check(tmp_path, "--no-model").returncode == 0
 
 
-@pytest.mark.parametrize("name", [one.name for one in list_campaigns()])
+@pytest.mark.parametrize("name", [campaign.name for campaign in list_campaigns()])
 def test_shipped_campaigns_keep_the_contract(name):
     campaign = load_campaign(name)
     assert breaches(campaign) == []

@@ -59,10 +59,6 @@ def test_a_plain_loop_over_python_floats_gives_the_same_bits(width):
         assert (columns["samples"][case], columns["sampled_at_s"][case]) == (m.samples, m.sampled_at)
 
 
-def test_one_case_and_eight_at_a_time_give_the_same_bytes():
-    same_bytes(flown(OSCILLATOR, width=1, **MIXED), flown(OSCILLATOR, width=8, **MIXED))
-
-
 def test_a_case_keeps_its_bytes_in_any_order_and_company():
     whole = flown(OSCILLATOR, **MIXED)
     order = np.random.default_rng(1).permutation(37)
@@ -104,11 +100,6 @@ def test_sampled_damping_follows_the_closed_form_of_a_held_push():
     assert columns["end_v_m_s"][0] == pytest.approx((1.0 - 0.25 * 0.4) ** 20, rel=1e-13)
 
 
-def test_the_last_step_is_the_one_that_reaches_the_end():
-    ends = [flown(OSCILLATOR, until_s=until, step_s=0.1)["end_time_s"][0] for until in (0.3, 0.31, 0.05, 7.0)]
-    assert ends == pytest.approx([0.3, 0.4, 0.1, 7.0], abs=1e-12)
-
-
 def test_a_case_that_becomes_nan_keeps_its_last_finite_state_and_its_neighbours_do_not_notice():
     breaks = np.full(37, 1e9)
     breaks[[3, 4, 20, 36]] = 2.05, 0.02, 6.0, -1.0
@@ -124,13 +115,6 @@ def test_a_case_that_becomes_nan_keeps_its_last_finite_state_and_its_neighbours_
         else:
             assert broken["end_x_km"][case] == flown(OSCILLATOR, **until)["end_x_km"][case]
     assert np.isnan(broken["top_km"][bad]).all()
-
-
-def test_a_case_that_flies_to_infinity_is_broken_too():
-    columns = flown(OSCILLATOR, gain_1_s=[0.0, -1e6, 0.0], v0_m_s=1.0, until_s=100.0)
-    assert list(columns["status"]) == ["ok", "not-finite", "ok"]
-    assert np.isfinite(columns["end_v_m_s"]).all()
-    assert np.isfinite(columns["end_x_km"]).all()
 
 
 def test_the_history_of_a_broken_case_ends_with_its_last_finite_look():
@@ -152,3 +136,7 @@ def test_the_history_runs_from_the_first_state_to_the_last_one_of_the_row(width)
     assert history["t_s"].tolist() == pytest.approx([0.1 * k for k in range(74)])
     assert (history["x_km"][0], history["x_km"][-1]) == (inputs["x0_km"] * 1e3 / 1e3, columns["end_x_km"][0])
     assert max(history["x_km"]) == columns["sampled_top_km"][0]
+
+
+def test_one_case_and_eight_at_a_time_give_the_same_bytes():
+    same_bytes(flown(OSCILLATOR, width=1, **MIXED), flown(OSCILLATOR, width=8, **MIXED))

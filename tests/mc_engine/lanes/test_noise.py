@@ -7,7 +7,7 @@ from scipy import stats
 
 from mc_engine.lanes import physics
 from mc_engine.lanes.noise import normal_pair
-from mc_engine.lanes.philox import Draws, noise_key, philox_words, uniform_pair
+from mc_engine.lanes.philox import Draws, philox_words, uniform_pair
 
 KEY = 0x299F31D0A4093822
 # Random123 1.14, file tests/kat_vectors, lines "philox4x32 10": counter, key, answer
@@ -95,21 +95,9 @@ def test_draws_of_one_address_and_of_neighbouring_ones_are_uncorrelated(many):
     assert abs(np.corrcoef(many[4], next_sample)[0, 1]) < four_sigma
 
 
-def test_no_two_addresses_share_a_draw(many):
-    assert np.unique(many[:4]).size == many[:4].size
-
-
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_case_draws_the_same_alone_and_in_any_company(width):
     cases = np.random.default_rng(5).permutation(64).astype(float)
     together = apply(_draw, 6, cases, 2.0, width)
     alone = np.column_stack([apply(_draw, 6, [case], 2.0, width)[:, 0] for case in cases])
     np.testing.assert_array_equal(bits(together), bits(alone))
-
-
-def test_every_seed_and_every_stream_name_has_its_own_key():
-    keys = {noise_key(seed, name) for seed in (0, 1, 2**63) for name in ("noise", "wind")}
-    assert len(keys) == 6
-    assert all(0 <= key < 2**64 for key in keys)
-    # the seed contract: a change of this number changes every run with noise
-    assert noise_key(20160421) == noise_key(20160421, "noise") == 0x83ECE2B71BA9DD61

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import RK45
 from scipy.integrate._ivp import dop853_coefficients as dop853
 
-from mc_engine.lanes.runge_kutta_pairs import DOP853, DP54, PAIRS
+from mc_engine.lanes.runge_kutta_pairs import DOP853, DP54
 
 
 def dense(row, length):
@@ -27,20 +27,3 @@ def test_dp54_has_scipys_coefficients():
         assert dense(row, 5) == pytest.approx(RK45.A[i], rel=1e-15)
     assert dense(DP54.weights, 6) == pytest.approx(RK45.B, rel=1e-15)
     assert np.abs(dense(DP54.error, 7)) == pytest.approx(np.abs(RK45.E), rel=1e-13)
-
-
-@pytest.mark.parametrize("pair", PAIRS.values(), ids=PAIRS)
-def test_rows_sum_to_their_nodes_and_the_error_of_a_constant_is_none(pair):
-    for node, row in zip(pair.nodes, pair.rows, strict=True):
-        assert sum(row.values()) == pytest.approx(node, abs=1e-14)
-    assert sum(pair.weights.values()) == pytest.approx(1.0, abs=1e-14)
-    assert sum(pair.error.values()) == pytest.approx(0.0, abs=1e-14)
-    assert sum(pair.second_error.values()) == pytest.approx(0.0, abs=1e-14)
-
-
-def test_the_kernel_gets_a_row_for_every_stage_the_end_and_two_errors():
-    for pair in PAIRS.values():
-        nodes, starts, columns, weights = pair.tables()
-        assert len(starts) == len(nodes) + 3
-        assert starts[-1] == len(columns) == len(weights)
-        assert nodes[-1] == 1.0

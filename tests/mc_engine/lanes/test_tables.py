@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, flown, same_bytes
+from flown_models import FOLDER, flown
 
 from mc_engine.flight.flight import settings_of
 from mc_engine.lanes import look_up
@@ -27,11 +27,6 @@ def test_cases_of_other_settings_have_other_tables():
     assert columns["last"].tolist() == (scales * 49.0**2).tolist()
 
 
-def test_one_case_alone_has_the_bits_of_the_same_among_others():
-    together, alone = flown(SHELF, place=PLACES), flown(SHELF, place=PLACES[3:4], width=1)
-    same_bytes({name: column[3:4] for name, column in together.items()}, alone)
-
-
 @pytest.mark.parametrize("width", [1, 8, 16])
 def test_a_place_outside_is_the_nearest_one_inside_and_what_is_no_number_breaks_the_flight(width):
     columns = flown(SHELF, place=np.array([-5.0, 1e9, np.pi, -200.0, 1e300]), width=width)
@@ -46,8 +41,3 @@ def test_interpreted_physics_reads_the_same_numbers():
     assert np.isnan(look_up(tables, np.nan))
     assert look_up(tables, np.array([0.0, 3.0])).tolist() == [0.0, 18.0]
     np.testing.assert_array_equal(look_up(tables, np.array([-1.0, np.nan, np.inf])), [0.0, np.nan, 4802.0])
-
-
-def test_tables_are_computed_once_for_the_same_settings():
-    codes = np.array([5.0, 0.5])
-    assert settings_of(SHELF, codes) is settings_of(SHELF, codes.copy())

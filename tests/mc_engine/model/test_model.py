@@ -82,7 +82,7 @@ def test_an_error_of_the_model_s_own_code_is_a_sentence_with_its_place(tmp_path,
     ("reference", "sentence"),
     [
         ("this", '"this" is a module of Python itself'),
-        ("trap", '"trap" has no MODEL; end it with MODEL = Model'),
+        ("trap", '"trap" has no MODEL; end it with MODEL = model'),
         ("trap_package.inner", '"trap_package.inner" has no MODEL'),
         ("trap_package.nothing", 'there is no module "trap_package.nothing"'),
         ("trap.inner", 'there is no module "trap.inner"'),

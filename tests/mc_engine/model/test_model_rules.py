@@ -38,7 +38,8 @@ CONTRADICTIONS = {
     "no unit": (('"km", "altitude of the c', 'None, "altitude of the c'), '"altitude_km" has None as its `unit`; it'),
     "number as a text": (('"largest speed"', "3"), '"top_speed_m_s" has 3 as its `description`; it must be a text'),
     "number as the source": (('source=""', "source=3"), "the model has 3 as its `source`; it must be a text"),
-    "wrong keyword": (("metrics=(", "metrix=("), "unexpected keyword argument 'metrix'; it takes name, "),
+    "wrong keyword": (("metrics=(", "metrix=("),
+                      "unexpected keyword argument 'metrix'; did you mean \"metrics\"?; it takes name, "),
 }  # fmt: skip
 
 
@@ -58,7 +59,7 @@ def test_a_contradiction_is_named_where_the_model_is_made(tmp_path):
             "low=150.0",
             "lo=150.0",
             "Parameter(",
-            "unexpected keyword argument 'lo'; it takes name, unit, description",
+            "unexpected keyword argument 'lo'; did you mean \"low\"?; it takes default, description, low",
         ),
         (
             CLOCK,

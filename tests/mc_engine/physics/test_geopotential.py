@@ -7,13 +7,10 @@ from hypothesis import strategies as st
 from scipy.special import lpmv
 
 from mc_engine.physics.geopotential import (
-    COLUMNS,
     EGM2008,
-    LARGEST_DEGREE,
     MU_EGM2008,
     RADIUS_EGM2008,
     harmonics,
-    harmonics_rows,
     harmonics_table,
     unnormalised,
 )
@@ -92,9 +89,10 @@ def test_the_geostationary_values_are_those_of_the_source_digest():
     assert along(at) == pytest.approx(4.417e-8, rel=5e-3)
     outward = np.array([np.cos(at), np.sin(at), 0.0])
     assert ours(42_164_170.0 * outward, 4, 4) @ outward == pytest.approx(-8.260e-6, rel=5e-3)
-    longitudes = np.radians(np.arange(0.0, 360.0, 0.02))
-    values = np.array([along(one) for one in longitudes])
-    zeros = np.degrees(longitudes[np.flatnonzero(values * np.roll(values, -1) < 0.0)])
+    longitudes = np.arange(0.0, 361.0)
+    values = np.array([along(longitude) for longitude in np.radians(longitudes)])
+    before = np.flatnonzero(values[:-1] * values[1:] < 0.0)
+    zeros = longitudes[before] + values[before] / (values[before] - values[before + 1])
     assert zeros == pytest.approx([74.94, 161.90, 254.91, 348.48], abs=0.1)
 
 
@@ -102,9 +100,3 @@ def test_beyond_degree_eight_little_is_left_at_the_geostationary_radius():
     place = (42_164_170.0, 0.0, 0.0)
     assert np.linalg.norm(ours(place, 8, 8) - ours(place, 7, 7)) < 1e-11
     assert np.linalg.norm(ours(place, 8, 8) - ours(place, 4, 4)) < 1e-9
-
-
-def test_the_table_has_the_rows_that_it_is_said_to_have():
-    for degree in range(2, LARGEST_DEGREE + 1):
-        for order in range(degree + 1):
-            assert harmonics_table(degree, order).shape == (harmonics_rows(degree, order), COLUMNS)

@@ -2,7 +2,7 @@ import io
 
 import pytest
 
-from mc_engine.runner.progress import Progress, duration, pace
+from mc_engine.runner.progress import Progress, duration
 
 
 class Clock:
@@ -21,12 +21,6 @@ def test_a_duration_reads_like_a_clock(seconds, words):
     assert duration(seconds) == words
 
 
-def test_the_pace_says_rate_remaining_time_and_failures():
-    assert pace(4000, 10_000, 3, 800.0) == "4,000 of 10,000 cases, 800 cases/s, 8 s left, 3 failed"
-    assert pace(0, 10, 0, None) == "0 of 10 cases"
-    assert pace(10, 10, 0, 0.25) == "10 of 10 cases, 0.25 cases/s"
-
-
 def test_a_pipe_gets_a_line_every_five_seconds_and_the_last_one():
     stream, clock = io.StringIO(), Clock()
     with Progress(stream, clock) as progress:
@@ -39,22 +33,6 @@ def test_a_pipe_gets_a_line_every_five_seconds_and_the_last_one():
         "10,000 of 12,000 cases, 1,000 cases/s, 2 s left, 1 failed",
         "12,000 of 12,000 cases, 1,000 cases/s, 2 failed",
     ]
-
-
-def test_cases_flown_before_do_not_count_in_the_rate():
-    stream, clock = io.StringIO(), Clock()
-    with Progress(stream, clock) as progress:
-        progress(5000, 10_000, 0)
-        clock.now = 10.0
-        progress(6000, 10_000, 0)
-    assert stream.getvalue() == "6,000 of 10,000 cases, 100 cases/s, 40 s left\n"
-
-
-def test_nothing_is_said_where_nothing_was_flown():
-    stream = io.StringIO()
-    with Progress(stream):
-        pass
-    assert stream.getvalue() == ""
 
 
 class Terminal(io.StringIO):
@@ -72,16 +50,3 @@ def test_a_terminal_gets_a_bar_and_keeps_the_last_line(monkeypatch):
     text = stream.getvalue()
     assert "━" in text
     assert text.endswith("100 of 100 cases, 50 cases/s, 1 failed\n")
-
-
-def test_an_interrupted_run_says_how_far_it_came():
-    stream = io.StringIO()
-
-    def interrupted():
-        with Progress(stream) as progress:
-            progress(30, 100, 0)
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert stream.getvalue() == "30 of 100 cases\n"

@@ -10,12 +10,10 @@ import sys
 import time
 
 import numpy as np
-import pandas as pd
 import pytest
 from small_run import ENVIRONMENT
 
 from mc_engine import load_campaign, open_store
-from mc_engine.campaign.loading import SHIPPED
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
 from mc_engine.runner import runner
 from mc_engine.store.verification import damage
@@ -50,12 +48,6 @@ def test_1000_cases_extended_to_2000_are_a_fresh_2000(flown, tmp_path):
     extended = runner.extend(tmp_path / "run", 2000)
     assert table_bytes(extended) == table_bytes(flown)
     assert extended.n_cases == 2000
-
-
-def test_a_design_that_cannot_grow_is_not_extended(tmp_path):
-    runner.run(load_campaign("deorbit/demonstration"), tmp_path / "run")
-    with pytest.raises(StoreError, match='"grid" cannot be extended; mc, sobol, saltelli, morris can'):
-        runner.extend(tmp_path / "run", 100)
 
 
 def test_an_interrupted_run_is_completed_to_the_same_table(tmp_path):
@@ -109,16 +101,6 @@ def test_replays_have_the_bits_of_the_run_and_a_history_that_ends_with_the_case(
         assert replay.equal, replay.differences
         assert replay.history["t_s"].iloc[-1] == replay.row["end_time_s"]
         assert replay.history["altitude_km"].iloc[-1] == pytest.approx(replay.row["apogee_altitude_km"], rel=1e-13)
-
-
-def test_a_replay_names_every_number_with_other_bits(flown, monkeypatch):
-    stored = flown.row(5)
-    other = {**stored, "apogee_time_s": np.nextafter(stored["apogee_time_s"], np.inf)}
-    monkeypatch.setattr(type(flown), "row", lambda store, case: other)
-    replay = runner.replay(flown.path, 5)
-    assert not replay.equal
-    assert len(replay.differences) == 1
-    assert "apogee_time_s" in replay.differences[0]
 
 
 def test_changed_sources_refuse_to_continue_a_run(flown, tmp_path):
@@ -190,17 +172,11 @@ def test_the_campaign_as_run_and_its_files_stand_in_the_run_directory(flown):
     assert {note.event for note in flown.notes()} >= {"started", "finished"}
 
 
-def test_pandas_reads_the_cases_without_the_engine(flown):
-    plain = pd.read_parquet(flown.path / "cases")
-    assert len(plain) == 2000
-    assert set(plain.columns) == set(flown.cases().columns)
-
-
 def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
     source = (load_campaign("minimal").directory / "model.py").read_text()
-    source = source.replace("    initial=initial,", "    prepare=prepare,\n    initial=initial,")
+    source = source.replace("initial=initial,", "prepare=prepare, initial=initial,")
     broken = "def prepare(i, o, refusals):\n    return {**vars(i), 'altitude': 1 / (i.altitude.size < 4)}\n\n\n"
-    source = source.replace("MODEL = Model(", f"{broken}MODEL = Model(")
+    source = source.replace("MODEL = model(", f"{broken}MODEL = model(")
     (tmp_path / "model.py").write_text(source)
     (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
     with pytest.raises(ModelError, match=r"cases \d+ to \d+ cannot be flown: model.py, line \d+: ZeroDivisionError"):
@@ -209,24 +185,10 @@ def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
 
 @pytest.mark.parametrize("slip", ["s.y // 2.0", "s.y**0.5"])
 def test_physics_that_does_not_compile_is_named_with_its_line(tmp_path, slip):
-    line = rf"cannot be flown: model.py, line 27: `r2 = s.x \* s.x \+ {re.escape(slip)}`: "
+    line = rf"cannot be flown: model.py, line 28: `r2 = s.x \* s.x \+ {re.escape(slip)}`: "
     source = (load_campaign("minimal").directory / "model.py").read_text()
     source = source.replace("s.x * s.x + s.y * s.y\n    g", f"s.x * s.x + {slip}\n    g")
     (tmp_path / "model.py").write_text(source)
     (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
     with pytest.raises(ModelError, match=f"{line}.*calls of .*floor, pow.*; `mc-engine check` tells more"):
         runner.run(load_campaign(tmp_path), tmp_path / "run")
-
-
-def test_histories_have_about_as_many_rows_as_asked_for(tmp_path):
-    text = (
-        SHIPPED.joinpath("minimal/campaign.toml")
-        .read_text(encoding="utf-8")
-        .replace("first = 3", "first = 3, rows = 20")
-    )
-    campaign = load_campaign("few.toml", text=text, directory=SHIPPED / "minimal", cases=10)
-    histories = runner.run(campaign, tmp_path / "run", workers=2).histories()
-    assert list(dict.fromkeys(histories["case_id"])) == [-1, 0, 1, 2]
-    assert histories.groupby("case_id").size().between(4, 24).all()
-    whole = runner.run(load_campaign("minimal", cases=10), tmp_path / "whole", workers=1).histories()
-    assert len(whole) > 4 * len(histories)

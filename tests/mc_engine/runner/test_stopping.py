@@ -3,7 +3,6 @@
 import os
 import signal
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +10,8 @@ import pytest
 from mc_engine import load_campaign, open_store
 from mc_engine.errors import CampaignError, RunInterrupted
 from mc_engine.runner import runner
-from mc_engine.runner.stopping import carry_on, fly_until_decided, refuse_undecidable, schedule
-from mc_engine.runner.summary import judgement, look_line
+from mc_engine.runner.stopping import carry_on, fly_until_decided, refuse_undecidable
+from mc_engine.runner.summary import analyses_line, judgement
 
 NO_PROGRESS = {"workers": 1}
 
@@ -28,22 +27,12 @@ def apogees():
     return {"at_most": None, "at_least": 0.0}
 
 
-def asked(share, confidence):
-    return SimpleNamespace(share=share, confidence=confidence)
-
-
-def test_the_schedule_grows_by_half_and_stops_by_where_no_failure_is_enough():
-    looks = schedule(SimpleNamespace(cases=2000, requirements=[asked(0.9973, 0.9), asked(0.95, 0.95)]))
-    assert looks == (100, 150, 225, 337, 505, 757, 1104, 1135, 1702, 2000)
-    assert schedule(SimpleNamespace(cases=60, requirements=[asked(0.9973, 0.9)])) == (60,)
-
-
 def test_flying_ends_where_the_requirement_passes_and_the_manifest_holds_the_schedule(tmp_path):
     store = fly_until_decided(minimal(**apogees(), share=0.95, confidence=0.95), tmp_path / "run", **NO_PROGRESS)
     assert store.n_cases == len(store.cases()) == 74  # no failure shows 0.95 with 0.95 at any time from here on
     assert store.manifest["looks"] == [74, 100, 150, 225, 337, 505, 757, 1135, 1702, 2000]
     assert judgement(store)[0][0].outcome == "pass"
-    assert look_line(store).startswith("judged once on the way, at 74 cases last, of at most 2,000")
+    assert analyses_line(store).startswith("1 interim analysis, the last at 74 of at most 2,000 cases")
 
 
 def test_flying_ends_where_the_requirement_fails(tmp_path):
@@ -94,16 +83,10 @@ def test_a_decided_run_is_not_carried_on_and_one_extended_by_hand_keeps_its_limi
 def test_a_run_of_fixed_size_that_is_extended_is_judged_as_looked_at(tmp_path):
     store = runner.run(load_campaign("minimal", cases=60), tmp_path / "run", workers=1)
     assert not judgement(store)[0][0].looked
-    assert look_line(store) == ""
+    assert analyses_line(store) == ""
     extended = runner.extend(tmp_path / "run", 90, workers=1)
     assert judgement(extended)[0][0].looked
-    assert look_line(extended).startswith("extended from 60 to 90 cases")
-
-
-@pytest.mark.parametrize("design", ["lhs", "sobol", "grid"])
-def test_designs_whose_cases_depend_on_one_another_are_refused(design):
-    with pytest.raises(CampaignError, match=f'campaign.design: cases of "{design}" are not independent'):
-        refuse_undecidable(replace(minimal(), design=design))
+    assert analyses_line(extended).startswith("extended from 60 to 90 cases")
 
 
 def test_a_campaign_without_a_requirement_or_with_a_run_upstream_is_refused():

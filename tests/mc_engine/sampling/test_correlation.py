@@ -4,10 +4,8 @@ from scipy.stats import spearmanr
 
 from mc_engine.sampling.correlation import (
     gaussian_copula,
-    group_matrix,
     iman_conover,
     is_positive_definite,
-    normal_correlation,
 )
 from mc_engine.sampling.streams import uniforms
 
@@ -40,26 +38,10 @@ def test_the_copula_works_on_each_case_for_itself():
         assert [float(u[0]) for u in alone] == [float(u[case]) for u in whole]
 
 
-def test_the_copula_leaves_the_first_column_and_a_free_one_bit_for_bit():
-    target = np.array([[1.0, 0.0, 0.5], [0.0, 1.0, 0.0], [0.5, 0.0, 1.0]])
-    columns = _independent(100)
-    mixed = gaussian_copula(columns, target)
-    assert [mixed[k] is columns[k] for k in range(3)] == [True, True, False]
-
-
 def test_iman_and_conover_reach_the_rank_correlations_with_few_cases():
     u = iman_conover(_hypercube(200), TARGET)
     # Scores, not ranks, are matched exactly; on 200 cases the ranks follow within a few hundredths.
     assert spearmanr(np.column_stack(u)).statistic == pytest.approx(TARGET, abs=0.03)
-
-
-def test_iman_and_conover_beat_the_copula_on_the_same_cases():
-    columns = _hypercube(100)
-    misses = [
-        np.abs(spearmanr(np.column_stack(method(columns, TARGET))).statistic - TARGET).max()
-        for method in (iman_conover, gaussian_copula)
-    ]
-    assert misses[0] < misses[1] / 2.0
 
 
 def test_iman_and_conover_only_pair_the_values_anew():
@@ -67,16 +49,6 @@ def test_iman_and_conover_only_pair_the_values_anew():
     mixed = iman_conover(columns, TARGET)
     assert mixed[0] is columns[0]
     assert all(np.sort(ours).tolist() == np.sort(theirs).tolist() for ours, theirs in zip(mixed, columns, strict=True))
-
-
-def test_normal_deviates_need_a_slightly_larger_correlation_than_their_ranks():
-    assert normal_correlation(np.array([0.0, 0.5, 1.0])) == pytest.approx([0.0, 2 * np.sin(np.pi / 12), 1.0], abs=1e-15)
-
-
-def test_entries_are_gathered_into_one_matrix_in_file_order():
-    members, matrix = group_matrix(["a", "b", "c", "d"], [("d", "a", 0.4), ("a", "c", -0.2)])
-    assert members == (0, 2, 3)
-    assert matrix.tolist() == [[1.0, -0.2, 0.4], [-0.2, 1.0, 0.0], [0.4, 0.0, 1.0]]
 
 
 def test_three_dispersions_cannot_all_oppose_each_other():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import spearmanr
+from scipy.stats import chisquare, spearmanr
 
 from mc_engine.sampling.designs import (
     EXTENSIBLE,
@@ -38,13 +38,9 @@ def test_cases_in_any_order_and_any_chunks_are_the_same_cases(design, data):
 
 @pytest.mark.parametrize("design", EXTENSIBLE)
 def test_a_thousand_cases_extended_to_two_thousand_are_a_fresh_two_thousand(design):
-    first, more = _cube(design, range(1000), 1000), _cube(design, range(1000, 2000), 2000)
+    first, later = _cube(design, range(1000), 1000), _cube(design, range(1000, 2000), 2000)
     fresh = _cube(design, range(2000), 2000)
-    assert np.concatenate([first, more], axis=1).tobytes() == fresh.tobytes()
-
-
-def test_a_latin_hypercube_of_another_size_is_another_design():
-    assert (_cube("lhs", range(100), 100) != _cube("lhs", range(100), 200)).all()
+    assert np.concatenate([first, later], axis=1).tobytes() == fresh.tobytes()
 
 
 @pytest.mark.parametrize("design", RANDOM)
@@ -76,11 +72,12 @@ def test_a_trajectory_of_morris_moves_every_dispersion_once_by_half_the_levels()
     assert (moved.sum(axis=2) == 1).all()
     assert set(np.unique(blocks)) == {0.125, 0.375, 0.625, 0.875}
     assert set(np.unique(np.abs(np.diff(blocks, axis=1))[moved])) == {0.5}
-    # where it begins, the order and the direction are a matter of chance
-    assert np.bincount((4.0 * blocks[:, 0, 0]).astype(int)) == pytest.approx([100] * 4, abs=40)
-    assert np.bincount(moved[:, :, 0].argmax(axis=1)) == pytest.approx([100] * 4, abs=40)
-    steps = np.diff(blocks, axis=1)
-    assert (steps > 0.0).sum() == pytest.approx((steps < 0.0).sum(), rel=0.2)
+    # where each dispersion begins, its turn among the moves and its direction are a matter of chance, all alike
+    for k in range(len(NAMES)):
+        turn = moved[:, :, k].argmax(axis=1)
+        rises = (np.diff(blocks[:, :, k], axis=1).sum(axis=1) > 0.0).astype(int)
+        for choice in ((4.0 * blocks[:, 0, k]).astype(int), turn, rises):
+            assert chisquare(np.bincount(choice)).pvalue > 0.001, NAMES[k]
 
 
 def test_a_number_of_cases_that_cuts_a_block_is_told_the_nearest_that_do_not():
@@ -108,17 +105,6 @@ def test_a_latin_hypercube_has_one_case_in_each_stratum_of_each_dispersion(pairs
     assert (np.sort((u * 300).astype(int), axis=1) == np.arange(300)).all()
 
 
-def test_the_strata_of_a_latin_hypercube_are_filled_off_centre():
-    inside = (_cube("lhs", range(300), pairs=()) * 300) % 1.0
-    assert np.histogram(inside, bins=4, range=(0, 1))[0] == pytest.approx([300] * 4, rel=0.2)
-
-
-def test_a_caller_cannot_spoil_the_shared_latin_hypercube():
-    part = unit_cube("lhs", 1, NAMES, np.arange(300), 300)[0]
-    part[:] = 0.5
-    assert len(np.unique(unit_cube("lhs", 1, NAMES, np.arange(300), 300)[0])) == 300
-
-
 @pytest.mark.parametrize("design", ["lhs", "sobol"])
 def test_spread_designs_estimate_a_mean_better_than_chance(design):
     def error(design):
@@ -140,10 +126,3 @@ def test_one_at_a_time_moves_one_dispersion_and_leaves_the_others_nominal():
     first, second = one_at_a_time_levels([2, 3], cases)
     assert first.tolist() == [-1, 0, 1, -1, -1, -1]
     assert second.tolist() == [-1, -1, -1, 0, 1, 2]
-
-
-def test_levels_do_not_depend_on_the_order_of_asking():
-    order = np.random.default_rng(1).permutation(24)
-    for levels in (grid_levels, one_at_a_time_levels):
-        straight = levels([2, 3, 4], np.arange(24))
-        assert all((a == b[order]).all() for a, b in zip(levels([2, 3, 4], order), straight, strict=True))

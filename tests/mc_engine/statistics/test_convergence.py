@@ -5,7 +5,6 @@ import pytest
 from scipy import stats
 
 from mc_engine.statistics.convergence import running_mean, running_quantile
-from mc_engine.statistics.order_statistics import quantile
 
 
 def draws(n, key=1):
@@ -25,16 +24,6 @@ def test_the_running_mean_is_that_of_the_first_cases_with_students_interval():
         low, high = stats.t.interval(0.90, part.size - 1, part.mean(), stats.sem(part))
         assert found.estimate[place] == pytest.approx(part.mean(), abs=1e-8)
         assert (found.lower[place], found.upper[place]) == pytest.approx((low, high), abs=1e-8)
-
-
-def test_the_running_quantile_is_that_of_the_first_cases():
-    values = draws(5000)
-    found = running_quantile(values, 0.99865)
-    for place in (0, 20, -1):
-        expected = quantile(np.sort(values[: found.cases[place]]), 0.99865)
-        assert found.estimate[place] == expected.value
-    assert np.isnan(found.upper[0])
-    assert found.upper[-1] == expected.upper
 
 
 def test_an_interval_close_enough_and_equal_halves_have_settled():
@@ -61,9 +50,3 @@ def test_independent_cases_are_said_to_drift_no_more_often_than_stated(estimate)
     # stated 1 %; three sigma of 400 trials are 1.5 %
     alarms = [estimate(draws(400, key)).halves_p < 0.01 for key in range(400)]
     assert np.mean(alarms) < 0.01 + 0.015
-
-
-@pytest.mark.parametrize("values", [np.zeros(0), np.arange(19.0), np.full(50, 0.1), np.full(50, np.nan), np.zeros(30)])
-def test_of_too_few_or_equal_values_nothing_is_said(values):
-    assert running_mean(values) is None
-    assert running_quantile(values, 0.5) is None

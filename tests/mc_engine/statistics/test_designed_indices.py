@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mc_engine.sampling.designs import unit_cube
-from mc_engine.statistics.designed_indices import FEWEST_BLOCKS, designed_indices
+from mc_engine.statistics.designed_indices import designed_indices
 
 
 def flown(design, n_blocks, function, names=("x0", "x1", "x2"), seed=4):
@@ -60,23 +60,3 @@ def test_cases_of_an_unfinished_block_do_not_count(design):
     cases, x, y = flown(design, 40, ishigami)
     found = designed_indices(design, cases[:-1], {k: v[:-1] for k, v in x.items()}, {"y": y[:-1]})
     assert (found.n_used.tolist(), found.n_tried) == ([39], 39)
-
-
-@pytest.mark.parametrize("design", ["saltelli", "morris"])
-def test_constants_and_too_few_blocks_have_no_indices(design):
-    cases, x, y = flown(design, FEWEST_BLOCKS, ishigami)
-    fewer = cases.size - 1
-    for found in (
-        designed_indices(design, cases, x, {"y": np.full(y.size, 0.1)}),
-        designed_indices(design, cases[:fewer], {k: v[:fewer] for k, v in x.items()}, {"y": y[:fewer]}),
-        designed_indices(design, cases[:0], {k: v[:0] for k, v in x.items()}, {"y": y[:0]}),
-    ):
-        assert all(np.isnan(one).all() for one in found.values.values())
-
-
-def test_an_input_that_moves_to_an_equal_value_has_no_effect():
-    cases, x, _ = flown("morris", 60, ishigami)
-    words = np.where(x["x0"] > 0.99, "burn", "coast").astype(object)  # the same in all cases
-    found = designed_indices("morris", cases, {**x, "x0": words}, {"y": 2.0 * x["x1"]})
-    assert found.values["mu_star"][[0, 2], 0].tolist() == [0.0, 0.0]
-    assert found.values["mu_star"][1, 0] > 0.0

@@ -60,12 +60,3 @@ def test_a_fit_finds_the_components_and_as_many_as_there_are():
     np.testing.assert_allclose(fitted.kappa[order], TWO.kappa, rtol=0.2)
     np.testing.assert_allclose(fitted.nu[order], TWO.nu, rtol=0.05)
     assert fitted.kappa[2] == 0.0
-
-
-def test_weights_count_like_repeated_cases():
-    rng = np.random.default_rng(3)
-    u = rng.standard_normal((5_000, 3))
-    weight = np.exp(2.0 * u[:, 0])  # turns the normal density into one about (2, 0, 0)
-    fitted = fit_mixture(u, weight, np.random.default_rng(1))
-    assert fitted.mean[0] @ [1.0, 0.0, 0.0] > 0.95
-    assert fitted.nu[:-1] @ fitted.share[:-1] / 0.9 == pytest.approx(4.0 + 3.0, rel=0.15)

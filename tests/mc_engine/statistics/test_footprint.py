@@ -30,17 +30,5 @@ def test_the_long_axis_points_where_the_cloud_does():
     assert np.degrees(found.ellipses[0].direction) == pytest.approx(60.0, abs=0.5)  # from east to north
 
 
-def test_chosen_cases_have_a_place_and_no_regions():
-    found = footprint(*scattered(20.0, 30.0), random=False)
-    assert found.all_regions == []
-    assert len(found.points) == 2000
-
-
-def test_one_place_many_equal_ones_and_a_line_have_no_regions():
-    for latitude, longitude in ([[45.0], [7.0]], [[45.0] * 30, [7.0] * 30], [[0.0] * 30, np.arange(30.0)]):
-        found = footprint(np.array(latitude), np.array(longitude))
-        assert found.all_regions == []
-
-
 def test_places_across_the_planet_are_no_footprint():
     assert footprint(np.array([0.0, 0.0, 60.0]), np.array([0.0, 100.0, 50.0])) is None

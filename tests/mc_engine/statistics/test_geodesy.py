@@ -44,21 +44,3 @@ def test_the_mean_of_places_around_a_pole_is_the_pole():
     assert plane.latitude == pytest.approx(-90.0, abs=1e-7)
     points = plane.points(np.full(6, -89.0), np.arange(0.0, 360.0, 60.0))
     assert np.hypot(*points.T) == pytest.approx(np.full(6, 111_693.865), abs=0.5)
-
-
-def test_the_middle_is_where_the_offsets_add_up_to_nothing():
-    draw = np.random.Generator(np.random.Philox(key=3))
-    latitude, longitude = draw.normal(60.0, 3.0, 500), draw.normal(170.0, 9.0, 500)
-    plane = middle_plane(latitude, longitude)
-    assert plane.points(latitude, longitude).mean(axis=0) == pytest.approx([0.0, 0.0], abs=0.01)
-
-
-def test_places_all_around_the_planet_have_no_middle():
-    assert middle_plane(np.zeros(4), np.array([0.0, 90.0, 180.0, 270.0])) is None
-    assert middle_plane(np.zeros(0), np.zeros(0)) is None
-
-
-def test_the_stretch_across_is_that_of_the_sphere():
-    angle = 2.0e6 / 6378137.0
-    assert LocalPlane(0.0, 0.0).stretch(2.0e6) == pytest.approx(angle / np.sin(angle) - 1.0, rel=1e-9)
-    assert LocalPlane(0.0, 0.0).stretch(0.0) == 0.0

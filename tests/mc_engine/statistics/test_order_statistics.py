@@ -31,27 +31,14 @@ def test_the_largest_value_becomes_an_upper_limit_at_wilks_sample_size(n, share,
 
 
 def test_a_limit_that_needs_more_cases_is_none_and_not_a_guess():
-    found = quantile(np.sort(np.arange(20.0)), 0.99865)
-    assert found.upper is None
-    assert found.lower is not None
-
-
-@pytest.mark.parametrize("n", [59, 300, 1000])
-def test_intervals_hold_the_true_quantile_as_often_as_they_promise(n):
-    draw = np.random.Generator(np.random.Philox(key=3))
-    samples = np.sort(draw.exponential(size=(2000, n)), axis=1)
-    truth = -np.log(0.5)
-    found = [quantile(sample, 0.5, 0.9) for sample in samples]
-    assert np.mean([item.lower <= truth <= item.upper for item in found]) >= 0.9 - 0.015
+    limits = quantile(np.sort(np.arange(20.0)), 0.99865)
+    assert limits.upper is None
+    assert limits.lower is not None
 
 
 @pytest.mark.parametrize("probability", QUANTILES)
 def test_the_estimate_lies_between_its_limits_and_agrees_with_numpy(probability):
     values = np.sort(np.random.Generator(np.random.Philox(key=5)).normal(size=5000))
-    found = quantile(values, probability)
-    assert found.lower <= found.value <= found.upper
-    assert found.value == pytest.approx(np.quantile(values, probability, method="median_unbiased"), abs=1e-12)
-
-
-def test_one_value_is_every_quantile():
-    assert quantile(np.array([0.1]), 0.00135).value == 0.1
+    limits = quantile(values, probability)
+    assert limits.lower <= limits.value <= limits.upper
+    assert limits.value == pytest.approx(np.quantile(values, probability, method="median_unbiased"), abs=1e-12)

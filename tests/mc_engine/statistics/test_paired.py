@@ -22,15 +22,6 @@ def test_a_set_that_lacks_a_level_or_has_one_twice_is_left_out():
     assert matching_rows(choice, ["a", "b"], {"x": x}).tolist() == [[0, 1]]
 
 
-def test_different_draws_make_no_pairs():
-    draw = np.random.Generator(np.random.Philox(key=2)).normal(size=50)
-    assert matching_rows(np.array(["a", "b"] * 25), ["a", "b"], {"x": draw}).shape == (0, 2)
-
-
-def test_the_choice_alone_makes_one_pair():
-    assert matching_rows(np.array(["b", "a"]), ["a", "b"], {}).tolist() == [[1, 0]]
-
-
 def test_pairs_find_a_shift_that_the_scatter_hides():
     draw = np.random.Generator(np.random.Philox(key=3))
     scatter = draw.normal(0.0, 100.0, 400)

@@ -18,11 +18,6 @@ def test_no_failure_in_2302_cases_shows_0999_with_90_percent_confidence():
     assert pass_probability(2302, 2302)[1] >= 0.999 > pass_probability(2301, 2301)[1]
 
 
-def test_pass_probability_without_a_case_is_refused():
-    with pytest.raises(ValueError, match="no case"):
-        pass_probability(0, 0)
-
-
 # Smallest N that shows 0.9973 with 90 % for 0 ... 3 failures (NASA/TP-2010-216447's three-sigma level).
 @pytest.mark.parametrize(("failures", "tried"), [(0, 852), (1, 1440), (2, 1970), (3, 2473)])
 def test_the_verdict_turns_to_pass_at_the_known_sample_sizes(failures, tried):
@@ -30,62 +25,38 @@ def test_the_verdict_turns_to_pass_at_the_known_sample_sizes(failures, tried):
     assert judge(FUEL, *cases(tried - failures - 1, failures)).outcome == "not demonstrable"
 
 
-def test_too_few_cases_say_how_many_would_do():
-    found = judge(FUEL, *cases(100, 0))
-    assert (found.outcome, found.needed) == ("not demonstrable", 852)
-
-
 def test_a_share_below_its_own_upper_bound_fails():
-    found = judge(FUEL, *cases(900, 100))
-    assert found.outcome == "fail"
-    assert found.lower < 0.9 < found.upper < 0.9973
+    verdict = judge(FUEL, *cases(900, 100))
+    assert verdict.outcome == "fail"
+    assert verdict.lower < 0.9 < verdict.upper < 0.9973
 
 
 def test_failed_cases_and_numbers_that_are_none_count_against_the_requirement():
     values, ok = cases(2302, 0)
-    values[:5] = np.nan
+    values[:4], values[4] = np.nan, -np.inf  # which is below every limit and no number
     ok[5:8] = False
-    found = judge(FUEL, values, ok)
-    assert (found.passed, found.tried, found.no_number) == (2294, 2302, 8)
-
-
-def test_a_value_on_the_limit_is_inside():
-    assert judge(FUEL, np.array([1.0]), np.array([True])).passed == 1
+    verdict = judge(FUEL, values, ok)
+    assert (verdict.passed, verdict.tried, verdict.no_number) == (2294, 2302, 8)
 
 
 def test_both_limits_together_make_a_band():
-    found = judge({**FUEL, "at_least": 0.5}, np.array([0.4, 0.5, 0.7, 1.0, 1.1]), np.ones(5, dtype=bool))
-    assert found.passed == 3
-    assert found.demonstrated is None
-    assert found.enclosed is None
-    assert found.margin is None
+    verdict = judge({**FUEL, "at_least": 0.5}, np.array([0.4, 0.5, 0.7, 1.0, 1.1]), np.ones(5, dtype=bool))
+    assert verdict.passed == 3
+    assert verdict.demonstrated is None
+    assert verdict.enclosed is None
+    assert verdict.margin is None
 
 
 def test_two_limits_are_held_against_the_interval_that_the_cases_show():
     values, ok = np.linspace(0.1, 0.9, 1440), np.ones(1440, dtype=bool)
     band = {**FUEL, "at_least": 0.0}
-    found = judge(band, values, ok)
-    assert found.enclosed == (values[0], values[-1])  # 1440: one failure, and so two values may be left out
-    assert found.margin == pytest.approx(0.1)
+    verdict = judge(band, values, ok)
+    assert verdict.enclosed == (values[0], values[-1])  # 1440: one failure, and so two values may be left out
+    assert verdict.margin == pytest.approx(0.1)
     assert judge(band, values[1:], ok[1:]).enclosed is None
     looked = judge(band, values, ok, looked=True)
     assert looked.enclosed is None  # takes half the error and half of what may lie outside at each end
     assert judge(band, np.linspace(0.1, 0.9, 5000), np.ones(5000, dtype=bool), looked=True).enclosed is not None
-
-
-def test_the_limit_shown_is_the_largest_value_at_the_smallest_sample_and_the_margin_follows():
-    values, ok = cases(852, 0)
-    found = judge(FUEL, values, ok)
-    assert found.demonstrated == values.max()
-    assert found.margin == pytest.approx(0.1)
-
-
-def test_the_limit_shown_decides_like_the_verdict():
-    draw = np.random.Generator(np.random.Philox(key=4))
-    for n in (900, 1500, 4000):
-        values = draw.exponential(size=n) / 6.2
-        found = judge(FUEL, values, np.ones(n, dtype=bool))
-        assert (found.outcome == "pass") == (found.demonstrated is not None and found.demonstrated <= 1.0)
 
 
 def test_at_least_is_at_most_turned_round():
@@ -106,28 +77,18 @@ def test_failed_cases_take_the_worst_ranks_of_the_limit_shown():
 
 
 def test_a_grid_gives_counts_but_no_verdict():
-    found = judge(FUEL, *cases(5000, 0), design="grid")
-    assert (found.outcome, found.passed, found.lower, found.needed) == ("not demonstrable", 5000, None, None)
-
-
-@pytest.mark.parametrize("n", [0, 1, 2])
-def test_hardly_any_cases_demonstrate_nothing_and_warn_of_nothing(n):
-    assert judge(FUEL, np.zeros(n), np.ones(n, dtype=bool)).outcome == "not demonstrable"
+    verdict = judge(FUEL, *cases(5000, 0), design="grid")
+    assert (verdict.outcome, verdict.passed, verdict.lower, verdict.needed) == ("not demonstrable", 5000, None, None)
 
 
 # Probability that 852 cases with no failure, or 1440 with one, pass a system that just misses 0.9973.
 @pytest.mark.parametrize(("tried", "accepted"), [(852, 0), (1440, 1), (2473, 3)])
 def test_consumers_and_producers_risk_are_binomial(tried, accepted):
-    found = judge(FUEL, *cases(tried, 0))
-    assert found.accepted == accepted
-    assert found.consumer_risk == pytest.approx(binom.cdf(accepted, tried, 0.0027), rel=1e-9)
-    assert 0.095 < found.consumer_risk <= 0.1
-    assert found.producer_risk == pytest.approx(binom.sf(accepted, tried, 0.00135), rel=1e-9)
-
-
-def test_so_few_cases_that_none_pass_have_no_consumers_risk_and_all_of_the_producers():
-    found = judge(FUEL, *cases(851, 0))
-    assert (found.accepted, found.consumer_risk, found.producer_risk) == (None, 0.0, 1.0)
+    verdict = judge(FUEL, *cases(tried, 0))
+    assert verdict.accepted == accepted
+    assert verdict.consumer_risk == pytest.approx(binom.cdf(accepted, tried, 0.0027), rel=1e-9)
+    assert 0.095 < verdict.consumer_risk <= 0.1
+    assert verdict.producer_risk == pytest.approx(binom.sf(accepted, tried, 0.00135), rel=1e-9)
 
 
 def test_the_number_accepted_is_where_the_verdict_turns():
@@ -137,16 +98,6 @@ def test_the_number_accepted_is_where_the_verdict_turns():
             if accepted is not None:
                 assert judge(FUEL, *cases(tried - accepted, accepted), looked=looked).outcome == "pass"
                 assert judge(FUEL, *cases(tried - accepted - 1, accepted + 1), looked=looked).outcome != "pass"
-
-
-def test_a_run_that_was_looked_at_takes_more_cases_and_says_what_it_cannot():
-    assert judge(FUEL, *cases(1000, 0)).outcome == "pass"
-    found = judge(FUEL, *cases(1000, 0), looked=True)
-    assert (found.outcome, found.needed) == ("not demonstrable", 1104)
-    assert (found.consumer_risk, found.producer_risk) == (None, None)
-    passed = judge(FUEL, *cases(1104, 0), looked=True)
-    assert passed.outcome == "pass"
-    assert passed.demonstrated == cases(1104, 0)[0].max()
 
 
 @pytest.mark.parametrize(
@@ -201,33 +152,12 @@ def test_requirements_that_pass_alone_can_fail_together():
     assert joint.outcome == "fail"  # 72 in all are too many, 36 of each are not surely
 
 
-def test_one_requirement_that_surely_fails_fails_them_all():
-    fuel = np.full(10_000, 0.5)
-    fuel[:45] = 1.5
-    verdicts, joint = both(fuel, np.full(10_000, 6.0))
-    assert verdicts[0].shared_outcome == "fail"
-    assert joint.estimate > joint.share
-    assert (joint.outcome, joint.needed) == ("fail", None)
-    fuel[36:45] = 0.5  # fails by itself, but not when two more had the chance to
-    verdicts, joint = both(fuel, np.full(10_000, 6.0))
-    assert (verdicts[0].outcome, verdicts[0].shared_outcome) == ("fail", "not demonstrable")
-    assert (joint.outcome, joint.needed) == ("not demonstrable", None)
-
-
 def test_a_shared_confidence_asks_more_of_each():
     alone = both([0.5] * 1000, [6.0] * 1000)[0][0]
     assert (alone.outcome, alone.shared_outcome) == ("pass", "not demonstrable")  # 852 at 90 %, 1259 at 96.67 %
     enough = both([0.5] * 1259, [6.0] * 1259)[0][0]
     assert enough.shared_outcome == "pass"
     assert judge(FUEL, *cases(852, 0)).shared_outcome == "pass"  # a single one shares with none
-
-
-def test_a_single_requirement_has_no_joint_verdict_and_neither_have_shares_that_leave_nothing():
-    one = np.ones(3, dtype=bool)
-    assert judge_all([FUEL], lambda name: np.ones(3), one)[1] is None
-    assert judge_all([], lambda name: np.ones(3), one) == ([], None)
-    half = {**FUEL, "share": 0.5}
-    assert judge_all([half, half], lambda name: np.ones(3), one)[1] is None
 
 
 @pytest.mark.parametrize("looked", [False, True])
@@ -241,7 +171,3 @@ def test_runs_of_hardly_anything_are_judged_together_without_a_warning(n, kind, 
     assert verdicts[0].no_number == (0 if usable else n)
     assert verdicts[0].outcome == ("fail" if n and not usable else "not demonstrable")
     assert verdicts[0].demonstrated is None
-
-
-def test_all_failed_is_a_fail():
-    assert judge(FUEL, np.full(50, np.nan), np.zeros(50, dtype=bool)).outcome == "fail"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from mc_engine.statistics import selection
-from mc_engine.statistics.selection import Selection, from_sortable, sortable
+from mc_engine.statistics.selection import Selection
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False).map(lambda value: value + 0.0)
 
@@ -48,15 +48,3 @@ def test_large_and_tied_columns_in_uneven_parts(kind, few, monkeypatch):
     ranks = [1, 2, 27, 10_000, 10_001, 19_999, 20_000]
     found = selected(np.split(values, [3, 9000, 9001]), ranks)
     assert found == {rank: float(np.sort(values)[rank - 1]) for rank in ranks}
-
-
-@given(FINITE, FINITE)
-def test_keys_sort_as_the_values_do(a, b):
-    first, second = (int(key) for key in sortable(np.array([a, b])))
-    assert (first < second) == (a < b)
-    assert from_sortable(first) == a
-
-
-def test_values_are_told_only_after_the_last_pass():
-    with pytest.raises(ValueError, match="not all passes"):
-        _ = Selection().values

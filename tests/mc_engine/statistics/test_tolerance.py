@@ -42,11 +42,6 @@ def test_a_second_value_is_left_out_at_each_end_when_there_are_enough():
     assert interval(np.arange(152.0), acceptance_number(152, 0.95, 0.95), 0) == (0.0, 150.0)
 
 
-def test_a_rank_below_one_is_refused():
-    with pytest.raises(ValueError, match="first rank is 1"):
-        smallest_interval_sample(0.95, 0.95, 0)
-
-
 @pytest.mark.parametrize(("accepted", "limit"), [(0, 5.0), (1, 4.0), (4, 1.0), (5, None), (None, None)])
 def test_an_upper_limit_leaves_out_as_many_values_as_failures_are_allowed(accepted, limit):
     assert upper_limit(VALUES, accepted, 0) == limit
@@ -59,9 +54,3 @@ def test_cases_without_a_number_are_left_out_first():
     assert upper_limit(VALUES, 2, 3) is None
     assert interval(VALUES, 3, 2) == (1.0, 5.0)
     assert interval(VALUES, 3, 3) is None
-
-
-def test_no_value_has_no_limit():
-    none = np.array([])
-    assert upper_limit(none, 0, 0) is None
-    assert interval(none, 1, 0) is None

@@ -14,11 +14,6 @@ def test_worst_first_ties_in_order_and_no_failed_case_among_them(largest, rows):
     assert worst_cases(VALUES, OK, 3, largest).tolist() == rows
 
 
-def test_fewer_cases_than_asked_for_are_all_given():
-    assert worst_cases(VALUES, OK, 100).size == 4
-    assert worst_cases(VALUES[:0], OK[:0], 5).size == 0
-
-
 @pytest.mark.parametrize("largest", [True, False])
 def test_of_many_cases_with_ties_the_worst_are_those_of_a_full_sort(largest):
     draw = np.random.Generator(np.random.Philox(key=1))

@@ -44,30 +44,12 @@ def test_any_flipped_bit_makes_a_line_worthless(number, bit):
         assert decode(bytes(flipped), number + 1) is None, place
 
 
-def test_a_line_is_worthless_at_another_place():
-    assert decode(LINES[2][:-1], 4) is None
-
-
-def test_a_whole_journal_gives_all_its_entries(path):
-    journal = Journal(path)
-    assert [entry.number for entry in journal.entries] == [1, 2, 3, 4]
-    assert journal.entries[2].facts == {"first": 20, "rows": 10, "file": "cases/part-3"}
-    assert not journal.torn
-
-
 @pytest.mark.parametrize("kept", range(len(LINES[3])))
 def test_every_cut_of_the_last_line_loads_the_lines_before_it(path, kept):
     path.write_bytes(WHOLE[: len(WHOLE) - len(LINES[3]) + kept])
     journal = Journal(path)
     assert len(journal.entries) == 3
     assert journal.torn == (kept > 0)
-
-
-def test_a_last_line_of_zeros_with_its_newline_is_torn_too(path):
-    path.write_bytes(b"".join(LINES[:3]) + bytes(len(LINES[3]) - 1) + b"\n")
-    journal = Journal(path)
-    assert journal.torn
-    assert len(journal.entries) == 3
 
 
 @pytest.mark.parametrize("line", [1, 2, 3])
@@ -99,12 +81,6 @@ def test_a_flipped_newline_costs_the_two_lines_it_joins_alone(line):
     assert found.damaged == (line + 1, line + 2)
     assert [entry.number for entry in found.entries] == sorted({1, 2, 3, 4, 5, 6} - {line + 1, line + 2})
     assert not found.torn
-
-
-def test_a_newline_within_a_line_costs_that_line_alone():
-    found = scan(LINES[0] + LINES[1][:20] + b"\n" + LINES[1][21:] + LINES[2] + LINES[3])
-    assert found.damaged == (2,)
-    assert [entry.number for entry in found.entries] == [1, 3, 4]
 
 
 def test_a_line_that_stands_twice_is_damage_and_so_is_a_number_beyond_all_lines():
@@ -155,15 +131,3 @@ def _half_written(descriptor, content, genuine=os.write):
     if len(content) < 20:
         _full_disk()
     return genuine(descriptor, content[:-15])
-
-
-def test_numpy_numbers_are_written_as_numbers(path):
-    import numpy as np
-
-    Journal(path).append("timing", {"steps": np.int64(3), "seconds": np.float64(0.5)})
-    assert Journal(path).entries[-1].facts == {"steps": 3, "seconds": 0.5}
-
-
-def test_a_journal_that_is_not_there_is_an_error_with_its_path(tmp_path):
-    with pytest.raises(StoreError, match="nowhere"):
-        Journal(tmp_path / "nowhere.jsonl")

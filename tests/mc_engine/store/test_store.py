@@ -1,6 +1,3 @@
-import json
-import os
-import time
 from hashlib import sha256
 from itertools import pairwise
 
@@ -19,7 +16,7 @@ from mc_engine.store import parts
 from mc_engine.store.journal import Journal
 from mc_engine.store.opening import open_store
 from mc_engine.store.run_files import is_run_directory
-from mc_engine.store.store import Column, create_store
+from mc_engine.store.store import create_store
 from mc_engine.store.verification import damage
 
 # ---- a store gives back what was put in
@@ -45,35 +42,12 @@ def test_the_table_is_the_same_however_the_cases_were_cut_and_ordered(tmp_path_f
     assert store.missing(45) == [(40, 45)]
 
 
-def test_status_is_stored_in_words_whether_given_in_codes_or_words(store):
-    store.append(0, 10, block(0, 10))
-    store.append(10, 10, {**block(10, 10), "status": ["ok"] * 9 + ["refused"]})
-    assert store.cases()["status"].tolist() == ["ok"] * 3 + ["no-stop"] + ["ok"] * 15 + ["refused"]
-    assert open_store(store.path).status_counts() == {"ok": 18, "no-stop": 1, "refused": 1}
-
-
-def test_a_missing_reason_is_an_empty_word(store):
-    store.append(0, 2, {**block(0, 2), "reason": np.array([None, "too heavy"], dtype=object)})
-    assert store.cases()["reason"].tolist() == ["", "too heavy"]
-
-
 def test_the_table_carries_units_and_meanings(store):
     table = filled(store).cases()
     assert table.attrs["units"]["propellant_kg"] == "kg"
     assert table.attrs["descriptions"]["ve_pct"] == "error of the speed change"
     assert table.attrs["roles"]["end_x_km"] == "state"
     assert list(table.attrs["units"]) == list(table.columns) == list(store.units)
-
-
-def test_some_columns_can_be_read_in_the_order_asked_for(store):
-    table = filled(store).cases(["propellant_kg", "case_id"])
-    assert list(table.columns) == ["propellant_kg", "case_id"]
-    assert table.attrs["units"] == {"propellant_kg": "kg", "case_id": ""}
-
-
-def test_an_unknown_column_is_refused_with_those_there_are(store):
-    with pytest.raises(StoreError, match=r'no column "fuel".*propellant_kg'):
-        filled(store).cases(["fuel"])
 
 
 def test_an_empty_store_gives_a_table_without_rows_and_with_every_column(store):
@@ -122,14 +96,6 @@ def test_every_field_on_disk_has_unit_role_and_description(store):
     assert len({pq.read_schema(part).serialize().to_pybytes() for part in path.parent.iterdir()}) == 1
 
 
-def test_numbers_are_written_without_dictionaries_and_words_with(store):
-    metadata = pq.read_metadata(next((filled(store).path / "cases").glob("part-*")))
-    chunks = [metadata.row_group(0).column(i) for i in range(metadata.num_columns)]
-    encodings = {chunk.path_in_schema: chunk.encodings for chunk in chunks}
-    assert not any("DICTIONARY" in name for name in encodings["propellant_kg"])
-    assert any("DICTIONARY" in name for name in encodings["status"])
-
-
 def test_the_same_columns_give_the_same_bytes(tmp_path):
     digests = []
     for name in ("one", "two"):
@@ -138,13 +104,6 @@ def test_the_same_columns_give_the_same_bytes(tmp_path):
         digests.append([(file.name, sha256(file.read_bytes()).hexdigest()) for file in files])
     assert len(digests[0]) == 4
     assert digests[0] == digests[1]
-
-
-def test_strided_and_read_only_arrays_are_stored_like_any_other(store):
-    square = np.arange(80.0).reshape(40, 2)
-    square.flags.writeable = False
-    store.append(0, 40, {**block(0, 40), "ve_pct": square[:, 1]})
-    assert store.cases()["ve_pct"].tolist() == square[:, 1].tolist()
 
 
 @pytest.mark.parametrize(
@@ -201,13 +160,6 @@ def test_the_nominal_is_kept_apart_as_case_minus_one(store):
     assert pd.read_parquet(store.path / "nominal.parquet")["propellant_kg"].tolist() == [given["propellant_kg"]]
 
 
-def test_a_nominal_written_again_replaces_the_first(store):
-    for case in (7, 8):
-        store.write_nominal(row(case))
-    assert open_store(store.path).nominal()["ve_pct"] == block(8, 1)["ve_pct"][0]
-    assert damage(store.path) == []
-
-
 def test_a_kill_while_the_nominal_is_replaced_leaves_no_nominal_rather_than_damage(store, monkeypatch):
     store.write_nominal(row(7))
     append = Journal.append
@@ -233,29 +185,6 @@ def test_histories_come_back_with_units_and_replace_those_kept_before(store):
     pd.testing.assert_frame_equal(pd.read_parquet(store.path / "history"), histories)
     store.write_histories(histories)
     pd.testing.assert_frame_equal(store.histories(), histories)
-
-
-def test_an_extension_changes_how_many_cases_are_wanted(store):
-    assert store.n_cases == 40
-    store.note("extended", cases=60)
-    assert open_store(store.path).n_cases == 60
-    assert store.missing() == [(0, 60)]
-
-
-def test_notes_come_back_in_order_with_their_facts(store):
-    store.note("started", cores=2)
-    store.note("timing", seconds=1.5)
-    assert [entry.event for entry in open_store(store.path).notes()] == ["created", "started", "timing"]
-    assert store.notes("timing")[0].facts == {"seconds": 1.5}
-
-
-def test_manifest_and_campaign_come_back_as_given(store):
-    again = open_store(store.path)
-    assert again.campaign_text == TEXT
-    assert (store.path / "campaign.toml").read_text(encoding="utf-8") == TEXT
-    assert again.manifest["quantities"] == MANIFEST["quantities"]
-    assert [column["name"] for column in again.manifest["columns"]] == list(again.units)
-    assert json.loads((store.path / "manifest.json").read_text(encoding="utf-8")) == again.manifest
 
 
 # ---- creation
@@ -319,56 +248,3 @@ def test_a_run_of_a_newer_engine_is_refused(run):
 
 
 # ---- speed
-
-
-@pytest.fixture
-def wide(run):
-    columns = [Column(f"metric_{i}", "", "metric", "a number") for i in range(40)]
-    store = create_store(run, MANIFEST, TEXT, columns)
-    rng = np.random.default_rng(1)
-    arrays = {column.name: rng.normal(size=5000) for column in columns}
-    return store, {**arrays, "status": np.zeros(5000, int), "reason": np.full(5000, "", object)}
-
-
-def shortest(act, repeats=7):
-    """Shortest of some times [s] that `act` takes; it gets the number of the repeat."""
-    times = []
-    for repeat in range(repeats):
-        begin = time.perf_counter()
-        act(repeat)
-        times.append(time.perf_counter() - begin)
-    return min(times)
-
-
-@pytest.mark.benchmark
-def test_reading_a_store_costs_at_most_four_times_what_pandas_takes_for_the_same_files(wide):
-    """The digest of every part is checked on the way."""
-    store, arrays = wide
-    store.append(0, 5000, arrays)
-    store.append(5000, 5000, arrays)
-    ours = shortest(lambda _: store.cases())
-    assert len(store.cases()) == 10_000
-    assert ours < 4.0 * shortest(lambda _: pd.read_parquet(store.path / "cases"))
-
-
-@pytest.mark.benchmark
-def test_storing_costs_at_most_four_times_a_synced_file_of_the_same_table(wide, tmp_path):
-    """A part and its line in the journal are two synced files and a synced folder."""
-    store, arrays = wide
-
-    def plain(repeat):
-        path = tmp_path / f"{repeat}.parquet"
-        pd.DataFrame(arrays).to_parquet(path, compression="zstd")
-        with path.open("rb+") as file:
-            os.fsync(file.fileno())
-
-    with store.lock():
-        ours = shortest(lambda repeat: store.append(5000 * repeat, 5000, arrays))
-    assert ours < 4.0 * shortest(plain)
-
-
-def test_columns_come_in_the_order_asked_for_each_once(store):
-    filled(store)
-    names = list(store.units)
-    asked = [names[3], names[1], names[3]]
-    assert store.cases(columns=asked).columns.tolist() == [names[3], names[1]]

@@ -30,19 +30,6 @@ def test_a_second_writer_is_refused_within_a_second_and_told_who_is_first(store)
     open_store(store.path).append(0, 10, block(0, 10))
 
 
-def test_a_lock_given_back_leaves_no_note(store):
-    store.append(0, 10, block(0, 10))
-    store.append(10, 10, block(10, 10))
-    assert store.notes("lock-taken-over") == []
-
-
-def test_the_lock_may_be_taken_inside_itself(store):
-    with store.lock(), store.lock():
-        store.append(0, 10, block(0, 10))
-        assert holder(store.path) is not None
-    assert holder(store.path) is None
-
-
 def test_a_writer_sees_what_another_committed_since_it_opened(store):
     other = open_store(store.path)
     store.append(0, 10, block(0, 10))
@@ -176,12 +163,6 @@ def test_a_new_directory_has_one_writer_and_is_gone_if_nothing_was_put_there(tmp
     assert not (tmp_path / "new").exists()
 
 
-def test_a_lock_record_of_garbage_is_no_obstacle(store):
-    (store.path / ".lock").write_bytes(b"\xff{")
-    store.note("x")
-    assert store.notes("lock-taken-over")[0].facts["from"] == {}
-
-
 RACE = """
 import os
 from small_run import ENVIRONMENT, block, created
@@ -216,16 +197,6 @@ def test_two_runs_that_start_in_one_directory_at_one_moment_do_not_mix(tmp_path)
         assert str(run) in "".join(messages)
         assert damage(run) == []
         assert len(open_store(run).cases()) == 40
-
-
-def test_a_lock_is_empty_when_given_back_and_none_is_lost_by_releasing_twice(run):
-    run.mkdir()
-    lock = WriterLock(run)
-    assert lock.acquire() is None
-    assert json.loads((run / ".lock").read_text())["pid"] == os.getpid()
-    lock.release()
-    lock.release()
-    assert (run / ".lock").read_bytes() == b""
 
 
 def test_a_record_of_somebody_elses_making_cannot_steer_the_terminal():

@@ -10,7 +10,7 @@ from apogee_tuning import apogee_and_speed, apogee_campaign
 from mc_engine.campaign.cases import case_table
 from mc_engine.flight.chunks import fly_cases
 from mc_engine.flight.kernel import build_kernel
-from mc_engine.studies.candidates import cases_per_candidate, commonest_failure, fly_candidates, quantile_rank
+from mc_engine.studies.candidates import cases_per_candidate, fly_candidates
 
 CHOICES = np.array([[300.0, 100.0], [250.0, 60.0], [600.0, 200.0], [400.0, 150.0], [200.0, 50.0]])
 ROBUST = '\n[tuning.constraint.most]\nmetric = "apogee_altitude_km"\nquantile = {}\n{} = 700.0\n'
@@ -61,11 +61,6 @@ def test_a_quantile_is_an_order_statistic_of_the_campaigns_own_cases(limit, rank
     assert len(np.unique(case_table(campaign, np.arange(10))["magnitude_error_pct"])) == 10
 
 
-def test_quantiles_never_take_the_better_case_of_two():
-    assert [quantile_rank(q, 20, True) for q in (0.05, 0.5, 0.51, 0.95, 0.999)] == [0, 9, 10, 18, 19]
-    assert [quantile_rank(q, 20, False) for q in (0.001, 0.05, 0.5, 0.51, 0.95)] == [0, 1, 10, 10, 19]
-
-
 def test_the_violation_is_the_excess_in_shares_of_the_limits():
     limits = '\n[tuning.constraint.band]\nmetric = "apogee_altitude_km"\nat_least = 500.0\nat_most = 700.0\n'
     scores = scores_of(apogee_campaign(limits))
@@ -85,11 +80,3 @@ def test_a_candidate_that_cannot_fly_has_no_number_and_an_infinite_violation():
     assert np.isinf(scores.violation[1])
     assert scores.failed.tolist() == [0, 11]
     assert scores.reasons.tolist() == ["", "refused: altitude_km is outside 150 to 2000 km"]
-
-
-def test_the_commonest_of_several_failures_is_told():
-    status, reason = ["refused", "no-stop", "refused", "refused"], ["late", "", "early", "early"]
-    assert commonest_failure(status, reason) == "refused: early"
-    assert commonest_failure(status[:2], reason[:2]) == "refused: late"
-    assert commonest_failure(status[1:2], reason[1:2]).startswith("no-stop: the flight reached its time limit")
-    assert commonest_failure([], []) == ""

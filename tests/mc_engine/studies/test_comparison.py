@@ -1,15 +1,11 @@
 """`mc-engine compare`: pairing, what changed, the answer and its exit status."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-import typer
-from cart import call, fails_with
-from comparable_runs import COLUMNS, TEXT, run
+from cart import call
+from comparable_runs import TEXT, run
 
-from mc_engine.command_line.commands import app
-from mc_engine.studies.comparison import ALPHA, TOLERANCE, compare_runs, pair_cases
+from mc_engine.studies.comparison import compare_runs, pair_cases
 from mc_engine.studies.comparison_lines import comparison_lines
 
 
@@ -50,12 +46,6 @@ def test_a_longer_run_is_paired_on_the_cases_of_the_shorter(tmp_path):
     assert not found.changed
 
 
-def test_runs_that_disperse_other_inputs_are_not_paired(tmp_path):
-    one = [column for column in COLUMNS if column.name != "mode"]
-    found = compared(run(tmp_path / "a"), run(tmp_path / "b", columns=one))
-    assert found.pairing.reason == "not paired: only one of the runs disperses mode"
-
-
 def test_pairs_need_half_of_the_smaller_run(tmp_path):
     a, b = run(tmp_path / "a", n=20).cases(), run(tmp_path / "b", n=20).cases()
     for same, paired in ((20, True), (10, True), (9, False), (0, False)):
@@ -78,14 +68,6 @@ def test_a_requirement_that_stands_worse_on_the_same_cases_is_a_change(tmp_path)
     assert found.changed
     better = compared(run(tmp_path / "c", limit=0.5), run(tmp_path / "d", limit=3.0))
     assert not better.changed
-
-
-def test_metrics_of_one_run_alone_or_in_another_unit_are_named(tmp_path):
-    fewer = [column for column in COLUMNS if column.name != "pulses"]
-    metres = [c if c.name != "range_m" else type(c)("range_m", "km", "metric", "far") for c in fewer]
-    found = compared(run(tmp_path / "a"), run(tmp_path / "b", columns=metres))
-    assert found.left_out == ("pulses: only in A", "range_m: in m in A, in km in B")
-    assert [one.metric for one in found.metrics] == ["propellant_kg"]
 
 
 def test_what_changed_in_code_and_campaign_is_told(tmp_path):
@@ -116,12 +98,6 @@ def test_a_case_or_two_are_compared_without_a_test(tmp_path, n):
     assert list(comparison_lines(found))
 
 
-def test_all_failed_is_compared_without_a_warning(tmp_path):
-    found = compared(run(tmp_path / "a", n=30, failed=30), run(tmp_path / "b", n=30, failed=30))
-    assert not found.changed
-    assert list(comparison_lines(found))
-
-
 def test_the_verb_answers_with_its_exit_status(tmp_path):
     run(tmp_path / "a")
     run(tmp_path / "b")
@@ -135,18 +111,3 @@ def test_the_verb_answers_with_its_exit_status(tmp_path):
     assert "changed: shift of propellant_kg" in changed.output
     assert call("compare", tmp_path / "a", tmp_path / "c", "--alpha", "1e-30").exit_code == 0
     assert call("compare", tmp_path / "a", tmp_path / "c", "--tolerance", "100").exit_code == 0
-
-
-def test_the_verb_takes_what_the_function_takes_where_nothing_is_said():
-    options = {option.name: option.default for option in typer.main.get_command(app).commands["compare"].params}
-    assert (options["alpha"], options["tolerance"]) == (ALPHA, TOLERANCE)
-
-
-def test_slips_of_usage_are_said(tmp_path):
-    run(tmp_path / "a")
-    run(tmp_path / "other", columns=[replace(one, unit="in") for one in COLUMNS])
-    fails_with(2, call("compare", tmp_path / "a", tmp_path / "other"), "have no metric of the same name and unit")
-    fails_with(2, call("compare", tmp_path / "a", tmp_path / "none"), "there is no such folder")
-    fails_with(2, call("compare", tmp_path / "a", tmp_path), "is no run directory")
-    fails_with(2, call("compare", tmp_path / "a", tmp_path / "a", "--report", "x.txt"), "must end in .html or .pdf")
-    fails_with(2, call("compare", tmp_path / "a", tmp_path / "a", "--alpha", "2"), "must lie between 0 and 1")

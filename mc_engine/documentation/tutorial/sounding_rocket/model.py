@@ -12,7 +12,19 @@ from figures import FIGURES
 
 from mc_engine.lanes import cos, exp, maximum, minimum, physics, sin, sqrt, where
 from mc_engine.lanes.noise import normal_pair
-from mc_engine.model import Event, Extremum, Field, FixedStep, Model, Parameter
+from mc_engine.model import (
+    Event,
+    FixedStep,
+    Parameter,
+    at_end,
+    inputs,
+    maximum_of,
+    metrics,
+    model,
+    outputs,
+    states,
+    time_of_maximum,
+)
 from mc_engine.physics.atmosphere import exponential
 from mc_engine.physics.constants import STANDARD_GRAVITY
 
@@ -27,30 +39,39 @@ HELD = radians(5.0)
 PROPORTIONAL, DERIVATIVE, NOZZLE_STOP = 0.3, 0.11, 0.1
 ATTITUDE_NOISE, RATE_NOISE = 0.002, 0.005  # rad, rad/s, one sigma of a sample
 
-PARAMETERS = (
-    Parameter(
-        "launcher_deg", "deg", "launcher's angle from the vertical", 5.0, 0.0, 30.0
-    ),
-    Parameter(
-        "thrust_pct", "%", "error of the thrust, not of the flow", 0.0, -50.0, 50.0
-    ),
-    Parameter("drag_pct", "%", "error of the body's drag area", 0.0, -90.0, 200.0),
-    Parameter("wind_m_s", "m/s", "wind at the ground, downrange", 0.0, -40.0, 40.0),
-    Parameter(
-        "misalignment_deg", "deg", "of the thrust, from the nozzle", 0.0, -3.0, 3.0
-    ),
+Inputs = inputs(
+    launcher_deg=Parameter(5.0, "launcher's angle from the vertical", 0.0, 30.0),
+    thrust_pct=Parameter(0.0, "error of the thrust, not of the flow", -50.0, 50.0),
+    drag_pct=Parameter(0.0, "error of the body's drag area", -90.0, 200.0),
+    wind_m_s=Parameter(0.0, "wind at the ground, downrange", -40.0, 40.0),
+    misalignment_deg=Parameter(0.0, "of the thrust, from the nozzle", -3.0, 3.0),
 )
 
-# m, m/s, rad from the vertical, rad/s, kg
-State = namedtuple("State", "downrange altitude vx vz pitch rate mass")
-# as PARAMETERS, in SI
-Parameters = namedtuple("Parameters", "launcher thrust drag wind misalignment")
+State = states(
+    downrange_km="distance along the ground",
+    altitude_km="altitude",
+    vx_m_s="speed downrange",
+    vz_m_s="speed upwards",
+    pitch_deg="body axis from the vertical",
+    rate_deg_s="rate of the same",
+    mass_kg="mass",
+)
 Memory = namedtuple("Memory", "nozzle burning drag_area")  # rad; 1 or 0; m^2
-Events = namedtuple("Events", "burn_out apogee main ground")
-Quantities = namedtuple("Quantities", "altitude downrange speed pressure pitch nozzle")
-Metrics = namedtuple(
-    "Metrics",
-    "apogee apogee_time top_speed peak_pressure landing_distance landing_speed",
+Outputs = outputs(
+    altitude_km="altitude",
+    downrange_km="distance along the ground",
+    speed_m_s="speed over the ground",
+    pressure_pa="dynamic pressure",
+    pitch_deg="body axis from the vertical",
+    nozzle_deg="angle of the nozzle",
+)
+Metrics = metrics(
+    apogee_km=maximum_of("altitude_km", "greatest altitude"),
+    apogee_time_s=time_of_maximum("altitude_km", "time from the rail to the apogee"),
+    top_speed_m_s=maximum_of("speed_m_s", "greatest speed over the ground"),
+    peak_pressure_pa=maximum_of("pressure_pa", "greatest dynamic pressure"),
+    landing_distance_km=at_end("downrange_km", "landing point from the launcher"),
+    landing_speed_m_s=at_end("speed_m_s", "speed at the ground, wind included"),
 )
 
 
@@ -61,19 +82,23 @@ def thrust_of(p):
 
 
 @physics
-def initial(p, o):
+def initial(p):
     """At the rail's end: the speed is that of a constant acceleration along it."""
     mass = DRY_MASS + PROPELLANT
     along = thrust_of(p) / mass - STANDARD_GRAVITY * cos(p.launcher)
     speed = sqrt(2.0 * RAIL * along)
     s, c = sin(p.launcher), cos(p.launcher)
-    return State(RAIL * s, RAIL * c, speed * s, speed * c, p.launcher, 0.0, mass)
+    return State(
+        downrange=RAIL * s, altitude=RAIL * c, vx=speed * s, vz=speed * c,
+        pitch=p.launcher, rate=0.0, mass=mass,
+    )  # fmt: skip
 
 
 @physics
-def start(p, o):
+def start(p):
     """The nozzle straight, the engine burning, no parachute."""
-    return Memory(0.0, 1.0, BODY_DRAG_AREA * (1.0 + p.drag))
+    drag_area = BODY_DRAG_AREA * (1.0 + p.drag)
+    return Memory(nozzle=0.0, burning=1.0, drag_area=drag_area)
 
 
 @physics
@@ -84,7 +109,7 @@ def air(s, p):
 
 
 @physics
-def rhs(t, s, m, p, o):
+def rhs(s, m, p):
     """Thrust along the nozzle, which turns the body; drag against the air; gravity."""
     rho, ux, uz = air(s, p)
     drag = 0.5 * rho * m.drag_area * sqrt(ux * ux + uz * uz)
@@ -93,109 +118,79 @@ def rhs(t, s, m, p, o):
     towards = s.pitch - swivel
     turn = force * (NOZZLE_ARM / INERTIA) * sin(swivel)
     return State(
-        s.vx,
-        s.vz,
-        (force * sin(towards) - drag * ux) / s.mass,
-        (force * cos(towards) - drag * uz) / s.mass - STANDARD_GRAVITY,
-        m.burning * s.rate,
-        turn,
-        -m.burning * MASS_FLOW,
+        downrange=s.vx,
+        altitude=s.vz,
+        vx=(force * sin(towards) - drag * ux) / s.mass,
+        vz=(force * cos(towards) - drag * uz) / s.mass - STANDARD_GRAVITY,
+        pitch=m.burning * s.rate,
+        rate=turn,
+        mass=-m.burning * MASS_FLOW,
     )
 
 
 @physics
-def control(t, s, m, p, o, draws):
+def control(s, m, draws):
     """Turn the nozzle against errors of attitude and rate; every sample has noise."""
     n1, n2 = normal_pair(draws, 0)
     error = s.pitch + ATTITUDE_NOISE * n1 - HELD
     nozzle = -PROPORTIONAL * error - DERIVATIVE * (s.rate + RATE_NOISE * n2)
     nozzle = minimum(maximum(nozzle, -NOZZLE_STOP), NOZZLE_STOP)
-    return Memory(nozzle, m.burning, m.drag_area)
+    return Memory(nozzle=nozzle, burning=m.burning, drag_area=m.drag_area)
 
 
 @physics
-def events(t, s, m, p, o):
-    """Zeros: no propellant left, end of the climb, main parachute, ground."""
-    return Events(s.mass - DRY_MASS, s.vz, s.altitude - MAIN_ALTITUDE, s.altitude)
+def propellant(s):  # propellant left [kg]
+    return s.mass - DRY_MASS
 
 
 @physics
-def switch(t, s, m, p, o, hit):
+def climb(s):  # speed upwards [m/s]
+    return s.vz
+
+
+@physics
+def above_main(s):  # altitude above that of the main parachute [m]
+    return s.altitude - MAIN_ALTITUDE
+
+
+@physics
+def altitude(s):  # altitude [m]
+    return s.altitude
+
+
+@physics
+def switch(s, m, hit):
     """Burn-out stops the engine; the drogue opens at the apogee, the main one lower."""
     burning = where(hit.burn_out > 0.5, 0.0, m.burning)
     area = where(hit.apogee > 0.5, DROGUE_AREA, m.drag_area)
     area = where(hit.main > 0.5, MAIN_AREA, area)
-    return s, Memory(m.nozzle, burning, area)
+    return s, Memory(nozzle=m.nozzle, burning=burning, drag_area=area)
 
 
 @physics
-def observe(t, s, m, p, o):
+def observe(s, m, p):
     """What histories show, and what extremes are taken of."""
     rho, ux, uz = air(s, p)
     pressure = 0.5 * rho * (ux * ux + uz * uz)
-    speed = sqrt(s.vx * s.vx + s.vz * s.vz)
-    nozzle = m.burning * m.nozzle
-    return Quantities(s.altitude, s.downrange, speed, pressure, s.pitch, nozzle)
+    return Outputs(
+        altitude=s.altitude, downrange=s.downrange,
+        speed=sqrt(s.vx * s.vx + s.vz * s.vz), pressure=pressure,
+        pitch=s.pitch, nozzle=m.burning * m.nozzle,
+    )  # fmt: skip
 
 
-@physics
-def evaluate(t, s, m, p, o, best, when):
-    """What a flight comes to."""
-    x, speed = s.downrange, sqrt(s.vx * s.vx + s.vz * s.vz)
-    return Metrics(best.apogee, when.apogee, best.speed, best.pressure, x, speed)
-
-
-MODEL = Model(
+MODEL = model(
     name="sounding_rocket",
     title="Sounding rocket from rail to ground",
-    source="",
-    parameters=PARAMETERS,
-    settings=(),
-    states=(
-        Field("downrange_km", "km", "distance along the ground"),
-        Field("altitude_km", "km", "altitude"),
-        Field("vx_m_s", "m/s", "speed downrange"),
-        Field("vz_m_s", "m/s", "speed upwards"),
-        Field("pitch_deg", "deg", "body axis from the vertical"),
-        Field("rate_deg_s", "deg/s", "rate of the same"),
-        Field("mass_kg", "kg", "mass"),
-    ),
-    quantities=(
-        Field("altitude_km", "km", "altitude"),
-        Field("downrange_km", "km", "distance along the ground"),
-        Field("speed_m_s", "m/s", "speed over the ground"),
-        Field("pressure_pa", "Pa", "dynamic pressure"),
-        Field("pitch_deg", "deg", "body axis from the vertical"),
-        Field("nozzle_deg", "deg", "angle of the nozzle"),
-    ),
-    metrics=(
-        Field("apogee_km", "km", "greatest altitude"),
-        Field("apogee_time_s", "s", "time from the rail to the apogee"),
-        Field("top_speed_m_s", "m/s", "greatest speed over the ground"),
-        Field("peak_pressure_pa", "Pa", "greatest dynamic pressure"),
-        Field("landing_distance_km", "km", "distance of the landing from the launcher"),
-        Field("landing_speed_m_s", "m/s", "speed at the ground, wind included"),
-    ),
+    inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
     clock=FixedStep(step=0.05, until=2000.0),
-    kernel_parameters=Parameters,
-    initial=initial,
-    start=start,
-    rhs=rhs,
-    control=control,
-    events=events,
-    event_list=(
-        Event("burn_out", "falling", "switch"),
-        Event("apogee", "falling", "switch"),
-        Event("main", "falling", "switch"),
-        Event("ground", "falling", "stop"),
-    ),
-    switch=switch,
-    observe=observe,
-    evaluate=evaluate,
-    extrema=(
-        Extremum("apogee", "altitude_km"),
-        Extremum("speed", "speed_m_s"),
-        Extremum("pressure", "pressure_pa"),
-    ),
+    initial=initial, start=start, rhs=rhs, control=control,
+    switch=switch, observe=observe,
+    events={
+        "burn_out": Event(propellant, "falling", "switch"),
+        "apogee": Event(climb, "falling", "switch"),
+        "main": Event(above_main, "falling", "switch"),
+        "ground": Event(altitude, "falling", "stop"),
+    },
     figures=FIGURES,
-)
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""What the source prints (`*.toml`), and our values of it that are no metric of a case (`values.py`)."""

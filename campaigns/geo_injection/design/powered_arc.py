@@ -1,0 +1,83 @@
+"""Powered arcs with their primer vector: fixed steps of order 8, compiled.  Canonical units.
+
+Importing this module imports numba, so whoever designs imports it when a design is wanted and not before.
+
+State y of twelve: place, velocity, primer vector p (the thrust's direction, minus the costate of the velocity) and its
+rate q (the costate of the place).  The steps are fixed, so an arc is a smooth function of its start and its duration:
+finite differences over it are as good as their rounding.
+"""
+
+import numpy as np
+
+from mc_engine.lanes.compiler import compile_kernel
+from mc_engine.lanes.runge_kutta_pairs import DOP853
+
+_NODES, _STARTS, _COLUMNS, _WEIGHTS = DOP853.tables()
+_STAGES = len(DOP853.nodes) + 1
+STEP = 0.1  # canonical time: a sixtieth of the parking orbit's revolution
+
+
+@compile_kernel
+def _rates(y, acceleration, out):
+    """Time derivative of y under a thrust acceleration along p: eqs (1) and (16) of the source, in vectors.
+
+    r'' = -r/r^3 + f p/|p|,  p' = q,  q' = -p/r^3 + 3 (r.p) r/r^5.
+    """
+    r2 = y[0] * y[0] + y[1] * y[1] + y[2] * y[2]
+    u3 = 1.0 / (r2 * np.sqrt(r2))
+    push = acceleration / np.sqrt(y[6] * y[6] + y[7] * y[7] + y[8] * y[8])
+    tide = 3.0 * (y[0] * y[6] + y[1] * y[7] + y[2] * y[8]) * u3 / r2
+    for k in range(3):
+        out[k] = y[3 + k]
+        out[3 + k] = -u3 * y[k] + push * y[6 + k]
+        out[6 + k] = y[9 + k]
+        out[9 + k] = -u3 * y[6 + k] + tide * y[k]
+
+
+@compile_kernel
+def _fly_one(y, mass, duration, thrust, flow, n_steps, nodes, starts, columns, weights, stages):
+    """Carry y over one burn in place, canonical.  mass : at its start;  thrust, flow : per initial mass.
+
+    Weights of order 8 of DOP853: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993).
+    """
+    h = duration / n_steps
+    n_stages = stages.shape[0]
+    now = np.empty(y.shape[0])
+    for step in range(n_steps):
+        t = step * h
+        for stage in range(n_stages + 1):
+            now[:] = y
+            for k in range(starts[stage], starts[stage + 1]):
+                for i in range(now.shape[0]):
+                    now[i] += h * weights[k] * stages[columns[k], i]
+            if stage == n_stages:
+                y[:] = now
+            else:
+                _rates(now, thrust / (mass - flow * (t + nodes[stage] * h)), stages[stage])
+
+
+@compile_kernel
+def _fly_all(y, mass, duration, thrust, flow, n_steps, nodes, starts, columns, weights, n_stages):
+    stages = np.empty((n_stages, y.shape[1]))
+    for case in range(y.shape[0]):
+        _fly_one(
+            y[case], mass[case], duration[case], thrust, flow, n_steps, nodes, starts, columns, weights, stages
+        )  # fmt: skip
+
+
+def fly_burns(
+    y: np.ndarray, mass: np.ndarray, duration: np.ndarray, thrust: float, flow: float, step: float = STEP
+) -> np.ndarray:
+    """States at the end of burns that begin at the states y [n, 12].
+
+    mass, duration : float64[n], of the initial mass and of the canonical time;  thrust, flow : canonical, per
+    initial mass.  step : longest; a thrust that turns over, because its primer vector passes near zero, wants short
+    ones.  A burn may last a negative time: it is then flown backward.
+    """
+    out = np.array(y, dtype=np.float64)
+    n = out.shape[0]
+    mass = np.ascontiguousarray(np.broadcast_to(mass, n), dtype=np.float64)
+    duration = np.ascontiguousarray(np.broadcast_to(duration, n), dtype=np.float64)
+    n_steps = max(8, int(np.ceil(np.abs(duration).max() / step)))
+    _fly_all(out, mass, duration, thrust, flow, n_steps, _NODES, _STARTS, _COLUMNS, _WEIGHTS, _STAGES)
+    return out

@@ -1,0 +1,170 @@
+"""The burn program: ignition times, durations and the thrust's direction, as data.
+
+A burn is one or more segments, on each of which the primer vector is a polynomial of degree 11 in s, from -1 at the
+segment's start to 1 at its end; thrust points along it.  Its length means nothing.  Text files of TOML keep a program.
+"""
+
+import tomllib
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from campaigns.geo_injection.design.optimal import Solution
+from campaigns.geo_injection.design.sequence import DESIGN, Sequence
+from campaigns.geo_injection.design.staged import StagedBurn
+
+DEGREE = 11
+_LONGEST = 2.5  # canonical time of a segment: the fit is then good to 1e-7 rad
+_NODES = 24  # instants that a segment is fitted to
+
+
+@dataclass(frozen=True)
+class Segment:
+    """start : time after ignition [s];  length [s];  steering : float64[3, DEGREE + 1], powers of s, rising."""
+
+    start: float
+    length: float
+    steering: np.ndarray
+
+
+@dataclass(frozen=True)
+class BurnProgram:
+    """ignition : time after the first [s];  duration [s];  error : of the fitted direction [rad].
+
+    end : place [m] and velocity [m/s] at the nominal cut-off
+    """
+
+    ignition: float
+    duration: float
+    error: float
+    end: np.ndarray
+    segments: tuple[Segment, ...]
+
+
+@dataclass(frozen=True)
+class Program:
+    """start : place [m] and velocity [m/s] at the first ignition, z to the north pole, x to the ascending node.
+
+    optimal : whether the switching function has its right sign all along; of a staged program, false
+    """
+
+    sequence: Sequence
+    start: np.ndarray
+    burns: tuple[BurnProgram, ...]
+    optimal: bool
+
+    @property
+    def propellant(self) -> float:
+        """Propellant of the nominal flight [kg]."""
+        return self.sequence.mass_flow * sum(burn.duration for burn in self.burns)
+
+
+def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float) -> tuple[float, tuple[Segment, ...]]:
+    """(largest error [rad], segments) of one burn from its canonical state at ignition."""
+    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
+
+    problem = sequence.problem()
+    count = max(1, int(np.ceil(duration / _LONGEST)))
+    edges = np.linspace(0.0, duration, count + 1)
+    nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    worst, segments = 0.0, []
+    for low, high in pairwise(edges):
+        times = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+        states = fly_burns(
+            np.repeat(start[None], _NODES, axis=0), np.full(_NODES, mass), times, problem.thrust, problem.flow
+        )
+        primer = sequence.inertial(states[:, 6:9])
+        primer = primer / np.linalg.norm(primer, axis=1).mean()
+        series = chebyshev.chebfit(nodes, primer, DEGREE)
+        error = np.cross(chebyshev.chebval(nodes, series).T, primer) / (primer**2).sum(1)[:, None]
+        worst = max(worst, float(np.abs(error).max()))
+        steering = np.array([_powers(column) for column in series.T])
+        unit = sequence.time_unit
+        segments.append(Segment(float(low * unit), float((high - low) * unit), steering))
+    return worst, tuple(segments)
+
+
+def _powers(column: np.ndarray) -> np.ndarray:
+    """Coefficients (no unit) of powers from those of a Chebyshev series; numpy drops the zeros at their end."""
+    powers = chebyshev.cheb2poly(column)
+    return np.pad(powers, (0, DEGREE + 1 - powers.size))
+
+
+Flown = tuple[float, float, np.ndarray, np.ndarray]
+
+
+def _in_space(sequence: Sequence, state: np.ndarray) -> np.ndarray:
+    """Place [m] and velocity [m/s], float64[6], z to the north pole, of a canonical state of the design's axes."""
+    place = sequence.inertial(state[:3]) * sequence.parking_radius
+    return np.concatenate([place, sequence.inertial(state[3:6]) * sequence.speed_unit])
+
+
+def program_of(sequence: Sequence, flown: list[Flown], optimal: bool) -> Program:
+    """The program of burns given as (ignition, duration, states at ignition and cut-off) in canonical units."""
+    burns, mass, unit = [], 1.0, sequence.time_unit
+    flow = sequence.problem().flow
+    for ignition, duration, state, end in flown:
+        error, segments = _fitted(sequence, state, mass, duration)
+        times = float(ignition * unit), float(duration * unit)
+        burns.append(BurnProgram(*times, error, _in_space(sequence, end), segments))
+        mass -= flow * duration
+    return Program(sequence, _in_space(sequence, flown[0][2]), tuple(burns), optimal)
+
+
+def of_solution(sequence: Sequence, solution: Solution, optimal: bool) -> Program:
+    """The program of the free-time optimum."""
+    rows = zip(solution.ignitions, solution.durations, solution.states[::2], solution.states[1::2], strict=True)
+    return program_of(sequence, list(rows), optimal)
+
+
+def of_stages(sequence: Sequence, stages: list[StagedBurn]) -> Program:
+    """The program of the staged procedure."""
+    rows = [(stage.ignition, stage.burn.duration, stage.burn.start, stage.burn.end) for stage in stages]
+    return program_of(sequence, rows, False)
+
+
+def to_text(program: Program) -> str:
+    """The program as TOML, SI."""
+    lines = ["# Burn program: see program.py.  Written by the design; edit its inputs instead.", f"design = {DESIGN}"]
+    lines += [f"optimal = {str(program.optimal).lower()}", f"start = {_list(program.start)}", "", "[sequence]"]
+    for name, value in program.sequence.record().items():
+        lines.append(f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value!r}")
+    for burn in program.burns:
+        lines += ["", "[[burn]]", f"ignition_s = {burn.ignition!r}", f"duration_s = {burn.duration!r}"]
+        lines.append(f"direction_error_rad = {burn.error!r}")
+        lines.append(f"end = {_list(burn.end)}")
+        for segment in burn.segments:
+            lines += ["", "[[burn.segment]]", f"start_s = {segment.start!r}", f"length_s = {segment.length!r}"]
+            lines += [f"{axis} = {_list(row)}" for axis, row in zip("xyz", segment.steering, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def _list(values: np.ndarray) -> str:
+    """Numbers as a TOML array with every digit of float64[n]."""
+    return "[" + ", ".join(repr(float(value)) for value in values) + "]"
+
+
+def from_text(text: str) -> Program:
+    """The program that `to_text` wrote; ValueError or KeyError where it is another file."""
+    record = tomllib.loads(text)
+    if record["design"] != DESIGN:
+        raise ValueError("a program of another design")
+    inputs: dict[str, Any] = record["sequence"]
+    sequence = Sequence(**{**inputs, "between": tuple(tuple(row) for row in inputs["between"])})
+    burns = tuple(
+        BurnProgram(
+            burn["ignition_s"],
+            burn["duration_s"],
+            burn["direction_error_rad"],
+            np.array(burn["end"]),
+            tuple(
+                Segment(segment["start_s"], segment["length_s"], np.array([segment[axis] for axis in "xyz"]))
+                for segment in burn["segment"]
+            ),
+        )
+        for burn in record["burn"]
+    )
+    return Program(sequence, np.array(record["start"]), burns, bool(record["optimal"]))

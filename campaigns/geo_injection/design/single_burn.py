@@ -1,0 +1,162 @@
+"""One burn of least time from a point of an orbit to a set of end conditions: the source's boundary-value problem.
+
+Canonical units: mu = 1.  The costates are kept as the primer vector p = -lambda_v and its rate q = lambda_r, so that
+H = 1 + q.v - p.g - T |p| / m (eq. 13) and eqs (14), (15) say "thrust along p".
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from campaigns.geo_injection.design.coast import coast
+from campaigns.geo_injection.design.optimal import SOLVED, coast_hamiltonian
+from mc_engine.errors import ModelError
+
+Conditions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of place and velocity [n, 3], complex too: [n, m]
+_STEP = 1e-6
+_IMAGINARY = 1e-40
+
+
+@dataclass(frozen=True)
+class Burn:
+    """ignition : time after the reference point of the old orbit;  start, end : states [12];  iterations : of scipy."""
+
+    ignition: float
+    duration: float
+    start: np.ndarray
+    end: np.ndarray
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What a burn has to do.
+
+    reference : place and velocity [6] on the old orbit that ignition times count from, an apsis or the node
+    mass : at ignition, of the initial one;  thrust, flow : per initial mass
+    reached : the end conditions, zero where they are met
+    step : of the integration, canonical time
+    placing : "fixed" ignites at the reference, "centred" half a burn before it, "free" where it lasts shortest
+    """
+
+    reference: np.ndarray
+    mass: float
+    thrust: float
+    flow: float
+    reached: Conditions
+    placing: str = "centred"
+    step: float = 0.1
+
+
+def rise_guess(rise: float) -> tuple[float, float, float]:
+    """(burn time, radial and transverse velocity costates) of a rise (R_f - R_0) / f: eqs (18), (23) of the source.
+
+    R_f, R_0 : canonical radii at cut-off and ignition, f : thrust acceleration; the radial place costate is 1.  Made
+    for a rise within less than a quarter revolution between circles: eq. (18) has R_0 = 1 and starts the example of
+    table 1.  Eq. (23) takes the same for burns between ellipses.  Of an apogee burn to the geostationary circle, which
+    needs speed and hardly any radius, it gives a third of the time and a thrust along the radius.  The search gets
+    there all the same, but `staged.py` tries an impulse first; and the radius at the end of a burn to an ellipse is
+    not known before.
+    """
+    half = float(np.sqrt(rise))
+    return 2.0 * half, half, rise
+
+
+def circle(radius: float) -> Conditions:
+    """The circle in the plane z = 0: eq. (17) for the angular momentum, and the two speeds."""
+
+    def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
+        h = np.cross(r, v)
+        rate, r2 = (r * v).sum(-1), (r * r).sum(-1)
+        conditions = [h[..., 0], h[..., 1], h[..., 2] - np.sqrt(radius), rate, r2 / radius - radius]
+        return np.stack(conditions, axis=-1) / np.sqrt(radius)
+
+    return reached
+
+
+def orbit(a: float, e: float, inclination: float) -> Conditions:
+    """An ellipse of given size, shape and inclination with node and apse line on the x axis, canonical.
+
+    Conditions: the angular momentum by eq. (17), the energy -1 / (2 a), and an eccentricity vector without a component
+    across the x axis.
+    """
+    h_wanted = np.sqrt(a * (1.0 - e * e))
+
+    def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
+        h = np.cross(r, v)
+        r1 = np.sqrt((r * r).sum(-1))
+        v2 = (v * v).sum(-1)
+        rows = [h[..., 0], h[..., 1] + h_wanted * np.sin(inclination), h[..., 2] - h_wanted * np.cos(inclination)]
+        rows.append(v2 - 2.0 / r1 + 1.0 / a)
+        apse = (v2 - 1.0 / r1)[..., None] * r - (r * v).sum(-1)[..., None] * v
+        rows.append(apse[..., 1] * np.cos(inclination) + apse[..., 2] * np.sin(inclination))
+        return np.stack(rows, axis=-1)
+
+    return reached
+
+
+def _ends(stage: Stage, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """States at ignition and cut-off of unknowns [n, ...]: primer vector, rate, duration, ignition, multipliers."""
+    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
+
+    n = len(x)
+    on_orbit = coast(np.concatenate([np.repeat(stage.reference[None], n, axis=0), np.ones((n, 6))], axis=1), x[:, 7])
+    start = np.concatenate([on_orbit[:, :6], x[:, :6]], axis=1)
+    return start, fly_burns(start, np.full(n, stage.mass), x[:, 6], stage.thrust, stage.flow, stage.step)
+
+
+def _residuals(stage: Stage, x: np.ndarray) -> np.ndarray:
+    """End conditions, transversality, H = 0 at the end, and the rule that places the ignition."""
+    start, end = _ends(stage, x)
+    r, v = end[:, :3], end[:, 3:6]
+    gradients = []
+    for k in range(6):
+        step = 1j * _IMAGINARY * np.eye(1, 6, k)[0]
+        gradients.append(stage.reached(r + step[:3], v + step[3:]).imag / _IMAGINARY)
+    costate = np.concatenate([end[:, 9:12], -end[:, 6:9]], axis=1)
+    across = costate - np.einsum("knm,nm->nk", np.array(gradients), x[:, 8:])
+    unit = stage.thrust / stage.mass  # the costates are those of eq. (13), times this
+    push = stage.mass / (stage.mass - stage.flow * x[:, 6]) * np.linalg.norm(end[:, 6:9], axis=1)
+    rules = {"fixed": x[:, 7], "centred": x[:, 7] + 0.5 * x[:, 6], "free": coast_hamiltonian(start)}
+    last = np.stack([1.0 + coast_hamiltonian(end) / unit - push, rules[stage.placing]], axis=1)
+    return np.concatenate([stage.reached(r, v), across, last], axis=1)
+
+
+def fly_shortest(stage: Stage, primer: np.ndarray, rate: np.ndarray, duration: float, ignition: float) -> Burn:
+    """The burn of least time near a guess of the primer vector and its rate at ignition; ModelError if none is found.
+
+    The guess fixes directions and a ratio; the size follows from H = 0.  Multipliers of the end conditions begin at
+    the values that fit the guessed end best.
+
+    Canonical; the conditions are eqs (9)-(17) of the source, solved by Levenberg-Marquardt and two Newton steps.
+    """
+    size = float(np.linalg.norm(primer))
+    x = np.array([*primer / size, *rate / size, duration, ignition])
+    m = stage.reached(stage.reference[None, :3], stage.reference[None, 3:]).shape[1]
+    x = np.append(x, np.zeros(m))
+    with np.errstate(all="ignore"):
+        free = _residuals(stage, x[None])[0, m : m + 6]
+        basis = np.repeat(x[None], m, axis=0)
+        basis[:, 8:] = np.eye(m)
+        columns = free[:, None] - _residuals(stage, basis)[:, m : m + 6].T
+        x[8:] = np.linalg.lstsq(columns, free, rcond=None)[0]
+
+        def value(x: np.ndarray) -> np.ndarray:
+            return np.nan_to_num(_residuals(stage, x[None])[0], nan=1e3, posinf=1e3, neginf=-1e3)
+
+        def slope(x: np.ndarray) -> np.ndarray:
+            steps = _STEP * np.diag(np.maximum(1.0, np.abs(x)))
+            both = np.nan_to_num(_residuals(stage, np.concatenate([x + steps, x - steps])))
+            return (both[: x.size] - both[x.size :]).T / (2.0 * np.diag(steps))
+
+        search = least_squares(value, x, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+        x = search.x
+        for _ in range(2):
+            x = x - np.linalg.lstsq(slope(x), value(x), rcond=1e-10)[0]
+        left = float(np.abs(value(x)).max())
+    if not left < SOLVED or x[6] <= 0.0:
+        raise ModelError(f"the search for the shortest burn stopped with a residual of {left:.1e}")
+    start, end = _ends(stage, x[None])
+    return Burn(float(x[7]), float(x[6]), start[0], end[0], int(search.njev))

@@ -1,0 +1,109 @@
+"""The source's procedure: burn by burn between given orbits, each of least time and centred on an apsis of the old one.
+
+The burns make one continuous flight, which the source's do not (its first burns begin on the node and its last ones
+are computed as if their apogee were there): the first burn leaves its perigee on the node, and begins where it lasts
+shortest if the parking orbit is a circle, which has no apsis.  The others are centred in time on the apsis that they
+reach and leave the perigee on the node again.  Canonical units, axes as in `optimal.py`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from campaigns.geo_injection.design.coast import coast
+from campaigns.geo_injection.design.optimal import Problem, parking_orbit
+from campaigns.geo_injection.design.single_burn import Burn, Stage, circle, fly_shortest, orbit, rise_guess
+from mc_engine.errors import ModelError
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """An orbit between two burns: canonical semi-major axis, eccentricity, inclination against the final orbit."""
+
+    a: float
+    e: float
+    inclination: float
+
+
+@dataclass(frozen=True)
+class StagedBurn:
+    """A burn of the flight.  ignition : canonical time after the first;  burn : as `single_burn` found it."""
+
+    ignition: float
+    burn: Burn
+
+
+def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
+    """The burns over the given intermediate orbits, canonical; ModelError names the burn that fails."""
+    burns: list[StagedBurn] = []
+    circle_first = problem.eccentricity == 0.0
+    if not circle_first and abs(np.sin(0.5 * problem.perigee)) > 1e-9:
+        raise ModelError(
+            "the staged procedure has all perigees on the ascending node: an elliptic parking orbit needs "
+            'parking_argument_of_perigee_deg = 0, or method = "optimal"'
+        )
+    places, velocities = parking_orbit(problem, np.zeros(1))
+    mass, reference, lead = 1.0, np.concatenate([places[0], velocities[0]]), 0.0
+    for k in range(problem.burns):
+        last = k == problem.burns - 1
+        reached = circle(problem.ratio) if last else orbit(between[k].a, between[k].e, between[k].inclination)
+        placing = "free" if k == 0 and circle_first else "centred"
+        stage = Stage(reference, mass, problem.thrust, problem.flow, reached, placing)
+        wanted = -np.sqrt(1.0 / problem.ratio) if last else _perigee_speed(between[k])
+        burn = _last(stage, wanted, problem) if last else _shortest(stage, wanted, between[k].inclination)
+        ignition = 0.0 if k == 0 else lead + burn.ignition
+        burns.append(StagedBurn(ignition, burn))
+        mass -= problem.flow * burn.duration
+        if not last:
+            at_apogee = k == problem.burns - 2
+            wait, reference = _next_apsis(burn.end[:6], at_apogee)
+            lead = ignition + burn.duration + wait
+    return burns
+
+
+def _perigee_speed(transfer: Orbit) -> float:
+    """Canonical speed at perigee, sqrt((1 + e) / ((1 - e) a)): the vis-viva equation at r = a (1 - e)."""
+    return float(np.sqrt((1.0 + transfer.e) / ((1.0 - transfer.e) * transfer.a)))
+
+
+def _shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
+    """The burn, guessed as an impulse at the apsis that gives the wanted speed; the rocket equation times it."""
+    r, v = stage.reference[:3], stage.reference[3:]
+    change = wanted * np.array([0.0, np.cos(inclination), np.sin(inclination)]) - v
+    size = float(np.linalg.norm(change))
+    duration = stage.mass * -np.expm1(-size * stage.flow / stage.thrust) / stage.flow
+    primer = change / size
+    rate = np.cross(np.cross(r, v) / (r @ r), primer)  # the thrust turns with the local horizon
+    return fly_shortest(stage, primer - 0.5 * duration * rate, rate, duration, -0.5 * duration)
+
+
+def _last(stage: Stage, wanted: float, problem: Problem) -> Burn:
+    """The burn into the final circle: guessed as an impulse or, if nothing is found so, by eq. (23)."""
+    try:
+        return _shortest(stage, wanted, 0.0)
+    except ModelError:
+        r, v = stage.reference[:3], stage.reference[3:]
+        r0 = float(np.linalg.norm(r))
+        if r0 >= problem.ratio:  # no rise: eq. (23) has no real root
+            raise
+        return rising(stage, problem.ratio, r / r0, v / np.linalg.norm(v))
+
+
+def rising(stage: Stage, radius: float, up: np.ndarray, along: np.ndarray) -> Burn:
+    """The burn to a radius, guessed by eq. (23) in the radial and transverse directions of the apsis."""
+    acceleration = stage.thrust / stage.mass
+    r0 = float(np.linalg.norm(stage.reference[:3]))
+    duration, radial, transverse = rise_guess((radius - r0) / acceleration)
+    return fly_shortest(stage, radial * up + transverse * along, -up - radial * along, duration, -0.5 * duration)
+
+
+def _next_apsis(state: np.ndarray, apogee: bool) -> tuple[float, np.ndarray]:
+    """(time to the next apogee or perigee, place and velocity there), as eqs (24)-(26) of the source."""
+    r, v = state[:3], state[3:]
+    r1 = np.sqrt(r @ r)
+    a = 1.0 / (2.0 / r1 - v @ v)
+    anomaly = np.arctan2(r @ v / np.sqrt(a), 1.0 - r1 / a)
+    e_sin = r @ v / np.sqrt(a)
+    mean = anomaly - e_sin
+    wait = float(((np.pi if apogee else 2.0 * np.pi) - mean) % (2.0 * np.pi) * a**1.5)
+    return wait, coast(np.append(state, np.ones(6))[None], np.array([wait]))[0, :6]

@@ -1,0 +1,68 @@
+"""Our values of the example of table 1, of the searches, of the optimum's totals and of the engine.
+
+M. Alavipour, A. A. Nikkhah, J. Roshanian.  The records name these functions; each returns its value in the unit of the
+record.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from campaigns.geo_injection.avoidance import AVOIDANCE, analytic_guess, burn_of, converged
+from campaigns.geo_injection.design.kept_programs import SEQUENCES
+from campaigns.geo_injection.design.programs import program_for
+from campaigns.geo_injection.design.staged import Orbit, staged
+from campaigns.geo_injection.model import MODEL
+from campaigns.geo_injection.published.burns import ORBITS
+from mc_engine.physics.constants import STANDARD_GRAVITY
+
+_COLUMNS = ("burn_time", "radial", "transverse")  # of table 1; the last two are velocity costates
+
+
+def avoidance_analytic(column: str) -> float:
+    """Row 1 of table 1, eq. (18), canonical.  column : burn_time, radial or transverse"""
+    return analytic_guess(AVOIDANCE)[_COLUMNS.index(column)]
+
+
+def avoidance_converged(column: str) -> float:
+    """Row 4 of table 1, the solution of the boundary-value problem, canonical."""
+    return converged(AVOIDANCE)[_COLUMNS.index(column)]
+
+
+def avoidance_iterations() -> int:
+    """Steps of our search (Levenberg–Marquardt, to 1e-9) for row 4 of table 1."""
+    return burn_of(AVOIDANCE).iterations
+
+
+@lru_cache
+def _iterations() -> list[int]:
+    """Steps of our search for each burn of the staged sequences over the printed orbits."""
+    steps = []
+    for name, orbits in ORBITS.items():
+        unit = SEQUENCES[name].parking_radius
+        between = tuple(
+            Orbit(1e3 * orbit.a_km / unit, orbit.e, float(np.radians(orbit.inclination_deg))) for orbit in orbits
+        )
+        steps += [stage.burn.iterations for stage in staged(SEQUENCES[name].problem(), between)]
+    return steps
+
+
+def most_iterations() -> int:
+    """Most steps a burn takes; text on the solution."""
+    return max(_iterations())
+
+
+def fewest_iterations() -> int:
+    """Fewest steps a burn takes; text on the solution."""
+    return min(_iterations())
+
+
+def optimal_burns_s(sequence: str) -> float:
+    """Sum [s] of the burns of the continuous optimal flight; to compare with the sums of tables 2 to 8."""
+    return sum(burn.duration for burn in program_for(SEQUENCES[sequence]).burns)
+
+
+def engine() -> str:
+    """Thrust and specific impulse that the campaign assumes."""
+    thrust_n, flow_kg_s = (float(MODEL.input(name).default) for name in ("thrust_n", "mass_flow_kg_s"))
+    return f"{thrust_n / 1e3:g} kN, {thrust_n / (flow_kg_s * STANDARD_GRAVITY):.2f} s"

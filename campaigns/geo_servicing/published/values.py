@@ -1,0 +1,98 @@
+"""Our values of published numbers that are no metric of a case.
+
+Hoang Vu Tan, 2021.  The records name these functions; each returns its value in the unit of the record.
+"""
+
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from campaigns.geo_servicing import plan_table
+from campaigns.geo_servicing.dynamics import R0
+from campaigns.geo_servicing.model import MODEL, nominal_start
+from campaigns.geo_servicing.phasing_plan import PUBLISHED, design
+from campaigns.geo_servicing.planned_flight import Craft
+from mc_engine.flight.chosen_cases import chosen_history
+from mc_engine.flight.kernel_parts import settings_class
+from mc_engine.physics.geopotential import harmonics_table
+from mc_engine.studies.published_values import dispersed_cases
+
+_FOLDER = Path(__file__).resolve().parents[1]
+# the source's corrections without errors, gravity 4 x 4, Moon and Sun
+SCHEDULE: dict[str, Any] = {"schedule": "published", "feedback": False, "navigation": "perfect", "sunlight": False}
+# tolerances of section 8.1 on longitude, period and eccentricity
+LONGITUDE_DEG, PERIOD_S, ECCENTRICITY = 0.05, 5.0, 4e-4
+
+
+def _per_run(metric: str) -> np.ndarray:
+    """A metric of the cases of published_per_run.toml: one error a run."""
+    return dispersed_cases(_FOLDER / "published_per_run.toml")[metric]
+
+
+def interval_end(metric: str, sigmas: float) -> float:
+    """Mean and so many standard deviations of a metric, one error a run; section 9.2."""
+    values = _per_run(metric)
+    return float(values.mean() + sigmas * values.std(ddof=1))
+
+
+def smallest(metric: str) -> float:
+    """Smallest value of a metric of all cases, one error a run; axis of the histogram of section 9.2."""
+    return float(_per_run(metric).min())
+
+
+def largest(metric: str) -> float:
+    """Largest value of a metric of all cases, one error a run; axis of the histogram of section 9.2."""
+    return float(_per_run(metric).max())
+
+
+def share_in_tolerance_pct() -> float:
+    """Share [%] of trials inside the tolerances of section 8.1, one error a run; section 9.2."""
+    inside = np.abs(_per_run("mean_longitude_deviation_deg")) < LONGITUDE_DEG
+    inside &= np.abs(_per_run("period_error_s")) < PERIOD_S
+    inside &= _per_run("eccentricity") < ECCENTRICITY
+    return 100.0 * float(inside.mean())
+
+
+def steady_share_pct() -> float:
+    """Share [%] of trials of inspection_single.toml that keep the range between 19.1 and 82.0 m; section 9.3."""
+    return 100.0 * float(dispersed_cases(_FOLDER / "inspection_single.toml")["steady"].mean())
+
+
+def eccentricity_limit(nearest_m: float, farthest_m: float) -> float:
+    """Largest difference of the eccentricity vectors that keeps a range: its width over 8 r0; section 3.3."""
+    return (farthest_m - nearest_m) / (8.0 * R0)
+
+
+def first_drift_deg_rev() -> float:
+    """Drift [deg/rev] at the start of the phasing; start of the plots of section 9.1."""
+    return float(chosen_history(MODEL, SCHEDULE, rows=11)["drift_rate_deg_rev"][0])
+
+
+def burn_signs() -> str:
+    """Signs of the source's three burns, as the campaign flies them."""
+    return ", ".join("+" if sign > 0.0 else "−" for _, _, sign in PUBLISHED)
+
+
+@lru_cache
+def _designed() -> tuple[np.ndarray, np.ndarray]:
+    """Coasts before the burns of our own plan, and the burns [s], float64[3] each."""
+    chosen: dict[str, Any] = {"navigation": "perfect", "schedule": "designed", "sunlight": False}
+    codes = [setting.code(chosen.get(setting.name, setting.default)) for setting in MODEL.settings]
+    o = settings_class(MODEL)(*codes, np.empty(0))
+    first, sun_moon = nominal_start(o)
+    rows = harmonics_table(int(o.gravity_degree), int(o.gravity_order))
+    craft = Craft(o, np.concatenate([plan_table.no_plan(), rows.ravel(), sun_moon.ravel()]), first)
+    plan, _ = design(o, craft)
+    return plan.coasts, craft.burn_times(plan.dv)
+
+
+def designed_coast_s(number: int) -> float:
+    """Coast [s] before a burn of our own plan, counted from 1; to compare with section 9.1."""
+    return float(_designed()[0][number - 1])
+
+
+def designed_burn_s(number: int) -> float:
+    """Length [s] of a burn of our own plan, counted from 1; to compare with section 9.1."""
+    return float(_designed()[1][number - 1])

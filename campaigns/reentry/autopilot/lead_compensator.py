@@ -1,0 +1,93 @@
+"""Lead compensation by frequency response: gain from the static error, phase lead from the margin asked for.
+
+NumPy, SI; frequencies in rad/s.  `bode_figure` draws the loops of the autopilot.
+
+K. Ogata, Modern Control Engineering, section on lead compensation by the frequency-response approach.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+Response = Callable[[Any], Any]  # frequency [rad/s] -> complex gain
+FREQUENCIES = np.geomspace(1e-3, 1e4, 4001)
+LARGEST_LEAD = np.radians(75.0)  # of one stage
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Phase margin [rad] at the highest crossover [rad/s], where the loop's gain falls through 1."""
+
+    phase: float
+    crossover: float
+
+
+@dataclass(frozen=True)
+class Lead:
+    """gain (s + zero) / (s + pole); margins : of the compensated loop."""
+
+    gain: float
+    zero: float
+    pole: float
+    margins: Margins
+
+    def response(self, w: Any) -> Any:
+        """Complex gain at a frequency w [rad/s]: gain (j w + zero) / (j w + pole)."""
+        return self.gain * (1j * w + self.zero) / (1j * w + self.pole)
+
+
+def crossover_of(loop: Response, level: float = 1.0) -> float:
+    """Highest frequency [rad/s] at which the loop's gain falls through a level."""
+
+    def above(logarithm: float) -> float:
+        return float(np.log(np.abs(loop(np.exp(logarithm))) / level))
+
+    grid = np.log(FREQUENCIES)
+    high = np.abs(loop(FREQUENCIES)) > level
+    if not high.any() or high[-1]:
+        raise ValueError("the gain does not fall through this level between 1e-3 and 1e4 rad/s")
+    last = int(np.flatnonzero(high)[-1])
+    return float(np.exp(brentq(above, grid[last], grid[last + 1], xtol=1e-13)))
+
+
+def margins_of(loop: Response) -> Margins:
+    """Phase margin and crossover of an open loop; the phase counts from -180 degrees, within half a turn of it."""
+    w = crossover_of(loop)
+    return Margins(float(np.angle(-loop(w))), w)
+
+
+def design_lead(plant: Response, gain: float, margin: float) -> Lead:
+    """Lead compensator that keeps the low-frequency gain of `gain` times the plant and has a phase margin [rad].
+
+    The crossover moves up, where the plant may lag more: the lead is changed until the margin is the one asked for.  A
+    margin that one stage cannot give is as large as it can.
+    """
+    bare = margins_of(lambda w: gain * plant(w))
+    extra = np.radians(5.0)
+    for _ in range(30):
+        lead = _lead_of(plant, gain, min(max(margin - bare.phase + extra, 1e-3), LARGEST_LEAD))
+        short = margin - lead.margins.phase
+        if abs(short) <= 1e-6:
+            break
+        extra += short
+    return lead
+
+
+def _lead_of(plant: Response, gain: float, lead: float) -> Lead:
+    """The stage that gives this phase [rad] at the new crossover."""
+    alpha = (1.0 - np.sin(lead)) / (1.0 + np.sin(lead))
+    w = crossover_of(lambda x: gain * plant(x), float(np.sqrt(alpha)))
+    stage = Lead(gain / alpha, w * float(np.sqrt(alpha)), w / float(np.sqrt(alpha)), Margins(0.0, 0.0))
+    return Lead(stage.gain, stage.zero, stage.pole, margins_of(lambda x: stage.response(x) * plant(x)))
+
+
+def short_period(stiffness: float, damping: float = 0.0) -> Response:
+    """Angle over angular acceleration [s^2] of a vehicle about its trim: 1 / (s^2 + damping s + stiffness)."""
+
+    def response(w: Any) -> Any:
+        return 1.0 / (stiffness - np.asarray(w) ** 2 + 1j * damping * np.asarray(w))
+
+    return response

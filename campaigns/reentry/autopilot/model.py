@@ -1,0 +1,273 @@
+"""Attitude autopilot of an entering capsule: pitch about trim and bank, each with a lead compensator.  A model.
+
+The capsule flies the planned entry's dynamic pressure and speed; its attitude does not change that path.  Pitch is the
+short period about trim, I a'' = q S d [C_ma (a - offset) + C_mq d a' / (2 V)] + M, bank turns freely under its torque.
+Both torques are limited.  The pitch gains follow the dynamic pressure.
+"""
+
+from collections import namedtuple
+from types import SimpleNamespace
+
+import numpy as np
+
+from campaigns.reentry.autopilot.gains import (
+    BANK_GAIN,
+    BANK_POLE,
+    BANK_ZERO,
+    LAST_SECOND,
+    PROFILE,
+    SCHEDULE,
+    STEEPEST,
+    STEPS,
+    autopilot_tables,
+)
+from mc_engine.lanes import floor, look_up, maximum, minimum, physics, sqrt, where
+from mc_engine.model import (
+    Field,
+    FixedStep,
+    Parameter,
+    Refusals,
+    Setting,
+    at_end,
+    inputs,
+    last_above,
+    maximum_of,
+    metrics,
+    model,
+    outputs,
+    states,
+    time_of_maximum,
+)
+from mc_engine.model.figures import HistoryFigure, ScatterFigure
+
+Inputs = inputs(
+    initial_alpha_deg=Parameter(2.0, "first angle of attack less that of trim", low=-30.0, high=30.0),
+    initial_alpha_rate_deg_s=Parameter(0.0, "its first rate"),
+    initial_bank_deg=Parameter(0.0, "first bank", low=-180.0, high=180.0),
+    inertia_pitch_factor=Parameter(1.0, "true over assumed moment of inertia in pitch", low=1e-3, unit=""),
+    inertia_roll_factor=Parameter(1.0, "true over assumed moment of inertia in roll", low=1e-3, unit=""),
+    c_m_alpha_factor=Parameter(1.0, "true over assumed static stability", unit=""),
+    c_mq=Parameter(-0.2, "pitch damping by d rate / (2 V): above zero it drives the oscillation", unit=""),
+    trim_offset_deg=Parameter(0.0, "true less assumed trim angle of attack, as by an offset centre of mass"),
+    side_offset_m=Parameter(0.0, "offset of the centre of mass to the side"),
+    side_force_coefficient=Parameter(1.3, "force coefficient that turns this offset into a roll moment", unit=""),
+    pressure_factor=Parameter(1.0, "true over planned dynamic pressure", low=0.0, unit=""),
+    pressure_known_factor=Parameter(1.0, "dynamic pressure that sets the gains over the true one", low=0.0, unit=""),
+    torque_pitch_n_m=Parameter(2000.0, "largest torque in pitch", low=0.0, unit="N m"),
+    torque_roll_n_m=Parameter(2000.0, "largest torque in roll", low=0.0, unit="N m"),
+    bank_amplitude_deg=Parameter(60.0, "commanded bank to either side", low=0.0, high=180.0),
+    reversal_period_s=Parameter(60.0, "time from one commanded reversal to the next", low=1.0),
+    commanded_rate_deg_s=Parameter(10.0, "rate of a commanded reversal", low=1e-3),
+    inertia_pitch_kg_m2=Setting(7000.0, "assumed moment of inertia in pitch", low=1.0, unit="kg m^2"),
+    inertia_roll_kg_m2=Setting(8000.0, "assumed moment of inertia in roll", low=1.0, unit="kg m^2"),
+    area_m2=Setting(12.017, "reference area", low=1e-3),
+    diameter_m=Setting(3.912, "reference length", low=1e-3),
+    c_m_alpha=Setting(-0.06, "assumed static stability per radian, negative if stable", unit=""),
+    phase_margin_deg=Setting(50.0, "phase margin of both loops", low=5.0, high=75.0),
+    bandwidth_rad_s=Setting(0.7, "root of both loops' gain without air", low=0.05, high=10.0),
+    scheduled=Setting(True, "pitch gains follow the dynamic pressure"),
+    fixed_pressure_pa=Setting(0.0, "dynamic pressure whose gains are used if they do not follow it", low=0.0),
+    duration_s=Setting(520.0, "length of the flight", low=1.0, high=800.0),
+    step_s=Setting(0.02, "integration step", low=1e-4, high=0.2),
+)
+# lead_..: states of the compensators; then integrals of squared errors, of the size of the torques, and of the time at
+# their limits
+State = states(
+    alpha_deg="angle of attack less that of trim",
+    alpha_rate_deg_s="its rate",
+    bank_deg="bank",
+    bank_rate_deg_s="rate of the bank",
+    lead_alpha_deg="state of the pitch compensator",
+    lead_bank_deg="state of the bank compensator",
+    alpha_square=Field("integral of the squared angle of attack error, rad^2 s", unit=""),
+    bank_square=Field("integral of the squared bank error, rad^2 s", unit=""),
+    impulse_n_m_s="integral of the size of both torques",
+    limited_s="time with a torque at its limit",
+)
+Outputs = outputs(
+    alpha_deg="angle of attack less that of trim",
+    bank_deg="bank",
+    bank_command_deg="commanded bank",
+    dynamic_pressure_pa="dynamic pressure",
+    alpha_size_deg="size of the angle of attack error",
+    bank_error_deg="size of the bank error",
+    torque_pitch_n_m=Field("torque in pitch", unit="N m"),
+    torque_roll_n_m=Field("torque in roll", unit="N m"),
+)
+# corners where the errors go through zero
+Metrics = metrics(
+    peak_alpha_deg=maximum_of("alpha_size_deg", "largest angle of attack error", smooth=False),
+    peak_alpha_time_s=time_of_maximum("alpha_size_deg", "when", smooth=False),
+    late_alpha_time_s=last_above(
+        "alpha_size_deg", float(np.radians(1.0)), "last time with an angle of attack error above one degree"
+    ),
+    alpha_rms_deg="root mean square of the angle of attack error",
+    peak_bank_error_deg=maximum_of("bank_error_deg", "largest bank error", smooth=False),
+    bank_rms_deg="root mean square of the bank error",
+    impulse_n_m_s="integral of the size of both torques",
+    limited_share=Field("share of the time with a torque at its limit", unit=""),
+    final_alpha_deg=at_end("alpha_deg", "angle of attack error at the end"),
+)
+Parameters = namedtuple(
+    "Parameters",
+    "alpha alpha_rate bank moment damping offset roll_moment pressure known torque_pitch torque_roll inverse_pitch "
+    "inverse_roll amplitude period bank_rate",
+)
+
+
+def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
+    """Kernel parameters of each case, SI: coefficients over its inertia, torques, errors."""
+    pitch, roll = settings.inertia_pitch * i.inertia_pitch_factor, settings.inertia_roll * i.inertia_roll_factor
+    lever = settings.area * settings.diameter / pitch
+    return {
+        "alpha": i.initial_alpha,
+        "alpha_rate": i.initial_alpha_rate,
+        "bank": i.initial_bank,
+        "moment": lever * settings.c_m_alpha * i.c_m_alpha_factor,
+        "damping": 0.5 * lever * settings.diameter * i.c_mq,
+        "offset": i.trim_offset,
+        "roll_moment": settings.area * i.side_force_coefficient * i.side_offset / roll,
+        "pressure": i.pressure_factor,
+        "known": i.pressure_known_factor,
+        "torque_pitch": i.torque_pitch,
+        "torque_roll": i.torque_roll,
+        "inverse_pitch": 1.0 / pitch,
+        "inverse_roll": 1.0 / roll,
+        "amplitude": i.bank_amplitude,
+        "period": i.reversal_period,
+        "bank_rate": i.commanded_rate,
+    }
+
+
+@physics
+def initial(p):
+    """At entry, compensators at rest."""
+    return State(
+        alpha=p.alpha, alpha_rate=p.alpha_rate, bank=p.bank, bank_rate=0.0, lead_alpha=0.0, lead_bank=0.0,
+        alpha_square=0.0, bank_square=0.0, impulse=0.0, limited=0.0,
+    )  # fmt: skip
+
+
+@physics
+def air_at(t, p, o):
+    """(dynamic pressure [Pa], speed [m/s]) of the planned entry, the pressure of the day on it."""
+    at = minimum(maximum(t + 0.0 * p.pressure, 0.0), look_up(o.tables, LAST_SECOND) - 1e-6)
+    second = floor(at)
+    x, row = at - second, PROFILE + 2.0 * second
+    q0, q1 = look_up(o.tables, row), look_up(o.tables, row + 2.0)
+    v0, v1 = look_up(o.tables, row + 1.0), look_up(o.tables, row + 3.0)
+    return p.pressure * (q0 + x * (q1 - q0)), v0 + x * (v1 - v0)
+
+
+@physics
+def pitch_gains(pressure, o):
+    """(gain, zero, pole) of the pitch compensator at the dynamic pressure [Pa] that the autopilot knows."""
+    place = minimum(maximum(pressure * ((STEPS - 1) / STEEPEST), 0.0), STEPS - 1.000001)
+    step = floor(place)
+    x, row = place - step, SCHEDULE + 3.0 * step
+    a0, b0 = look_up(o.tables, row), look_up(o.tables, row + 3.0)
+    a1, b1 = look_up(o.tables, row + 1.0), look_up(o.tables, row + 4.0)
+    a2, b2 = look_up(o.tables, row + 2.0), look_up(o.tables, row + 5.0)
+    return a0 + x * (b0 - a0), a1 + x * (b1 - a1), a2 + x * (b2 - a2)
+
+
+@physics
+def bank_command(t, p):
+    """Commanded bank [rad]: reversals from one side to the other, half a period after entry and every period on."""
+    number = floor(t / p.period + 0.5)
+    since = t - p.period * number
+    side = where(number - 2.0 * floor(0.5 * number) < 0.5, 1.0, -1.0)
+    return side * minimum(maximum(p.bank_rate * since, -p.amplitude), p.amplitude)
+
+
+@physics
+def torques(t, s, p, o, pressure):
+    """(pitch torque, roll torque [N m] within their limits, bank error, rates of both compensators, at a limit)."""
+    gain, zero, pole = pitch_gains(p.known * pressure, o)
+    error = bank_command(t, p) - s.bank
+    bank_zero, bank_pole = look_up(o.tables, BANK_ZERO), look_up(o.tables, BANK_POLE)
+    wanted_pitch = o.inertia_pitch * gain * (s.lead_alpha - s.alpha)
+    wanted_roll = o.inertia_roll * look_up(o.tables, BANK_GAIN) * (s.lead_bank + error)
+    pitch = minimum(maximum(wanted_pitch, -p.torque_pitch), p.torque_pitch)
+    roll = minimum(maximum(wanted_roll, -p.torque_roll), p.torque_roll)
+    # (s + z) / (s + p) = 1 + (z - p) / (s + p)
+    lead_alpha = -pole * s.lead_alpha - (zero - pole) * s.alpha
+    lead_bank = -bank_pole * s.lead_bank + (bank_zero - bank_pole) * error
+    limited = where((pitch != wanted_pitch) | (roll != wanted_roll), 1.0, 0.0)
+    return pitch, roll, error, lead_alpha, lead_bank, limited
+
+
+@physics
+def rhs(t, s, p, o):
+    """Short period about trim and free roll under limited torques, SI and radians.
+
+    I a'' = q S d [C_ma (a - offset) + C_mq d a' / (2 V)] + M: pitch about trim with linear coefficients, derived here;
+    the bank is a double integrator.
+    """
+    pressure, speed = air_at(t, p, o)
+    pitch, roll, error, lead_alpha, lead_bank, limited = torques(t, s, p, o, pressure)
+    air = pressure * (p.moment * (s.alpha - p.offset) + p.damping * s.alpha_rate / speed)
+    return State(
+        alpha=s.alpha_rate,
+        alpha_rate=air + pitch * p.inverse_pitch,
+        bank=s.bank_rate,
+        bank_rate=pressure * p.roll_moment + roll * p.inverse_roll,
+        lead_alpha=lead_alpha,
+        lead_bank=lead_bank,
+        alpha_square=s.alpha * s.alpha,
+        bank_square=error * error,
+        impulse=abs(pitch) + abs(roll),
+        limited=limited,
+    )
+
+
+@physics
+def observe(t, s, p, o):
+    """Outputs, SI and radians."""
+    pressure, _ = air_at(t, p, o)
+    pitch, roll, error, _, _, _ = torques(t, s, p, o, pressure)
+    return Outputs(
+        alpha=s.alpha,
+        bank=s.bank,
+        bank_command=bank_command(t, p),
+        dynamic_pressure=pressure,
+        alpha_size=abs(s.alpha),
+        bank_error=abs(error),
+        torque_pitch=pitch,
+        torque_roll=roll,
+    )
+
+
+@physics
+def evaluate(t, s):
+    """Metrics, SI and radians; means over the flight from integrals of squares."""
+    return Metrics(
+        alpha_rms=sqrt(s.alpha_square / t),
+        bank_rms=sqrt(s.bank_square / t),
+        impulse=s.impulse,
+        limited_share=s.limited / t,
+    )
+
+
+MODEL = model(
+    name="reentry_autopilot",
+    title="Attitude autopilot of an entering capsule",
+    source="K. Ogata, Modern Control Engineering: lead compensation by the frequency-response approach",
+    inputs=Inputs,
+    states=State,
+    outputs=Outputs,
+    metrics=Metrics,
+    clock=FixedStep("step", "duration"),
+    kernel_parameters=Parameters,
+    prepare=prepare,
+    initial=initial,
+    rhs=rhs,
+    tables=autopilot_tables,
+    observe=observe,
+    evaluate=evaluate,
+    figures=(
+        HistoryFigure(("alpha_deg", "bank_deg", "bank_command_deg"), "Angle of attack error, bank and its command"),
+        HistoryFigure(("dynamic_pressure_pa", "torque_pitch_n_m", "torque_roll_n_m"), "Dynamic pressure and torques"),
+        ScatterFigure("peak_alpha_deg", "impulse_n_m_s", "Torque impulse and largest angle of attack error"),
+    ),
+)

@@ -1,0 +1,77 @@
+"""Layout of a stored reference path in the tables, one for all cases of a plan, and its reading in flight.
+
+Two tables of eight columns, one over the speed, one over the speed lost W that an accelerometer has counted.  Rows
+are equally spaced in ln(1 + x / SPREAD) with x the speed lost since the first row: close where the air is thin and
+the range runs fast, wide where all is slow.  Between rows everything is linear.
+"""
+
+from collections import namedtuple
+
+from mc_engine.lanes import floor, log, look_up, maximum, minimum, physics
+from mc_engine.physics.constants import STANDARD_GRAVITY
+
+FELT = 0.05 * STANDARD_GRAVITY  # axial deceleration from which on the speed lost is counted
+STEERED = 0.15 * STANDARD_GRAVITY  # drag from which on a law commands: earlier the speed may still rise
+LAST_SPEED = 400.0  # m/s, below which the reference bank is held
+
+ROWS, COLUMNS = 512, 8
+LAST_PLACE = ROWS - 1.000001  # among the rows
+SPREAD = 60.0  # m/s
+# the header: speed of the first row [m/s]; rows per unit of the logarithm, of both tables; range of the whole
+# reference [m]; the same quantities as the clock tells them before the air is felt (see `clocked_range`)
+FIRST_SPEED, SPEED_DENSITY, LOST_DENSITY, RANGE, CLOCK_TIME, CLOCK_RANGE, CLOCK_RATE, CLOCK_BEND = range(8)
+SPEED_TABLE = 8
+LOST_TABLE = SPEED_TABLE + ROWS * COLUMNS
+LENGTH = LOST_TABLE + ROWS * COLUMNS
+
+# SI; drag is an acceleration, climb the rate of the altitude; k_..: gains on the three differences
+BySpeed = namedtuple("BySpeed", "altitude path range drag climb k_altitude k_path k_range")
+ByLoss = namedtuple("ByLoss", "axial log_axial speed range_rate range k_altitude k_path k_range")
+# the flown table of the Apollo final phase: influence of drag, climb and lift-to-drag ratio on the range
+Influence = namedtuple("Influence", "climb drag range by_drag by_climb by_lift unused also_unused")
+
+
+@physics
+def _interpolated_row(tables, start, density, x):
+    """The eight columns at a speed lost x [m/s]; the first and the last row stand for what lies beyond."""
+    place = log(1.0 + maximum(x, 0.0) * (1.0 / SPREAD)) * density
+    place = minimum(maximum(place, 0.0), LAST_PLACE)
+    row = floor(place)
+    f, at = place - row, start + COLUMNS * row
+    a0, b0 = look_up(tables, at), look_up(tables, at + 8.0)
+    a1, b1 = look_up(tables, at + 1.0), look_up(tables, at + 9.0)
+    a2, b2 = look_up(tables, at + 2.0), look_up(tables, at + 10.0)
+    a3, b3 = look_up(tables, at + 3.0), look_up(tables, at + 11.0)
+    a4, b4 = look_up(tables, at + 4.0), look_up(tables, at + 12.0)
+    a5, b5 = look_up(tables, at + 5.0), look_up(tables, at + 13.0)
+    a6, b6 = look_up(tables, at + 6.0), look_up(tables, at + 14.0)
+    a7, b7 = look_up(tables, at + 7.0), look_up(tables, at + 15.0)
+    return (
+        a0 + f * (b0 - a0), a1 + f * (b1 - a1), a2 + f * (b2 - a2), a3 + f * (b3 - a3),
+        a4 + f * (b4 - a4), a5 + f * (b5 - a5), a6 + f * (b6 - a6), a7 + f * (b7 - a7),
+    )  # fmt: skip
+
+
+@physics
+def by_speed(tables, first, speed):
+    """The row of the speed table at a speed [m/s]; here and below, first : place where the reference begins."""
+    lost = look_up(tables, first + FIRST_SPEED) - speed
+    return _interpolated_row(tables, first + SPEED_TABLE, look_up(tables, first + SPEED_DENSITY), lost)
+
+
+@physics
+def by_loss(tables, first, lost):
+    """The row of the other table at a speed lost W [m/s]."""
+    return ByLoss(*_interpolated_row(tables, first + LOST_TABLE, look_up(tables, first + LOST_DENSITY), lost))
+
+
+@physics
+def clocked_range(tables, first, t):
+    """Range [m] of the reference at a time t [s] after entry, before the air is felt; then on at the last rate."""
+    end = look_up(tables, first + CLOCK_TIME)
+    early = minimum(t, end) - end
+    return (
+        look_up(tables, first + CLOCK_RANGE)
+        + look_up(tables, first + CLOCK_RATE) * (t - end)
+        + look_up(tables, first + CLOCK_BEND) * (early * early)
+    )

@@ -1,0 +1,289 @@
+"""Our values of published numbers on air, closed forms of entry, single entries and the autopilot's lead design.
+
+The records name these functions; each returns its value in the unit of the record.
+"""
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from campaigns.reentry.autopilot.lead_compensator import Lead, Margins, crossover_of, margins_of
+from campaigns.reentry.closed_forms import SteepEntry, critical_roll_angle, glide_angle, glide_range, shallow_peak
+from campaigns.reentry.critical_trajectories import CriticalPeriapses, critical_periapses
+from campaigns.reentry.guidance.apollo_final_phase import FLOWN
+from campaigns.reentry.model import MODEL
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.flight.chosen_cases import chosen_case, chosen_cases, chosen_history
+from mc_engine.physics.atmosphere import EXPONENTIALS, us76
+from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY
+from mc_engine.physics.frames import WGS84_RADIUS
+from mc_engine.statistics.binomial import lower_bound, smallest_sample
+
+GROUND_DENSITY, SCALE_M = EXPONENTIALS["earth"]  # of the textbook atmosphere: kg/m^3, m
+EXACT: dict[str, Any] = {"tolerance": 1e-12}  # of an integration step, where a flight is compared with a closed form
+AT_REST: dict[str, Any] = {"shape": "sphere", "gravity": "point", "rotating": False}
+# a spherical Earth that does not turn, motion in the plane of the equator, textbook atmosphere
+TEXTBOOK: dict[str, Any] = AT_REST | {"speed_frame": "relative", "planar": True, "atmosphere": "exponential"}
+# P. N. Desai, G. D. Qualls, AIAA 2008-1198; the latitude, so that it comes down in Utah, is ours
+STARDUST: dict[str, Any] = {
+    "vehicle": "sample_return",
+    "entry_radius_km": 6503.14,
+    "entry_speed_m_s": 12_900.0,
+    "entry_flight_path_angle_deg": -8.2,
+    "entry_heading_deg": 103.0,
+    "entry_latitude_deg": 42.3,
+    "stop_altitude_km": 20.0,
+}
+
+
+# ---- air and numbers of cases
+
+
+def density_kg_m3(altitude_km: float) -> float:
+    """Density [kg/m^3] at a geometric altitude: U.S. Standard Atmosphere, 1976."""
+    return float(us76(1e3 * altitude_km))
+
+
+def cases_without_failure(probability: float, confidence: float) -> int:
+    """Fewest cases without a failure that show a probability with a confidence; binomial distribution."""
+    return int(smallest_sample(probability, confidence))
+
+
+def failure_probability(cases: int, confidence: float) -> float:
+    """Upper bound of the failure probability after no failure: C. J. Clopper, E. S. Pearson, Biometrika 26 (1934)."""
+    return 1.0 - float(lower_bound(cases, cases, confidence))
+
+
+# ---- ballistic entries
+
+
+def grazing_load_g(root_beta_r: float) -> float:
+    """Largest load [g] of a grazing ballistic entry: D. R. Chapman, NASA TR R-11 (1959)."""
+    return root_beta_r * shallow_peak(0.0)
+
+
+@lru_cache
+def _loads_from_orbit() -> np.ndarray:
+    """Largest loads [g] at circular speed and −2°, 50 to 1000 kg/m^2, from where rho / B is that of 100 at 120 km.
+
+    Eq. (5) of the source has then one solution for all of them.
+    """
+    b = np.array([50.0, 100.0, 200.0, 400.0, 1000.0])
+    altitude_km = 120.0 - 1e-3 * SCALE_M * np.log(b / 100.0)
+    speed = np.sqrt(MU_EARTH / (WGS84_RADIUS + 1e3 * altitude_km))
+    start = {"entry_altitude_km": altitude_km, "entry_speed_m_s": speed, "stop_altitude_km": 5.0}
+    return chosen_cases(MODEL, TEXTBOOK | _ballistic(b) | start | EXACT)["peak_load_g"]
+
+
+def smallest_load_from_orbit_g() -> float:
+    """Smallest of the largest loads [g] of these entries."""
+    return float(_loads_from_orbit().min())
+
+
+def largest_load_from_orbit_g() -> float:
+    """Largest of the largest loads [g] of these entries."""
+    return float(_loads_from_orbit().max())
+
+
+@lru_cache
+def _excess_of_gravity_pct() -> np.ndarray:
+    """By how much [%] largest loads of steep entries at 6.5 km/s from 150 km exceed those without gravity.
+
+    −30 to −60° and 100 to 3000 kg/m^2: H. J. Allen, A. J. Eggers, NACA Rep. 1381 (1958), eq. (15).
+    """
+    angles, masses = np.meshgrid(-np.arange(30.0, 61.0, 5.0), [100.0, 300.0, 1000.0, 3000.0])
+    angle_deg, b = angles.ravel(), masses.ravel()
+    start = {"entry_speed_m_s": 6500.0, "entry_altitude_km": 150.0, "stop_altitude_km": 0.0}
+    flown = chosen_cases(
+        MODEL, {**TEXTBOOK, **_ballistic(b), **start, "entry_flight_path_angle_deg": angle_deg, **EXACT}
+    )
+    alone = [_steep_load_g(6500.0, angle) for angle in angle_deg]
+    return 100.0 * (flown["peak_load_g"] / np.array(alone) - 1.0)
+
+
+def least_excess_of_gravity_pct() -> float:
+    """The least of these excesses [%]."""
+    return float(_excess_of_gravity_pct().min())
+
+
+def most_excess_of_gravity_pct() -> float:
+    """The most of these excesses [%]."""
+    return float(_excess_of_gravity_pct().max())
+
+
+def _ballistic(b: np.ndarray) -> dict[str, Any]:
+    """A vehicle without lift of ballistic coefficient b [kg/m^2]."""
+    return {"mass_kg": b, "reference_area_m2": 1.0, "drag_coefficient": 1.0, "lift_coefficient": 0.0}
+
+
+def _steep_load_g(speed: float, angle_deg: float) -> float:
+    """Largest load [g] of a straight entry: it depends on neither vehicle nor air but the scale height."""
+    entry = SteepEntry(speed, np.radians(angle_deg), 1.0, GROUND_DENSITY, SCALE_M)
+    return entry.peak_deceleration / STANDARD_GRAVITY
+
+
+# ---- Stardust
+
+
+def stardust_mach_time_s(mach: float) -> float:
+    """Time [s] after entry at which Stardust has slowed to a Mach number, constant hypersonic drag coefficient."""
+    history = chosen_history(MODEL, STARDUST, rows=8001)
+    fastest = int(np.argmax(history["mach"]))
+    return float(np.interp(-mach, -history["mach"][fastest:], history["t_s"][fastest:]))
+
+
+def stardust_at_rest_excess_pct() -> float:
+    """How much larger [%] the load of Stardust is over a sphere at rest, its inertial speed taken as relative."""
+    at_rest = chosen_case(MODEL, STARDUST | AT_REST | EXACT)["peak_load_g"]
+    return 100.0 * (float(at_rest) / _stardust_load_g() - 1.0)
+
+
+def stardust_constant_angle_excess_pct() -> float:
+    """How much larger [%] its load is by NACA Rep. 1381, eq. (15), at a constant angle."""
+    return 100.0 * (_steep_load_g(12_900.0, 8.2) / _stardust_load_g() - 1.0)
+
+
+@lru_cache
+def _stardust_load_g() -> float:
+    return float(chosen_case(MODEL, STARDUST | EXACT)["peak_load_g"])
+
+
+def stardust_load_three_sigma_g() -> float:
+    """3σ [g] of the largest load under 3σ of 5 m/s, 0.08°, C_D 5 %, mass 1 %, and the slow density error."""
+    n, rng = 2000, np.random.default_rng(2003)
+    flown = chosen_cases(
+        MODEL,
+        {
+            **STARDUST,
+            "entry_speed_error_m_s": rng.normal(0.0, 5.0 / 3.0, n),
+            "entry_flight_path_angle_error_deg": rng.normal(0.0, 0.08 / 3.0, n),
+            "density_deviation": rng.normal(0.0, 1.0, n),
+            "cd_factor": rng.normal(1.0, 0.05 / 3.0, n),
+            "mass_factor": rng.normal(1.0, 0.01 / 3.0, n),
+        },
+    )
+    return 3.0 * float(flown["peak_load_g"].std())
+
+
+# ---- skip, glide, aerobraking
+
+
+def critical_roll_deg(entry_angle_deg: float) -> float:
+    """Climb angle [deg] up to which a roll to lift down keeps a skip inside; eqs (14) to (16) of the source."""
+    return float(np.degrees(critical_roll_angle(np.radians(entry_angle_deg))))
+
+
+def glide_range_km() -> float:
+    """Range [km] of an equilibrium glide, L/D 1, from 0.95 of circular speed: A. J. Eggers, NACA Rep. 1382 (1958)."""
+    return glide_range(1.0, 0.95, 0.0, WGS84_RADIUS) / 1e3
+
+
+def flown_glide_km() -> float:
+    """Length [km] of the same glide at its altitude, flown from 80 km."""
+    radius = WGS84_RADIUS + 80e3
+    speed = 0.95 * float(np.sqrt(MU_EARTH / radius))
+    density = GROUND_DENSITY * np.exp(-80e3 / SCALE_M)
+    # lift carries what the circular motion does not
+    lift_area = 2.0 * (MU_EARTH / radius**2 - speed**2 / radius) / (density * speed**2)
+    history = chosen_history(
+        MODEL,
+        {
+            **TEXTBOOK,
+            "mass_kg": 1.0,
+            "reference_area_m2": lift_area,
+            "lift_coefficient": 1.0,
+            "drag_coefficient": 1.0,
+            "bank_deg": 0.0,
+            "entry_altitude_km": 80.0,
+            "entry_speed_m_s": speed,
+            "entry_flight_path_angle_deg": float(np.degrees(glide_angle(1.0, 0.95, radius, SCALE_M))),
+            "on_exit": "continue",
+            "stop_altitude_km": 0.0,
+        },
+        rows=4001,
+    )
+    along = history["speed_m_s"] * np.cos(np.radians(history["flight_path_angle_deg"]))
+    return 1e-3 * float(np.trapezoid(along, history["t_s"]))
+
+
+@lru_cache
+def _periapses() -> CriticalPeriapses:
+    return critical_periapses(load_campaign("reentry/aerobraking").nominal)
+
+
+def capture_periapsis_km() -> float:
+    """Vacuum periapsis [km] below which one pass of aerobraking captures; eqs (17), (18) of the source."""
+    return _periapses().capture
+
+
+def entry_periapsis_km() -> float:
+    """Vacuum periapsis [km] below which the vehicle comes down at once; eqs (17), (18) of the source."""
+    return _periapses().entry
+
+
+# ---- Apollo final phase
+
+
+def apollo_range_to_go_km(speed_m_s: float) -> float:
+    """Range [km] from a speed on that drag and climb of the printed table leave, linear between its rows.
+
+    ds/dV = -V cos γ / (D + g sin γ), from the table's last range on: R. Morth, MIT R-532 (1966).
+    """
+    rows = np.array(FLOWN)
+    v = np.linspace(rows[0, 0], rows[-1, 0], 20_001)
+    drag, climb = (np.interp(v, rows[:, 0], rows[:, column]) for column in (2, 1))
+    slope = np.sqrt(v * v - climb * climb) / (drag + STANDARD_GRAVITY * climb / v)
+    distance = np.concatenate([[0.0], np.cumsum(0.5 * (slope[1:] + slope[:-1]) * np.diff(v))])
+    return float(rows[0, 3] + np.interp(speed_m_s, v, distance) / 1e3)
+
+
+# ---- lead design
+
+
+def _ogata_plant(w: Any) -> Any:
+    """4 / (s (s + 2)) at a frequency [rad/s]."""
+    return 4.0 / (1j * w * (1j * w + 2.0))
+
+
+@lru_cache
+def _ogata_lead() -> Lead:
+    """Ogata's design with his roundings: static gain 10, lead 38°, α to two digits, crossover to a whole rad/s.
+
+    K. Ogata, Modern Control Engineering, lead compensation: zero ω√α, pole ω/√α, gain K/α.
+    """
+    alpha = round(float((1.0 - np.sin(np.radians(38.0))) / (1.0 + np.sin(np.radians(38.0)))), 2)
+    root = float(np.sqrt(alpha))
+    w = float(round(crossover_of(lambda x: 10.0 * _ogata_plant(x), root)))
+    stage = Lead(10.0 / alpha, w * root, w / root, Margins(0.0, 0.0))
+    return Lead(stage.gain, stage.zero, stage.pole, margins_of(lambda x: stage.response(x) * _ogata_plant(x)))
+
+
+def bare_phase_margin_deg() -> float:
+    """Phase margin [deg] with the static gain alone."""
+    return float(np.degrees(margins_of(lambda w: 10.0 * _ogata_plant(w)).phase))
+
+
+def lead_zero_rad_s() -> float:
+    """Zero [rad/s] of Ogata's lead compensator."""
+    return _ogata_lead().zero
+
+
+def lead_pole_rad_s() -> float:
+    """Pole [rad/s] of Ogata's lead compensator."""
+    return _ogata_lead().pole
+
+
+def lead_gain() -> float:
+    """Gain of Ogata's lead compensator."""
+    return _ogata_lead().gain
+
+
+def lead_phase_margin_deg() -> float:
+    """Phase margin [deg] of the compensated loop."""
+    return float(np.degrees(_ogata_lead().margins.phase))
+
+
+def lead_crossover_rad_s() -> float:
+    """Crossover [rad/s] of the compensated loop."""
+    return _ogata_lead().margins.crossover

@@ -1,0 +1,344 @@
+"""The commands on several runs and beyond one: import, tune, rare, compare, published, bench."""
+
+import importlib
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from mc_engine.command_line.app import (
+    USAGE,
+    CampaignFile,
+    NoReport,
+    Workers,
+    app,
+    beginning,
+    existing_run,
+    exit_status,
+    leave,
+    new_file,
+    new_folder,
+    refuse_occupied_folder,
+    run_at,
+    write_reports,
+)
+from mc_engine.command_line.flight import finish
+from mc_engine.command_line.next_step import after_search
+from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
+
+if TYPE_CHECKING:
+    from mc_engine.campaign.parts import Requirement
+    from mc_engine.studies.lane_speed import Timing
+
+CHANGED = 1  # the exit status of `compare`
+_SECONDS_BETWEEN_LINES = 5.0
+_REPEATS = 20
+
+
+@app.command("import")
+@exit_status()
+def import_(
+    results: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Table of results, .parquet or .csv.", parser=new_file)
+    ],
+    campaign: Annotated[str, typer.Option(metavar="FILE_OR_NAME", help="The campaign that the cases were flown for.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Directory of the run to be made.", parser=new_folder)],
+    history: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Table of time histories: case_id, t_s, outputs.", parser=new_file),
+    ] = None,
+    no_report: NoReport = False,
+) -> None:
+    """Make a run of results that were flown elsewhere: a table of case_id, inputs and metrics.
+
+    The inputs are compared with those that `mc-engine sample` gives for the campaign.
+    """
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.runner.importing import import_results
+
+    loaded = load_campaign(campaign)
+    refuse_occupied_folder(out)
+    finish(import_results(loaded, results, out, history), no_report)
+
+
+@app.command()
+@exit_status()
+def tune(
+    file: CampaignFile,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Directory of the result; by default runs/<campaign>-<time>.", parser=new_folder
+        ),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Seed of the search.")] = None,
+    generations: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="Generations, in place of the file's.")
+    ] = None,
+    population: Annotated[
+        int | None, typer.Option(min=4, max=100_000, help="Candidates in each, in place of the file's.")
+    ] = None,
+    no_report: NoReport = False,
+    workers: Workers = None,
+) -> None:
+    """Search parameters for the best metrics, as the section tuning of FILE says (needs pymoo)."""
+    advise(lambda: NOTHING_BEGUN)
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.store.run_folder import default_folder
+
+    campaign = load_campaign(file)
+    path = out if out is not None else default_folder(campaign.name)
+    refuse_occupied_folder(path)
+    advise(lambda: after_search(path, "tuning.json", "the generations that were flown are"))
+    from mc_engine.runner.progress import Progress
+    from mc_engine.studies.tuning import tune
+    from mc_engine.studies.tuning_folder import tuning_lines
+
+    with Progress() as progress:
+        record = tune(
+            campaign,
+            path,
+            seed=seed,
+            generations=generations,
+            population=population,
+            workers=workers,
+            progress=progress,
+        )
+    raise_if_signalled()
+    for line in [f"tuning       {path}", *tuning_lines(record)]:
+        typer.echo(line)
+    for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
+        typer.echo(f"report       {report_path}")
+
+
+@app.command()
+@exit_status()
+def rare(
+    file: CampaignFile,
+    requirement: Annotated[str | None, typer.Option(help="Its name; the only one by default.")] = None,
+    method: Annotated[
+        str, typer.Option(help="subset or cross-entropy.", autocompletion=beginning(("subset", "cross-entropy")))
+    ] = "subset",
+    cases_per_level: Annotated[
+        int, typer.Option(min=1, max=10_000_000, help="Cases that each level stands on.")
+    ] = 10_000,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed, in place of the file's.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Directory of the result; by default runs/<campaign>-…", parser=new_folder),
+    ] = None,
+    no_report: NoReport = False,
+    workers: Workers = None,
+) -> None:
+    """The probability that a requirement of FILE is not met, down to one in millions, with its interval."""
+    advise(lambda: NOTHING_BEGUN)
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.store.run_folder import default_folder
+    from mc_engine.studies.limit_state import chosen_requirement, refuse_unmappable
+    from mc_engine.studies.rare_event import METHODS, estimate_rare_event
+    from mc_engine.studies.rare_event_folder import rare_event_lines
+
+    if method not in METHODS:
+        leave(USAGE, f'--method "{method}" is not known; {" or ".join(METHODS)}')
+    campaign = load_campaign(file, seed=seed)
+    _refuse_ambiguity(campaign.requirements, requirement)
+    chosen_requirement(campaign, requirement)
+    refuse_unmappable(campaign)
+    path = out if out is not None else default_folder(f"{campaign.name}-rare")
+    refuse_occupied_folder(path)
+    advise(lambda: after_search(path, "rare.json", "the estimate is"))
+    typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
+    lines = _ProgressLines()
+    estimate = estimate_rare_event(
+        campaign,
+        requirement,
+        path,
+        method=method,
+        cases_per_level=cases_per_level,
+        workers=workers,
+        progress=lambda flown, failed: lines.tell(f"{flown:,} cases, {failed:,} of them failed"),
+    )
+    raise_if_signalled()
+    for line in (f"rare event   {path}", *rare_event_lines(estimate.result)):
+        typer.echo(line)
+    for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
+        typer.echo(f"report       {report_path}")
+
+
+def _refuse_ambiguity(requirements: Sequence["Requirement"], name: str | None) -> None:
+    if name is None and len(requirements) > 1:
+        names = ", ".join(requirement.name for requirement in requirements)
+        leave(USAGE, f"--requirement is missing: the campaign has several; choose one of {names}")
+
+
+class _ProgressLines:
+    """Prints a line every few seconds."""
+
+    def __init__(self) -> None:
+        self.begin = self._last = time.monotonic()
+
+    def tell(self, line: str) -> None:
+        if time.monotonic() - self._last >= _SECONDS_BETWEEN_LINES:
+            self._last = time.monotonic()
+            typer.echo(line, err=True)
+
+
+@app.command()
+@exit_status()
+def compare(
+    before: Annotated[str, typer.Argument(metavar="A", help="The directory or URL of the run before.")],
+    after: Annotated[str, typer.Argument(metavar="B", help="The directory or URL of the run after.")],
+    alpha: Annotated[
+        float, typer.Option(help="Chance of even one false alarm in all tests together, above 0, below 1.")
+    ] = 0.003,
+    tolerance: Annotated[
+        float, typer.Option(min=0.0, help="Standard deviations; smaller differences of a pair are rounding.")
+    ] = 1e-6,
+    report: Annotated[
+        list[Path] | None,
+        typer.Option(
+            metavar="FILE", help="Where to write the comparison, .html or .pdf; may be given twice.", parser=new_file
+        ),
+    ] = None,
+) -> None:
+    """What changed from run A to run B beyond chance.
+
+    Exit status 0: no significant change; 1: a metric or a fraction of cases changed, or a requirement has a
+    worse verdict on the same cases.
+    """
+    wrong = [path for path in report or [] if path.suffix not in (".html", ".pdf")]
+    if wrong:
+        leave(USAGE, f"--report {wrong[0]}: the name must end in .html or .pdf")
+    if not 0.0 < alpha < 1.0:
+        leave(USAGE, f"--alpha {alpha:g}: must lie between 0 and 1, such as 0.003")
+    a, b = existing_run(run_at(before)), existing_run(run_at(after))
+    from mc_engine.studies.comparison import compare_runs
+    from mc_engine.studies.comparison_lines import comparison_lines
+
+    comparison = compare_runs(a, b, (before, after), alpha=alpha, tolerance=tolerance)
+    for line in comparison_lines(comparison):
+        typer.echo(line)
+    for path in report or []:
+        importlib.import_module("reports.studies.comparison").write_comparison(comparison, path, (a, b))
+        typer.echo(str(path))
+    if comparison.changed:
+        raise typer.Exit(CHANGED)
+
+
+@app.command()
+@exit_status()
+def published(
+    names: Annotated[
+        list[str] | None, typer.Argument(metavar="[NAME]...", help="Campaigns, for all values of their sources.")
+    ] = None,
+    compute: Annotated[
+        bool, typer.Option("--compute", help="Compute our values anew; runs code of the campaigns.")
+    ] = False,
+    no_slow: Annotated[
+        bool, typer.Option("--no-slow", help="With --compute: take the kept values of the slow records.")
+    ] = False,
+    update_lock: Annotated[
+        bool, typer.Option("--update-lock", help="With --compute: keep the values, in published.lock.toml.")
+    ] = False,
+    write: Annotated[
+        Path | None,
+        typer.Option(
+            parser=new_file,
+            metavar="FILE",
+            help="Put it into a Markdown file, between <!-- published --> and <!-- end -->.",
+        ),
+    ] = None,
+) -> None:
+    """Published values beside ours, as Markdown, each with its outcome: reached, close, improved, not reached, unknown.
+
+    Without a name: how many there are of each in the shipped campaigns, and the headline numbers.  Ours are the kept
+    values of `published.lock.toml` unless --compute is given.
+    """
+    from mc_engine.durable_file import write_durably
+    from mc_engine.studies.published_table import (
+        campaign_table,
+        headline_table,
+        published_file,
+        published_files,
+        written_into,
+    )
+
+    if (no_slow or update_lock) and not compute:
+        leave(USAGE, f"--{'no-slow' if no_slow else 'update-lock'} is for --compute")
+    if compute and not names:
+        leave(USAGE, "--compute needs the NAME of a campaign")
+    tables = []
+    for name in names or ():
+        path = published_file(name)
+        tables.append(campaign_table(path, _computed(path, not no_slow, update_lock) if compute else None))
+    text = "\n\n".join(tables or [headline_table(published_files())])
+    if write is None:
+        typer.echo(text)
+    else:
+        write_durably(write, written_into(write, text).encode())
+
+
+def _computed(path: Path, slow: bool, update_lock: bool) -> dict[str, float | str]:
+    """Our values, computed now; says on stderr which differ from the kept ones."""
+    advise(lambda: NOTHING_BEGUN)
+    from mc_engine.studies.published import differing, kept_values, read_published
+    from mc_engine.studies.published_values import computed_values, write_lock
+
+    records, kept = read_published(path), kept_values(path)
+    lines = _ProgressLines()
+    values = computed_values(
+        path, slow=slow, progress=lambda done, total, name: lines.tell(f"{done} of {total} values, now {name}")
+    )
+    typer.echo(f"{len(values)} values in {time.monotonic() - lines.begin:.1f} s", err=True)
+    if not slow:
+        values |= {
+            record["quantity"]: kept[record["quantity"]]
+            for record in records
+            if record.get("slow") and record["quantity"] in kept
+        }
+    for quantity in differing(records, values, kept) if kept else ():
+        typer.echo(f"{quantity}: {values.get(quantity, 'none')}, kept is {kept.get(quantity, 'none')}", err=True)
+    if update_lock:
+        typer.echo(f"kept in {write_lock(path, values, records).name}", err=True)
+    return values
+
+
+@app.command()
+@exit_status()
+def bench(
+    file: CampaignFile,
+    cases: Annotated[
+        int | None,
+        typer.Option(min=1, max=10_000_000, help="Cases of a flight; by default those of a short time."),
+    ] = None,
+    repeats: Annotated[
+        int, typer.Option(min=1, max=10_000, help="Flights of each build; the fastest counts.")
+    ] = _REPEATS,
+) -> None:
+    """How fast a campaign flies on one thread, and how much faster its cases fly side by side than one at a time.
+
+    Only the flights are timed: compiling, sampling and storing are not. Nothing is stored.
+    """
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.flight.kernel import usual_width
+    from mc_engine.model.faults import naming_faults
+    from mc_engine.studies.lane_speed import campaign_flight, measure
+
+    campaign = load_campaign(file)
+    with naming_faults(campaign.model_reference, "the model"):
+        flight = campaign_flight(campaign, cases)
+        timing = measure(flight, sorted({1, 8, usual_width(flight.model)}), repeats)
+    typer.echo(f"{campaign.name}: {flight.n_cases} cases a flight, the fastest of {repeats}, one thread")
+    for line in _timing_lines(timing, usual_width(flight.model)):
+        typer.echo(line)
+
+
+def _timing_lines(timing: "Timing", usual: int) -> Iterator[str]:
+    for width, seconds in timing.case_s.items():
+        title = "one case at a time" if width == 1 else f"{width} side by side"
+        step = f", {timing.ns[width]:6.1f} ns a step" if width in timing.ns else ""
+        factor = "" if width == 1 else f", {timing.ratio(width):5.2f} times as fast"
+        mark = " (as `run`)" if width == usual else ""
+        yield f"  {title:<18} {1.0 / seconds:9,.0f} cases/s{step}{factor}{mark}"

@@ -1,0 +1,167 @@
+"""A process that flies cases for a worker, as the worker sees it: orders, replies, and how it ended.
+
+Processes wait for the next chunk of their simulator, and are started anew where a case ended them.
+"""
+
+import atexit
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from mc_engine.errors import DiskError, ModelError
+from mc_engine.flight.case_worker import STDERR, STDOUT, Order, Setup, end_of
+from mc_engine.flight.flyer import RunStopped
+from mc_engine.flight.program_flight import end_noted, how_it_ended, last_lines
+from mc_engine.safe_path import SAFE_PATH
+from mc_engine.status import CRASHED, TIME_LIMIT
+
+START_S = 600.0  # for `start`
+LOOK_EVERY_S = 0.2  # whether the run is to stop
+_idle: dict[tuple[Any, ...], list["CaseProcess"]] = {}
+_lock = threading.Lock()
+# A process ends with the thread that started it, so one thread that lives as long as this process starts all.
+_starter: list[ThreadPoolExecutor] = []
+
+
+class CaseEnded(Exception):
+    """A case ended its process, or was ended by a limit: status code and reason."""
+
+    def __init__(self, status: int, reason: str):
+        super().__init__(reason)
+        self.status, self.reason = status, reason
+
+
+class CaseProcess:
+    """One process, with a temporary folder for its cases."""
+
+    def __init__(self, setup: Setup):
+        self.work = Path(tempfile.mkdtemp(prefix="mc-engine-"))
+        ours, theirs = socket.socketpair()
+        try:
+            with _lock:
+                if not _starter:
+                    _starter.append(ThreadPoolExecutor(1, thread_name_prefix="mc-engine-starter"))
+            self._process = _starter[0].submit(self._start, theirs.fileno()).result()
+        finally:
+            theirs.close()
+        self._connection: Connection[Any, Any] = Connection(ours.detach())
+        try:
+            self._connection.send(setup)
+            fault = self._connection.recv() if self._connection.poll(START_S) else f"took longer than {START_S:.0f} s"
+        except (EOFError, OSError):
+            fault = f"{how_it_ended(self._process.wait())}{last_lines(end_of(self.work / STDERR))}"
+        if fault:
+            self.end()
+            raise ModelError(f"{setup.reference}: {fault}")
+
+    def _start(self, descriptor: int) -> "subprocess.Popen[bytes]":
+        path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the same packages as here
+        environment = {**os.environ, **SAFE_PATH, "PYTHONPATH": path}
+        command = [sys.executable, "-m", "mc_engine.flight.case_worker", str(descriptor), str(self.work)]
+        with open(self.work / STDOUT, "ab") as stdout, open(self.work / STDERR, "ab") as stderr:
+            return subprocess.Popen(
+                [*command, str(os.getpid())],
+                stdin=subprocess.DEVNULL,
+                stdout=stdout,
+                stderr=stderr,
+                pass_fds=(descriptor,),
+                start_new_session=True,
+                env=environment,
+            )
+
+    def replies(self, order: Order, count: int, limit_s: float | None, stopped: Callable[[], bool]) -> Iterator[Any]:
+        """The replies to an order, one by one.
+
+        limit_s : time from one reply to the next.  Raises CaseEnded if the process ends, or the limit is exceeded, and
+        RunStopped once `stopped()` is true; the process has ended then.
+        """
+        try:
+            self._connection.send(order)
+            for _ in range(count):
+                self._wait(limit_s, stopped)
+                reply = self._connection.recv()
+                if isinstance(reply, str):
+                    raise DiskError(reply)
+                yield reply
+        except (EOFError, ConnectionError):
+            code = self._process.wait()
+            raise CaseEnded(CRASHED, f"{how_it_ended(code)}{_place(end_of(self.work / STDERR))}") from None
+
+    def _wait(self, limit_s: float | None, stopped: Callable[[], bool]) -> None:
+        begin = time.monotonic()
+        while not self._connection.poll(LOOK_EVERY_S if limit_s is None else min(LOOK_EVERY_S, limit_s)):
+            if stopped():
+                raise RunStopped
+            if limit_s is not None and time.monotonic() - begin >= limit_s:
+                raise CaseEnded(TIME_LIMIT, f"took longer than {limit_s:g} s")
+
+    def is_alive(self) -> bool:
+        """Whether it answers."""
+        try:
+            self._connection.send(None)
+            return bool(self._connection.poll(5.0)) and self._connection.recv() == ""
+        except (EOFError, OSError):
+            return False
+
+    def end(self, keep: Callable[[Path], None] | None = None) -> None:
+        """End the process and what it began.  keep : called with its folder before that is removed."""
+        self._connection.close()
+        for stop in (lambda: os.killpg(self._process.pid, signal.SIGKILL), self._process.kill):
+            try:
+                stop()
+            except (ProcessLookupError, PermissionError):
+                continue
+        self._process.wait()
+        end_noted(self.work)
+        if keep is not None:
+            keep(self.work)
+        shutil.rmtree(self.work, ignore_errors=True)
+
+
+def _place(stderr: bytes) -> str:
+    """Where a process crashed, by the lines that Python's faulthandler wrote; else the last lines of stderr."""
+    lines = stderr.decode(errors="replace").splitlines()
+    for number, line in enumerate(lines):
+        if line.startswith("Current thread"):
+            frames = [frame.strip() for frame in lines[number + 1 :] if frame.strip().startswith("File")]
+            ours = [frame for frame in frames if "/mc_engine/flight/" not in frame]
+            if ours:
+                file, _, rest = ours[0].removeprefix('File "').partition('"')
+                return f" at {Path(file).name}{rest}"
+    return last_lines(stderr)
+
+
+def take(key: tuple[Any, ...], setup: Callable[[], Setup]) -> CaseProcess:
+    """A process that waits for cases of the simulator `key`, or a new one."""
+    while True:
+        with _lock:
+            waiting = _idle.get(key)
+            process = waiting.pop() if waiting else None
+        if process is None:
+            return CaseProcess(setup())
+        if process.is_alive():
+            return process
+        process.end()
+
+
+@atexit.register
+def _end_idle() -> None:
+    for process in (process for waiting in _idle.values() for process in waiting):
+        process.end()
+
+
+def give_back(key: tuple[Any, ...], process: CaseProcess) -> None:
+    """Let a process wait for further cases."""
+    with _lock:
+        _idle.setdefault(key, []).append(process)

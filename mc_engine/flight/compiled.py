@@ -1,0 +1,60 @@
+"""Compiled models as what flies a campaign's cases."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from mc_engine.campaign.loading import Campaign
+from mc_engine.flight import flight
+from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
+from mc_engine.flight.flyer import Columns, Flyer, Inputs, OnRow, never
+from mc_engine.flight.kernel import source_digest, usual_width
+from mc_engine.flight.lost_numbers import first_lost, may_be_lost
+from mc_engine.model.record import compiled_model
+
+
+class CompiledFlyer(Flyer):
+    """A compiled model: eight or sixteen cases at a time, each independent of the others.
+
+    It needs neither `on_row` nor `keep`: a chunk takes seconds at most, and leaves no files.
+    """
+
+    def __init__(self, campaign: Campaign):
+        self._campaign = campaign
+        self._model, self._folder, self._seed = compiled_model(campaign.model), campaign.directory, campaign.seed
+        self.batch = usual_width(self._model)
+
+    def fly(
+        self,
+        inputs: Inputs,
+        noise: np.ndarray,
+        on_row: OnRow | None = None,
+        keep: Path | None = None,
+        stopped: Callable[[], bool] = never,
+    ) -> Columns:
+        return flight.fly(self._model, inputs, noise, self._seed, folder=self._folder)
+
+    def history(self, inputs: Inputs, noise: int, rows: int, alone: bool = False) -> tuple[Columns, Columns]:
+        width = 1 if alone else None
+        return flight.fly_history(self._model, inputs, noise, self._seed, folder=self._folder, width=width, rows=rows)
+
+    def digest(self) -> str:
+        return source_digest(self._model, self._folder)
+
+    def make_ready(self) -> None:
+        self.fly(self._campaign.nominal, np.zeros(1, dtype=np.int64))
+
+    def faults(self) -> list[str]:
+        return breaches(self._campaign)
+
+    def faults_in_flight(self, file: str) -> list[str]:
+        return flight_faults(self._campaign, file)
+
+    def refuse_faults(self) -> None:
+        refuse_breaches(self._campaign)
+
+    def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
+        if not may_be_lost(self._model, results):
+            return ""
+        return first_lost(self._model, inputs, noise, self._seed, who)

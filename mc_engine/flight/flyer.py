@@ -1,0 +1,101 @@
+"""What flies a case: the one interface between the runner and a compiled model or a simulator.
+
+Inputs of a chunk of cases go in, as columns in declared units; columns of results, statuses and reasons come out, and
+the time history of one case.  The runner, the store and all studies know nothing else of what flies.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine.errors import EngineError
+
+NOMINAL_NOISE = 2**52  # the nominal draws its noise where no case does
+Columns = dict[str, np.ndarray]
+Inputs = Mapping[str, Any]
+Row = dict[str, Any]
+OnRow = Callable[[int, Row], None]
+
+
+class RunStopped(EngineError):
+    """The run was stopped while cases were in flight; those that were complete are recorded."""
+
+
+def never() -> bool:
+    return False
+
+
+class Flyer(ABC):
+    """Flies the cases of one campaign.  Used by several threads at once.
+
+    batch : cases that fly together, of which one may end the worker of all.
+    keeps_rows : a case may take long, so the row of each is recorded when it is complete, and a run that is stopped
+        does not wait for the cases in flight.
+    most_workers : that may fly cases of this campaign at a time, as licences allow; None for any number.
+    """
+
+    batch: int
+    keeps_rows: bool = False
+    most_workers: int | None = None
+
+    @abstractmethod
+    def fly(
+        self,
+        inputs: Inputs,
+        noise: np.ndarray,
+        on_row: OnRow | None = None,
+        keep: Path | None = None,
+        stopped: Callable[[], bool] = never,
+    ) -> Columns:
+        """Status, reason and every result of each case.
+
+        inputs : every parameter and setting by column name, in declared units; one value, or an array [n] of cases.
+        noise : int64[n], what addresses the random draws in the flight of each case.
+        on_row : called with place and row of each case that is complete, where `keeps_rows`.
+        keep : folder for what cases leave behind; None keeps nothing.
+        Raises RunStopped once `stopped()` is true, where `keeps_rows`.
+        """
+
+    @abstractmethod
+    def history(self, inputs: Inputs, noise: int, rows: int, alone: bool = False) -> tuple[Columns, Columns]:
+        """(results, history) of one case; history : t_s and the outputs, about `rows` rows, none of a refused case.
+
+        alone : by the build for one case, where there are several.
+        """
+
+    @abstractmethod
+    def digest(self) -> str:
+        """SHA-256 of the sources that decide the results."""
+
+    @abstractmethod
+    def make_ready(self) -> None:
+        """Compile or load what flies, before several workers ask for it."""
+
+    @abstractmethod
+    def faults(self) -> list[str]:
+        """Sentences on what is wrong with it, as far as it shows at once; empty if nothing."""
+
+    @abstractmethod
+    def faults_in_flight(self, file: str) -> list[str]:
+        """Sentences on what flights of a few cases show.  file : the campaign file, as the user named it."""
+
+    def remarks(self) -> list[str]:
+        """Lines for `check` on a simulator that is sound: is it deterministic, how long does a case take."""
+        return []
+
+    @abstractmethod
+    def refuse_faults(self) -> None:
+        """ModelError with the first fault, before anything is flown or written."""
+
+    def differs(self, stored: Any, value: Any) -> bool:
+        """Whether a number of a replayed case is another one than stored: in any bit, by default."""
+        if isinstance(value, float | np.floating):
+            return np.float64(stored).tobytes() != np.float64(value).tobytes()
+        return bool(stored != value)
+
+    def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
+        """Where a number of a failed flight became infinite or NaN, as a sentence; empty where that is not known."""
+        return ""

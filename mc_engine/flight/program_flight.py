@@ -1,0 +1,385 @@
+"""Flight of one case by a program: its files, its start, its limits, its results, and what it leaves behind.
+
+Linux has the means to end every process that a program began, to see its memory while it runs, and to end it with the
+engine; elsewhere only its own process group is ended.
+"""
+
+import csv
+import ctypes
+import io
+import json
+import os
+import re
+import selectors
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from mc_engine.model.simulator import Simulator
+from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, TIME_LIMIT
+from mc_engine.text import clean
+
+if TYPE_CHECKING:
+    from mc_engine.flight.case_worker import Case
+
+PROGRAM_ID = "program_id"  # file with the process group of the program in flight, for whoever must end it
+LOOK_EVERY_S = 0.02  # between two looks at the memory of a program, and whether it has ended
+MOST_STDOUT, MOST_STDERR, MOST_RESULT = 2**24, 2**16, 2**26  # bytes
+_PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
+_MIB = 2**20
+_SET_PARENT_SIGNAL, _SET_SUBREAPER = 1, 36  # of prctl
+_LINUX = sys.platform.startswith("linux")
+
+
+class Flown(NamedTuple):
+    """How a case ended.  metrics : by name; empty of a case that failed.  history : by column, empty without one."""
+
+    status: int
+    reason: str
+    metrics: dict[str, float]
+    history: dict[str, np.ndarray]
+
+
+def flown(
+    status: int, reason: str, metrics: dict[str, float] | None = None, history: dict[str, np.ndarray] | None = None
+) -> Flown:
+    return Flown(status, clean(" ".join(reason.split()))[:600], metrics or {}, history or {})
+
+
+@dataclass
+class _Ended:
+    """A program that has ended.  limit : the status of the limit that ended it, or OK."""
+
+    code: int
+    stdout: bytes = b""
+    stderr: bytes = b""
+    limit: int = OK
+    peak_mib: float = 0.0
+
+
+class ProgramFlight:
+    """Starts the program of a simulator.  home : folder in which the files are laid out that it is made of."""
+
+    def __init__(self, simulator: Simulator, home: Path):
+        assert simulator.program is not None  # the caller looked
+        self._simulator, self._program, self._home = simulator, simulator.program, home
+        for name, content in self._program.files.items():
+            path = home / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+            path.chmod(0o755)
+
+    def fly(self, inputs: Mapping[str, Any], case: "Case", history: bool) -> Flown:
+        """Fly one case in its own folder."""
+        folder = case.folder
+        self._write_inputs(folder, inputs, case)
+        words = {"folder": str(folder), "case_id": case.id, "seed": case.seed, "home": str(self._home)}
+        command = [word.format(**words) for word in self._program.command]
+        try:
+            ended = self._run(command, folder)
+        except OSError as error:
+            return flown(CRASHED, f"{Path(command[0]).name} cannot be started: {error.strerror}")
+        finally:
+            end_children(set())
+        (folder / "stdout.txt").write_bytes(ended.stdout[-MOST_STDERR:])
+        (folder / "stderr.txt").write_bytes(ended.stderr)
+        if sentence := self._ended_badly(ended):
+            return flown(*sentence)
+        try:
+            return self._results(folder, ended.stdout, inputs, history)
+        except (ValueError, OSError, RecursionError) as error:
+            return flown(NO_RESULT, str(error))
+
+    def _write_inputs(self, folder: Path, inputs: Mapping[str, Any], case: "Case") -> None:
+        known = {**inputs, "case_id": case.id, "seed": case.seed}
+        for name, kind in self._program.inputs.items():
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(known, indent=1) if kind == "json" else _rendered(kind, known), encoding="utf-8")
+
+    def _run(self, command: list[str], folder: Path) -> _Ended:
+        """Run the command until it ends or exceeds a limit; then nothing of its process group is left."""
+        process = subprocess.Popen(
+            command,
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,
+        )
+        (self._home.parent / PROGRAM_ID).write_text(str(process.pid))
+        assert process.stdout is not None
+        assert process.stderr is not None
+        limit, begin, streams = OK, time.monotonic(), {"stdout": bytearray(), "stderr": bytearray()}
+        with selectors.DefaultSelector() as selector, process.stdout, process.stderr:
+            for name, pipe, most in (
+                ("stdout", process.stdout, MOST_STDOUT),
+                ("stderr", process.stderr, MOST_STDERR),
+            ):
+                os.set_blocking(pipe.fileno(), False)
+                selector.register(pipe, selectors.EVENT_READ, (streams[name], most))
+            while True:
+                _read_ready(selector, LOOK_EVERY_S)
+                if not selector.get_map():
+                    time.sleep(0.0005)  # it has closed its streams, and ends
+                if os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None:
+                    break
+                limit = self._exceeded(process.pid, time.monotonic() - begin)
+                if limit != OK:
+                    break
+            _kill_group(process.pid)
+            (self._home.parent / PROGRAM_ID).unlink()
+            _, code, usage = os.wait4(process.pid, 0)
+            process.returncode = os.waitstatus_to_exitcode(code)
+            _read_ready(selector, 0.0)
+        peak = usage.ru_maxrss * (1024 if _LINUX else 1) / _MIB
+        return _Ended(process.returncode, bytes(streams["stdout"]), bytes(streams["stderr"]), limit, peak)
+
+    def _exceeded(self, pid: int, seconds: float) -> int:
+        """The status of the limit that a program exceeds, or OK."""
+        if self._simulator.time_limit_s is not None and seconds > self._simulator.time_limit_s:
+            return TIME_LIMIT
+        most = self._simulator.memory_limit_mib
+        return MEMORY_LIMIT if most is not None and _memory_mib(pid) > most else OK
+
+    def _ended_badly(self, ended: _Ended) -> tuple[int, str] | None:
+        """Status and reason of a program that did not end by itself with exit code 0."""
+        most = self._simulator.memory_limit_mib
+        if ended.limit == TIME_LIMIT:
+            return TIME_LIMIT, f"took longer than {self._simulator.time_limit_s:g} s"
+        if ended.limit == MEMORY_LIMIT or (most is not None and ended.peak_mib > most and ended.code):
+            return MEMORY_LIMIT, f"needed more than {most:g} MiB"
+        if ended.code == 0:
+            return None
+        return CRASHED, f"{how_it_ended(ended.code)}{last_lines(ended.stderr)}"
+
+    def _results(self, folder: Path, stdout: bytes, inputs: Mapping[str, Any], history: bool) -> Flown:
+        """Metrics and history that a program wrote; ValueError with a sentence where they are not there."""
+        document = None if self._program.result is None else _document(folder, self._program.result)
+        if self._program.echo is not None and (difference := _difference(document, self._program.echo, inputs)):
+            return flown(NO_RESULT, difference)
+        text, values = stdout.decode(errors="replace"), {}
+        for metric in self._simulator.metrics:
+            path, pattern = self._program.reads[metric.name]
+            values[metric.name] = _number(metric.name, document, path, pattern, text, metric.sometimes)
+        for metric in self._simulator.metrics:
+            value = values[metric.name]
+            if np.isinf(value) or (np.isnan(value) and not metric.sometimes):
+                return flown(NOT_FINITE, f'"{metric.name}" is {"not a number" if np.isnan(value) else "infinite"}')
+        return flown(OK, "", values, self._history(folder) if history else None)
+
+    def _history(self, folder: Path) -> dict[str, np.ndarray]:
+        if self._program.history is None or not self._simulator.outputs:
+            return {}
+        rows = list(csv.reader(io.StringIO(_content(folder, self._program.history).decode())))
+        names = [name.strip() for name in rows[0]] if rows else []
+        table = np.array([[float(value) for value in row] for row in rows[1:]]).reshape(-1, max(len(names), 1))
+        wanted = ["t_s", *(output.name for output in self._simulator.outputs)]
+        if missing := [name for name in wanted[1:] if name not in names]:
+            raise ValueError(f'{self._program.history} has no column "{missing[0]}"')
+        places = [0, *(names.index(name) for name in wanted[1:])]  # the first column is the time, whatever its name
+        return {name: table[:, place] for name, place in zip(wanted, places, strict=True)}
+
+
+def how_it_ended(code: int) -> str:
+    """An exit code, or the signal that a negative one stands for, in words."""
+    if code >= 0:
+        return f"ended with exit code {code}"
+    try:
+        name = signal.Signals(-code).name
+    except ValueError:
+        name = f"signal {-code}"
+    return f"ended by {name}"
+
+
+def last_lines(stderr: bytes, count: int = 3) -> str:
+    """The last lines of what was written to stderr, to be put at the end of a sentence."""
+    lines = [line.strip() for line in stderr.decode(errors="replace").splitlines() if line.strip()]
+    return f": {' | '.join(lines[-count:])}" if lines else ""
+
+
+def _rendered(template: str, known: Mapping[str, Any]) -> str:
+    return str(_compiled(template).render(known))
+
+
+@lru_cache(maxsize=64)
+def _compiled(template: str) -> Any:
+    import jinja2
+    from jinja2.sandbox import SandboxedEnvironment
+
+    environment = SandboxedEnvironment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
+    return environment.from_string(template)
+
+
+def _read_ready(selector: selectors.BaseSelector, seconds: float) -> None:
+    """Read what has been written, and keep the end of it."""
+    for key, _ in selector.select(seconds) if selector.get_map() else ():
+        kept, most = key.data
+        try:
+            content = os.read(key.fd, 2**16)
+        except BlockingIOError:
+            continue
+        if not content:
+            selector.unregister(key.fileobj)
+        kept += content
+        if len(kept) > 2 * most:
+            del kept[:-most]
+
+
+def _content(folder: Path, name: str) -> bytes:
+    path = folder / name
+    if not path.is_file():
+        raise ValueError(f"wrote no {name}")
+    if path.stat().st_size > MOST_RESULT:
+        raise ValueError(f"{name} has {path.stat().st_size:,} bytes; at most {MOST_RESULT:,} are read")
+    return path.read_bytes()
+
+
+def _document(folder: Path, name: str) -> Any:
+    """The result as nested mappings and lists; of a CSV, its one row by column."""
+    content = _content(folder, name)
+    try:
+        text = content.decode()
+        if name.endswith(".json"):
+            return json.loads(text)
+    except ValueError as error:
+        raise ValueError(f"{name} cannot be read: {error}") from None
+    rows = [row for row in csv.reader(io.StringIO(text)) if row]
+    if len(rows) != 2 or len(rows[0]) != len(rows[1]):
+        raise ValueError(f"{name} has {len(rows)} rows; it must have one of names and one of numbers, of equal length")
+    return {key.strip(): value for key, value in zip(*rows, strict=True)}
+
+
+def _at(document: Any, path: str) -> Any:
+    """What is in a document under a key, or under keys and places with dots between them; KeyError if nothing."""
+    if isinstance(document, dict) and path in document:
+        return document[path]
+    for key in path.split("."):
+        if isinstance(document, dict) and key in document:
+            document = document[key]
+        elif isinstance(document, list) and key.isdecimal() and int(key) < len(document):
+            document = document[int(key)]
+        else:
+            raise KeyError(path)
+    return document
+
+
+def _number(name: str, document: Any, path: str | None, pattern: str | None, stdout: str, sometimes: bool) -> float:
+    if pattern is not None:
+        found = re.findall(pattern, stdout, re.MULTILINE)
+        if not found and not sometimes:
+            raise ValueError(f'stdout has nothing like "{pattern}", by which "{name}" is read')
+        value: Any = found[-1] if found else "nan"
+    else:
+        assert path is not None  # one of them is given
+        try:
+            value = _at(document, path)
+        except KeyError:
+            if sometimes:
+                return float("nan")
+            raise ValueError(f'the result has no "{path}", by which "{name}" is read') from None
+    try:
+        if isinstance(value, bool):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f'"{name}" is {clean(str(value)[:60])}, which is no number') from None
+
+
+def _difference(document: Any, path: str, inputs: Mapping[str, Any]) -> str:
+    """How the inputs that a program used differ from those of its case, as a sentence; empty if they do not."""
+    try:
+        used = _at(document, path)
+    except KeyError:
+        return f'the result has no "{path}", the inputs that were used'
+    if not isinstance(used, dict):
+        return f'"{path}" in the result is no table of the inputs that were used'
+    for name, value in inputs.items():
+        if name not in used:
+            return f'the program does not say that it used "{name}"'
+        if used[name] != value:
+            return f"the program used {name} = {used[name]!r}, where the case has {value!r}"
+    return ""
+
+
+def _memory_mib(pid: int) -> float:
+    """Memory of a process and its descendants; 0 where the system does not show it."""
+    pages = 0
+    for one in [pid, *_descendants(pid)]:
+        try:
+            pages += int(Path(f"/proc/{one}/statm").read_text().split()[1])
+        except (OSError, IndexError):
+            continue
+    return pages * _PAGE / _MIB
+
+
+def _descendants(pid: int) -> list[int]:
+    children = _children(pid)
+    return [*children, *(below for child in children for below in _descendants(child))]
+
+
+def _children(pid: int) -> list[int]:
+    try:
+        tasks = os.listdir(f"/proc/{pid}/task")
+        texts = [Path(f"/proc/{pid}/task/{task}/children").read_text() for task in tasks]
+    except OSError:
+        return []
+    return [int(word) for text in texts for word in text.split()]
+
+
+def own_children() -> set[int]:
+    """Children of this process."""
+    return set(_children(os.getpid())) if _LINUX else set()
+
+
+def end_children(keep: set[int]) -> None:
+    """Kill the descendants of this process that a case left behind.  keep : children that live on."""
+    for _ in range(50):  # the children of one that dies become this process's own
+        left = own_children() - keep
+        if not left:
+            return
+        for pid in left:
+            _kill_group(pid)
+            try:
+                os.kill(pid, signal.SIGKILL)
+                os.waitpid(pid, 0)
+            except (ProcessLookupError, ChildProcessError):
+                continue
+
+
+def end_noted(work: Path) -> None:
+    """Kill the program whose start was noted in `work`, where its own process could not."""
+    try:
+        _kill_group(int((work / PROGRAM_ID).read_text()))
+    except (OSError, ValueError):
+        pass
+
+
+def _kill_group(pid: int) -> None:
+    try:
+        if os.getpgid(pid) != os.getpgrp():
+            os.killpg(os.getpgid(pid), signal.SIGKILL)
+    except (ProcessLookupError, PermissionError):
+        pass
+
+
+def adopt_orphans() -> None:
+    """From now on, descendants whose parent dies become children of this process."""
+    if _LINUX:
+        ctypes.CDLL(None).prctl(_SET_SUBREAPER, 1)
+
+
+def die_with_parent(parent: int, by: int) -> None:
+    """Have this process end by the signal `by` when its parent dies, even in code that lets no Python run."""
+    if _LINUX:
+        ctypes.CDLL(None).prctl(_SET_PARENT_SIGNAL, by)
+        if os.getppid() != parent:  # it died before
+            os._exit(1)

@@ -1,0 +1,286 @@
+"""Simulators as what flies a campaign's cases: each worker has them flown in a process of its own."""
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.loading import Campaign
+from mc_engine.errors import ModelError
+from mc_engine.flight.case_process import CaseEnded, CaseProcess, give_back, take
+from mc_engine.flight.case_worker import Order, Setup, folder_name, lost_metric, settle
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, OnRow, Row, RunStopped, never
+from mc_engine.flight.program_flight import Flown
+from mc_engine.model.fields import Parameter, Setting
+from mc_engine.model.record import Refusals
+from mc_engine.model.simulator import Simulator
+from mc_engine.status import NOT_FINITE, OK, REFUSED, STATUS_NAME
+
+_TOGETHER = 64  # cases of a batch, where one may end the worker of all
+
+
+class SimulatorFlyer(Flyer):
+    """A Python function or a program."""
+
+    def __init__(self, campaign: Campaign):
+        assert isinstance(campaign.model, Simulator)  # the caller looked
+        self._campaign, self._simulator = campaign, campaign.model
+        self.keeps_rows = not self._simulator.batch  # a batch is one piece of work, as a chunk of a model is
+        self.batch = _TOGETHER if self._simulator.batch else 1
+        self.most_workers = self._simulator.slots
+        self._names = [metric.name for metric in self._simulator.metrics]
+        self._key = (self._simulator.reference, str(campaign.directory), self.digest(), campaign.seed)
+
+    def fly(
+        self,
+        inputs: Inputs,
+        noise: np.ndarray,
+        on_row: OnRow | None = None,
+        keep: Path | None = None,
+        stopped: Callable[[], bool] = never,
+    ) -> Columns:
+        n = len(noise)
+        columns = {name: np.broadcast_to(np.asarray(value), n) for name, value in inputs.items()}
+        rows = self._refusals(columns, n)
+        able = [place for place in range(n) if rows[place] is None]
+
+        def note(place: int, row: Row) -> None:
+            rows[place] = row
+            if on_row is not None:
+                on_row(place, row)
+
+        flight = _Flight(self, columns, noise, note, keep, stopped)
+        if self._simulator.batch:
+            flight.fly_together(able)
+        else:
+            flight.fly_in_turn(able)
+        return self._table(rows)
+
+    def _refusals(self, columns: Columns, n: int) -> list[Row | None]:
+        """The row of each case whose inputs are outside what the simulator accepts; None where they are inside."""
+        refusals = Refusals.none(n)
+        items: tuple[Parameter | Setting, ...] = (*self._simulator.parameters, *self._simulator.settings)
+        for item in items:
+            if isinstance(item, Setting) and (item.choices or item.date or isinstance(item.default, bool)):
+                continue
+            column = columns[item.name]
+            refusals.add(np.isnan(column), f"{item.name} is not a number")
+            refusals.add(np.isinf(column), f"{item.name} is infinite")
+            outside = f"{item.name} is outside {item.low:g} to {item.high:g} {item.unit}".rstrip()
+            refusals.add(~((column >= item.low) & (column <= item.high)), outside)
+        return [self.row(REFUSED, reason) if reason else None for reason in refusals.reason]
+
+    def row(self, status: int, reason: str, metrics: dict[str, float] | None = None) -> Row:
+        """One row of results; metrics of a failed case are not a number."""
+        values = {name: (metrics or {}).get(name, float("nan")) for name in self._names}
+        return {"status": STATUS_NAME[status], "reason": reason, **values}
+
+    def _table(self, rows: list[Any]) -> Columns:
+        words = {name: np.array([row[name] for row in rows], dtype=object) for name in ("status", "reason")}
+        return {**words, **{name: np.array([row[name] for row in rows], dtype=np.float64) for name in self._names}}
+
+    def history(self, inputs: Inputs, noise: int, rows: int, alone: bool = False) -> tuple[Columns, Columns]:
+        names = ["t_s", *(output.name for output in self._simulator.outputs)]
+        empty = {name: np.empty(0) for name in names}
+        found: list[Columns] = []
+        columns = {name: np.broadcast_to(np.asarray(value), 1) for name, value in inputs.items()}
+        row = self._refusals(columns, 1)[0]
+        if row is None:
+            kept: dict[int, Row] = {}
+            flight = _Flight(self, columns, np.array([noise]), kept.__setitem__, None, never, found.append)
+            flight.fly_together([0]) if self._simulator.batch else flight.fly_in_turn([0])
+            row = kept[0]
+        history = found[0] if found and found[0] else empty
+        every = max(1, -(-len(history["t_s"]) // rows))
+        chosen = np.arange(len(history["t_s"]))
+        chosen = chosen[(chosen % every == 0) | (chosen == len(chosen) - 1)]
+        return self._table([row]), {name: values[chosen] for name, values in history.items()}
+
+    def digest(self) -> str:
+        return self._simulator.digest()
+
+    def make_ready(self) -> None:
+        """Nothing: each worker starts a process of its own."""
+
+    def faults(self) -> list[str]:
+        if self._simulator.fly is None and self._simulator.program is None:
+            why = (
+                "has neither a function `fly` nor a command; `mc-engine import` reads results that were flown elsewhere"
+            )
+            return [f"{self._simulator.reference}: {why}"]
+        return []  # all else that is wrong with a simulator is found where it is loaded
+
+    def refuse_faults(self) -> None:
+        for sentence in self.faults():
+            raise ModelError(sentence)
+
+    def faults_in_flight(self, file: str) -> list[str]:
+        row = self._flown(np.array([NOMINAL_NOISE]), {})[0]
+        if row["status"] == STATUS_NAME[OK]:
+            return []
+        return [f"the nominal case ends as {row['status']}: {row['reason']}"]
+
+    def _flown(self, noise: np.ndarray, table: Columns) -> list[Row]:
+        columns = self.fly(full_inputs(self._campaign, table), noise)
+        return [{name: column[k] for name, column in columns.items()} for k in range(len(noise))]
+
+    def remarks(self) -> list[str]:
+        """Deterministic or not, metrics that no input moves, seconds a case, hours for the campaign here.
+
+        The nominal and one dispersed case are flown twice.
+        """
+        ids = np.array([0])
+        table = {} if self._campaign.first is not None else case_table(self._campaign, ids)
+        nominal = np.array([NOMINAL_NOISE])
+        self._flown(nominal, {})  # starts the process
+        begin = time.perf_counter()
+        twice = [(self._flown(nominal, {})[0], self._flown(ids, table)[0]) for _ in range(2)]
+        seconds = (time.perf_counter() - begin) / 4
+        first, dispersed = twice[0]
+        differing = [
+            name for name in self._names if any(self._differ(a[name], b[name]) for a, b in zip(*twice, strict=True))
+        ]
+        lines = ["deterministic: two flights of two cases give the same bits"]
+        if differing:
+            lines = [f"not deterministic: {', '.join(differing)} differ between two flights of a case"]
+            if self._simulator.deterministic:
+                lines[0] += "; `replay` will not find the same bits, say deterministic = false with a tolerance"
+        still = [name for name in self._names if first[name] == dispersed[name]]
+        if still and dispersed["status"] == first["status"] == STATUS_NAME[OK]:
+            lines.append(f"the same in the nominal and in case 0: {', '.join(still)}; does an input move it?")
+        if dispersed["status"] != STATUS_NAME[OK]:
+            lines.append(f"case 0 ends as {dispersed['status']}: {dispersed['reason']}")
+        workers = min(os.cpu_count() or 1, self.most_workers or _TOGETHER**3)
+        hours = seconds * self._campaign.cases / workers / 3600.0
+        lines.append(
+            f"{seconds:.3g} s a case, {hours:.2g} hours for {self._campaign.cases:,} cases on {workers} workers"
+        )
+        return lines
+
+    @staticmethod
+    def _differ(a: float, b: float) -> bool:
+        return np.float64(a).tobytes() != np.float64(b).tobytes()
+
+    def differs(self, stored: Any, value: Any) -> bool:
+        if self._simulator.deterministic or not isinstance(value, float | np.floating):
+            return super().differs(stored, value)
+        if np.isnan(stored) or np.isnan(value):
+            return bool(np.isnan(stored) != np.isnan(value))
+        return bool(abs(stored - value) > self._simulator.tolerance * max(abs(stored), abs(value)))
+
+    def process(self) -> CaseProcess:
+        """A process of this simulator, from those that wait or new."""
+        return take(self._key, self._setup)
+
+    def give_back(self, process: CaseProcess) -> None:
+        give_back(self._key, process)
+
+    def _setup(self) -> Setup:
+        simulator, folder = self._simulator, str(self._campaign.directory)
+        of_program = simulator.program is not None
+        sent = replace(simulator, sources=None, figures=(), published=()) if of_program else None
+        memory = None if of_program else simulator.memory_limit_mib  # a program is limited, not what starts it
+        return Setup(simulator.reference, folder, self._key[2], self._campaign.seed, sent, memory)
+
+    @property
+    def simulator(self) -> Simulator:
+        return self._simulator
+
+
+class _Flight:
+    """The cases of one call, and where their rows go."""
+
+    def __init__(
+        self,
+        flyer: SimulatorFlyer,
+        columns: Columns,
+        noise: np.ndarray,
+        note: Callable[[int, Row], None],
+        keep: Path | None,
+        stopped: Callable[[], bool],
+        on_history: Callable[[Columns], None] | None = None,
+    ):
+        self._flyer, self._columns, self._noise, self._note = flyer, columns, noise, note
+        self._keep, self._stopped, self._on_history = keep, stopped, on_history
+        simulator = flyer.simulator
+        self._limit_s = simulator.time_limit_s if simulator.program is None else None  # which keeps its own
+
+    def fly_in_turn(self, places: list[int]) -> None:
+        """Cases one after another; one that ends the process costs itself."""
+        left = list(places)
+        while left:
+            if self._stopped():
+                raise RunStopped
+            process = self._flyer.process()
+            try:
+                for reply in process.replies(self._order(left), len(left), self._limit_s, self._stopped):
+                    self._take(left.pop(0), reply)
+            except CaseEnded as end:
+                self._lost(left.pop(0), end, process)
+            except BaseException:
+                process.end()
+                raise
+            else:
+                self._flyer.give_back(process)
+
+    def fly_together(self, places: list[int]) -> None:
+        """Cases as one batch; where it fails as a whole, by halves, until the case is found."""
+        if not places:
+            return
+        process = self._flyer.process()
+        limit = None if self._limit_s is None else self._limit_s * len(places)
+        try:
+            reply = next(process.replies(self._order(places), 1, limit, self._stopped))
+        except CaseEnded as end:
+            if len(places) == 1:
+                self._lost(places[0], end, process)
+                return
+            process.end()
+            reply = None
+        except BaseException:
+            process.end()
+            raise
+        else:
+            self._flyer.give_back(process)
+        if isinstance(reply, Flown) and len(places) == 1:
+            self._take(places[0], reply)
+        elif reply is None or isinstance(reply, Flown):
+            half = len(places) // 2
+            self.fly_together(places[:half])
+            self.fly_together(places[half:])
+        else:
+            self._take_batch(places, *reply)
+
+    def _take_batch(self, places: list[int], metrics: Columns, shared: Flown) -> None:
+        for k, place in enumerate(places):
+            values = {name: float(column[k]) for name, column in metrics.items()}
+            lost = lost_metric(self._flyer.simulator, values)
+            self._note(place, self._flyer.row(NOT_FINITE, lost) if lost else self._flyer.row(OK, "", values))
+        if self._on_history is not None:
+            self._on_history(shared.history)
+
+    def _take(self, place: int, reply: Flown) -> None:
+        self._note(place, self._flyer.row(reply.status, reply.reason, reply.metrics if reply.status == OK else None))
+        if self._on_history is not None:
+            self._on_history(reply.history)
+
+    def _lost(self, place: int, end: CaseEnded, process: CaseProcess) -> None:
+        """Record a case that ended its process, and keep what it left behind."""
+        if self._stopped() or not threading.main_thread().is_alive():  # ended with the engine, not by the case
+            process.end()
+            raise RunStopped
+        noise, rule = int(self._noise[place]), self._flyer.simulator.keep
+        inputs = {name: column[[place]].tolist()[0] for name, column in self._columns.items()}
+        process.end(lambda work: settle(rule, work, folder_name(noise), -1, self._keep, inputs))
+        self._note(place, self._flyer.row(end.status, end.reason))
+
+    def _order(self, places: list[int]) -> Order:
+        columns = {name: column[places] for name, column in self._columns.items()}
+        keep = None if self._keep is None else str(self._keep)
+        return Order(columns, self._noise[places], self._on_history is not None, keep)

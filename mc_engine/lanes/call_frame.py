@@ -1,0 +1,92 @@
+"""How compiled functions call one another: as numba's do, and with the data that the kernel was handed at hand.
+
+Every function that numba compiles takes, before its own arguments, the address of a slot for errors.  numba makes a
+slot for each call; here the callers hand their own on, so that all functions of one call of a kernel have the same, on
+the stack of its thread.  Behind it lies the address of the kernel's data.  So physics reads data without an argument
+for them, and nothing of it is global: any number of threads may fly other data through the same machine code.
+"""
+
+from typing import Any
+
+from llvmlite import ir
+from numba.core import cgutils
+from numba.core.callconv import CPUCallConv, excinfo_ptr_t
+from numba.core.cpu import CPUContext
+
+from mc_engine.errors import ModelError
+
+DATA = ir.DoubleType().as_pointer()
+BLOCK = "mc_engine.block."  # begins the name of the constant that holds a block's index among the kernel's
+_FRAME = ir.LiteralStructType([excinfo_ptr_t, DATA])  # slot for errors, data of the kernel
+
+
+class _SharedSlot(CPUCallConv):
+    """numba's calls, with the slot for errors that `_slot` gives."""
+
+    def call_function(
+        self, builder: Any, callee: Any, resty: Any, argtys: Any, args: Any, attrs: Any = None
+    ) -> tuple[Any, Any]:
+        """Called by numba to write a call; (status, result) as numba's own gives them."""
+        result = cgutils.alloca_once(builder, self.get_return_type(resty).pointee)
+        builder.store(cgutils.get_null_value(result.type.pointee), result)
+        slot = self._slot(builder)
+        values = self._get_arg_packer(argtys).as_arguments(builder, args)
+        code = builder.call(callee, [result, slot, *values], attrs=tuple(attrs or ()))
+        status = self._get_return_status(builder, code, builder.load(slot))
+        return status, self.context.get_returned_value(builder, resty, builder.load(result))
+
+    def _slot(self, builder: Any) -> Any:
+        return self._get_excinfo_argument(builder.function)
+
+
+class PartCalls(_SharedSlot):
+    """Calls of the functions that kernels consist of."""
+
+    def data(self, builder: Any) -> Any:
+        """Address of the kernel's data."""
+        frame = builder.bitcast(self._slot(builder), _FRAME.as_pointer())
+        return builder.load(cgutils.gep_inbounds(builder, frame, 0, 1))
+
+
+class KernelCalls(_SharedSlot):
+    """Calls of a kernel itself, which has the frame on its stack."""
+
+    def __init__(self, context: Any):
+        super().__init__(context)
+        self._frames: dict[Any, Any] = {}  # by function: numba's wrapper around the kernel is one of its own
+
+    def hand_over(self, builder: Any, data: Any) -> None:
+        """From here on `data` are the kernel's."""
+        builder.store(data, cgutils.gep_inbounds(builder, self._frame(builder), 0, 1))
+
+    def _slot(self, builder: Any) -> Any:
+        return cgutils.gep_inbounds(builder, self._frame(builder), 0, 0)
+
+    def _frame(self, builder: Any) -> Any:
+        function = builder.function
+        if function not in self._frames:
+            self._frames[function] = cgutils.alloca_once(builder, _FRAME, name="frame")
+        return self._frames[function]
+
+
+class _Context(CPUContext):
+    """numba's target with calls of our own."""
+
+    calls: Any
+
+    @property
+    def call_conv(self) -> Any:
+        return self.calls
+
+
+def calling_by(calls: type[_SharedSlot], context: Any) -> None:
+    """Let the functions that are compiled in this context, one compilation's own, call others in this way."""
+    context.__class__ = _Context
+    context.calls = calls(context)
+
+
+def refuse_missing_blocks(module: Any) -> None:
+    """ModelError where a kernel reads data that it is not handed; undefined, their index would be any number."""
+    if any(one.is_declaration and one.name.startswith(BLOCK) for one in module.global_variables):
+        raise ModelError("the physics reads a curve or other data that were not found by the names in its functions; "
+                         "let the function name them itself, at the top of its module")  # fmt: skip

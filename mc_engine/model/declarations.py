@@ -1,0 +1,290 @@
+"""The declarations of a model: each names its numbers once, and gives the named tuple that physics uses.
+
+The name of a number is its column; its ending tells the unit, and what is before it is the name inside physics:
+`altitude_km` is `altitude`, in metres.  A number whose name ends in no unit, or in what may be read as two, says its
+unit: Parameter(0.1, "eccentricity", unit="").
+"""
+
+from collections import namedtuple
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from mc_engine.errors import ModelError
+from mc_engine.model.fields import OF_NAME, Extremum, Field, Named, Parameter, Setting
+from mc_engine.units import UNITS, nearest_unit, unit_suffix
+
+_LONGEST_ENDING = 5  # words of a unit at the end of a name, as in _n_m_s or _deg_sqrt_h
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A metric that the engine computes: made by `maximum_of`, `at_end` and the like.
+
+    source : str, "value" or "time" of an extremum, "end" for the output at the end of the case
+    extremum : the output and the kind of its extreme value; None for the end
+    output : str, the output at the end
+    description, low, high, sometimes, unit : of the metric, see `Field`
+    """
+
+    source: str
+    extremum: Extremum | None = None
+    output: str = ""
+    description: str = ""
+    low: float = field(default=-float("inf"), kw_only=True)
+    high: float = field(default=float("inf"), kw_only=True)
+    sometimes: bool = field(default=False, kw_only=True)
+    unit: str = field(default=OF_NAME, kw_only=True)
+
+    def as_field(self, name: str) -> Field:
+        """The metric's column."""
+        more = {"low": self.low, "high": self.high, "sometimes": self.sometimes, "unit": self.unit}
+        return Field(self.description, name=name, **more)
+
+
+def maximum_of(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
+    """The largest value of an output along the flight: metrics(top_speed_m_s=maximum_of("speed_m_s", "top speed")).
+
+    output : str, the name of an output
+    description : str, one line
+    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
+    more : low, high, sometimes, unit; see `Field`
+
+    Returns the Metric, for `metrics`.
+
+    Raises TypeError for another argument.
+
+    >>> maximum_of("speed_m_s", "largest speed").extremum.kind
+    'max'
+    """
+    return Metric("value", Extremum("", output, "max", smooth=smooth), "", description, **more)
+
+
+def minimum_of(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
+    """The smallest value of an output along the flight; see `maximum_of`.
+
+    output : str, the name of an output
+    description : str, one line
+    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
+    more : low, high, sometimes, unit; see `Field`
+
+    Returns the Metric, for `metrics`.
+
+    Raises TypeError for another argument.
+
+    >>> minimum_of("altitude_km", "lowest altitude").extremum.kind
+    'min'
+    """
+    return Metric("value", Extremum("", output, "min", smooth=smooth), "", description, **more)
+
+
+def time_of_maximum(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
+    """The time of the largest value of an output; see `maximum_of`.
+
+    output : str, the name of an output
+    description : str, one line
+    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
+    more : low, high, sometimes, unit; see `Field`
+
+    Returns the Metric, for `metrics`.
+
+    Raises TypeError for another argument.
+
+    >>> time_of_maximum("altitude_km", "time of the apogee").source
+    'time'
+    """
+    return replace(maximum_of(output, description, smooth=smooth, **more), source="time")
+
+
+def time_of_minimum(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
+    """The time of the smallest value of an output; see `maximum_of`.
+
+    output : str, the name of an output
+    description : str, one line
+    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
+    more : low, high, sometimes, unit; see `Field`
+
+    Returns the Metric, for `metrics`.
+
+    Raises TypeError for another argument.
+
+    >>> time_of_minimum("altitude_km", "time of the perigee").source
+    'time'
+    """
+    return replace(minimum_of(output, description, smooth=smooth, **more), source="time")
+
+
+def last_above(output: str, level: float, description: str, **more: Any) -> Metric:
+    """The last time at which an output was above `level`, in SI; see `maximum_of`.
+
+    output : str, the name of an output
+    description : str, one line
+    level : float, in SI
+    more : low, high, sometimes, unit; see `Field`
+
+    Returns the Metric, for `metrics`.
+
+    Raises TypeError for another argument.
+
+    >>> last_above("error_deg", 0.01, "settling time").extremum.level
+    0.01
+    """
+    return Metric("time", Extremum("", output, "last_above", level), "", description, **more)
+
+
+def at_end(output: str, description: str, **more: Any) -> Metric:
+    """The value of an output, or of the time "t_s", at the end of the case; see `maximum_of`.
+
+    output : str, the name of an output
+    description : str, one line
+    more : low, high, sometimes, unit; see `Field`
+
+    Returns the Metric, for `metrics`.
+
+    Raises TypeError for another argument.
+
+    >>> at_end("altitude_km", "altitude of the apogee").output
+    'altitude_km'
+    """
+    return Metric("end", None, output, description, **more)
+
+
+def inputs(**declared: Parameter | Setting) -> Any:
+    """The inputs of a model by their columns: a named tuple of the parameters, by which physics reads them from `p`.
+
+    declared : Parameter or Setting, by column
+
+    Returns the named tuple of the parameters.
+
+    Raises ModelError for a name without its unit.
+
+    >>> inputs(altitude_km=Parameter(300.0, "altitude of the orbit"))._fields
+    ('altitude',)
+    """
+    for name, item in declared.items():
+        if not isinstance(item, Parameter | Setting):
+            raise ModelError(
+                f'the input "{name}" is {item!r}; it must be Parameter(default, "meaning") or Setting(...)'
+            )
+    named = [_with_unit(item, name) for name, item in declared.items()]
+    return _record("Inputs", [item.symbol for item in named if isinstance(item, Parameter)], tuple(named))
+
+
+def states(**declared: str | Field) -> Any:
+    """The state of a model by its columns, each with its meaning: the named tuple that `initial` and `rhs` give.
+
+    declared : str or Field, the meaning, by column
+
+    Returns the named tuple of the state.
+
+    Raises ModelError for a name without its unit.
+
+    >>> State = states(x_m="distance", vx_m_s="speed")
+    >>> State(x=1.0, vx=0.0)
+    State(x=1.0, vx=0.0)
+    """
+    return _of_fields("State", "state", declared)
+
+
+def outputs(**declared: str | Field) -> Any:
+    """What is looked at along the flight, by its columns: the named tuple that `observe` gives.
+
+    declared : str or Field, the meaning, by column
+
+    Returns the named tuple of the outputs.
+
+    Raises ModelError for a name without its unit.
+
+    >>> outputs(altitude_km="altitude", speed_m_s="speed")._fields
+    ('altitude', 'speed')
+    """
+    return _of_fields("Outputs", "output", declared)
+
+
+def metrics(**declared: str | Field | Metric) -> Any:
+    """The results of a case by their columns: the named tuple of those that `evaluate` gives, and those of the engine.
+
+    declared : str, Field, or what `maximum_of` and its like give, by column
+
+    Returns the named tuple of what `evaluate` gives.
+
+    Raises ModelError for a name without its unit.
+
+    >>> Metrics = metrics(top_speed_m_s=maximum_of("speed_m_s", "largest speed"), range_km="distance flown")
+    >>> Metrics._fields
+    ('range',)
+    """
+    fields = tuple(
+        _with_unit(item.as_field(name), name) if isinstance(item, Metric) else _field("metric", name, item)
+        for name, item in declared.items()
+    )
+    computed = {name: item for name, item in declared.items() if isinstance(item, Metric)}
+    rest = [item.symbol for item in fields if item.name not in computed]
+    made: Any = _record("Metrics", rest, fields)
+    made.computed = computed
+    return made
+
+
+def _of_fields(title: str, what: str, declared: dict[str, Any]) -> Any:
+    fields = tuple(_field(what, name, item) for name, item in declared.items())
+    return _record(title, [item.symbol for item in fields], fields)
+
+
+def _record(title: str, symbols: list[str], declared: tuple[Named, ...]) -> Any:
+    """The named tuple of these numbers, with `declared`: what is known of each."""
+    for symbol in symbols:
+        if symbols.count(symbol) > 1:
+            raise ModelError(f'{title}: two names are "{symbol}" without their units; give each a name of its own')
+    try:
+        made = namedtuple(title, symbols)  # type: ignore[misc]
+    except ValueError as error:
+        raise ModelError(f"{title}: {error}; a name without its unit is a word of letters, digits and _") from None
+    made.declared = declared  # type: ignore[attr-defined]
+    return made
+
+
+def _field(what: str, name: str, item: Any) -> Field:
+    if isinstance(item, Metric):
+        raise ModelError(f'the {what} "{name}" is a metric; maximum_of and its like stand in metrics(...)')
+    if not isinstance(item, str | Field):
+        raise ModelError(f'the {what} "{name}" is {item!r}; it must be its meaning, a text, or Field("meaning", ...)')
+    return _with_unit(Field(item) if isinstance(item, str) else item, name)
+
+
+def _with_unit(item: Any, name: str) -> Any:
+    """The number with its name, and the unit that the name says."""
+    unit = item.unit
+    if unit == OF_NAME:
+        has_none = isinstance(item, Setting) and (item.choices or item.date or isinstance(item.default, bool))
+        unit = "" if has_none else unit_of(name)
+    return replace(item, name=name, unit=unit)
+
+
+def unit_of(name: str) -> str:
+    """The unit at the end of a column's name; ModelError where there is none, or where it may be two.
+
+    >>> unit_of("burn_dv_m_s"), unit_of("heat_load_mj_m2")
+    ('m/s', 'MJ/m^2')
+    """
+    known = [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
+    longest = max((unit_suffix(unit) for unit in known), key=len, default="")
+    units = [unit for unit in known if unit_suffix(unit) == longest]
+    if longest.startswith("_1_"):  # stage_1_s is a time of stage 1, or a rate
+        units += [unit for unit in known if unit_suffix(unit) == longest[2:]]
+    if len(units) == 1:
+        return units[0]
+    if units:
+        raise ModelError(f'"{name}" may end in the unit {" or ".join(units)}; say which, unit="{units[0]}"')
+    meant = _meant(name)
+    ending = f'; did you mean "{meant}"?' if meant else ""
+    raise ModelError(f'"{name}" ends in no unit{ending}; say unit="" for a plain number; `mc-engine units` lists all')
+
+
+def _meant(name: str) -> str:
+    """The name with the unit that its last words are nearly; "" where they are like none."""
+    words = name.split("_")
+    for count in range(1, min(_LONGEST_ENDING, len(words) - 1) + 1):
+        ending = "_".join(words[-count:]) or "_"
+        alike = [unit for unit in UNITS if unit == "%" or unit[:1].lower() == ending[0].lower()]
+        if near := nearest_unit(ending, alike):
+            return "_".join(words[:-count]) + unit_suffix(near)
+    return ""

@@ -1,0 +1,99 @@
+"""Designs of a model that take seconds and serve all its cases, such as a burn program or a gain table.
+
+A design is computed once and kept in the cache folder, so that the next process, `resume` and `replay` find it.
+"""
+
+import dataclasses
+import io
+import platform
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from mc_engine.cache_folder import cache_folder
+from mc_engine.durable_file import make_folder, read_file, write_durably
+from mc_engine.errors import StoreError
+from mc_engine.model.imports import USER
+from mc_engine.model.sources import sources_beside, sources_of_module
+
+_ENGINE = Path(__file__).parents[1]
+_DIGEST_BYTES = 32
+
+
+def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
+    """The array that `design(*inputs)` returns, from the cache if these inputs were designed before.
+
+    design : function of a module; its result follows from the inputs and the sources alone
+    inputs : numbers, texts, None, arrays of numbers; tuples, lists, dictionaries, named tuples, dataclasses and
+        `SimpleNamespace` of them
+
+    Returns the array, of any shape and numeric type.
+
+    A design is computed again after a change of the inputs, of a source in the folder of `design` or one that these
+    import, of the engine's physics, of NumPy or SciPy, or of the processor, and if its file is damaged.  A cache that
+    cannot be written costs the time of a computation, no result.
+
+    Raises TypeError for inputs of other types: they cannot tell whether a design is the same.
+
+    >>> from mc_engine.physics.attitude import rotation_quaternion
+    >>> kept_design(rotation_quaternion, np.zeros(3))
+    array([1., 0., 0., 0.])
+    """
+    key = sha256(f"{_sources(design.__module__)} {design.__qualname__} {_versions()} ".encode() + _content(inputs))
+    path = cache_folder() / "designs" / f"{design.__name__}_{key.hexdigest()[:32]}.npy"
+    with suppress(StoreError, ValueError):
+        kept = read_file(path)
+        if kept[:_DIGEST_BYTES] == sha256(kept[_DIGEST_BYTES:]).digest():
+            return np.asarray(np.load(io.BytesIO(kept[_DIGEST_BYTES:]), allow_pickle=False))
+    designed = design(*inputs)
+    with io.BytesIO() as file:
+        np.save(file, designed, allow_pickle=False)
+        content = file.getvalue()
+    with suppress(StoreError):
+        make_folder(path.parent)
+        write_durably(path, sha256(content).digest() + content)
+    return designed
+
+
+def _sources(module: str) -> str:
+    """SHA-256 over the sources of a module, as it was imported, and over the engine's physics."""
+    file = Path(str(sys.modules[module].__file__))
+    files = sources_beside(file) if module.startswith(USER) else sources_of_module(module, file.parent).files
+    digest = sha256()
+    for path in [*_ENGINE.glob("lanes/*.py"), *_ENGINE.glob("physics/*.py")]:
+        files = {**files, path: path.read_bytes()}
+    for content in sorted(sha256(content).digest() for content in files.values()):
+        digest.update(content)
+    return digest.hexdigest()
+
+
+@cache
+def _versions() -> str:
+    import scipy
+    from llvmlite import binding
+
+    return f"{platform.python_version()} {np.__version__} {scipy.__version__} {binding.get_host_cpu_name()}"
+
+
+def _content(value: Any) -> bytes:
+    """Bytes that differ wherever two inputs do."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, str | int | float | complex | None):
+        return f"{value!r};".encode()
+    if isinstance(value, np.ndarray) and value.dtype.kind in "biufc":
+        return f"{value.dtype.str}{value.shape}:".encode() + value.tobytes()
+    if isinstance(value, SimpleNamespace) or dataclasses.is_dataclass(value):
+        value = vars(value)
+    if isinstance(value, Mapping):
+        value = tuple(value.items())
+    if isinstance(value, tuple | list):
+        return b"(" + b"".join(_content(part) for part in value) + b")"
+    raise TypeError(f"a kept design cannot depend on a {type(value).__name__}; see mc_engine.model.kept_design")

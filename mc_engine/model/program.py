@@ -1,0 +1,269 @@
+"""Programs as simulators: the table [simulator] of a campaign file, and the record that is made of it.
+
+The command is started without a shell, in the folder of its case.  What a program is made of beside the campaign file
+counts as its source: the executable, files that the command names, templates, and `files`.
+"""
+
+import os
+import re
+import shutil
+import string
+from collections.abc import Mapping
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from types import ModuleType
+from typing import Literal
+
+from pydantic import Field as Key
+
+from mc_engine.errors import ModelError
+from mc_engine.model.fields import Field, Parameter
+from mc_engine.model.files import FileFault, resolve_beside
+from mc_engine.model.simulator import LARGEST_MIB, LONGEST_S, Simulator
+from mc_engine.model.sources import Sources
+from mc_engine.section import Section
+from mc_engine.suggestions import hint
+from mc_engine.units import UNITS, unit_suffix
+
+PLACES = ("folder", "case_id", "seed")  # that a command may name in braces
+JSON_INPUT = "json"
+Problems = list[tuple[str, str]]
+
+
+class _NumberSection(Section):
+    unit: str | None = Key(default=None, description="by default the one that the name ends in")
+    description: str = ""
+    low: float | None = None
+    high: float | None = None
+
+
+class ParameterSection(_NumberSection):
+    """[simulator.parameter]: an input."""
+
+    default: float = Key(description="the nominal value")
+
+
+class MetricSection(_NumberSection):
+    """[simulator.metric]: a result, read by key, path or pattern."""
+
+    read: str | None = Key(
+        default=None, min_length=1, description="key or dotted path in the result; default: its name"
+    )
+    pattern: str | None = Key(default=None, min_length=1, description="regular expression over stdout, with one group")
+    sometimes: bool = Key(default=False, description="it may be missing, or not a number")
+
+
+class ProgramSection(Section):
+    """[simulator]: a program that flies one case at a time."""
+
+    command: list[str] = Key(
+        default_factory=list,
+        description="the executable and its arguments, without a shell; none for `mc-engine import`",
+    )
+    title: str = ""
+    input: dict[str, str] = Key(default_factory=lambda: {"case.json": JSON_INPUT}, description="files that it reads")
+    result: str | None = Key(default=None, min_length=1, description="the file that it writes, .json or .csv")
+    history: str | None = Key(default=None, min_length=1, description="a CSV, whose first column is the time t_s")
+    echo: str | None = Key(default=None, min_length=1, description="path in the result of the inputs that it used")
+    files: list[str] = Key(
+        default_factory=list, description="further files beside this one that the program is made of"
+    )
+    time_limit_s: float | None = Key(default=None, gt=0.0, le=LONGEST_S, description="time of a case")
+    memory_limit_mib: float | None = Key(default=None, gt=0.0, le=LARGEST_MIB, description="memory of a case")
+    slots: int | None = Key(default=None, ge=1, le=100_000, description="cases that fly at a time, as licences allow")
+    keep: Literal["none", "failed", "all"] = Key(default="failed", description="whose folders are kept")
+    deterministic: bool = Key(default=True, description="replay compares bits; false: numbers within tolerance")
+    tolerance: float = Key(default=0.0, ge=0.0, lt=1.0, description="fraction by which numbers may differ")
+    parameter: dict[str, ParameterSection] = Key(default_factory=dict)
+    metric: dict[str, MetricSection] = Key(min_length=1, description="its results, a table each")
+    output: dict[str, _NumberSection] = Key(default_factory=dict, description="columns of its history")
+
+
+@dataclass(frozen=True)
+class Program:
+    """How a program is started, and where its results are.
+
+    command : words with places in braces.  files : contents by name, laid out in the folder `home` of each worker.
+    inputs : file name to "json" or the text of a template.  reads : metric to (path, pattern), one of them None.
+    """
+
+    command: tuple[str, ...]
+    files: Mapping[str, bytes]
+    inputs: Mapping[str, str]
+    result: str | None
+    history: str | None
+    echo: str | None
+    reads: Mapping[str, tuple[str | None, str | None]]
+
+
+def program_simulator(section: ProgramSection, directory: Path, problems: Problems) -> Simulator | None:
+    """The simulator that a campaign file describes, or None with the mistakes added to `problems` by key."""
+    contents: dict[Path, bytes] = {}
+    command, outside = _command(section, directory, contents, problems)
+    inputs = _inputs(section, directory, contents, problems)
+    for name in section.files:
+        _add_file(name, "files", directory, contents, problems)
+    reads = {name: _reading(name, metric, section, problems) for name, metric in section.metric.items()}
+    for key in ("result", "history", *section.input):
+        _check_file_name(key, getattr(section, key, None) or key, problems)
+    if section.result is not None and not section.result.endswith((".json", ".csv")):
+        problems.append(("result", f'"{section.result}" ends in neither .json nor .csv'))
+    if section.echo is not None and not (section.result or "").endswith(".json"):
+        problems.append(("echo", 'is a path in a JSON result; give `result`, such as "result.json"'))
+    if section.output and section.history is None:
+        problems.append(("output", "there is no `history` to read these columns from"))
+    if problems:
+        return None
+    files = {path.relative_to(directory.resolve()).as_posix(): content for path, content in contents.items()}
+    name = Path(section.command[0]).stem if section.command else directory.name
+    program = Program(command, files, inputs, section.result, section.history, section.echo, reads)
+    module = ModuleType("program")
+    module.__doc__ = outside  # counts in the digest, as what lies beside the campaign file does
+    try:
+        return Simulator(
+            title=section.title or f"The program {name}",
+            name=name,
+            parameters=tuple(_parameter(name, one) for name, one in section.parameter.items()),
+            metrics=tuple(_field(name, one, one.sometimes) for name, one in section.metric.items()),
+            outputs=tuple(_field(name, one) for name, one in section.output.items()),
+            time_limit_s=section.time_limit_s,
+            memory_limit_mib=section.memory_limit_mib,
+            slots=section.slots,
+            keep=section.keep,
+            deterministic=section.deterministic,
+            tolerance=section.tolerance,
+            program=program if command else None,
+            reference=section.command[0] if command else "[simulator]",
+            sources=Sources(module, directory.resolve(), directory.resolve(), contents, {}),
+        )
+    except ModelError as error:
+        problems.append(("", str(error)))
+        return None
+
+
+def _command(
+    section: ProgramSection, directory: Path, contents: dict[Path, bytes], problems: Problems
+) -> tuple[tuple[str, ...], str]:
+    """(words of the command, SHA-256 of an executable that does not lie beside the campaign file).
+
+    A word that names a file beside the campaign file begins with {home} from then on.
+    """
+    words, outside = [], ""
+    for place, word in enumerate(section.command, start=1):
+        try:
+            named = {name for _, name, _, _ in string.Formatter().parse(word) if name is not None}
+        except ValueError as error:
+            problems.append(("command", f"word {place}: {error}; a brace itself is written twice"))
+            continue
+        for name in sorted(named - {*PLACES}):
+            problems.append(("command", f"word {place}: {{{name}}} is not known{hint(name, PLACES)}"))
+        beside = not named and (directory / word).is_file() and not os.path.isabs(word)
+        if beside and (place > 1 or "/" in word):
+            _add_file(word, "command", directory, contents, problems)
+            word = "{home}/" + os.path.normpath(word)
+        elif place == 1:
+            word, outside = _executable(word, problems)
+        words.append(word)
+    return tuple(words), outside
+
+
+def _executable(word: str, problems: Problems) -> tuple[str, str]:
+    """(path of a program that is installed, SHA-256 of it)."""
+    found = shutil.which(word)
+    if found is not None and os.path.isabs(found):
+        with open(found, "rb") as file:
+            return found.replace("{", "{{").replace("}", "}}"), sha256(file.read()).hexdigest()
+    if "/" in word:
+        problems.append(("command", f'there is no program "{word}" that can be executed; a path begins in the folder '
+                         "of the campaign file"))  # fmt: skip
+    else:
+        problems.append(("command", f'there is no program "{word}" on the PATH; one beside the campaign file is named '
+                         f'"./{word}"'))  # fmt: skip
+    return word, ""
+
+
+def _add_file(name: str, key: str, directory: Path, contents: dict[Path, bytes], problems: Problems) -> None:
+    try:
+        path = resolve_beside(directory, name)
+        contents[path] = path.read_bytes()
+    except FileFault as fault:
+        problems.append((key, str(fault)))
+    except OSError as error:
+        problems.append((key, f'"{name}" cannot be read: {error.strerror}'))
+
+
+def _inputs(
+    section: ProgramSection, directory: Path, contents: dict[Path, bytes], problems: Problems
+) -> dict[str, str]:
+    """The files that each case is given: "json", or the text of a Jinja template."""
+    import jinja2  # which a campaign without templates does not wait for
+    from jinja2 import meta, sandbox
+
+    inputs = {}
+    known = [*section.parameter, "case_id", "seed"]
+    for name, kind in section.input.items():
+        if kind == JSON_INPUT:
+            inputs[name] = kind
+            continue
+        before, key = len(problems), f"input.{name}"
+        _add_file(kind, key, directory, contents, problems)
+        if len(problems) > before:
+            continue
+        try:
+            text = contents[resolve_beside(directory, kind)].decode()
+            tree = sandbox.SandboxedEnvironment().parse(text)
+        except UnicodeDecodeError:
+            problems.append((key, f'"{kind}" is not text in UTF-8'))
+            continue
+        except jinja2.TemplateSyntaxError as error:
+            problems.append((key, f"{kind}, line {error.lineno}: {error.message}"))
+            continue
+        for missing in sorted(meta.find_undeclared_variables(tree) - {*known}):
+            problems.append((key, f'{kind}: "{missing}" is no input{hint(missing, known)}'))
+        inputs[name] = text
+    return inputs
+
+
+def _reading(
+    name: str, metric: MetricSection, section: ProgramSection, problems: Problems
+) -> tuple[str | None, str | None]:
+    """(path in the result, pattern) of a metric."""
+    key = f"metric.{name}"
+    if metric.pattern is None:
+        if section.result is None and section.command:
+            problems.append((key, "is never read; give it a `pattern` over stdout, or give `result`, a file"))
+        return metric.read or name, None
+    if metric.read is not None:
+        problems.append((key, "has `read` and `pattern`; leave one of them out"))
+    try:
+        if re.compile(metric.pattern).groups != 1:
+            problems.append((f"{key}.pattern", f'"{metric.pattern}" must have one group, in parentheses'))
+    except re.error as error:
+        problems.append((f"{key}.pattern", f'"{metric.pattern}" is no regular expression: {error}'))
+    return None, metric.pattern
+
+
+def _check_file_name(key: str, name: str, problems: Problems) -> None:
+    if os.path.isabs(name) or os.path.normpath(name).startswith("..") or "\0" in name:
+        problems.append((key, f'"{name}" lies outside the folder of the case; name a file in it'))
+
+
+def _parameter(name: str, section: ParameterSection) -> Parameter:
+    low = -float("inf") if section.low is None else section.low
+    high = float("inf") if section.high is None else section.high
+    return Parameter(name, _unit(name, section), section.description or name, section.default, low=low, high=high)
+
+
+def _field(name: str, section: _NumberSection, sometimes: bool = False) -> Field:
+    low = -float("inf") if section.low is None else section.low
+    high = float("inf") if section.high is None else section.high
+    return Field(name, _unit(name, section), section.description or name, sometimes=sometimes, low=low, high=high)
+
+
+def _unit(name: str, section: _NumberSection) -> str:
+    """The unit that a number declares, or that its name ends in; "" where it ends in none."""
+    if section.unit is not None:
+        return section.unit
+    ends = [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
+    return max(ends, key=lambda unit: len(unit_suffix(unit)), default="")

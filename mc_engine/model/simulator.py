@@ -1,0 +1,167 @@
+"""Simulators: systems that fly by a Python function or a program of their own, instead of a compiled model.
+
+A simulator declares its numbers as models do, and offers the same attributes to all that asks what goes in and what
+comes out.  `mc_engine.flight.simulated` flies it, each worker in a process of its own.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from hashlib import sha256
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mc_engine.errors import ModelError
+from mc_engine.model.fields import Field, Parameter, Setting
+from mc_engine.model.figures import Figure
+from mc_engine.model.record import Model, load_sources
+from mc_engine.model.rules import refuse_false_simulator
+from mc_engine.model.sources import Sources
+
+if TYPE_CHECKING:
+    from mc_engine.model.program import Program
+
+KEPT = ("none", "failed", "all")  # of the folders of cases
+LONGEST_S, LARGEST_MIB = 1e8, 2**30
+
+
+class Refuse(Exception):
+    """Raised by the function of a simulator: these inputs cannot be flown.  The case ends as `refused`, with the text.
+
+    >>> try:
+    ...     raise Refuse("the mass is above the payload of the launcher")
+    ... except Refuse as why:
+    ...     print(why)
+    the mass is above the payload of the launcher
+    """
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """A system that flies by its own code: a Python function, or a program that a campaign file describes.
+
+    A file or module ends with `SIMULATOR = Simulator(...)`, and the campaign file names it as `simulator`.
+
+    title : str, one line for reports
+    parameters : tuple of Parameter, inputs that may differ from case to case
+    metrics : tuple of Field, the results of a case
+    fly(inputs, case) : a mapping of the metrics, or (metrics, history).  `inputs` has the value of every parameter and
+        setting by name, in declared units.  `case` has `id`; `seed`, a whole number of 64 bits; `rng`, a NumPy
+        generator of this case; `folder`, its own and empty; `shared`, what `start` returned.  history is a DataFrame
+        with t_s and the outputs.  `raise Refuse("why")` refuses the inputs.  With `batch`, inputs and metrics are
+        arrays [n], `id` and `seed` too, `rng` a list of generators, and NaN in a metric fails its case alone.
+        Without `fly`, the record declares what `mc-engine import` reads.
+    outputs : tuple of Field, what histories hold besides the time t_s
+    settings : tuple of Setting, inputs that are words, switches, dates or numbers that all cases share
+    start() : called once in each worker, before its first case; loads a library or opens a licence
+    batch : bool, many cases at a time
+    name : str, by default that of the file
+    source : str, the publication or the version that the results are from
+    time_limit_s : float, a case that takes longer ends as time-limit; by default it may take any time
+    memory_limit_mib : float, memory that the process of a worker may have; a case beyond it ends as memory-limit
+    slots : int, cases that fly at a time, as licences allow; by default as many as there are workers
+    keep : str, whose folders are kept in the run directory: "none", "failed", "all"
+    deterministic : bool, `replay` compares bits; otherwise numbers may differ by `tolerance`, a fraction of them
+    tolerance : float, the fraction
+    figures : tuple of figure records, as of a `Model`
+    data : tuple of str, files that the simulator reads from its own folder, as of a `Model`
+    published : tuple of dict, published values to compare with
+    program : Program, set by the engine for the table [simulator] of a campaign file
+    reference : str, set by `load_simulator`
+    sources : Sources, set by `load_simulator`
+
+    Raises ModelError where the record contradicts itself.
+
+    >>> fall = Simulator(
+    ...     title="A stone",
+    ...     parameters=(Parameter("height_m", "m", "height of the fall", 10.0, low=0.0),),
+    ...     metrics=(Field("fall_time_s", "s", "time to the ground"),),
+    ...     fly=lambda inputs, case: {"fall_time_s": (2.0 * inputs["height_m"] / 9.81) ** 0.5},
+    ... )
+    >>> fall.input("height_m").default
+    10.0
+    """
+
+    title: str
+    parameters: tuple[Parameter, ...]
+    metrics: tuple[Field, ...]
+    fly: Callable[..., Any] | None = None
+    outputs: tuple[Field, ...] = ()
+    settings: tuple[Setting, ...] = field(default=(), kw_only=True)
+    start: Callable[[], Any] | None = field(default=None, kw_only=True)
+    batch: bool = field(default=False, kw_only=True)
+    name: str = field(default="", kw_only=True)
+    source: str = field(default="", kw_only=True)
+    time_limit_s: float | None = field(default=None, kw_only=True)
+    memory_limit_mib: float | None = field(default=None, kw_only=True)
+    slots: int | None = field(default=None, kw_only=True)
+    keep: str = field(default="failed", kw_only=True)
+    deterministic: bool = field(default=True, kw_only=True)
+    tolerance: float = field(default=0.0, kw_only=True)
+    figures: tuple[Figure, ...] = field(default=(), kw_only=True)
+    data: tuple[str, ...] = field(default=(), kw_only=True)
+    published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False, kw_only=True)
+    program: "Program | None" = field(default=None, kw_only=True)  # of a campaign file's [simulator]
+    reference: str = field(default="", compare=False, kw_only=True)
+    sources: Sources | None = field(default=None, compare=False, repr=False, kw_only=True)
+
+    def __post_init__(self) -> None:
+        refuse_false_simulator(self)
+        if self.keep not in KEPT:
+            raise ModelError(f'the simulator has "{self.keep}" as its `keep`; it must be one of {", ".join(KEPT)}')
+        for name, most in (("time_limit_s", LONGEST_S), ("memory_limit_mib", LARGEST_MIB), ("slots", 100_000)):
+            value = getattr(self, name)
+            if value is not None and not 0 < value <= most:
+                raise ModelError(f"the simulator has {value!r} as its `{name}`; it must be above 0, at most {most:g}")
+        if not 0.0 <= self.tolerance < 1.0:
+            raise ModelError(f"the simulator has {self.tolerance!r} as its `tolerance`; it must be from 0 to below 1")
+
+    @property
+    def quantities(self) -> tuple[Field, ...]:
+        """The outputs, by the name that models have for them."""
+        return self.outputs
+
+    @property
+    def states(self) -> tuple[Field, ...]:
+        """None: what a simulator integrates is its own affair."""
+        return ()
+
+    def digest(self) -> str:
+        """SHA-256 of the sources, in a fixed order; of a program, of all that it is made of."""
+        assert self.sources is not None  # a loaded simulator has them
+        digest = sha256((self.sources.module.__doc__ or "").encode() if self.program else b"")
+        for name, content in self.sources.named():
+            digest.update(f"{name}\n{len(content)}\n".encode() + content)
+        return digest.hexdigest()
+
+    def input(self, name: str) -> Parameter | Setting:
+        """The parameter or setting called `name`; KeyError if the simulator has none."""
+        items: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
+        for item in items:
+            if item.name == name:
+                return item
+        raise KeyError(name)
+
+
+System = Model | Simulator
+
+
+def load_simulator(reference: str, beside: Path | None = None) -> Simulator:
+    """Load the `SIMULATOR` of a module or a file.  This runs its code.
+
+    reference : str, a module ("plant.simulator") or a file next to the campaign file ("sim.py")
+    beside : Path, the folder of the campaign file; the working folder by default
+
+    Raises ModelError with one sentence where the module, the file or its SIMULATOR is missing or broken.
+    """
+    sources = load_sources(reference, beside, "SIMULATOR")
+    simulator = getattr(sources.module, "SIMULATOR", None)
+    if not isinstance(simulator, Simulator):
+        raise ModelError(f'"{reference}" has no SIMULATOR; end it with SIMULATOR = Simulator(...)')
+    try:
+        sources = sources.with_data(simulator.data)
+    except ModelError as error:
+        raise ModelError(f'"{reference}": {error}') from None
+    name = simulator.name or Path(reference).stem.rpartition(".")[2]
+    for key, value in (("reference", reference), ("sources", sources), ("name", name)):
+        object.__setattr__(simulator, key, value)
+    return simulator

@@ -1,0 +1,67 @@
+"""The standard air: density, pressure, temperature and speed of sound over altitude, and what a flow does to a body.
+
+`us76_air` is exact to 86 km, where bodies feel the air; above it is a table of densities and pressures.  See
+`mc_engine.physics.atmosphere` for densities alone and other planets, `wind_profile` of `mc_engine.physics.curves` for
+wind.
+"""
+
+import math
+from collections import namedtuple
+from itertools import pairwise
+
+from mc_engine.lanes import exp, minimum, physics, sqrt, where
+from mc_engine.physics.atmosphere import US76_TOP, us76_logarithm
+
+Air = namedtuple("Air", "density pressure temperature speed_of_sound")  # kg/m^3, Pa, K, m/s
+
+# U.S. Standard Atmosphere, 1976 (NOAA-S/T 76-1562): gas constant of air R*/M0 [J/(kg K)] and ratio of specific heats,
+# table 2; geometric altitude [m] and pressure [Pa] above 86 km, table I.
+GAS_CONSTANT = 8314.32 / 28.9644
+HEAT_RATIO = 1.4
+_ALOFT = (
+    (90e3, 1.8359e-1),
+    (95e3, 7.5966e-2),
+    (100e3, 3.2011e-2),
+    (105e3, 1.4477e-2),
+    (110e3, 7.1042e-3),
+    (115e3, 4.0096e-3),
+    (120e3, 2.5382e-3),
+    (130e3, 1.2505e-3),
+    (150e3, 4.5422e-4),
+    (200e3, 8.4736e-5),
+)
+
+
+def _aloft_constants():
+    """Of each interval (base [m], a, c): ln p = a + c h."""
+    logarithm, _, temperature = us76_logarithm(US76_TOP * (1.0 - 1e-15))
+    nodes = [(US76_TOP, logarithm + math.log(GAS_CONSTANT * temperature)), *((h, math.log(p)) for h, p in _ALOFT)]
+    slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in pairwise(nodes)]
+    return tuple(zip(*((h, y - c * h, c) for (h, y), c in zip(nodes, slopes, strict=False)), strict=True))
+
+
+_BASE, _A, _C = _aloft_constants()
+
+
+@physics
+def us76_air(h):
+    """Air of the U.S. Standard Atmosphere, 1976, at geometric altitude h [m].
+
+    To 86 km p = rho R T and a^2 = 1.4 R T, the lowest layer going on below the ground.  Above,
+    the densities and pressures of table I, their logarithms linear in between and going on beyond 200 km; temperature
+    and speed of sound are then those of 86 km: the standard defines no speed of sound there.
+    """
+    logarithm, _, temperature = us76_logarithm(h)
+    a, c = _A[0], _C[0]
+    for i in range(1, len(_BASE)):
+        inside = h >= _BASE[i]
+        a, c = where(inside, _A[i], a), where(inside, _C[i], c)
+    density = exp(logarithm)
+    pressure = where(h >= US76_TOP, exp(minimum(a + c * h, 50.0)), density * (GAS_CONSTANT * temperature))
+    return Air(density, pressure, temperature, sqrt(HEAT_RATIO * GAS_CONSTANT * temperature))
+
+
+@physics
+def dynamic_pressure(density, speed):
+    """Dynamic pressure [Pa] of a flow: rho v^2 / 2."""
+    return 0.5 * density * speed * speed

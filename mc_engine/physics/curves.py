@@ -1,0 +1,384 @@
+"""Curves and surfaces through given points: functions of one number or two, from a file or from arrays.
+
+    THRUST = curve("thrust.csv", x="time_s", y="thrust_n", outside="zero")
+    CD = surface("cd.csv", "mach", "alpha_deg", "cd")
+
+and in physics `THRUST(t)`, `CD(mach, alpha)`, in SI and radians: the unit is in the name of a column.  The points may
+lie at any distances and are met exactly; nothing is resampled.  The numbers lie outside of the machine code, so other
+numbers compile nothing.  The range is divided into equal buckets, so that two comparisons, seldom more, find the points
+on both sides of an argument (see `_axis`).  An argument that is not a number gives one that is not.
+"""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine.errors import ModelError
+from mc_engine.lanes import physics, where
+from mc_engine.lanes.kernel_data import DataBlock, numbers_of, one_at, row_of_four, row_of_two
+from mc_engine.lanes.number import Number, result_of
+from mc_engine.lanes.physics_function import PhysicsFunction
+from mc_engine.physics.curve_points import array_of, caller_folder, columns_of, grid_of, refuse_points, refuse_steep
+from mc_engine.physics.vectors import Vector
+
+KINDS = ("linear", "cubic", "nearest")
+OUTSIDE = ("held", "zero", "ends")
+_HEADER = 8  # low, high, buckets per unit, last bucket, levels, place of the points, of the buckets, of what follows
+_MOST_BUCKETS = 16384  # 512 KB: beyond, a look-up waits for memory longer than for another comparison
+_NAN = float("nan")
+
+
+class Curve(PhysicsFunction):
+    """A function through points, of one number (`curve`) or two (`surface`)."""
+
+    def __init__(self, function: Callable[..., Any], block: DataBlock, words: str, kind: str, outside: str):
+        super().__init__(function)
+        self.block, self.words, self.kind, self.outside = block, words, kind, outside
+
+    def structure(self) -> tuple[str, ...]:
+        """What machine code has of the curve: all but its numbers and how many there are."""
+        return type(self).__name__, self.function.__qualname__, self.kind, self.outside
+
+    def __call__(self, *args: Any) -> Any:
+        """The value at the argument(s), interpreted: floats or arrays, SI."""
+        if Number not in map(type, args):
+            return self.function(*args)
+        plain = [float(one) if type(one) is Number else one for one in args]
+        return result_of(self.words, args, self.function(*plain))
+
+    def __repr__(self) -> str:
+        return f"<{self.words}>"
+
+
+def curve(
+    file: str | None = None,
+    x: str | Sequence[float] | np.ndarray = "x",
+    y: str | Sequence[float] | np.ndarray = "y",
+    *,
+    kind: str = "linear",
+    outside: str = "held",
+    x_unit: str | None = None,
+    y_unit: str | None = None,
+) -> Curve:
+    """A function y(x) through points.
+
+    file : CSV or Parquet, named from the folder of the module that calls; x and y are then names of columns, whose
+        ends say their units unless x_unit or y_unit does.  Without a file, x and y are numbers in SI.
+    x : rising, at least two points.  All numbers are finite.
+    kind : "linear"; "cubic", smooth (continuous slope) and monotone where the points are (PCHIP, F. N. Fritsch and
+        J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304); "nearest", of two equally near points the lower one.
+    outside : of the points: "held" at the first and the last value, "zero", or "ends": the value is not a number, with
+        which the case ends as "not-finite".
+    Raises ModelError for what is wrong with the file or the points.
+    """
+    _refuse_unknown(kind, KINDS, "kind")
+    _refuse_unknown(outside, OUTSIDE, "outside")
+    path = caller_folder() / file if file is not None else None
+    if path is not None:
+        read = columns_of(path, {str(x): x_unit, str(y): y_unit})
+        xs, ys = read[str(x)], read[str(y)]
+    else:
+        xs, ys = array_of(x, "x"), array_of(y, "y")
+    return _through(xs, ys, kind, outside, path)
+
+
+def _through(xs: np.ndarray, ys: np.ndarray, kind: str, outside: str, path: Path | None) -> Curve:
+    """The curve through points in SI.  path : that they come from."""
+    words = f"the curve {path.name}" if path else "the curve"
+    refuse_points(words, xs, ys, xs.size)
+    axis = _axis(_turnovers(xs) if kind == "nearest" else xs)
+    axis[_HEADER - 1] = axis.size
+    rows = _ROWS[kind](xs, ys)
+    refuse_steep(words, rows[:, :2])
+    block = DataBlock(np.concatenate([axis, rows.ravel()]), path)
+    return Curve(_bounded(_AT[kind], block, outside), block, words, kind, outside)
+
+
+def wind_profile(
+    file: str, altitude: str, north: str = "", east: str = "", *, speed: str = "", coming_from: str = "",
+    kind: str = "linear", outside: str = "held",
+) -> PhysicsFunction:  # fmt: skip
+    """wind(h) -> Vector, velocity of the air over the ground [m/s] at altitude h [m]: north, east, down (zero).
+
+    file, kind, outside : as in `curve`; the other arguments are names of columns.  Either north and east are given, the
+    components, or speed and coming_from, the direction that the wind blows from, clockwise from north.  Components are
+    what is interpolated, so that 350 and 10 degrees have north between them, with a speed a little below both.
+    """
+    path = caller_folder() / file
+    wanted = [name for name in (altitude, north, east, speed, coming_from) if name]
+    if len(wanted) != 3 or bool(north) != bool(east):
+        raise ModelError("a wind has the columns north and east, or speed and coming_from")
+    h, *pair = (columns_of(path, dict.fromkeys(wanted))[name] for name in wanted)
+    components = pair if north else [-pair[0] * np.cos(pair[1]), -pair[0] * np.sin(pair[1])]
+    to_north, to_east = (_through(h, one, kind, outside, path) for one in components)
+
+    @physics
+    def wind(h):
+        return Vector(to_north(h), to_east(h), 0.0 * h)
+
+    return wind
+
+
+def surface(
+    file: str | None = None,
+    x: str | Sequence[float] | np.ndarray = "x",
+    y: str | Sequence[float] | np.ndarray = "y",
+    z: str | np.ndarray = "z",
+    *,
+    kind: str = "linear",
+    outside: str = "held",
+    units: dict[str, str] | None = None,
+) -> Curve:
+    """A function z(x, y) through the points of a grid.
+
+    file : CSV or Parquet as in `curve`, one row for each point of the grid, in any order.
+    units : of columns whose names do not say theirs.
+    Without a file, x and y are rising numbers and z is float64[n_x, n_y], in SI.
+    kind : "linear" in each direction (bilinear), or "nearest".
+    outside : as in `curve`.
+    """
+    _refuse_unknown(outside, OUTSIDE, "outside")
+    words = f"the surface {file or ''}".rstrip()
+    path = caller_folder() / file if file is not None else None
+    if path is not None:
+        names = [str(x), str(y), str(z)]
+        read = columns_of(path, {name: (units or {}).get(name) for name in names})
+        xs, ys, zs = grid_of(words, *(read[name] for name in names))
+    else:
+        xs, ys, zs = array_of(x, "x"), array_of(y, "y"), np.asarray(z, dtype=np.float64)
+    refuse_points(words, xs, zs, xs.size)
+    refuse_points(words, ys, zs.T, ys.size)
+    first, second = (_axis(_turnovers(one) if kind == "nearest" else one) for one in (xs, ys))
+    first[_HEADER - 1] = first.size
+    second[_HEADER - 1] = first.size + second.size
+    second[5:7] += first.size
+    cells = _CELLS[kind](xs, ys, zs)
+    refuse_steep(words, cells)
+    block = DataBlock(np.concatenate([first, second, [cells.shape[1], 0.0, 0.0, 0.0], cells.ravel()]), path)
+    return Curve(_bounded_surface(_ON[kind], block, outside), block, words, kind, outside)
+
+
+# ---- points and the buckets that they are found by
+
+
+def _axis(points: np.ndarray) -> np.ndarray:
+    """Header, buckets and points of one argument; the place of what follows is left open.
+
+    A bucket is (number of a point at or before it, that point, the two behind it).  Buckets are numbered by the very
+    operations of a look-up, which keep the order whatever they round to: a point of an earlier bucket lies before all
+    arguments of this one.  So only the points of an argument's own bucket are left to be compared with it, two by
+    their values in the bucket.  Where some bucket has more, up to 2**levels - 1, they are bisected.
+    """
+    low, high, n = points[0], points[-1], points.size
+    buckets = n - 1
+    while True:
+        scale = buckets / (high - low)
+        own = np.minimum(np.maximum(np.floor((points - low) * scale), 0.0), buckets - 1.0)
+        held = np.bincount(own[1:].astype(int), minlength=buckets)
+        if held.max() <= 2 or 2 * buckets > max(_MOST_BUCKETS, 4 * n):
+            break
+        buckets *= 2
+    levels = int(held.max()).bit_length() if held.max() > 2 else 0
+    start = np.concatenate([[0], np.cumsum(held)[:-1]])
+    padded = np.concatenate([points, np.full(2 ** (levels + 1), np.inf)])
+    table = np.column_stack([start, padded[start], padded[start + 1], padded[start + 2]])
+    first = _HEADER + table.size
+    header = [low, high, scale, buckets - 1.0, levels, first, _HEADER, 0.0]
+    return np.concatenate([header, table.ravel(), padded])
+
+
+@physics
+def _segment(numbers, at, x):
+    """(number of the point at or before x, way from it to x, whether x is outside); outside, x is held.
+
+    at : place of the axis.  The way is not a number where x is not one; the number of the point always is.
+    """
+    low, high, scale, last = row_of_four(numbers, at, 0)
+    levels, points, buckets, _ = row_of_four(numbers, at, 1)
+    outside = (x < low) | (x > high)
+    x = where(x < low, low, where(x > high, high, x))
+    bucket = (x - low) * scale
+    # in this order what is not a number becomes the first bucket
+    bucket = where(bucket > 0.0, bucket, 0.0)
+    bucket = where(bucket < last, bucket, last)
+    point, here, next_point, second = row_of_four(numbers, buckets, bucket)
+    if levels > 0.0:
+        point, here = _bisected(numbers, points, levels, point, here, x)
+    else:
+        passed, passed_both = x >= next_point, x >= second
+        point = where(passed_both, point + 2.0, where(passed, point + 1.0, point))
+        here = where(passed_both, second, where(passed, next_point, here))
+    return point, x - here, outside
+
+
+@physics
+def _bisected(numbers, points, levels, point, here, x):
+    """The last of the next 2**levels - 1 points that x has passed: (its number, the point)."""
+    size = 1.0
+    for _ in range(int(levels) - 1):
+        size = size * 2.0
+    for _ in range(int(levels)):
+        ahead = one_at(numbers, points + point + size)
+        passed = x >= ahead
+        point, here = where(passed, point + size, point), where(passed, ahead, here)
+        size = size * 0.5
+    return point, here
+
+
+# ---- what is between the points
+
+
+def _linear_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(value, slope behind it) of each point; the last one has no slope, as nothing is behind it."""
+    with np.errstate(over="ignore"):
+        return np.column_stack([y, np.append(np.diff(y) / np.diff(x), 0.0)])
+
+
+@physics
+def _linear(numbers, x):
+    point, way, outside = _segment(numbers, 0.0, x)
+    y, slope = row_of_two(numbers, one_at(numbers, 7), point)
+    return y + way * slope, outside
+
+
+def _cubic_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Coefficients of the powers of the way from each point."""
+    h = np.diff(x)
+    m = np.diff(y) / h
+    d = _slopes(h, m)
+    rows = np.column_stack([y[:-1], d[:-1], (3.0 * m - 2.0 * d[:-1] - d[1:]) / h, (d[:-1] + d[1:] - 2.0 * m) / h / h])
+    return np.concatenate([rows, [[y[-1], 0.0, 0.0, 0.0]]])
+
+
+def _slopes(h: np.ndarray, m: np.ndarray) -> np.ndarray:
+    """Slopes at the points by Fritsch and Butland's weighted harmonic mean; h, m : length and slope of each stretch."""
+    if m.size == 1:
+        return np.repeat(m, 2)
+    before, behind = h[1:] + 2.0 * h[:-1], 2.0 * h[1:] + h[:-1]  # weights of the slopes behind and before
+    same = m[:-1] * m[1:] > 0.0
+    safe = np.where(same, m[:-1], 1.0), np.where(same, m[1:], 1.0)
+    inner = np.where(same, (before + behind) / (behind / safe[0] + before / safe[1]), 0.0)
+    return np.concatenate([[_end(h[0], h[1], m[0], m[1])], inner, [_end(h[-1], h[-2], m[-1], m[-2])]])
+
+
+def _end(h0: float, h1: float, m0: float, m1: float) -> float:
+    """Slope at an end by three points, kept from overshooting (C. Moler, Numerical Computing with MATLAB, 3.6)."""
+    d = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1)
+    if np.sign(d) != np.sign(m0):
+        return 0.0
+    return 3.0 * m0 if np.sign(m0) != np.sign(m1) and abs(d) > 3.0 * abs(m0) else d
+
+
+@physics
+def _cubic(numbers, x):
+    point, way, outside = _segment(numbers, 0.0, x)
+    y, c1, c2, c3 = row_of_four(numbers, one_at(numbers, 7), point)
+    return y + way * (c1 + way * (c2 + way * c3)), outside
+
+
+def _turnovers(x: np.ndarray) -> np.ndarray:
+    """First point, the first arguments that are nearer to the next point than to the one before, last point."""
+    return np.concatenate([x[:1], np.nextafter(0.5 * x[:-1] + 0.5 * x[1:], np.inf), x[-1:]])
+
+
+def _nearest_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(value, 0) from each turnover on; at the last one begins what is outside."""
+    return np.column_stack([np.append(y, y[-1]), np.zeros(x.size + 1)])
+
+
+@physics
+def _nearest(numbers, x):
+    point, way, outside = _segment(numbers, 0.0, x)
+    y, _ = row_of_two(numbers, one_at(numbers, 7), point)
+    return where(way == way, y, way), outside
+
+
+_ROWS = {"linear": _linear_rows, "cubic": _cubic_rows, "nearest": _nearest_rows}
+_AT = {"linear": _linear, "cubic": _cubic, "nearest": _nearest}
+
+
+def _linear_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """(value, slope along x, slope along y, their product's) of the cell behind each point of the grid."""
+    along_x, along_y = np.zeros_like(z), np.zeros_like(z)
+    along_x[:-1] = np.diff(z, axis=0) / np.diff(x)[:, None]
+    along_y[:, :-1] = np.diff(z, axis=1) / np.diff(y)
+    both = np.zeros_like(z)
+    both[:-1] = np.diff(along_y, axis=0) / np.diff(x)[:, None]
+    return np.stack([z, along_x, along_y, both], axis=-1)
+
+
+def _nearest_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """The value from each pair of turnovers on."""
+    return np.pad(z, ((0, 1), (0, 1)), "edge")
+
+
+@physics
+def _cell(numbers, x, y):
+    """(first place, number of the cell, ways from its corner, whether the place is outside)."""
+    i, way_x, outside_x = _segment(numbers, 0.0, x)
+    j, way_y, outside_y = _segment(numbers, one_at(numbers, 7), y)
+    first = one_at(numbers, one_at(numbers, 7) + 7.0)
+    return first + 4.0, i * one_at(numbers, first) + j, way_x, way_y, outside_x | outside_y
+
+
+@physics
+def _bilinear(numbers, x, y):
+    first, cell, way_x, way_y, outside = _cell(numbers, x, y)
+    z, along_x, along_y, both = row_of_four(numbers, first, cell)
+    return z + way_x * along_x + way_y * (along_y + way_x * both), outside
+
+
+@physics
+def _nearest_on_grid(numbers, x, y):
+    first, cell, way_x, way_y, outside = _cell(numbers, x, y)
+    way = way_x + way_y
+    return where(way == way, one_at(numbers, first + cell), way), outside
+
+
+_CELLS = {"linear": _linear_cells, "nearest": _nearest_cells}
+_ON = {"linear": _bilinear, "nearest": _nearest_on_grid}
+
+
+# ---- functions that physics calls
+
+
+def _bounded(at: Any, block: DataBlock, outside: str) -> Callable[..., Any]:
+    """The function of x on a block, with what is declared outside of its points."""
+    if outside == "held":
+
+        def value(x):
+            return at(numbers_of(block), x)[0]
+
+        return value
+    beyond = 0.0 if outside == "zero" else _NAN
+
+    def value_inside(x):
+        y, is_outside = at(numbers_of(block), x)
+        return where(is_outside, beyond, y)
+
+    return value_inside
+
+
+def _bounded_surface(on: Any, block: DataBlock, outside: str) -> Callable[..., Any]:
+    """The same of x and y."""
+    if outside == "held":
+
+        def value(x, y):
+            return on(numbers_of(block), x, y)[0]
+
+        return value
+    beyond = 0.0 if outside == "zero" else _NAN
+
+    def value_inside(x, y):
+        z, is_outside = on(numbers_of(block), x, y)
+        # a value that is none stays none, also where the other argument is outside
+        return where(is_outside & (z == z), beyond, z)
+
+    return value_inside
+
+
+def _refuse_unknown(value: str, known: Sequence[str], name: str) -> None:
+    if value not in known:
+        raise ModelError(f'{name} "{value}" is not known; write one of {", ".join(known)}')

@@ -1,0 +1,202 @@
+"""A rigid body with six degrees of freedom, over flat ground or about the turning, oblate Earth.
+
+A `Motion` is position, velocity, attitude and angular rate, and so is its derivative; the fields of a model's state are
+these numbers one by one.  Forces and moments are given in body axes, moments about the centre of mass.  The attitude is
+a quaternion from the frame of the position to the body (see `mc_engine.physics.rotations`).  Not for flexible bodies
+and sloshing fuel.  SI.
+
+P. H. Zipfel, Modeling and Simulation of Aerospace Vehicle Dynamics, 2nd ed. (2007), chapters 4 and 6;
+W. T. Thomson, Introduction to Space Dynamics (1961), chapters 5 and 8 (variable mass).
+"""
+
+from collections import namedtuple
+
+from mc_engine.lanes import cos, physics, sin, sqrt
+from mc_engine.physics.constants import EARTH_RATE, MU_EARTH
+from mc_engine.physics.earth_frames import wind_from_body
+from mc_engine.physics.gravity import oblate
+from mc_engine.physics.rotations import derivative, transformed, transformed_back
+from mc_engine.physics.vectors import Vector, added, cross, dot, scaled, subtracted, transposed_times
+
+# position [m] and velocity [m/s] in one frame, attitude (Quaternion) from it to the body, rate [rad/s] in body axes
+Motion = namedtuple("Motion", "position velocity attitude rate")
+
+# Moments of inertia and products of inertia [kg m^2] about the centre of mass, in body axes: xy is the integral of
+# x y dm, so that the tensor has -xy beside its diagonal.
+Inertia = namedtuple("Inertia", "xx yy zz xy xz yz")
+
+
+# ---- inertia
+
+
+@physics
+def angular_momentum(inertia, rate):
+    """Inertia times rate [kg m^2/s], in body axes."""
+    i, w = inertia, rate
+    return Vector(
+        i.xx * w.x - i.xy * w.y - i.xz * w.z,
+        i.yy * w.y - i.xy * w.x - i.yz * w.z,
+        i.zz * w.z - i.xz * w.x - i.yz * w.y,
+    )
+
+
+@physics
+def rate_of(inertia, momentum):
+    """The rate [rad/s] that goes with an angular momentum: the inverse of `angular_momentum`, by cofactors."""
+    i, h = inertia, momentum
+    cxx, cyy, czz = i.yy * i.zz - i.yz * i.yz, i.xx * i.zz - i.xz * i.xz, i.xx * i.yy - i.xy * i.xy
+    cxy, cxz, cyz = i.xy * i.zz + i.xz * i.yz, i.xy * i.yz + i.xz * i.yy, i.xx * i.yz + i.xy * i.xz
+    u = 1.0 / (i.xx * cxx - i.xy * cxy - i.xz * cxz)
+    return Vector(
+        u * (cxx * h.x + cxy * h.y + cxz * h.z),
+        u * (cxy * h.x + cyy * h.y + cyz * h.z),
+        u * (cxz * h.x + cyz * h.y + czz * h.z),
+    )
+
+
+@physics
+def inertia_about(inertia, mass, arm):
+    """Inertia about a point at `arm` [m] from the centre of mass, by the parallel axes; with -mass the way back."""
+    i, a = inertia, arm
+    return Inertia(
+        i.xx + mass * (a.y * a.y + a.z * a.z),
+        i.yy + mass * (a.x * a.x + a.z * a.z),
+        i.zz + mass * (a.x * a.x + a.y * a.y),
+        i.xy + mass * a.x * a.y,
+        i.xz + mass * a.x * a.z,
+        i.yz + mass * a.y * a.z,
+    )
+
+
+@physics
+def inertia_between(empty, full, share):
+    """Inertia at a share of the fuel, 0 to 1, linear between two; with share' [1/s] and `inertia_rate` for its rate."""
+    e, f = empty, full
+    return Inertia(
+        e.xx + share * (f.xx - e.xx),
+        e.yy + share * (f.yy - e.yy),
+        e.zz + share * (f.zz - e.zz),
+        e.xy + share * (f.xy - e.xy),
+        e.xz + share * (f.xz - e.xz),
+        e.yz + share * (f.yz - e.yz),
+    )
+
+
+@physics
+def inertia_rate(empty, full, share_rate):
+    """Rate [kg m^2/s] of `inertia_between` for a rate of the share [1/s], negative while fuel burns."""
+    e, f, k = empty, full, share_rate
+    return Inertia(
+        k * (f.xx - e.xx), k * (f.yy - e.yy), k * (f.zz - e.zz),
+        k * (f.xy - e.xy), k * (f.xz - e.xz), k * (f.yz - e.yz),
+    )  # fmt: skip
+
+
+@physics
+def angular_acceleration(inertia, rate, moment):
+    """Euler's equation [rad/s^2]: I w' = M - w x (I w).  Zipfel, chapter 6."""
+    return rate_of(inertia, subtracted(moment, cross(rate, angular_momentum(inertia, rate))))
+
+
+@physics
+def angular_acceleration_changing(inertia, change, rate, moment):
+    """The same while the inertia changes [kg m^2/s]: I w' = M - I' w - w x (I w).
+
+    What the gas takes along is a moment of its own: `jet_damping`.  Thomson, chapter 8.
+    """
+    return angular_acceleration(inertia, rate, subtracted(moment, angular_momentum(change, rate)))
+
+
+# ---- forces and moments, in body axes
+
+
+@physics
+def moment_of(force, arm):
+    """Moment [N m] of a force that acts at `arm` [m] from the centre of mass."""
+    return cross(arm, force)
+
+
+@physics
+def thrust_force(thrust, pitch, yaw):
+    """Force [N] of an engine that points along x but for two angles [rad], towards -z and towards y."""
+    level = thrust * cos(pitch)
+    return Vector(level * cos(yaw), level * sin(yaw), -thrust * sin(pitch))
+
+
+@physics
+def jet_damping(flow, arm, rate):
+    """Moment [N m] of gas that leaves at `arm` [m] with a mass flow [kg/s] above 0: -flow arm x (rate x arm)."""
+    return scaled(-flow, cross(arm, cross(rate, arm)))
+
+
+@physics
+def aerodynamic_force(pressure, area, alpha, beta, drag, side, lift):
+    """Force [N] by coefficients in wind axes.  pressure : dynamic [Pa];  area : of reference [m^2]."""
+    size = pressure * area
+    return transposed_times(wind_from_body(alpha, beta), Vector(-size * drag, size * side, -size * lift))
+
+
+@physics
+def aerodynamic_moment(pressure, area, length, roll, pitch, yaw):
+    """Moment [N m] by coefficients about the body axes.  length : of reference [m]."""
+    size = pressure * area * length
+    return Vector(size * roll, size * pitch, size * yaw)
+
+
+@physics
+def gravity_gradient(inertia, r_body, mu=MU_EARTH):
+    """Moment [N m] of gravity: 3 mu / r^5 r x (I r).  r_body : from the Earth's centre [m], in body axes.
+
+    P. C. Hughes, Spacecraft Attitude Dynamics (1986), chapter 8.
+    """
+    r2 = dot(r_body, r_body)
+    moment = cross(r_body, angular_momentum(inertia, r_body))
+    return scaled(3.0 * mu / (r2 * r2 * sqrt(r2)), moment)
+
+
+@physics
+def air_velocity(r_eci, v_eci, body_from_eci, wind_eci, rate=EARTH_RATE):
+    """Velocity [m/s] through the air that turns with the Earth, in body axes.  wind_eci : over the ground, in ECI."""
+    ground = Vector(v_eci.x + rate * r_eci.y, v_eci.y - rate * r_eci.x, v_eci.z)
+    return transformed(body_from_eci, subtracted(ground, wind_eci))
+
+
+# ---- motion
+
+
+@physics
+def flat_derivative(motion, mass, inertia, force, moment, gravity):
+    """Derivative of a Motion in NED over flat ground at rest.  gravity : [m/s^2], down."""
+    push = transformed_back(motion.attitude, scaled(1.0 / mass, force))
+    return Motion(
+        motion.velocity,
+        Vector(push.x, push.y, push.z + gravity),
+        derivative(motion.attitude, motion.rate),
+        angular_acceleration(inertia, motion.rate, moment),
+    )
+
+
+@physics
+def orbital_derivative(motion, mass, inertia, force, moment):
+    """Derivative of a Motion in ECI under the gravity of the oblate Earth, whose moment is not in it.
+
+    The turning of the Earth is in what acts: `air_velocity`, and places by `eci_to_ecef` and `ecef_to_geodetic`.
+    """
+    r = motion.position
+    push = transformed_back(motion.attitude, scaled(1.0 / mass, force))
+    gx, gy, gz = oblate(r.x, r.y, r.z, MU_EARTH)
+    return Motion(
+        motion.velocity,
+        added(push, Vector(gx, gy, gz)),
+        derivative(motion.attitude, motion.rate),
+        angular_acceleration(inertia, motion.rate, moment),
+    )
+
+
+@physics
+def point_of_body(motion, arm):
+    """(position, velocity) of a point at `arm` [m] from the centre of mass, in the frame of the motion."""
+    return (
+        added(motion.position, transformed_back(motion.attitude, arm)),
+        added(motion.velocity, transformed_back(motion.attitude, cross(motion.rate, arm))),
+    )

@@ -1,0 +1,145 @@
+"""Results that were flown elsewhere, made a run directory that is reported, compared and judged like any other.
+
+The table has a row for each case of the campaign: `case_id`, the dispersed inputs, the metrics, and where there are
+any `status` and `reason`.  `mc-engine sample` gives the inputs; those in the table are compared with them.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from mc_engine.campaign.cases import case_table
+from mc_engine.campaign.inputs import number
+from mc_engine.campaign.loading import Campaign
+from mc_engine.campaign.tables_beside import numbers, read_columns
+from mc_engine.errors import CampaignError, Problem
+from mc_engine.flight.chunks import LARGEST_CHUNK, chunks_of
+from mc_engine.flight.flyer import Columns
+from mc_engine.model.files import FileFault
+from mc_engine.runner.flown_campaign import companions_of
+from mc_engine.runner.manifest import columns_of, manifest_of
+from mc_engine.status import NO_RESULT, NOT_FINITE, OK, STATUS_NAME
+from mc_engine.store.store import Store, create_store
+from mc_engine.suggestions import hint
+
+_SAME = 1e-9  # of an input, which a CSV may round
+_MOST = 20  # problems of one table
+
+
+def import_results(campaign: Campaign, file: Path, out: Path, history: Path | None = None) -> Store:
+    """Make `out` a run of the campaign from the table in `file`, Parquet or CSV.
+
+    A row with the case_id -1 is the nominal case.  history : table of case_id, t_s and the outputs.
+    Raises CampaignError with every mistake of the tables.
+    """
+    problems: list[Problem] = []
+    try:
+        table = {name: np.asarray(cells) for name, cells in read_columns(file).items()}
+        past = None if history is None else _read_history(campaign, history)
+    except FileFault as fault:
+        raise CampaignError(file.name, [Problem("", str(fault))]) from None
+    rows, nominal = _results(campaign, file, table, problems)
+    if problems:
+        raise CampaignError(file.name, problems[:_MOST])
+    imported = {"file": file.name, "history": None if history is None else history.name}
+    manifest = {**manifest_of(campaign), "imported": imported}
+    store = create_store(out, manifest, campaign.text, columns_of(campaign), companions_of(campaign))
+    with store.lock():
+        for first, stop in chunks_of([(0, campaign.cases)], LARGEST_CHUNK):
+            store.append(first, stop - first, {name: column[first:stop] for name, column in rows.items()})
+        store.write_nominal({name: column[0] for name, column in nominal.items()})
+        if past is not None:
+            store.write_histories(past)
+    return store
+
+
+def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Problem]) -> tuple[Columns, Columns]:
+    """(rows of all cases but case_id, the nominal row), with what is wrong added to `problems`."""
+    inputs = [dispersion.name for dispersion in campaign.dispersions]
+    metrics = [metric.name for metric in campaign.model.metrics]
+    needed = ["case_id", *inputs, *metrics]
+    problems += [Problem(name, f"is no column of the table{hint(name, table)}") for name in needed if name not in table]
+    if problems:
+        return {}, {}
+    try:
+        values = {name: _numbers_or_nan(file, name, table[name]) for name in ("case_id", *metrics)}
+    except FileFault as fault:
+        problems.append(Problem("", str(fault)))
+        return {}, {}
+    ids = values["case_id"]
+    order = np.argsort(ids, kind="stable")
+    order = order[ids[order] >= 0]
+    if not np.array_equal(ids[order], np.arange(campaign.cases)):
+        missing = sorted({*range(campaign.cases)} - {*ids.tolist()})
+        which = f"case {missing[0]} is missing" if missing else "a case is there twice, or is none of the campaign's"
+        problems.append(Problem("case_id", f"{which}; the campaign has the cases 0 to {campaign.cases - 1}"))
+        return {}, {}
+    drawn = case_table(campaign, np.arange(campaign.cases))
+    for name in inputs:
+        _compare(name, table[name][order], drawn[name], file, problems)
+    rows = {name: values[name][order] for name in metrics}
+    return {**drawn, **_judged(campaign, table, order, rows)}, _nominal(campaign, values, metrics)
+
+
+def _numbers_or_nan(file: Path, name: str, cells: np.ndarray) -> np.ndarray:
+    """float64[n]; an empty cell is not a number, as a metric of a failed case.  FileFault for a word."""
+    values = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells.tolist()):
+        try:
+            values[row] = np.nan if cell in ("", None) else float(cell)
+        except (TypeError, ValueError):
+            raise FileFault(f'"{file.name}", row {row + 1}, column "{name}": {cell!r:.60} is not a number') from None
+    return values
+
+
+def _compare(name: str, given: np.ndarray, drawn: np.ndarray, file: Path, problems: list[Problem]) -> None:
+    """Note an input that is not the one that the campaign draws."""
+    if drawn.dtype.kind == "f":
+        try:
+            cells = numbers(file, name, given)
+        except FileFault as fault:
+            problems.append(Problem("", str(fault)))
+            return
+        wrong = np.flatnonzero(~(np.abs(cells - drawn) <= _SAME * np.maximum(np.abs(drawn), 1e-300)))
+        texts = [number(float(one[wrong[0]])) for one in (cells, drawn)] if wrong.size else []
+    else:
+        wrong = np.flatnonzero(np.char.lower(given.astype(str)) != np.char.lower(drawn.astype(str)))
+        texts = [str(one[wrong[0]]) for one in (given, drawn)] if wrong.size else []
+    if wrong.size:
+        message = f"case {wrong[0]} has {texts[0]}, and the campaign draws {texts[1]}; {wrong.size:,} cases differ"
+        problems.append(Problem(name, f"{message}; `mc-engine sample` gives the inputs"))
+
+
+def _judged(campaign: Campaign, table: Columns, order: np.ndarray, rows: Columns) -> Columns:
+    """Status and reason of each case, and its metrics, which a failed case has not."""
+    words = {name: np.full(len(order), "", dtype=object) for name in ("status", "reason")}
+    words |= {name: table[name][order].astype(object) for name in words if name in table}
+    status = np.where(words["status"] == "", STATUS_NAME[OK], words["status"]).astype(object)
+    for metric in campaign.model.metrics:
+        if not metric.sometimes:
+            lost = (status == STATUS_NAME[OK]) & ~np.isfinite(rows[metric.name])
+            status[lost] = STATUS_NAME[NOT_FINITE]
+            words["reason"][lost] = f'"{metric.name}" is no finite number in the imported table'
+    failed = status != STATUS_NAME[OK]
+    metrics = {name: np.where(failed, np.nan, column) for name, column in rows.items()}
+    return {"status": status, "reason": words["reason"], **metrics}
+
+
+def _nominal(campaign: Campaign, values: Columns, metrics: list[str]) -> Columns:
+    """The nominal row: the one with the case_id -1, or one without results."""
+    place = np.flatnonzero(values["case_id"] == -1)
+    known = {dispersion.name: campaign.nominal[dispersion.name] for dispersion in campaign.dispersions}
+    status, reason = (OK, "") if place.size else (NO_RESULT, "the imported table has no case -1, the nominal")
+    row = {**known, "status": STATUS_NAME[status], "reason": reason}
+    row |= {name: values[name][place[0]] if place.size else np.nan for name in metrics}
+    return {name: np.array([value], dtype=object if isinstance(value, str) else None) for name, value in row.items()}
+
+
+def _read_history(campaign: Campaign, file: Path) -> Columns:
+    """The columns of a history table; FileFault if one is missing."""
+    table = read_columns(file)
+    names = ["case_id", "t_s", *(quantity.name for quantity in campaign.model.quantities)]
+    if missing := [name for name in names if name not in table]:
+        raise FileFault(f'"{file.name}" has no column "{missing[0]}"')
+    columns = {name: numbers(file, name, np.asarray(table[name])) for name in names}
+    return {**columns, "case_id": columns["case_id"].astype(np.int64)}

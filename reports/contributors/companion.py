@@ -1,0 +1,138 @@
+"""The section of the contributors: total and first-order effects of inputs, groups and random draws.
+
+From the flights beside the run, or from the table of cases, which also tells trends and leaves a share unexplained.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_chance
+from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest, surely
+from reports.document.blocks import Cell, Column, FigureBlock, Table
+from reports.run.contributions import UNEXPLAINED, Contributions, Contributor
+from reports.run.flown import Flown
+from reports.text.numbers import count, number, percent, with_unit
+
+_TRENDS = {"src": "SRC", "prcc": "PRCC", "spearman": "Spearman"}
+
+
+def companion_blocks(flown: Flown, contributions: Contributions) -> Iterator[FigureBlock | Table | str]:
+    """The figure of the effects, and a table of the strongest contributors of each metric with their 1σ budget."""
+    shown = [metric for metric, rows in contributions.by_metric.items() if rows]
+    if shown:
+        yield _effect_figure(flown, contributions, shown)
+        yield _effect_table(flown, contributions, shown)
+    yield from no_contributors(flown, [metric for metric in contributions.by_metric if metric not in shown])
+
+
+def no_contributors(flown: Flown, silent: list[str]) -> Iterator[str]:
+    """A sentence on metrics whose contributors are not known."""
+    if silent:
+        names = ", ".join(flown.words(metric) for metric in silent)
+        yield f"No contributors for {names}: the same in all cases that have it, or fewer than {FEWEST_CASES} of them."
+
+
+def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str]) -> FigureBlock:
+    used = [contributions.n_used[metric] for metric in shown]
+    few, most = min(used), max(used)
+    blocks = f"{count(most)}" if few == most else f"{count(few)} to {count(most)}"
+    of = f"{blocks} of {count(contributions.n_tried)}"
+    source = f"from {of} blocks" if contributions.trends is None else f"from a surrogate model of {of} cases"
+    return contributor_figure(flown, [(flown.words(item), contributions.by_metric[item]) for item in shown], source)
+
+
+def _effect_table(flown: Flown, contributions: Contributions, shown: list[str]) -> Table:
+    columns = (
+        Column("Metric", "text", 2.4, grouped=True),
+        Column("Contributor", "text", 2.6),
+        Column("First-order effect", "number", 2.0),
+        Column("Total effect", "number", 2.0),
+        Column("1σ contribution", "number", 1.4),
+        *(Column(title, "number", 1.2) for title in (_TRENDS.values() if contributions.trends else ())),
+    )
+    rows = []
+    for k, metric in enumerate(contributions.by_metric):
+        cell = Cell(flown.words(metric), small="; ".join(_about(flown, contributions, metric, k)))
+        for contributor in strongest(contributions.by_metric[metric]):
+            cells = [
+                _cell(contributor.first, contributor.first_interval),
+                _cell(contributor.total, contributor.total_interval),
+            ]
+            cells.append(_sigma_cell(flown, metric, contributor))
+            cells += _trends(contributions.trends, contributor.input, k) if contributions.trends else []
+            rows.append((cell, Cell(name_of(flown, contributor.input)), *cells))
+    return Table(f"Contributors to each metric, at most {STRONGEST}", columns, tuple(rows), _note(flown, contributions))
+
+
+def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> Iterator[str]:
+    """Cases used where not all are, σ of the metric, and the root sum square of the 1σ contributions."""
+    if contributions.n_used[metric] != contributions.n_tried or contributions.trends is not None:
+        used, tried = count(contributions.n_used[metric]), count(contributions.n_tried)
+        yield f"{used} / {tried} {'cases' if contributions.trends else 'blocks'}"
+    if contributions.trends and np.isfinite(contributions.trends.r_squared[k]):
+        yield f"R² {contributions.trends.r_squared[k]:.2f}"
+    sigma = flown.summaries[metric].sd
+    if sigma:
+        explained = float(
+            np.hypot.reduce(
+                [sigma_contribution(contributor, sigma) or 0.0 for contributor in contributions.by_metric[metric]]
+            )
+        )
+        rest = float(np.sqrt(max(sigma**2 - explained**2, 0.0)))
+        told = [with_unit(number(value, 3), flown.unit(metric)) for value in (sigma, explained, rest)]
+        yield f"σ {told[0]}; root sum square {told[1]}, rest {told[2]}"
+
+
+def sigma_contribution(contributor: Contributor, sigma: float) -> float | None:
+    """The part of a metric's σ that an input causes by itself; None where noise could have done so."""
+    if contributor.input == UNEXPLAINED or contributor.first is None or not surely(contributor.first_interval):
+        return None
+    return float(np.sqrt(max(contributor.first, 0.0))) * sigma
+
+
+def _sigma_cell(flown: Flown, metric: str, contributor: Contributor) -> Cell:
+    value = sigma_contribution(contributor, flown.summaries[metric].sd or 0.0)
+    return Cell("–") if not value else Cell(with_unit(number(value, 3), flown.unit(metric)), value)
+
+
+def _trends(sensitivity: Sensitivity, name: str, k: int) -> list[Cell]:
+    if name not in sensitivity.inputs:
+        return [Cell("–") for _ in _TRENDS]
+    return [_cell(_finite(getattr(sensitivity, trend)[sensitivity.inputs.index(name), k]), None) for trend in _TRENDS]
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _note(flown: Flown, contributions: Contributions) -> str:
+    each = f"In brackets: {percent(flown.stated.confidence)} confidence interval."
+    if contributions.trends is None:
+        return (
+            f"From {count(contributions.flights)} cases in {count(contributions.n_tried)} blocks, flown for this "
+            f"purpose and in no other statistic. {each} Pick-freeze estimates (Janon 2014, Jansen 1999)."
+        )
+    note = (
+        "Estimated from the table of cases. Unexplained: fraction that the surrogate model behind the total effects "
+        "attributes to no input (random draws in flight, discontinuities); a total effect may be larger by up to it. "
+        f"{each} SRC, PRCC and Spearman: trends with their direction. R²: fraction of the variance that the linear "
+        "regression behind SRC explains."
+    )
+    if contributions.trends.correlated is not None:
+        first, second, rho = contributions.trends.correlated
+        if beyond_chance(rho, contributions.n_tried):
+            note += (
+                f" Inputs are correlated, most of all {flown.words(first)} and {flown.words(second)} "
+                f"(rank correlation {number(rho, 2)}): first-order and Spearman include what an input owes to its "
+                "correlation; total effects require independent inputs and are left out."
+            )
+    return note
+
+
+def _cell(value: float | None, interval: tuple[float, float] | None) -> Cell:
+    if value is None:
+        return Cell("–")
+    text = f"{value:.2f}".replace("-0.00", "0.00").replace("-", "−")
+    bounds = "" if interval is None else f" [{interval[0]:.2f}, {interval[1]:.2f}]".replace("-", "−")
+    return Cell(text + bounds, value)

@@ -1,0 +1,134 @@
+"""Contributors: the inputs behind the spread of each metric, and those that separate failed from passed cases."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from mc_engine.statistics.drivers import FALSE_DISCOVERIES, FEWEST, Driver, failure_drivers, success_along
+from reports.contributors.companion import companion_blocks, no_contributors
+from reports.contributors.designed_indices import designed_blocks
+from reports.document.blocks import Cell, Column, FigureBlock, Table
+from reports.drawing.marks import Drawing
+from reports.figures.statistics import success_panel
+from reports.run.flown import Flown
+from reports.run.outcomes import failures
+from reports.text.numbers import count, number, percent
+
+MOST_DRIVERS = 12
+MOST_PANELS = 6
+
+
+def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
+    """Indices of the metrics that matter, then the drivers of the failures; nothing without a dispersed input."""
+    inputs = flown.inputs
+    if not inputs or not flown.n_tried:
+        return
+    if flown.design in ("saltelli", "morris"):
+        yield from designed_blocks(flown, inputs)
+        return
+    if not flown.random:
+        yield (
+            f"The cases of this design ({flown.design}) were chosen, not drawn at random: Sobol’ indices and "
+            "contributors to failures would describe that choice. The designs mc, lhs and sobol give them."
+        )
+        return
+    failed = failures(flown)
+    contributions = flown.contributions
+    yield from (
+        no_contributors(flown, flown.key_metrics) if contributions is None else companion_blocks(flown, contributions)
+    )
+    if failed:
+        yield from _driver_blocks(flown, inputs, failed)
+
+
+# ---- drivers of the failures
+
+
+def _driver_blocks(
+    flown: Flown, inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]
+) -> Iterator[FigureBlock | Table | str]:
+    drivers = failure_drivers(inputs, failed)
+    told = [*drivers.singles, *drivers.pairs]
+    if told:
+        yield _driver_table(
+            flown,
+            drivers.singles,
+            drivers.pairs,
+            failed,
+            drivers.singles_tested,
+            drivers.pairs_tested,
+        )
+    elif drivers.singles_tested:
+        yield (
+            f"No input, and no pair of inputs, separates failed from passed cases beyond chance "
+            f"({count(drivers.singles_tested)} tests of single inputs, {count(drivers.pairs_tested)} of pairs, at a "
+            f"false-discovery rate of {percent(FALSE_DISCOVERIES)})."
+        )
+    if drivers.undecided:
+        yield (
+            f"Not tested for contributors to failures, fewer than {FEWEST} cases failed or fewer than {FEWEST} passed: "
+            f"{', '.join(drivers.undecided)}."
+        )
+    if drivers.singles:
+        yield _success_figure(flown, drivers.singles[:MOST_PANELS], inputs, failed)
+
+
+def _driver_table(
+    flown: Flown,
+    singles: tuple[Driver, ...],
+    pairs: tuple[Driver, ...],
+    failed: Mapping[str, np.ndarray],
+    singles_tested: int,
+    pairs_tested: int,
+) -> Table:
+    columns = (
+        Column("Requirement", "text", 1.7, grouped=True),
+        Column("Contributor", "text", 2.3),
+        Column("Cases fail where it is", "text", 2.1),
+        Column("Separation", "number", 1.2),
+        Column("Adjusted p", "number", 1.3),
+        Column("Failed in that cell", "number", 1.5),
+    )
+    told = [*singles[:MOST_DRIVERS], *pairs[:MOST_DRIVERS]]
+    rows = tuple(_driver_row(flown, driver, failed) for driver in told)
+    left_out = len(singles) + len(pairs) - len(told)
+    note = (
+        f"{count(singles_tested)} tests of single inputs and {count(pairs_tested)} of pairs; false-discovery rate of "
+        f"each kind at most {percent(FALSE_DISCOVERIES)} (Benjamini–Hochberg). Separation: Cliff’s delta, 1 if all "
+        "failed cases are separated from all passed ones, 0 if none. A pair is listed if it separates better than "
+        "each of its inputs; its cell is made of outer thirds. Inputs correlated with a contributor are listed too."
+    )
+    if left_out:
+        note += f" {count(left_out)} weaker ones are not shown."
+    return Table("What separates failed cases from passed ones", columns, rows, note)
+
+
+def _driver_row(flown: Flown, driver: Driver, failed: Mapping[str, np.ndarray]) -> tuple[Cell, ...]:
+    lost = int(failed[driver.requirement].sum())
+    inside = "–" if not driver.inside_tried else f"{count(driver.inside_failed)} / {count(driver.inside_tried)}"
+    return (
+        Cell(driver.requirement, small=f"{count(lost)} / {count(flown.n_held)} failed"),
+        Cell(" with ".join(flown.words(name) for name in driver.inputs)),
+        Cell(" with ".join(driver.where)),
+        Cell(number(driver.effect, 2), driver.effect),
+        Cell(number(driver.adjusted, 2), driver.adjusted),
+        Cell(inside),
+    )
+
+
+def _success_figure(
+    flown: Flown, drivers: tuple[Driver, ...], inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]
+) -> FigureBlock:
+    panels = []
+    for driver in drivers:
+        passed = ~failed[driver.requirement]
+        curve = success_along(inputs[driver.inputs[0]], passed, flown.stated.confidence)
+        if curve is not None:
+            label, overall = flown.axis(driver.inputs[0]), float(passed.mean())
+            panels.append(success_panel(driver.requirement, label, curve, overall, flown.stated.confidence))
+    return FigureBlock(
+        f"Success probability along the inputs that separate failed from passed cases, {count(flown.n_held)} cases.",
+        Drawing("Success probability in bins of single inputs", tuple(panels)),
+        "half",
+    )

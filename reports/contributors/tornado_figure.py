@@ -1,0 +1,74 @@
+"""The figure of the contributors: a tornado of their effects, a panel a metric."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from reports.document.blocks import FigureBlock
+from reports.drawing.marks import Drawing
+from reports.figures.rows import tornado
+from reports.run.contributions import UNEXPLAINED, Contributor
+from reports.run.flown import Flown
+from reports.text.numbers import number, percent
+
+MOST_METRICS = 6  # of the figure
+STRONGEST = 5  # of a metric
+SMALL = 0.02  # a smaller effect is left out, but for the strongest
+LEFT = 0.005  # an unexplained share below it is not told
+
+
+def contributor_figure(
+    flown: Flown, by_metric: Iterable[tuple[str, Sequence[Contributor]]], source: str
+) -> FigureBlock:
+    """by_metric : words and contributors of each metric.  source : what the effects were estimated from."""
+    panels, told = [], []
+    interval = f"{percent(flown.stated.confidence)} confidence"
+    for words, contributors in list(by_metric)[:MOST_METRICS]:
+        rows = strongest(contributors)
+        names = [name_of(flown, row.input) for row in rows]
+        total = _effect_array((row.total, row.total_interval) for row in rows)
+        first = _effect_array((row.first, row.first_interval) for row in rows)
+        panels.append(tornado(words, names, total, first, interval))
+        effects = [f"{name} {number(row.size, 2)}" for name, row in zip(names[:3], rows, strict=False)]
+        told.append(f"{words}: {', '.join(effects)}")
+    caption = f"Total and first-order effects of the contributors to each metric, {source}."
+    return FigureBlock(caption, Drawing("Tornado diagrams", tuple(panels), words="; ".join(told)), "half")
+
+
+def name_of(flown: Flown, contributor: str) -> str:
+    """A contributor in words: an input, a group of inputs, or the random draws."""
+    if contributor == UNEXPLAINED:
+        return f"{UNEXPLAINED} by the inputs"
+    return flown.words(contributor) if contributor in flown.columns else contributor
+
+
+def strongest(contributors: Sequence[Contributor]) -> list[Contributor]:
+    """The largest contributor, others whose interval excludes zero, and the unexplained fraction."""
+    named = sorted(
+        (contributor for contributor in contributors if contributor.input != UNEXPLAINED),
+        key=lambda contributor: -contributor.size,
+    )
+    sure = [
+        contributor
+        for contributor in named[1:STRONGEST]
+        if contributor.size >= SMALL and max(map(surely, intervals(contributor)))
+    ]
+    return [
+        *named[:1],
+        *sure,
+        *(contributor for contributor in contributors if contributor.input == UNEXPLAINED and contributor.size >= LEFT),
+    ]
+
+
+def intervals(contributor: Contributor) -> tuple[tuple[float, float] | None, ...]:
+    return contributor.first_interval, contributor.total_interval
+
+
+def surely(interval: tuple[float, float] | None) -> bool:
+    """Whether the interval of an effect excludes zero."""
+    return interval is not None and interval[0] > 0.0
+
+
+def _effect_array(effects: Iterable[tuple[float | None, tuple[float, float] | None]]) -> np.ndarray:
+    """float64[n, 3]: values and ends of their intervals, NaN for what is not known."""
+    return np.array([(value, *(ends or (None, None))) for value, ends in effects], dtype=np.float64)

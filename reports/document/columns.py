@@ -1,0 +1,77 @@
+"""Widths of the columns of a printed table, chosen so that its rows take as few lines as possible."""
+
+import re
+
+import numpy as np
+
+from reports.document.blocks import Cell, Column, Table
+from reports.drawing import lettering
+
+TYPE = 7.5
+ROOM = 490.0  # points that a table has
+INSET = 7.0  # of a column, both sides together
+JUMPS = (4.0, 8.0, 16.0, 32.0, 64.0, 128.0)  # points that a column may get at a time
+MONO = 0.602  # of the type size, the width of every letter of a column's name
+BADGE = 18.0  # mark and margins of a verdict
+_WORD = re.compile(r"\[[^\]]{1,22}\]|[^\s_/-]*[\s_/-]?")  # what is not broken: a word, an interval
+COMMAND = 36  # letters of a command that is not broken
+BOLD = 1.15  # of the head
+SLACK = 1.06  # of a text over its lines: a line seldom ends at the edge
+
+
+def widths(table: Table) -> list[float]:
+    """Width of each column in points, together that of the page: longest words first, then where it saves lines."""
+    shape = (len(table.rows) + 1, len(table.columns), 2)  # the head is a row, and a cell has its text and a small one
+    size, least = np.zeros(shape), np.zeros(len(table.columns))
+    room = [1.0, *(max(0.5 * rows, 1.0) if rows else np.inf for rows in spans(table))]  # of all rows of a cell
+    for k, column in enumerate(table.columns):
+        for row, cell in enumerate((Cell(column.title.replace("_", " ")), *(cells[k] for cells in table.rows))):
+            for part, text in enumerate((cell.text, cell.small)):
+                scale = _scale(column, text) if part == 0 and row else 1.0 if row else BOLD
+                size[row, k, part] = lettering.width(text, TYPE) * scale + BADGE * bool(cell.tone and part == 0)
+                size[row, k, part] /= room[row] if k == 0 else 1.0
+                words = (
+                    [text]
+                    if (cell.tone and not part) or (column.kind == "code" and len(text) <= COMMAND)
+                    else _WORD.findall(text)
+                )
+                longest = max((lettering.width(word, TYPE) for word in words), default=0.0)
+                least[k] = max(least[k], longest * scale + BADGE * bool(cell.tone and part == 0))
+    if least.sum() + INSET * len(least) >= ROOM:
+        return list((least + INSET) * ROOM / (least + INSET).sum())
+    width = least.copy()
+    while (left := ROOM - INSET * len(width) - width.sum()) > JUMPS[0]:
+        lines = _lines(size, width)
+        jumps = [(k, jump) for k in range(len(width)) for jump in JUMPS if jump <= left]
+        gain, k, jump = max((_saved(lines, size[:, k], width[k] + jump, k) / jump, k, jump) for k, jump in jumps)
+        if not gain:
+            break
+        width[k] += jump
+    return list(width * ((ROOM - INSET * len(width)) / width.sum()) + INSET)
+
+
+def spans(table: Table) -> list[int]:
+    """How many rows the first cell of each row stands for, 0 where that of a row above does."""
+    cells = [row[0] for row in table.rows]
+    starts = [k for k, cell in enumerate(cells) if not (table.columns[0].grouped and k and cell == cells[k - 1])]
+    lengths = dict(zip(starts, np.diff([*starts, len(cells)]).tolist(), strict=True))
+    return [lengths.get(k, 0) for k in range(len(cells))]
+
+
+def _lines(size: np.ndarray, width: np.ndarray | float) -> np.ndarray:
+    """Lines that texts of these sizes take, the small ones under the others."""
+    return np.ceil(SLACK * size / (np.asarray(width)[..., None] + 0.01)).sum(axis=-1)
+
+
+def _saved(lines: np.ndarray, size: np.ndarray, width: float, k: int) -> float:
+    """Lines of all rows that a width of a column saves, and something for those that another column still takes."""
+    fewer = _lines(size, width)
+    others = np.delete(lines, k, axis=1).max(axis=1, initial=1.0)
+    rows = np.maximum(lines[:, k], others) - np.maximum(fewer, others)
+    return float(rows.sum() + 0.15 * (lines[:, k] - fewer).sum())
+
+
+def _scale(column: Column, text: str) -> float:
+    """Ratio of a column's type width to that of the page's body text."""
+    plain = lettering.width(text, TYPE)
+    return len(text) * MONO * TYPE / plain if column.kind in ("code", "name") and plain else 1.0

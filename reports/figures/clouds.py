@@ -1,0 +1,80 @@
+"""Cases over two columns, a point a case: clouds by class, regions that hold them, and where limits run."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, joined, nominal_ring
+from reports.drawing.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PAPER, PURPLE, SKY, VERMILION
+from reports.text.numbers import count
+
+# Colour and shape by class: apart in grey and for the colour-blind, too.
+OUTCOMES = ((BLUE, "circle"), (VERMILION, "diamond"), (INK, "triangle-up"))  # inside, outside, failed
+LIMIT_SETS = ((BLUE, "circle"), (VERMILION, "x"), (ORANGE, "diamond"), (PURPLE, "square"), (GREEN, "triangle-up"),
+              (SKY, "cross"), (MUTED, "star"))  # fmt: skip
+MOST, FEWER = (4.0, 0.5), (7.0, 0.9)  # size and opacity of the largest class, beneath, and of the others, above it
+OUTLINE_COLOURS = {"ellipse": PURPLE, "region": GREEN, "CEP": VERMILION, "target": ORANGE, "limit": INK}
+
+
+@dataclass(frozen=True)
+class Outline:
+    """The edge of a region, or where a limit runs: curves float64[k, 2] in the units of the axes, and its words.
+
+    kind : one of OUTLINE_COLOURS; each further outline of a kind has a dash of its own.
+    """
+
+    kind: str
+    text: str
+    curves: tuple[np.ndarray, ...]
+
+
+def outline_lines(outlines: Sequence[Outline]) -> Iterator[Line]:
+    """The outlines in their styles."""
+    drawn: Counter[str] = Counter()
+    for outline in outlines:
+        dash = DASHES[drawn[outline.kind] % len(DASHES)]
+        drawn[outline.kind] += 1
+        x, y = joined(outline.curves).T
+        yield Line(x, y, OUTLINE_COLOURS[outline.kind], dash=dash, text=outline.text, key=outline.text)
+
+
+def outcome_cloud(k: int, words: str, x: np.ndarray, y: np.ndarray, cases: np.ndarray) -> Points:
+    """The cases of one outcome, in its colour and shape."""
+    colour, sign = OUTCOMES[k]
+    size, opacity = FEWER if k else MOST
+    return Points(x, y, colour, words, sign, size, opacity, cases=cases)
+
+
+def case_scatter(
+    cloud: Points,
+    member: np.ndarray,
+    classes: Sequence[tuple[str, int]],
+    axes: tuple[str, str],
+    n_tried: int,
+    *,
+    styles: Sequence[tuple[str, str]] = OUTCOMES,
+    nominal: tuple[float, float] | None = None,
+    outlines: Sequence[Outline] = (),
+    form: str = "Scatter of cases",
+) -> Drawing:
+    """The cases shown, of n_tried, and the class of each: int[n], an index into `classes`.
+
+    cloud : all of them, with their numbers and columns.
+    classes : words of each, and how many cases belong to it, those not shown among them.
+    """
+    clouds: list[Mark] = []
+    for k in sorted((k for k, (_, cases) in enumerate(classes) if cases), key=lambda k: -classes[k][1]):
+        (words, cases), rows, (colour, sign) = classes[k], member == k, styles[k]
+        size, opacity = FEWER if clouds else MOST
+        shown = int(rows.sum())
+        thinned = "" if shown == cases else f" ({count(shown)} shown)"
+        numbers = None if cloud.cases is None else cloud.cases[rows]
+        clouds.append(
+            replace(cloud, x=cloud.x[rows], y=cloud.y[rows], cases=numbers, name=words, colour=colour, sign=sign,
+                    size=size, opacity=opacity, key=f"{words}: {count(cases)} of {count(n_tried)} cases{thinned}")
+        )  # fmt: skip
+    rings = [nominal_ring(nominal, VERMILION, edge=PAPER)] if nominal else []
+    marks = (*clouds, *outline_lines(outlines), *rings)
+    return Drawing(form, (Plot(marks, Axis(axes[0]), Axis(axes[1]), height=420.0),))

@@ -1,0 +1,107 @@
+"""What cases say of inputs and metrics: success along an input, correlations, normal probability plots."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import betaincinv, ndtri
+
+from mc_engine.statistics.drivers import SuccessCurve
+from reports.drawing.marks import Axis, Bar, Limit, Line, Mark, Plot, Points, between, joined
+from reports.drawing.palette import BLUE, INK, MUTED, SKY, VERMILION, blended
+from reports.text.numbers import count, number, percent
+
+LIGHT = 0.6  # a cell of a weaker correlation is light, and takes black numbers
+MOST_POINTS = 160  # of a probability plot: the outermost ones whole, the others evenly along the axis
+OUTERMOST = 20  # on either side
+CONTENT = 0.90  # of the band of a probability plot, at every point by itself
+TICKS = (1e-6, 1e-5, 1e-4, 0.00135, 0.0228, 0.1587, 0.5, 0.8413, 0.9772, 0.99865, 0.9999, 0.99999, 0.999999)
+
+
+def success_panel(requirement: str, label: str, curve: SuccessCurve, overall: float, confidence: float) -> Plot:
+    """Success probability in bins of an input, with exact two-sided limits; overall : that of all cases."""
+    fraction = 100.0 * curve.passed / curve.tried
+    names = [curve.levels[int(k)] for k in curve.middle] if curve.levels else []
+    place = np.arange(len(names), dtype=np.float64) if names else curve.middle
+    marks: list[Mark] = [Limit(100.0 * overall, "y", VERMILION, "all cases", "dash", 1.4, key="all cases")]
+    x = Axis(label, reach=(-0.5, len(names) - 0.5), ticks=tuple(enumerate(names)))
+    if not names:
+        bins = [np.array([[low, y], [high, y]]) for low, high, y in zip(curve.low, curve.high, fraction, strict=True)]
+        left, right = joined(bins).T
+        marks.insert(0, Line(left, right, MUTED, "bin", width=1.5, key="extent of the bin"))
+        x = Axis(label)
+    texts = [
+        f"{where}: {count(int(passed))} of {count(int(tried))} cases pass, {number(float(share), 4)} %"
+        for where, passed, tried, share in zip(
+            names or [number(float(at), 3) for at in place], curve.passed, curve.tried, fraction, strict=True
+        )
+    ]
+    key = f"share of a bin that passes, at its median, with {percent(confidence)} Clopper–Pearson interval"
+    ends = 100.0 * curve.lower, 100.0 * curve.upper
+    marks.append(Points(place, fraction, BLUE, size=6.0, texts=texts, y_ends=ends, key=key))
+    return Plot(tuple(marks), x, Axis("pass [%]", most=5), requirement, 260.0)
+
+
+def correlation_matrix(names: Sequence[str], rho: np.ndarray) -> Plot:
+    """rho : float64[n, n], symmetric, NaN where there is none; blue cells are positive, red ones negative."""
+    rows, columns = np.tril_indices(len(names), -1)
+    known = np.isfinite(rho[rows, columns])
+    rows, columns = rows[known], columns[known]
+    values = rho[rows, columns]
+    labels = [f"{value:.2f}".replace("-0.00", "0.00").replace("-", "−") for value in values]
+    cells = Bar(
+        columns - 0.48,
+        columns + 0.48,
+        rows - 0.46,
+        rows + 0.46,
+        [blended(VERMILION if value < 0.0 else BLUE, abs(value)) for value in values],
+        1.0,
+        [f"{names[i]}, {names[k]}: {label}" for i, k, label in zip(rows, columns, labels, strict=True)],
+        labels,
+        ["#000000" if abs(value) < LIGHT else "#ffffff" for value in values],
+        "rank correlation: blue positive, red negative",
+    )
+    x = Axis(reach=(-0.5, len(names) - 1.5), ticks=tuple(enumerate(names[:-1])), grid=False)
+    y = Axis(reach=(len(names) - 0.5, 0.5), ticks=tuple(enumerate(names))[1:], grid=False)
+    return Plot((cells,), x, y, height=60.0 + 28.0 * len(names))
+
+
+def probability_plot(
+    values: np.ndarray, cases: np.ndarray, label: str, title: str, limits: Sequence[float] = (), column: str = ""
+) -> Plot:
+    """The sorted cases over the normal distribution with their mean and σ.
+
+    values, cases : float64[n], sorted, and the case of each.  column : their name in the table of cases.
+    """
+    n, z = values.size, plotting_positions(values.size)
+    mean, deviation = float(values.mean()), float(values.std(ddof=1))
+    ranks = shown_ranks(n)
+    low, high = (ndtri(betaincinv(ranks + 1, n - ranks, p)) for p in (0.5 - 0.5 * CONTENT, 0.5 + 0.5 * CONTENT))
+    normal = f"normal distribution with the same mean and σ, with {percent(CONTENT)} band of every rank"
+    ends = z[[0, -1]]
+    marks: list[Mark] = [
+        between(mean + deviation * z[ranks], low, high, SKY, 0.35),
+        Line(mean + deviation * ends, ends, INK, normal, "dash", 1.2, key=normal),
+        Points(values[ranks], z[ranks], BLUE, "cases", cases=cases[ranks], columns=(column,), key="cases by rank"),
+    ]
+    reach = Axis().ends([values])
+    near = [at for at in limits if reach[0] <= at <= reach[1]]
+    marks += [Limit(at, "x", VERMILION, f"required limit {number(at)}", key="required limit") for at in near]
+    most = 1.04 * max(abs(float(ends[0])), 2.2)
+    ticks = tuple((float(ndtri(p)), percent(p, 4)) for p in TICKS if abs(ndtri(p)) <= most)
+    y = Axis(name="cumulative probability", reach=(-most, most), ticks=ticks)
+    return Plot(tuple(marks), Axis(label, most=4), y, title, 250.0)
+
+
+def plotting_positions(n: int) -> np.ndarray:
+    """Normal quantiles of the ranks 1 ... n, by Blom's positions (i - 3/8) / (n + 1/4)."""
+    return np.asarray(ndtri((np.arange(1, n + 1) - 0.375) / (n + 0.25)))
+
+
+def shown_ranks(n: int) -> np.ndarray:
+    """The ranks, from 0, of the points that are drawn."""
+    if n <= MOST_POINTS:
+        return np.arange(n)
+    end = -float(ndtri(OUTERMOST / n))
+    z = np.linspace(-end, end, MOST_POINTS - 2 * OUTERMOST)
+    middle = np.searchsorted(plotting_positions(n), z).clip(0, n - 1)
+    return np.unique(np.r_[np.arange(OUTERMOST), middle, np.arange(n - OUTERMOST, n)])

@@ -1,0 +1,272 @@
+"""The report as data: `report.json`, everything that the pages say, with a documented schema.
+
+The numbers have all their digits, in the unit of their column.  `sections` holds the texts and tables of the pages as
+they are printed; all else is for programs.
+"""
+
+import json
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict
+
+from mc_engine.statistics import Summary, Verdict
+from mc_engine.statistics.worst import Limits
+from reports.document.blocks import Document, FigureBlock, Table, Terms, Text
+from reports.run.flown import Flown
+
+FILE = "report.json"
+WORST = 10  # cases of a requirement
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Counts(_Record):
+    """cases : wanted.  flown : with a row in the table.  completed : with status ok.  inside_all_limits : of those."""
+
+    cases: int
+    flown: int
+    completed: int
+    inside_all_limits: int
+
+
+class RequirementRecord(_Record):
+    """A requirement and what the cases demonstrate.
+
+    demonstrated_probability : the lower confidence bound on the probability of keeping the limits.
+    demonstrated : the tolerance limit of the metric that holds with the required probability and confidence;
+        `enclosed` in its place has two of them where there are two limits.
+    margin : from the demonstrated bound to the nearest limit, negative outside.
+    """
+
+    name: str
+    metric: str
+    unit: str
+    at_most: float | None
+    at_least: float | None
+    required_probability: float
+    confidence: float
+    passed: int
+    tried: int
+    without_number: int
+    observed_probability: float | None
+    demonstrated_probability: float | None
+    demonstrated: float | None
+    enclosed: tuple[float, float] | None
+    margin: float | None
+    verdict: str
+
+
+class QuantileRecord(_Record):
+    """A quantile with its confidence interval; None for a bound that the cases are too few for."""
+
+    probability: float
+    value: float
+    lower: float | None
+    upper: float | None
+
+
+class MetricRecord(_Record):
+    """Statistics of a metric over the n_used cases, of n_tried, that have a number."""
+
+    name: str
+    unit: str
+    description: str
+    n_used: int
+    n_tried: int
+    nominal: float | None
+    mean: float | None
+    sigma: float | None
+    minimum: float | None
+    maximum: float | None
+    quantiles: list[QuantileRecord]
+
+
+class ContributorRecord(_Record):
+    """Shares of a metric's variance.  input : a parameter, a group, "random draws" or "unexplained"."""
+
+    metric: str
+    input: str
+    first: float | None
+    total: float | None
+    first_interval: tuple[float, float] | None
+    total_interval: tuple[float, float] | None
+
+
+class WorstRecord(_Record):
+    """One of the worst cases of a requirement.
+
+    margin : to the nearest limit, in the unit of the metric, negative outside.
+    """
+
+    requirement: str
+    case_id: int
+    value: float
+    margin: float
+
+
+class TextRecord(_Record):
+    """A text, table, figure or glossary of the pages, as it is printed."""
+
+    kind: Literal["text", "table", "figure", "terms"]
+    number: int | None = None
+    caption: str = ""
+    columns: list[str] = []
+    rows: list[list[str]] = []
+    text: list[str] = []
+
+
+class SectionRecord(_Record):
+    title: str
+    blocks: list[TextRecord]
+
+
+class ReportRecord(_Record):
+    """What `report.json` holds.  contributor_flights : cases flown for the contributors alone; 0: from the table.
+
+    probability, confidence : of all statistics but the requirements' own; each bound of a quantile holds with it.
+    """
+
+    format: Literal[1] = 1
+    title: str
+    summary: str
+    campaign: dict[str, str]
+    warnings: list[str]
+    probability: float | None = None
+    confidence: float | None = None
+    counts: Counts | None = None
+    requirements: list[RequirementRecord] = []
+    metrics: list[MetricRecord] = []
+    contributors: list[ContributorRecord] = []
+    contributor_flights: int = 0
+    worst: list[WorstRecord] = []
+    sections: list[SectionRecord]
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of `report.json`."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **ReportRecord.model_json_schema()}
+
+
+def render_json(document: Document) -> bytes:
+    """The file, UTF-8."""
+    numbers = document.data or {}
+    record = ReportRecord(
+        title=document.title,
+        summary=document.subtitle,
+        campaign=dict(document.facts),
+        warnings=list(document.warnings),
+        sections=[
+            SectionRecord(title=section.title, blocks=[_block_record(block) for block in section.blocks])
+            for section in document.sections
+        ],
+        **numbers,
+    )
+    return (json.dumps(record.model_dump(), indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
+
+
+def run_data(flown: Flown) -> dict[str, Any]:
+    """The numbers of a run's report, by the fields of ReportRecord."""
+    contributions = flown.contributions
+    return {
+        "probability": flown.stated.probability,
+        "confidence": flown.stated.confidence,
+        "counts": _counts_record(flown),
+        "requirements": [_requirement_record(flown, one) for one in flown.verdicts],
+        "metrics": [_metric_record(flown, name, summary) for name, summary in flown.summaries.items()],
+        "contributors": [] if contributions is None else [_contributor_record(row) for row in contributions.rows()],
+        "contributor_flights": 0 if contributions is None else contributions.flights,
+        "worst": [one for verdict in flown.verdicts for one in _worst_records(flown, verdict)],
+    }
+
+
+def _counts_record(flown: Flown) -> Counts:
+    inside = flown.every.inside_all
+    return Counts(cases=flown.n_wanted, flown=flown.n_tried, completed=flown.every.completed, inside_all_limits=inside)
+
+
+def _requirement_record(flown: Flown, verdict: Verdict) -> RequirementRecord:
+    return RequirementRecord(
+        name=verdict.name,
+        metric=verdict.metric,
+        unit=flown.unit(verdict.metric),
+        at_most=verdict.at_most,
+        at_least=verdict.at_least,
+        required_probability=verdict.share,
+        confidence=verdict.confidence,
+        passed=verdict.passed,
+        tried=verdict.tried,
+        without_number=verdict.no_number,
+        observed_probability=verdict.estimate,
+        demonstrated_probability=verdict.lower,
+        demonstrated=_finite(verdict.demonstrated),
+        enclosed=verdict.enclosed,
+        margin=_finite(verdict.margin),
+        verdict=verdict.outcome,
+    )
+
+
+def _metric_record(flown: Flown, name: str, summary: Summary) -> MetricRecord:
+    facts = flown.columns[name]
+    return MetricRecord(
+        name=name,
+        unit=facts.unit,
+        description=facts.description,
+        n_used=summary.n_used,
+        n_tried=summary.n_tried,
+        nominal=flown.nominal_value(name),
+        mean=_finite(summary.mean),
+        sigma=_finite(summary.sd),
+        minimum=summary.minimum,
+        maximum=summary.maximum,
+        quantiles=[
+            QuantileRecord(
+                probability=quantile.probability, value=quantile.value, lower=quantile.lower, upper=quantile.upper
+            )
+            for quantile in summary.quantiles
+        ],
+    )
+
+
+def _contributor_record(contributor: Any) -> ContributorRecord:
+    return ContributorRecord(
+        metric=contributor.metric,
+        input=contributor.input,
+        first=contributor.first,
+        total=contributor.total,
+        first_interval=contributor.first_interval,
+        total_interval=contributor.total_interval,
+    )
+
+
+def _worst_records(flown: Flown, verdict: Verdict) -> list[WorstRecord]:
+    limits = Limits(verdict.at_most, verdict.at_least)
+    worst = flown.every.worst(verdict.metric, WORST, limits)
+    values = worst[verdict.metric].to_numpy(dtype=np.float64)
+    margins = limits.margins(values) * limits.width
+    return [
+        WorstRecord(requirement=verdict.name, case_id=int(case), value=float(value), margin=float(margin))
+        for case, value, margin in zip(worst["case_id"], values, margins, strict=True)
+    ]
+
+
+def _finite(value: float | None) -> float | None:
+    return float(value) if value is not None and np.isfinite(value) else None
+
+
+def _block_record(block: Any) -> TextRecord:
+    if isinstance(block, Table):
+        rows = [[f"{cell.text} ({cell.small})" if cell.small else cell.text for cell in row] for row in block.rows]
+        note = [block.note] if block.note else []
+        titles = [column.title for column in block.columns]
+        return TextRecord(
+            kind="table", number=block.number, caption=block.caption, columns=titles, rows=rows, text=note
+        )
+    if isinstance(block, FigureBlock):
+        return TextRecord(kind="figure", number=block.number, caption=block.caption, text=[block.drawing.alternative])
+    if isinstance(block, Terms):
+        return TextRecord(kind="terms", rows=[list(entry) for entry in block.entries])
+    assert isinstance(block, Text)
+    return TextRecord(kind="text", text=list(block.paragraphs))

@@ -1,0 +1,172 @@
+"""A run in the units that a person would choose: 9.3 days, not 8·10⁵ s.
+
+One unit for every metric, state and history quantity of a run, chosen from its values and limits; inputs keep the units
+in which the campaign file gives them.  Statistics and verdicts are computed in the columns' own units, and told here.
+"""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import cached_property
+from math import isfinite, log10
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mc_engine.statistics import Summary, Verdict
+from mc_engine.statistics.first_order import Contributor
+from mc_engine.statistics.worst import Limits
+from mc_engine.units import convert
+from reports.run.flown import ColumnFacts, Flown
+
+COMFORTABLE = (0.01, 1e4)  # where the largest number may lie in its own unit
+IDEAL = (1.0, 1e3)  # where it lies in the unit chosen instead, if it can
+# Units of one quantity, the smallest first; a column changes to another one of its own row only.
+_LADDERS = (
+    ("us", "ms", "s", "h", "day"),
+    ("um", "mm", "m", "km"),
+    ("mm/s", "m/s", "km/s"),
+    ("m/day", "km/day"),
+    ("m^2", "km^2"),
+    ("ug", "g"),
+    ("J/kg", "kJ/kg", "MJ/kg"),
+    ("m^2/s^2", "km^2/s^2"),
+    ("m^2/s", "km^2/s"),
+    ("m^3/s^2", "km^3/s^2"),
+    ("mg/s", "g/s", "kg/s"),
+    ("uN", "mN", "N", "kN"),
+    ("uN s", "mN s", "N s", "kN s"),
+    ("uN m", "mN m", "N m", "kN m"),
+    ("mN m s", "N m s"),
+    ("Pa", "kPa", "MPa"),
+    ("J", "kJ", "MJ"),
+    ("eV", "keV", "MeV"),
+    ("mW", "W", "kW"),
+    ("W/m^2", "kW/m^2", "MW/m^2"),
+    ("J/m^2", "kJ/m^2", "MJ/m^2"),
+    ("urad", "mrad", "rad"),
+    ("arcsec", "deg"),
+    ("mrad/s", "rad/s"),
+    ("deg/h", "deg/s"),
+    ("mV", "V", "kV"),
+    ("mA", "A"),
+    ("nT", "uT", "mT", "T"),
+    ("Hz", "kHz"),
+    ("1/day", "1/h", "1/s"),
+)
+_LADDER = {unit: ladder for ladder in _LADDERS for unit in ladder}
+
+
+def chosen_unit(unit: str, numbers: Iterable[float | None]) -> str:
+    """The unit for these numbers in `unit`: `unit` itself unless the largest of them is awkward in it."""
+    largest = max((abs(number) for number in numbers if number and isfinite(number)), default=0.0)
+    if unit not in _LADDER or not largest or COMFORTABLE[0] <= largest < COMFORTABLE[1]:
+        return unit
+
+    def awkwardness(other: str) -> float:
+        size = convert(largest, unit, other)
+        return max(log10(size / IDEAL[1]), log10(IDEAL[0] / size), 0.0)
+
+    return min(reversed(_LADDER[unit]), key=awkwardness)  # of equally good ones, the largest unit
+
+
+class ShownRun(Flown):
+    """A run as its report tells it.  own : the same run, each column in its own unit."""
+
+    def __init__(self, own: Flown):
+        self.__dict__.update(vars(own))
+        self._own = own
+        self._units: dict[str, str] = {}
+        self.histories = self.told_table(own.histories)
+
+    @property
+    def own(self) -> Flown:
+        return self._own
+
+    def unit(self, name: str) -> str:
+        if name not in self._units:
+            unit = self._own.unit(name)
+            role = self._own.columns[name].role if name in self._own.columns else ""
+            self._units[name] = unit if role == "dispersion" else chosen_unit(unit, self._sizes(name))
+        return self._units[name]
+
+    def _sizes(self, name: str) -> list[float | None]:
+        """What the numbers of a column come to, in the table and in the histories, and its limits."""
+        sizes = [*self._own.limits(name), self._own.nominal_value(name)]
+        tables = [self._own.histories]
+        if name in self._own.summaries:
+            sizes += [quantile.value for quantile in self._own.summaries[name].quantiles]
+        else:
+            tables.append(self._own.cases)
+        for table in tables:
+            if name in table.columns and pd.api.types.is_numeric_dtype(table[name]):
+                values = np.abs(table[name].to_numpy(dtype=np.float64))
+                sizes.append(float(values[np.isfinite(values)].max(initial=0.0)))
+        return sizes
+
+    def told(self, name: str, value: Any) -> Any:
+        """A number, or an array of them, of a column's own unit in the unit chosen for it; None stays None."""
+        own, unit = self._own.unit(name), self.unit(name)
+        return value if value is None or own == unit else convert(value, own, unit)
+
+    def words(self, name: str) -> str:
+        return self._own.words(name)  # of the name, which ends in its own unit
+
+    @cached_property
+    def columns(self) -> dict[str, ColumnFacts]:
+        return {name: replace(fact, unit=self.unit(name)) for name, fact in self._own.columns.items()}
+
+    def range(self, name: str) -> tuple[float, float]:
+        low, high = self._own.range(name)
+        return float(self.told(name, low)), float(self.told(name, high))
+
+    def values(self, name: str) -> np.ndarray:
+        return np.asarray(self.told(name, self._own.values(name)))
+
+    def nominal_value(self, name: str) -> float | None:
+        value: float | None = self.told(name, self._own.nominal_value(name))
+        return value
+
+    def told_table(self, table: pd.DataFrame) -> pd.DataFrame:
+        """A table of cases or histories with its columns in the units chosen."""
+        known = [name for name in table.columns if self._own.unit(name) != self.unit(name)]
+        return table.assign(**{name: self.told(name, table[name].to_numpy()) for name in known}) if known else table
+
+    @cached_property
+    def summaries(self) -> dict[str, Summary]:
+        return {name: self._told_summary(name, summary) for name, summary in self._own.summaries.items()}
+
+    def _told_summary(self, name: str, summary: Summary) -> Summary:
+        numbers = {key: self.told(name, getattr(summary, key)) for key in ("mean", "sd", "minimum", "maximum")}
+        quantiles = [
+            replace(each, **{key: self.told(name, getattr(each, key)) for key in ("value", "lower", "upper")})
+            for each in summary.quantiles
+        ]
+        return replace(summary, **numbers, quantiles=tuple(quantiles))
+
+    @cached_property
+    def _judgement(self) -> tuple[list[Verdict], Verdict | None]:
+        return [self._told_verdict(verdict) for verdict in self._own.verdicts], self._own.joint
+
+    def _told_verdict(self, verdict: Verdict) -> Verdict:
+        numbers = {
+            key: self.told(verdict.metric, getattr(verdict, key)) for key in ("at_most", "at_least", "demonstrated")
+        }
+        enclosed = verdict.enclosed and tuple(self.told(verdict.metric, end) for end in verdict.enclosed)
+        return replace(verdict, **numbers, enclosed=enclosed)
+
+    def limits(self, metric: str) -> Limits:
+        return Limits(*(self.told(metric, end) for end in self._own.limits(metric)))
+
+    def largest_is_worst(self, metric: str) -> bool:
+        return self._own.largest_is_worst(metric)
+
+    def worst(self, metric: str, most: int) -> pd.DataFrame:
+        return self.told_table(self._own.worst(metric, most))
+
+    def contributors(self, metric: str) -> list[Contributor]:
+        return self._own.contributors(metric)
+
+    @property
+    def contributions(self) -> Any:
+        return self._own.contributions

@@ -1,0 +1,151 @@
+"""Contributors: the share of each metric's variance that comes from each input, and from the random draws.
+
+From the flights beside the run where it has them ([sensitivity]), else from the table of cases, which tells less: what
+it cannot assign to an input is a row of its own.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import ndtri
+
+from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
+from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, sensitivity
+from mc_engine.store.opening import open_store
+from mc_engine.store.run_files import SENSITIVITY, is_run_directory
+from mc_engine.store.store import Store
+
+if TYPE_CHECKING:
+    from reports.run.flown import Flown
+
+UNEXPLAINED = "unexplained"
+MOST_METRICS = 8
+MOST_ROWS = 20_000  # of a table, above which cases are picked evenly
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Contributor:
+    """What one input, group of inputs, or the random draws contribute to one metric, as shares of its variance.
+
+    first : the share that goes when it alone becomes known.  total : the share that stays when all others are known.
+    None where that is not known.  Intervals hold with the report's confidence.
+    """
+
+    metric: str
+    input: str
+    first: float | None
+    total: float | None
+    first_interval: Interval | None
+    total_interval: Interval | None
+
+    @property
+    def size(self) -> float:
+        """What contributors are ranked by: the total effect, or what is known of it."""
+        return max(value for value in (self.total, self.first, 0.0) if value is not None)
+
+
+@dataclass(frozen=True)
+class Contributions:
+    """By metric, the strongest contributor first; the unexplained share last.
+
+    flights : of the companion, 0 where all comes from the table of cases.  n_used, n_tried : by metric, the blocks or
+    cases that the indices rest on.  members : the inputs in each group of the flights; empty without them.
+    trends : what the table of cases tells besides; None with flights.
+    """
+
+    by_metric: dict[str, tuple[Contributor, ...]]
+    flights: int
+    n_used: dict[str, int]
+    n_tried: int
+    members: dict[str, list[str]]
+    trends: Sensitivity | None = None
+
+    def rows(self) -> Iterator[Contributor]:
+        """All contributors, metric by metric."""
+        for indices in self.by_metric.values():
+            yield from indices
+
+
+def contributions(flown: "Flown") -> Contributions | None:
+    """Contributions to the metrics that matter; None where neither a companion nor a random table tells them."""
+    store, metrics = companion_of(flown), flown.key_metrics[:MOST_METRICS]
+    if store is not None:
+        return _of_companion(flown, store, metrics)
+    return _of_table(flown, metrics) if flown.random and flown.n_held >= FEWEST_CASES else None
+
+
+def companion_of(flown: "Flown") -> Store | None:
+    """The flights beside the run, if all of them are there."""
+    path = getattr(flown.run, "path", None)  # a Run of tests has none
+    if path is None or not is_run_directory(path / SENSITIVITY):
+        return None
+    store = open_store(path / SENSITIVITY)
+    return None if store.missing() else store
+
+
+def _of_companion(flown: "Flown", store: Store, metrics: list[str]) -> Contributions:
+    record = store.manifest["sensitivity"]
+    layout = layout_of(record)
+    cases = store.cases(["case_id", *metrics])
+    values = {name: cases[name].to_numpy(dtype=np.float64) for name in metrics}
+    indices = pick_freeze(layout, cases["case_id"].to_numpy(), values)
+    shares = (indices.first, indices.first_error, indices.total, indices.total_error)
+    by_metric = {
+        metric: _ranked(flown, metric, layout.groups, *(share[:, k] for share in shares))
+        for k, metric in enumerate(metrics)
+    }
+    used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
+    members = {group["name"]: list(group["members"]) for group in record["groups"]}
+    return Contributions(by_metric, len(cases), used, indices.n_tried, members)
+
+
+def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
+    if not flown.inputs:
+        return None
+    rows = np.arange(flown.n_held)[:: -(-flown.n_held // MOST_ROWS)]
+    indices = sensitivity(
+        {name: values[rows] for name, values in flown.inputs.items()},
+        {name: flown.values(name)[rows] for name in metrics},
+    )
+    shares = (indices.first_order, indices.first_order_error, indices.total, indices.total_error)
+    by_metric = {}
+    for k, metric in enumerate(metrics):
+        ranked = _ranked(flown, metric, indices.inputs, *(share[:, k] for share in shares))
+        left = _number(indices.unexplained[k]) if ranked else None
+        rest = [] if left is None else [Contributor(metric, UNEXPLAINED, left, left, None, None)]
+        by_metric[metric] = (*ranked, *rest)
+    used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
+    return Contributions(by_metric, 0, used, indices.n_tried, {}, indices)
+
+
+def _ranked(
+    flown: "Flown",
+    metric: str,
+    names: Sequence[str],
+    first: np.ndarray,
+    first_error: np.ndarray,
+    total: np.ndarray,
+    total_error: np.ndarray,
+) -> tuple[Contributor, ...]:
+    """The contributors of one metric that have an effect, float64[n_names] each, the strongest first."""
+    errors = float(ndtri(0.5 * (1.0 + flown.stated.confidence)))  # standard errors on each side of an interval
+
+    def interval(value: float, error: float) -> Interval | None:
+        if not (np.isfinite(value) and np.isfinite(error)):
+            return None
+        return float(value - errors * error), float(value + errors * error)
+
+    rows = [
+        Contributor(metric, name, _number(a), _number(b), interval(a, da), interval(b, db))
+        for name, a, da, b, db in zip(names, first, first_error, total, total_error, strict=True)
+        if np.isfinite(a) or np.isfinite(b)
+    ]
+    return tuple(sorted(rows, key=lambda contributor: -contributor.size))
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

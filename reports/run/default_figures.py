@@ -1,0 +1,36 @@
+"""The figures of one kind that a report draws: the model's own, or without any, what the run itself suggests."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
+from reports.run.flown import Flown
+
+MOST_SCATTERS = 4
+
+
+def history_figures(flown: Flown) -> list[HistoryFigure]:
+    """The model's histories; of a model without any, one of all saved quantities."""
+    own = [figure for figure in flown.figures if isinstance(figure, HistoryFigure)]
+    if own or any(isinstance(figure, ProfileFigure) for figure in flown.figures):
+        return own
+    saved = [name for name in flown.histories.columns if name not in ("case_id", "t_s")]
+    return [HistoryFigure(tuple(saved), "Saved time histories")] if saved else []
+
+
+def scatter_figures(flown: Flown) -> list[ScatterFigure]:
+    """The model's scatter plots; of a model without any, the metrics that matter over their strongest contributors."""
+    own = [figure for figure in flown.figures if isinstance(figure, ScatterFigure)]
+    return own or list(_suggested(flown))[:MOST_SCATTERS]
+
+
+def _suggested(flown: Flown) -> Iterator[ScatterFigure]:
+    for metric in flown.key_metrics:
+        if flown.summaries[metric].constant or not flown.summaries[metric].n_used:
+            continue
+        for contributor in flown.contributors(metric):
+            if np.isfinite(flown.values(contributor.name)).any():
+                title = f"{flown.words(metric)} over its strongest contributor, {flown.words(contributor.name)}"
+                yield ScatterFigure(contributor.name, metric, title[:1].upper() + title[1:])
+                break

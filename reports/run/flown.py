@@ -1,0 +1,282 @@
+"""The run as the report sees it: the table, the nominal, what every column is, and which metrics matter."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from mc_engine.model.figures import KINDS, MapFigure, ScatterFigure, from_record
+from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, was_looked_at
+from mc_engine.statistics.first_order import Contributor, contributors
+from mc_engine.statistics.worst import Limits, limits_on
+from mc_engine.status import STATUS_NAME, STATUS_TEXT
+from reports.run.all_cases import Run, all_cases, without_attributes
+from reports.run.contributions import Contributions
+from reports.run.contributions import contributions as contributions_of
+from reports.text.numbers import axis_label, count, named, words
+
+
+@dataclass(frozen=True)
+class Stated:
+    """The probability and the confidence of all statistics of a report: [report] of the campaign file."""
+
+    probability: float = 0.9973
+    confidence: float = 0.90
+
+    @property
+    def outer(self) -> tuple[float, float]:
+        """The percentiles between which a case lies with the probability."""
+        return round(0.5 * (1.0 - self.probability), 12), round(0.5 * (1.0 + self.probability), 12)
+
+    @property
+    def low(self) -> float:
+        """The percentile above which a case lies with the probability."""
+        return round(1.0 - self.probability, 12)
+
+    @property
+    def percentiles(self) -> tuple[float, ...]:
+        """All that are told, ascending."""
+        return self.outer[0], self.low, 0.5, self.probability, self.outer[1]
+
+    @property
+    def two_sided(self) -> float:
+        """The confidence of an interval whose bounds each hold with the confidence."""
+        return 2.0 * self.confidence - 1.0
+
+
+@dataclass(frozen=True)
+class ColumnFacts:
+    """name, unit, role and one-line meaning of a column."""
+
+    name: str
+    unit: str
+    role: str
+    description: str
+
+
+class Flown:
+    """A run with its tables read once.  name : of the run directory, as the commands in the report spell it.
+
+    `cases` is the table at hand, one row for each of `n_held` cases: all `n_tried`, unless the run is too large to be
+    held.  Its columns (`values`, `inputs`, `ok`, `case_ids`) are what figures are drawn of; all that is told of all
+    cases (counts, summaries, verdicts, worst and failed ones) comes from `every`.
+    """
+
+    def __init__(self, run: Run, name: str):
+        self.run = run
+        self.name = name
+        self.manifest = run.manifest
+        self.every = all_cases(run, self.stated.two_sided, self.stated.percentiles)
+        self.cases = self.every.table
+        self.nominal = run.nominal()
+        self.histories = without_attributes(run.histories())
+        self.n_wanted = int(run.n_cases)
+        self._contributors: dict[str, list[Contributor]] = {}
+
+    # ---- what the manifest says
+
+    @cached_property
+    def campaign(self) -> Mapping[str, Any]:
+        return self.manifest.get("campaign", {})
+
+    @cached_property
+    def stated(self) -> Stated:
+        """Probability and confidence of all statistics."""
+        return Stated(**self.manifest.get("report", {}))
+
+    @property
+    def own(self) -> "Flown":
+        """The run with each column in its own unit."""
+        return self
+
+    @cached_property
+    def design(self) -> str:
+        return str(self.campaign.get("design", "mc"))
+
+    @property
+    def random(self) -> bool:
+        """Whether shares of cases estimate probabilities."""
+        return self.design in SAMPLING_DESIGNS
+
+    @cached_property
+    def columns(self) -> dict[str, ColumnFacts]:
+        """All columns and history quantities by name."""
+        records = [*self.manifest.get("quantities", []), *self.manifest.get("columns", [])]
+        facts = [
+            ColumnFacts(record["name"], record.get("unit", ""), record.get("role", ""), record.get("description", ""))
+            for record in records
+        ]
+        return {"t_s": ColumnFacts("t_s", "s", "time", "time"), **{fact.name: fact for fact in facts}}
+
+    def with_role(self, role: str) -> list[ColumnFacts]:
+        """Columns of one role that the table holds, in order."""
+        return [fact for fact in self.columns.values() if fact.role == role and fact.name in self.cases.columns]
+
+    def range(self, name: str) -> tuple[float, float]:
+        """The physical range that the model gives a column; infinite where it gives none."""
+        low, high = self.manifest.get("ranges", {}).get(name, (None, None))
+        return -np.inf if low is None else float(low), np.inf if high is None else float(high)
+
+    def told(self, name: str, value: Any) -> Any:
+        """A number, or an array of them, of a column's own unit in the unit that it is told in."""
+        return value
+
+    def told_table(self, table: pd.DataFrame) -> pd.DataFrame:
+        """A table of histories in the units that they are told in."""
+        return table
+
+    def unit(self, name: str) -> str:
+        return self.columns[name].unit if name in self.columns else ""
+
+    def words(self, name: str) -> str:
+        return words(name, self.unit(name))
+
+    def axis(self, name: str) -> str:
+        """An axis label: the column's name in words with its unit; of an input that is a symbol, its meaning too."""
+        # Of the inputs' own records: the columns of a run upstream have its name before their meaning.
+        meanings = {
+            str(record["name"]): str(record.get("description", "")) for record in self.manifest.get("inputs", [])
+        }
+        return axis_label(named(self.words(name), meanings.get(name, "")), self.unit(name))
+
+    def absence(self, *names: str) -> str:
+        """Why the table of cases lacks one of the columns, as the end of a sentence; empty if it lacks none."""
+        shared = {record["name"] for key in ("parameters", "settings") for record in self.manifest.get(key, [])}
+        for name in names:
+            if name not in self.cases.columns:
+                return f"the run does not disperse {name}" if name in shared else f"the run has no column {name}"
+        return ""
+
+    @cached_property
+    def figures(self) -> list[Any]:
+        """The model's figures, of the kinds that this report knows."""
+        return [from_record(record) for record in self.manifest.get("figures", []) if record.get("kind") in KINDS]
+
+    # ---- the table at hand
+
+    @property
+    def n_held(self) -> int:
+        """How many cases the table at hand has."""
+        return len(self.cases)
+
+    @property
+    def sampled(self) -> bool:
+        """Whether these are some of the cases only."""
+        return self.n_held < self.n_tried
+
+    @property
+    def sample_words(self) -> str:
+        """What a caption says of a sample, as its end; empty where all cases are held."""
+        return f", from {count(self.n_held)} of {count(self.n_tried)} cases picked evenly" if self.sampled else ""
+
+    @property
+    def ok(self) -> np.ndarray:
+        """bool[n_held]: completed."""
+        return self.every.ok
+
+    @cached_property
+    def case_ids(self) -> np.ndarray:
+        return self.cases["case_id"].to_numpy(dtype=np.int64)
+
+    def rows(self, case_ids: np.ndarray | pd.Series) -> np.ndarray:
+        """Rows of the table at hand for these cases, in their order, without those that it does not hold."""
+        place = pd.Index(self.case_ids).get_indexer(np.asarray(case_ids, dtype=np.int64))
+        return place[place >= 0]
+
+    def values(self, name: str) -> np.ndarray:
+        """float64[n_held] of a column; NaN for words, for a missing column, and for metrics of failed cases."""
+        return self.every.values(name)
+
+    def nominal_value(self, name: str) -> float | None:
+        """The nominal case's number in a column, None if it has none."""
+        value = self.nominal.get(name)
+        return float(value) if isinstance(value, int | float | np.number) and np.isfinite(float(value)) else None
+
+    # ---- statistics of all cases
+
+    @property
+    def n_tried(self) -> int:
+        return self.every.n_tried
+
+    @property
+    def summaries(self) -> dict[str, Summary]:
+        """Summary per metric."""
+        return self.every.summaries
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        """One verdict per requirement, in the order of the campaign file."""
+        return self._judgement[0]
+
+    @property
+    def joint(self) -> Verdict | None:
+        """The verdict on all requirements at once; None unless there are several."""
+        return self._judgement[1]
+
+    @property
+    def _judgement(self) -> tuple[list[Verdict], Verdict | None]:
+        return self.every.judgement
+
+    def worst(self, metric: str, most: int) -> pd.DataFrame:
+        """The worst cases of a metric: those with the smallest margin to its limits."""
+        return self.every.worst(metric, most, self.limits(metric))
+
+    @property
+    def looked(self) -> bool:
+        """Whether the number of cases was decided by looking at them."""
+        return was_looked_at(self.manifest, self.n_wanted)
+
+    @cached_property
+    def key_metrics(self) -> list[str]:
+        """The metrics that matter: those with a requirement, then those that the model maps or plots; else all."""
+        wanted = [verdict.metric for verdict in self.verdicts]
+        for figure in self.figures:
+            wanted += [figure.metric] if isinstance(figure, MapFigure) else []
+            wanted += [figure.y, figure.x] if isinstance(figure, ScatterFigure) else []
+        metrics = [fact.name for fact in self.with_role("metric")]
+        return [name for name in dict.fromkeys(wanted) if name in metrics] or metrics
+
+    def limits(self, metric: str) -> Limits:
+        """The tightest limits that the requirements set on a metric."""
+        return limits_on(metric, self.manifest.get("requirements", []))
+
+    def largest_is_worst(self, metric: str) -> bool:
+        """Whether the bad end of a metric is the upper one; with two limits, that with the smaller margin."""
+        summary = self.summaries[metric]
+        return self.limits(metric).largest_is_worst(np.array([summary.minimum, summary.maximum], dtype=np.float64))
+
+    @property
+    def inputs(self) -> dict[str, np.ndarray]:
+        """The columns at hand of the dispersed inputs by name."""
+        return {fact.name: self.cases[fact.name].to_numpy() for fact in self.with_role("dispersion")}
+
+    def contributors(self, metric: str) -> list[Contributor]:
+        """The dispersed inputs that vary, the one that contributes most to the metric first."""
+        if metric not in self._contributors:
+            self._contributors[metric] = self._flown_contributors(metric) or contributors(
+                self.inputs, self.values(metric)
+            )
+        return self._contributors[metric]
+
+    def _flown_contributors(self, metric: str) -> list[Contributor]:
+        """The same from the flights beside the run, by total effect; empty without them."""
+        contributions = self.contributions
+        if contributions is None or not contributions.flights:
+            return []
+        rows, inputs = contributions.by_metric.get(metric, ()), self.inputs
+        return [
+            Contributor(name, row.size) for row in rows for name in contributions.members[row.input] if name in inputs
+        ]
+
+    @cached_property
+    def contributions(self) -> Contributions | None:
+        """Shares of the variance of the metrics that matter, by input and random draws."""
+        return contributions_of(self)
+
+    def status_text(self, status: str) -> str:
+        """The sentence behind a status word: the run's own, or this engine's."""
+        texts = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}
+        return str({**texts, **self.manifest.get("status_texts", {})}.get(status, ""))

@@ -1,0 +1,73 @@
+"""What the flights of many cases have in common: envelopes of a history quantity over the time."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from reports.figures.histories import Envelope
+
+FEWEST_CASES = 20  # of a band
+INSTANTS = 300
+OUTER = (0.00135, 0.005, 0.01, 0.025, 0.05)  # percentiles, the first of which a number of cases supports is drawn
+
+
+def outer_percentile(n_cases: int) -> float:
+    """The lowest percentile that so many cases support: beyond it, one of them is expected at least."""
+    return next((p for p in OUTER if p * n_cases >= 1.0), OUTER[-1])
+
+
+def envelope_probabilities(n_cases: int) -> tuple[float, ...]:
+    """Probabilities of the curves of an envelope: the extremes, the outer percentiles, the median."""
+    outer = outer_percentile(n_cases)
+    return (0.0, outer, 0.5, 1.0 - outer, 1.0)
+
+
+def fair_cases(case_ids: Sequence[int]) -> list[int]:
+    """Of the retained cases those that stand for all: 0, 1, 2, ... up to the first gap.
+
+    A case further on may have been kept because it is one of the worst; a band over such cases would be too wide.
+    """
+    kept = sorted(case for case in case_ids if case >= 0)
+    return [case for place, case in enumerate(kept) if case == place]
+
+
+def history_envelopes(histories: pd.DataFrame, case_ids: Sequence[int], names: Sequence[str]) -> dict[str, Envelope]:
+    """Envelopes of the quantities over these cases; none if the cases are too few.
+
+    Between its own rows a flight is a straight line; after its end it counts no more.  Where so few still fly that they
+    do not support the outer percentiles, these end.
+    """
+    if len(case_ids) < FEWEST_CASES:
+        return {}
+    chosen = histories[histories["case_id"].isin(case_ids)].sort_values(["case_id", "t_s"], kind="stable")
+    starts = np.flatnonzero(np.diff(chosen["case_id"].to_numpy(), prepend=-2))
+    times = np.split(chosen["t_s"].to_numpy(), starts[1:])
+    grid = _instants(times)
+    return {name: _envelope(grid, times, np.split(chosen[name].to_numpy(), starts[1:])) for name in names}
+
+
+def _instants(times: list[np.ndarray]) -> np.ndarray:
+    """Instants to look at: those of the first case if all share them, else even ones to the end of the longest."""
+    first = times[0]
+    if all(time.size == first.size and (time == first).all() for time in times):
+        return first[np.unique(np.linspace(0, first.size - 1, min(first.size, INSTANTS)).round().astype(int))]
+    return np.linspace(min(time[0] for time in times), max(time[-1] for time in times), INSTANTS)
+
+
+def _envelope(grid: np.ndarray, times: list[np.ndarray], values: list[np.ndarray]) -> Envelope:
+    rows = [np.interp(grid, t, y, right=np.nan) for t, y in zip(times, values, strict=True)]
+    table = np.sort(np.array(rows), axis=0)  # flights that have ended last, as not-a-numbers
+    flying = np.count_nonzero(np.isfinite(table), axis=0)
+    used = flying >= FEWEST_CASES
+    table, flying = table[:, used], flying[used]
+    curves = {}
+    for probability in envelope_probabilities(len(times)):
+        place = probability * (flying - 1)
+        low = np.floor(place).astype(int)
+        high = np.minimum(low + 1, flying - 1)
+        columns = np.arange(flying.size)
+        below, above = table[low, columns], table[high, columns]
+        supported = (flying * min(probability, 1.0 - probability) >= 1.0) | (probability in (0.0, 1.0))
+        curves[probability] = np.where(supported, below + (place - low) * (above - below), np.nan)
+    return Envelope(grid[used], curves, len(times))

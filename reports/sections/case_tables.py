@@ -1,0 +1,128 @@
+"""Single cases: the worst, the failed, and all of them when there are only a few; each can be repeated alone."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pandas as pd
+
+from mc_engine.shell_words import shell_word
+from mc_engine.statistics.first_order import Contributor, contributors
+from mc_engine.statistics.worst import Limits
+from reports.document.blocks import Cell, Column, Table
+from reports.run.flown import ColumnFacts, Flown
+from reports.run.outcomes import inside
+from reports.text.numbers import axis_label, column_texts, count, exact, number, with_unit
+
+WORST = 5
+WORST_METRICS = 4
+FAILED_SHOWN = 10
+INPUTS_SHOWN = 4
+FEW_CASES = 12
+METRICS_SHOWN = 5
+
+
+def case_table(flown: Flown) -> Table | None:
+    """Every case with its inputs and the metrics that matter, when there are no more than a dozen."""
+    if not 0 < flown.n_tried <= FEW_CASES:
+        return None
+    inputs = varying_inputs(flown)[:INPUTS_SHOWN]
+    metrics = [flown.columns[name] for name in flown.key_metrics[:METRICS_SHOWN]]
+    columns = (
+        Column("Case", "number", 0.8),
+        *(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.3) for fact in inputs),
+        *(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.5) for fact in metrics),
+        Column("Status", "code", 1.2),
+    )
+    cells = [
+        [Cell(str(case), int(case), case=int(case)) for case in flown.case_ids],
+        *(_input_cells(flown.cases[fact.name]) for fact in inputs),
+        *(_number_cells(flown.values(fact.name)) for fact in metrics),
+        [Cell(str(word)) for word in flown.cases["status"]],
+    ]
+    rows = tuple(zip(*cells, strict=True))
+    return Table("Case by case", columns, rows, "Inputs that are the same in all cases are listed under Inputs.")
+
+
+def _sortable(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def varying_inputs(flown: Flown) -> list[ColumnFacts]:
+    """The dispersed inputs that differ between the cases."""
+    return [fact for fact in flown.with_role("dispersion") if flown.cases[fact.name].nunique() > 1]
+
+
+def input_words(flown: Flown, row: int) -> str:
+    """What sets a case apart, for the key of a figure: its first two inputs that vary."""
+    parts = []
+    for fact in varying_inputs(flown)[:2]:
+        value = with_unit(_input_cells(flown.cases[fact.name])[row].text, fact.unit)
+        parts.append(f"{flown.words(fact.name)} {value}")
+    return ", ".join(parts)
+
+
+def worst_tables(flown: Flown) -> Iterator[Table]:
+    """The worst cases of the metrics that matter, those of requirements not met first; then the first failed cases."""
+    passed = {verdict.metric: verdict.outcome == "pass" for verdict in flown.verdicts}
+    for metric in sorted(flown.key_metrics, key=lambda name: passed.get(name, True))[:WORST_METRICS]:
+        cases = flown.worst(metric, WORST)
+        if len(cases) and not flown.summaries[metric].constant:
+            yield _case_table(flown, _worst_words(flown, metric), metric, cases)
+    failed = flown.n_tried - flown.every.completed
+    if failed:
+        title = f"Failed cases: the first {min(FAILED_SHOWN, failed)} of {count(failed)}"
+        yield _case_table(flown, title, None, flown.every.failed(FAILED_SHOWN))
+
+
+def _worst_words(flown: Flown, metric: str) -> str:
+    limits = flown.limits(metric)
+    if not limits.two_sided:
+        return f"Cases with the {'smallest' if limits.at_least is not None else 'largest'} {flown.words(metric)}"
+    ends = [with_unit(number(end), flown.unit(metric)) for end in (limits.at_least, limits.at_most)]
+    return f"Cases with the smallest margin of {flown.words(metric)} to its limits, {ends[0]} and {ends[1]}"
+
+
+def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFrame) -> Table:
+    """Cases with their status, or a metric and its margin, the inputs that contribute most, and the command to replay.
+
+    Without a metric the inputs are those that contribute most to being inside all limits.
+    """
+    inside_of = inside(flown).astype(np.float64)
+    ranked = flown.contributors(metric) if metric else contributors(flown.inputs, inside_of)
+    ranked = ranked or [Contributor(name, np.nan) for name in flown.inputs]
+    shown = [flown.columns[contributor.name] for contributor in ranked[:INPUTS_SHOWN]]
+    columns = [Column("Case", "number", 0.9)]
+    cells = [[Cell(count(int(case)), int(case), case=int(case)) for case in cases["case_id"]]]
+    if metric is None:
+        columns.append(Column("Status", "code", 1.4))
+        cells.append([Cell(str(word)) for word in cases["status"]])
+    else:
+        values, limits = cases[metric].to_numpy(dtype=np.float64), flown.limits(metric)
+        columns.append(Column(axis_label(flown.words(metric), flown.unit(metric)), "number", 1.6))
+        cells.append(_number_cells(values))
+        if limits != Limits():
+            columns.append(Column(axis_label("Margin", flown.unit(metric)), "number", 1.3))
+            cells.append(_number_cells(limits.margins(values) * limits.width))
+    for fact in shown:
+        columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.3))
+        cells.append(_input_cells(cases[fact.name]))
+    columns.append(Column("Command to replay", "code", 3.6))
+    cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in cases["case_id"]])
+    return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, ranked, len(shown)))
+
+
+def _inputs_said(flown: Flown, ranked: list[Contributor], shown: int) -> str:
+    """Which inputs the columns are of, where nothing is known of their contributions."""
+    n = len(flown.with_role("dispersion"))
+    return f"The first {shown} of {n} inputs." if shown < n and not np.isfinite(ranked[0].share) else ""
+
+
+def _input_cells(column: pd.Series) -> list[Cell]:
+    if pd.api.types.is_bool_dtype(column) or not pd.api.types.is_numeric_dtype(column):
+        return [Cell(exact(value if isinstance(value, str) else bool(value))) for value in column]
+    return _number_cells(column.to_numpy(dtype=np.float64))
+
+
+def _number_cells(values: np.ndarray) -> list[Cell]:
+    texts = column_texts(values.tolist())
+    return [Cell(text, _sortable(value)) for text, value in zip(texts, values.tolist(), strict=True)]

@@ -1,0 +1,132 @@
+"""The corridor: which cases violate which limits, where in the plane of two columns, and how probable that is."""
+
+from collections.abc import Iterator
+from itertools import compress
+
+import contourpy
+import numpy as np
+
+from mc_engine.model.figures import CorridorFigure
+from mc_engine.statistics import SurfaceMap, Verdict, map_metric
+from reports.document.blocks import FigureBlock, Table
+from reports.drawing.marks import Points
+from reports.figures.clouds import LIMIT_SETS, Outline, case_scatter
+from reports.run.flown import Flown
+from reports.run.outcomes import inside, inside_words
+from reports.sections.figure_blocks import nominal_point, thinned_rows
+from reports.sections.tables import limit_text
+from reports.text.numbers import count
+
+FEWEST_BEYOND = 12  # cases on either side of a limit that is drawn
+TOLD_RIGHT = 0.75  # share of the cases beyond a limit that its line must put there
+MOST_CLASSES = len(LIMIT_SETS)  # with a colour, "inside" among them
+
+
+def corridor_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
+    """The model's corridors; nothing where the campaign sets no requirement on their metrics."""
+    for figure in flown.figures:
+        if isinstance(figure, CorridorFigure) and not (figure.upstream and flown.absence(figure.x, figure.y)):
+            verdicts = [verdict for verdict in flown.verdicts if verdict.metric in figure.metrics]
+            if verdicts:
+                violated = np.array([~inside(flown, [verdict]) for verdict in verdicts])
+                yield _corridor(flown, figure, verdicts, violated)
+
+
+def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray) -> FigureBlock | str:
+    x, y = flown.values(figure.x), flown.values(figure.y)
+    placed = np.isfinite(x) & np.isfinite(y)
+    used = np.flatnonzero(placed)
+    if not used.size:
+        lacking = f"none of {count(flown.n_held)} cases has both {figure.x} and {figure.y}"
+        return f"{figure.title}: not drawn; {flown.absence(figure.x, figure.y) or lacking}."
+    words, member = _classes([verdict.name for verdict in verdicts], violated, inside_words(flown, verdicts))
+    # every violation stays in the picture, as far as there is room
+    rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
+    limits = tuple(_limit_lines(flown, figure, verdicts, violated))
+    if not limits and not violated.any():
+        return f"{figure.title}: not drawn; all cases are {inside_words(flown, verdicts)}."
+    drawing = case_scatter(
+        Points(x[rows], y[rows], "", cases=flown.case_ids[rows], columns=(figure.x, figure.y)),
+        member[rows],
+        [(word, int(np.count_nonzero(member[used] == k))) for k, word in enumerate(words)],
+        (flown.axis(figure.x), flown.axis(figure.y)),
+        flown.n_held,
+        styles=LIMIT_SETS,
+        nominal=nominal_point(flown, figure.x, figure.y),
+        outlines=limits,
+        form="Cases by the limits that they violate",
+    )
+    missing = flown.n_held - used.size
+    lost = f" {count(missing)} of {count(flown.n_held)} cases have no values to draw." if missing else ""
+    said = "" if limits else " No limit is drawn: none of them is decided by the two columns alone."
+    return FigureBlock(f"{figure.title}.{said}{lost}", drawing, "wide")
+
+
+def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[list[str], np.ndarray]:
+    """Words of the classes, and the class of each case: inside, then the sets of limits violated, most frequent first.
+
+    violated : bool[n_requirements, n_held].  What is too rare for a colour of its own shares the last one.
+    """
+    code = (violated * (1 << np.arange(len(names)))[:, None]).sum(axis=0)
+    sets, cases = np.unique(code[code > 0], return_counts=True)
+    ordered = sets[np.lexsort((sets, -cases))].tolist()
+    own = ordered if len(ordered) < MOST_CLASSES else ordered[: MOST_CLASSES - 2]
+    words = [inside_all]
+    member = np.zeros(code.size, dtype=np.int64)
+    for k, one in enumerate(own, start=1):
+        words.append(f"beyond {' and '.join(compress(names, [one >> bit & 1 for bit in range(len(names))]))}")
+        member[code == one] = k
+    if len(own) < len(ordered):
+        words.append("beyond other sets of limits")
+        member[(code > 0) & (member == 0)] = len(words) - 1
+    return words, member
+
+
+def _limit_lines(
+    flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray
+) -> Iterator[Outline]:
+    """Where the surface of a metric over the two columns is at its limit, if the two columns decide it.
+
+    Of a count, such as that of exits, the surface between two cases means nothing.
+    """
+    x, y = flown.values(figure.x), flown.values(figure.y)
+    for verdict, beyond in zip(verdicts, violated, strict=True):
+        values = flown.values(verdict.metric)
+        surface = map_metric(x, y, values) if _continuous(values) else None
+        if surface is None or not _decides(surface, x, y, values, beyond):
+            continue
+        generator = contourpy.contour_generator(surface.x, surface.y, np.ma.masked_invalid(surface.value))
+        for limit in (verdict.at_most, verdict.at_least):
+            curves = [] if limit is None else generator.lines(limit)
+            if curves:
+                text = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
+                words = f"{text}, in the mean over the other inputs"
+                yield Outline("limit", words, tuple(np.asarray(curve) for curve in curves))
+
+
+def _continuous(values: np.ndarray) -> bool:
+    numbers = values[np.isfinite(values)]
+    return bool((numbers != np.round(numbers)).any())
+
+
+def _decides(surface: SurfaceMap, x: np.ndarray, y: np.ndarray, values: np.ndarray, beyond: np.ndarray) -> bool:
+    """Whether the surface tells most cases beyond the limit, and most inside it, from the others.
+
+    Told apart by the surface's own order: beyond are as many cases, those with the most extreme surface, as really are.
+    """
+    row, column = (_nearest(axis, place) for axis, place in ((surface.y, y), (surface.x, x)))
+    told = np.where(np.isfinite(x) & np.isfinite(y), surface.value[row, column], np.nan)
+    used = np.isfinite(told) & np.isfinite(values)
+    told, outside = told[used], beyond[used]
+    n_outside = int(outside.sum())
+    if min(n_outside, outside.size - n_outside) < FEWEST_BEYOND:
+        return False
+    downwards = values[used][outside].mean() < values[used][~outside].mean()
+    most = np.argsort(told if downwards else -told, kind="stable")[:n_outside]
+    return bool(outside[most].mean() >= TOLD_RIGHT)
+
+
+def _nearest(axis: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Index of the node of an ascending axis nearest to each place; any for a place that is not a number."""
+    middles = 0.5 * (axis[1:] + axis[:-1])
+    return np.searchsorted(middles, np.nan_to_num(places))

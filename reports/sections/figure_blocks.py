@@ -1,0 +1,369 @@
+"""The figures of a run: picks the data, bounds how much of it is drawn, and says what was left out."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import ceil
+
+import numpy as np
+
+from mc_engine.model.figures import MapFigure, ScatterFigure
+from mc_engine.statistics import map_metric
+from mc_engine.statistics.maps import FEWEST, LEAST_EXPLAINED, explained_share
+from mc_engine.statistics.summary import nearly_equal
+from reports.document.blocks import FigureBlock
+from reports.drawing.marks import Drawing, Plot, Points
+from reports.figures.clouds import Outline, case_scatter
+from reports.figures.distributions import histogram, histograms
+from reports.figures.histories import Envelope, HistoryLine, history_figure, history_plot
+from reports.figures.maps import metric_map
+from reports.run.cloud_regions import cloud_regions
+from reports.run.default_figures import history_figures, scatter_figures
+from reports.run.flown import Flown
+from reports.run.history_bands import FEWEST_CASES, OUTER, fair_cases, history_envelopes, outer_percentile
+from reports.run.history_limits import history_limits
+from reports.run.outcomes import case_outcomes, outcome_names
+from reports.sections.case_tables import FEW_CASES, input_words
+from reports.sections.published import published_law
+from reports.text.numbers import axis_label, count, counted, number, percent
+
+POINTS_SHOWN = 2000
+FEWEST_SHOWN = 50  # of an outcome, as far as there are so many
+MOST_PANELS = 16  # of a figure
+LOW_PANEL = 160.0  # height of the histograms of other metrics
+STRONGEST_INPUTS = 4  # among whose pairs the one is looked for that explains most
+COLOURED_CASES = 8
+COLOURED_OVER_BANDS = 2  # more would hide the band
+WORST_RANKS = 10
+HISTORIES_SHOWN = 40
+FEWEST_VALUES = 10  # of a histogram
+NOMINAL = -1
+
+
+def thinned_rows(rows: np.ndarray, always: np.ndarray, most: int = POINTS_SHOWN) -> np.ndarray:
+    """At most about `most` of the ascending row numbers: evenly through the table, those of `always` among them."""
+    if rows.size <= most:
+        return rows
+    even = rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
+    place = np.minimum(np.searchsorted(rows, always), rows.size - 1)
+    return np.union1d(even, always[rows[place] == always])
+
+
+def thinned_by_outcome(rows: np.ndarray, outcome: np.ndarray, most: int = POINTS_SHOWN) -> np.ndarray:
+    """At most about `most` of the ascending row numbers, the same share of every outcome, evenly through the table.
+
+    An outcome of up to FEWEST_SHOWN cases is drawn whole.
+    """
+    share = min(1.0, most / max(rows.size, 1))
+    groups = [rows[outcome[rows] == kind] for kind in np.unique(outcome[rows])]
+    kept = [max(round(share * group.size), min(FEWEST_SHOWN, group.size)) for group in groups]
+    chosen = [group[np.linspace(0, group.size - 1, n).astype(np.int64)] for group, n in zip(groups, kept, strict=True)]
+    return np.sort(np.concatenate(chosen)) if chosen else rows
+
+
+def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
+    """The model's maps; a sentence in place of one that cannot be drawn, one for all over inputs not dispersed."""
+    elsewhere = []
+    for figure in (drawn for drawn in flown.figures if isinstance(drawn, MapFigure)):
+        absent = flown.absence(figure.x, figure.y)
+        if not absent:
+            yield _map_block(flown, figure)
+        elif not figure.upstream:
+            elsewhere.append(f"{figure.title} ({absent})")
+    if elsewhere:
+        yield f"Not drawn: {'; '.join(elsewhere)}."
+
+
+def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
+    x, y, z = (flown.values(name) for name in (figure.x, figure.y, figure.metric))
+    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z))
+    reason = flown.absence(figure.metric) or _no_map(figure, x[used], y[used], z[used])
+    if reason:
+        return f"{figure.title}: not drawn; {reason}."
+    surface = map_metric(x, y, z)
+    if surface is not None and surface.explained < LEAST_EXPLAINED:
+        return f"{figure.title}: not drawn; {_too_little_explained(flown, figure, surface.explained)}."
+    if surface is None or not np.isfinite(surface.value).any():
+        few = f"the run has too few cases over {figure.x} and {figure.y} for a map"
+        unsure = (f"nowhere is its surface over {figure.x} and {figure.y} sure enough: other inputs scatter it, the "
+                  f"{count(used.size)} cases are too few, or they lie on a line")  # fmt: skip
+        return f"{figure.title}: not drawn; {few if used.size < FEWEST else unsure}."
+    rows = thinned_rows(used, flown.rows(flown.worst(figure.metric, WORST_RANKS)["case_id"]))
+    labels = flown.axis(figure.x), flown.axis(figure.y), flown.axis(figure.metric)
+    drawing = metric_map(
+        surface,
+        np.column_stack([x[rows], y[rows]]),
+        z[rows],
+        flown.case_ids[rows],
+        labels,
+        flown.unit(figure.metric),
+        n_points=int(used.size),
+        nominal=nominal_point(flown, figure.x, figure.y),
+        columns=(figure.x, figure.y, figure.metric),
+    )
+    return FigureBlock(f"{figure.title}.", drawing, "wide")
+
+
+def _too_little_explained(flown: Flown, figure: MapFigure, share: float) -> str:
+    """How little the two inputs explain, and which two explain most."""
+    x, y = flown.words(figure.x), flown.words(figure.y)
+    said = f"{x} and {y} together explain {percent(max(share, 0.0), 0)} of the variance of {flown.words(figure.metric)}"
+    names = [
+        contributor.name
+        for contributor in flown.contributors(figure.metric)
+        if np.isfinite(flown.values(contributor.name)).any()
+    ]
+    values = flown.values(figure.metric)
+    pairs = {
+        (a, b): explained_share(flown.values(a), flown.values(b), values)
+        for a, b in combinations(names[:STRONGEST_INPUTS], 2)
+        if {a, b} != {figure.x, figure.y}
+    }
+    best = max(pairs, key=lambda pair: np.nan_to_num(pairs[pair], nan=-1.0), default=None)
+    if best is None or not pairs[best] > share:
+        return f"{said}, and no two inputs more"
+    a, b = (flown.words(name) for name in best)
+    return f"{said}; the two inputs that explain most are {a} and {b}, {percent(max(pairs[best], 0.0), 0)}"
+
+
+def _no_map(figure: MapFigure, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> str:
+    """Why there is nothing to map in the cases that have all three numbers; empty if there is."""
+    if not z.size:
+        return f"no case has a number for {figure.metric}, {figure.x} and {figure.y}"
+    if z.size > 1 and nearly_equal(z.min(), z.max()):
+        return f"{figure.metric} is {number(z[0])} in all cases"
+    flat = [name for name, values in ((figure.x, x), (figure.y, y)) if nearly_equal(values.min(), values.max())]
+    return f"{flat[0]} is the same in all cases" if z.size > 1 and flat else ""
+
+
+def nominal_point(flown: Flown, x: str, y: str) -> tuple[float, float] | None:
+    place = flown.nominal_value(x), flown.nominal_value(y)
+    return None if place[0] is None or place[1] is None else (place[0], place[1])
+
+
+def scatter_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
+    """The model's scatter figures; a sentence in place of an empty one, none where the run upstream is another."""
+    for figure in scatter_figures(flown):
+        if not (figure.upstream and flown.absence(figure.x, figure.y)):
+            yield _scatter_block(flown, figure)
+
+
+def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
+    x, y = flown.values(figure.x), flown.values(figure.y)
+    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    if not used.size:
+        reason = flown.absence(figure.x, figure.y) or f"no case has both {figure.x} and {figure.y}"
+        return f"{figure.title}: not drawn; {reason}."
+    regions = cloud_regions(flown, (figure.x, figure.y), x[used], y[used])
+    drawing = outcome_scatter(flown, figure.x, figure.y, regions)
+    impossible = bool(regions) and not any(region.kind == "ellipse" for region in regions)
+    left_out = ". No normal ellipse is shown: it would leave the physical range of these metrics" if impossible else ""
+    return FigureBlock(f"{figure.title}{left_out}.", drawing, "wide")
+
+
+def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Outline] = ()) -> Drawing:
+    """The cases over two columns by their outcome, thinned; those at the ends of both columns among them."""
+    x, y, outcome = flown.values(x_name), flown.values(y_name), case_outcomes(flown)
+    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    ends = [int(used[pick(values[used])]) for values in (x, y) for pick in (np.argmin, np.argmax)] if used.size else []
+    rows = np.union1d(thinned_by_outcome(used, outcome), ends).astype(np.int64)
+    counts = np.bincount(outcome[used], minlength=3).tolist()
+    return case_scatter(
+        Points(x[rows], y[rows], "", cases=flown.case_ids[rows], columns=(x_name, y_name)),
+        outcome[rows],
+        tuple(zip(outcome_names(flown), counts, strict=True)),
+        (flown.axis(x_name), flown.axis(y_name)),
+        flown.n_held,
+        nominal=nominal_point(flown, x_name, y_name),
+        outlines=regions,
+    )
+
+
+def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
+    """Histograms of the metrics that matter, with limits and percentiles; those not drawn, in sentences."""
+    key, others = _drawable(flown)
+    title = "Distributions of the key metrics" if others else "Distributions of the metrics"
+    yield from _distribution_figures(flown, key, title)
+    few = [name for name, item in flown.summaries.items() if 0 < item.n_used < FEWEST_VALUES and not item.constant]
+    if few:
+        yield f"Not drawn, fewer than {FEWEST_VALUES} cases have a number: {', '.join(few)}."
+    silent = [name for name, item in flown.summaries.items() if item.n_used == 0]
+    constant = [name for name, item in flown.summaries.items() if item.constant]
+    if constant:
+        yield f"Not drawn, the same in all cases that have it: {', '.join(constant)}."
+    if silent:
+        yield f"Not drawn, no case has a number: {', '.join(silent)}."
+
+
+def other_distributions(flown: Flown) -> Iterator[FigureBlock]:
+    """Histograms of all other metrics."""
+    yield from _distribution_figures(flown, _drawable(flown)[1], "Distributions of the other metrics", LOW_PANEL)
+
+
+def _drawable(flown: Flown) -> tuple[list[str], list[str]]:
+    """Metrics with a distribution: those that matter, and the others."""
+    names = [name for name, item in flown.summaries.items() if item.n_used >= FEWEST_VALUES and not item.constant]
+    return [name for name in flown.key_metrics if name in names], [
+        name for name in names if name not in flown.key_metrics
+    ]
+
+
+def _distribution_figures(flown: Flown, names: list[str], title: str, height: float = 240.0) -> Iterator[FigureBlock]:
+    pages = -(-len(names) // MOST_PANELS)
+    for page in range(pages):
+        group = names[len(names) * page // pages : len(names) * (page + 1) // pages]
+        plots = [_distribution_plot(flown, name, height) for name in group]
+        part = f" ({page + 1} of {pages})" if pages > 1 else ""
+        yield FigureBlock(f"{title}{part}, {_used(flown)}", histograms(plots), "small")
+
+
+def _used(flown: Flown) -> str:
+    return f"{counted(flown.n_tried, 'case')}, fewer where a panel says so."
+
+
+def _distribution_plot(flown: Flown, name: str, height: float) -> Plot:
+    values, summary = flown.values(name), flown.summaries[name]
+    limits = {
+        limit
+        for verdict in flown.verdicts
+        if verdict.metric == name
+        for limit in (verdict.at_most, verdict.at_least)
+        if limit is not None
+    }
+    used = "" if summary.n_used == summary.n_tried else f"{count(summary.n_used)} of {count(summary.n_tried)} cases"
+    return histogram(
+        values[np.isfinite(values)],
+        flown.axis(name),
+        summary,
+        flown.stated.outer,
+        title=used,
+        nominal=flown.nominal_value(name),
+        limits=sorted(limits),
+        normal=_printed_normal(flown, name),
+        column=name,
+        with_intervals=flown.random,
+        height=height,
+    )
+
+
+def _printed_normal(flown: Flown, name: str) -> tuple[float, float] | None:
+    """Mean and standard deviation that the source prints, in the unit chosen for the metric."""
+    law = published_law(flown.own, name)
+    return None if law is None else (flown.told(name, law[0]), flown.told(name, law[1]))
+
+
+def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
+    """The model's history figures over all retained cases; a sentence in place of one without histories."""
+    wanted = history_figures(flown)
+    if not wanted:
+        return
+    if not len(flown.histories):
+        yield "No time histories were saved in this run; [retention] in the campaign file selects cases."
+        return
+    saved = [name for name in flown.histories.columns if name not in ("case_id", "t_s")]
+    asked = list(dict.fromkeys(name for figure in wanted for name in figure.quantities))
+    missing = [name for name in asked if name not in saved]
+    constant = [name for name in asked if name in saved and is_constant(flown.histories[name].to_numpy())]
+    drawn = [name for name in asked if name not in missing and name not in constant]
+    histories = saved_histories(flown, drawn)
+    yield from _envelope_words(flown, histories.envelopes)
+    for figure in wanted:
+        plots = [histories.plot(flown, name) for name in figure.quantities if name in drawn]
+        if plots:
+            yield FigureBlock(figure.title, history_figure(plots), "half")
+    if constant:
+        yield f"Not drawn, constant in every saved case: {', '.join(constant)}."
+    if missing:
+        yield f"Not drawn, the histories have no such quantity: {', '.join(missing)}."
+
+
+@dataclass(frozen=True)
+class SavedHistories:
+    """What is drawn of the saved cases: their lines, envelopes by quantity, and limits by quantity with their words."""
+
+    lines: tuple[HistoryLine, ...]
+    envelopes: dict[str, Envelope]
+    limits: dict[str, tuple[tuple[float, str], ...]]
+
+    def plot(self, flown: Flown, name: str) -> Plot:
+        """The panel of one quantity."""
+        label, time = flown.axis(name), axis_label("time", flown.unit("t_s"))
+        return history_plot(name, label, time, self.lines, self.envelopes.get(name), self.limits.get(name, ()))
+
+
+def saved_histories(
+    flown: Flown, names: list[str], cases: dict[int, tuple[str, int | None]] | None = None
+) -> SavedHistories:
+    """Of these quantities; cases : name and rank of the lines, by default those worth a line."""
+    if not len(flown.histories):
+        return SavedHistories((), {}, {})
+    fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
+    envelopes = history_envelopes(flown.histories, fair, names)
+    if cases is None:
+        cases = {
+            case: (label, rank)
+            for case, (label, rank) in history_cases(flown).items()
+            if not envelopes or (rank is not None and rank <= COLOURED_OVER_BANDS)
+        }
+    lines = tuple(history_line(flown, case, label, rank, names) for case, (label, rank) in cases.items())
+    return SavedHistories(lines, envelopes, history_limits(flown, names))
+
+
+def _envelope_words(flown: Flown, envelopes: dict[str, Envelope]) -> Iterator[str]:
+    """What the envelopes and limits of all history figures are."""
+    sizes = {envelope.n_cases for envelope in envelopes.values()}
+    if sizes:
+        n = sizes.pop()
+        outer = outer_percentile(n)
+        why = (
+            f", the outermost that {count(n)} cases support; {percent(OUTER[0], 3)} needs {count(ceil(1.0 / OUTER[0]))}"
+        )
+        yield (
+            f"Envelopes: smallest to largest, {percent(outer, 3)} to {percent(1.0 - outer, 3)}"
+            f"{why if outer > OUTER[0] else ''}, and median of the first {count(n)} cases, "
+            "at every time of those that still fly. These cases were saved whatever their result."
+        )
+    elif flown.random:
+        yield f"Envelopes need {FEWEST_CASES} saved cases from case 0 on: `first = {FEWEST_CASES}` under [retention]."
+
+
+def is_constant(values: np.ndarray) -> bool:
+    numbers = values[np.isfinite(values)]
+    return not numbers.size or nearly_equal(numbers.min(), numbers.max())
+
+
+def history_cases(flown: Flown) -> dict[int, tuple[str, int | None]]:
+    """Name and rank of the retained cases: nominal 0, then by how bad they are in the metrics that matter."""
+    kept = [int(case) for case in np.unique(flown.histories["case_id"].to_numpy())]
+    reasons = _worst_reasons(flown)
+    ordered = sorted((case for case in kept if case in reasons), key=lambda case: reasons[case][0])
+    coloured = {case: rank for rank, case in enumerate(ordered[:COLOURED_CASES], start=1)}
+    named: dict[int, tuple[str, int | None]] = {}
+    for case in kept:
+        if case == NOMINAL:
+            named[case] = ("nominal", 0)
+        elif case in coloured:
+            named[case] = (f"case {case}: {reasons[case][1]}".removesuffix(": "), coloured[case])
+        elif len(named) < HISTORIES_SHOWN:
+            named[case] = (f"case {case}", None)
+    return named
+
+
+def _worst_reasons(flown: Flown) -> dict[int, tuple[int, str]]:
+    """Per case among the worst: sort key and what it is worst in; for a handful of cases, what sets them apart."""
+    if flown.n_tried <= FEW_CASES:
+        return {int(case): (row, input_words(flown, row)) for row, case in enumerate(flown.case_ids)}
+    reasons: dict[int, tuple[int, str]] = {}
+    for order, metric in enumerate(name for name in flown.key_metrics if not flown.summaries[name].constant):
+        one_sided = "largest" if flown.largest_is_worst(metric) else "smallest"
+        which = "worst" if flown.limits(metric).two_sided else one_sided
+        for place, case in enumerate(flown.worst(metric, WORST_RANKS)["case_id"], start=1):
+            text = f"{which} {flown.words(metric)}" + (f", no. {place}" if place > 1 else "")
+            reasons.setdefault(int(case), (place + WORST_RANKS * order, text))
+    return reasons
+
+
+def history_line(flown: Flown, case: int, label: str, rank: int | None, names: list[str]) -> HistoryLine:
+    rows = flown.histories[flown.histories["case_id"] == case].sort_values("t_s")
+    quantities = {name: rows[name].to_numpy(dtype=np.float64) for name in names}
+    return HistoryLine(label, rows["t_s"].to_numpy(dtype=np.float64), quantities, rank)

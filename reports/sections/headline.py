@@ -1,0 +1,191 @@
+"""The headline box: which requirements are met, with what confidence, and the key results."""
+
+from collections.abc import Iterator
+
+from mc_engine.model.figures import MapFigure
+from mc_engine.shell_words import shell_word
+from mc_engine.statistics import Summary, Verdict
+from mc_engine.statistics.worst import Limits
+from reports.document.blocks import Card
+from reports.run.flown import Flown
+from reports.sections.tables import TONES, limit_text
+from reports.text.numbers import count, number, percent, percentile, with_unit
+
+MOST_COSTS = 4
+
+
+def verdict_cards(flown: Flown) -> tuple[Card, ...]:
+    """One card per requirement, failed ones first."""
+    order = {"fail": 0, "not demonstrable": 1, "pass": 2}
+    verdicts = sorted(flown.verdicts, key=lambda verdict: order[verdict.outcome])
+    joint = [] if flown.joint is None else [flown.joint]
+    return tuple(_verdict_card(flown, verdict) for verdict in [*verdicts, *joint])
+
+
+def _verdict_card(flown: Flown, verdict: Verdict) -> Card:
+    asked = "inside every limit"
+    if verdict.metric:
+        asked = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
+    wanted = f"{percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
+    counted = f"{count(verdict.passed)} of {count(verdict.tried)} cases inside"
+    return Card(
+        label=verdict.name,
+        answer=verdict.outcome,
+        detail=f"{asked} for {wanted}: {counted}{_because(flown, verdict)}.",
+        tone=TONES[verdict.outcome],
+    )
+
+
+def _because(flown: Flown, verdict: Verdict) -> str:
+    """The counts behind a verdict, as the end of a sentence."""
+    lost = f", {count(verdict.no_number)} of the others without a number" if verdict.no_number else ""
+    if verdict.lower is None or verdict.upper is None:
+        return f"{lost}; " + (
+            "no case was flown" if not verdict.tried else "the cases of this design are not a random sample"
+        )
+    if verdict.outcome == "fail" and verdict.upper >= verdict.share:  # the joint one, for another's failing
+        failing = [verdict.name for verdict in flown.verdicts if verdict.shared_outcome == "fail"]
+        return f"{lost}; {' and '.join(failing)} {'fails' if len(failing) == 1 else 'fail'} with confidence shared"
+    if verdict.outcome == "fail":
+        return f"{lost}; the true probability is at most {percent(verdict.upper)}"
+    needed = f", {count(verdict.needed)} cases without a further failure would demonstrate it" if verdict.needed else ""
+    return f"{lost}; the true probability is at least {percent(verdict.lower)}{needed}"
+
+
+def cost_cards(flown: Flown) -> tuple[Card, ...]:
+    """The key results: the metrics that the model maps, or those that matter."""
+    mapped = [figure.metric for figure in flown.figures if isinstance(figure, MapFigure)]
+    names = [name for name in dict.fromkeys([*mapped, *flown.key_metrics]) if name in flown.summaries]
+    names.sort(key=lambda name: flown.summaries[name].n_used == 0)  # what no case has comes last
+    return tuple(_cost_cards(flown, names[:MOST_COSTS]))
+
+
+def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
+    for name in names:
+        summary, unit = flown.summaries[name], flown.unit(name)
+        used = f"{count(summary.n_used)} of {count(summary.n_tried)} cases"
+        if summary.minimum is None or summary.maximum is None:
+            yield Card(flown.words(name), "no number", f"{used} have one", "open")
+            continue
+        if summary.constant and summary.n_used > 1:
+            yield Card(flown.words(name), *_same(flown, name, used))
+            continue
+        spread, limits = summary.spread, flown.limits(name)
+        median, nominal = summary.at(0.5), flown.nominal_value(name)
+        rest = [f"nominal {number(nominal, 4, spread)}"] if nominal is not None else []
+        rest.append(f"median {number(median.value, 4, spread) if median else '–'}")
+        if limits == Limits() or limits.two_sided:
+            rest += _tails(flown, summary, flown.stated.outer)
+            low, high = (number(end, 4, spread) for end in (summary.minimum, summary.maximum))
+            answer = f"{low} to {with_unit(high, unit)}{_of_limits(limits, unit)}"
+            yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
+            continue
+        large = limits.at_most is not None
+        probability = flown.stated.probability if large else flown.stated.low
+        end, tail = summary.maximum if large else summary.minimum, summary.at(probability)
+        rest.append(f"{'largest' if large else 'smallest'} {number(end, 4, spread)}")
+        rest += [f"{percentile(probability)} {number(tail.value, 4, spread)}"] if tail and flown.random else []
+        shown, where = number(end, 4, spread), "in the cases flown"
+        for verdict in flown.verdicts:  # what the verification matrix says is demonstrated, in the same digits
+            if verdict.metric == name and verdict.demonstrated is not None:
+                shown = number(verdict.demonstrated)
+                where = f"in {percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
+                break
+        answer = f"at {'most' if large else 'least'} {with_unit(shown, unit)} {where}"
+        yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
+
+
+def _tails(flown: Flown, summary: Summary, probabilities: tuple[float, ...]) -> Iterator[str]:
+    """Outer percentiles with their confidence bounds, those that the cases are enough for."""
+    each = percent(flown.stated.confidence)
+    for probability in probabilities if flown.random else ():
+        quantile, upper = summary.at(probability), probability > 0.5
+        bound = None if quantile is None else (quantile.upper if upper else quantile.lower)
+        if quantile is not None and bound is not None:
+            value, limit = (number(end, 4, summary.spread) for end in (quantile.value, bound))
+            side = "upper" if upper else "lower"
+            yield f"{percentile(probability)} {value}, {each} {side} confidence bound {limit}"
+
+
+def _of_limits(limits: Limits, unit: str) -> str:
+    """The two limits behind a range: of ±5 s, or of 24 to 55 m."""
+    if limits.at_most is None or limits.at_least is None:
+        return ""
+    if limits.at_least == -limits.at_most:
+        return f" of ±{with_unit(number(limits.at_most), unit)}"
+    return f" of {number(limits.at_least)} to {with_unit(number(limits.at_most), unit)}"
+
+
+def _same(flown: Flown, name: str, used: str) -> tuple[str, str]:
+    """Answer and detail of a metric that is the same in all cases."""
+    summary, nominal = flown.summaries[name], flown.nominal_value(name)
+    begun = f"nominal {number(nominal)}; " if nominal is not None else ""
+    where = "in all cases" if summary.n_used == summary.n_tried else "in all cases with a number"
+    return f"{with_unit(number(summary.mean), flown.unit(name))} {where}", f"{begun}the same in {used}."
+
+
+def warnings(flown: Flown) -> tuple[str, ...]:
+    """What a reader must know before using any number below."""
+    sentences = []
+    missing = flown.n_wanted - flown.n_tried
+    if missing > 0:
+        sentences.append(
+            f"The run is not complete: {count(missing)} of {count(flown.n_wanted)} cases are missing; "
+            f"mc-engine resume {shell_word(flown.name)} flies them."
+        )
+    if flown.n_tried and not flown.every.completed:
+        sentences.append(f"All {count(flown.n_tried)} cases failed: no metric has a number.")
+    elif failed := flown.n_tried - flown.every.completed:
+        sentences.append(
+            f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement."
+        )
+    if flown.looked and flown.n_tried and flown.verdicts:
+        sentences.append(_how_looked_at(flown))
+    if flown.n_tried == 0:
+        sentences.append("No case was flown.")
+    if flown.sampled:
+        sentences.append(
+            f"Requirements, statistics, percentiles, worst and failed cases are those of all "
+            f"{count(flown.n_tried)} cases. Figures, convergence, contributors and regions show {count(flown.n_held)} "
+            "of them, one picked at random from each of equal stretches of the case numbers."
+        )
+    if not flown.random:
+        sentences.append(
+            f"The design is “{flown.design}”: its cases are chosen, not drawn at random. Fractions and percentiles "
+            "below describe these cases and do not estimate probabilities."
+        )
+    return tuple(sentences)
+
+
+def _how_looked_at(flown: Flown) -> str:
+    """Interim analyses: why the bounds are wider than those of a number of cases that was fixed in advance."""
+    looks = [int(look) for look in flown.manifest.get("looks", [])]
+    flown_so_far = count(flown.n_wanted)
+    if looks:
+        steps = ", ".join(count(look) for look in looks)
+        story = (
+            f"The run was to end once every requirement passes or fails, with interim analyses after {steps} cases; "
+        )
+        story += f"it ended after {flown_so_far}."
+    else:
+        begun = count(int(flown.campaign.get("cases", 0)))
+        story = f"The run began with {begun} cases and was extended to {flown_so_far} after their results were known."
+    return (
+        f"{story} The bounds on probabilities hold at every number of cases at once (sequential testing: Robbins’ "
+        "mixture, Ville’s inequality) and are wider for it; percentiles and other intervals are those of a number "
+        "fixed in advance."
+    )
+
+
+def summary_sentence(flown: Flown) -> str:
+    """All verdicts in one sentence."""
+    outcomes = [verdict.outcome for verdict in flown.verdicts]
+    if not outcomes:
+        return "The campaign sets no requirement; the key results follow."
+    total = len(outcomes)
+    if all(outcome == "pass" for outcome in outcomes):
+        met = "The requirement is met" if total == 1 else f"All {total} requirements are met"
+        return f"{met}{' by the cases flown so far' if flown.n_tried < flown.n_wanted else ''}."
+    parts = [(outcomes.count("pass"), "met"), (outcomes.count("fail"), "failed"),
+             (outcomes.count("not demonstrable"), "not demonstrable with these cases")]  # fmt: skip
+    return f"Of {total} requirement{'s' if total > 1 else ''}: {', '.join(f'{n} {what}' for n, what in parts if n)}."

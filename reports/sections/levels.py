@@ -1,0 +1,166 @@
+"""Comparison of options: the metrics by the level of a dispersed word, on the same cases wherever the run has them."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from pandas.api.types import infer_dtype
+
+from mc_engine.statistics import summarize
+from mc_engine.statistics.paired import matching_rows, paired_difference
+from reports.document.blocks import Cell, Column, FigureBlock, Table
+from reports.drawing.marks import Drawing, Plot
+from reports.figures.rows import SPREAD, level_panel
+from reports.run.flown import Flown
+from reports.text.numbers import axis_label, count, interval, number, percent
+
+MOST_LEVELS = 20
+MOST_METRICS = 8
+NOTHING = 1e-20  # in any unit that a metric comes in
+TABLES = 4  # of the metrics that matter most
+
+
+def level_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
+    """A figure and tables for every dispersed input that is a word with several levels."""
+    for fact in flown.with_role("dispersion"):
+        levels = _levels(flown, fact.name)
+        if len(levels) > 1:
+            yield from _compared(flown, fact.name, levels)
+
+
+def _levels(flown: Flown, name: str) -> list[str]:
+    """The nominal level first, then the others as they come in the table; none for numbers."""
+    column = flown.cases[name]
+    if infer_dtype(column, skipna=False) != "string":
+        return []
+    levels = list(dict.fromkeys(column))
+    nominal = str(flown.nominal.get(name))
+    levels.sort(key=lambda level: level != nominal)
+    return levels if len(levels) <= MOST_LEVELS else []
+
+
+def _compared(flown: Flown, name: str, levels: list[str]) -> Iterator[FigureBlock | Table | str]:
+    choice = flown.cases[name].to_numpy(dtype=object)
+    others = {
+        fact.name: flown.cases[fact.name].to_numpy() for fact in flown.with_role("dispersion") if fact.name != name
+    }
+    matched = matching_rows(choice, levels, others)
+    metrics = [metric for metric in flown.key_metrics if _varies(flown, metric)][:MOST_METRICS]
+    if not metrics:
+        yield f"{flown.words(name)}: no metric differs between its levels."
+        return
+    rows = [np.flatnonzero(choice == level) for level in levels]
+    plots = tuple(_metric_panel(flown, metric, levels, rows) for metric in metrics)
+    yield FigureBlock(
+        f"Metrics by {flown.words(name)}. {_pairs_said(flown, matched)}",
+        Drawing(f"Metrics by {flown.words(name)}", plots),
+        "half",
+    )
+    for metric in metrics[:TABLES]:
+        yield _level_table(flown, name, metric, levels, rows, matched)
+
+
+def _varies(flown: Flown, metric: str) -> bool:
+    """Whether the metric is more than the rounding of a zero."""
+    summary = flown.summaries[metric]
+    return summary.maximum is not None and summary.minimum is not None and summary.maximum - summary.minimum > NOTHING
+
+
+def _pairs_said(flown: Flown, matched: np.ndarray) -> str:
+    if not len(matched):
+        return "Its levels were flown on different cases: differences between them include the scatter of the cases."
+    share = len(matched) * matched.shape[1]
+    return (
+        f"{count(len(matched))} sets of cases differ in it alone, one case a level: the same draws for all "
+        f"({count(share)} of {count(flown.n_held)} cases)."
+    )
+
+
+def _metric_panel(flown: Flown, metric: str, levels: list[str], rows: list[np.ndarray]) -> Plot:
+    values = flown.values(metric)
+    quantiles, used = np.full((len(rows), len(SPREAD)), np.nan), []
+    for place, group in enumerate(rows):
+        numbers = values[group][np.isfinite(values[group])]
+        used.append(int(numbers.size))
+        if numbers.size:
+            quantiles[place] = np.quantile(numbers, SPREAD)
+    return level_panel(axis_label(flown.words(metric), flown.unit(metric)), levels, quantiles, used)
+
+
+def _level_table(
+    flown: Flown, name: str, metric: str, levels: list[str], rows: list[np.ndarray], matched: np.ndarray
+) -> Table:
+    columns = (
+        Column(flown.words(name), "text", 1.4),
+        Column("Used / tried", "number", 1.3),
+        Column("Median", "number", 1.5),
+        Column(percent(flown.stated.probability, 3), "number", 1.4),
+        Column("Largest", "number", 1.3),
+        Column(f"Median difference to {levels[0]}", "number", 2.2),
+        Column(f"Smaller than {levels[0]}", "number", 1.9),
+    )
+    values = flown.values(metric)
+    body, probabilities = [], (0.5, flown.stated.probability)
+    for place, (level, group) in enumerate(zip(levels, rows, strict=True)):
+        summary = summarize(values[group], probabilities=probabilities, confidence=flown.stated.two_sided)
+        cells = [
+            Cell(
+                number(item.value, 4, summary.spread),
+                item.value,
+                _bounds(flown, item.lower, item.upper, summary.spread),
+            )
+            for item in summary.quantiles
+        ] or [Cell("–"), Cell("–")]
+        used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
+        largest = Cell(number(summary.maximum, 4, summary.spread), summary.maximum)
+        against = _difference_cells(flown, values, matched, place)
+        body.append((Cell(level), used, *cells, largest, *against))
+    title = f"{axis_label(flown.words(metric), flown.unit(metric))} by {flown.words(name)}"
+    return Table(
+        title[:1].upper() + title[1:], columns, tuple(body), _pairing_note(flown, levels[0], bool(len(matched)))
+    )
+
+
+def _bounds(flown: Flown, lower: float | None, upper: float | None, scale: float | None) -> str:
+    return interval(lower, upper, scale) if flown.random else ""
+
+
+def _difference_cells(flown: Flown, values: np.ndarray, matched: np.ndarray, place: int) -> tuple[Cell, Cell]:
+    """The paired difference of a level to the first one, and in how many pairs it is negative."""
+    if place == 0 or not len(matched):
+        return Cell("–"), Cell("–")
+    difference = paired_difference(values[matched[:, place]], values[matched[:, 0]], flown.stated.confidence)
+    if (
+        difference.median is None
+        or difference.smaller_share is None
+        or difference.smallest is None
+        or difference.largest is None
+    ):
+        return Cell("–", small=f"0 of {count(difference.n_tried)} pairs"), Cell("–")
+    if _pairs_are_draws(flown):
+        small = interval(difference.median.lower, difference.median.upper)
+        bounds = f"[{percent(difference.smaller_share[0], 1)}, {percent(difference.smaller_share[1], 1)}]"
+    else:
+        small, bounds = f"{number(difference.smallest, 4)} to {number(difference.largest, 4)}", ""
+    share = difference.smaller / difference.n_used
+    words = f"{count(difference.smaller)} of {count(difference.n_used)}"
+    return Cell(number(difference.median.value, 4), difference.median.value, small), Cell(words, share, bounds)
+
+
+def _pairs_are_draws(flown: Flown) -> bool:
+    """Whether pairs may be taken as independent draws: a table's rows are the user's own, mostly drawn elsewhere."""
+    return flown.random or flown.design == "table"
+
+
+def _pairing_note(flown: Flown, first: str, paired: bool) -> str:
+    if not paired:
+        return "No pairs: the levels were flown on different cases."
+    note = f"Differences of pairs of cases that differ in nothing else, to “{first}”. "
+    if not _pairs_are_draws(flown):
+        return (
+            note + "Below the median: smallest to largest difference; the cases were chosen, so there is no interval."
+        )
+    share = percent(flown.stated.confidence)
+    return note + (
+        f"In brackets: {share} distribution-free interval of the median (sign test) and Clopper–Pearson interval of "
+        "the fraction of pairs, for pairs that were drawn independently."
+    )

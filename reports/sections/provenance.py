@@ -1,0 +1,93 @@
+"""Where the numbers come from: versions, digests, seed, machine kind and timing, enough to repeat the run."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from reports.document.blocks import Cell, Column, Table
+from reports.run.flown import Flown
+from reports.text.numbers import count, exact, number, with_unit, words
+
+TIMED_EVENTS = ("timing", "finished")
+
+
+def provenance_table(flown: Flown) -> Table:
+    """The provenance of a run."""
+    campaign = flown.campaign
+    cases = f"{count(flown.n_tried)} / {count(flown.n_wanted)}"
+    own = [("design", flown.design), ("seed", campaign.get("seed", "")), ("cases flown / required", cases)]
+    return origin_table("run", flown.name, flown.manifest, own, timing_facts(flown))
+
+
+def origin_table(
+    what: str,
+    name: str,
+    manifest: Mapping[str, Any],
+    own: Iterable[tuple[str, Any]],
+    more: Iterable[tuple[str, Any]] = (),
+) -> Table:
+    """Everything a manifest says of its own making, a line each.  own, more : facts of this kind of result alone."""
+    campaign, model, made = (manifest.get(part, {}) for part in ("campaign", "model", "provenance"))
+    facts = (
+        ("directory", name),
+        ("started (UTC)", manifest.get("created_utc", "")),
+        ("engine", manifest.get("engine", "")),
+        ("campaign", campaign.get("name", "")),
+        ("campaign digest", campaign.get("digest", "")),
+        ("model", campaign.get("model", "") or model.get("name", "")),
+        ("model source digest", model.get("digest", "")),
+        ("published source", model.get("source", "")),
+        *own,
+        ("seed contract", manifest.get("seed_contract", "")),
+        ("git", git_text(made.get("git"))),
+        *((key, made.get(key, "")) for key in ("python", "platform", "cpu", "numba", "llvm")),
+        (
+            "packages",
+            ", ".join(f"{package} {version}" for package, version in sorted(made.get("packages", {}).items())),
+        ),
+        *more,
+    )
+    rows = tuple((Cell(label), Cell(str(value))) for label, value in facts if str(value))
+    return Table(f"Provenance of the {what}", (Column("What", "text", 1.6), Column("Value", "code", 4.0)), rows)
+
+
+def git_text(git: Mapping[str, Any] | None) -> str:
+    """Commit, and whether files differed from it."""
+    if not git:
+        return "not a git checkout"
+    return f"{git.get('commit', '')}{', with uncommitted changes' if git.get('dirty') else ''}"
+
+
+def timing_facts(flown: Flown) -> Iterator[tuple[str, str]]:
+    """Times from the manifest and from the journal's notes on timing, the later ones last."""
+    notes = getattr(flown.run, "notes", None)
+    entries = notes() if callable(notes) else []
+    facts: dict[str, Any] = dict(manifest_timing(flown.manifest.get("timing")))
+    for entry in entries:
+        if entry.event in TIMED_EVENTS:
+            facts.update(manifest_timing(entry.facts))
+    for name, value in facts.items():
+        yield f"timing: {words(name, 's')}", with_unit(number(value, 4), "s" if name.endswith("_s") else "")
+
+
+def manifest_timing(record: Any) -> dict[str, float]:
+    """The numbers among the facts of a note."""
+    if not isinstance(record, Mapping):
+        return {}
+    return {str(key): float(value) for key, value in record.items() if type(value) in (int, float)}
+
+
+def campaign_facts(flown: Flown) -> tuple[tuple[str, str], ...]:
+    """The facts below the title: campaign, model, cases, design, date, engine."""
+    campaign = flown.campaign
+    facts = (
+        ("Campaign", str(campaign.get("name", ""))),
+        ("Model", str(flown.manifest.get("model", {}).get("title", ""))),
+        (
+            "Cases",
+            f"{count(flown.n_tried)} flown of {count(flown.n_wanted)}, {count(flown.every.completed)} completed",
+        ),
+        ("Design", f"{flown.design}, seed {exact(str(campaign.get('seed', '–')))}"),
+        ("Run", str(flown.manifest.get("created_utc", ""))[:16].replace("T", " ") + " UTC"),
+        ("Engine", f"mc-engine {flown.manifest.get('engine', '')}"),
+    )
+    return tuple((what, text) for what, text in facts if text.strip())

@@ -1,0 +1,175 @@
+"""The tables of requirements: what was asked, what the cases show, and how much the verdicts can be wrong."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mc_engine.statistics import Verdict
+from mc_engine.statistics.worst import Limits
+from reports.document.blocks import Cell, Column, FigureBlock, Table
+from reports.figures.rows import MarginRow, margin_figure
+from reports.run.flown import Flown
+from reports.sections.tables import TONES, limit_text
+from reports.text.numbers import SPACE, count, number, percent, with_unit
+
+
+def requirement_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str | None]:
+    """The verification matrix, the figure of all margins, and the risks of the verdicts."""
+    if not flown.verdicts:
+        yield "The campaign file sets no requirement; [requirement.NAME] with a metric and a limit adds one."
+        return
+    yield requirement_table(flown)
+    yield margin_block(flown)
+    yield risk_table(flown)
+
+
+def margin_block(flown: Flown) -> FigureBlock | None:
+    """Margins of all requirements on one axis; None where no case has a number."""
+    rows, left_out = [], []
+    for verdict in flown.own.verdicts:
+        limits = Limits(verdict.at_most, verdict.at_least)
+        if not _has_width(limits):
+            left_out.append(verdict.name)
+            continue
+        worst = limits.margins(flown.every.worst(verdict.metric, 1, limits)[verdict.metric].to_numpy(dtype=np.float64))
+        demonstrated = None if verdict.margin is None else verdict.margin / limits.width
+        if worst.size:
+            rows.append(MarginRow(verdict.name, demonstrated, float(worst[0]), TONES[verdict.outcome]))
+    if not rows:
+        return None
+    return FigureBlock(
+        "Margins of the requirements, relative to the width of the limits: the distance between two limits, the size "
+        "of a single one. Margins beyond 100 % are drawn at the edge."
+        + f" Not drawn, the limit is 0: {', '.join(left_out)}."
+        * bool(left_out),
+        margin_figure(rows),
+    )
+
+
+def _has_width(limits: Limits) -> bool:
+    """Whether margins can be given relative to the limits: not to a single one of 0."""
+    return any(limits)
+
+
+def requirement_table(flown: Flown) -> Table:
+    """The verification matrix: every requirement with what is demonstrated, its margin and verdict; all at once."""
+    columns = (
+        Column("Requirement", "text", 2.3),
+        Column("Limit", "text", 1.9),
+        Column("Demonstrated", "text", 1.8),
+        Column("Margin", "number", 1.4),
+        Column("Inside / tried", "number", 1.5),
+        Column("Demonstrated probability", "number", 1.8),
+        Column("Verdict", "text", 2.0),
+    )
+    records = flown.manifest.get("requirements", [])
+    sources = [str(record.get("source") or "") for record in records]
+    rows = [_requirement_row(flown, *pair) for pair in zip(flown.verdicts, sources, strict=True)]
+    note = (
+        "Margin: from the demonstrated bound (tolerance limit) to the nearest limit; in brackets, relative to the "
+        "width of the limits. "
+        f"Demonstrated probability: observed fraction of the cases, in brackets {_bounds_named(flown)}. A failed case, "
+        "or one whose metric is not a number, counts as outside."
+    )
+    if flown.joint is not None:
+        rows.append(_requirement_row(flown, flown.joint, ""))
+        note += (
+            " All at once: cases inside every limit; required is 100 % less what each requirement may miss. It "
+            "passes where that is demonstrated and every requirement passes, and fails where one of them fails with "
+            "confidence shared (next table)."
+        )
+    return Table("Verification matrix", columns, tuple(rows), note)
+
+
+def _bounds_named(flown: Flown) -> str:
+    if not flown.looked:
+        return "the Clopper–Pearson bounds, each holding with the confidence required"
+    return (
+        "bounds that hold, each with the confidence required, at every number of cases at once (Robbins’ mixture): "
+        "the number of cases was decided by interim analyses"
+    )
+
+
+def _requirement_row(flown: Flown, verdict: Verdict, source: str) -> tuple[Cell, ...]:
+    unit = flown.unit(verdict.metric)
+    lost = f"{count(verdict.no_number)} without a number" if verdict.no_number else ""
+    bounds = f"[{percent(verdict.lower)}, {percent(verdict.upper)}]" if verdict.lower is not None else ""
+    needed = f"needs {count(verdict.needed)} cases" if verdict.needed else ""
+    asked = f"for {percent(verdict.share, 3)} with {percent(verdict.confidence)} confidence"
+    what = "; ".join(filter(None, (flown.words(verdict.metric), source)))
+    return (
+        Cell(verdict.name, small=what),
+        Cell(limit_text(verdict, unit) if verdict.metric else "all limits", small=asked),
+        Cell(_limit_shown(verdict, unit)),
+        _margin_cell(verdict, unit),
+        Cell(f"{count(verdict.passed)} / {count(verdict.tried)}", verdict.passed, lost),
+        Cell(percent(verdict.estimate), verdict.estimate, bounds),
+        Cell(verdict.outcome, small=needed, tone=TONES[verdict.outcome]),
+    )
+
+
+def _margin_cell(verdict: Verdict, unit: str) -> Cell:
+    if verdict.margin is None:
+        return Cell("–")
+    limits = Limits(verdict.at_most, verdict.at_least)
+    share = f"({number(100.0 * verdict.margin / limits.width, 3)}{SPACE}%)" if _has_width(limits) else ""
+    return Cell(with_unit(number(verdict.margin, 3), unit), verdict.margin, share)
+
+
+def _limit_shown(verdict: Verdict, unit: str) -> str:
+    if verdict.enclosed is not None:
+        low, high = verdict.enclosed
+        fine = 0.01 * (high - low)  # the ends to four digits of the width
+        return f"{number(low, scale=fine)} to {with_unit(number(high, scale=fine), unit)}"
+    return "–" if verdict.demonstrated is None else with_unit(number(verdict.demonstrated), unit)
+
+
+def risk_table(flown: Flown) -> Table | None:
+    """How much the verdicts can be wrong, one by one and together; None without a random sample."""
+    judged = [*flown.verdicts, *([flown.joint] if flown.joint is not None else [])]
+    if not flown.random or not flown.n_tried or not judged:
+        return None
+    columns: tuple[Column, ...] = (
+        Column("Requirement", "text", 2.0),
+        Column("Outside", "number", 1.0),
+        Column("Allowed outside", "number", 1.3),
+        Column("Consumer’s risk", "number", 1.3),
+        Column("Producer’s risk", "number", 1.3),
+        Column("With confidence shared", "text", 1.7),
+    )
+    rows = tuple(_risk_row(verdict, len(judged)) for verdict in judged)
+    note = f"Allowed outside: the most of these {count(flown.n_tried)} cases with which the requirement still passes. "
+    if flown.looked:
+        note += (
+            "The number of cases was decided by interim analyses: the consumer’s risk is then below the figure given, "
+            "whatever the stopping rule, and the producer’s risk has no figure. "
+        )
+    if len(flown.verdicts) > 1:
+        note += (
+            "With confidence shared: the verdict if all verdicts together are to hold with their confidence, each "
+            f"taking 1/{len(judged)} of the error allowed (Bonferroni). That every requirement is met needs no such "
+            "sharing (Berger 1982)."
+        )
+    else:
+        columns, rows = columns[:-1], tuple(row[:-1] for row in rows)
+    return Table("Risks of the verdicts", columns, rows, note)
+
+
+def _risk_row(verdict: Verdict, among: int) -> tuple[Cell, ...]:
+    outside = verdict.tried - verdict.passed
+    allowed = (
+        Cell("none suffices", -1.0) if verdict.accepted is None else Cell(count(verdict.accepted), verdict.accepted)
+    )
+    if verdict.looked:
+        consumer = Cell(f"below {percent(1.0 - verdict.confidence)}", 1.0 - verdict.confidence)
+    else:
+        consumer = Cell(percent(verdict.consumer_risk), verdict.consumer_risk)
+    shared = f"with {percent(1.0 - (1.0 - verdict.confidence) / among)} each"
+    return (
+        Cell(verdict.name, small=verdict.metric),
+        Cell(count(outside), outside),
+        allowed,
+        consumer,
+        Cell(percent(verdict.producer_risk), verdict.producer_risk),
+        Cell(verdict.shared_outcome, small=shared),
+    )

@@ -1,0 +1,86 @@
+"""The scenario of a run: what flies, what happens when, what is assumed, and what is dispersed."""
+
+from collections.abc import Iterator
+
+from mc_engine.units import UNITS, convert
+from reports.document.blocks import Cell, Column, Table
+from reports.run.flown import Flown
+from reports.sections.tables import fixed_table, input_table
+from reports.text.numbers import counted, number, with_unit
+
+AT_EVENT = 4  # numbers that a row of the timeline tells
+
+
+def scenario_blocks(flown: Flown) -> Iterator[Table | str | None]:
+    """The vehicle and the campaign in words, the timeline of the nominal case, assumptions and dispersions."""
+    yield _vehicle(flown)
+    yield timeline_table(flown)
+    changed = fixed_table(flown, "Assumptions: values set by the campaign file", True)
+    if changed is None and flown.manifest.get("parameters"):
+        yield "All parameters and settings that are not dispersed have the model’s own values (appendix Inputs)."
+    yield changed
+    yield input_table(flown) or "No input is dispersed: all cases are the nominal one."
+
+
+def _vehicle(flown: Flown) -> str:
+    model, upstream = flown.manifest.get("model", {}), flown.manifest.get("upstream")
+    said = [f"{model['title']}." if model.get("title") else ""]
+    said.append(f"Source of the model: {model['source'].rstrip('.')}." if model.get("source") else "")
+    dispersed = counted(len(flown.with_role("dispersion")), "dispersed input")
+    said.append(
+        f"{counted(flown.n_wanted, 'case')} of the design “{flown.design}” with {dispersed}, and one nominal case with "
+        "all inputs at their nominal values."
+    )
+    if upstream:
+        said.append(f"Each case continues a case of the run of {upstream['name']}.")
+    return " ".join(filter(None, said))
+
+
+def timeline_table(flown: Flown) -> Table | None:
+    """The events of the nominal case whose times the metrics tell, in their order; None where they tell none."""
+    times = {}
+    for fact in flown.with_role("metric"):
+        words, value = flown.words(fact.name), flown.own.nominal_value(fact.name)
+        if value is not None and _is_time(flown.own.unit(fact.name)) and words.endswith(" time"):
+            times[fact.name] = words.removesuffix(" time")
+    if not times:
+        return None
+    rows = []
+    for name in sorted(times, key=lambda event: _seconds(flown, event)):
+        summary, event = flown.summaries[name], times[name]
+        spread = "–" if summary.sd is None else number(0.0 if summary.constant else summary.sd, 3)
+        rows.append(
+            (
+                Cell(event[:1].upper() + event[1:], small=flown.columns[name].description),
+                Cell(with_unit(number(flown.nominal_value(name), 5), flown.unit(name)), _seconds(flown, name)),
+                Cell(with_unit(spread, flown.unit(name)) if summary.sd is not None else "–", summary.sd),
+                Cell("; ".join(_at_event(flown, name, event)) or "–"),
+            )
+        )
+    columns = (
+        Column("Event", "text", 2.6),
+        Column("Nominal time", "number", 1.4),
+        Column("1σ of the cases", "number", 1.4),
+        Column("Nominal values at the event", "text", 4.0),
+    )
+    return Table("Timeline of the nominal case", columns, tuple(rows))
+
+
+def _is_time(unit: str) -> bool:
+    return unit in UNITS and UNITS[unit].quantity == "time"
+
+
+def _seconds(flown: Flown, name: str) -> float:
+    return convert(float(flown.own.nominal_value(name) or 0.0), flown.own.unit(name), "s")
+
+
+def _at_event(flown: Flown, name: str, event: str) -> Iterator[str]:
+    """What else the metrics tell of an event: those whose names begin like that of its time."""
+    stem = f"{event.replace(' ', '_')}_"
+    told = 0
+    for fact in flown.with_role("metric"):
+        value = flown.nominal_value(fact.name)
+        if fact.name.startswith(stem) and fact.name != name and value is not None and told < AT_EVENT:
+            told += 1
+            words = flown.words(fact.name).removeprefix(event).strip() or event
+            yield f"{words} {with_unit(number(value, 4), flown.unit(fact.name))}"

@@ -1,0 +1,216 @@
+"""The tables of results: verdicts, summaries, quantiles, published values, statuses, worst cases."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from mc_engine.statistics import Summary, Verdict
+from mc_engine.units import convert
+from reports.document.blocks import Cell, Column, Table
+from reports.run.chosen_units import chosen_unit
+from reports.run.flown import Flown
+from reports.text.numbers import axis_label, count, exact, interval, number, percent, with_unit
+
+TONES = {"pass": "good", "fail": "bad", "not demonstrable": "open"}
+REASONS_SHOWN = 20
+LONGEST_NUMBER = 14  # letters of a parameter’s value; a longer one is a computed number
+
+
+def limit_text(verdict: Verdict, unit: str) -> str:
+    """The required limit in words: at most 2.5 kg."""
+    at_most = None if verdict.at_most is None else with_unit(number(verdict.at_most), unit)
+    at_least = None if verdict.at_least is None else with_unit(number(verdict.at_least), unit)
+    if at_most and at_least:
+        return f"from {at_least} to {at_most}"
+    return f"at most {at_most}" if at_most else f"at least {at_least}"
+
+
+def summary_table(flown: Flown) -> Table:
+    """Moments and range of every metric that has a number, beside its nominal value."""
+    columns = (
+        Column("Metric", "text", 3.0),
+        Column("Used / tried", "number", 1.75),
+        Column("Nominal", "number", 1.45),
+        Column("Mean", "number", 1.45),
+        Column("Std. dev.", "number", 1.3),
+        Column("Smallest", "number", 1.45),
+        Column("Largest", "number", 1.45),
+        Column("Shape", "text", 1.5),
+    )
+    rows = []
+    for name, summary in flown.summaries.items():
+        nominal = flown.nominal_value(name)
+        if not summary.n_used:
+            continue
+        cells = [(value, number(value, scale=summary.spread)) for value in (nominal, summary.mean)]
+        cells += [(summary.sd, "0" if summary.constant and summary.sd else number(summary.sd, scale=summary.spread))]
+        cells += [(value, number(value, scale=summary.spread)) for value in (summary.minimum, summary.maximum)]
+        used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
+        rows.append(
+            (metric_cell(flown, name), used, *(Cell(text, value) for value, text in cells), shape_cell(summary))
+        )
+    note = (
+        "Used / tried: cases with a number, of all cases flown. Shape: skewness and excess kurtosis, both 0 for a "
+        "normal distribution; “not normal” where they and the D’Agostino–Pearson test agree."
+    )
+    return Table("Statistics of the metrics", columns, tuple(rows), note)
+
+
+def metric_cell(flown: Flown, name: str) -> Cell:
+    """A metric with its unit; below, its meaning, or its column's name."""
+    return Cell(axis_label(flown.words(name), flown.unit(name)), small=flown.columns[name].description or name)
+
+
+def shape_cell(summary: Summary) -> Cell:
+    """Skewness and kurtosis in words."""
+    if summary.constant:
+        return Cell("constant", small="" if summary.minimum == summary.maximum else "but for rounding")
+    if summary.shape is None:
+        return Cell("–")
+    shape = summary.shape
+    figures = f"{shape.skewness:.2f}, {shape.excess_kurtosis:.2f}".replace("-", "−")
+    return Cell("near normal" if shape.looks_normal else "not normal", small=figures)
+
+
+def quantile_table(flown: Flown) -> Table | None:
+    """The quantiles of every metric with their intervals; None if no metric has one."""
+    drawn = {name: summary for name, summary in flown.summaries.items() if summary.quantiles and not summary.constant}
+    if not drawn:
+        return None
+    shown = (flown.stated.outer[0], 0.5, flown.stated.outer[1])
+    columns = (
+        Column("Metric", "text", 2.6),
+        Column("Used / tried", "number", 1.75),
+        *(Column(percent(probability, 3), "number", 2.0) for probability in shown),
+    )
+    rows = []
+    for name, summary in drawn.items():
+        cells = [
+            Cell(
+                number(item.value, scale=summary.spread),
+                item.value,
+                interval(item.lower, item.upper, summary.spread) if flown.random else "",
+            )
+            for item in summary.quantiles
+            if item.probability in shown
+        ]
+        used = Cell(f"{count(summary.n_used)} / {count(summary.n_tried)}", summary.n_used)
+        rows.append((Cell(axis_label(flown.words(name), flown.unit(name))), used, *cells))
+    each = percent(flown.stated.confidence)
+    note = (
+        f"In brackets: distribution-free limits from order statistics, each holding with {each}{_for_fixed(flown)}; "
+        if flown.random
+        else ""
+    )
+    note += (
+        "a dash: too few cases for a limit." if flown.random else "Percentiles of the flown cases, not of a population."
+    )
+    return Table("Percentiles of the metrics", columns, tuple(rows), note)
+
+
+def _for_fixed(flown: Flown) -> str:
+    """A restriction for bounds of a run whose number of cases was decided by interim analyses; else empty."""
+    if not flown.looked:
+        return ""
+    return " for a number of cases fixed in advance (with interim analyses they hold somewhat less often)"
+
+
+def status_table(flown: Flown) -> Table:
+    """Completion of the cases: each status with its meaning; reasons of refused and failed cases below it."""
+    columns = (
+        Column("Status", "code", 1.2),
+        Column("Cases", "number", 1.0),
+        Column("Fraction", "number", 1.0),
+        Column("Meaning", "text", 6.0),
+    )
+    counts = flown.every.statuses
+    words = sorted(counts, key=lambda word: (word != "ok", -counts[word], word))
+    rows = [_status_row(word, counts[word], flown.n_tried, flown.status_text(word)) for word in words]
+    rows += [_status_row("", cases, flown.n_tried, reason) for reason, cases in _reasons(flown)]
+    rows.append(_status_row("all", flown.n_tried, flown.n_tried, f"flown of {count(flown.n_wanted)} required"))
+    return Table("Completion of the cases", columns, tuple(rows))
+
+
+def _reasons(flown: Flown) -> list[tuple[str, int]]:
+    reasons = [(f"reason: {reason}", cases) for reason, cases in flown.every.reasons.items()]
+    if len(reasons) > REASONS_SHOWN:
+        rest = reasons[REASONS_SHOWN - 1 :]
+        reasons = [*reasons[: REASONS_SHOWN - 1], (f"{len(rest)} other reasons", sum(cases for _, cases in rest))]
+    return reasons
+
+
+def _status_row(word: str, cases: int, tried: int, text: str) -> tuple[Cell, ...]:
+    share = cases / tried if tried else None
+    return Cell(word), Cell(count(cases), cases), Cell(percent(share), share), Cell(text)
+
+
+def fixed_table(flown: Flown, caption: str, overridden: bool) -> Table | None:
+    """Parameters and settings that all cases share: those that the campaign file sets, or the others; None for none."""
+    records = [
+        record
+        for key in ("parameters", "settings")
+        for record in flown.manifest.get(key, [])
+        if bool(record.get("overridden")) == overridden
+    ]
+    return value_table(records, caption)
+
+
+def value_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table | None:
+    """Parameters and settings with their values; None for none."""
+    columns = (Column("Name", "name", 2.2), Column("Value", "number", 1.3), Column("Meaning", "text", 4.0))
+    rows = tuple(_fixed_row(record) for record in records)
+    return Table(caption, columns, rows) if rows else None
+
+
+def dispersed_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table:
+    """Inputs with their distributions and sources."""
+    columns = (Column("Input", "name", 2.4), Column("Distribution", "text", 2.6), Column("Source", "text", 3.0))
+    rows = tuple(
+        (
+            Cell(axis_label(record["name"], record["unit"]), small=record["description"]),
+            Cell(", ".join(filter(None, (record["distribution"], record.get("bounds", ""))))),
+            Cell(record["source"] or "not stated"),
+        )
+        for record in records
+    )
+    return Table(caption, columns, rows)
+
+
+def _fixed_row(record: Mapping[str, Any]) -> tuple[Cell, ...]:
+    value, unit = record.get("value", ""), record.get("unit", "")
+    text = exact(value)
+    if isinstance(value, float):
+        shown = chosen_unit(unit, [value])
+        converted = exact(float(f"{convert(value, unit, shown):.12g}")) if shown != unit else text
+        if len(converted) < len(text):
+            text, unit = converted, shown
+        text = text if len(text) <= LONGEST_NUMBER else number(value, 8)
+    sort = float(value) if isinstance(value, int | float) else None
+    return Cell(str(record["name"])), Cell(with_unit(text, unit), sort), Cell(str(record.get("description", "")))
+
+
+def input_table(flown: Flown) -> Table | None:
+    """The dispersed inputs: nominal, distribution, source, and the range that was drawn."""
+    records = flown.manifest.get("inputs", [])
+    columns = (
+        Column("Input", "name", 2.4),
+        Column("Nominal", "number", 1.1),
+        Column("Distribution", "text", 2.2),
+        Column("Drawn", "number", 1.8),
+        Column("Source", "text", 2.4),
+    )
+    rows = []
+    for record in records:
+        name, unit = str(record["name"]), str(record.get("unit", ""))
+        ends = flown.every.ends(name)
+        drawn = f"{number(ends[0], 4)} to {number(ends[1], 4)}" if ends else "–"
+        nominal = record.get("nominal", "")
+        rows.append(
+            (
+                Cell(axis_label(name, unit), small=str(record.get("description", ""))),
+                Cell(exact(nominal) if nominal != "" else "–"),
+                Cell(str(record.get("distribution", ""))),
+                Cell(drawn),
+                Cell(str(record.get("source") or "not stated"), small=str(record.get("note") or "")),
+            )
+        )
+    return Table("Dispersed inputs", columns, tuple(rows)) if rows else None

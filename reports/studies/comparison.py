@@ -1,0 +1,367 @@
+"""What `mc-engine compare A B --report FILE` writes: the comparison of two runs as a page or as a PDF."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from mc_engine.durable_file import write_durably
+from mc_engine.statistics.change_tests import UNKNOWN, Estimate, MetricChange, ShareChange, finite
+from mc_engine.studies.comparison import Comparison, VerdictChange
+from mc_engine.studies.run_changes import Difference
+from reports.document.blocks import (
+    Block,
+    Card,
+    Cell,
+    Column,
+    Document,
+    FigureBlock,
+    Section,
+    Table,
+    Terms,
+    as_blocks,
+    numbered,
+)
+from reports.drawing.marks import Drawing
+from reports.figures.rows import change_panel
+from reports.formats.html import render_html
+from reports.formats.pdf import render_pdf
+from reports.run.flown import Flown, Run
+from reports.studies.comparison_overlays import overlay_blocks
+from reports.text.numbers import count, number, percent, with_unit, words
+
+MOST_ROWS = 40  # of the figure
+LEAST_P = 1e-12  # a smaller p-value means no more
+WIDEST, FEW_SIGMA = 20.0, 5.0  # the axis of shifts: so many medians, or so many σ at least
+GLOSSARY = Terms(
+    (
+        (
+            "significant",
+            "Its adjusted p-value is at most alpha. Holm’s adjustment covers all tests of this comparison together: if "
+            "nothing had changed, the chance of even one significant line is at most alpha.",
+        ),
+        (
+            "paired",
+            "The same case, with the same inputs, in both runs: what the inputs do is taken out of the difference. "
+            "Otherwise the runs are two independent samples.",
+        ),
+        (
+            "shift",
+            "The shift from run A to run B that the test does not distinguish from none: the Hodges–Lehmann "
+            "estimate, in standard deviations σ of run A. Means of both runs are in columns of their own.",
+        ),
+        ("spread", "The ratio, run B over run A, of the distances from each run’s own median, estimated likewise."),
+        (
+            "tests",
+            "Paired: Wilcoxon’s signed ranks of the differences, and of the distances to each run’s own median; "
+            "McNemar’s exact test of a fraction. Unpaired: normal scores, Brown and Forsythe’s test, Fisher’s exact "
+            "test. They are distribution-free. Each size and interval of a metric is of the quantity that its test is "
+            "of: the interval excludes no change exactly where the test, by itself, finds one.",
+        ),
+        (
+            "intervals",
+            "They hold with the confidence of run B’s [report], one by one; they are not widened for their number.",
+        ),
+    )
+)
+
+
+def write_comparison(comparison: Comparison, path: Path, runs: tuple[Run, Run] | None = None) -> Path:
+    """Write the comparison to `path`, a page if it ends in .html, else a PDF; the file appears whole or not at all.
+
+    runs : A and B, whose distributions, histories and footprints are laid over one another.
+    """
+    document = build_comparison(comparison, runs)
+    content = render_html(document) if path.suffix == ".html" else render_pdf(document)
+    write_durably(path, content)
+    return path
+
+
+def build_comparison(comparison: Comparison, runs: tuple[Run, Run] | None = None) -> Document:
+    """The comparison as a document: requirements first, then metrics, then what was edited in code and campaign."""
+    overlays: tuple[Block, ...] = ()
+    if runs is not None:
+        pair = Flown(runs[0], comparison.names[0]), Flown(runs[1], comparison.names[1])
+        overlays = as_blocks(overlay_blocks(pair, [change.metric for change in _ranked(comparison)]))
+    sections = (
+        Section("requirements", "Requirements", as_blocks([_verdict_table(comparison), _share_table(comparison)])),
+        Section("metrics", "Metrics", as_blocks(_metric_blocks(comparison))),
+        Section("overlays", "Both runs over one another", overlays),
+        Section("code", "Changes in the code", as_blocks([_difference_block("Code", comparison.code)])),
+        Section("campaign", "Changes in the campaign", as_blocks(_campaign_blocks(comparison))),
+        Section("reading", "Glossary", (GLOSSARY,)),
+    )
+    return numbered(
+        Document(
+            kind="Comparison of two runs",
+            question="Changes",
+            title=comparison.titles[1]
+            if comparison.titles[0] == comparison.titles[1]
+            else " and ".join(comparison.titles),
+            subtitle=_change_sentence(comparison),
+            created=comparison.created[1],
+            facts=_run_facts(comparison),
+            verdicts=tuple(_change_cards(comparison)),
+            costs=(),
+            warnings=_comparison_warnings(comparison),
+            sections=tuple(section for section in sections if section.blocks),
+        )
+    )
+
+
+# ---- the headline
+
+
+def _change_sentence(comparison: Comparison) -> str:
+    chance = f"{count(comparison.n_tests)} tests; at most {percent(comparison.alpha)} chance of any false alarm"
+    what = (
+        "Significant changes from run A to run B" if comparison.changed else "No significant change from run A to run B"
+    )
+    turned = [f"{verdict.name}: {verdict.words}" for verdict in comparison.verdicts if verdict.before != verdict.after]
+    verdicts = f"Requirements: {'; '.join(turned)}. " if turned else ""
+    return f"{verdicts}{what} ({chance})."
+
+
+def _run_facts(comparison: Comparison) -> tuple[tuple[str, str], ...]:
+    reason = comparison.pairing.reason
+    facts = []
+    for letter, name, cases, ok, created in zip(
+        "AB", comparison.names, comparison.cases, comparison.ok, comparison.created, strict=True
+    ):
+        flown = f"{count(cases)} cases, {count(ok)} completed"
+        facts.append((f"Run {letter}", f"{name}: {flown}, {created[:16].replace('T', ' ')}".rstrip(", ")))
+    return (*facts, ("Cases", f"{reason[:1].upper()}{reason[1:]}"))
+
+
+def _change_cards(comparison: Comparison) -> Iterator[Card]:
+    for verdict in comparison.verdicts:
+        if verdict.before != verdict.after:
+            yield Card(verdict.name, verdict.words, verdict.inside_words(count), _tone(verdict) or "open")
+    same = [verdict for verdict in comparison.verdicts if verdict.before == verdict.after]
+    if same:
+        detail = "; ".join(
+            f"{verdict.name}: {verdict.words}, {verdict.inside_words(count)}".rstrip(", ") for verdict in same
+        )
+        yield Card(
+            "Other requirements" if len(same) < len(comparison.verdicts) else "Requirements", "same verdicts", detail
+        )
+    total = len(comparison.metrics)
+    for label, moved, what in (("Shift", comparison.shifted, "mean"), ("Spread", comparison.spread, "spread")):
+        ranked = sorted(moved, key=lambda change: -change.effect)
+        names = ", ".join(words(change.metric, comparison.units[change.metric]) for change in ranked[:4])
+        more = f" and {len(moved) - 4} more" if len(moved) > 4 else ""
+        detail = (
+            f"of {count(total)} metrics: {names}{more}" if moved else f"the {what} of none of {count(total)} metrics"
+        )
+        yield Card(label, f"{count(len(moved))} changed" if moved else "no change", detail, "bad" if moved else "good")
+    shares = comparison.moved_shares
+    detail = ", ".join(share.name for share in shares) or f"none of {count(len(comparison.shares))} fractions of cases"
+    yield Card(
+        "Fractions of cases", f"{len(shares)} changed" if shares else "no change", detail, "bad" if shares else "good"
+    )
+
+
+def _comparison_warnings(comparison: Comparison) -> tuple[str, ...]:
+    sentences = [f"Not compared: {sentence}." for sentence in comparison.left_out]
+    if not comparison.pairing.paired and any(verdict.worse for verdict in comparison.verdicts):
+        sentences.append("The runs flew other cases: chance alone may have changed the verdict of a requirement.")
+    return tuple(sentences)
+
+
+# ---- metrics
+
+
+def _metric_blocks(comparison: Comparison) -> Iterator[FigureBlock | Table | str]:
+    if not comparison.metrics:
+        yield "The runs have no metric in common."
+        return
+    moved = _ranked(comparison)
+    drawn = [change for change in moved if finite(change.shift_in_sigma) or finite(change.ratio)]
+    if drawn:
+        yield _change_figure(comparison, drawn)
+    if moved:
+        yield _metric_table(comparison, moved)
+    same = [metric.metric for metric in comparison.metrics if metric.same]
+    if same:
+        yield f"The same in both runs: {', '.join(same)}."
+    absent = [metric.metric for metric in comparison.metrics if not metric.same and not finite(metric.shift)]
+    if absent:
+        yield f"Without a number in one of the runs: {', '.join(absent)}."
+
+
+def _ranked(comparison: Comparison) -> list[MetricChange]:
+    """The metrics that differ, the largest effect first."""
+    return sorted(
+        (metric for metric in comparison.metrics if not metric.same and finite(metric.shift)),
+        key=lambda change: -change.effect,
+    )
+
+
+def _change_figure(comparison: Comparison, moved: list[MetricChange]) -> FigureBlock:
+    shown = moved[:MOST_ROWS]
+    reach = _reach([abs(item.shift_in_sigma.value) for item in shown])
+    far = [item for item in shown if abs(item.shift_in_sigma.value) > reach]
+    names = tuple(words(item.metric, comparison.units[item.metric]) for item in shown)
+    caption = "How far each metric moved and how much its spread changed from run A to run B"
+    if len(shown) < len(moved):
+        caption += f"; the {len(shown)} of {len(moved)} metrics with the largest changes"
+    if far:
+        values = (
+            f"{words(change.metric, comparison.units[change.metric])} {number(change.shift_in_sigma.value, 3)} σ"
+            for change in far
+        )
+        caption += f". Shifts beyond the axis, not drawn: {', '.join(values)}"
+    shifts = [UNKNOWN if item in far else item.shift_in_sigma for item in shown]
+    shifted, spread = (np.array([getattr(item, p) <= comparison.alpha for item in shown], dtype=bool)
+                       for p in ("shift_adjusted", "spread_adjusted"))  # fmt: skip
+    ratios, interval = [item.ratio for item in shown], percent(comparison.confidence)
+    plots = (
+        change_panel("Shift [σ of run A]", names, _ends(shifts), shifted, 0.0, interval),
+        change_panel("Spread, run B over run A", names, _ends(ratios), spread, 1.0, interval),
+    )
+    return FigureBlock(f"{caption}.", Drawing("Changes from run A to run B", plots), "half")
+
+
+def _reach(shifts: list[float]) -> float:
+    """The largest shift on the axis; shifts far beyond most others are told in the caption instead."""
+    known = np.sort([shift for shift in shifts if np.isfinite(shift)])
+    return max(WIDEST * float(np.quantile(known, 0.5, method="lower")), FEW_SIGMA) if known.size else FEW_SIGMA
+
+
+def _ends(estimates: list[Estimate]) -> np.ndarray:
+    """float64[n, 3]: values and both ends of their intervals."""
+    return np.array(
+        [(estimate.value, estimate.lower, estimate.upper) for estimate in estimates], dtype=np.float64
+    ).reshape(-1, 3)
+
+
+def _metric_table(comparison: Comparison, moved: list[MetricChange]) -> Table:
+    columns = (
+        Column("Metric", "text", 2.6),
+        Column("Mean A", "number", 1.4),
+        Column("Mean B", "number", 1.4),
+        Column("Shift [σ]", "number", 1.6),
+        Column("Adjusted p", "number", 1.3),
+        Column("Spread B/A", "number", 1.6),
+        Column("Adjusted p", "number", 1.3),
+    )
+    note = (
+        f"The largest change first. Small: the {percent(comparison.confidence)} interval of the quantity that the test "
+        "is of; cases used of cases flown. σ: standard deviation of run A."
+    )
+    return Table("Metrics of both runs", columns, tuple(_metric_row(comparison, change) for change in moved), note)
+
+
+def _metric_row(comparison: Comparison, change: MetricChange) -> tuple[Cell, ...]:
+    unit = comparison.units[change.metric]
+    used = " and ".join(f"{count(k)} / {count(n)}" for k, n in zip(change.n_used, change.n_tried, strict=True))
+    if change.differing is not None:
+        used = f"{count(change.differing)} of {count(change.n_used[0])} pairs differ"
+        lost = change.n_tried[0] - change.n_used[0]
+        used += f", {count(lost)} without a number" if lost else ""
+    return (
+        Cell(with_unit(words(change.metric, unit), f"[{unit}]" if unit else ""), small=used),
+        *(_number_cell(value, change.deviation[0]) for value in change.mean),
+        _estimate_cell(change.shift_in_sigma),
+        _p_value_cell(change.shift_adjusted, comparison.alpha),
+        _estimate_cell(change.ratio),
+        _p_value_cell(change.spread_adjusted, comparison.alpha),
+    )
+
+
+def _number_cell(value: float, scale: float) -> Cell:
+    return Cell(number(value, scale=scale), value) if np.isfinite(value) else Cell("–")
+
+
+def _estimate_cell(estimate: Estimate) -> Cell:
+    if not finite(estimate):
+        return Cell("–")
+    ends = f"[{number(estimate.lower, 3)}, {number(estimate.upper, 3)}]"
+    return Cell(number(estimate.value, 3), estimate.value, ends)
+
+
+def _p_value_cell(value: float, alpha: float) -> Cell:
+    if not np.isfinite(value):
+        return Cell("no test")
+    text = number(value, 2) if value >= LEAST_P else f"< {number(LEAST_P, 2)}"
+    return Cell(text, value, tone="bad" if value <= alpha else "")
+
+
+# ---- shares and requirements
+
+
+def _share_table(comparison: Comparison) -> Table:
+    columns = (
+        Column("Cases", "text", 2.0),
+        Column("Run A", "number", 1.5),
+        Column("Run B", "number", 1.5),
+        Column("Difference", "number", 2.2),
+        Column("Adjusted p", "number", 1.2),
+    )
+    note = "Requirements are counted by the limits of run B in both runs; a case without a number is outside."
+    return Table(
+        "Fractions of the cases in both runs",
+        columns,
+        tuple(_share_row(share, comparison.alpha) for share in comparison.shares),
+        note,
+    )
+
+
+def _share_row(change: ShareChange, alpha: float) -> tuple[Cell, ...]:
+    runs = [
+        Cell(percent(k / n) if n else "–", k / n if n else None, f"{count(k)} / {count(n)}")
+        for k, n in zip(change.counted, change.tried, strict=True)
+    ]
+    pairs = f"{count(change.lost)} lost, {count(change.gained or 0)} gained" if change.lost is not None else ""
+    return (
+        Cell(change.name, small=pairs),
+        *runs,
+        _estimate_cell(change.difference),
+        _p_value_cell(change.adjusted, alpha),
+    )
+
+
+def _verdict_table(comparison: Comparison) -> Table | None:
+    if not comparison.verdicts:
+        return None
+    columns = (Column("Requirement", "text", 2.0), Column("Run A", "text", 1.6), Column("Run B", "text", 1.6),
+               Column("Change", "text", 3.4))  # fmt: skip
+    rows = tuple(
+        (
+            Cell(verdict.name),
+            Cell(verdict.before or "not required"),
+            Cell(verdict.after or "not required", tone=_tone(verdict)),
+            Cell(verdict.words, small=verdict.inside_words(count)),
+        )
+        for verdict in comparison.verdicts
+    )
+    return Table("Verdicts, each by its own run’s requirement", columns, rows)
+
+
+def _tone(change: VerdictChange) -> str:
+    if change.worse:
+        return "bad"
+    return "good" if change.after == "pass" else ""
+
+
+# ---- code and campaign
+
+
+def _difference_block(what: str, differences: tuple[Difference, ...]) -> Table | str:
+    if not differences:
+        return f"{what}: the same in both runs."
+    columns = (Column("What", "text", 1.6), Column("Run A", "code", 2.4), Column("Run B", "code", 2.4))
+    rows = tuple(
+        (Cell(difference.what), Cell(difference.before or "–"), Cell(difference.after or "–"))
+        for difference in differences
+    )
+    return Table(f"{what}: what is not the same", columns, rows)
+
+
+def _campaign_blocks(comparison: Comparison) -> Iterator[Table | str]:
+    yield _difference_block("Campaign", comparison.campaign)
+    if comparison.diff:
+        rows = tuple((Cell(line[:1]), Cell(line[1:])) for line in comparison.diff if not line.startswith("@@"))
+        columns = (Column("", "code", 0.3), Column("Line of campaign.toml", "code", 6.0))
+        note = "−: a line of run A alone; +: a line of run B alone; others are in both."
+        yield Table("The two campaign files", columns, rows, note)

@@ -1,0 +1,117 @@
+"""The distributions, time histories and footprints of two runs, laid over one another."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from mc_engine.model.figures import FootprintFigure, HistoryFigure
+from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
+from reports.document.blocks import FigureBlock
+from reports.drawing.marks import Axis, Band, Drawing, Line, Plot, Points, between
+from reports.drawing.palette import BLUE, VERMILION
+from reports.footprint.landings import landed, planet_of
+from reports.run.flown import Flown
+from reports.run.history_bands import fair_cases, history_envelopes
+from reports.text.numbers import count
+
+MOST_PANELS = 9
+MOST_POINTS = 2000  # of each run
+BINS = 40
+BINNED = "fraction of the cases in each bin"
+HEIGHT = 260.0  # pixels of a panel
+NAMES, COLOURS, SIGNS = ("run A", "run B"), (BLUE, VERMILION), ("circle", "diamond")
+FORM = "Two runs over one another"
+NOISE = 1e-9  # of the range over all saved cases: curves of a smaller one are rounding errors
+TAILS = (0.001, 0.999)  # of both runs, ends of the axis of a distribution
+
+
+def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterator[FigureBlock | str]:
+    """Figures of what both runs have; metrics : those whose distributions are drawn, in this order."""
+    panels = tuple(panel for name in metrics[:MOST_PANELS] if (panel := _distribution(runs, name)) is not None)
+    if panels:
+        caption = "Distributions of the metrics that changed, the largest change first."
+        yield FigureBlock(caption, Drawing(FORM, panels, 3), "small")
+    drawn = dict(_histories(runs))
+    panels = tuple(item for item in drawn.values() if item is not None)[:MOST_PANELS]
+    if panels:
+        caption = "Time histories of both runs: of the saved cases, or the nominal case where fewer than 20 are saved."
+        yield FigureBlock(caption, Drawing(FORM, panels, 3), "half")
+    if noise := [name for name, one in drawn.items() if one is None]:
+        yield f"Not drawn, rounding errors only in both nominal cases: {', '.join(noise)}."
+    for figure in (drawn for drawn in runs[1].figures if isinstance(drawn, FootprintFigure)):
+        footprint = _footprint(runs, figure)
+        if footprint is not None:
+            caption = f"{figure.title}, both runs. {_thinned_words(runs)}"
+            yield FigureBlock(caption, Drawing(FORM, (footprint,)), "wide")
+
+
+def _distribution(runs: tuple[Flown, Flown], name: str) -> Plot | None:
+    """Outlines of two histograms over common bins."""
+    values = [numbers[np.isfinite(numbers)] for numbers in (run.values(name) for run in runs)]
+    if min(value.size for value in values) == 0:
+        return None
+    low, high = (
+        pick([np.quantile(value, tail) for value in values]) for pick, tail in zip((min, max), TAILS, strict=True)
+    )
+    if not low < high:
+        return None
+    edges = np.linspace(low, high, BINS + 1)
+    marks = []
+    for run, value in enumerate(values):
+        height = np.histogram(value, edges)[0] / value.size
+        marks.append(_line(run, np.repeat(edges, 2), np.r_[0.0, np.repeat(height, 2), 0.0], BINNED))
+    return Plot(tuple(marks), Axis(runs[1].axis(name)), Axis("fraction of the cases"), height=HEIGHT)
+
+
+def _histories(runs: tuple[Flown, Flown]) -> Iterator[tuple[str, Plot | None]]:
+    """By quantity its panel, None where both curves are nothing beside those of the saved cases."""
+    wanted = [name for figure in runs[1].figures if isinstance(figure, HistoryFigure) for name in figure.quantities]
+    for name in dict.fromkeys(wanted):
+        if all(len(run.histories) and name in run.histories.columns for run in runs):
+            marks = [mark for run, flown in enumerate(runs) for mark in _history_marks(run, flown, name)]
+            if marks:
+                plot = Plot(tuple(marks), Axis("time [s]"), Axis(runs[1].axis(name)), height=HEIGHT)
+                low, high = Plot(tuple(marks), Axis(), Axis(margin=0.0)).ends[1]
+                saved = np.concatenate([run.histories[name].to_numpy(dtype=np.float64) for run in runs])
+                yield name, None if high - low < NOISE * np.ptp(saved[np.isfinite(saved)]) else plot
+
+
+def _history_marks(run: int, flown: Flown, name: str) -> Iterator[Band | Line]:
+    """The band and the median of the first cases; the nominal case where too few are saved."""
+    fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
+    band = history_envelopes(flown.histories, fair, [name]).get(name)
+    if band is not None:
+        key = f"{NAMES[run]}: smallest to largest"
+        yield between(band.at, band.curves[0.0], band.curves[1.0], COLOURS[run], 0.2, key=key)
+        yield _line(run, band.at, band.curves[0.5], "median")
+        return
+    rows = flown.histories[flown.histories["case_id"] == -1].sort_values("t_s")
+    if len(rows):
+        yield _line(run, rows["t_s"].to_numpy(np.float64), rows[name].to_numpy(np.float64), "nominal")
+
+
+def _line(run: int, x: np.ndarray, y: np.ndarray, what: str) -> Line:
+    return Line(x, y, COLOURS[run], NAMES[run], key=f"{NAMES[run]}: {what}")
+
+
+def _footprint(runs: tuple[Flown, Flown], figure: FootprintFigure) -> Plot | None:
+    """Impact points in the plane about the mean impact point of run A."""
+    places = [landed(run, figure) for run in runs]
+    if min(latitude.size for latitude, _ in places) == 0:
+        return None
+    plane = middle_plane(*places[0], ELLIPSOIDS.get(planet_of(runs[1], figure), WGS84))
+    if plane is None:
+        return None
+    marks = []
+    for run, (latitude, longitude) in enumerate(places):
+        rows = np.unique(np.linspace(0, latitude.size - 1, min(latitude.size, MOST_POINTS)).astype(np.int64))
+        points = plane.points(latitude[rows], longitude[rows]) / 1000.0
+        key = f"{NAMES[run]}: impact points"
+        marks.append(Points(points[:, 0], points[:, 1], COLOURS[run], NAMES[run], SIGNS[run], opacity=0.5, key=key))
+    east, north = "east of the mean impact point of run A [km]", "north of it [km]"
+    return Plot(tuple(marks), Axis(east), Axis(north), height=500.0, equal=True)
+
+
+def _thinned_words(runs: tuple[Flown, Flown]) -> str:
+    most = max(run.n_tried for run in runs)
+    return f"At most {count(MOST_POINTS)} cases of each run are drawn." if most > MOST_POINTS else ""

@@ -1,0 +1,313 @@
+"""The report of a rare event: how probable it is, how far that can be trusted, and what the failures look like."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from mc_engine.studies.rare_event_folder import RareEventRecord
+from reports.document.blocks import (
+    Block,
+    Card,
+    Cell,
+    Column,
+    Document,
+    FigureBlock,
+    Section,
+    Table,
+    Terms,
+    Text,
+    as_blocks,
+    numbered,
+)
+from reports.drawing.marks import Axis, Drawing, Limit, Line, Mark, Plot, Points, nominal_ring
+from reports.drawing.palette import BLUE, INK, PAPER, SKY, VERMILION
+from reports.sections.provenance import origin_table
+from reports.sections.tables import dispersed_table
+from reports.text.numbers import SPACE, axis_label, count, exact, named, number, percent, with_unit, words
+
+MOST_POINTS = 2000  # of a kind
+METHODS = {
+    "subset": "subset simulation",
+    "cross-entropy": "importance sampling by cross entropy",
+    "plain": "plain Monte Carlo",
+}
+GLOSSARY = Terms(
+    (
+        (
+            "margin",
+            "How far the metric is inside its limit, in its own unit; the nearer one of two limits. A case that did "
+            "not complete, or has no number, has failed.",
+        ),
+        (
+            "subset simulation",
+            "The tenth of the cases of a level with the smallest margins starts Markov chains, which give the cases of "
+            "the next level. The probability is the product of the fractions. Several runs are made, and the interval "
+            "comes from their scatter. Au & Beck (2001); Papaioannou and others (2015).",
+        ),
+        (
+            "cross entropy",
+            "Importance sampling: cases are drawn where failures are, from a density fitted in levels, and weighted by "
+            "the density of the dispersions over it. The interval is that of the last level. Papaioannou, Geyer & "
+            "Straub (2019).",
+        ),
+        (
+            "noise in flight",
+            "Where the model draws noise, the probability is over inputs and noise together: chains draw the noise of "
+            "a case anew in half of their steps and keep it in the others.",
+        ),
+        (
+            "sigma",
+            "An input’s distance from its median, as the normal deviation that is as improbable; for a normal input "
+            "its standard deviation.",
+        ),
+        (
+            "likeliest failed case",
+            "The design point: of all failed cases the one nearest to the medians of all dispersions together. Across: "
+            "the nearest one on the other side.",
+        ),
+    )
+)
+
+
+def build_rare_event(record: RareEventRecord, name: str) -> Document:
+    """The report of an estimate; `name` is its directory's name."""
+    campaign, result = record.record["campaign"], record.result
+    sections = (
+        Section("failures", "Failures", as_blocks(_failures(record))),
+        Section("levels", "Levels of the estimate", _levels(result)),
+        Section("inputs", "Dispersed inputs", (dispersed_table(record.record["inputs"], "Dispersed inputs"),)),
+        Section("provenance", "Provenance", (origin_table("estimate", name, record.record, _asked(record)),)),
+        Section("reading", "Glossary", (GLOSSARY,)),
+    )
+    return numbered(
+        Document(
+            kind="Rare-event report",
+            title=str(campaign.get("title") or name),
+            subtitle=_estimate_sentence(result),
+            created=str(record.record.get("created_utc", "")),
+            facts=_estimate_facts(record),
+            verdicts=(_verdict_card(result),),
+            costs=tuple(_cost_cards(result)),
+            warnings=tuple(result["remarks"]),
+            sections=sections,
+        )
+    )
+
+
+def _estimate_sentence(result: dict[str, Any]) -> str:
+    event = f"P({_event(result)})"
+    if not result["probability"]:
+        return f"No case failed: {event} < {number(result['upper'], 3)}. Requirement {_judged(result)[0]}."
+    return f"{event} = {number(result['probability'], 3)} ({_interval(result)}). Requirement {_judged(result)[0]}."
+
+
+def _event(result: dict[str, Any]) -> str:
+    """What the probability is of: the metric beyond a limit."""
+    requirement, unit = result["requirement"], result["metric"]["unit"]
+    name = words(requirement["metric"], unit)
+    limits = [("<", requirement["at_least"]), (">", requirement["at_most"])]
+    return " or ".join(f"{name} {sign} {with_unit(exact(limit), unit)}" for sign, limit in limits if limit is not None)
+
+
+def _interval(result: dict[str, Any]) -> str:
+    ends = f"{number(result['lower'], 3)} to {number(result['upper'], 3)}"
+    return f"{percent(result['confidence'])} confidence interval {ends}"
+
+
+def _judged(result: dict[str, Any]) -> tuple[str, str]:
+    """The verdict and its tone."""
+    allowed = 1.0 - result["requirement"]["share"]
+    if result["upper"] <= allowed:
+        return "met", "good"
+    return ("not met", "bad") if result["lower"] > allowed else ("open", "open")
+
+
+def _estimate_facts(record: RareEventRecord) -> tuple[tuple[str, str], ...]:
+    result, campaign = record.result, record.record["campaign"]
+    return (
+        ("Campaign", str(campaign["name"])),
+        ("Model", str(record.record["model"]["title"])),
+        ("Requirement", str(result["requirement"]["name"])),
+        ("Method", f"{METHODS[result['method']]}, seed {campaign['seed']}"),
+        ("Cases", f"{count(result['cases'])} flown, {count(result['failed'])} failed"),
+        ("Run", str(record.record["created_utc"])[:16].replace("T", " ") + " UTC"),
+    )
+
+
+def _verdict_card(result: dict[str, Any]) -> Card:
+    allowed = 1.0 - result["requirement"]["share"]
+    source = f" Source: {result['requirement']['source']}." if result["requirement"]["source"] else ""
+    answer, tone = _judged(result)
+    return Card(
+        label=result["requirement"]["name"],
+        answer=answer,
+        detail=f"Probability of failure {number(result['probability'], 3)}, {_interval(result)}; allowed: "
+        f"{number(allowed, 3)}.{source}",
+        tone=tone,
+    )
+
+
+def _cost_cards(result: dict[str, Any]) -> Iterator[Card]:
+    error = result["relative_error"]
+    yield Card(
+        label="standard error",
+        answer="none" if error is None else percent(error, 1),
+        detail="of the probability; the interval is a fifth wider than this error gives."
+        if result["method"] != "plain"
+        else "of the probability; the interval is Clopper and Pearson’s.",
+    )
+    plain = result["plain_cases"]
+    if plain is not None and result["method"] != "plain":
+        yield Card(
+            label="cases",
+            answer=count(result["cases"]),
+            detail=f"Plain Monte Carlo needs {number(plain, 3)} for the same standard error, "
+            f"{number(plain / result['cases'], 3)} times as many.",
+        )
+
+
+def _failures(record: RareEventRecord) -> Iterator[FigureBlock | Table | str | None]:
+    result = record.result
+    yield (
+        f"{count(result['failed'])} of {count(result['cases'])} cases failed"
+        + (f", {count(result['no_number'])} of them without a number" if result["no_number"] else "")
+        + ". All are in cases.parquet, with the level and the weight of each; the weights of those that "
+        "failed add up to the probability."
+    )
+    yield _failure_figure(record)
+    yield _input_table(result) if result["inputs"] else None
+
+
+def _main_inputs(result: dict[str, Any]) -> list[dict[str, Any]]:
+    """The inputs, the one whose failed cases lie farthest from its median first."""
+    return sorted(result["inputs"], key=lambda entry: -abs(entry["likeliest_sigma"]))
+
+
+def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
+    """The failed cases over their two main inputs, with the cases drawn from the dispersions beneath."""
+    cases, shown = record.cases, [entry for entry in _main_inputs(record.result) if entry["name"] in record.cases][:2]
+    if len(shown) < 2 or not record.result["failed"] or "failed" not in cases:
+        return None
+    failed = cases["failed"].to_numpy(dtype=bool)
+    drawn = ~failed & (cases["level"].to_numpy() == 0)
+    x, y = (cases[item["name"]].to_numpy(dtype=np.float64) for item in shown)
+    marks: list[Mark] = []
+    for rows, colour, sign, what in (
+        (np.flatnonzero(drawn), SKY, "circle", "cases drawn from the dispersions, not failed"),
+        (np.flatnonzero(failed), VERMILION, "diamond", "failed cases"),
+    ):
+        some = rows[np.unique(np.linspace(0, rows.size - 1, min(rows.size, MOST_POINTS)).astype(np.int64))]
+        thinned = f", {count(some.size)} shown" if some.size < rows.size else ""
+        key = f"{count(rows.size)} {what}{thinned}" if rows.size else ""
+        marks.append(Points(x[some], y[some], colour, what, sign, 4.0, 0.6, cases=some, key=key))
+    for what, colour in (("likeliest", INK), ("across", BLUE)):
+        if shown[0].get(what) is not None:
+            name = "likeliest failed case" if what == "likeliest" else "the likeliest across"
+            marks.append(nominal_ring((shown[0][what], shown[1][what]), colour, name, PAPER))
+    axes = (
+        Axis(axis_label(named(words(item["name"], item["unit"]), item["description"]), item["unit"])) for item in shown
+    )
+    x_axis, y_axis = axes
+    caption = (
+        "Failed cases over the two inputs in which they lie farthest from the median. They are denser than the "
+        "dispersions draw them; their weights give their probabilities."
+    )
+    plot = Plot(tuple(marks), x_axis, y_axis, height=420.0)
+    return FigureBlock(caption, Drawing("Failed cases over two inputs", (plot,)), "wide")
+
+
+def _input_table(result: dict[str, Any]) -> Table:
+    across = result["inputs"][0].get("across") is not None
+    columns = [
+        Column("Input", "name", 2.6),
+        Column("Mean [σ]", "number", 1.0),
+        Column("Spread [σ]", "number", 1.0),
+        Column("Likeliest", "number", 1.5),
+    ]
+    columns += [Column("Across", "number", 1.5)] if across else []
+    rows = []
+    for entry in _main_inputs(result):
+        label = Cell(axis_label(entry["name"], entry["unit"]), small=entry["description"])
+        cells = [Cell(number(entry[key], 3), entry[key]) for key in ("mean_sigma", "spread_sigma")]
+        for what in ("likeliest", "across")[: 1 + across]:
+            sigma = entry[f"{what}_sigma"]
+            cells.append(Cell(number(entry[what], 5), entry[what], small=f"{number(sigma, 3)}{SPACE}σ"))
+        rows.append((label, *cells))
+    note = "Weighted mean and spread of the failed cases; the input farthest from its median first."
+    return Table("Failed cases by input", tuple(columns), tuple(rows), note)
+
+
+def _levels(result: dict[str, Any]) -> tuple[Block, ...]:
+    shown = [level for level in result["levels"] if level["margin"] is not None]
+    limits: list[Block] = [_level_table(result)]
+    if shown and result["probability"] and result["method"] != "plain":
+        limits.append(
+            FigureBlock("Probability over the margin to the limit, level by level.", _probability_figure(result, shown))
+        )
+    chains = result["method"] == "subset"
+    return (Text((_level_words(chains),)), *limits) if result["method"] != "plain" else tuple(limits)
+
+
+def _probability_figure(result: dict[str, Any], shown: list[dict[str, Any]]) -> Drawing:
+    """The probability of each level over its margin, down to the limit."""
+    margin, probability = (np.array([item[key] for item in shown]) for key in ("margin", "probability"))
+    p, lower, upper = (np.array([result[key]]) for key in ("probability", "lower", "upper"))
+    marks = (
+        Limit(0.0, "x", INK, "limit", width=1.0),
+        Line(margin, probability, BLUE, "levels", width=2.0, key="levels"),
+        Points(margin, probability, BLUE, "levels", size=6.0),
+        Points(
+            np.zeros(1), p, VERMILION, "not met", size=8.0, y_ends=(lower, upper), key="P(failure) with its interval"
+        ),
+    )
+    x = Axis(axis_label("margin", result["metric"]["unit"]), reach=Axis().ends([margin, np.zeros(1)])[::-1])
+    words = (
+        f"The probability falls over {margin.size} levels as the margin falls to zero, where it is "
+        f"{number(p[0], 4)}, interval {number(lower[0], 4)} to {number(upper[0], 4)}"
+    )
+    plot = Plot(marks, x, Axis("P(smaller margin)", log=True), height=340.0)
+    return Drawing("Probability over the margin", (plot,), words=words)
+
+
+def _level_words(chains: bool) -> str:
+    if chains:
+        return (
+            "Level 0 is plain Monte Carlo. Each further level samples the cases at or below its margin with Markov "
+            "chains. Accepted: fraction of the chains’ steps that were accepted."
+        )
+    return (
+        "Each level is drawn from the density fitted to the level before. Its margin is the median of the cases that "
+        "the next density is fitted to. Accepted: effective fraction of these. The estimate is from the last level."
+    )
+
+
+def _level_table(result: dict[str, Any]) -> Table:
+    columns = (
+        Column("Level", "number", 0.7),
+        Column(axis_label("Margin", result["metric"]["unit"]), "number", 1.4),
+        Column("Probability", "number", 1.3),
+        Column("Runs", "number", 0.7),
+        Column("Cases", "number", 1.0),
+        Column("Accepted", "number", 1.0),
+    )
+    rows = [
+        (
+            Cell(str(k), k),
+            Cell("all" if level["margin"] is None else number(level["margin"], 4), level["margin"]),
+            Cell(number(level["probability"], 4), level["probability"]),
+            Cell(str(level["runs"]), level["runs"]),
+            Cell(count(level["cases"]), level["cases"]),
+            Cell(percent(level["accepted"], 0), level["accepted"]),
+        )
+        for k, level in enumerate(result["levels"])
+    ]
+    return Table("Levels", columns, tuple(rows))
+
+
+def _asked(record: RareEventRecord) -> tuple[tuple[str, Any], ...]:
+    asked = record.result["asked"]
+    return (
+        ("configured", f"{asked['method']}, {asked['cases_per_level']} cases per level"),
+        ("seed", record.record["campaign"]["seed"]),
+    )

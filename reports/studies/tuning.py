@@ -1,0 +1,225 @@
+"""The report of a tuning: what was found, how it compares with what is published, and how the search went."""
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from mc_engine.studies.tuning_folder import UNFINISHED, TuningRecord, infeasibility
+from reports.document.blocks import Block, Card, Document, FigureBlock, Section, Table, Terms, Text, as_blocks, numbered
+from reports.drawing.marks import Axis, Drawing, Line, Plot
+from reports.drawing.palette import BLUE
+from reports.figures.fronts import Candidates, candidates_beyond, front_figure
+from reports.sections.figure_blocks import POINTS_SHOWN, thinned_rows
+from reports.studies.tuned import Tuned, inside, limit_words, quantile_words
+from reports.studies.tuning_tables import (
+    front_table,
+    held_by_bounds,
+    input_tables,
+    least_table,
+    measure_table,
+    parameter_table,
+    provenance_table,
+    published_table,
+)
+from reports.text.numbers import SPACE, count
+
+GLOSSARY = Terms(
+    (
+        ("candidate", "One choice of the tuned parameters, flown as the nominal case or as the same dispersed cases."),
+        ("feasible", "Inside all constraints, with a number for every metric."),
+        (
+            "front",
+            "Of all feasible candidates that were flown, those that no other one equals or beats in every objective "
+            "and beats in one. Which of them is best is a choice between the objectives.",
+        ),
+        ("violation", "How far a candidate is beyond its limits, as fractions of each limit, added up."),
+        (
+            "quantile",
+            "The order statistic of the candidate’s dispersed cases; a case that failed takes the worst rank. All "
+            "candidates fly the same cases with the same noise, so they differ by their choice alone.",
+        ),
+        (
+            "fraction of the box",
+            "Of the box that holds the fronts of all generations: what the front so far dominates. It levels off when "
+            "the search brings nothing new; it does not show that nothing better exists.",
+        ),
+    )
+)
+
+
+def build_tuning(record: TuningRecord, name: str) -> Document:
+    """The report of a tuning; `name` is its directory's name."""
+    tuned = Tuned(record, name)
+    campaign = tuned.manifest["campaign"]
+    sections = (
+        Section("front", "The front", as_blocks(_front_blocks(tuned))),
+        Section("published", "Validation against published results", as_blocks([published_table(tuned)])),
+        Section("convergence", "Convergence of the search", _progress_blocks(tuned)),
+        Section("question", "Problem", (parameter_table(tuned), measure_table(tuned))),
+        Section("inputs", "Other inputs", as_blocks(input_tables(tuned))),
+        Section("provenance", "Provenance", (provenance_table(tuned),)),
+        Section("reading", "Glossary", (GLOSSARY,)),
+    )
+    return numbered(
+        Document(
+            kind="Tuning report",
+            title=str(campaign.get("title") or name),
+            subtitle=_front_sentence(tuned),
+            created=str(tuned.manifest.get("created_utc", "")),
+            facts=_search_facts(tuned),
+            verdicts=tuple(_constraint_cards(tuned)),
+            costs=tuple(_objective_cards(tuned)),
+            warnings=tuple(_search_warnings(tuned)),
+            sections=tuple(section for section in sections if section.blocks),
+        )
+    )
+
+
+# ---- the headline
+
+
+def _front_sentence(tuned: Tuned) -> str:
+    if tuned.record.feasible:
+        n = len(tuned.front)
+        return f"{count(n)} candidate{'s are' if n > 1 else ' is'} inside all limits and not beaten by any other."
+    sentence = re.sub(r"(?<=\d),(?=\d{3})", SPACE, infeasibility(tuned.record))
+    sentence = re.sub(r"-(?=\d)", "−", sentence)
+    return f"{sentence[:1].upper()}{sentence[1:]}."
+
+
+def _search_facts(tuned: Tuned) -> tuple[tuple[str, str], ...]:
+    plan, campaign = tuned.plan, tuned.manifest["campaign"]
+    cases = int(plan["cases"])
+    return (
+        ("Campaign", str(campaign.get("name", ""))),
+        ("Model", str(tuned.manifest.get("model", {}).get("title", ""))),
+        ("Candidates", f"{count(len(tuned.evaluations))} in {count(plan['flown'])} generations"),
+        ("Each flown as", "the nominal case" if cases == 1 else f"{count(cases)} dispersed cases, the same for all"),
+        ("Search", f"NSGA-II, seed {plan['seed']}"),
+        ("Run", str(tuned.manifest.get("created_utc", ""))[:16].replace("T", " ") + " UTC"),
+    )
+
+
+def _constraint_cards(tuned: Tuned) -> Iterator[Card]:
+    for constraint in tuned.plan["constraints"]:
+        values = tuned.evaluations[constraint["name"]].to_numpy()
+        met = int(np.count_nonzero(inside(values, constraint)))
+        numbers = values[np.isfinite(values)]
+        side = "largest" if constraint["at_most"] is None else "smallest"
+        near = (numbers.max() if side == "largest" else numbers.min()) if numbers.size else np.nan
+        yield Card(
+            label=constraint["name"],
+            answer="within reach" if met else "out of reach",
+            detail=f"{limit_words(tuned, constraint)}: {count(met)} of {count(len(values))} candidates; "
+            f"the {side} found is {tuned.with_unit(constraint['name'], float(near))}.",
+            tone="good" if met else "bad",
+        )
+
+
+def _objective_cards(tuned: Tuned) -> Iterator[Card]:
+    for objective in tuned.plan["objectives"]:
+        values = tuned.best[objective["name"]].to_numpy()
+        if not values.size:
+            yield Card(objective["name"], "no number", "no candidate has one", "open")
+            continue
+        ends = [tuned.with_unit(objective["name"], float(end)) for end in (values.min(), values.max())]
+        best, other = ends if objective["goal"] == "minimise" else ends[::-1]
+        yield Card(
+            label=f"{objective['name']}, to be {'small' if objective['goal'] == 'minimise' else 'large'}",
+            answer=best if tuned.record.feasible else f"{best} without constraints",
+            detail=f"{objective['metric']}{quantile_words(objective)}; up to {other} at the other end of the front.",
+        )
+
+
+def _search_warnings(tuned: Tuned) -> Iterator[str]:
+    if not tuned.record.feasible:
+        yield "There is no front: no candidate is inside all limits. What is drawn and listed leaves them out."
+    failed = int((tuned.evaluations["failed_cases"] > 0).sum())
+    if failed:
+        ends = tuned.evaluations["commonest_failure"][tuned.evaluations["failed_cases"] > 0].value_counts(sort=False)
+        yield (
+            f"{count(failed)} candidates had cases that failed; each of these takes the worst rank. Most often, with "
+            f"{count(int(ends.max()))} candidates: {ends.idxmax()}."
+        )
+    if tuned.plan["end"] in ("interrupted", UNFINISHED):
+        how = "was interrupted" if tuned.plan["end"] == "interrupted" else "had not ended, or was killed,"
+        yield f"The search {how} after {tuned.plan['flown']} of {tuned.plan['generations']} generations."
+
+
+# ---- the front
+
+
+def _front_blocks(tuned: Tuned) -> Iterator[FigureBlock | Table | str | None]:
+    if not len(tuned.best):
+        yield "No candidate has a number for every metric; nothing can be drawn."
+        return
+    if len(tuned.objectives) > 1:
+        yield _front_figure(tuned)
+    yield front_table(tuned)
+    yield least_table(tuned)
+    held = held_by_bounds(tuned)
+    if held:
+        yield f"At a bound all along the front: {', '.join(held)}. A wider range may bring more."
+
+
+def _front_figure(tuned: Tuned) -> FigureBlock:
+    names, every = tuned.objectives, tuned.evaluations
+    finite = np.isfinite(every[names]).all(axis=1)
+    others = every[finite & ~every["candidate"].isin(tuned.best["candidate"])]
+    parts = [others[others["feasible"]], others[~others["feasible"]]]
+    shown = [part[names].to_numpy()[thinned_rows(np.arange(len(part)), np.empty(0, int))] for part in parts]
+    feasible = int(every["feasible"].sum())
+    drawing = front_figure(
+        [tuned.label(name) for name in names],
+        Candidates(shown[0], feasible),
+        Candidates(shown[1], len(every) - feasible),
+        tuned.best[names].to_numpy(),
+        [(point["name"], [point["values"][name] for name in names]) for point in tuned.plan["published"]],
+        relaxed=not tuned.record.feasible,
+        first_small=tuned.plan["objectives"][0]["goal"] == "minimise",
+    )
+    beyond = candidates_beyond(drawing.plots[0])
+    caption = "Every candidate and the front" if tuned.record.feasible else "Every candidate; none is inside all limits"
+    outside = f". {count(beyond)} candidates lie beyond the axes" if beyond else ""
+    thinner = (
+        f". At most {count(POINTS_SHOWN)} of each kind are drawn" if any(len(p) > POINTS_SHOWN for p in parts) else ""
+    )
+    return FigureBlock(f"{caption}{outside}{thinner}.", drawing)
+
+
+# ---- the search and the question
+
+
+def _progress_blocks(tuned: Tuned) -> tuple[Block, ...]:
+    frame, plan = tuned.record.generations, tuned.plan
+    shares = frame["dominated_share"].to_numpy()
+    curves = {}
+    if tuned.record.feasible and np.isfinite(shares).all():
+        curves["fraction of the box that the front dominates"] = shares
+    if tuned.constraints:
+        least = frame["least_violation"].to_numpy()
+        if least[0] > 0.0:
+            curves["least violation so far"] = np.where(np.isfinite(least), least, np.nan)
+        if tuned.record.feasible:
+            curves["feasible candidates so far"] = frame["feasible_so_far"].to_numpy(dtype=float)
+    text = (
+        f"NSGA-II with {count(plan['population'])} candidates a generation, crossover {plan['crossover']:g}, mutation "
+        f"of each parameter {plan['mutation']:.3g}, seed {plan['seed']}; ended after {count(plan['flown'])} of "
+        f"{count(plan['generations'])} generations: {plan['end']}."
+    )
+    if not curves:
+        return (Text((text,)),)
+    x = frame["evaluations"].to_numpy(dtype=float)
+    key = f"after each of {count(x.size)} generations"
+    panels = tuple(
+        Plot(
+            (Line(x, y, BLUE, width=2.0, step="hv", key=key),),
+            Axis("candidates flown", most=4),
+            Axis(name=label, zero=True),
+            label,
+            250.0,
+        )
+        for label, y in curves.items()
+    )
+    return (Text((text,)), FigureBlock("Progress of the search", Drawing("Progress of the search", panels), "half"))

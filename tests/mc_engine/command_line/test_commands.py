@@ -1,0 +1,317 @@
+import csv
+import subprocess
+import sys
+from types import ModuleType, SimpleNamespace
+
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+from cart import CAMPAIGN, MODEL, call, fails_with, small_store
+from small_run import ENVIRONMENT, block, created
+
+import mc_engine.runner
+from mc_engine.errors import ModelError, RunInterrupted, StoreError
+from mc_engine.store.opening import open_store
+from mc_engine.store.verification import damage
+
+
+@pytest.fixture
+def calls(monkeypatch):
+    """The calls that reach runner and reports, which are stand-ins here; `calls.fail` is raised in flight."""
+    seen = SimpleNamespace(runner=[], reports=[], fail=None, equal=True)
+
+    def run(campaign, out=None, *, progress=None, workers=None, chunk=None, **options):
+        seen.runner.append(("run", campaign.cases, campaign.seed, workers))
+        if seen.fail is not None:
+            raise seen.fail
+        progress(40, 40, 4)
+        return small_store(out)
+
+    def resume(path, *, progress=None, workers=None, **options):
+        seen.runner.append(("resume", str(path), workers))
+        return open_store(path)
+
+    def extend(path, cases, *, progress=None, workers=None, **options):
+        seen.runner.append(("extend", str(path), cases))
+        store = open_store(path)
+        store.note("extended", cases=cases)
+        return store
+
+    def replay(path, case_id):
+        history = pd.DataFrame({"case_id": [case_id] * 2, "t_s": [0.0, 1.0], "force_n": [1.0, 2.0]})
+        return SimpleNamespace(
+            equal=seen.equal, differences=["propellant_kg: 1 is not 2"], history=history, row={}, lost=""
+        )
+
+    def write_reports(path, formats=("html", "pdf")):
+        seen.reports.append(formats)
+        return [path / f"report.{kind}" for kind in formats]
+
+    runner, reports = ModuleType("mc_engine.runner.runner"), ModuleType("reports")
+    runner.run, runner.resume, runner.extend, runner.replay = run, resume, extend, replay
+    reports.write_reports = write_reports
+    reports.replay_picture = lambda store, case, history: b"\x89PNG"
+    monkeypatch.setitem(sys.modules, "mc_engine.runner.runner", runner)
+    monkeypatch.setattr(mc_engine.runner, "runner", runner, raising=False)
+    monkeypatch.setitem(sys.modules, "reports", reports)
+    return seen
+
+
+# ---- before flying
+
+
+def test_check_says_what_a_good_campaign_holds(here):
+    result = call("check", "cart", "--no-model")
+    assert result.exit_code == 0
+    assert result.stdout == "cart: 20 cases, design mc, 1 dispersion, 0 correlations, 1 requirement; valid\n"
+    assert call("check", "cart/campaign.toml", "--no-model").stdout == result.stdout
+
+
+def test_check_lists_every_problem_of_a_bad_campaign_and_exits_with_2(here):
+    bad = CAMPAIGN.replace('"uniform"', '"unifrom"').replace('"range_m"', '"rnage_m"')
+    (here / "cart" / "campaign.toml").write_text(bad)
+    fails_with(2, call("check", "cart"), "2 problems", 'did you mean "uniform"?', 'did you mean "range_m"?')
+
+
+def test_a_model_that_cannot_be_imported_gets_a_sentence_with_its_line(here):
+    (here / "cart" / "model.py").write_text("import math\n1 / 0\n")
+    fails_with(2, call("check", "cart"), "model.py, line 2", "ZeroDivisionError")
+
+
+def test_sample_prints_head_and_summary(here):
+    result = call("sample", "cart", "--cases", 30)
+    assert result.exit_code == 0
+    assert "cart: 30 cases, design mc" in result.stdout
+    head, summary = result.stdout.split("\n\n")[1:]
+    assert [line.split()[0] for line in head.splitlines()] == ["case_id", "0", "1", "2", "3", "4"]
+    assert summary.split()[:5] == ["mean", "std", "smallest", "largest", "push_n"]
+
+
+def test_a_sample_in_parquet_and_one_in_csv_hold_the_same_numbers(here):
+    assert call("sample", "cart", "--out", "a.parquet").exit_code == 0
+    assert call("sample", "cart", "--out", "a.csv").exit_code == 0
+    table = pd.read_parquet("a.parquet")
+    assert len(table) == 20
+    assert table["push_n"].between(1.0, 3.0).all()
+    with open("a.csv", newline="") as file:
+        assert [float(row["push_n"]) for row in csv.DictReader(file)] == table["push_n"].tolist()
+    assert pq.read_schema("a.parquet").field("push_n").metadata[b"unit"] == b"N"
+
+
+def test_plan_gives_the_classic_sample_sizes(here):
+    lines = call("plan", "--share", "0.9", "--confidence", "0.9").stdout.splitlines()
+    assert [line.split()[:2] for line in lines[3:5]] == [["0", "22"], ["1", "38"]]
+    lines = call("plan", "--share", "0.9", "--confidence", "0.9", "--failures", "1").stdout.splitlines()
+    assert [line.split()[:2] for line in lines[3:]] == [["1", "38"]]
+
+
+def test_list_names_every_shipped_campaign():
+    from mc_engine.campaign.loading import list_campaigns
+
+    lines = call("list").stdout.splitlines()
+    named = [line.split()[0] for line in lines if not line.startswith(" ")]
+    assert named == [campaign.name for campaign in list_campaigns()]
+
+
+@pytest.fixture
+def minimal(tmp_path, monkeypatch):
+    """A shipped minimal campaign."""
+    folder = tmp_path / "shipped" / "minimal"
+    folder.mkdir(parents=True)
+    (folder / "model.py").write_text(MODEL)
+    (folder / "campaign.toml").write_text(CAMPAIGN)
+    monkeypatch.setattr("mc_engine.campaign.loading.SHIPPED", folder.parent)
+
+
+def test_init_makes_a_campaign_that_checks(here, minimal):
+    assert call("init", "new/cart").exit_code == 0
+    assert call("check", "new/cart", "--no-model").exit_code == 0
+
+
+def test_init_overwrites_nothing(here, minimal):
+    (here / "mine").mkdir()
+    (here / "mine" / "model.py").write_text("mine")
+    fails_with(2, call("init", "mine"), "mine/model.py: is there already")
+    assert [path.name for path in (here / "mine").iterdir()] == ["model.py"]
+    assert (here / "mine" / "model.py").read_text() == "mine"
+    fails_with(2, call("init", "mine/model.py"), "model.py")
+
+
+# ---- flying
+
+
+def test_run_flies_into_a_folder_named_by_campaign_and_time_and_says_where(here, calls):
+    result = call("run", "cart")
+    assert result.exit_code == 0, result.output
+    (folder,) = (here / "runs").iterdir()
+    assert folder.name.startswith("cart-20")
+    assert folder.name.endswith("Z")
+    assert f"runs/{folder.name}\n" in result.stdout
+    assert "40 of 40 cases: 36 ok, 4 no-stop" in result.stdout
+    assert "fuel: pass, propellant_kg ≤ 100 kg in 36 of 40 cases (required: 50 % with 90 % confidence)" in result.stdout
+    assert "zero: fail" in result.stdout
+    assert f"runs/{folder.name}/report.html" in result.stdout
+    assert calls.reports == [("html", "pdf")]
+    assert calls.runner == [("run", 20, 7, None)]
+    assert "40 of 40 cases" in result.stderr
+
+
+def test_run_takes_folder_cases_seed_and_workers_from_its_options(here, calls):
+    result = call("run", "cart", "--out", "a", "--cases", 5, "--seed", 0, "--workers", 1, "--no-report")
+    assert result.exit_code == 0
+    assert calls.runner == [("run", 5, 0, 1)]
+    assert calls.reports == []
+    assert len(open_store("a").cases()) == 40
+
+
+def test_judging_exits_with_1_where_a_requirement_is_not_met(here, calls):
+    fails_with(1, call("run", "cart", "--out", "a", "--judge"), "not every requirement is met")
+    assert calls.reports == [("html", "pdf")]
+
+
+def test_more_failed_cases_than_allowed_exit_with_3(here, calls):
+    fails_with(3, call("run", "cart", "--out", "a", "--max-failed", 3, "--judge"), "4 cases failed; at most 3")
+    assert call("run", "cart", "--out", "b", "--max-failed", 4).exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("error", "status"),
+    [
+        (RunInterrupted("stopped; `mc-engine resume a` completes it"), 4),
+        (KeyboardInterrupt(), 4),
+        (StoreError("a/cases: No space left on device"), 5),
+        (ModelError("the model has no clock"), 2),
+    ],
+)
+def test_what_goes_wrong_in_flight_sets_the_exit_status(here, calls, error, status):
+    calls.fail = error
+    fails_with(status, call("run", "cart", "--out", "a"), str(error))
+
+
+def test_a_fault_of_the_engine_itself_is_told_apart_from_all_else(here, calls):
+    calls.fail = ZeroDivisionError("a bug")
+    fails_with(6, call("run", "cart", "--out", "a"), "the program failed", "ZeroDivisionError: 'a bug'")
+
+
+def test_an_occupied_folder_is_refused_before_flying(here, calls):
+    small_store(here / "flown")
+    fails_with(2, call("run", "cart", "--out", "flown"), "--out flown: holds a run already")
+    fails_with(2, call("run", "cart", "--out", "cart"), "--out cart: is not empty and holds no run")
+    fails_with(2, call("run", "cart", "--out", "flown/cases/in"), "--out flown/cases/in: lies inside the run flown")
+    (here / "flown" / "in").mkdir()
+    (here / "flown" / "in" / ".lock").touch()  # as a creation that was cut short leaves it
+    fails_with(2, call("run", "cart", "--out", "flown/in"), "--out flown/in: lies inside the run flown")
+    assert calls.runner == []
+
+
+def test_resume_completes_and_reports(here, calls):
+    small_store(here / "flown", fly=False)
+    assert call("resume", "flown", "--workers", 2).exit_code == 0
+    assert calls.runner == [("resume", "flown", 2)]
+    assert calls.reports == [("html", "pdf")]
+
+
+def test_extend_takes_the_new_number_of_cases(here, calls):
+    small_store(here / "flown")
+    result = call("extend", "flown", "--cases", 60, "--no-report")
+    assert result.exit_code == 0
+    assert calls.runner == [("extend", "flown", 60)]
+    assert "40 of 60 cases" in result.stdout
+    fails_with(2, call("extend", "flown", "--cases", 60), "flown: has 60 cases; give the number it is to have in all")
+
+
+def test_replay_says_that_the_bits_agree_and_leaves_history_and_picture(here, calls):
+    small_store(here / "flown")
+    result = call("replay", "flown", 17)
+    assert result.exit_code == 0, result.output
+    assert "case 17: every stored number has the same bits" in result.stdout
+    table = pd.read_parquet(here / "flown" / "replay" / "case-17.parquet")
+    assert table["force_n"].tolist() == [1.0, 2.0]
+    assert table.attrs["units"]["force_n"] == "N"
+    assert (here / "flown" / "replay" / "case-17.png").read_bytes().startswith(b"\x89PNG")
+    assert damage(here / "flown") == []
+
+
+def test_replay_of_a_case_with_other_bits_names_them_and_exits_with_5(here, calls):
+    small_store(here / "flown")
+    calls.equal = False
+    fails_with(5, call("replay", "flown", 17), "propellant_kg: 1 is not 2", "case 17 is not the one in flown")
+
+
+# ---- after flying
+
+
+def test_report_writes_the_formats_asked_for(here, calls):
+    small_store(here / "flown")
+    assert call("report", "flown").stdout.split() == ["flown/report.html", "flown/report.pdf"]
+    assert call("report", "flown", "--format", "pdf").stdout.split() == ["flown/report.pdf"]
+    assert calls.reports == [("html", "pdf"), ("pdf",)]
+    fails_with(2, call("report", "flown", "--format", "docx"), '"docx" is not known; html, pdf, md')
+    fails_with(2, call("report", "flown", "--template", "none.md"), "--template none.md: there is no such file")
+
+
+def test_status_says_how_far_a_run_is(here):
+    store = small_store(here / "flown", cases=60)
+    text = call("status", "flown").stdout
+    assert "40 of 60 cases: 36 ok, 4 no-stop" in text
+    assert "missing   40 to 59; `mc-engine resume flown` flies them" in text
+    store.append(40, 20, block(40, 20))
+    assert "complete" in call("status", "flown").stdout
+    lost = sorted((here / "flown" / "cases").iterdir())[0]
+    lost.unlink()
+    fails_with(5, call("status", "flown"), f"flown/cases/{lost.name}: is gone; `mc-engine verify flown`")
+
+
+def test_verify_names_each_damaged_file_and_exits_with_5(here):
+    store = small_store(here / "flown")
+    assert call("verify", "flown").stdout == "flown: every byte is as it was written\n"
+    files = sorted((here / "flown" / "cases").iterdir())
+    for path in files[:2]:
+        path.write_bytes(path.read_bytes()[:-3])
+    fails_with(5, call("verify", "flown"), files[0].name, files[1].name, "flown: 2 problems")
+    (store.path / "journal.jsonl").write_bytes(b"?\n?\n")
+    fails_with(5, call("verify", "flown"), "flown/journal.jsonl, line 1: damaged")
+
+
+def test_summary_tells_the_metrics_asked_for_and_refuses_others(here):
+    small_store(here / "flown")
+    text = call("summary", "flown", "--metric", "propellant_kg").stdout
+    assert text.startswith("propellant_kg [kg]: 36 of 40 cases have a number\n  mean ")
+    assert text.endswith("each holding with 90 % for independent cases\n")
+    fails_with(
+        2, call("summary", "flown", "--metric", "fuel"), '"fuel" is no metric of this run; it has', "propellant_kg"
+    )
+
+
+@pytest.mark.parametrize("verb", ["status", "report", "resume", "verify"])
+def test_a_damaged_journal_exits_with_5_and_the_line(here, calls, verb):
+    small_store(here / "flown")
+    journal = here / "flown" / "journal.jsonl"
+    journal.write_bytes(journal.read_bytes().replace(b'"rows":10', b'"rows":11', 1))
+    fails_with(5, call(verb, "flown"), "journal.jsonl, line 2: damaged")
+
+
+@pytest.mark.parametrize(
+    "verb", [["status"], ["report"], ["resume"], ["verify"], ["summary"], ["extend", "--cases", 9], ["replay"]]
+)
+@pytest.mark.parametrize("folder", ["cart", "nowhere", "cart/model.py"])
+def test_a_path_that_is_no_run_is_a_usage_error_that_names_it(here, calls, verb, folder):
+    case = [0] if verb == ["replay"] else []
+    fails_with(2, call(*verb, folder, *case), folder)
+    assert calls.runner == []
+
+
+def test_the_module_runs_like_the_command(here):
+    created(here / "flown")
+    done = subprocess.run(
+        [sys.executable, "-m", "mc_engine", "status", "flown"], capture_output=True, text=True, env=ENVIRONMENT
+    )
+    assert done.returncode == 0, done.stderr
+    assert "0 of 40 cases" in done.stdout
+
+
+def test_every_verb_of_the_contract_has_its_help():
+    for verb in "init check plan sample run status resume extend replay report verify list schema".split():
+        result = call(verb, "--help")
+        assert result.exit_code == 0
+        assert "Usage: " in result.stdout

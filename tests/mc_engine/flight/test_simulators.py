@@ -1,0 +1,168 @@
+"""Simulators under a campaign file: each kind gives the same numbers, and keeps the promises of a run."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mc_engine import CampaignError, StoreError, load_campaign, open_run, replay, resume, run
+from mc_engine.runner.importing import import_results
+from mc_engine.runner.runner import Backend, extend, rerun
+from mc_engine.runner.summary import judgement
+from tests.mc_engine.flight.falling_ball import CAMPAIGN, PROGRAM, program_campaign, python_campaign
+
+METRICS = ["fall_time_s", "impact_speed_m_s"]
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    """The run of each kind, by its name."""
+    folder = tmp_path_factory.mktemp("kinds")
+    files = {
+        "case": python_campaign(folder / "case"),
+        "batch": python_campaign(folder / "batch", options="batch=True,"),
+        "program": program_campaign(folder / "program"),
+    }
+    return {kind: run(load_campaign(file), folder / f"run-{kind}", workers=2) for kind, file in files.items()}
+
+
+@pytest.mark.parametrize("kind", ["batch", "program"])
+def test_each_kind_gives_the_same_numbers_and_verdicts(flown, kind):
+    ours, theirs = flown["case"].cases(), flown[kind].cases()
+    assert list(ours["mass_kg"]) == list(theirs["mass_kg"])  # bit for bit: recorded is flown
+    assert np.allclose(ours[METRICS], theirs[METRICS], rtol=1e-12, atol=0.0)
+    assert [vars(a)["outcome"] for a in judgement(flown["case"])[0]] == [
+        vars(b)["outcome"] for b in judgement(flown[kind])[0]
+    ]
+
+
+@pytest.mark.parametrize("kind", ["case", "batch", "program"])
+def test_a_case_is_replayed_with_its_history(flown, kind):
+    again = replay(flown[kind].path, 3)
+    assert again.equal, again.differences
+    assert again.history["speed_m_s"].iloc[-1] == pytest.approx(again.row["impact_speed_m_s"], rel=1e-12)
+    assert set(flown[kind].histories()["case_id"]) == {-1, 0, 1}
+
+
+def test_backends_and_more_cases_change_nothing(tmp_path, flown):
+    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=60))
+    store = run(campaign, tmp_path / "run", workers=2, backend=Backend("loky"), chunk=16)
+    extend(store.path, 100, workers=1)
+    assert open_run(tmp_path / "run").store.cases().equals(flown["case"].cases())
+
+
+def test_draws_of_a_case_are_its_own(tmp_path):
+    fault = "return {'fall_time_s': case.rng.normal(), 'impact_speed_m_s': float(case.seed % 1000003)}"
+    campaign = load_campaign(python_campaign(tmp_path / "a", cases=20, fault=fault))
+    first = run(campaign, tmp_path / "run-1", workers=1, chunk=20).cases()
+    second = run(campaign, tmp_path / "run-2", workers=2, chunk=3).cases()
+    assert first.equals(second)
+    assert first[METRICS].nunique().tolist() == [20, 20]
+
+
+def test_start_runs_once_a_worker_and_each_case_has_an_empty_folder(tmp_path):
+    fault = "\n".join(
+        [
+            "assert list(case.folder.iterdir()) == []",
+            "(case.folder / 'left').write_text('x')",
+            "case.shared.append(case.id)",
+            "return {'fall_time_s': float(len(case.shared)), 'impact_speed_m_s': 1.0}",
+        ]
+    )
+    campaign = load_campaign(python_campaign(tmp_path / "a", cases=20, fault=fault, options="start=list,"))
+    table = run(campaign, tmp_path / "run", workers=1, chunk=20).cases()
+    assert set(table["status"]) == {"ok"}
+    assert table["fall_time_s"].is_monotonic_increasing  # one list for all of them
+
+
+def test_failed_cases_are_flown_again(tmp_path):
+    mark = tmp_path / "mended"
+    fault = (
+        f"import os\nif case.id == 4 and not os.path.exists({str(mark)!r}): raise ValueError('a licence is missing')"
+    )
+    campaign = load_campaign(python_campaign(tmp_path / "a", cases=8, fault=fault))
+    store = run(campaign, tmp_path / "run", workers=1)
+    assert store.row(4)["reason"] == "sim.py, line 11: ValueError: a licence is missing"
+    inputs = json.loads((tmp_path / "run/simulator/case-0000004/case.json").read_text())
+    assert inputs["mass_kg"] == store.row(4)["mass_kg"]
+    mark.touch()
+    assert rerun(tmp_path / "run").status_counts() == {"ok": 8}
+
+
+def test_numbers_within_the_tolerance_replay(tmp_path):
+    fault = "import time\ninputs = {**inputs, 'mass_kg': inputs['mass_kg'] * (1.0 + 1e-12 * (time.time_ns() % 1000))}"
+    for options, equal in (("", False), ("deterministic=False, tolerance=1e-6,", True)):
+        name = "tolerant" if options else "strict"
+        campaign = load_campaign(python_campaign(tmp_path / name, cases=4, fault=fault, options=options))
+        run(campaign, tmp_path / f"run-{name}", workers=1)
+        assert replay(tmp_path / f"run-{name}", 1).equal == equal
+
+
+def test_a_changed_simulator_is_another_one(tmp_path):
+    file = python_campaign(tmp_path / "a", cases=4)
+    run(load_campaign(file), tmp_path / "run", workers=1)
+    copy = tmp_path / "run/sim.py"
+    copy.write_text(copy.read_text().replace("9.81", "9.80"))
+    with pytest.raises(Exception, match=r"sim\.py"):
+        resume(tmp_path / "run")
+
+
+MISTAKES = {
+    "no program": ('["./fall"', '["./fal"', 'simulator.command: there is no program "./fal"'),
+    "not on the path": ('["./fall"', '["falls-nowhere"', 'no program "falls-nowhere" on the PATH'),
+    "slots": ("time_limit_s = 2.0", "slots = 0", "simulator.slots: 0 is not allowed; it must be at least 1"),
+    "unknown place": ("{folder}", "{foldr}", 'word 3: {foldr} is not known; did you mean "folder"?'),
+    "never read": ('result = "result.json"', "", "is never read; give it a `pattern` over stdout"),
+    "two things": ("[campaign]", '[campaign]\nsimulator = "sim.py"', "beside the table [simulator]"),
+    "template": ("case.txt.j2", "other.j2", 'other.j2: "mas_kg" is no input; did you mean "mass_kg"?'),
+    "default": ("low = 0.1", "low = 20.0", "mass_kg: the model's own value 10 is not within"),
+    "outside": ('"case.txt" =', '"../case.txt" =', "lies outside the folder of the case"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_are_sentences_with_their_place(tmp_path, mistake):
+    old, new, sentence = MISTAKES[mistake]
+    (tmp_path / "fall").write_text("#!/bin/sh\n")
+    (tmp_path / "case.txt.j2").write_text("{{ mass_kg }}")
+    (tmp_path / "other.j2").write_text("{{ mas_kg }}")
+    text = CAMPAIGN.format(flies="", cases=4) + PROGRAM
+    assert old in text
+    (tmp_path / "campaign.toml").write_text(text.replace(old, new))
+    with pytest.raises(CampaignError) as error:
+        load_campaign(tmp_path / "campaign.toml")
+    assert sentence in str(error.value)
+
+
+def test_a_file_without_a_simulator_is_named(tmp_path):
+    file = python_campaign(tmp_path / "a")
+    (tmp_path / "a/sim.py").write_text("x = 1\n")
+    with pytest.raises(CampaignError, match=r"campaign\.simulator: .* has no SIMULATOR; end it with"):
+        load_campaign(file)
+
+
+def test_results_from_elsewhere_make_the_same_run(tmp_path, flown):
+    table = flown["case"].cases().drop(columns=["status", "reason"])
+    table.to_parquet(tmp_path / "results.parquet", index=False)
+    campaign = load_campaign(python_campaign(tmp_path / "ball"))
+    store = import_results(campaign, tmp_path / "results.parquet", tmp_path / "run")
+    assert store.cases().equals(flown["case"].cases())
+    assert judgement(store)[0] == judgement(flown["case"])[0]
+    assert store.manifest["imported"]["file"] == "results.parquet"
+    with pytest.raises(StoreError, match=r"imported from results\.parquet; the engine did not fly them"):
+        replay(tmp_path / "run", 3)
+
+
+def test_results_of_other_inputs_are_refused(tmp_path, flown):
+    table = flown["case"].cases()
+    campaign = load_campaign(python_campaign(tmp_path / "ball"))
+    table.loc[7, "mass_kg"] += 1e-3
+    table.to_csv(tmp_path / "results.csv", index=False)
+    with pytest.raises(CampaignError, match=r"mass_kg: case 7 has .* and the campaign draws .*; 1 cases differ"):
+        import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
+    table.drop(index=50).to_csv(tmp_path / "results.csv", index=False)
+    with pytest.raises(CampaignError, match="case_id: case 50 is missing"):
+        import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
+    table.drop(columns="fall_time_s").to_csv(tmp_path / "results.csv", index=False)
+    with pytest.raises(CampaignError, match="fall_time_s: is no column of the table"):
+        import_results(campaign, tmp_path / "results.csv", tmp_path / "run")

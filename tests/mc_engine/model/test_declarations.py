@@ -1,0 +1,145 @@
+"""Declarations of a model: what they make, that kernels have the same bits, and what is said of mistakes in them."""
+
+import numpy as np
+import pytest
+from mistaken_campaign import declared_with as campaign_with
+
+from mc_engine.errors import CampaignError, ModelError
+from mc_engine.flight.contract import breaches
+from mc_engine.flight.flight import fly
+from mc_engine.model import Field, Parameter, Setting, inputs, maximum_of, metrics, outputs, states
+from mc_engine.model.declarations import unit_of
+
+
+def test_one_declaration_makes_the_tuple_and_the_columns():
+    made = inputs(altitude_km=Parameter(300.0, "altitude", low=150.0), law=Setting("b", "law", choices=("a", "b")))
+    assert made._fields == ("altitude",)  # a setting is in `o`
+    assert [(item.name, item.unit, item.symbol) for item in made.declared] == [
+        ("altitude_km", "km", "altitude"),
+        ("law", "", "law"),
+    ]
+    assert states(x_m="x", vx_m_s="speed")(x=1.0, vx=2.0) == (1.0, 2.0)
+    assert outputs(share=Field("a share", unit="", low=0.0)).declared[0].low == 0.0
+    assert metrics(top_m_s=maximum_of("v_m_s", "top"), e=Field("e", unit=""))._fields == ("e",)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [("x_m", "m"), ("vx_m_s", "m/s"), ("ve_pct", "%"), ("delay_days", "day"), ("load_mj_m2", "MJ/m^2"), ("isp_s", "s")],
+)
+def test_the_ending_of_a_name_tells_the_unit(name, unit):
+    assert unit_of(name) == unit
+
+
+@pytest.mark.parametrize(
+    ("name", "sentence"),
+    [
+        ("eccentricity", '"eccentricity" ends in no unit; say unit="" for a plain number'),
+        ("altitude_kilometres", 'ends in no unit; did you mean "altitude_km"?'),
+        ("share_percent", 'did you mean "share_pct"?'),
+        ("angle_dge", 'did you mean "angle_deg"?'),
+        ("arm_n_m", 'may end in the unit N m or N/m; say which, unit="N m"'),
+        ("gain_1_s", 'may end in the unit 1/s or s; say which, unit="1/s"'),
+    ],
+)
+def test_a_unit_that_is_not_told_is_asked_for(name, sentence):
+    with pytest.raises(ModelError) as error:
+        states(**{name: "a number"})
+    assert sentence in str(error.value)
+    assert states(**{name: Field("a number", unit="")}) if name == "eccentricity" else True
+
+
+# text of the smallest model, what stands in its place, the sentence
+MISTAKES = {
+    "argument": (("def rhs(s)", "def rhs(s, w)"), '`rhs` in line 26 takes "w"; a function takes what it names of t'),
+    "misspelt argument": (("def rhs(s)", "def rhs(s, stat)"), 'takes "stat"; did you mean "state"?'),
+    "argument of another": (("def observe(s)", "def observe(s, hit)"),
+                            '`observe` in line 38 takes "hit"; a function takes'),
+    "metric of nobody": (('top_speed_m_s=maximum_of("speed_m_s", ', "range_km=("),
+                         'nobody computes the metric "range_km"; write'),
+    "output": (('maximum_of("speed_m_s"', 'maximum_of("sped_m_s"'),
+               'metric "top_speed_m_s": there is no output "sped_m_s"; did you mean "speed_m_s"?'),
+    "unit of a metric": (("top_speed_m_s=", "top_speed_km="), 'metric "top_speed_km" is in "km", but it holds a value'),
+    "suffix": (("altitude_km=Parameter", "altitude_kmm=Parameter"), '"altitude_kmm" ends in no unit; did you mean'),
+    "event without function": (("Event(climb, ", "Event("), 'the event "apogee" has no function; declare it so: '),
+    "argument of an event": (("def climb(s)", "def climb(x)"), 'event "apogee" in line 33 takes "x"'),
+    "keyword": (("metrics=Metrics", "metrix=Metrics"), "did you mean \"metrics\"?; it takes name, title, inputs"),
+    "no declaration": (("states=State", "states=('x', 'y')"), "`states` is ('x', 'y'); declare it, State ="),
+    "a number as a meaning": (('x_m="x"', "x_m=3"), 'the state "x_m" is 3; it must be its meaning, a text, or Field('),
+    "two of a name": (('x_m="x"', 'x_m="x", x_km="x"'), 'State: two names are "x" without their units'),
+    "a word of Python": (('x_m="x"', 'class_m="x"'), "State: Type names and field names cannot be a keyword: 'class'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_a_declaration_is_named_with_its_fix(mistake, tmp_path):
+    *edits, sentence = MISTAKES[mistake]
+    with pytest.raises(CampaignError) as error:
+        campaign_with(tmp_path, *edits)
+    (problem,) = error.value.problems
+    assert problem.message.startswith("model.py, line ")
+    assert sentence in problem.message
+
+
+IN_PHYSICS = {
+    "state without a field": (("vy=g * s.y)", ")"), "State(...) leaves out 'vy'; give every field that has no default"),
+    "unknown field": (("vy=g * s.y)", "v_y=g * s.y)"), 'State(...) has no field "v_y"; did you mean "vy"?'),
+    "another record": (("return Outputs(altitude=", "return State(x=0.0, y=0.0, vx="), ("speed=sqrt", "vy=sqrt"),
+                       "`observe` gives "),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", IN_PHYSICS)
+def test_a_record_made_wrongly_is_named_with_its_line(mistake, tmp_path):
+    *edits, sentence = IN_PHYSICS[mistake]
+    (found,) = breaches(campaign_with(tmp_path, *edits))
+    assert found.startswith("model.py, line ")
+    assert sentence in found
+
+
+def flown(folder, *edits):
+    campaign = campaign_with(folder, *edits)
+    return fly(campaign.model, campaign.nominal, np.arange(3), 1, folder=folder)
+
+
+def test_arguments_have_any_order_and_either_name(tmp_path):
+    plain = flown(tmp_path / "plain")
+    others = (
+        ("def rhs(s)", "def rhs(settings, state, t, parameters)"),
+        ("r2 = s.x * s.x", "s = state\n    r2 = s.x * s.x"),
+    )
+    named = flown(tmp_path / "named", *others)
+    assert all(np.array_equal(plain[name], named[name]) for name in plain)
+
+
+def test_evaluate_gives_the_metrics_that_the_engine_does_not_compute(tmp_path):
+    plain = flown(tmp_path / "plain")
+    edits = (
+        ('maximum_of("speed_m_s", "largest speed")', 'maximum_of("speed_m_s", "largest"), slow_m_s="half"'),
+        ("\nMODEL =", "\n@physics\ndef evaluate(best):\n    return Metrics(slow=0.5 * best.top_speed)\n\n\nMODEL ="),
+        ("observe=observe,", "observe=observe, evaluate=evaluate,"),
+    )
+    with_slow = flown(tmp_path / "slow", *edits)
+    assert all(np.array_equal(plain[name], with_slow[name]) for name in plain)
+    np.testing.assert_array_equal(with_slow["slow_m_s"], 0.5 * plain["top_speed_m_s"])
+    without = edits[1][0], edits[1][1].replace("Metrics(slow=", "(")
+    (found,) = breaches(campaign_with(tmp_path / "lost", edits[0], without, edits[2]))
+    assert "`evaluate` gives " in found
+    assert 'it must give a record with "slow"' in found
+
+
+def test_a_memory_starts_with_its_defaults_and_is_given_by_keyword(tmp_path):
+    edits = (
+        ("\n\n@physics\ndef initial", '\n\nMemory = namedtuple("Memory", "samples mode", defaults=(0.0, 7.0))\n\n\n'
+         "@physics\ndef control(memory):\n    return Memory(samples=memory.samples + 1.0)\n\n\n@physics\ndef initial"),
+        ("from mc_engine.lanes import", "from collections import namedtuple\n\nfrom mc_engine.lanes import"),
+        ("def observe(s)", "def observe(s, m)"),
+        ("Outputs(altitude=", "Outputs(samples=10.0 * m.samples + m.mode, altitude="),
+        ('outputs(altitude_km="altitude"', 'outputs(altitude_km="altitude", samples=Field("seen", unit="")'),
+        ("    top_speed_m_s=", '    samples=at_end("samples", "", unit=""),\n    top_speed_m_s='),
+        ("observe=observe,", "observe=observe, memory=Memory, control=control,"),
+        ("import Event", "import Event, Field"),
+    )  # fmt: skip
+    columns = flown(tmp_path, *edits)
+    steps = np.floor(columns["end_time_s"] / 10.0)
+    np.testing.assert_array_equal(columns["samples"], 10.0 * (steps + 1.0) + 7.0)

@@ -1,0 +1,97 @@
+"""A design is computed once for the same inputs and sources, and again after a change or where its file is damaged."""
+
+import doctest
+from collections import namedtuple
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mc_engine.campaign.loading import SHIPPED
+from mc_engine.model import designs, kept_design, load_model
+
+INPUTS = np.array([1.0, np.nan, 3.0])
+Pair = namedtuple("Pair", "a b")
+calls: list[object] = []
+
+
+@dataclass
+class Craft:
+    mass: float
+
+
+def doubled(inputs):
+    calls.append(inputs)
+    return 2.0 * inputs
+
+
+def nothing(inputs):
+    calls.append(inputs)
+    return np.zeros(1)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Where the designs are kept."""
+    monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path / "cache"))
+    calls.clear()
+    return tmp_path / "cache" / "designs"
+
+
+def test_the_second_time_it_is_read_with_the_same_bits(folder):
+    first = kept_design(doubled, INPUTS)
+    assert kept_design(doubled, INPUTS).tobytes() == first.tobytes() == (2.0 * INPUTS).tobytes()
+    assert len(calls) == 1
+
+
+def test_inputs_that_differ_are_designed_apart(folder):
+    inputs = [
+        1.0, 1, True, "1", None, (1.0,), ((1.0,),), (1.0, 1.0), Pair(1.0, 2.0), {"a": 1.0}, SimpleNamespace(a=2.0),
+        Craft(1.0), Craft(2.0), np.array([1.0]), np.array([[1.0]]), np.array([1]), -0.0, 0.0, float("nan"),
+        np.array([1.0 + 1e-15]),
+    ]  # fmt: skip
+    for value in [*inputs, *inputs]:
+        kept_design(nothing, value)
+    assert len(calls) == len(inputs) == len(list(folder.iterdir()))
+
+
+def test_what_could_hold_anything_is_no_input(folder):
+    with pytest.raises(TypeError, match="cannot depend on a function"):
+        kept_design(nothing, doubled)
+
+
+@pytest.mark.parametrize("damage", [lambda old: b"", lambda old: old[:50], lambda old: old[:-1] + bytes([old[-1] ^ 1])])
+def test_a_damaged_file_is_designed_again(folder, damage):
+    first = kept_design(doubled, INPUTS)
+    (file,) = folder.iterdir()
+    file.write_bytes(damage(file.read_bytes()))
+    for _ in range(2):
+        assert kept_design(doubled, INPUTS).tobytes() == first.tobytes()
+    assert len(calls) == 2
+
+
+def test_a_cache_that_cannot_be_written_costs_nothing_but_time(folder):
+    folder.parent.mkdir()
+    folder.write_text("in the way")
+    for _ in range(2):
+        assert kept_design(doubled, INPUTS)[2] == 6.0
+    assert len(calls) == 2
+
+
+@pytest.mark.parametrize("changed", ["model.py", "gains.py"])
+def test_a_changed_source_of_the_model_is_another_design(folder, tmp_path, changed):
+    minimal = (SHIPPED / "minimal" / "model.py").read_text()
+    (tmp_path / "model.py").write_text(f"{minimal}\nfrom gains import gains\n")
+    (tmp_path / "gains.py").write_text("import numpy as np\n\n\ndef gains(k):\n    return np.array([k])\n")
+    for text, count in (("", 1), ("", 1), ("\nK = 1\n", 2)):
+        (tmp_path / changed).write_text((tmp_path / changed).read_text() + text)
+        kept_design(load_model("model.py", tmp_path).sources.module.gains, 4.0)
+        assert len(list(folder.iterdir())) == count
+
+
+def test_the_example_runs(folder):
+    (example,) = doctest.DocTestFinder().find(
+        kept_design, "kept_design", globs={**vars(designs), "np": np, "__name__": __name__}
+    )
+    assert doctest.DocTestRunner().run(example) == (0, 2)

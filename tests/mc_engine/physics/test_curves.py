@@ -1,0 +1,208 @@
+"""Curves and surfaces: the points, what lies between and outside, against SciPy; files and their mistakes."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from read_numbers import compiled, every_way
+from scipy.interpolate import PchipInterpolator, RegularGridInterpolator, interp1d
+
+from mc_engine.errors import ModelError
+from mc_engine.physics import curves
+from mc_engine.physics.curve_points import si_factor
+from mc_engine.physics.curves import curve, surface
+
+RNG = np.random.default_rng(11)
+N = 100_000
+SPACINGS = {
+    "even": np.linspace(-2.0, 7.0, 37),
+    "uneven": np.sort(RNG.uniform(0.0, 10.0, 300)),
+    "three decades in each other": np.sort(np.concatenate([np.geomspace(1e-6, 1e3, 60), [500.0, 500.0001, 500.00011]])),
+    "two points": np.array([3.0, 4.0]),
+}
+NAMES = list(SPACINGS)
+VALUES = {name: RNG.normal(size=x.size) * 1e5 for name, x in SPACINGS.items()}
+
+
+def inside(x):
+    """Random arguments, the points, and their neighbours among the floats."""
+    near = np.concatenate([x, np.nextafter(x[1:], -np.inf), np.nextafter(x[:-1], np.inf)])
+    return np.concatenate([RNG.uniform(x[0], x[-1], N), near])
+
+
+def close(found, wanted, scale):
+    assert np.abs(found - wanted).max() <= 1e-12 * scale
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("kind", curves.KINDS)
+def test_a_curve_is_scipys_and_meets_its_points(name, kind):
+    x, y = SPACINGS[name], VALUES[name]
+    f, at = curve(x=x, y=y, kind=kind), inside(x)
+    theirs = PchipInterpolator(x, y) if kind == "cubic" else interp1d(x, y, kind=kind)
+    close(every_way(f, at), theirs(at), np.abs(y).max())
+    assert f(x).tolist() == y.tolist()
+    assert compiled(f, x).tolist() == y.tolist()
+
+
+def test_some_of_these_spacings_need_the_bisection_and_some_do_not():
+    levels = {name: curve(x=x, y=VALUES[name]).block.numbers[4] for name, x in SPACINGS.items()}
+    assert levels["even"] == levels["two points"] == 0.0
+    assert levels["three decades in each other"] >= 2.0
+
+
+@pytest.mark.parametrize("kind", ["linear", "nearest"])
+@pytest.mark.parametrize("sizes", [(2, 2), (12, 8), (40, 300)])
+def test_a_surface_is_scipys_and_meets_its_points(sizes, kind):
+    x, y = (np.sort(RNG.uniform(-1.0, 1.0, size)) for size in sizes)
+    z = RNG.normal(size=sizes)
+    f = surface(x=x, y=y, z=z, kind=kind)
+    at = RNG.uniform(x[0], x[-1], N), RNG.uniform(y[0], y[-1], N)
+    close(every_way(f, *at), RegularGridInterpolator((x, y), z, kind)(np.transpose(at)), np.abs(z).max())
+    assert f(*np.meshgrid(x, y, indexing="ij")).tolist() == z.tolist()
+
+
+@given(
+    steps=st.lists(st.tuples(st.floats(1e-3, 1e3), st.floats(-1e3, 1e3)), min_size=1, max_size=20),
+    rising=st.booleans(),
+)
+def test_a_cubic_curve_is_smooth_and_as_monotone_as_its_points(steps, rising):
+    dx, dy = np.array(steps).T
+    x, y = np.concatenate([[0.0], np.cumsum(dx)]), np.concatenate([[0.0], np.cumsum(np.abs(dy) if rising else dy)])
+    f = curve(x=x, y=y, kind="cubic")
+    for i in range(x.size - 1):
+        values = f(np.linspace(x[i], x[i + 1], 50))
+        slack = 1e-12 * (1.0 + np.abs(y).max())
+        assert (np.sign(y[i + 1] - y[i]) * np.diff(values) >= -slack).all()
+        assert values.min() >= min(y[i], y[i + 1]) - slack
+        assert values.max() <= max(y[i], y[i + 1]) + slack
+    rows = f.block.numbers[-4 * x.size :].reshape(-1, 4)
+    h = np.diff(x)
+    arriving = rows[:-1, 1] + 2.0 * rows[:-1, 2] * h + 3.0 * rows[:-1, 3] * h * h
+    np.testing.assert_allclose(arriving[:-1], rows[1:-1, 1], rtol=1e-9, atol=1e-9 * np.abs(dy / dx).max())
+
+
+BEYOND = np.array([-1e300, -0.1, -5e-324, 0.0, 1.0, 2.0, np.nextafter(2.0, 3.0), 9.0, np.inf, -np.inf])
+
+
+@pytest.mark.parametrize("kind", curves.KINDS)
+def test_outside_a_curve_is_held_is_zero_or_ends_the_case(kind):
+    x, y = [0.0, 1.0, 2.0], [3.0, 4.0, 7.0]
+    is_outside = np.array([True, True, True, False, False, False, True, True, True, True])
+    held = every_way(curve(x=x, y=y, kind=kind), BEYOND)
+    assert held.tolist() == [3.0, 3.0, 3.0, 3.0, 4.0, 7.0, 7.0, 7.0, 7.0, 3.0]
+    zero = every_way(curve(x=x, y=y, kind=kind, outside="zero"), BEYOND)
+    assert zero.tolist() == np.where(is_outside, 0.0, held).tolist()
+    ends = every_way(curve(x=x, y=y, kind=kind, outside="ends"), BEYOND)
+    assert np.isnan(ends).tolist() == is_outside.tolist()
+    assert ends[~is_outside].tolist() == held[~is_outside].tolist()
+
+
+@pytest.mark.parametrize("kind", curves.KINDS)
+@pytest.mark.parametrize("outside", curves.OUTSIDE)
+@pytest.mark.parametrize("name", ["even", "three decades in each other"])
+def test_what_is_not_a_number_gives_what_is_not_one(kind, outside, name):
+    f = curve(x=SPACINGS[name], y=VALUES[name], kind=kind, outside=outside)
+    at = np.where(np.arange(16) % 2, np.nan, 1.0)
+    assert np.isnan(compiled(f, at)).tolist() == np.isnan(at).tolist()
+    assert np.isnan(f(np.nan))
+    assert np.isnan(f(at)).tolist() == np.isnan(at).tolist()
+
+
+@pytest.mark.parametrize("kind", ["linear", "nearest"])
+@pytest.mark.parametrize("outside", curves.OUTSIDE)
+def test_a_surface_has_the_same_edges(outside, kind):
+    f = surface(x=[0.0, 1.0], y=[0.0, 2.0], z=[[1.0, 2.0], [3.0, 4.0]], outside=outside, kind=kind)
+    x, y = np.array([0.5, -1.0, 0.5, np.nan, 0.5, np.nan, 9.0]), np.array([1.0, 1.0, 5.0, 1.0, np.nan, 5.0, np.nan])
+    found = every_way(f, x, y)
+    middle, held = (2.5, [1.5, 3.0]) if kind == "linear" else (1.0, [1.0, 2.0])
+    beyond = {"held": held, "zero": [0.0, 0.0], "ends": [np.nan, np.nan]}[outside]
+    np.testing.assert_array_equal(found, [middle, *beyond, np.nan, np.nan, np.nan, np.nan])
+
+
+def test_the_structure_has_no_numbers_of_the_points():
+    one, other = curve(x=[0.0, 1.0], y=[0.0, 1.0]), curve(x=[0.0, 3.0, 4.0], y=[0.0, 1.0, 7.0])
+    assert one.structure() == other.structure()
+    kinds = {curve(x=[0, 1], y=[0, 1], kind=k, outside=o).structure() for k in curves.KINDS for o in curves.OUTSIDE}
+    flat = {surface(x=[0, 1], y=[0, 1], z=[[0, 0], [0, 0]], kind=k).structure() for k in ("linear", "nearest")}
+    assert len(kinds | flat) == 11
+
+
+# ---- files
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setitem(globals(), "__file__", str(tmp_path / "model.py"))
+    return tmp_path
+
+
+def test_columns_of_a_csv_come_in_si_by_the_ends_of_their_names(folder):
+    (folder / "thrust.csv").write_text("# engine 3\ntime_min, thrust_kn, mach\n0, 1.5, 0\n\n2, 3, 0.5\n")
+    f = curve("thrust.csv", x="time_min", y="thrust_kn")
+    assert f(np.array([0.0, 60.0, 120.0])).tolist() == [1500.0, 2250.0, 3000.0]
+    assert curve("thrust.csv", x="time_min", y="mach", x_unit="h")(7200.0) == 0.5
+    assert f.block.file == Path(folder / "thrust.csv")
+
+
+def test_a_parquet_file_is_read_as_a_csv_is(folder):
+    table = pa.table({"altitude_km": [0, 10], "wind_m_s": [5.0, 15.0], "station": ["a", "b"]})
+    pq.write_table(table, folder / "wind.parquet")
+    assert curve("wind.parquet", x="altitude_km", y="wind_m_s")(5e3) == 10.0
+
+
+def test_the_rows_of_a_surface_come_in_any_order(folder):
+    rows = [f"{m},{a},{m + 0.1 * a}" for a in (0, 5, 10) for m in (2, 0, 1)]
+    (folder / "cd.csv").write_text("mach,alpha_deg,cd\n" + "\n".join(rows))
+    f = surface("cd.csv", "mach", "alpha_deg", "cd")
+    assert f(1.5, np.radians(7.5)) == pytest.approx(2.25, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "empty"),
+        ("x,y\n1\n", "line 2: 1 numbers for 2 columns"),
+        ("x,y\n1,2\n2,b\n", 'line 3: "2,b"'),
+        ("x,z\n1,2\n", 'no column "y"'),
+        ("x,y\n1,2\n", "two or more points"),
+        ("x,y\n1,2\n1,3\n", "must rise, but 1 follows 1"),
+        ("x,y\n1,2\n2,nan\n", "infinite or missing"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_said(folder, text, message):
+    (folder / "points.csv").write_text(text)
+    with pytest.raises(ModelError, match=message):
+        curve("points.csv", x="x", y="y")
+
+
+def test_what_is_wrong_with_a_call_is_said(folder):
+    (folder / "cd.csv").write_text("mach,alpha,cd\n0,0,1\n0,1,1\n1,0,1\n")
+    with pytest.raises(ModelError, match="no grid of 2 by 2"):
+        surface("cd.csv", "mach", "alpha", "cd")
+    with pytest.raises(ModelError, match="one of linear, cubic, nearest"):
+        curve(x=[0, 1], y=[0, 1], kind="spline")
+    with pytest.raises(ModelError, match="one of held, zero, ends"):
+        curve(x=[0, 1], y=[0, 1], outside="nan")
+    with pytest.raises(ModelError, match="there is no file"):
+        curve(x="time_s", y="thrust_n")
+    with pytest.raises(ModelError, match="so close"):
+        curve(x=[0.0, 5e-324, 1.0], y=[0.0, 1.0, 2.0])
+    with pytest.raises(ModelError, match="rise"):
+        surface(x=[0, 1], y=[1, 0], z=[[0, 0], [0, 0]])
+    with pytest.raises(FileNotFoundError):
+        curve("missing.csv")
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("time_s", 1.0), ("v_km_s", 1e3), ("alpha_deg", np.pi / 180.0), ("cd", 1.0), ("wind_m_s", 1.0), ("q_n_m", 1.0)],
+)
+def test_the_longest_unit_at_the_end_of_a_name_counts(name, factor):
+    assert si_factor(name) == factor
+    with pytest.raises(ModelError, match="did you mean"):
+        si_factor(name, "m/ss")

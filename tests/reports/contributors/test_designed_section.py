@@ -1,0 +1,41 @@
+"""The section on a run of design saltelli or morris."""
+
+import numpy as np
+import pytest
+from synthetic_run import SyntheticRun, fly, synthetic_run
+
+from mc_engine.sampling.designs import unit_cube
+from reports.contents import build
+from reports.document.blocks import FigureBlock, Table
+
+
+def designed(design, n_cases=600, lost=()):
+    made = synthetic_run(n_cases, failed=0)
+    ve, oe = (40.0 * (u - 0.5) for u in unit_cube(design, 1, ("ve_pct", "oe_pct"), np.arange(n_cases), n_cases))
+    table = made.table.assign(ve_pct=ve, oe_pct=oe, **fly(ve, oe))
+    table.loc[list(lost), "status"] = "not-finite"
+    manifest = {**made.manifest, "campaign": {**made.manifest["campaign"], "design": design, "cases": n_cases}}
+    return SyntheticRun(manifest, table, made.nominal_row, made.history)
+
+
+def section(run):
+    (found,) = [one for one in build(run, "run").sections if one.anchor == "drivers"]
+    return found.blocks
+
+
+@pytest.mark.parametrize(("design", "size", "word"), [("saltelli", 4, "blocks"), ("morris", 3, "trajectories")])
+def test_indices_stand_in_a_table_that_counts_whole_blocks(design, size, word):
+    blocks = section(designed(design, lost=(0, 50)))
+    (table,) = [block for block in blocks if isinstance(block, Table)]
+    propellant = [row for row in table.rows if row[0].text.startswith("propellant")]
+    assert [row[1].text for row in propellant] == ["ve", "oe"]
+    assert propellant[0][0].small == f"{600 // size - 2} / {600 // size} {word}"
+    assert propellant[0][2].value > propellant[1][2].value > 0.0
+    assert propellant[0][2].small.startswith("± ")
+    assert sum(isinstance(block, FigureBlock) for block in blocks) == (design == "saltelli")
+
+
+def test_too_few_blocks_are_a_sentence():
+    blocks = section(designed("saltelli", 16))
+    assert not [block for block in blocks if isinstance(block, Table)]
+    assert "fewer than 10 whole blocks" in blocks[0].paragraphs[0]

@@ -1,0 +1,134 @@
+"""What drives it: a section for random designs, with sentences where there is nothing to show."""
+
+import json
+
+import numpy as np
+import pytest
+from synthetic_run import synthetic_run
+
+from reports.contents import build
+from reports.document.blocks import FigureBlock, Table, Text
+from reports.drawing import paper, screen
+
+
+def section(run):
+    return next((one for one in build(run, "run").sections if one.anchor == "drivers"), None)
+
+
+def said(found):
+    return " ".join(text for block in found.blocks if isinstance(block, Text) for text in block.paragraphs)
+
+
+def block(found, kind, caption=""):
+    return next(one for one in found.blocks if isinstance(one, kind) and one.caption.startswith(caption))
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    return section(synthetic_run(4000, failed=12))
+
+
+def test_the_settling_time_is_shared_as_its_closed_form_says(drawn):
+    # settling = 350 + 0.4 VE + 0.2 OE, VE of 20/3 % and OE of 5 %: variances 7.111 and 1
+    panel = next(one for one in block(drawn, FigureBlock).drawing.plots if one.title == "settling time")
+    first = next(mark for mark in panel.marks if getattr(mark, "key", "") == "first-order effect")
+    shares = dict(zip((text for _, text in panel.y.ticks), first.right, strict=True))
+    assert shares["ve"] == pytest.approx(7.111 / 8.111, abs=0.02)
+    assert shares["oe"] == pytest.approx(1.0 / 8.111, abs=0.02)
+
+
+def test_the_table_says_how_many_cases_each_index_rests_on(drawn):
+    rows = block(drawn, Table, "Contributors to each metric").rows
+    by_metric = {row[0].text: row[0].small for row in rows}
+    assert by_metric["propellant"].startswith("3\u202f988 / 4\u202f000 cases; R² 0.0")
+    assert by_metric["settling time"].startswith("3\u202f988 / 4\u202f000 cases; R² 1.00; σ ")
+
+
+def test_the_driver_of_the_force_is_the_burns_size_at_both_ends(drawn):
+    rows = block(drawn, Table, "What separates failed").rows
+    force = next(row for row in rows if row[0].text == "force")
+    assert [cell.text for cell in force[1:3]] == ["ve", "at both ends"]
+    assert force[3].value > 0.7
+    assert force[4].value < 1e-6
+    panel = block(drawn, FigureBlock, "Success probability").drawing.plots[0]
+    assert panel.title == "force"
+    *_, overall, bins = panel.marks
+    tried = [int(text.split(" of ")[1].split(" cases")[0].replace("\u202f", "")) for text in bins.texts]
+    assert sum(tried) == 4000
+    assert bins.y[0] < overall.at < bins.y[5]
+
+
+def test_chosen_cases_have_a_sentence_and_no_index():
+    run = synthetic_run(400, failed=0)
+    run.manifest["campaign"]["design"] = "grid"
+    found = section(run)
+    assert len(found.blocks) == 1
+    assert "were chosen, not drawn" in said(found)
+
+
+def test_words_and_switches_have_names_in_the_figures():
+    run = synthetic_run(2000, failed=0)
+    run.table["mode"] = np.array(["aim", "coast", "burn"], dtype=object)[np.arange(2000) % 3]
+    run.table["backup"] = np.arange(2000) % 2 == 0
+    luck = np.random.Generator(np.random.Philox(key=3)).random(2000)
+    run.table["peak_force_n"] = np.where((run.table["mode"] == "coast") & (luck < 0.3), 200.0, 50.0 + luck)
+    for name in ("mode", "backup"):
+        run.manifest["columns"].append({"name": name, "unit": "", "role": "dispersion", "description": f"the {name}"})
+    found = section(run)
+    row = block(found, Table, "What separates failed").rows[0]
+    assert [cell.text for cell in row[:3]] == ["force", "mode", "coast"]
+    panel = block(found, FigureBlock, "Success probability").drawing.plots[0]
+    assert [text for _, text in panel.x.ticks] == ["aim", "burn", "coast"]
+    drawable(found)
+
+
+def drawable(found):
+    for one in found.blocks:
+        if isinstance(one, FigureBlock):
+            assert one.drawing.key
+            assert len(one.drawing.alternative) > 40
+            json.dumps(screen.specifications(one.drawing), allow_nan=False)
+            assert "<svg" in paper.svg(one.drawing)
+
+
+def test_both_drawings_hold_what_the_table_says(drawn):
+    drawable(drawn)
+    words = block(drawn, FigureBlock, "Success probability").drawing.alternative
+    assert words.startswith("Success probability in bins of single inputs. force: ")
+
+
+@pytest.mark.parametrize("cases", [0, 1, 2, 60])
+def test_few_failed_and_equal_cases_are_drawn_or_said(cases):
+    lost = {"status": "not-finite", **{name: np.nan for name in ("propellant_kg", "peak_force_n", "settling_time_s")}}
+    for change in ({}, lost, {"ve_pct": 0.0, "oe_pct": 0.0}, {"propellant_kg": np.nan}, {"propellant_kg": 2.0}):
+        run = synthetic_run(60, failed=0)
+        run.table = run.table.assign(**change).head(cases)
+        found = section(run)
+        if cases == 0:
+            assert found.blocks == ()  # its part with the maps says why there are none
+            continue
+        assert found.blocks
+        drawable(found)
+        if change == lost or cases < 20:
+            assert "No contributors for propellant" in said(found)
+            assert "Not tested for contributors to failures" in said(found)
+
+
+def test_without_a_driver_the_report_says_how_many_tests_found_none():
+    run = synthetic_run(1000, failed=0)
+    luck = np.random.Generator(np.random.Philox(key=4)).random(1000)
+    run.table = run.table.assign(
+        propellant_kg=1.0 + 2.0 * (luck < 0.02), peak_force_n=50.0 + luck, settling_time_s=300.0
+    )
+    assert "No input, and no pair of inputs, separates failed from passed cases beyond chance (2 tests" in said(
+        section(run)
+    )
+
+
+def test_names_with_markup_stay_text():
+    run = synthetic_run(500, failed=0)
+    for column in run.manifest["columns"]:
+        if column["name"] == "ve_pct":
+            column["description"] = "<b>$x$</b>"
+    panel = screen.specifications(block(section(run), FigureBlock, "Success probability").drawing)[0]
+    assert "<b>" not in json.dumps(panel)

@@ -1,0 +1,94 @@
+"""Histograms: what is cut off is said."""
+
+import numpy as np
+import pytest
+
+from mc_engine.statistics import summarize
+from reports.drawing import paper, screen
+from reports.drawing.marks import Bar
+from reports.figures.distributions import histogram, histograms, shown_range
+
+OUTER = (0.00135, 0.99865)
+
+
+def panel(values):
+    return histogram(values, "peak [N]", summarize(values), OUTER, title="all")
+
+
+def bins(plot):
+    """Edges of the bins and cases in them."""
+    (bars,) = [mark for mark in plot.marks if isinstance(mark, Bar) and mark.key == "cases"]
+    return np.append(bars.left, bars.right[-1]), bars.top
+
+
+def told(plot):
+    """What stands above the panel on what is beyond its axis."""
+    return plot.title.removeprefix("all").replace("\n", " ").strip()
+
+
+def near_seven(nominal, limits):
+    values = 7.0 + 1e-4 * np.random.Generator(np.random.Philox(key=3)).normal(0.0, 1.0, 1000)
+    found = histogram(values, "peak [N]", summarize(values), OUTER, title="all", nominal=nominal, limits=limits)
+    return found, histograms([found])
+
+
+def test_a_nominal_or_limit_far_from_all_cases_is_told_and_does_not_squeeze_them():
+    found, drawing = near_seven(0.0, (-9.0, 9.0))
+    assert told(found) == "nominal 0, limits −9 and 9 beyond the axis"
+    panel = screen.specifications(drawing)[0]
+    low, high = panel["layout"]["xaxis"]["range"]
+    assert high - low < 1.1 * (bins(found)[0][-1] - bins(found)[0][0])
+    assert "beyond" in panel["layout"]["title"]["text"]
+    assert max(map(len, panel["layout"]["title"]["text"].split("<br>"))) <= 28  # else it is clipped
+    assert not {"nominal", "required limit"} & {key.text for key in drawing.key}
+
+
+def test_a_nominal_and_a_limit_near_the_cases_are_drawn():
+    found, drawing = near_seven(7.0, (7.001,))
+    assert told(found) == ""
+    assert {"nominal", "required limit"} <= {key.text for key in drawing.key}
+    assert screen.specifications(drawing)[0]["layout"]["xaxis"]["range"][1] > 7.001
+
+
+def test_an_axis_of_large_numbers_has_their_power_of_ten_at_its_end():
+    large, plain = (paper.svg(histograms([panel(scale * np.arange(100.0))])) for scale in (1e6, 1.0))
+    assert "×10⁶</text>" in large
+    assert "×10" not in plain
+
+
+def spoilt(n=10_000, outliers=(900.0, 1000.0, -5000.0)):
+    values = np.random.Generator(np.random.Philox(key=1)).normal(0.0, 1.0, n)
+    values[: len(outliers)] = outliers
+    return values
+
+
+def test_a_few_far_cases_do_not_squeeze_the_rest_and_are_counted():
+    found = panel(spoilt())
+    assert -8.0 < bins(found)[0][0] < -3.0
+    assert 3.0 < bins(found)[0][-1] < 8.0
+    assert bins(found)[1].sum() == 10_000 - 3
+    assert np.count_nonzero(bins(found)[1]) > 20
+    assert told(found) == "3 beyond the axis"
+
+
+def test_without_far_cases_all_are_shown_and_nothing_is_said():
+    values = np.random.Generator(np.random.Philox(key=2)).exponential(1.0, 10_000)
+    assert shown_range(np.minimum(values, 6.0)) == (values.min(), 6.0)
+    found = panel(np.minimum(values, 6.0))
+    assert bins(found)[1].sum() == 10_000
+    assert told(found) == ""
+
+
+def test_values_that_are_mostly_equal_keep_their_range():
+    values = np.zeros(5000)
+    values[:3] = [1.0, 2.0, 60.0]
+    assert shown_range(values) == (0.0, 60.0)
+
+
+@pytest.mark.parametrize("outliers", [(900.0, 1000.0, -5000.0), (50.0,) * 40])
+def test_the_axis_ends_near_the_bins_whatever_the_outer_quantiles_are(outliers):
+    found = panel(spoilt(outliers=outliers))
+    drawing = histograms([found])
+    (low, high) = screen.specifications(drawing)[0]["layout"]["xaxis"]["range"]
+    width = bins(found)[0][-1] - bins(found)[0][0]
+    assert high - low < 1.1 * width

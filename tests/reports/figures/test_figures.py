@@ -1,0 +1,94 @@
+"""The figures' data and their two drawings."""
+
+import json
+
+import numpy as np
+import pytest
+from figure_marks import FORMS
+from synthetic_run import synthetic_run
+
+from reports.contents import build
+from reports.document.blocks import FigureBlock, blocks_of
+from reports.drawing import paper, screen
+from reports.drawing.marks import Points
+from reports.figures.distributions import bin_edges
+from reports.figures.histories import thinned
+
+
+@pytest.fixture(scope="module")
+def drawings():
+    return [block.drawing for block in blocks_of(build(synthetic_run(3000, failed=3), "run"), FigureBlock)]
+
+
+def test_every_case_falls_into_a_bin():
+    values = np.random.Generator(np.random.Philox(key=1)).exponential(size=5000)
+    counts, _ = np.histogram(values, bin_edges(values))
+    assert counts.sum() == 5000
+    assert 8 <= counts.size <= 48
+
+
+def test_counts_get_a_bin_each():
+    assert bin_edges(np.array([3.0, 4.0, 4.0, 6.0])).tolist() == [2.5, 3.5, 4.5, 5.5, 6.5]
+
+
+def test_a_far_outlier_does_not_make_a_million_bins():
+    assert bin_edges(np.r_[np.linspace(0.0, 1.0, 1000), 1e9]).size == 49
+
+
+def test_thinning_a_history_keeps_its_shortest_pulse():
+    t = np.linspace(0.0, 700.0, 70_001)
+    y = np.zeros(t.size)
+    y[31_337] = 30.0
+    short_t, short_y = thinned(t, y)
+    assert short_t.size < 1000
+    assert short_y.max() == 30.0
+    assert short_t[short_y.argmax()] == t[31_337]
+
+
+def test_at_most_two_thousand_points_and_the_extremes_are_drawn(drawings):
+    for drawing in drawings:
+        for plot in drawing.plots:
+            for mark in plot.marks:
+                if isinstance(mark, Points):
+                    assert mark.x.size <= 2020
+
+
+def test_the_interactive_figures_are_json_without_nan(drawings):
+    for drawing in drawings:
+        json.dumps(screen.specifications(drawing), allow_nan=False)
+
+
+def test_the_printed_figures_are_the_same_bytes_twice_and_hold_no_date(drawings):
+    for drawing in drawings:
+        first = paper.svg(drawing)
+        assert first == paper.svg(drawing)
+        assert "<metadata>" not in first
+        assert "<path" in first
+        assert "<text" in first
+
+
+def test_numbers_that_differ_by_little_stay_different_on_the_screen():
+    values = -2.0 + 1e-5 * np.array([0.0, 0.5, np.nan, 1.0, 0.25, 0.75])
+    shown = np.array(screen.rounded(values, 5), dtype=float)
+    assert np.nanmax(np.abs(shown - values)) < 1e-9
+    assert np.isnan(shown[2])
+    assert screen.rounded([1.0, 1.0 + 2**-52], 5)[1] == 1.0 + 2**-52
+    assert screen.rounded([-0.123456789, 2.0], 5) == [-0.12346, 2.0]
+    assert screen.rounded([1 / 3, 1 / 3], 5) == [0.33333, 0.33333]
+    assert screen.rounded([], 5) == []
+
+
+def test_dollar_signs_in_names_are_no_mathematics():
+    drawn = [block.drawing for block in blocks_of(build(_with_name("cost $x$ of $\\nosuch$"), "run"), FigureBlock)]
+    labelled = [one for one in drawn if one.form == FORMS["map"] and "$x$" in one.plots[0].x.label]
+    assert labelled
+    for one in labelled:
+        assert "<svg" in paper.svg(one)
+
+
+def _with_name(name):
+    run = synthetic_run(200, failed=0)
+    for one in run.manifest["inputs"]:
+        if one["name"] == "ve_pct":
+            one["description"] = name
+    return run

@@ -1,0 +1,174 @@
+"""The typeset report."""
+
+import ctypes
+import io
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pypdf
+import pypdfium2
+import pytest
+from payloads import PAYLOADS, hostile
+from synthetic_run import synthetic_run
+
+from reports import build, render_pdf
+from reports.document.blocks import Cell, Column, Section, Table
+from reports.document.columns import spans
+
+MARKUP = [
+    '#panic("x")',
+    "*bold* _x_ $x^2$ `raw`",
+    "= heading",
+    "@reference <label>",
+    "\\ \\u{41} // comment",
+    "$\\frac{",
+]
+
+
+@pytest.fixture(scope="module")
+def pdf():
+    return render_pdf(build(synthetic_run(3000), "run"))
+
+
+def text_of(pdf, tmp_path):
+    """What a reader's text search finds."""
+    if shutil.which("pdftotext") is None:
+        pytest.skip("needs the Debian package poppler-utils")
+    (tmp_path / "report.pdf").write_bytes(pdf)
+    done = subprocess.run(["pdftotext", "-layout", tmp_path / "report.pdf", "-"], capture_output=True, check=True)
+    return done.stdout.decode()
+
+
+def test_the_same_run_gives_the_same_bytes(pdf):
+    assert pdf.startswith(b"%PDF")
+    assert render_pdf(build(synthetic_run(3000), "run")) == pdf
+
+
+def test_two_readers_open_it_and_see_the_same_pages_with_ink_on_each(pdf):
+    pages = pypdf.PdfReader(io.BytesIO(pdf)).pages
+    drawn = pypdfium2.PdfDocument(pdf)
+    assert len(pages) == len(drawn) > 8
+    for page, other in zip(pages, drawn, strict=True):
+        grey = other.render(scale=0.3, grayscale=True).to_numpy()
+        assert (grey < 128).any()
+        squeezed = [re.sub(r"\s", "", text) for text in (page.extract_text(), other.get_textpage().get_text_bounded())]
+        assert abs(len(squeezed[0]) - len(squeezed[1])) <= 0.02 * len(squeezed[0]) + 5
+
+
+def test_it_has_a_title_a_language_an_outline_and_alternative_texts(pdf):
+    reader = pypdf.PdfReader(io.BytesIO(pdf))
+    assert reader.metadata.title == "De-orbit correction after an erroneous burn"
+    assert reader.trailer["/Root"]["/Lang"] == "en"
+    assert len(reader.outline) >= 12
+    assert sum("/Alt" in item for item in _dictionaries(reader)) >= 9
+
+
+def test_every_font_is_embedded_and_every_figure_is_drawn_with_lines(pdf):
+    reader = pypdf.PdfReader(io.BytesIO(pdf))
+    fonts = [item for item in _dictionaries(reader) if item.get("/Type") == "/FontDescriptor"]
+    assert fonts
+    assert all({"/FontFile", "/FontFile2", "/FontFile3"} & set(font) for font in fonts)
+    assert not [item for item in _dictionaries(reader) if item.get("/Subtype") == "/Image" and item["/Width"] > 64]
+
+
+def test_payloads_are_typeset_as_they_were_written():
+    text = " ".join(PAYLOADS)
+    reader = pypdf.PdfReader(io.BytesIO(render_pdf(build(hostile(text), "run"))))
+    squeezed = re.sub(r"\s", "", "".join(page.extract_text() for page in reader.pages))
+    for payload in PAYLOADS:
+        assert re.sub(r"\s", "", payload) in squeezed
+    assert not [item for item in _dictionaries(reader) if item.get("/S") == "/URI" or "/URI" in item]
+
+
+def _dictionaries(reader):
+    """Every dictionary that stands as an object of its own."""
+    found = (
+        reader.get_object(number)
+        for number in range(1, len(reader.xref_objStm) + sum(map(len, reader.xref.values())) + 1)
+    )
+    return [item for item in found if isinstance(item, pypdf.generic.DictionaryObject)]
+
+
+def test_the_creation_date_is_that_of_the_run(pdf):
+    dates = set(re.findall(rb"D:(\d{14})", pdf))
+    assert dates == {b"20260421101500"}
+
+
+def test_numbered_tables_figures_and_pages_are_there(pdf, tmp_path):
+    text = text_of(pdf, tmp_path)
+    assert "Table 1. Verification matrix" in text
+    assert "Figure 1. Margins of the requirements" in text
+    assert "Figure 5. Correction fuel" in text
+    assert re.search(r"\b2 ?/ ?\d", text)
+    assert re.search(r"Provenance\W+\d", text)
+
+
+@pytest.mark.parametrize("markup", MARKUP)
+def test_what_users_write_is_never_read_as_markup(markup, tmp_path):
+    run = synthetic_run(40, failed=2, figures=[])
+    run.manifest["campaign"]["title"] = markup
+    run.manifest["inputs"][0]["source"] = markup
+    squeezed = re.sub(r"\s", "", text_of(render_pdf(build(run, "run")), tmp_path))
+    assert re.sub(r"\s", "", markup) in squeezed
+
+
+@pytest.mark.parametrize(("n", "failed"), [(0, 0), (1, 0), (2, 0), (20, 20)])
+def test_hardly_any_cases_and_all_failed_are_still_typeset(n, failed):
+    assert render_pdf(build(synthetic_run(n, failed=failed), "run")).startswith(b"%PDF")
+
+
+def test_a_date_that_cannot_be_read_is_left_out():
+    assert render_pdf(build(synthetic_run(5, failed=0, created_utc="yesterday"), "run")).startswith(b"%PDF")
+
+
+def test_every_page_but_the_last_is_at_least_half_full(pdf):
+    pages = [page.render(scale=0.5, grayscale=True).to_numpy() for page in pypdfium2.PdfDocument(pdf)]
+    for grey in pages[1:-1]:
+        body = grey[: int(0.93 * len(grey))]  # without the foot
+        assert np.flatnonzero((body < 200).any(axis=1)).max() > 0.5 * len(grey)
+
+
+def test_no_type_is_smaller_than_seven_and_a_half_points(pdf):
+    sizes = {}
+    for page in pypdfium2.PdfDocument(pdf):
+        for item in page.get_objects(filter=[pypdfium2.raw.FPDF_PAGEOBJ_TEXT], max_depth=8):
+            height = ctypes.c_float()
+            assert pypdfium2.raw.FPDFTextObj_GetFontSize(item.raw, height)
+            _, _, c, d, _, _ = item.get_matrix().get()
+            sizes[round(height.value * (c * c + d * d) ** 0.5, 2)] = item
+    assert len(sizes) >= 3
+    assert min(sizes) >= 7.45
+
+
+def test_text_of_figures_is_found_and_set_in_the_typefaces_of_the_page(pdf, tmp_path):
+    text = text_of(pdf, tmp_path)
+    for label in ("peak force [N]", "time [s]", "required limit"):
+        assert label in text
+    fonts = [item["/FontName"].split("+")[1] for item in _dictionaries(pypdf.PdfReader(io.BytesIO(pdf)))
+             if item.get("/Type") == "/FontDescriptor"]  # fmt: skip
+    assert set(fonts) == {"DejaVuSans", "DejaVuSans-Bold", "DejaVuSansMono"}
+
+
+def test_a_table_leaves_no_row_alone_on_a_page():
+    blocks = []
+    for n in range(2, 60, 3):
+        rows = tuple((Cell(f"first of {n}" if k == 0 else f"last of {n}" if k == n - 1 else f"{k}"),) for k in range(n))
+        blocks.append(Table("rows", (Column("head"),), rows, number=n))
+    document = replace(build(synthetic_run(5, failed=0), "run"), sections=(Section("t", "Tables", tuple(blocks)),))
+    for page in pypdf.PdfReader(io.BytesIO(render_pdf(document))).pages[1:]:
+        lines = [line for line in page.extract_text().splitlines() if line.strip()]
+        for k, line in enumerate(lines):
+            before, after = (lines[k + step] if 0 <= k + step < len(lines) else "" for step in (-1, 1))
+            assert not (line.startswith("last of") and before == "head"), line
+            assert not (line.startswith("first of") and not re.match(r"\d|last", after)), line
+
+
+def test_a_grouped_cell_is_shown_once_and_stands_for_all_its_rows():
+    rows = tuple((Cell(metric), Cell(name)) for metric, name in (("load", "ld"), ("load", "cd"), ("miss", "cd")))
+    columns = Column("Metric", grouped=True), Column("Contributor")
+    assert spans(Table("Contributors", columns, rows)) == [2, 0, 1]
+    assert spans(Table("Contributors", columns[1:] * 2, rows)) == [1, 1, 1]
+    assert spans(Table("Contributors", columns, ())) == []

@@ -1,0 +1,96 @@
+"""Numbers are told in units that a person would choose, one per column in all of a report; its data keep their own."""
+
+import dataclasses
+import json
+import re
+from base64 import b64decode
+
+import numpy as np
+import pytest
+from synthetic_run import synthetic_run
+
+from reports.contents import build
+from reports.document.blocks import FigureBlock, blocks_of
+from reports.formats.html import case_record, render_html
+from reports.formats.json_data import render_json
+from reports.formats.markdown import render_markdown
+from reports.run.chosen_units import ShownRun, chosen_unit
+from reports.run.flown import Flown
+
+
+@pytest.mark.parametrize(
+    ("unit", "numbers", "told"),
+    [
+        ("s", [8e5], "day"),
+        ("s", [5000.0], "s"),
+        ("s", [2e4], "h"),
+        ("J/m^2", [9.4e7, 1.2e8], "MJ/m^2"),
+        ("W/m^2", [5.8e5, 8e5], "kW/m^2"),
+        ("m", [6.5e6], "km"),
+        ("km", [35786.0], "km"),  # there is no larger one
+        ("deg", [0.004, 0.05], "deg"),
+        ("deg", [0.0004], "arcsec"),
+        ("m/s", [0.0, None, float("nan")], "m/s"),
+        ("furlong", [1e9], "furlong"),
+        ("", [1e9], ""),
+    ],
+)
+def test_a_unit_is_changed_only_where_its_numbers_are_awkward(unit, numbers, told):
+    assert chosen_unit(unit, numbers) == told
+
+
+@pytest.fixture(scope="module")
+def slow():
+    """A run whose settling takes days, and whose limit says so in seconds."""
+    run = synthetic_run(400, failed=3)
+    run.table["settling_time_s"] = 800_000.0 + 1000.0 * run.table["ve_pct"]
+    run.nominal_row["settling_time_s"] = 800_000.0
+    settling = run.manifest["requirements"][2]
+    run.manifest["requirements"][2] = {**settling, "at_most": 820_000.0}
+    run.history["t_s"] *= 1000.0
+    return run
+
+
+def test_a_metric_has_one_unit_on_all_pages_and_on_the_axes(slow):
+    document = build(slow, "run")
+    text = render_markdown(document).decode().replace("\\", "")
+    assert "settling time [day]" in text
+    assert "at most 9.4907\u202fday" in text
+    assert not re.search(r"settling time [^.|]*\[s\]|8[0-9]{5}|8\.[0-9]+·10⁵", text)
+    assert "settling time [s]" not in render_html(document).decode()
+    axes = [plot.x.label for one in blocks_of(document, FigureBlock) for plot in one.drawing.plots]
+    assert "settling time [day]" in axes
+    assert "time [day]" in axes
+
+
+def test_verdicts_and_counts_are_those_of_the_columns_own_units(slow):
+    own = Flown(slow, "run")
+    told = ShownRun(own)
+    assert [(one.passed, one.tried, one.outcome) for one in told.verdicts] == [
+        (one.passed, one.tried, one.outcome) for one in own.verdicts
+    ]
+    limit = next(one for one in told.verdicts if one.name == "settling")
+    assert limit.at_most == pytest.approx(820_000.0 / 86_400.0)
+    summary = told.summaries["settling_time_s"]
+    values = slow.table["settling_time_s"][: 400 - 3] / 86_400.0
+    assert summary.mean == pytest.approx(values.mean())
+    assert summary.sd == pytest.approx(values.std())
+    assert summary.at(0.5).value == pytest.approx(np.quantile(values, 0.5, method="median_unbiased"))
+    assert dataclasses.replace(own.summaries["propellant_kg"]) == told.summaries["propellant_kg"]
+
+
+def test_the_data_of_a_report_stay_in_the_columns_own_units(slow):
+    record = json.loads(render_json(build(slow, "run")))
+    settling = next(one for one in record["requirements"] if one["name"] == "settling")
+    assert (settling["unit"], settling["at_most"]) == ("s", 820_000.0)
+    metric = next(one for one in record["metrics"] if one["name"] == "settling_time_s")
+    assert metric["unit"] == "s"
+    assert metric["mean"] == pytest.approx(slow.table["settling_time_s"][:397].mean(), rel=1e-12)
+
+
+def test_a_single_case_is_drawn_over_time_in_the_unit_of_its_label(slow):
+    record = case_record(build(slow, "run"))
+    assert record["panel"]["xaxis"]["title"]["text"] == "time [day]"
+    times = record["histories"]["-1"]["force_n"][0]
+    own = slow.history.loc[slow.history["case_id"] == -1, "t_s"].max()
+    assert max(np.frombuffer(b64decode(times["bdata"]), times["dtype"])) == pytest.approx(own / 86400.0, rel=1e-6)

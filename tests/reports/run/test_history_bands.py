@@ -1,0 +1,96 @@
+"""Percentile bands over the histories of many cases."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from figure_marks import drawings
+from synthetic_run import synthetic_run
+
+from reports.contents import build
+from reports.drawing import paper, screen
+from reports.drawing.marks import Band, Line
+from reports.run.history_bands import fair_cases, history_envelopes
+
+TIMES = np.linspace(0.0, 10.0, 101)
+
+
+def histories(slopes, times=None):
+    """A straight line a case; `times` a list of one grid each, or the same for all."""
+    frames = []
+    for case, slope in enumerate(slopes):
+        t = TIMES if times is None else times[case]
+        frames.append(pd.DataFrame({"case_id": case, "t_s": t, "x_m": slope * t, "y_m": -slope * t}))
+    return pd.concat(frames, ignore_index=True)
+
+
+def test_the_band_holds_the_quantiles_of_the_cases_at_every_time():
+    slopes = np.random.Generator(np.random.Philox(key=2)).normal(size=200)
+    bands = history_envelopes(histories(slopes), range(200), ["x_m", "y_m"])
+    for name, sign in (("x_m", 1.0), ("y_m", -1.0)):
+        band = bands[name]
+        np.testing.assert_array_equal(band.at, TIMES)
+        assert band.n_cases == 200
+        for probability, curve in band.curves.items():
+            expected = [np.quantile(sign * slopes * t, probability) for t in TIMES]
+            np.testing.assert_allclose(curve, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_flights_of_their_own_steps_are_met_at_common_times_and_count_until_their_end():
+    """Cases 0 to 29 end at 5 s, 30 to 54 at 10 s, each with other steps; straight lines are met exactly."""
+    ends = [5.0] * 30 + [10.0] * 25
+    times = [np.linspace(0.0, end, 20 + case) for case, end in enumerate(ends)]
+    slopes = np.arange(55.0)
+    band = history_envelopes(histories(slopes, times), range(55), ["x_m"])["x_m"]
+    assert band.at[-1] == 10.0
+    early, late = band.at < 4.99, band.at > 5.01
+    np.testing.assert_allclose(band.curves[0.5][early], 27.0 * band.at[early], rtol=1e-9)
+    np.testing.assert_allclose(band.curves[0.5][late], 42.0 * band.at[late], rtol=1e-9)
+
+
+def test_where_too_few_still_fly_the_band_ends():
+    times = [np.linspace(0.0, 10.0 if case < 5 else 4.0, 50) for case in range(40)]
+    band = history_envelopes(histories(np.ones(40), times), range(40), ["x_m"])["x_m"]
+    assert 3.9 < band.at[-1] <= 4.0
+
+
+def test_a_handful_of_cases_makes_no_band():
+    assert history_envelopes(histories(np.ones(19)), range(19), ["x_m"]) == {}
+
+
+def test_only_cases_kept_for_no_reason_are_in_a_band():
+    """The nominal is no case; 7 and 90 were kept because they are among the worst."""
+    assert fair_cases([-1, 0, 1, 2, 3, 4, 7, 90]) == [0, 1, 2, 3, 4]
+    assert fair_cases([-1, 3, 4]) == []
+
+
+@pytest.fixture(scope="module")
+def drawing():
+    run = synthetic_run(300, failed=0)
+    slopes = np.random.Generator(np.random.Philox(key=3)).normal(size=60)
+    names = ["semi_major_axis_error_km", "eccentricity_error", "force_n", "position_error_m"]
+    lines = [
+        pd.DataFrame({"case_id": case, "t_s": TIMES} | {name: slope * TIMES for name in names[:3]} | {names[3]: 1.0})
+        for case, slope in enumerate([0.0, *slopes], start=-1)
+    ]
+    run.history = pd.concat(lines, ignore_index=True)
+    document = build(run, "run")
+    return document, drawings(document, "histories")[0]
+
+
+def test_a_report_draws_bands_with_the_nominal_and_the_two_worst(drawing):
+    _, histories_drawing = drawing
+    plots = [plot for plot in histories_drawing.plots if any(isinstance(mark, Band) for mark in plot.marks)]
+    assert [plot.quantity for plot in plots] == ["semi_major_axis_error_km", "eccentricity_error", "force_n"]
+    lines = [mark.name for mark in histories_drawing.plots[0].marks if isinstance(mark, Line)]
+    assert (len(lines), lines[0], lines[-1]) == (4, "median of them", "nominal")
+    texts = [entry.text for entry in histories_drawing.key]
+    assert "2.5\u202f% to 97.5\u202f% of 60 saved cases" in texts  # 60 cases support no percentile farther out
+    assert "smallest to largest of 60 saved cases" in texts
+    filled = [trace for trace in screen.specifications(histories_drawing)[0]["data"] if trace.get("fill") == "toself"]
+    assert len(filled) == 2
+    assert paper.svg(histories_drawing) == paper.svg(histories_drawing)
+
+
+def test_a_quantity_that_never_changes_is_named_instead_of_drawn(drawing):
+    document, _ = drawing
+    assert "Not drawn, constant in every saved case: position_error_m." in repr(document)

@@ -1,0 +1,79 @@
+"""The corridor: violated limits in colour, limits as lines."""
+
+import json
+
+import numpy as np
+import pytest
+from figure_marks import FORMS, classes, marks_of
+from landing_run import landing_run
+
+from reports.contents import build
+from reports.document.blocks import FigureBlock
+from reports.drawing import paper, screen
+from reports.drawing.marks import Line, Points
+
+
+def corridor(document):
+    section = next(one for one in document.sections if one.anchor == "corridor")
+    return next(block for block in section.blocks if isinstance(block, FigureBlock))
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    return corridor(build(landing_run(3000, failed=20), "run"))
+
+
+def test_each_case_has_the_class_of_the_limits_that_it_violates(drawn):
+    drawing = drawn.drawing
+    assert drawing.form == FORMS["corridor"]
+    table = landing_run(3000, failed=20).table.set_index("case_id")
+    load = ~(table["peak_load_g"] <= 9.0)
+    out = ~(table["exits"] <= 0.0)
+    words = {"inside all limits": ~load & ~out, "beyond load": load & ~out, "beyond inside": out & ~load,
+             "beyond load and inside": load & out}  # fmt: skip
+    assert classes(drawing) == {word: int(rows.sum()) for word, rows in words.items() if rows.any()}
+    clouds = [mark for mark in marks_of(drawing, Points) if mark.cases is not None]
+    assert len(clouds) > 1
+    for cloud in clouds:
+        assert words[cloud.name].loc[cloud.cases].all()
+
+
+def test_the_limit_runs_where_the_closed_form_puts_it(drawn):
+    (limit,) = marks_of(drawn.drawing, Line)  # of the load; exits are counts
+    assert limit.text.startswith("peak load at most 9")
+    points = np.column_stack([limit.x, limit.y])[np.isfinite(limit.x)]
+    assert len(points) > 20
+    load = 8.7 - 4.0 * (points[:, 1] + 2.0) + 0.02 * (points[:, 0] - 7800.0)
+    assert load == pytest.approx(np.full(len(points), 9.0), abs=1e-3)
+
+
+def test_a_limit_that_the_two_columns_do_not_decide_is_not_drawn():
+    run = landing_run(3000, failed=0)
+    draw = np.random.Generator(np.random.Philox(key=6))
+    run.table["peak_load_g"] = draw.normal(8.7, 0.3, 3000)
+    assert not marks_of(corridor(build(run, "run")).drawing, Line)
+
+
+def test_without_a_violation_a_sentence_says_that_all_cases_are_inside():
+    run = landing_run(1000, failed=0)
+    run.table = run.table.assign(peak_load_g=8.0 + 1e-3 * run.table["angle_deg"], exits=0.0)
+    (section,) = [one for one in build(run, "run").sections if one.anchor == "corridor"]
+    (said,) = section.blocks
+    assert said.paragraphs == ("Entry corridor: not drawn; all cases are inside all limits.",)
+
+
+@pytest.mark.parametrize("cases", [0, 1, 2, 60])
+def test_few_failed_and_equal_cases_are_drawn_or_said(cases):
+    for change in ({}, {"status": "not-finite"}, {"angle_deg": -2.0, "speed_m_s": 7800.0}, {"peak_load_g": np.nan}):
+        run = landing_run(60, failed=0)
+        run.table = run.table.assign(**change).head(cases)
+        document = build(run, "run")
+        for section in document.sections:
+            for block in section.blocks:
+                if isinstance(block, FigureBlock):
+                    json.dumps(screen.specifications(block.drawing), allow_nan=False)
+                    assert "<svg" in paper.svg(block.drawing)
+
+
+def test_without_a_requirement_there_is_no_corridor():
+    assert "corridor" not in [section.anchor for section in build(landing_run(60, requirements=[]), "run").sections]

@@ -1,0 +1,129 @@
+"""What the report says of requirements."""
+
+import numpy as np
+import pytest
+from synthetic_run import synthetic_run
+
+from reports.contents import build
+from reports.run.flown import Flown
+from reports.sections.headline import verdict_cards, warnings
+from reports.sections.requirement_tables import margin_block, requirement_table, risk_table
+from reports.sections.tables import quantile_table
+
+FUEL = {"name": "fuel", "metric": "propellant_kg", "at_most": 2.5, "at_least": None, "share": 0.9973, "confidence": 0.9}
+FORCE = {**FUEL, "name": "force", "metric": "peak_force_n", "at_most": 1000.0}
+
+
+def flown(n=1000, failed=0, **changes):
+    changes.setdefault("requirements", [FUEL, FORCE])
+    return Flown(synthetic_run(n, failed, **changes), "run")
+
+
+def texts(table):
+    return [[" ".join(filter(None, (cell.text, cell.small))).replace("\u202f", " ") for cell in row]
+            for row in table.rows]  # fmt: skip
+
+
+def mc(cases=1000):
+    return {"name": "deorbit", "design": "mc", "seed": 1, "cases": cases}
+
+
+def test_the_last_row_is_all_at_once_with_the_joint_share_asked_for():
+    row = texts(requirement_table(flown(campaign=mc())))[-1]
+    assert row[:2] == ["all at once", "all limits for 99.46 % with 90 % confidence"]
+    assert row[4] == "1 000 / 1 000"
+    assert row[-1] == "pass"
+
+
+def test_a_single_requirement_has_neither_a_joint_row_nor_a_shared_confidence():
+    one = flown(campaign=mc(), requirements=[FUEL])
+    assert len(requirement_table(one).rows) == 1
+    assert [column.title for column in risk_table(one).columns][-1] == "Producer’s risk"
+    assert all(len(row) == len(risk_table(one).columns) for row in risk_table(one).rows)
+    assert "Bonferroni" not in risk_table(one).note
+
+
+def test_risks_stand_beside_the_failures_seen_and_allowed():
+    fuel, _, joint = texts(risk_table(flown(campaign=mc())))
+    # 1000 cases, no failure allowed: 0.9973^1000 = 6.69 %, and 1 - 0.99865^1000 = 74.1 %
+    assert fuel == ["fuel propellant_kg", "0", "0", "6.69 %", "74.09 %", "not demonstrable with 96.66 % each"]
+    assert joint[-1] == "pass with 96.66 % each"
+
+
+def test_a_run_by_looks_says_its_schedule_and_which_bounds_these_are():
+    looked = flown(campaign=mc(100), looks=[100, 500, 1000, 2000])
+    assert "Robbins" in requirement_table(looked).note
+    assert "Clopper" not in requirement_table(looked).note
+    assert "fixed in advance" in quantile_table(looked).note
+    assert "fixed in advance" not in quantile_table(flown(campaign=mc())).note
+    warned = " ".join(warnings(looked)).replace("\u202f", " ")
+    assert "with interim analyses after 100, 500, 1 000, 2 000 cases; it ended after 1 000" in warned
+    fuel = texts(risk_table(looked))[0]
+    assert fuel[3:5] == ["below 10 %", "–"]
+    assert texts(requirement_table(looked))[0][-1] == "not demonstrable needs 1 104 cases"
+
+
+def test_a_run_extended_by_hand_says_so():
+    warned = " ".join(warnings(flown(campaign=mc(500)))).replace("\u202f", " ")
+    assert "began with 500 cases and was extended to 1 000" in warned
+    assert "extended" not in " ".join(warnings(flown(campaign=mc())))
+
+
+def test_two_limits_show_the_interval_and_its_margin():
+    band = {**FUEL, "at_least": -1.0}
+    row = texts(requirement_table(flown(2000, campaign=mc(2000), requirements=[band])))[0]
+    low, high = (float(word) for word in row[2].split(" kg")[0].split(" to "))
+    assert 0.0 <= low < high < 2.5
+    margin, share = (float(word) for word in row[3].replace(" %)", "").split(" kg ("))
+    assert margin == pytest.approx(min(2.5 - high, low + 1.0), abs=1e-3)
+    assert share == pytest.approx(100.0 * margin / 3.5, abs=0.1)
+
+
+@pytest.mark.parametrize("n", [0, 1, 2, 40])
+@pytest.mark.parametrize("kind", ["good", "all failed", "constant", "not a number"])
+@pytest.mark.parametrize("looks", [[], [1, 2, 40, 100]])
+def test_hardly_any_cases_are_reported_without_a_warning(n, kind, looks):
+    run = synthetic_run(n, n if kind == "all failed" else 0, requirements=[FUEL, FORCE], campaign=mc(n), looks=looks)
+    if kind in ("constant", "not a number"):
+        run.table["propellant_kg"] = 1.0 if kind == "constant" else np.nan
+    built = Flown(run, "run")
+    rows = texts(requirement_table(built))
+    assert len(rows) == 3
+    bad = kind in ("all failed", "not a number") and n > 0
+    assert rows[0][-1].startswith("fail" if bad else "not demonstrable")
+    assert rows[2][-1].startswith("fail" if bad else "not demonstrable")
+    assert (risk_table(built) is None) == (n == 0)
+    assert verdict_cards(built)[-1].label == "all at once"
+
+
+def test_a_grid_has_no_risks():
+    assert risk_table(flown(campaign={**mc(), "design": "grid"})) is None
+
+
+def test_both_tables_stand_in_the_section_of_requirements():
+    document = build(synthetic_run(300, 0, campaign=mc(300)), "run")
+    section = next(section for section in document.sections if section.anchor == "requirements")
+    captions = [getattr(block, "caption", "").split(",")[0] for block in section.blocks]
+    assert captions == ["Verification matrix", "Margins of the requirements", "Risks of the verdicts"]
+
+
+def test_the_joint_card_names_the_requirement_that_fails_it():
+    draw = Flown(synthetic_run(3000, 0, campaign=mc(3000)), "run")
+    at_most = float(np.sort(draw.values("propellant_kg"))[-27])  # 26 of 3000 are outside
+    found = flown(
+        3000, campaign=mc(3000), requirements=[{**FUEL, "at_most": at_most}, FORCE, {**FORCE, "name": "more"}]
+    )
+    card = verdict_cards(found)[-1]
+    assert (card.label, card.answer) == ("all at once", "fail")
+    assert card.detail.endswith("inside; fuel fails with confidence shared.")
+
+
+def test_margins_of_a_limit_of_zero_have_no_width():
+    spare = {**FUEL, "name": "spare", "metric": "propellant_kg", "at_most": None, "at_least": 0.0}
+    one = flown(campaign=mc(), requirements=[spare, FORCE])
+    cells = [row[3].small for row in requirement_table(one).rows]
+    assert cells[0] == ""
+    assert cells[1].endswith("\u202f%)")
+    figure = margin_block(one)
+    assert [text.split(",")[0] for _, text in figure.drawing.plots[0].y.ticks] == ["force"]
+    assert figure.caption.endswith("Not drawn, the limit is 0: spare.")

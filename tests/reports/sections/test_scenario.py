@@ -1,0 +1,73 @@
+"""What a report says was flown; and what it draws where the model asks for no figure."""
+
+import pytest
+from figure_marks import FORMS, marks_of
+from synthetic_run import synthetic_run
+
+from reports.contents import build
+from reports.document.blocks import FigureBlock, Table
+from reports.drawing.marks import Points
+
+
+def section(run, anchor):
+    return next(one for one in build(run, "run").sections if one.anchor == anchor)
+
+
+def test_the_timeline_tells_when_and_what_else_is_known_of_the_event():
+    run = synthetic_run(50, failed=0)
+    columns = run.manifest["columns"]
+    columns += [
+        {"name": "peak_load_time_s", "unit": "s", "role": "metric", "description": "when"},
+        {"name": "peak_load_altitude_km", "unit": "km", "role": "metric", "description": "where"},
+    ]
+    run.table = run.table.assign(peak_load_time_s=120.0 + run.table["case_id"], peak_load_altitude_km=40.0)
+    run.nominal_row |= {"peak_load_time_s": 100.0, "peak_load_altitude_km": 41.5}
+    table = next(one for one in section(run, "scenario").blocks if isinstance(one, Table))
+    assert [row[0].text for row in table.rows] == ["Peak load", "Settling"]  # in the order of their times
+    assert table.rows[0][1].text == "100\u202fs"
+    assert table.rows[0][3].text == "altitude 41.5\u202fkm"
+
+
+def test_assumptions_are_what_the_campaign_file_sets_and_the_rest_is_in_the_appendix():
+    run = synthetic_run(50, failed=0)
+    scenario = {one.caption: one for one in section(run, "scenario").blocks if isinstance(one, Table)}
+    assert [row[0].text for row in scenario["Assumptions: values set by the campaign file"].rows] == ["isp_s"]
+    assert [row[0].text for row in scenario["Dispersed inputs"].rows] == ["ve_pct [%]", "oe_pct [%]"]
+    (fixed,) = section(run, "inputs").blocks
+    assert [row[0].text for row in fixed.rows] == ["gain_1_s", "control"]
+
+
+def test_without_figures_of_its_own_a_model_gets_histories_and_scatters_of_what_matters():
+    run = synthetic_run(200, failed=0, figures=[])
+    histories = [one for one in section(run, "histories").blocks if isinstance(one, FigureBlock)]
+    assert {plot.quantity for plot in histories[0].drawing.plots} == {
+        "semi_major_axis_error_km", "eccentricity_error", "force_n", "position_error_m",
+    }  # fmt: skip
+    scatters = [one for one in section(run, "scatter").blocks if isinstance(one, FigureBlock)]
+    assert [marks_of(one.drawing, Points)[0].columns for one in scatters if one.drawing.form == FORMS["scatter"]] == [
+        ("ve_pct", "propellant_kg"), ("ve_pct", "peak_force_n"), ("ve_pct", "settling_time_s"),
+    ]  # fmt: skip
+
+
+def test_the_margin_figure_has_a_row_a_requirement_with_bound_and_worst_case():
+    run = synthetic_run(3000, failed=0)
+    document = build(run, "run")
+    drawing = next(one.drawing for one in document.sections[0].blocks if isinstance(one, FigureBlock))
+    assert drawing.form == FORMS["margins"]
+    (plot,) = drawing.plots
+    assert [text.split(",")[0] for _, text in plot.y.ticks].index("fuel") == 0
+    worst, demonstrated_bound = (marks_of(drawing, Points, words)[0] for words in ("worst", "demonstrated"))
+    assert worst.x[0] == pytest.approx(100.0 * (1.0 - run.table["propellant_kg"].max() / 2.5))
+    demonstrated = next(one for one in document.data["requirements"] if one.name == "fuel")
+    assert demonstrated_bound.x[0] == pytest.approx(100.0 * demonstrated.margin / 2.5)
+    assert len(plot.y.ticks) == 3
+    low, high = plot.x.reach
+    assert low >= -105.0
+    assert high <= 105.0
+
+
+def test_the_worst_cases_of_requirements_not_met_come_first():
+    blocks = section(synthetic_run(3000, failed=0), "worst").blocks  # all but the fuel are not met
+    assert [one.caption.removeprefix("Cases with the largest ") for one in blocks[:3]] == [
+        "peak force", "settling time", "propellant",
+    ]  # fmt: skip

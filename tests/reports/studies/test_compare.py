@@ -1,0 +1,157 @@
+"""The comparison of two runs as a page and as a PDF."""
+
+import warnings
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from synthetic_run import synthetic_run
+
+from mc_engine.errors import StoreError
+from mc_engine.studies.comparison import compare_runs
+from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.figures.rows import ratio_ticks
+from reports.formats.html import render_html
+from reports.studies.comparison import build_comparison, write_comparison
+
+INJECTION = "<script>alert(1)</script>"
+
+
+def compared(shift=0.0, seed=1, n=400, failed=3, text="", names=("before", "after")):
+    runs = []
+    for own, moved, words in ((1, 0.0, "[campaign]"), (seed, shift, text or "[campaign]")):
+        made = synthetic_run(n, failed=min(failed, n), seed=own)
+        made.table["peak_force_n"] += moved
+        runs.append(SimpleNamespace(manifest=made.manifest, campaign_text=words, cases=made.cases))
+    return compare_runs(*runs, names)
+
+
+def tables(document):
+    return {table.caption: table for table in blocks_of(document, Table)}
+
+
+def test_the_headline_says_what_changed_and_the_table_by_how_much():
+    found = compared(shift=8.0, seed=2)
+    document = build_comparison(found)
+    assert document.subtitle.endswith("chance of any false alarm).")
+    assert [(card.label, card.tone) for card in document.verdicts][:2] == [("Requirements", ""), ("Shift", "bad")]
+    (row,) = [row for row in tables(document)["Metrics of both runs"].rows if row[0].text.startswith("peak force")]
+    assert row[4].tone == "bad"
+    change = next(one for one in found.metrics if one.metric == "peak_force_n")
+    assert row[3].value == pytest.approx(change.shift.value / change.deviation[0])
+    (figure,) = blocks_of(document, FigureBlock)
+    assert "peak force" in figure.drawing.alternative
+
+
+def two_runs(tmp_shift):
+    """Runs that fly the same cases; in B all are inside the limit on force, and a metric without spread has moved."""
+    runs = []
+    for limit, moved in ((20.0, 0.0), (1e3, tmp_shift)):
+        made = synthetic_run(1200, failed=0)
+        made.manifest["requirements"][1]["at_most"] = limit
+        made.table["entry_speed_m_s"] = 7800.0 + 1e-6 * made.table["ve_pct"] + 1e-3 * moved
+        made.table["settling_time_s"] += moved
+        made.campaign_text = "[campaign]"
+        runs.append(made)
+    return runs
+
+
+def test_requirements_come_first_and_in_words():
+    a, b = two_runs(1.0)
+    found = compare_runs(a, b, ("before", "after"))
+    document = build_comparison(found, (a, b))
+    assert document.sections[0].anchor == "requirements"
+    passed = [int((run.table["peak_force_n"] <= limit).sum()) for run, limit in ((a, 20.0), (b, 1e3))]
+    card = document.verdicts[0]
+    assert (card.label, card.answer, card.tone) == ("force", "fail → pass", "good")
+    assert card.detail == f"{passed[0]:,} → {passed[1]:,} of {len(a.table):,} cases inside".replace(",", "\u202f")
+    assert "force: fail → pass" in document.subtitle
+
+
+def test_a_shift_far_beyond_the_others_is_said_and_the_axis_shows_the_others():
+    a, b = two_runs(1.0)
+    document = build_comparison(compare_runs(a, b, ("before", "after")))
+    (figure,) = blocks_of(document, FigureBlock)
+    low, high = figure.drawing.plots[0].x.reach
+    assert -10.0 < low < high < 10.0
+    assert "beyond the axis, not drawn: entry speed" in figure.caption
+    rows = tables(document)["Metrics of both runs"].rows
+    assert [row[0].text.split(" [")[0].split("\u202f")[0] for row in rows] == ["entry speed", "settling time"]
+
+
+def test_both_runs_are_laid_over_one_another_with_the_counts_of_the_table():
+    a, b = two_runs(1.0)
+    document = build_comparison(compare_runs(a, b, ("before", "after")), (a, b))
+    section = next(one for one in document.sections if one.anchor == "overlays")
+    distribution = section.blocks[0].drawing.plots[1]
+    assert distribution.x.label == "settling time [s]"
+    for mark, run in zip(distribution.marks, (a, b), strict=True):
+        values, edges = run.table["settling_time_s"], np.unique(mark.x)
+        assert mark.y[1:-1:2] == pytest.approx(np.histogram(values, edges)[0] / 1200)
+    keys = {mark.key[:5] for panel in section.blocks[1].drawing.plots for mark in panel.marks}
+    assert keys == {"run A", "run B"}
+    page = render_html(document).decode()
+    assert "run B: fraction of the cases" in page
+
+
+def test_rounding_errors_of_nominal_cases_are_not_drawn_over_one_another():
+    a, b = two_runs(1.0)
+    for seed, run in enumerate((a, b)):
+        keep = run.history["case_id"] < 3  # too few for envelopes
+        run.history = run.history[keep].copy()
+        nominal = run.history["case_id"] == -1
+        assert nominal.any()
+        run.history.loc[nominal, "force_n"] = 1e-13 * np.random.default_rng(seed).random(nominal.sum())
+    document = build_comparison(compare_runs(a, b, ("before", "after")), (a, b))
+    section = next(one for one in document.sections if one.anchor == "overlays")
+    labels = [panel.y.label for panel in section.blocks[1].drawing.plots]
+    assert "position error [m]" in labels
+    assert "force [N]" not in labels
+    assert section.blocks[2].paragraphs == ("Not drawn, rounding errors only in both nominal cases: force_n.",)
+
+
+def test_the_same_run_twice_has_no_figure_and_says_so():
+    document = build_comparison(compared())
+    assert document.subtitle.startswith("No significant change")
+    assert not list(blocks_of(document, FigureBlock))
+    page = render_html(document).decode()
+    assert "The same in both runs: correction_impulse_m_s" in page
+    assert "Code: the same in both runs." in page
+
+
+@pytest.mark.parametrize(("n", "failed"), [(0, 0), (1, 0), (2, 0), (40, 40)])
+def test_few_cases_and_failed_ones_make_a_page_without_a_warning(n, failed, tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = compared(shift=1.0, seed=2, n=n, failed=failed)
+        write_comparison(found, tmp_path / "compare.html")
+        write_comparison(found, tmp_path / "compare.pdf")
+    assert (tmp_path / "compare.html").stat().st_size > 10_000
+
+
+def test_names_and_campaign_lines_stay_text():
+    page = render_html(build_comparison(compared(text=INJECTION, names=(INJECTION, "b")))).decode()
+    assert INJECTION not in page
+    assert page.count("&lt;script&gt;alert(1)&lt;/script&gt;") >= 2
+
+
+def test_page_and_pdf_are_the_same_bytes_twice(tmp_path):
+    found = compared(shift=8.0, seed=2)
+    for name in ("compare.html", "compare.pdf"):
+        first = write_comparison(found, tmp_path / name).read_bytes()
+        assert write_comparison(found, tmp_path / name).read_bytes() == first
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["compare.html", "compare.pdf"]
+
+
+def test_a_folder_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(StoreError, match="No such file"):
+        write_comparison(compared(), tmp_path / "none" / "compare.html")
+
+
+@pytest.mark.parametrize("span", [(0.97, 1.02), (0.8, 1.1), (0.5, 3.0), (0.1, 8.0), (1e-4, 1e3)])
+def test_the_ticks_of_a_ratio_lie_inside_and_hold_one(span):
+    ticks = ratio_ticks(span)
+    assert 1.0 in ticks
+    assert 2 <= len(ticks) <= 9
+    assert np.all(np.diff(ticks) > 0.0)
+    assert span[0] <= ticks[0] <= ticks[-1] <= span[1]

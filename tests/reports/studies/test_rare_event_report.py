@@ -1,0 +1,131 @@
+"""The report of a rare event: verdict, failures, levels and cost, on the screen and on paper."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import reports
+from mc_engine.store.parts import Column
+from mc_engine.store.result_folder import write_result
+from mc_engine.store.run_files import RARE_EVENT
+from mc_engine.studies.rare_event_folder import open_rare_event
+from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.drawing import screen
+from reports.studies.rare_events import build_rare_event
+
+MANIFEST = {
+    "created_utc": "2026-01-02T03:04:05.000Z",
+    "engine": "0.1.0",
+    "seed_contract": 1,
+    "campaign": {"name": "toy", "title": "Toy <b>", "model": "toy", "digest": "d", "seed": 7, "cases": 9},
+    "model": {"title": "A toy", "source": "", "digest": "m"},
+    "inputs": [
+        {"name": "a_pct", "unit": "%", "description": "a", "distribution": "normal", "bounds": "", "source": ""}
+    ],
+    "provenance": {},
+}
+
+
+def level(margin, probability, cases=9_000):
+    return {"margin": margin, "probability": probability, "runs": 10, "cases": cases, "accepted": 0.44}
+
+
+def estimated(path, **changes):
+    one = {"name": "a_pct", "unit": "%", "description": "a", "mean_sigma": 4.3, "spread_sigma": 0.2}
+    result = {
+        "asked": {"method": "subset", "cases_per_level": 10_000},
+        "requirement": {
+            "name": "fuel", "metric": "fuel_kg", "at_most": 2.5, "at_least": None, "share": 0.9973, "confidence": 0.9,
+            "source": "tank",
+        },
+        "metric": {"name": "fuel_kg", "unit": "kg", "description": "fuel"},
+        "method": "subset", "probability": 2e-5, "lower": 1.5e-5, "upper": 2.7e-5, "confidence": 0.95,
+        "relative_error": 0.13, "plain_cases": 2.96e6, "cases": 46_000, "failed": 3_000, "no_number": 0,
+        "levels": [level(None, 1.0, 10_000), level(1.4, 0.1), level(0.6, 1e-2), level(0.2, 1e-3), level(0.05, 1e-4)],
+        "inputs": [{**one, "likeliest": 27.0, "likeliest_sigma": 4.1}],
+        "remarks": [],
+    }  # fmt: skip
+    result.update(changes)
+    columns = [Column("case_id", "", "case", "number", "integer"), Column("weight", "", "case", "weight")]
+    arrays = {"case_id": np.arange(3), "weight": np.array([0.5, 0.5, 2e-5])}
+    record = {**MANIFEST, "rare_event": result}
+    write_result(path, RARE_EVENT, "[campaign]\n", record, {"cases": (columns, arrays)})
+    return open_rare_event(path)
+
+
+def table(document, caption):
+    (found,) = [block for block in blocks_of(document, Table) if block.caption == caption]
+    return [[cell.text for cell in row] for row in found.rows]
+
+
+def test_the_headline_is_the_probability_against_what_is_allowed(tmp_path):
+    document = build_rare_event(estimated(tmp_path), "out")
+    interval = "95\u202f% confidence interval 1.5·10⁻⁵ to 2.7·10⁻⁵"
+    assert document.subtitle == f"P(fuel > 2.5\u202fkg) = 2·10⁻⁵ ({interval}). Requirement met."
+    (card,) = document.verdicts
+    assert (card.answer, card.tone) == ("met", "good")
+    assert f"{interval}; allowed: 0.0027. Source: tank." in card.detail
+    assert document.costs[1].detail.startswith("Plain Monte Carlo needs 2\u202f960\u202f000 for the same")
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "answer"), [(1e-3, 2e-3, "met"), (1e-3, 4e-3, "open"), (3e-3, 4e-3, "not met")]
+)
+def test_the_verdict_is_where_the_interval_lies(tmp_path, lower, upper, answer):
+    record = estimated(tmp_path, probability=0.5 * (lower + upper), lower=lower, upper=upper)
+    assert build_rare_event(record, "out").verdicts[0].answer == answer
+
+
+def test_levels_and_failed_inputs_are_listed_and_drawn(tmp_path):
+    document = build_rare_event(estimated(tmp_path), "out")
+    assert [row[1] for row in table(document, "Levels")] == ["all", "1.4", "0.6", "0.2", "0.05"]
+    assert table(document, "Failed cases by input") == [["a_pct [%]", "4.3", "0.2", "27"]]
+    (figure,) = blocks_of(document, FigureBlock)
+    _, levels, *_ = figure.drawing.plots[0].marks
+    np.testing.assert_array_equal(levels.y, [0.1, 1e-2, 1e-3, 1e-4])
+    point = screen.specifications(figure.drawing)[0]["data"][-1]
+    assert point["y"][0] - point["error_y"]["arrayminus"][0] == pytest.approx(1.5e-5)
+    assert "interval 1.5·10⁻⁵ to 2.7·10⁻⁵" in figure.drawing.alternative
+
+
+def test_without_a_failed_case_the_report_says_below(tmp_path):
+    nothing = {"probability": 0.0, "lower": 0.0, "upper": 3e-4, "failed": 0, "inputs": [], "method": "plain"}
+    record = estimated(
+        tmp_path,
+        **nothing,
+        relative_error=None,
+        plain_cases=None,
+        levels=[level(None, 1.0)],
+        remarks=["Nothing varies."],
+    )
+    document = build_rare_event(record, "out")
+    assert document.subtitle == "No case failed: P(fuel > 2.5\u202fkg) < 0.0003. Requirement met."
+    assert document.warnings == ("Nothing varies.",)
+    assert not list(blocks_of(document, FigureBlock))
+
+
+def test_page_and_paper_are_written_and_names_stay_text(tmp_path):
+    estimated(tmp_path)
+    pages = {path.name: path.read_bytes() for path in reports.write_reports(tmp_path)}
+    assert b"Toy &lt;b&gt;" in pages["report.html"]
+    assert b"Toy <b>" not in pages["report.html"]
+    assert pages["report.pdf"].startswith(b"%PDF")
+
+
+def test_failed_cases_are_a_scatter_of_the_two_inputs_they_lie_farthest_in(tmp_path):
+    draw = np.random.Generator(np.random.Philox(key=4))
+    record = estimated(tmp_path, failed=300)
+    one = record.result["inputs"][0]
+    record.result["inputs"][:] = [
+        {**one, "name": name, "likeliest_sigma": sigma, "likeliest": sigma}
+        for name, sigma in zip("abc", (1, -5, 3), strict=True)
+    ]
+    cases = pd.DataFrame({name: draw.normal(size=1000) for name in "abc"})
+    cases["failed"], cases["level"] = np.arange(1000) >= 700, np.arange(1000) // 500
+    figure = next(blocks_of(build_rare_event(replace(record, cases=cases), "out"), FigureBlock))
+    ordinary, failed, likeliest = figure.drawing.plots[0].marks
+    np.testing.assert_array_equal(failed.x, cases["b"][700:])
+    np.testing.assert_array_equal(failed.y, cases["c"][700:])
+    assert (ordinary.x.size, likeliest.x[0], likeliest.y[0]) == (500, -5.0, 3.0)

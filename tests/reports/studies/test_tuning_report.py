@@ -1,0 +1,126 @@
+"""The report of a tuning: front, published points, and a plain word where nothing is feasible."""
+
+import json
+
+import numpy as np
+import pytest
+from figure_marks import drawings, marks_of
+from synthetic_tuning import synthetic_tuning
+
+import reports
+from mc_engine.studies.tuning_folder import UNFINISHED
+from reports.document.blocks import FigureBlock, Table, blocks_of
+from reports.drawing import paper, screen
+from reports.drawing.marks import Points
+from reports.formats.html import render_html
+from reports.formats.pdf import render_pdf
+from reports.studies.tuning import build_tuning
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory):
+    return synthetic_tuning(tmp_path_factory.mktemp("tuning") / "out")
+
+
+@pytest.fixture(scope="module")
+def document(record):
+    return build_tuning(record, "out")
+
+
+@pytest.fixture(scope="module")
+def infeasible(tmp_path_factory):
+    return build_tuning(synthetic_tuning(tmp_path_factory.mktemp("tuning") / "out", limit=-1.0), "out")
+
+
+def table(document, caption):
+    (found,) = [block for block in blocks_of(document, Table) if block.caption.startswith(caption)]
+    return found
+
+
+def front_of(document):
+    return drawings(document, "front")[0]
+
+
+def test_the_front_is_drawn_with_every_candidate_and_the_published_points(record, document):
+    drawing = front_of(document)
+    (front,) = marks_of(drawing, Points, "front")
+    np.testing.assert_array_equal(np.column_stack([front.x, front.y]), record.front[["cost", "error"]])
+    keys = [entry.text for entry in drawing.key]
+    assert sum(int(text.split()[0]) for text in keys if "candidates" in text and text[0].isdigit()) == 300
+    assert {"Table 8", "Table 9"} <= set(keys)
+    assert any("front: " in entry.text for entry in drawing.key)
+    low, high = drawing.plots[0].x.reach
+    assert low < -0.9 < 0.9 < high
+
+
+def test_a_published_point_is_beaten_or_not(document):
+    rows = table(document, "Published points").rows
+    said = {row[0].text: row[-2] for row in rows}
+    assert said["Table 8"].text == "no worse in any objective"
+    assert said["Table 8"].tone == "good"
+    assert said["Table 9"].text.endswith("worse in one")
+
+
+def test_the_table_of_the_front_is_the_front(record, document):
+    rows = table(document, "The front").rows
+    shown = [row[0].value for row in rows]
+    assert set(shown) <= set(record.front["candidate"])
+    assert shown[0] == record.front["candidate"].iloc[0]
+    assert shown[-1] == record.front["candidate"].iloc[-1]
+
+
+def test_infeasibility_is_stated_with_the_least_violation_and_never_hidden(infeasible):
+    assert infeasible.subtitle.startswith("No feasible point among 300 candidates; the least violation found is")
+    assert "where at most −1 is allowed" in infeasible.subtitle
+    assert infeasible.warnings[0].startswith("There is no front")
+    assert infeasible.verdicts[0].answer == "out of reach"
+    assert infeasible.verdicts[0].tone == "bad"
+    drawing = front_of(infeasible)
+    assert not any("feasible candidates" in entry.text for entry in drawing.key)
+    assert any("constraints are left out" in entry.text for entry in drawing.key)
+    assert len(table(infeasible, "The least violation found").rows) == 1
+    assert table(infeasible, "Published points").rows[0][-2].small == "outside a constraint"
+
+
+def test_a_feasible_search_has_no_such_warning(document):
+    assert document.warnings == ()
+    assert document.verdicts[0].answer == "within reach"
+    assert "not beaten by any other" in document.subtitle
+
+
+def test_three_objectives_have_a_panel_for_each_pair(tmp_path):
+    drawing = front_of(build_tuning(synthetic_tuning(tmp_path / "out", third=True), "out"))
+    assert len(screen.specifications(drawing)) == 3
+    assert paper.svg(drawing).count("<clipPath") == 3
+
+
+def test_failed_cases_are_told(tmp_path):
+    found = build_tuning(synthetic_tuning(tmp_path / "out", failed=3), "out")
+    assert found.warnings == (
+        "90 candidates had cases that failed; each of these takes the worst rank. Most often, with 90 candidates: "
+        "refused: too far.",
+    )
+
+
+def test_a_search_that_was_killed_is_reported_with_what_it_has(tmp_path):
+    found = build_tuning(synthetic_tuning(tmp_path / "out", end=UNFINISHED), "out")
+    assert found.warnings == ("The search had not ended, or was killed, after 30 of 30 generations.",)
+    progress = [block.drawing for block in blocks_of(found, FigureBlock) if block.caption == "Progress of the search"]
+    assert [[plot.title for plot in one.plots] for one in progress] == [["feasible candidates so far"]]
+    assert render_pdf(found).startswith(b"%PDF")
+
+
+def test_both_renderers_take_it_and_give_the_same_bytes_twice(document, infeasible):
+    for one in (document, infeasible):
+        page = render_html(one)
+        assert b"Tuning report" in page
+        assert page == render_html(one)
+        assert render_pdf(one) == render_pdf(one)
+        for block in blocks_of(one, FigureBlock):
+            json.dumps(screen.specifications(block.drawing), allow_nan=False)
+            assert paper.svg(block.drawing) == paper.svg(block.drawing)
+
+
+def test_reports_of_a_tuning_are_written_beside_its_tables(record):
+    assert [path.name for path in reports.write_reports(record.path)] == ["report.html", "report.pdf"]
+    assert (record.path / "report.pdf").read_bytes().startswith(b"%PDF")

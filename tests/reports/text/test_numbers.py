@@ -1,0 +1,96 @@
+"""How numbers and names are written."""
+
+import math
+
+import pytest
+
+from reports.text.numbers import axis_label, count, exact, interval, named, number, percent, typeset, with_unit, words
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (-1.5, "−1.5"),
+        (2.30559, "2.3056"),
+        (7800.0, "7800"),
+        (123456.0, "123\u202f456"),
+        (1.23456e-6, "1.235·10⁻⁶"),
+        (-4.2e12, "−4.2·10¹²"),
+        (math.nan, "not a number"),
+        (-math.inf, "−∞"),
+        (None, "–"),
+    ],
+)
+def test_a_number_has_five_significant_digits_and_a_true_minus_sign(value, text):
+    assert number(value) == text
+
+
+def test_digits_follow_the_spread_so_that_mean_and_limits_can_be_compared():
+    assert number(7800.0012, scale=0.03) == "7800.0012"
+    assert number(350.0, scale=2.86) == "350.00"
+    assert number(231.4, scale=140.0) == "231"
+
+
+def test_no_number_has_more_than_eight_digits_however_narrow_the_spread():
+    assert number(7800.00119612, scale=1e-6) == "7800.0012"
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.9973, "99.73"), (1.0, "100"), (0.0, "0"), (0.999988, "99.998"), (0.97699, "97.69")]
+)
+def test_a_share_is_never_rounded_up(share, text):
+    assert percent(share) == f"{text}\u202f%"
+
+
+def test_a_count_is_grouped_in_threes():
+    assert count(1234567) == "1\u202f234\u202f567"
+
+
+def test_an_interval_says_when_the_cases_are_too_few():
+    assert interval(None, None) == "too few cases"
+    assert interval(1.0, None) == "[1, –]"
+
+
+@pytest.mark.parametrize(("value", "text"), [(246.0, "246"), (0.0175, "0.0175"), (True, "yes"), ("off", "off")])
+def test_an_input_is_written_as_it_was_given(value, text):
+    assert exact(value) == text
+
+
+@pytest.mark.parametrize(
+    ("name", "meaning", "label"),
+    [
+        ("sun right ascension", "of the Sun", "sun right ascension"),
+        ("failure time", "when one engine fails; beyond the landing, none", "failure time"),
+        ("misalignment", "of the thrust, from the nozzle", "misalignment"),
+        ("ve", "VE: error of the burn's magnitude", "VE: error of the burn's magnitude"),
+        ("tip x", "tip-off rate; about x", "tip x: tip-off rate"),
+        ("kp", "", "kp"),
+        ("kp", "a meaning that is longer than there is room for on an axis", "kp"),
+    ],
+)
+def test_an_axis_says_the_name_in_words_and_of_a_symbol_the_meaning_too(name, meaning, label):
+    assert named(name, meaning) == label
+
+
+def test_a_column_name_becomes_words_without_its_unit():
+    assert words("correction_impulse_m_s", "m/s") == "correction impulse"
+    assert words("odd_name", "furlong") == "odd name"
+    assert axis_label("propellant", "kg") == "propellant [kg]"
+
+
+@pytest.mark.parametrize(
+    ("unit", "printed"),
+    [("W/m^2", "W/m²"), ("km^3/s^2", "km³/s²"), ("kg m^2", "kg\u202fm²"), ("uN", "µN"), ("deg/sqrt(h)", "deg/√h"),
+     ("Ohm", "Ω"), ("us", "µs"), ("bar", "bar"), ("m/s", "m/s")],
+)  # fmt: skip
+def test_units_are_printed_with_raised_powers_and_greek_letters(unit, printed):
+    assert typeset(unit) == printed
+    assert axis_label("load", unit) == f"load [{printed}]"
+    assert with_unit("1", unit) == f"1\u202f{printed}"
+
+
+def test_a_number_that_is_nothing_beside_the_spread_is_0():
+    assert number(6.66e-16, 4, 0.35) == "0"
+    assert number(6.66e-16, 4) == "6.66·10⁻¹⁶"
+    assert number(-2e-6, 4, 1e-5) != "0"

@@ -1,0 +1,80 @@
+"""Every public name explains its arguments, what it returns and what it raises, and shows an example that runs."""
+
+import doctest
+import inspect
+import re
+import shutil
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mc_engine
+from mc_engine import model, statistics
+
+TUNING = """
+[campaign]
+model = "model.py"
+cases = 10
+design = "mc"
+seed = 5
+
+[tuning]
+[tuning.parameter]
+altitude_km = { lower = 200.0, upper = 600.0 }
+burn_dv_m_s = { lower = 50.0, upper = 200.0 }
+
+[tuning.objective]
+apogee = { metric = "apogee_altitude_km", goal = "maximise" }
+speed = { metric = "top_speed_m_s" }
+"""
+ENGINE = {name: getattr(mc_engine, name) for name in mc_engine.__all__}
+PACKAGES = {name: getattr(package, name) for package in (model, statistics) for name in package.__all__}
+EXPLAINED = {**ENGINE, **{name: value for name, value in PACKAGES.items() if callable(value)}}
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """A folder with what the examples begin with: a run of eight cases, and a small tuning with its result."""
+    folder = tmp_path_factory.mktemp("examples")
+    shutil.copy(Path(mc_engine.load_campaign("minimal").directory) / "model.py", folder)
+    (folder / "apogee.toml").write_text(TUNING)
+    mc_engine.run(mc_engine.load_campaign("minimal", cases=8), folder / "runs" / "small", workers=1)
+    mc_engine.tune(mc_engine.load_campaign(folder / "apogee.toml"), folder / "runs" / "tuned", generations=1, workers=1)
+    return folder
+
+
+@pytest.mark.parametrize("name", EXPLAINED)
+def test_the_example_of_a_public_name_runs(name, runs, tmp_path, monkeypatch):
+    shutil.copytree(runs, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    examples = doctest.DocTestParser().get_doctest(_text(name), {**ENGINE, **PACKAGES, "np": np}, name, None, None)
+    assert examples.examples
+    said = []
+    assert doctest.DocTestRunner().run(examples, out=said.append).failed == 0, "".join(said)
+
+
+@pytest.mark.parametrize("name", EXPLAINED)
+def test_a_public_name_explains_its_arguments_and_what_comes_of_them(name):
+    text = _text(name)
+    assert [one for one in _arguments(EXPLAINED[name]) if not _is_explained(one, text)] == []
+    if inspect.isfunction(EXPLAINED[name]):
+        assert [word for word in ("Returns", "Raises") if not re.search(rf"^{word} ", text, re.MULTILINE)] == []
+
+
+def _text(name):
+    return inspect.getdoc(EXPLAINED[name]) or ""
+
+
+def _arguments(value):
+    if is_dataclass(value):
+        return [field.name for field in fields(value) if field.init]
+    if inspect.isclass(value) and "__init__" not in vars(value):
+        return list(getattr(value, "_fields", ()))
+    return [one for one in inspect.signature(value).parameters if one not in ("self", "args", "kwargs")]
+
+
+def _is_explained(argument, text):
+    """A line "argument : ...", or "argument(p, o) : ..." of a function, or "first, argument : ..."."""
+    return re.search(rf"^(\w+, )*{argument}(\(.*\))?(, \w+)* : \S", text, re.MULTILINE) is not None
