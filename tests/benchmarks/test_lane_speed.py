@@ -13,10 +13,10 @@ WITH_PULSES = 0.93
 
 
 def least_ratio():
-    """What the processor's registers allow: eight doubles of AVX-512, or four of AVX2."""
+    """What the processor allows: eight doubles of AVX-512, which Zen 4 computes in two halves, or four of AVX2."""
     features = binding.get_host_cpu_features()
     if features.get("avx512f"):
-        return 7.0
+        return 4.5 if binding.get_host_cpu_name() == "znver4" else 7.0  # Zen 4: 5.1 to 6.0 were measured
     if features.get("avx2"):
         return 3.0
     return None
@@ -35,7 +35,7 @@ def best_ratio(cases, wanted, repeats):
 @pytest.mark.benchmark
 @pytest.mark.skipif(least_ratio() is None, reason="this processor has neither AVX-512 nor AVX2")
 @pytest.mark.parametrize(("cases", "repeats"), [(orbit, 60), (deorbit, 60), (flexible, LONG), (sounding_rocket, LONG)])
-def test_eight_lanes_fly_seven_times_as_fast_as_one_where_registers_hold_eight_doubles(cases, repeats):
+def test_eight_lanes_fly_as_many_times_as_fast_as_one_as_the_processor_allows(cases, repeats):
     assert best_ratio(cases, least_ratio(), repeats) >= least_ratio()
 
 
