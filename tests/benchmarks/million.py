@@ -46,6 +46,7 @@ def fly(cases: int, workers: int) -> dict[str, float]:
     """One run in this process: wall [s], peak memory [MiB], thread-seconds by part, parts and cases in the largest."""
     from mc_engine import load_campaign
     from mc_engine.flight import chunks
+    from mc_engine.flight.compiled import CompiledFlyer
     from mc_engine.runner import runner
     from tests.benchmarks.kernel_clock import KernelClock
 
@@ -54,7 +55,7 @@ def fly(cases: int, workers: int) -> dict[str, float]:
         watch = Stopwatch()
         for place, name, part in (
             (chunks, "case_table", "sampling"),
-            (chunks, "fly", "flying"),
+            (CompiledFlyer, "fly", "flying"),
             (chunks, "write_aside", "writing"),
         ):
             watch.watch(place, name, part)
@@ -81,7 +82,7 @@ def fly(cases: int, workers: int) -> dict[str, float]:
 def measured(cases: int, workers: int) -> dict[str, float]:
     """`fly` in a process of its own."""
     command = [sys.executable, "-m", "tests.benchmarks.million", "--inside", str(cases), str(workers)]
-    return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()[-1])
+    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout.splitlines()[-1])
 
 
 def line(cases: int, workers: int, result: dict[str, float]) -> str:
