@@ -44,12 +44,12 @@ def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str])
 
 def _effect_table(flown: Flown, contributions: Contributions, shown: list[str]) -> Table:
     columns = (
-        Column("Metric", "text", 2.4, grouped=True),
-        Column("Contributor", "text", 2.6),
-        Column("First-order effect", "number", 2.0),
-        Column("Total effect", "number", 2.0),
-        Column("1σ contribution", "number", 1.4),
-        *(Column(title, "number", 1.2) for title in (_TRENDS.values() if contributions.trends else ())),
+        Column("Metric", "text", grouped=True),
+        Column("Contributor", "text"),
+        Column("First-order effect", "number"),
+        Column("Total effect", "number"),
+        Column("1σ contribution", "number"),
+        *(Column(title, "number") for title in (_TRENDS.values() if contributions.trends else ())),
     )
     rows = []
     for k, metric in enumerate(contributions.by_metric):

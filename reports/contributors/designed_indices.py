@@ -71,9 +71,9 @@ def _index_table(
 ) -> Table:
     indices = list(designed.values)
     columns = (
-        Column("Metric", "text", 2.2, grouped=True),
-        Column("Input", "text", 2.4),
-        *(Column(_TITLES[index], "number", 1.6) for index in indices),
+        Column("Metric", "text", grouped=True),
+        Column("Input", "text"),
+        *(Column(_TITLES[index], "number") for index in indices),
     )
     rows = []
     for k in shown:

@@ -83,12 +83,12 @@ def _driver_table(
     pairs_tested: int,
 ) -> Table:
     columns = (
-        Column("Requirement", "text", 1.7, grouped=True),
-        Column("Contributor", "text", 2.3),
-        Column("Cases fail where it is", "text", 2.1),
-        Column("Separation", "number", 1.2),
-        Column("Adjusted p", "number", 1.3),
-        Column("Failed in that cell", "number", 1.5),
+        Column("Requirement", "text", grouped=True),
+        Column("Contributor", "text"),
+        Column("Cases fail where it is", "text"),
+        Column("Separation", "number"),
+        Column("Adjusted p", "number"),
+        Column("Failed in that cell", "number"),
     )
     told = [*singles[:MOST_DRIVERS], *pairs[:MOST_DRIVERS]]
     rows = tuple(_driver_row(flown, driver, failed) for driver in told)

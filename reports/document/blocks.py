@@ -47,14 +47,13 @@ class Cell:
 
 @dataclass(frozen=True)
 class Column:
-    """kind: "text", "name" (a column name), "code" or "number"; width: relative, on paper.
+    """kind: "text", "name" (a column name), "code" or "number".
 
     grouped : of a first column, whether equal cells in consecutive rows are shown once.
     """
 
     title: str
     kind: str = "text"
-    width: float = 0.0
     grouped: bool = False
 
 

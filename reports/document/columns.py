@@ -14,6 +14,7 @@ JUMPS = (4.0, 8.0, 16.0, 32.0, 64.0, 128.0)  # points that a column may get at a
 MONO = 0.602  # of the type size, the width of every letter of a column's name
 BADGE = 18.0  # mark and margins of a verdict
 _WORD = re.compile(r"\[[^\]]{1,22}\]|[^\s_/-]*[\s_/-]?")  # what is not broken: a word, an interval
+_VALUE = re.compile(r"[^ ]+ ?")  # of a column of numbers: with its unit, such as m/s
 COMMAND = 36  # letters of a command that is not broken
 BOLD = 1.15  # of the head
 SLACK = 1.06  # of a text over its lines: a line seldom ends at the edge
@@ -33,7 +34,7 @@ def widths(table: Table) -> list[float]:
                 words = (
                     [text]
                     if (cell.tone and not part) or (column.kind == "code" and len(text) <= COMMAND)
-                    else _WORD.findall(text)
+                    else (_VALUE if column.kind == "number" and row and not part else _WORD).findall(text)
                 )
                 longest = max((lettering.width(word, TYPE) for word in words), default=0.0)
                 least[k] = max(least[k], longest * scale + BADGE * bool(cell.tone and part == 0))

@@ -183,12 +183,12 @@ def _region_table(flown: Flown, landing: Landing) -> Table:
     """Contents stated and shares really inside."""
     regions = landing.footprint
     columns = (
-        Column("Region", "text", 2.0),
-        Column("Stated content", "number", 1.7),
-        Column("Cases inside", "number", 1.4),
-        Column("Fraction inside", "number", 1.7),
-        Column("Semi-axes [km]", "number", 1.6),
-        Column("Long axis [° from north]", "number", 1.2),
+        Column("Region", "text"),
+        Column("Stated content", "number"),
+        Column("Cases inside", "number"),
+        Column("Fraction inside", "number"),
+        Column("Semi-axes [km]", "number"),
+        Column("Long axis [° from north]", "number"),
     )
     rows = tuple(_region_row(region, flown.stated.confidence) for region in regions.all_regions)
     n = regions.ellipses[0].n
@@ -254,10 +254,10 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
     places = [landing.centre, *([landing.aim] if landing.aim is not None and landing.aim != landing.centre else [])]
     titles = ("50 %", *(percent(p) for p in DISTANCES[1:]))
     columns = (
-        Column("Distance from", "text", 2.6),
-        Column("Used / tried", "number", 1.5),
-        *(Column(f"{title} [km]", "number", 1.8) for title in titles),
-        Column("Largest [km]", "number", 1.2),
+        Column("Distance from", "text"),
+        Column("Used / tried", "number"),
+        *(Column(f"{title} [km]", "number") for title in titles),
+        Column("Largest [km]", "number"),
     )
     rows = tuple(_distance_row(flown, landing, place) for place in places)
     each = percent(flown.stated.confidence)

@@ -28,10 +28,10 @@ def case_table(flown: Flown) -> Table | None:
     inputs = varying_inputs(flown)[:INPUTS_SHOWN]
     metrics = [flown.columns[name] for name in flown.key_metrics[:METRICS_SHOWN]]
     columns = (
-        Column("Case", "number", 0.8),
-        *(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.3) for fact in inputs),
-        *(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.5) for fact in metrics),
-        Column("Status", "code", 1.2),
+        Column("Case", "number"),
+        *(Column(axis_label(flown.words(fact.name), fact.unit), "number") for fact in inputs),
+        *(Column(axis_label(flown.words(fact.name), fact.unit), "number") for fact in metrics),
+        Column("Status", "code"),
     )
     cells = [
         [Cell(str(case), int(case), case=int(case)) for case in flown.case_ids],
@@ -91,22 +91,22 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
     ranked = flown.contributors(metric) if metric else contributors(flown.inputs, inside_of)
     ranked = ranked or [Contributor(name, np.nan) for name in flown.inputs]
     shown = [flown.columns[contributor.name] for contributor in ranked[:INPUTS_SHOWN]]
-    columns = [Column("Case", "number", 0.9)]
+    columns = [Column("Case", "number")]
     cells = [[Cell(count(int(case)), int(case), case=int(case)) for case in cases["case_id"]]]
     if metric is None:
-        columns.append(Column("Status", "code", 1.4))
+        columns.append(Column("Status", "code"))
         cells.append([Cell(str(word)) for word in cases["status"]])
     else:
         values, limits = cases[metric].to_numpy(dtype=np.float64), flown.limits(metric)
-        columns.append(Column(axis_label(flown.words(metric), flown.unit(metric)), "number", 1.6))
+        columns.append(Column(axis_label(flown.words(metric), flown.unit(metric)), "number"))
         cells.append(_number_cells(values))
         if limits != Limits():
-            columns.append(Column(axis_label("Margin", flown.unit(metric)), "number", 1.3))
+            columns.append(Column(axis_label("Margin", flown.unit(metric)), "number"))
             cells.append(_number_cells(limits.margins(values) * limits.width))
     for fact in shown:
-        columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number", 1.3))
+        columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number"))
         cells.append(_input_cells(cases[fact.name]))
-    columns.append(Column("Command to replay", "code", 3.6))
+    columns.append(Column("Command to replay", "code"))
     cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in cases["case_id"]])
     return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, ranked, len(shown)))
 

@@ -69,13 +69,13 @@ def _estimate_words(run: RunningEstimate) -> str:
 
 def _convergence_table(flown: Flown, told: dict[str, tuple[RunningEstimate, ...]]) -> Table:
     columns = (
-        Column("Metric", "text", 2.6, grouped=True),
-        Column("Estimate", "text", 1.5),
-        Column("From half the cases", "number", 1.7),
-        Column("From the sample" if flown.sampled else "From all", "number", 1.9),
-        Column("Bounds within", "number", 1.3),
-        Column("Halves differ by chance", "number", 1.3),
-        Column("Converged", "text", 1.5),
+        Column("Metric", "text", grouped=True),
+        Column("Estimate", "text"),
+        Column("From half the cases", "number"),
+        Column("From the sample" if flown.sampled else "From all", "number"),
+        Column("Bounds within", "number"),
+        Column("Halves differ by chance", "number"),
+        Column("Converged", "text"),
     )
     rows = tuple(_estimate_row(flown, name, run) for name, pair in told.items() for run in pair)
     note = (

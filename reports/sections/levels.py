@@ -90,13 +90,13 @@ def _level_table(
     flown: Flown, name: str, metric: str, levels: list[str], rows: list[np.ndarray], matched: np.ndarray
 ) -> Table:
     columns = (
-        Column(flown.words(name), "text", 1.4),
-        Column("Used / tried", "number", 1.3),
-        Column("Median", "number", 1.5),
-        Column(percent(flown.stated.probability, 3), "number", 1.4),
-        Column("Largest", "number", 1.3),
-        Column(f"Median difference to {levels[0]}", "number", 2.2),
-        Column(f"Smaller than {levels[0]}", "number", 1.9),
+        Column(flown.words(name), "text"),
+        Column("Used / tried", "number"),
+        Column("Median", "number"),
+        Column(percent(flown.stated.probability, 3), "number"),
+        Column("Largest", "number"),
+        Column(f"Median difference to {levels[0]}", "number"),
+        Column(f"Smaller than {levels[0]}", "number"),
     )
     values = flown.values(metric)
     body, probabilities = [], (0.5, flown.stated.probability)

@@ -47,7 +47,7 @@ def origin_table(
         *more,
     )
     rows = tuple((Cell(label), Cell(str(value))) for label, value in facts if str(value))
-    return Table(f"Provenance of the {what}", (Column("What", "text", 1.6), Column("Value", "code", 4.0)), rows)
+    return Table(f"Provenance of the {what}", (Column("What", "text"), Column("Value", "code")), rows)
 
 
 def git_text(git: Mapping[str, Any] | None) -> str:

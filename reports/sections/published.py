@@ -49,11 +49,11 @@ def published_blocks(flown: Flown) -> Iterator[Table | str]:
     places = [where for _, ours, where in computed if ours is not None]
     rows = tuple(_row(record, where, outcome(record, known)) for record, where in zip(known, places, strict=True))
     columns = (
-        Column("Quantity", "text", 2.4),
-        Column("Published", "number", 1.6),
-        Column("Computed", "number", 2.0),
-        Column("Difference", "number", 1.7),
-        Column("Outcome", "text", 2.5),
+        Column("Quantity", "text"),
+        Column("Published", "number"),
+        Column("Computed", "number"),
+        Column("Difference", "number"),
+        Column("Outcome", "text"),
     )
     note = (
         "Computed: by the nominal case of this run, or by the case named. Difference: computed less published. "

@@ -32,9 +32,9 @@ def _source_table(
     flown: Flown, place: str, rows: Mapping[str, Mapping[str, Record]], records: Sequence[Record]
 ) -> Table:
     used = [name for name in STATISTICS if any(name in row for row in rows.values())]
-    columns = [Column("Quantity", "name", 2.0)]
+    columns = [Column("Quantity", "name")]
     for name in used:
-        columns += [Column(f"{_TITLES[name]}, published", "number", 1.4), Column("computed", "number", 1.4)]
+        columns += [Column(f"{_TITLES[name]}, published", "number"), Column("computed", "number")]
     body = []
     for of, row in rows.items():
         cells = [Cell(axis_label(of, flown.unit(of)))]

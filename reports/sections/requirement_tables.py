@@ -54,13 +54,13 @@ def _has_width(limits: Limits) -> bool:
 def requirement_table(flown: Flown) -> Table:
     """The verification matrix: every requirement with what is demonstrated, its margin and verdict; all at once."""
     columns = (
-        Column("Requirement", "text", 2.3),
-        Column("Limit", "text", 1.9),
-        Column("Demonstrated", "text", 1.8),
-        Column("Margin", "number", 1.4),
-        Column("Inside / tried", "number", 1.5),
-        Column("Demonstrated probability", "number", 1.8),
-        Column("Verdict", "text", 2.0),
+        Column("Requirement", "text"),
+        Column("Limit", "text"),
+        Column("Demonstrated", "text"),
+        Column("Margin", "number"),
+        Column("Inside / tried", "number"),
+        Column("Demonstrated probability", "number"),
+        Column("Verdict", "text"),
     )
     records = flown.manifest.get("requirements", [])
     sources = [str(record.get("source") or "") for record in records]
@@ -130,12 +130,12 @@ def risk_table(flown: Flown) -> Table | None:
     if not flown.random or not flown.n_tried or not judged:
         return None
     columns: tuple[Column, ...] = (
-        Column("Requirement", "text", 2.0),
-        Column("Outside", "number", 1.0),
-        Column("Allowed outside", "number", 1.3),
-        Column("Consumer’s risk", "number", 1.3),
-        Column("Producer’s risk", "number", 1.3),
-        Column("With confidence shared", "text", 1.7),
+        Column("Requirement", "text"),
+        Column("Outside", "number"),
+        Column("Allowed outside", "number"),
+        Column("Consumer’s risk", "number"),
+        Column("Producer’s risk", "number"),
+        Column("With confidence shared", "text"),
     )
     rows = tuple(_risk_row(verdict, len(judged)) for verdict in judged)
     note = f"Allowed outside: the most of these {count(flown.n_tried)} cases with which the requirement still passes. "

@@ -58,10 +58,10 @@ def timeline_table(flown: Flown) -> Table | None:
             )
         )
     columns = (
-        Column("Event", "text", 2.6),
-        Column("Nominal time", "number", 1.4),
-        Column("1σ of the cases", "number", 1.4),
-        Column("Nominal values at the event", "text", 4.0),
+        Column("Event", "text"),
+        Column("Nominal time", "number"),
+        Column("1σ of the cases", "number"),
+        Column("Nominal values at the event", "text"),
     )
     return Table("Timeline of the nominal case", columns, tuple(rows))
 

@@ -27,14 +27,14 @@ def limit_text(verdict: Verdict, unit: str) -> str:
 def summary_table(flown: Flown) -> Table:
     """Moments and range of every metric that has a number, beside its nominal value."""
     columns = (
-        Column("Metric", "text", 3.0),
-        Column("Used / tried", "number", 1.75),
-        Column("Nominal", "number", 1.45),
-        Column("Mean", "number", 1.45),
-        Column("Std. dev.", "number", 1.3),
-        Column("Smallest", "number", 1.45),
-        Column("Largest", "number", 1.45),
-        Column("Shape", "text", 1.5),
+        Column("Metric", "text"),
+        Column("Used / tried", "number"),
+        Column("Nominal", "number"),
+        Column("Mean", "number"),
+        Column("Std. dev.", "number"),
+        Column("Smallest", "number"),
+        Column("Largest", "number"),
+        Column("Shape", "text"),
     )
     rows = []
     for name, summary in flown.summaries.items():
@@ -78,9 +78,9 @@ def quantile_table(flown: Flown) -> Table | None:
         return None
     shown = (flown.stated.outer[0], 0.5, flown.stated.outer[1])
     columns = (
-        Column("Metric", "text", 2.6),
-        Column("Used / tried", "number", 1.75),
-        *(Column(percent(probability, 3), "number", 2.0) for probability in shown),
+        Column("Metric", "text"),
+        Column("Used / tried", "number"),
+        *(Column(percent(probability, 3), "number") for probability in shown),
     )
     rows = []
     for name, summary in drawn.items():
@@ -117,10 +117,10 @@ def _for_fixed(flown: Flown) -> str:
 def status_table(flown: Flown) -> Table:
     """Completion of the cases: each status with its meaning; reasons of refused and failed cases below it."""
     columns = (
-        Column("Status", "code", 1.2),
-        Column("Cases", "number", 1.0),
-        Column("Fraction", "number", 1.0),
-        Column("Meaning", "text", 6.0),
+        Column("Status", "code"),
+        Column("Cases", "number"),
+        Column("Fraction", "number"),
+        Column("Meaning", "text"),
     )
     counts = flown.every.statuses
     words = sorted(counts, key=lambda word: (word != "ok", -counts[word], word))
@@ -156,14 +156,14 @@ def fixed_table(flown: Flown, caption: str, overridden: bool) -> Table | None:
 
 def value_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table | None:
     """Parameters and settings with their values; None for none."""
-    columns = (Column("Name", "name", 2.2), Column("Value", "number", 1.3), Column("Meaning", "text", 4.0))
+    columns = (Column("Name", "name"), Column("Value", "number"), Column("Meaning", "text"))
     rows = tuple(_fixed_row(record) for record in records)
     return Table(caption, columns, rows) if rows else None
 
 
 def dispersed_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table:
     """Inputs with their distributions and sources."""
-    columns = (Column("Input", "name", 2.4), Column("Distribution", "text", 2.6), Column("Source", "text", 3.0))
+    columns = (Column("Input", "name"), Column("Distribution", "text"), Column("Source", "text"))
     rows = tuple(
         (
             Cell(axis_label(record["name"], record["unit"]), small=record["description"]),
@@ -192,11 +192,11 @@ def input_table(flown: Flown) -> Table | None:
     """The dispersed inputs: nominal, distribution, source, and the range that was drawn."""
     records = flown.manifest.get("inputs", [])
     columns = (
-        Column("Input", "name", 2.4),
-        Column("Nominal", "number", 1.1),
-        Column("Distribution", "text", 2.2),
-        Column("Drawn", "number", 1.8),
-        Column("Source", "text", 2.4),
+        Column("Input", "name"),
+        Column("Nominal", "number"),
+        Column("Distribution", "text"),
+        Column("Drawn", "number"),
+        Column("Source", "text"),
     )
     rows = []
     for record in records:

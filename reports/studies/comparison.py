@@ -237,13 +237,13 @@ def _ends(estimates: list[Estimate]) -> np.ndarray:
 
 def _metric_table(comparison: Comparison, moved: list[MetricChange]) -> Table:
     columns = (
-        Column("Metric", "text", 2.6),
-        Column("Mean A", "number", 1.4),
-        Column("Mean B", "number", 1.4),
-        Column("Shift [σ]", "number", 1.6),
-        Column("Adjusted p", "number", 1.3),
-        Column("Spread B/A", "number", 1.6),
-        Column("Adjusted p", "number", 1.3),
+        Column("Metric", "text"),
+        Column("Mean A", "number"),
+        Column("Mean B", "number"),
+        Column("Shift [σ]", "number"),
+        Column("Adjusted p", "number"),
+        Column("Spread B/A", "number"),
+        Column("Adjusted p", "number"),
     )
     note = (
         f"The largest change first. Small: the {percent(comparison.confidence)} interval of the quantity that the test "
@@ -292,11 +292,11 @@ def _p_value_cell(value: float, alpha: float) -> Cell:
 
 def _share_table(comparison: Comparison) -> Table:
     columns = (
-        Column("Cases", "text", 2.0),
-        Column("Run A", "number", 1.5),
-        Column("Run B", "number", 1.5),
-        Column("Difference", "number", 2.2),
-        Column("Adjusted p", "number", 1.2),
+        Column("Cases", "text"),
+        Column("Run A", "number"),
+        Column("Run B", "number"),
+        Column("Difference", "number"),
+        Column("Adjusted p", "number"),
     )
     note = "Requirements are counted by the limits of run B in both runs; a case without a number is outside."
     return Table(
@@ -324,8 +324,8 @@ def _share_row(change: ShareChange, alpha: float) -> tuple[Cell, ...]:
 def _verdict_table(comparison: Comparison) -> Table | None:
     if not comparison.verdicts:
         return None
-    columns = (Column("Requirement", "text", 2.0), Column("Run A", "text", 1.6), Column("Run B", "text", 1.6),
-               Column("Change", "text", 3.4))  # fmt: skip
+    columns = (Column("Requirement", "text"), Column("Run A", "text"), Column("Run B", "text"),
+               Column("Change", "text"))  # fmt: skip
     rows = tuple(
         (
             Cell(verdict.name),
@@ -350,7 +350,7 @@ def _tone(change: VerdictChange) -> str:
 def _difference_block(what: str, differences: tuple[Difference, ...]) -> Table | str:
     if not differences:
         return f"{what}: the same in both runs."
-    columns = (Column("What", "text", 1.6), Column("Run A", "code", 2.4), Column("Run B", "code", 2.4))
+    columns = (Column("What", "text"), Column("Run A", "code"), Column("Run B", "code"))
     rows = tuple(
         (Cell(difference.what), Cell(difference.before or "–"), Cell(difference.after or "–"))
         for difference in differences
@@ -362,6 +362,6 @@ def _campaign_blocks(comparison: Comparison) -> Iterator[Table | str]:
     yield _difference_block("Campaign", comparison.campaign)
     if comparison.diff:
         rows = tuple((Cell(line[:1]), Cell(line[1:])) for line in comparison.diff if not line.startswith("@@"))
-        columns = (Column("", "code", 0.3), Column("Line of campaign.toml", "code", 6.0))
+        columns = (Column("", "code"), Column("Line of campaign.toml", "code"))
         note = "−: a line of run A alone; +: a line of run B alone; others are in both."
         yield Table("The two campaign files", columns, rows, note)

@@ -220,12 +220,12 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
 def _input_table(result: dict[str, Any]) -> Table:
     across = result["inputs"][0].get("across") is not None
     columns = [
-        Column("Input", "name", 2.6),
-        Column("Mean [σ]", "number", 1.0),
-        Column("Spread [σ]", "number", 1.0),
-        Column("Likeliest", "number", 1.5),
+        Column("Input", "name"),
+        Column("Mean [σ]", "number"),
+        Column("Spread [σ]", "number"),
+        Column("Likeliest", "number"),
     ]
-    columns += [Column("Across", "number", 1.5)] if across else []
+    columns += [Column("Across", "number")] if across else []
     rows = []
     for entry in _main_inputs(result):
         label = Cell(axis_label(entry["name"], entry["unit"]), small=entry["description"])
@@ -284,12 +284,12 @@ def _level_words(chains: bool) -> str:
 
 def _level_table(result: dict[str, Any]) -> Table:
     columns = (
-        Column("Level", "number", 0.7),
-        Column(axis_label("Margin", result["metric"]["unit"]), "number", 1.4),
-        Column("Probability", "number", 1.3),
-        Column("Runs", "number", 0.7),
-        Column("Cases", "number", 1.0),
-        Column("Accepted", "number", 1.0),
+        Column("Level", "number"),
+        Column(axis_label("Margin", result["metric"]["unit"]), "number"),
+        Column("Probability", "number"),
+        Column("Runs", "number"),
+        Column("Cases", "number"),
+        Column("Accepted", "number"),
     )
     rows = [
         (

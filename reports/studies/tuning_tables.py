@@ -42,8 +42,8 @@ def _candidate_table(tuned: Tuned, rows: pd.DataFrame, caption: str, note: str) 
     parameters = tuned.parameters[:MOST_PARAMETERS]
     names = [*tuned.objectives, *tuned.constraints, *parameters]
     columns = (
-        Column("Candidate", "number", 1.1),
-        *(Column(tuned.label(name), "number", 1.6 if name in tuned.constraints else 1.2) for name in names),
+        Column("Candidate", "number"),
+        *(Column(tuned.label(name), "number") for name in names),
     )
     limits = {constraint["name"]: constraint for constraint in tuned.plan["constraints"]}
     body = []
@@ -77,11 +77,11 @@ def published_table(tuned: Tuned) -> Table | None:
     if not tuned.plan["published"] or not len(tuned.best):
         return None
     columns = (
-        Column("Point", "text", 1.6),
-        *(Column(tuned.label(name), "number", 1.2) for name in tuned.objectives),
-        *(Column(f"computed, {tuned.label(name)}", "number", 1.2) for name in tuned.objectives),
-        Column("Computed is", "text", 1.6),
-        Column("Source", "text", 2.6),
+        Column("Point", "text"),
+        *(Column(tuned.label(name), "number") for name in tuned.objectives),
+        *(Column(f"computed, {tuned.label(name)}", "number") for name in tuned.objectives),
+        Column("Computed is", "text"),
+        Column("Source", "text"),
     )
     best = tuned.best[tuned.objectives].to_numpy()
     rows = []
@@ -102,12 +102,12 @@ def published_table(tuned: Tuned) -> Table | None:
 
 def parameter_table(tuned: Tuned) -> Table:
     columns = (
-        Column("Parameter", "name", 2.4),
-        Column("From", "number", 1.0),
-        Column("To", "number", 1.0),
-        Column("On the front", "number", 1.6),
-        Column("Untuned", "number", 1.0),
-        Column("Source of the range", "text", 2.4),
+        Column("Parameter", "name"),
+        Column("From", "number"),
+        Column("To", "number"),
+        Column("On the front", "number"),
+        Column("Untuned", "number"),
+        Column("Source of the range", "text"),
     )
     rows = []
     for parameter in tuned.plan["parameters"]:
@@ -123,11 +123,11 @@ def parameter_table(tuned: Tuned) -> Table:
 
 def measure_table(tuned: Tuned) -> Table:
     columns = (
-        Column("Name", "name", 1.4),
-        Column("What", "text", 1.4),
-        Column("Metric", "name", 2.2),
-        Column("Wanted", "text", 2.0),
-        Column("Source", "text", 1.8),
+        Column("Name", "name"),
+        Column("What", "text"),
+        Column("Metric", "name"),
+        Column("Wanted", "text"),
+        Column("Source", "text"),
     )
     rows = [
         (Cell(objective["name"]), Cell("objective"), _metric_cell(tuned, objective), Cell(objective["goal"]), Cell(""))

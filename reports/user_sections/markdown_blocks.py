@@ -116,7 +116,7 @@ def _pipe_table(tokens: Sequence[Token], caption: str) -> Table:
     for token, inline in zip(tokens, [*tokens[1:], tokens[-1]], strict=True):
         if token.type == "th_open":
             kind = "number" if "right" in str(token.attrs.get("style", "")) else "text"
-            columns.append(Column(_flat(inline), kind, 1.0))
+            columns.append(Column(_flat(inline), kind))
         elif token.type == "tr_open":
             rows.append([])
         elif token.type == "td_open":
