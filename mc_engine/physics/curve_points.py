@@ -1,5 +1,5 @@
-"""Points of curves and surfaces: read from a CSV or Parquet file, in SI by the units in the names of its columns, and
-held to what a curve needs."""
+"""Points of curves and surfaces: read from a CSV or Parquet file, in SI by the units in the names of its columns, held
+to what a curve needs, and made into what a look-up reads: a row of numbers for each point, or each cell of a grid."""
 
 import sys
 from collections.abc import Mapping
@@ -114,3 +114,86 @@ def grid_of(words: str, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np
     if np.isnan(values).any() or x.size != values.size:
         raise ModelError(f"{words}: {x.size} rows are no grid of {xs.size} by {ys.size} points, each once")
     return xs, ys, values
+
+
+# ---- a row for each point
+
+
+def linear_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(value, slope behind it) of each point; the last one has no slope, as nothing is behind it."""
+    with np.errstate(over="ignore"):
+        return np.column_stack([y, np.append(np.diff(y) / np.diff(x), 0.0)])
+
+
+def cubic_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Coefficients of the powers of the way from each point."""
+    h = np.diff(x)
+    m = np.diff(y) / h
+    d = _slopes(h, m)
+    rows = np.column_stack([y[:-1], d[:-1], (3.0 * m - 2.0 * d[:-1] - d[1:]) / h, (d[:-1] + d[1:] - 2.0 * m) / h / h])
+    return np.concatenate([rows, [[y[-1], 0.0, 0.0, 0.0]]])
+
+
+def _slopes(h: np.ndarray, m: np.ndarray) -> np.ndarray:
+    """Slopes at the points by Fritsch and Butland's weighted harmonic mean; h, m : length and slope of each stretch."""
+    if m.size == 1:
+        return np.repeat(m, 2)
+    before, behind = h[1:] + 2.0 * h[:-1], 2.0 * h[1:] + h[:-1]  # weights of the slopes behind and before
+    same = m[:-1] * m[1:] > 0.0
+    safe = np.where(same, m[:-1], 1.0), np.where(same, m[1:], 1.0)
+    inner = np.where(same, (before + behind) / (behind / safe[0] + before / safe[1]), 0.0)
+    return np.concatenate([[_end(h[0], h[1], m[0], m[1])], inner, [_end(h[-1], h[-2], m[-1], m[-2])]])
+
+
+def _end(h0: float, h1: float, m0: float, m1: float) -> float:
+    """Slope at an end by three points, kept from overshooting (C. Moler, Numerical Computing with MATLAB, 3.6)."""
+    d = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1)
+    if np.sign(d) != np.sign(m0):
+        return 0.0
+    return 3.0 * m0 if np.sign(m0) != np.sign(m1) and abs(d) > 3.0 * abs(m0) else d
+
+
+def turnovers(x: np.ndarray) -> np.ndarray:
+    """First point, the first arguments that are nearer to the next point than to the one before, last point."""
+    return np.concatenate([x[:1], np.nextafter(0.5 * x[:-1] + 0.5 * x[1:], np.inf), x[-1:]])
+
+
+def nearest_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """(value, 0) from each turnover on; at the last one begins what is outside."""
+    return np.column_stack([np.append(y, y[-1]), np.zeros(x.size + 1)])
+
+
+# ---- a cell behind each point of a grid
+
+
+def linear_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """(value, slope along x, slope along y, their product's) of the cell behind each point of the grid."""
+    along_x, along_y = np.zeros_like(z), np.zeros_like(z)
+    along_x[:-1] = np.diff(z, axis=0) / np.diff(x)[:, None]
+    along_y[:, :-1] = np.diff(z, axis=1) / np.diff(y)
+    both = np.zeros_like(z)
+    both[:-1] = np.diff(along_y, axis=0) / np.diff(x)[:, None]
+    return np.stack([z, along_x, along_y, both], axis=-1)
+
+
+def nearest_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """The value from each pair of turnovers on."""
+    return np.pad(z, ((0, 1), (0, 1)), "edge")
+
+
+def cubic_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Coefficients of the powers of both ways, [n_x, n_y, power of the way along x, along y].
+
+    Along y the values and the slopes along x are curves by `cubic_rows`; between them stands Hermite's cubic along x.
+    """
+    steps = np.diff(x)
+    slopes = np.column_stack([_slopes(steps, np.diff(column) / steps) for column in z.T])
+    values, slopes = (np.stack([cubic_rows(y, row) for row in rows]) for rows in (z, slopes))
+    h = steps[:, None, None]
+    m = np.diff(values, axis=0) / h
+    cells = np.zeros((x.size, y.size, 4, 4))
+    cells[:, :, 0] = values
+    cells[:-1, :, 1] = slopes[:-1]
+    cells[:-1, :, 2] = (3.0 * m - 2.0 * slopes[:-1] - slopes[1:]) / h
+    cells[:-1, :, 3] = (slopes[:-1] + slopes[1:] - 2.0 * m) / h / h
+    return cells

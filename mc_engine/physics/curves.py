@@ -20,7 +20,21 @@ from mc_engine.lanes import physics, where
 from mc_engine.lanes.kernel_data import DataBlock, numbers_of, one_at, row_of_four, row_of_two
 from mc_engine.lanes.number import Number, result_of
 from mc_engine.lanes.physics_function import PhysicsFunction
-from mc_engine.physics.curve_points import array_of, caller_folder, columns_of, grid_of, refuse_points, refuse_steep
+from mc_engine.physics.curve_points import (
+    array_of,
+    caller_folder,
+    columns_of,
+    cubic_cells,
+    cubic_rows,
+    grid_of,
+    linear_cells,
+    linear_rows,
+    nearest_cells,
+    nearest_rows,
+    refuse_points,
+    refuse_steep,
+    turnovers,
+)
 from mc_engine.physics.vectors import Vector
 
 KINDS = ("linear", "cubic", "nearest")
@@ -88,7 +102,7 @@ def _through(xs: np.ndarray, ys: np.ndarray, kind: str, outside: str, path: Path
     """The curve through points in SI.  path : that they come from."""
     words = f"the curve {path.name}" if path else "the curve"
     refuse_points(words, xs, ys, xs.size)
-    axis = _axis(_turnovers(xs) if kind == "nearest" else xs)
+    axis = _axis(turnovers(xs) if kind == "nearest" else xs)
     axis[_HEADER - 1] = axis.size
     rows = _ROWS[kind](xs, ys)
     refuse_steep(words, rows[:, :2])
@@ -136,9 +150,11 @@ def surface(
     file : CSV or Parquet as in `curve`, one row for each point of the grid, in any order.
     units : of columns whose names do not say theirs.
     Without a file, x and y are rising numbers and z is float64[n_x, n_y], in SI.
-    kind : "linear" in each direction (bilinear), or "nearest".
+    kind : "linear" in each direction (bilinear); "cubic" in each (bicubic), smooth (continuous slopes), and along the
+        lines of the grid the cubic curve through their points; or "nearest".
     outside : as in `curve`.
     """
+    _refuse_unknown(kind, KINDS, "kind")
     _refuse_unknown(outside, OUTSIDE, "outside")
     words = f"the surface {file or ''}".rstrip()
     path = caller_folder() / file if file is not None else None
@@ -150,7 +166,7 @@ def surface(
         xs, ys, zs = array_of(x, "x"), array_of(y, "y"), np.asarray(z, dtype=np.float64)
     refuse_points(words, xs, zs, xs.size)
     refuse_points(words, ys, zs.T, ys.size)
-    first, second = (_axis(_turnovers(one) if kind == "nearest" else one) for one in (xs, ys))
+    first, second = (_axis(turnovers(one) if kind == "nearest" else one) for one in (xs, ys))
     first[_HEADER - 1] = first.size
     second[_HEADER - 1] = first.size + second.size
     second[5:7] += first.size
@@ -230,45 +246,11 @@ def _bisected(numbers, points, levels, point, here, x):
 # ---- what is between the points
 
 
-def _linear_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(value, slope behind it) of each point; the last one has no slope, as nothing is behind it."""
-    with np.errstate(over="ignore"):
-        return np.column_stack([y, np.append(np.diff(y) / np.diff(x), 0.0)])
-
-
 @physics
 def _linear(numbers, x):
     point, way, outside = _segment(numbers, 0.0, x)
     y, slope = row_of_two(numbers, one_at(numbers, 7), point)
     return y + way * slope, outside
-
-
-def _cubic_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Coefficients of the powers of the way from each point."""
-    h = np.diff(x)
-    m = np.diff(y) / h
-    d = _slopes(h, m)
-    rows = np.column_stack([y[:-1], d[:-1], (3.0 * m - 2.0 * d[:-1] - d[1:]) / h, (d[:-1] + d[1:] - 2.0 * m) / h / h])
-    return np.concatenate([rows, [[y[-1], 0.0, 0.0, 0.0]]])
-
-
-def _slopes(h: np.ndarray, m: np.ndarray) -> np.ndarray:
-    """Slopes at the points by Fritsch and Butland's weighted harmonic mean; h, m : length and slope of each stretch."""
-    if m.size == 1:
-        return np.repeat(m, 2)
-    before, behind = h[1:] + 2.0 * h[:-1], 2.0 * h[1:] + h[:-1]  # weights of the slopes behind and before
-    same = m[:-1] * m[1:] > 0.0
-    safe = np.where(same, m[:-1], 1.0), np.where(same, m[1:], 1.0)
-    inner = np.where(same, (before + behind) / (behind / safe[0] + before / safe[1]), 0.0)
-    return np.concatenate([[_end(h[0], h[1], m[0], m[1])], inner, [_end(h[-1], h[-2], m[-1], m[-2])]])
-
-
-def _end(h0: float, h1: float, m0: float, m1: float) -> float:
-    """Slope at an end by three points, kept from overshooting (C. Moler, Numerical Computing with MATLAB, 3.6)."""
-    d = ((2.0 * h0 + h1) * m0 - h0 * m1) / (h0 + h1)
-    if np.sign(d) != np.sign(m0):
-        return 0.0
-    return 3.0 * m0 if np.sign(m0) != np.sign(m1) and abs(d) > 3.0 * abs(m0) else d
 
 
 @physics
@@ -278,16 +260,6 @@ def _cubic(numbers, x):
     return y + way * (c1 + way * (c2 + way * c3)), outside
 
 
-def _turnovers(x: np.ndarray) -> np.ndarray:
-    """First point, the first arguments that are nearer to the next point than to the one before, last point."""
-    return np.concatenate([x[:1], np.nextafter(0.5 * x[:-1] + 0.5 * x[1:], np.inf), x[-1:]])
-
-
-def _nearest_rows(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """(value, 0) from each turnover on; at the last one begins what is outside."""
-    return np.column_stack([np.append(y, y[-1]), np.zeros(x.size + 1)])
-
-
 @physics
 def _nearest(numbers, x):
     point, way, outside = _segment(numbers, 0.0, x)
@@ -295,23 +267,8 @@ def _nearest(numbers, x):
     return where(way == way, y, way), outside
 
 
-_ROWS = {"linear": _linear_rows, "cubic": _cubic_rows, "nearest": _nearest_rows}
+_ROWS = {"linear": linear_rows, "cubic": cubic_rows, "nearest": nearest_rows}
 _AT = {"linear": _linear, "cubic": _cubic, "nearest": _nearest}
-
-
-def _linear_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """(value, slope along x, slope along y, their product's) of the cell behind each point of the grid."""
-    along_x, along_y = np.zeros_like(z), np.zeros_like(z)
-    along_x[:-1] = np.diff(z, axis=0) / np.diff(x)[:, None]
-    along_y[:, :-1] = np.diff(z, axis=1) / np.diff(y)
-    both = np.zeros_like(z)
-    both[:-1] = np.diff(along_y, axis=0) / np.diff(x)[:, None]
-    return np.stack([z, along_x, along_y, both], axis=-1)
-
-
-def _nearest_cells(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """The value from each pair of turnovers on."""
-    return np.pad(z, ((0, 1), (0, 1)), "edge")
 
 
 @physics
@@ -337,8 +294,25 @@ def _nearest_on_grid(numbers, x, y):
     return where(way == way, one_at(numbers, first + cell), way), outside
 
 
-_CELLS = {"linear": _linear_cells, "nearest": _nearest_cells}
-_ON = {"linear": _bilinear, "nearest": _nearest_on_grid}
+@physics
+def _bicubic(numbers, x, y):
+    first, cell, way_x, way_y, outside = _cell(numbers, x, y)
+    c0 = _cubic_along_y(numbers, first, 4.0 * cell, way_y)
+    c1 = _cubic_along_y(numbers, first, 4.0 * cell + 1.0, way_y)
+    c2 = _cubic_along_y(numbers, first, 4.0 * cell + 2.0, way_y)
+    c3 = _cubic_along_y(numbers, first, 4.0 * cell + 3.0, way_y)
+    return c0 + way_x * (c1 + way_x * (c2 + way_x * c3)), outside
+
+
+@physics
+def _cubic_along_y(numbers, first, row, way):
+    """The coefficient of a power of the way along x."""
+    c0, c1, c2, c3 = row_of_four(numbers, first, row)
+    return c0 + way * (c1 + way * (c2 + way * c3))
+
+
+_CELLS = {"linear": linear_cells, "cubic": cubic_cells, "nearest": nearest_cells}
+_ON = {"linear": _bilinear, "cubic": _bicubic, "nearest": _nearest_on_grid}
 
 
 # ---- functions that physics calls

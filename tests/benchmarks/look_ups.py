@@ -87,9 +87,10 @@ def main():
             show(f"curve, {kind}, {name}", lambda width, f=f, x=x: look_up(f, [(x[0], x[-1])], width))
     for sizes in ((12, 8), (60, 40)):
         x, y = (np.sort(RNG.uniform(0.0, 1.0, size)) for size in sizes)
-        f = surface(x=x, y=y, z=RNG.normal(size=sizes))
-        ranges = [(x[0], x[-1]), (y[0], y[-1])]
-        show(f"surface, {sizes[0]} by {sizes[1]}, random", lambda width, f=f, r=ranges: look_up(f, r, width))
+        for kind in ("linear", "cubic"):
+            f = surface(x=x, y=y, z=RNG.normal(size=sizes), kind=kind)
+            ranges = [(x[0], x[-1]), (y[0], y[-1])]
+            show(f"surface, {kind}, {sizes[0]} by {sizes[1]}", lambda width, f=f, r=ranges: look_up(f, r, width))
     show("vector by a quaternion", lambda width: on_records(turned, TURN, 3, width))
     show("us76_air", lambda width: on_records(standard_air, Vector, 4, width))
     show("ecef_to_geodetic", lambda width: on_records(geodetic, Vector, 3, width))

@@ -66,6 +66,43 @@ def test_a_surface_is_scipys_and_meets_its_points(sizes, kind):
     assert f(*np.meshgrid(x, y, indexing="ij")).tolist() == z.tolist()
 
 
+def test_a_cubic_surface_is_scipys_cubic_along_x_through_its_cubics_along_y():
+    x, y = (np.sort(RNG.uniform(-1.0, 1.0, size)) for size in (9, 14))
+    z = RNG.normal(size=(9, 14))
+    f = surface(x=x, y=y, z=z, kind="cubic")
+    at_x, at_y = RNG.uniform(x[0], x[-1], N), RNG.uniform(y[0], y[-1], N)
+    values = PchipInterpolator(y, z, axis=1)(at_y)
+    slopes = PchipInterpolator(y, PchipInterpolator(x, z).derivative()(x), axis=1)(at_y)
+    i, k = np.searchsorted(x, at_x, "right") - 1, np.arange(N)
+    ends = (
+        np.stack([x[i], x[i + 1]]),
+        np.stack([values[i, k], values[i + 1, k]]),
+        np.stack([slopes[i, k], slopes[i + 1, k]]),
+    )
+    close(every_way(f, at_x, at_y), hermite(at_x, *ends), np.abs(z).max())
+    assert f(*np.meshgrid(x, y, indexing="ij")).tolist() == z.tolist()
+    for j in (0, 5, 13):  # along the lines of the grid it is the curve through their points
+        close(f(at_x, np.full(N, y[j])), PchipInterpolator(x, z[:, j])(at_x), np.abs(z).max())
+
+
+def hermite(x, ends, values, slopes):
+    """Hermite's cubic between two ends, by its basis."""
+    h = ends[1] - ends[0]
+    t = (x - ends[0]) / h
+    low = values[0] * (1 + 2 * t) * (1 - t) ** 2 + h * slopes[0] * t * (1 - t) ** 2
+    return low + values[1] * t**2 * (3 - 2 * t) + h * slopes[1] * t**2 * (t - 1)
+
+
+def test_a_cubic_surface_has_no_edge_between_its_cells():
+    x, y, z = np.array([0.0, 1.0, 3.0, 3.5]), np.array([0.0, 2.0, 2.5, 4.0]), RNG.normal(size=(4, 4))
+    f, d = surface(x=x, y=y, z=z, kind="cubic"), 1e-6
+    for at in RNG.uniform(0.1, 3.4, 20):
+        before, behind = [(f(1.0 + s * d, at) - f(1.0, at)) / (s * d) for s in (-1, 1)]
+        left, right = [(f(at, 2.5 + s * d) - f(at, 2.5)) / (s * d) for s in (-1, 1)]
+        assert abs(before - behind) < 1e-4
+        assert abs(left - right) < 1e-4
+
+
 @given(
     steps=st.lists(st.tuples(st.floats(1e-3, 1e3), st.floats(-1e3, 1e3)), min_size=1, max_size=20),
     rising=st.booleans(),
@@ -113,13 +150,13 @@ def test_what_is_not_a_number_gives_what_is_not_one(kind, outside, name):
     assert np.isnan(f(at)).tolist() == np.isnan(at).tolist()
 
 
-@pytest.mark.parametrize("kind", ["linear", "nearest"])
+@pytest.mark.parametrize("kind", curves.KINDS)
 @pytest.mark.parametrize("outside", curves.OUTSIDE)
 def test_a_surface_has_the_same_edges(outside, kind):
     f = surface(x=[0.0, 1.0], y=[0.0, 2.0], z=[[1.0, 2.0], [3.0, 4.0]], outside=outside, kind=kind)
     x, y = np.array([0.5, -1.0, 0.5, np.nan, 0.5, np.nan, 9.0]), np.array([1.0, 1.0, 5.0, 1.0, np.nan, 5.0, np.nan])
     found = every_way(f, x, y)
-    middle, held = (2.5, [1.5, 3.0]) if kind == "linear" else (1.0, [1.0, 2.0])
+    middle, held = (1.0, [1.0, 2.0]) if kind == "nearest" else (2.5, [1.5, 3.0])
     beyond = {"held": held, "zero": [0.0, 0.0], "ends": [np.nan, np.nan]}[outside]
     np.testing.assert_array_equal(found, [middle, *beyond, np.nan, np.nan, np.nan, np.nan])
 
@@ -128,8 +165,8 @@ def test_the_structure_has_no_numbers_of_the_points():
     one, other = curve(x=[0.0, 1.0], y=[0.0, 1.0]), curve(x=[0.0, 3.0, 4.0], y=[0.0, 1.0, 7.0])
     assert one.structure() == other.structure()
     kinds = {curve(x=[0, 1], y=[0, 1], kind=k, outside=o).structure() for k in curves.KINDS for o in curves.OUTSIDE}
-    flat = {surface(x=[0, 1], y=[0, 1], z=[[0, 0], [0, 0]], kind=k).structure() for k in ("linear", "nearest")}
-    assert len(kinds | flat) == 11
+    flat = {surface(x=[0, 1], y=[0, 1], z=[[0, 0], [0, 0]], kind=k).structure() for k in curves.KINDS}
+    assert len(kinds | flat) == 12
 
 
 # ---- files
