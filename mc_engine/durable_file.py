@@ -12,6 +12,7 @@ files are read or written, no pipes and no devices.
 
 import errno
 import os
+import shutil
 import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -28,6 +29,7 @@ if os.name != "nt":
 
 # Largest files that are read at once, so that an oversized one cannot fill the memory.
 MOST_OF_TEXT, MOST_OF_JOURNAL, MOST_OF_FILE = 2**28, 2**30, 2**34  # bytes
+_PIECE = 2**20  # bytes that are copied at a time
 
 _LINK = "is a symbolic link; put the file itself there"
 # Opening follows no link, and does not wait for the writer of a pipe.  Windows has neither flag.
@@ -234,6 +236,33 @@ def remove_file(root: Path, name: str) -> None:
     """Remove the file `name` of a directory, if it exists; a symbolic link is removed, not its target."""
     with _parent(root, name) as (folder, last), _refusing_folder(folder.path / last), suppress(FileNotFoundError):
         os.unlink(folder.of(last), dir_fd=folder.descriptor)
+
+
+def open_to_append(root: Path, name: str) -> int:
+    """Descriptor at the end of the file `name` of a directory; the file and the folders on its path are created."""
+    with _parent(root, name, make=True) as (folder, last):
+        return open_regular(folder.path / last, os.O_WRONLY | os.O_CREAT | os.O_APPEND, folder)
+
+
+def copy_into(root: Path, name: str, source: Path) -> None:
+    """Write a copy of the regular file `source` as the file `name` of a directory, and create the folders on its path.
+
+    It is not synced.
+    """
+    make_way(root, name)
+    with disk_errors(source), open(open_regular(source, os.O_RDONLY), "rb") as file:
+        with _opened(root, name, _NEW) as descriptor:
+            while piece := file.read(_PIECE):
+                write_all(descriptor, piece)
+
+
+def remove_folder(root: Path, name: str) -> None:
+    """Remove the folder `name` of a directory with all that is in it, if it exists; of a symbolic link, the link."""
+    with _parent(root, name) as (folder, last), suppress(FileNotFoundError):
+        if stat.S_ISDIR(os.stat(folder.of(last), dir_fd=folder.descriptor, follow_symlinks=False).st_mode):
+            shutil.rmtree(folder.of(last), dir_fd=folder.descriptor)
+        else:
+            os.unlink(folder.of(last), dir_fd=folder.descriptor)
 
 
 def _discard(root: Path, name: str) -> None:

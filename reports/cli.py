@@ -5,8 +5,7 @@ from pathlib import Path
 
 from mc_engine.store.derived_files import FIGURES, derived_files
 from mc_engine.store.opening import open_store
-from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of
-from mc_engine.store.run_folder import readable
+from mc_engine.store.run_files import RARE_EVENT, TUNING, kind_of, readable
 from reports.contents import build, titled
 from reports.document.blocks import Attachment, Document
 from reports.formats.html import render_html

@@ -10,21 +10,22 @@ from reports.drawing.marks import Drawing
 from reports.drawing.pictures import render_picture
 from reports.figures.histories import HistoryLine, history_figure
 from reports.run.flown import Flown, Run
+from reports.run.phases import quantity_names
 from reports.sections.figure_blocks import NOMINAL, is_constant, saved_histories
 
 LARGEST = 1e100  # of any unit: what a flight that is lost holds beyond it, no axis can have ticks for
 
 
 def replay_picture(run: Run, case_id: int, history: pd.DataFrame) -> bytes:
-    """A PNG in the style of the reports.  history : t_s and the quantities of the case."""
+    """A PNG in the style of the reports.  history : t_s and the outputs of the case."""
     return render_picture(paper.svg(replay_drawing(run, case_id, history)), "png")
 
 
 def replay_drawing(run: Run, case_id: int, history: pd.DataFrame) -> Drawing:
     """A panel a quantity that varies."""
     flown = Flown(run, "")
-    columns = {name: history[name].to_numpy(dtype=np.float64) for name in history.columns if name != "case_id"}
-    t = columns.pop("t_s")
+    columns = {name: history[name].to_numpy(dtype=np.float64) for name in quantity_names(history)}
+    t = history["t_s"].to_numpy(dtype=np.float64)
     varying = [name for name, values in columns.items() if not is_constant(values)] or list(columns)
     quantities = {name: np.where(np.abs(columns[name]) < LARGEST, columns[name], np.nan) for name in varying}
     line = HistoryLine(f"case {case_id}", t, quantities, 1)

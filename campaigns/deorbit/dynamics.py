@@ -9,55 +9,74 @@ difference of large numbers, and within a Runge-Kutta step two places taken apar
 
 from collections import namedtuple
 
-from campaigns.deorbit.elements import osculating
-from mc_engine.lanes import any_lane, exp, physics, sincos, sqrt, where
+from mc_engine.lanes import any_lane, atan2, exp, physics, sincos, sqrt, where
 from mc_engine.lanes.noise import normal_pair
+from mc_engine.model import Setting, states
 from mc_engine.physics.atmosphere import layered
 from mc_engine.physics.constants import EARTH_RATE, EQUATORIAL_RADIUS, MU_EARTH
 from mc_engine.physics.frames import half_turn
 from mc_engine.physics.gravity import j2_perturbation, point_mass
 from mc_engine.physics.pulse_modulators import lag_rate
+from mc_engine.physics.vectors import Vector, added, added_scaled, cross, dot, norm, scaled, subtracted
 
-# x to vz: deviation of position and velocity; f_desired: true anomaly of the place on the desired path;
-# impulse: S; filtered: output of the modulator's lag
-State = namedtuple("State", "x y z vx vy vz f_desired impulse filtered")
-# navigation error held since the last fix, along R, T, N of the desired path; modulator; one over the first error
-# of each element
-Memory = namedtuple("Memory", "r_r r_t r_n v_r v_t v_n on pulses a_scale e_scale omega_scale")
-Parameters = namedtuple(
-    "Parameters",
-    "x y z vx vy vz f_desired "  # first state: deviation just after the burn
-    "px py pz qx qy qz p e "  # desired path: unit vectors to perigee and 90 deg on; semi-latus rectum; eccentricity
-    "a omega "  # desired semi-major axis and argument of perigee
-    "theta_burn dv alpha duration "  # planned burn: argument of latitude, size, angle; time from it to entry
-    "gain mass exhaust limit thrust_factor ballistic radius delay greenwich "
-    "misled bias_r bias_t bias_n bias_vr bias_vt bias_vn noise_position noise_velocity "
-    "input_gain feedback_gain time_constant on off",
+State = states(
+    **{f"deviation_{axis}_m": f"inertial position less the desired one, {axis}" for axis in "xyz"},
+    **{f"deviation_v{axis}_m_s": f"inertial velocity less the desired one, {axis}" for axis in "xyz"},
+    f_desired_deg="true anomaly on the desired path",
+    impulse_m_s="impulse S per mass",
+    filtered_n="output of the modulator's lag",
 )
-Events = namedtuple("Events", "entry pulse_on pulse_off")
-Desired = namedtuple("Desired", "x y z vx vy vz ax ay az rx ry rz tx ty tz rate")
+# navigation errors held since the last fix, along R, T, N of the desired path; one over the first error of each
+# element; modulator
+Memory = namedtuple("Memory", "position_error velocity_error scale on pulses", defaults=(0.0, 0.0))
+Elements = namedtuple("Elements", "a e omega")
+Desired = namedtuple("Desired", "position velocity acceleration radial transverse rate")
 
-# settings arrive as numbers: places in the lists of words of `model.py`
-CONTINUOUS, CLIPPED, PULSED, OFF = 0.0, 1.0, 2.0, 3.0
-FEED_CONTINUOUS = 0.0
-BURNING = 1.0
+CONTROL = Setting("continuous", "how the commanded force is flown", choices=("continuous", "clipped", "pulsed", "off"))
+PULSE_FEED = Setting("continuous", "what feeds the modulator", choices=("continuous", "closed_loop"))
+MASS_MODEL = Setting("constant", "mass that turns force into acceleration", choices=("constant", "burning"))
+# settings arrive as numbers
+CLIPPED, PULSED, OFF = CONTROL.code("clipped"), CONTROL.code("pulsed"), CONTROL.code("off")
+FEED_CONTINUOUS, BURNING = PULSE_FEED.code("continuous"), MASS_MODEL.code("burning")
 
 
 @physics
-def initial(p, o):
+def initial(p):
     """State just after the burn."""
     return State(
-        x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz,
+        deviation_x=p.deviation_x, deviation_y=p.deviation_y, deviation_z=p.deviation_z,
+        deviation_vx=p.deviation_vx, deviation_vy=p.deviation_vy, deviation_vz=p.deviation_vz,
         f_desired=p.f_desired, impulse=0.0, filtered=0.0,
     )  # fmt: skip
 
 
 @physics
+def deviation(s):
+    """Flown less desired position [m] and velocity [m/s]; of the parameters, those just after the burn.  (24), (25)"""
+    return Vector(s.deviation_x, s.deviation_y, s.deviation_z), Vector(s.deviation_vx, s.deviation_vy, s.deviation_vz)
+
+
+@physics
+def osculating(r, v):
+    """(a [m], e, omega [rad]) of the orbit through an inertial position [m] and velocity [m/s].
+
+    omega from the eccentricity vector's components along and across the node, by atan2: near-circular orbits
+    keep all digits.  Curtis, Orbital Mechanics for Engineering Students, 3rd ed., algorithm 4.2.
+    """
+    w, u = dot(v, v) * (1.0 / MU_EARTH), 1.0 / norm(r)
+    h, e = cross(r, v), subtracted(scaled(w - u, r), scaled(dot(r, v) * (1.0 / MU_EARTH), v))
+    # node vector (-hy, hx, 0); across it in the orbital plane lies h x node
+    along = h.x * e.y - h.y * e.x
+    across = h.z * (-h.x * e.x - h.y * e.y) + (h.x * h.x + h.y * h.y) * e.z  # times h
+    return Elements(a=1.0 / (2.0 * u - w), e=norm(e), omega=atan2(across, along * norm(h)))
+
+
+@physics
 def element_errors(s, p):
-    """Flown less desired (a [m], e, omega [rad, within half a turn])."""
-    x, y, z, vx, vy, vz = flown(s, desired_motion(s.f_desired, p))
-    a, e, omega = osculating(x, y, z, vx, vy, vz)
-    return a - p.a, e - p.e, half_turn(omega - p.omega)
+    """Flown less desired elements: a [m], e, omega [rad, within half a turn]."""
+    r, v = flown(s, desired_motion(s.f_desired, p))
+    at = osculating(r, v)
+    return Elements(a=at.a - p.a, e=at.e - p.e, omega=half_turn(at.omega - p.omega))
 
 
 @physics
@@ -68,32 +87,30 @@ def inverse(first, scale):
 
 
 @physics
-def start(p, o):
-    """Navigation errors are the constant ones until the first fix; the thruster is off."""
-    a, e, omega = element_errors(initial(p, o), p)
-    return Memory(
-        r_r=p.bias_r, r_t=p.bias_t, r_n=p.bias_n, v_r=p.bias_vr, v_t=p.bias_vt, v_n=p.bias_vn,
-        on=0.0, pulses=0.0,
-        a_scale=inverse(a, p.a), e_scale=inverse(e, 1.0), omega_scale=inverse(omega, 1.0),
-    )  # fmt: skip
+def start(p):
+    """Before the first navigation fix, which is at once; the thruster is off."""
+    first, none = element_errors(initial(p), p), Vector(0.0, 0.0, 0.0)
+    scale = Elements(a=inverse(first.a, p.a), e=inverse(first.e, 1.0), omega=inverse(first.omega, 1.0))
+    return Memory(position_error=none, velocity_error=none, scale=scale)
 
 
 @physics
-def fix_position(t, s, m, p, o, draws):
+def fix_position(m, p, draws):
     """A new navigation fix: constant error plus a fresh normal deviate on every component [m, m/s along R, T, N]."""
-    k, w = p.noise_position, p.noise_velocity
-    n1 = n2 = n3 = n4 = n5 = n6 = 0.0 * k
+    position = Vector(
+        p.navigation_radial_position_error, p.navigation_transverse_position_error, p.navigation_normal_position_error
+    )
+    velocity = Vector(
+        p.navigation_radial_velocity_error, p.navigation_transverse_velocity_error, p.navigation_normal_velocity_error
+    )
+    k, w = p.navigation_position_noise, p.navigation_velocity_noise
     if any_lane(k + w > 0.0):  # without noise the deviates would be multiplied by zero: save them
         n1, n2 = normal_pair(draws, 0)
         n3, n4 = normal_pair(draws, 1)
         n5, n6 = normal_pair(draws, 2)
-    r_r, r_t, r_n = p.bias_r + k * n1, p.bias_t + k * n2, p.bias_n + k * n3
-    v_r, v_t, v_n = p.bias_vr + w * n4, p.bias_vt + w * n5, p.bias_vn + w * n6
-    return Memory(
-        r_r=r_r, r_t=r_t, r_n=r_n, v_r=v_r, v_t=v_t, v_n=v_n,
-        on=m.on, pulses=m.pulses,
-        a_scale=m.a_scale, e_scale=m.e_scale, omega_scale=m.omega_scale,
-    )  # fmt: skip
+        position = added_scaled(position, k, Vector(n1, n2, n3))
+        velocity = added_scaled(velocity, w, Vector(n4, n5, n6))
+    return Memory(position_error=position, velocity_error=velocity, scale=m.scale, on=m.on, pulses=m.pulses)
 
 
 @physics
@@ -101,28 +118,16 @@ def desired_motion(f, p):
     """Where the craft should be: position, velocity, acceleration, unit vectors R and T, rate of f.  (31)-(38)"""
     s, c = sincos(f)
     u = (1.0 + p.e * c) * (1.0 / p.p)  # 1/r; what is inverted here stays the same all the flight
-    r = 1.0 / u
     h = sqrt(MU_EARTH * p.p)
-    rx, ry, rz = c * p.px + s * p.qx, c * p.py + s * p.qy, c * p.pz + s * p.qz
-    tx, ty, tz = c * p.qx - s * p.px, c * p.qy - s * p.py, c * p.qz - s * p.pz
-    v_r, v_t = h * (p.e / p.p) * s, h * u  # (34)
-    g = -MU_EARTH * (u * u)  # (35)
+    to_perigee, ahead = Vector(p.px, p.py, p.pz), Vector(p.qx, p.qy, p.qz)
+    radial = added_scaled(scaled(c, to_perigee), s, ahead)
+    transverse = subtracted(scaled(c, ahead), scaled(s, to_perigee))
     return Desired(
-        x=r * rx,
-        y=r * ry,
-        z=r * rz,
-        vx=v_r * rx + v_t * tx,
-        vy=v_r * ry + v_t * ty,
-        vz=v_r * rz + v_t * tz,
-        ax=g * rx,
-        ay=g * ry,
-        az=g * rz,
-        rx=rx,
-        ry=ry,
-        rz=rz,
-        tx=tx,
-        ty=ty,
-        tz=tz,
+        position=scaled(1.0 / u, radial),
+        velocity=added_scaled(scaled(h * (p.e / p.p) * s, radial), h * u, transverse),  # (34)
+        acceleration=scaled(-MU_EARTH * (u * u), radial),  # (35)
+        radial=radial,
+        transverse=transverse,
         rate=h * (u * u),  # (33)
     )
 
@@ -130,164 +135,139 @@ def desired_motion(f, p):
 @physics
 def flown(s, d):
     """Inertial position [m] and velocity [m/s]."""
-    return d.x + s.x, d.y + s.y, d.z + s.z, d.vx + s.vx, d.vy + s.vy, d.vz + s.vz
+    r, v = deviation(s)
+    return added(d.position, r), added(d.velocity, v)
 
 
 @physics
-def law(d, ex, ey, ez, wx, wy, wz, p, o):
-    """Commanded acceleration [m/s^2] for these errors of position (e) and velocity (w).  (28)"""
-    x, y, z = d.x + ex, d.y + ey, d.z + ez
-    gx, gy, gz = point_mass(x, y, z, MU_EARTH)
-    k = p.gain
-    ux = d.ax - gx - 2.0 * k * wx - k * k * ex
-    uy = d.ay - gy - 2.0 * k * wy - k * k * ey
-    uz = d.az - gz - 2.0 * k * wz - k * k * ez
+def law(d, e, w, p, o):
+    """Commanded acceleration [m/s^2] for these errors of position, e, and velocity, w.  (28)"""
+    r, k = added(d.position, e), p.gain
+    free = subtracted(d.acceleration, Vector(*point_mass(r.x, r.y, r.z, MU_EARTH)))
+    u = subtracted(subtracted(free, scaled(2.0 * k, w)), scaled(k * k, e))
     if o.j2_feedforward:
-        jx, jy, jz = j2_perturbation(x, y, z, MU_EARTH)
-        ux, uy, uz = ux - jx, uy - jy, uz - jz
-    return ux, uy, uz
+        u = subtracted(u, Vector(*j2_perturbation(r.x, r.y, r.z, MU_EARTH)))
+    return u
 
 
 @physics
-def measured(s, d, m):
-    """Errors of position [m] and velocity [m/s] as the navigation sees them, inertial axes.  (24), (25)
+def measured(e, rtn, d):
+    """Error of position [m] or velocity [m/s] as the navigation sees it: e, and its own along R, T, N; inertial axes.
 
-    Its own errors lie along R, T, N of the desired path and are added here; the source has none.
+    The source's navigation has no errors.
     """
-    nx, ny, nz = d.ry * d.tz - d.rz * d.ty, d.rz * d.tx - d.rx * d.tz, d.rx * d.ty - d.ry * d.tx
-    return (
-        s.x + m.r_r * d.rx + m.r_t * d.tx + m.r_n * nx,
-        s.y + m.r_r * d.ry + m.r_t * d.ty + m.r_n * ny,
-        s.z + m.r_r * d.rz + m.r_t * d.tz + m.r_n * nz,
-        s.vx + m.v_r * d.rx + m.v_t * d.tx + m.v_n * nx,
-        s.vy + m.v_r * d.ry + m.v_t * d.ty + m.v_n * ny,
-        s.vz + m.v_r * d.rz + m.v_t * d.tz + m.v_n * nz,
-    )
+    normal = cross(d.radial, d.transverse)
+    return added_scaled(added_scaled(added_scaled(e, rtn.x, d.radial), rtn.y, d.transverse), rtn.z, normal)
 
 
 @physics
 def ideal_errors(t, p):
     """Errors that the exact law would have left by now: x = (x0 + (v0 + k x0) t) exp(-k t), the solution of (29)."""
+    x0, v0 = deviation(p)
     k, decay = p.gain, exp(-p.gain * t)
-    bx, by, bz = p.vx + k * p.x, p.vy + k * p.y, p.vz + k * p.z
-    return (
-        (p.x + bx * t) * decay,
-        (p.y + by * t) * decay,
-        (p.z + bz * t) * decay,
-        (p.vx - k * bx * t) * decay,
-        (p.vy - k * by * t) * decay,
-        (p.vz - k * bz * t) * decay,
-    )
+    b = added_scaled(v0, k, x0)
+    return scaled(decay, added_scaled(x0, t, b)), scaled(decay, subtracted(v0, scaled(t, scaled(k, b))))
 
 
 @physics
 def craft_mass(s, p, o):
     """Mass [kg]: constant as in the source, or falling with the impulse.  (40)"""
+    mass = p.initial_mass
     if o.mass_model == BURNING:
-        mass = p.mass * exp(-s.impulse / p.exhaust)
-    else:
-        mass = p.mass
+        mass = mass * exp(-s.impulse / p.exhaust)
     return mass
 
 
 @physics
 def command(t, s, m, d, p, o):
-    """Commanded force [N], components and size; zero when the control is off."""
+    """Commanded force [N] as a vector, and its size; zero when the control is off."""
+    e, w = deviation(s)
     if o.control == PULSED and o.pulse_feed == FEED_CONTINUOUS:
-        ex, ey, ez, wx, wy, wz = ideal_errors(t, p)
-        ux, uy, uz = law(d, ex, ey, ez, wx, wy, wz, p, o)
+        e, w = ideal_errors(t, p)
+        u = law(d, e, w, p, o)
     elif any_lane(p.misled > 0.0):
-        ex, ey, ez, wx, wy, wz = measured(s, d, m)
-        ux, uy, uz = law(d, ex, ey, ez, wx, wy, wz, p, o)
+        u = law(d, measured(e, m.position_error, d), measured(w, m.velocity_error, d), p, o)
     else:  # the same numbers as with errors of zero, for half the work
-        ux, uy, uz = law(d, s.x, s.y, s.z, s.vx, s.vy, s.vz, p, o)
+        u = law(d, e, w, p, o)
     mass = craft_mass(s, p, o)
     if o.control == OFF:
-        mass = 0.0 * mass
-    return mass * ux, mass * uy, mass * uz, mass * sqrt(ux * ux + uy * uy + uz * uz)
+        mass = 0.0
+    return scaled(mass, u), mass * norm(u)
 
 
 @physics
 def thrust(size, m, p, o):
     """(scale, force): what the thrusters make of a command of this size [N]; force [N] is the true one."""
     if o.control == CLIPPED:
-        scale = where(size > p.limit, p.limit / where(size > 0.0, size, 1.0), 1.0)
+        scale = where(size > p.thrust_limit, p.thrust_limit / where(size > 0.0, size, 1.0), 1.0)
     elif o.control == PULSED:
-        scale = m.on * p.limit / where(size > 0.0, size, 1.0)
+        scale = m.on * p.thrust_limit / where(size > 0.0, size, 1.0)
     else:
-        scale = 1.0 + 0.0 * size
+        scale = 1.0
     scale = scale * p.thrust_factor
     return scale, scale * size
 
 
 @physics
-def disturbances(x, y, z, vx, vy, vz, p, o):
+def disturbances(r, v, p, o):
     """Acceleration [m/s^2] by oblateness and drag, as far as they are switched on."""
-    ax, ay, az = 0.0 * x, 0.0 * y, 0.0 * z
+    a = Vector(0.0, 0.0, 0.0)
     if o.j2:
-        ax, ay, az = j2_perturbation(x, y, z, MU_EARTH)
+        a = Vector(*j2_perturbation(r.x, r.y, r.z, MU_EARTH))
     if o.drag:
-        ux, uy = vx + EARTH_RATE * y, vy - EARTH_RATE * x
-        speed = sqrt(ux * ux + uy * uy + vz * vz)
-        h = sqrt(x * x + y * y + z * z) - EQUATORIAL_RADIUS
-        k = -0.5 * layered(h) * speed / p.ballistic
-        ax, ay, az = ax + k * ux, ay + k * uy, az + k * vz
-    return ax, ay, az
+        wind = Vector(v.x + EARTH_RATE * r.y, v.y - EARTH_RATE * r.x, v.z)
+        k = -0.5 * layered(norm(r) - EQUATORIAL_RADIUS) * norm(wind) / p.ballistic_coefficient
+        a = added_scaled(a, k, wind)
+    return a
 
 
 @physics
 def rhs(t, s, m, p, o):
     """Time derivative of the state: (2) less the desired acceleration (35), (33), and S' = |F|/m."""
     d = desired_motion(s.f_desired, p)
-    x, y, z, vx, vy, vz = flown(s, d)
-    gx, gy, gz = point_mass(x, y, z, MU_EARTH)
-    fx, fy, fz, size = command(t, s, m, d, p, o)
+    r, v = flown(s, d)
+    gravity = Vector(*point_mass(r.x, r.y, r.z, MU_EARTH))  # (1) before the law, which need not compute it again
+    commanded, size = command(t, s, m, d, p, o)
     scale, force = thrust(size, m, p, o)
     inverse_mass = 1.0 / craft_mass(s, p, o)
-    k = scale * inverse_mass
-    ax, ay, az = disturbances(x, y, z, vx, vy, vz, p, o)
+    free = added(subtracted(gravity, d.acceleration), disturbances(r, v, p, o))
+    a = added_scaled(free, scale * inverse_mass, commanded)
+    filtered = 0.0
     if o.control == PULSED:
-        filtered = lag_rate(s.filtered, size, m.on * p.limit, p.input_gain, p.feedback_gain, p.time_constant)
-    else:
-        filtered = 0.0 * size
+        k_in, k_fb = p.modulator_input_gain, p.modulator_feedback_gain
+        filtered = lag_rate(s.filtered, size, m.on * p.thrust_limit, k_in, k_fb, p.modulator_time_constant)
     return State(
-        x=s.vx,
-        y=s.vy,
-        z=s.vz,
-        vx=gx - d.ax + ax + k * fx,
-        vy=gy - d.ay + ay + k * fy,
-        vz=gz - d.az + az + k * fz,
-        f_desired=d.rate,
-        impulse=force * inverse_mass,
-        filtered=filtered,
-    )
-
-
-@physics
-def events(t, s, m, p, o):
-    """Entry interface as r^2 - R^2 [m^2]; Schmitt trigger of the modulator on its filtered input [N].
-
-    M. J. Sidi, Spacecraft Dynamics and Control (1997), which the source follows.
-    """
-    x, y, z, _vx, _vy, _vz = flown(s, desired_motion(s.f_desired, p))
-    above = x * x + y * y + z * z - p.radius * p.radius
-    firing = m.on > 0.5
-    return Events(above, where(firing, -1.0, s.filtered - p.on), where(firing, s.filtered - p.off, 1.0))
-
-
-@physics
-def switch(t, s, m, p, o, hit):
-    """The trigger of the modulator turns: on counts a pulse.  M. J. Sidi, Spacecraft Dynamics and Control (1997)."""
-    on = where(hit.pulse_on > 0.5, 1.0, where(hit.pulse_off > 0.5, 0.0, m.on))
-    pulses = m.pulses + where(hit.pulse_on > 0.5, 1.0, 0.0)
-    return s, Memory(
-        r_r=m.r_r, r_t=m.r_t, r_n=m.r_n, v_r=m.v_r, v_t=m.v_t, v_n=m.v_n,
-        on=on, pulses=pulses,
-        a_scale=m.a_scale, e_scale=m.e_scale, omega_scale=m.omega_scale,
+        deviation_x=s.deviation_vx, deviation_y=s.deviation_vy, deviation_z=s.deviation_vz,
+        deviation_vx=a.x, deviation_vy=a.y, deviation_vz=a.z,
+        f_desired=d.rate, impulse=force * inverse_mass, filtered=filtered,
     )  # fmt: skip
 
 
 @physics
-def propellant(s, p):
-    """Propellant [kg] spent for the impulse S so far.  (40)"""
-    return p.mass * (1.0 - exp(-s.impulse / p.exhaust))
+def entry(s, p):
+    """Entry interface as r^2 - R^2 [m^2]."""
+    r, _ = flown(s, desired_motion(s.f_desired, p))
+    return dot(r, r) - p.target_radius * p.target_radius
+
+
+# The Schmitt trigger of the modulator: M. J. Sidi, Spacecraft Dynamics and Control (1997), which the source follows.
+
+
+@physics
+def pulse_on(s, m, p):
+    """Filtered input [N] over the upper level of the trigger, while the thruster is off."""
+    return where(m.on > 0.5, -1.0, s.filtered - p.modulator_on)
+
+
+@physics
+def pulse_off(s, m, p):
+    """Filtered input [N] over the lower level of the trigger, while the thruster is on."""
+    return where(m.on > 0.5, s.filtered - p.modulator_off, 1.0)
+
+
+@physics
+def switch(s, m, hit):
+    """The trigger turns: on counts a pulse."""
+    on = where(hit.pulse_on > 0.5, 1.0, where(hit.pulse_off > 0.5, 0.0, m.on))
+    errors = m.position_error, m.velocity_error
+    return s, Memory(*errors, scale=m.scale, on=on, pulses=m.pulses + hit.pulse_on)

@@ -1,174 +1,135 @@
 """Quantities along a de-orbit flight and metrics at its end.  SI, radians."""
 
-from collections import namedtuple
-
-from campaigns.deorbit.dynamics import (
-    OFF,
-    command,
-    desired_motion,
-    element_errors,
-    flown,
-    initial,
-    propellant,
-    thrust,
-)
-from mc_engine.lanes import asin, atan2, maximum, minimum, physics, sqrt, where
-from mc_engine.model import Extremum, Field
+from campaigns.deorbit.dynamics import OFF, command, desired_motion, deviation, element_errors, flown, initial, thrust
+from mc_engine.lanes import asin, atan2, exp, maximum, minimum, physics, sqrt, where
+from mc_engine.model import Field, at_end, last_above, maximum_of, metrics, minimum_of, outputs
 from mc_engine.physics.constants import EARTH_RATE
 from mc_engine.physics.frames import full_turn, half_turn
+from mc_engine.physics.vectors import Vector, cross, dot, norm
 
 SETTLED = 0.01  # of its first value: an element's error below this has settled
-QUANTITIES = (
-    Field("position_error_m", "m", "distance from the desired place"),
-    Field("velocity_error_m_s", "m/s", "difference from the desired velocity"),
-    Field("a_error_km", "km", "semi-major axis, flown less desired"),
-    Field("e_error", "", "eccentricity, flown less desired"),
-    Field("omega_error_deg", "deg", "argument of perigee, flown less desired"),
-    Field("a_remaining_pct", "%", "error of the semi-major axis in its first value"),
-    Field("e_remaining_pct", "%", "error of the eccentricity in its first value"),
-    Field("omega_remaining_pct", "%", "error of the argument of perigee in its first value"),
-    Field("unsettled_pct", "%", "largest of the three remaining errors, without sign"),
-    Field("force_n", "N", "size of the thrust"),
-    Field("force_radial_n", "N", "thrust along the desired radius"),
-    Field("force_transverse_n", "N", "thrust along the desired transverse direction"),
-    Field("force_normal_n", "N", "thrust along the orbit normal"),
-    Field("command_n", "N", "size of the commanded force"),
-    Field("impulse_m_s", "m/s", "impulse S per mass so far"),
-    Field("radius_km", "km", "distance from the Earth's centre"),
+Outputs = outputs(
+    position_error_m="distance from the desired place",
+    velocity_error_m_s="difference from the desired velocity",
+    a_error_km="semi-major axis, flown less desired",
+    e_error=Field("eccentricity, flown less desired", unit=""),
+    omega_error_deg="argument of perigee, flown less desired",
+    a_remaining_pct="error of the semi-major axis in its first value",
+    e_remaining_pct="error of the eccentricity in its first value",
+    omega_remaining_pct="error of the argument of perigee in its first value",
+    unsettled_pct="largest of the three remaining errors, without sign",
+    force_n="size of the thrust",
+    force_radial_n="thrust along the desired radius",
+    force_transverse_n="thrust along the desired transverse direction",
+    force_normal_n="thrust along the orbit normal",
+    command_n="size of the commanded force",
+    impulse_m_s="impulse S per mass so far",
+    radius_km="distance from the Earth's centre",
 )
-EXTREMA = (
-    Extremum("position_error", "position_error_m"),
-    Extremum("force", "force_n", smooth=False),  # clipped and pulsed thrust has corners
-    Extremum("a_below", "a_remaining_pct", "min"),
-    Extremum("e_below", "e_remaining_pct", "min"),
-    Extremum("omega_below", "omega_remaining_pct", "min"),
-    Extremum("settling", "unsettled_pct", "last_above", SETTLED),
-)
-METRICS = (
-    Field("correction_impulse_m_s", "m/s", "S: time integral of thrust over mass", low=0.0),
-    Field("propellant_kg", "kg", "propellant of the correction, from S", low=0.0),
-    Field("peak_force_n", "N", "largest thrust", low=0.0),
-    Field(
-        "settling_time_s",
-        "s",
+EXTREMA = {
+    **{f"{of}_below": minimum_of(f"{of}_remaining_pct", "beyond zero") for of in ("a", "e", "omega")},
+    "settling": last_above("unsettled_pct", SETTLED, "until all are settled"),
+}
+Metrics = metrics(
+    correction_impulse_m_s=at_end("impulse_m_s", "S: time integral of thrust over mass", low=0.0),
+    propellant_kg=Field("propellant of the correction, from S", low=0.0),
+    peak_force_n=maximum_of("force_n", "largest thrust", smooth=False, low=0.0),  # clipped and pulsed, it has corners
+    settling_time_s=Field(
         "last time with the error of a, e or omega above 1 % of its first value; none if so at entry",
         sometimes=True,
         low=0.0,
     ),
-    Field("overshoot_a_pct", "%", "largest error of a beyond zero, in its first value", low=0.0),
-    Field("overshoot_e_pct", "%", "largest error of e beyond zero, in its first value", low=0.0),
-    Field("overshoot_omega_pct", "%", "largest error of omega beyond zero, in its first value", low=0.0),
-    Field("max_position_error_m", "m", "largest distance from the desired place", low=0.0),
-    Field("max_position_error_time_s", "s", "when that was, after the nominal burn", low=0.0),
-    Field("final_position_error_m", "m", "distance from the desired place at entry", low=0.0),
-    Field("pulse_count", "", "pulses fired by the modulator", low=0.0),
-    Field("entry_time_s", "s", "entry, after the nominal burn", low=0.0),
-    Field("entry_speed_m_s", "m/s", "inertial speed at entry", low=0.0),
-    Field(
-        "entry_flight_path_angle_deg",
-        "deg",
-        "inertial flight-path angle at entry, negative below the horizon",
-        low=-90.0,
-        high=90.0,
+    **{f"overshoot_{of}_pct": Field(f"largest error of {of} beyond zero, in its first value", low=0.0)
+       for of in ("a", "e", "omega")},
+    max_position_error_m=maximum_of("position_error_m", "largest distance from the desired place", low=0.0),
+    max_position_error_time_s=Field("when that was, after the nominal burn", low=0.0),
+    final_position_error_m=at_end("position_error_m", "distance from the desired place at entry", low=0.0),
+    pulse_count=Field("pulses fired by the modulator", unit="", low=0.0),
+    entry_time_s=Field("entry, after the nominal burn", low=0.0),
+    entry_speed_m_s=Field("inertial speed at entry", low=0.0),
+    entry_flight_path_angle_deg=Field(
+        "inertial flight-path angle at entry, negative below the horizon", low=-90.0, high=90.0
     ),
-    Field("entry_heading_deg", "deg", "inertial heading at entry, from north, clockwise"),
-    Field("entry_latitude_argument_deg", "deg", "angle in the desired plane from its node to the entry place"),
-    Field("entry_latitude_deg", "deg", "geocentric latitude of entry", low=-90.0, high=90.0),
-    Field("entry_longitude_deg", "deg", "longitude of entry, east, on the rotating Earth"),
-    Field("entry_right_ascension_deg", "deg", "right ascension of entry, from the node"),
-    Field("entry_radius_km", "km", "distance from the Earth's centre at entry", low=0.0),
-    Field("entry_mass_kg", "kg", "mass at entry", low=0.0),
-    Field("initial_velocity_error_m_s", "m/s", "velocity after the burn less the desired one", low=0.0),
-    Field("actual_semi_major_axis_km", "km", "semi-major axis after the burn, before any correction", low=0.0),
-    Field("actual_eccentricity", "", "eccentricity after the burn, before any correction", low=0.0),
-    Field("actual_perigee_argument_deg", "deg", "argument of perigee after the burn, before any correction"),
-    Field("desired_semi_major_axis_km", "km", "semi-major axis of the desired path", low=0.0),
-    Field("desired_eccentricity", "", "eccentricity of the desired path", low=0.0),
-    Field("desired_perigee_argument_deg", "deg", "argument of perigee of the desired path"),
-    Field("burn_latitude_argument_deg", "deg", "argument of latitude of the planned burn"),
-    Field("burn_dv_m_s", "m/s", "size of the planned burn", low=0.0),
-    Field("burn_angle_deg", "deg", "alpha: angle of the planned burn from the retrograde direction"),
-    Field("planned_entry_time_s", "s", "entry along the desired path, after the nominal burn", low=0.0),
-)
-Quantities = namedtuple(
-    "Quantities",
-    "position_error velocity_error a_error e_error omega_error a_left e_left omega_left unsettled "
-    "force force_r force_t force_n command impulse radius",
-)
-Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]
-
-
-@physics
-def distance(x, y, z):
-    """Length of a vector, in the unit of its components: sqrt(x^2 + y^2 + z^2)."""
-    return sqrt(x * x + y * y + z * z)
+    entry_heading_deg="inertial heading at entry, from north, clockwise",
+    entry_latitude_argument_deg="angle in the desired plane from its node to the entry place",
+    entry_latitude_deg=Field("geocentric latitude of entry", low=-90.0, high=90.0),
+    entry_longitude_deg="longitude of entry, east, on the rotating Earth",
+    entry_right_ascension_deg="right ascension of entry, from the node",
+    entry_radius_km=at_end("radius_km", "distance from the Earth's centre at entry", low=0.0),
+    entry_mass_kg=Field("mass at entry", low=0.0),
+    initial_velocity_error_m_s=Field("velocity after the burn less the desired one", low=0.0),
+    actual_semi_major_axis_km=Field("semi-major axis after the burn, before any correction", low=0.0),
+    actual_eccentricity=Field("eccentricity after the burn, before any correction", unit="", low=0.0),
+    actual_perigee_argument_deg="argument of perigee after the burn, before any correction",
+    desired_semi_major_axis_km=Field("semi-major axis of the desired path", low=0.0),
+    desired_eccentricity=Field("eccentricity of the desired path", unit="", low=0.0),
+    desired_perigee_argument_deg="argument of perigee of the desired path",
+    burn_latitude_argument_deg="argument of latitude of the planned burn",
+    burn_dv_m_s=Field("size of the planned burn", low=0.0),
+    burn_angle_deg="alpha: angle of the planned burn from the retrograde direction",
+    planned_entry_time_s=Field("entry along the desired path, after the nominal burn", low=0.0),
+)  # fmt: skip
 
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES, SI and radians."""
+    """Outputs, SI and radians; force along R, T, N.  (39)"""
     d = desired_motion(s.f_desired, p)
-    fx, fy, fz, size = command(t, s, m, d, p, o)
+    r, _ = flown(s, d)
+    dr, dv = deviation(s)
+    commanded, size = command(t, s, m, d, p, o)
     scale, force = thrust(size, m, p, o)
-    nx, ny, nz = d.ry * d.tz - d.rz * d.ty, d.rz * d.tx - d.rx * d.tz, d.rx * d.ty - d.ry * d.tx
-    a_error, e_error, omega_error = element_errors(s, p)
-    a_left, e_left, omega_left = m.a_scale * a_error, m.e_scale * e_error, m.omega_scale * omega_error
-    return Quantities(
-        position_error=distance(s.x, s.y, s.z),
-        velocity_error=distance(s.vx, s.vy, s.vz),
-        a_error=a_error,
-        e_error=e_error,
-        omega_error=omega_error,
-        a_left=a_left,
-        e_left=e_left,
-        omega_left=omega_left,
+    errors = element_errors(s, p)
+    a_left, e_left, omega_left = m.scale.a * errors.a, m.scale.e * errors.e, m.scale.omega * errors.omega
+    return Outputs(
+        position_error=norm(dr),
+        velocity_error=norm(dv),
+        a_error=errors.a,
+        e_error=errors.e,
+        omega_error=errors.omega,
+        a_remaining=a_left,
+        e_remaining=e_left,
+        omega_remaining=omega_left,
         unsettled=maximum(maximum(abs(a_left), abs(e_left)), abs(omega_left)),
         force=force,
-        force_r=scale * (fx * d.rx + fy * d.ry + fz * d.rz),
-        force_t=scale * (fx * d.tx + fy * d.ty + fz * d.tz),
-        force_n=scale * (fx * nx + fy * ny + fz * nz),
+        force_radial=scale * dot(commanded, d.radial),
+        force_transverse=scale * dot(commanded, d.transverse),
+        force_normal=scale * dot(commanded, cross(d.radial, d.transverse)),
         command=size,
         impulse=s.impulse,
-        radius=distance(d.x + s.x, d.y + s.y, d.z + s.z),
+        radius=norm(r),
     )
 
 
 @physics
 def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at entry, SI and radians.
+    """The metrics at entry that the engine does not compute, SI and radians.
 
     Heading and flight-path angle come from the inertial velocity's components to the east, to the north and up, the
     longitude from the right ascension less the Earth's rotation since the epoch; derived here.
     """
-    d = desired_motion(s.f_desired, p)
-    x, y, z, vx, vy, vz = flown(s, d)
-    r, v = distance(x, y, z), distance(vx, vy, vz)
-    along = (x * p.px + y * p.py + z * p.pz) / r
-    across = (x * p.qx + y * p.qy + z * p.qz) / r
+    place, velocity = flown(s, desired_motion(s.f_desired, p))
+    r, v, x, y, z = norm(place), norm(velocity), place.x, place.y, place.z
+    along = dot(place, Vector(p.px, p.py, p.pz)) / r
+    across = dot(place, Vector(p.qx, p.qy, p.qz)) / r
     ground = sqrt(x * x + y * y)
     right_ascension = atan2(y, x)
-    east = (x * vy - y * vx) / ground
-    north = (vz * ground * ground - z * (x * vx + y * vy)) / (r * ground)
-    climb = (x * vx + y * vy + z * vz) / r
-    entry_time = t + p.delay
-    longitude = right_ascension - p.greenwich - EARTH_RATE * entry_time
-    spent = propellant(s, p)
-    a_error, e_error, omega_error = element_errors(s, p)
-    left = maximum(maximum(abs(m.a_scale * a_error), abs(m.e_scale * e_error)), abs(m.omega_scale * omega_error))
+    east = (x * velocity.y - y * velocity.x) / ground
+    north = (velocity.z * ground * ground - z * (x * velocity.x + y * velocity.y)) / (r * ground)
+    climb = dot(place, velocity) / r
+    entry_time = t + p.burn_delay
+    spent = p.initial_mass * (1.0 - exp(-s.impulse / p.exhaust))  # (40)
     # not settled at entry is no settling time: such a case counts against a requirement on it
-    unsettled = (left > SETTLED) | (o.control == OFF)
-    a_error, e_error, omega_error = element_errors(initial(p, o), p)
+    unsettled = (observe(t, s, m, p, o).unsettled > SETTLED) | (o.control == OFF)
+    _, first_velocity_error = deviation(p)
+    first = element_errors(initial(p), p)
     return Metrics(
-        correction_impulse=s.impulse,
         propellant=spent,
-        peak_force=best.force,
-        settling_time=where(unsettled, float("nan"), when.settling + p.delay),
+        settling_time=where(unsettled, float("nan"), when.settling + p.burn_delay),
         overshoot_a=maximum(-best.a_below, 0.0),
         overshoot_e=maximum(-best.e_below, 0.0),
         overshoot_omega=maximum(-best.omega_below, 0.0),
-        max_position_error=best.position_error,
-        max_position_error_time=when.position_error + p.delay,
-        final_position_error=distance(s.x, s.y, s.z),
+        max_position_error_time=when.max_position_error + p.burn_delay,
         pulse_count=m.pulses,
         entry_time=entry_time,
         entry_speed=v,
@@ -176,14 +137,13 @@ def evaluate(t, s, m, p, o, best, when):
         entry_heading=full_turn(atan2(east, north)),
         entry_latitude_argument=full_turn(atan2(across, along) + p.omega),
         entry_latitude=asin(maximum(-1.0, minimum(1.0, z / r))),
-        entry_longitude=half_turn(longitude),
+        entry_longitude=half_turn(right_ascension - p.greenwich_angle - EARTH_RATE * entry_time),
         entry_right_ascension=right_ascension,
-        entry_radius=r,
-        entry_mass=p.mass - spent,
-        initial_velocity_error=distance(p.vx, p.vy, p.vz),
-        actual_semi_major_axis=p.a + a_error,
-        actual_eccentricity=p.e + e_error,
-        actual_perigee_argument=full_turn(p.omega + omega_error),
+        entry_mass=p.initial_mass - spent,
+        initial_velocity_error=norm(first_velocity_error),
+        actual_semi_major_axis=p.a + first.a,
+        actual_eccentricity=p.e + first.e,
+        actual_perigee_argument=full_turn(p.omega + first.omega),
         desired_semi_major_axis=p.a,
         desired_eccentricity=p.e,
         desired_perigee_argument=p.omega,

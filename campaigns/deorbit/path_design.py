@@ -4,7 +4,8 @@ S. Divsalar, R. Nadafi, M. Kabganian, Electronics Industries Quarterly 7(1), 201
 ellipse through the wanted entry state and its two crossings with the circular initial orbit.
 """
 
-from dataclasses import dataclass
+from collections import namedtuple
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -12,37 +13,12 @@ from mc_engine.model import Refusals
 from mc_engine.physics.constants import MU_EARTH
 
 TAU = 2.0 * np.pi
-
-
-@dataclass
-class DeorbitPath:
-    """The desired ellipse and its burn; float64[n], SI.
-
-    a, e, omega : semi-major axis, eccentricity, argument of perigee;  f_entry : true anomaly at entry
-    f_burn, theta_burn : true anomaly on the ellipse and argument of latitude of the burn
-    dv, alpha : burn magnitude, and its angle from the retrograde direction;  tilt : +1 where the burn points
-        below the horizon (descending crossing), -1 above
-    """
-
-    a: np.ndarray
-    e: np.ndarray
-    omega: np.ndarray
-    f_entry: np.ndarray
-    f_burn: np.ndarray
-    theta_burn: np.ndarray
-    dv: np.ndarray
-    alpha: np.ndarray
-    tilt: np.ndarray
-
-    @property
-    def p(self) -> np.ndarray:
-        """Semi-latus rectum, eq. (7)."""
-        return self.a * (1.0 - self.e**2)
-
-    def flight_time(self) -> np.ndarray:
-        """Time [s] from the burn to the entry state along the undisturbed path."""
-        n = np.sqrt(MU_EARTH / self.a**3)
-        return np.mod(mean_anomaly(self.f_entry, self.e) - mean_anomaly(self.f_burn, self.e), TAU) / n
+# The desired ellipse and its burn; float64[n], SI.
+# a, e, p, omega: semi-major axis, eccentricity, semi-latus rectum, argument of perigee; f_burn, theta_burn: true
+# anomaly on the ellipse and argument of latitude of the burn; dv, alpha: burn magnitude, and its angle from the
+# retrograde direction; tilt: +1 where the burn points below the horizon (descending crossing), -1 above;
+# duration: time from the burn to the entry state along the undisturbed path
+DeorbitPath = namedtuple("DeorbitPath", "a e p omega f_burn theta_burn dv alpha tilt duration")
 
 
 def mean_anomaly(f, e):
@@ -60,13 +36,18 @@ def true_anomaly(mean, e):
     return 2.0 * np.arctan2(np.sqrt(1.0 + e) * np.sin(0.5 * eccentric), np.sqrt(1.0 - e) * np.cos(0.5 * eccentric))
 
 
-def design_path(a_initial, speed, angle, radius, theta_entry, ascending, refusals: Refusals) -> DeorbitPath:
+def design_path(i: SimpleNamespace, ascending: np.ndarray, refusals: Refusals) -> DeorbitPath:
     """Ellipse to the entry state and the burn that reaches it from a circular orbit.
 
-    a_initial [m] : radius of the initial orbit;  speed [m/s], angle [rad, positive below the horizon],
-    radius [m], theta_entry [rad] : entry state;  ascending : where true, burn at the ascending crossing D2.
+    i : inputs of the model, SI;  ascending : where true, burn at the ascending crossing D2.
     Cases whose entry state lies on no ellipse, or whose ellipse misses the orbit, join `refusals`.
     """
+    a_initial, radius, speed, angle = (
+        i.initial_semi_major_axis,
+        i.target_radius,
+        i.target_speed,
+        i.target_flight_path_angle,
+    )
     a = MU_EARTH / (2.0 * (MU_EARTH / radius - speed**2 / 2.0))  # eq. (11)
     refusals.add(~((a > 0.0) & np.isfinite(a)), "no ellipse reaches the entry state: its speed is at or above escape")
     e = np.sqrt(1.0 - (radius * speed * np.cos(angle)) ** 2 / (MU_EARTH * a))  # eq. (12)
@@ -77,40 +58,68 @@ def design_path(a_initial, speed, angle, radius, theta_entry, ascending, refusal
     cos_psi = (a - radius) / (a * e)  # eq. (15)
     sin_psi = -radius * speed * np.sin(angle) / (e * np.sqrt(MU_EARTH * a))  # eq. (16)
     f_entry = np.mod(np.arctan2(np.sqrt(1.0 - e**2) * sin_psi, cos_psi - e), TAU)  # eq. (14)
-    omega = np.mod(theta_entry - f_entry, TAU)  # eq. (13)
-    p = a * (1.0 - e**2)
+    omega = np.mod(i.target_latitude_argument - f_entry, TAU)  # eq. (13)
+    p = a * (1.0 - e**2)  # eq. (7)
     cos_f = (p / a_initial - 1.0) / e  # eq. (17) with e_i = 0
     refusals.add(~(np.abs(cos_f) <= 1.0), "the initial orbit and the path to the entry state do not intersect")
     f_burn = np.where(ascending, np.arccos(cos_f), TAU - np.arccos(cos_f))
     v_initial = np.sqrt(MU_EARTH / a_initial)  # eq. (19)
     v_radial = np.sqrt(MU_EARTH / p) * e * np.sin(f_burn)
     v_transverse = np.sqrt(MU_EARTH * p) / a_initial
-    # the velocity triangle of eqs (18) and (23), by components: no asin, no lost quadrant
-    dv = np.hypot(v_radial, v_transverse - v_initial)
     tilt = np.where(ascending, -1.0, 1.0)
-    alpha = np.arctan2(-tilt * v_radial, v_initial - v_transverse)
     return DeorbitPath(
         a=a,
         e=e,
+        p=p,
         omega=omega,
-        f_entry=f_entry,
         f_burn=f_burn,
         theta_burn=np.mod(f_burn + omega, TAU),
-        dv=dv,
-        alpha=alpha,
+        # the velocity triangle of eqs (18) and (23), by components: no asin, no lost quadrant
+        dv=np.hypot(v_radial, v_transverse - v_initial),
+        alpha=np.arctan2(-tilt * v_radial, v_initial - v_transverse),
         tilt=tilt,
+        duration=np.mod(mean_anomaly(f_entry, e) - mean_anomaly(f_burn, e), TAU) / np.sqrt(MU_EARTH / a**3),
     )
 
 
-def burnt_velocity(path: DeorbitPath, a_initial, magnitude_error, angle_error, out_of_plane):
-    """(radial, transverse, normal) velocity [m/s] after the erroneous burn.
+def burnt_velocity(path: DeorbitPath, i: SimpleNamespace):
+    """(radial, transverse, normal) velocity [m/s] after the erroneous burn; OE is a fraction of the angle alpha itself.
 
-    magnitude_error, angle_error : VE and OE as fractions; OE is a fraction of the angle alpha itself.
-    out_of_plane [rad] : angle of the burn out of the orbital plane, towards the orbit normal.
+    i : inputs of the model, SI.  The error out of the plane [rad] is positive towards the orbit normal.
     """
-    dv = path.dv * (1.0 + magnitude_error)
-    alpha = path.alpha * (1.0 + angle_error)
-    in_plane = dv * np.cos(out_of_plane)
+    dv, alpha = path.dv * (1.0 + i.ve), path.alpha * (1.0 + i.oe)
+    in_plane = dv * np.cos(i.out_of_plane_error)
     radial = -path.tilt * in_plane * np.sin(alpha)
-    transverse = np.sqrt(MU_EARTH / a_initial) - in_plane * np.cos(alpha)
-    return radial, transverse, dv * np.sin(out_of_plane)
+    transverse = np.sqrt(MU_EARTH / i.initial_semi_major_axis) - in_plane * np.cos(alpha)
+    return radial, transverse, dv * np.sin(i.out_of_plane_error)
+
+
+def path_axes(omega, inclination):
+    """Unit vectors [3, n] to the perigee and 90 degrees ahead of it: eq. (30) with the node on x."""
+    s, c, zero = np.sin(omega), np.cos(omega), np.zeros_like(omega)
+    node = np.array([np.ones_like(omega), zero, zero])
+    across = np.array([zero, np.cos(inclination), np.sin(inclination)])
+    return c * node + s * across, c * across - s * node
+
+
+def _turned(to_perigee, ahead, angle):
+    """Radial and transverse unit vectors [3, n] at a true anomaly."""
+    s, c = np.sin(angle), np.cos(angle)
+    return c * to_perigee + s * ahead, c * ahead - s * to_perigee
+
+
+def first_deviation(path: DeorbitPath, i: SimpleNamespace, to_perigee, ahead):
+    """(true anomaly of the desired place [rad], deviation of position [m] and velocity [m/s], [3, n]) after the burn.
+
+    The burn happens `burn_delay` after its time: the craft has gone on along the circle, its target along the path.
+    """
+    angle = path.f_burn + np.sqrt(MU_EARTH / i.initial_semi_major_axis**3) * i.burn_delay
+    radial, transverse = _turned(to_perigee, ahead, angle)
+    v = burnt_velocity(path, i)
+    velocity = v[0] * radial + v[1] * transverse + v[2] * np.cross(to_perigee, ahead, axis=0)
+    mean = mean_anomaly(path.f_burn, path.e) + np.sqrt(MU_EARTH / path.a**3) * i.burn_delay
+    f = np.where(i.burn_delay == 0.0, path.f_burn, true_anomaly(mean, path.e))
+    wanted_radial, wanted_transverse = _turned(to_perigee, ahead, f)
+    root, rise = np.sqrt(MU_EARTH / path.p), 1.0 + path.e * np.cos(f)
+    wanted = root * path.e * np.sin(f) * wanted_radial + root * rise * wanted_transverse  # (34), (37)
+    return f, (i.initial_semi_major_axis * radial - path.p / rise * wanted_radial, velocity - wanted)  # (31)

@@ -1,162 +1,150 @@
-"""The flexible-satellite model as the engine sees it: inputs, settings, each case's matrices, and the MODEL record."""
+"""The flexible-satellite model as the engine sees it: inputs, settings, each case's matrices, and the MODEL record.
 
+Numbers in brackets are equations of H. Taei, S. Ayati, S. F. Mousavi, Iranian Journal of Mechanical Engineering 24(3),
+2022; mass and modes are those of its Tables 10 and 11.
+"""
+
+from collections.abc import Mapping
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
-from campaigns.flexible_satellite import control, dynamics, figures, outcome, structure
-from mc_engine.model import Field, FixedStep, Model, Parameter, Refusals, Setting
+from campaigns.flexible_satellite import control, dynamics, outcome
+from campaigns.flexible_satellite.dynamics import AXES, MODES
+from mc_engine.model import FixedStep, Parameter, Refusals, Setting, inputs, model, prepared
+from mc_engine.model.figures import HistoryFigure, ScatterFigure
 from mc_engine.physics.attitude import body_matrix, quaternion_product, rotation_quaternion
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.studies.published import read_published
 
-SOURCE = (
-    "H. Taei, S. Ayati, S. F. Mousavi, Robust PID control of a flexible satellite considering thruster actuator "
-    "dynamics (in Persian), Iranian Journal of Mechanical Engineering 24(3), 2022, doi 10.30506/IJMEP.2022.525295.1770"
-)
-AXES, MODES = "xyz", (1, 2, 3, 4)
+# c0, kg^(1/2) m: rows body x, y, z; columns modes 1 to 4.  Printed with a transpose sign and in kg m^2, which cannot
+# be: (1) and (2) need 3 x 4 and a square root of an inertia.
+COUPLING = np.array([[7.0, -1.2, 1.1, 1.2], [1.2, 0.9, 2.5, -2.6], [2.2, -1.7, -0.8, -1.1]])
 LONGEST_DELAY = 2  # samples that the control remembers
 _NOT_ZERO = 1e-9
-
-_CRAFT = (
-    Parameter("inertia_x_kg_m2", "kg m^2", "moment of inertia about x", 100.0, low=0.0),
-    Parameter("inertia_y_kg_m2", "kg m^2", "moment of inertia about y", 75.0, low=0.0),
-    Parameter("inertia_z_kg_m2", "kg m^2", "moment of inertia about z", 50.0, low=0.0),
-    Parameter("inertia_xy_kg_m2", "kg m^2", "entry xy of the inertia matrix: minus the product of inertia", 0.0),
-    Parameter("inertia_xz_kg_m2", "kg m^2", "entry xz of the inertia matrix: minus the product of inertia", 0.0),
-    Parameter("inertia_yz_kg_m2", "kg m^2", "entry yz of the inertia matrix: minus the product of inertia", 0.0),
-    Parameter("inertia_x_factor", "", "true over assumed moment of inertia about x", 1.0, low=0.0),
-    Parameter("inertia_y_factor", "", "true over assumed moment of inertia about y", 1.0, low=0.0),
-    Parameter("inertia_z_factor", "", "true over assumed moment of inertia about z", 1.0, low=0.0),
-    Parameter("modal_frequency_1_rad_s", "rad/s", "frequency of mode 1 on a body that is held", 0.7, low=0.0),
-    Parameter("modal_frequency_2_rad_s", "rad/s", "frequency of mode 2 on a body that is held", 1.0, low=0.0),
-    Parameter("modal_frequency_3_rad_s", "rad/s", "frequency of mode 3 on a body that is held", 1.8, low=0.0),
-    Parameter("modal_frequency_4_rad_s", "rad/s", "frequency of mode 4 on a body that is held", 2.5, low=0.0),
-    Parameter("modal_damping_1", "", "damping ratio of mode 1", 0.0056, low=0.0),
-    Parameter("modal_damping_2", "", "damping ratio of mode 2", 0.0086, low=0.0),
-    Parameter("modal_damping_3", "", "damping ratio of mode 3", 0.0128, low=0.0),
-    Parameter("modal_damping_4", "", "damping ratio of mode 4", 0.0252, low=0.0),
-    Parameter("modal_frequency_factor", "", "true over assumed frequency, all modes", 1.0, low=0.0),
-    Parameter("modal_damping_factor", "", "true over assumed damping ratio, all modes", 1.0, low=0.0),
-    Parameter("coupling_factor", "", "true over assumed coupling matrix c0 of modes and rotation", 1.0),
+PAIRING = Setting(
+    "B", "level in the modulator, torque on the body: A is T, T; B is T, T/2; C is T/2, T/2", choices=("A", "B", "C")
 )
-_FLIGHT = (
-    Parameter("initial_q0", "", "scalar part of the first attitude in the orbital frame", 0.4),
-    Parameter("initial_q1", "", "first component of its vector part", 0.2),
-    Parameter("initial_q2", "", "second component of its vector part", 0.4),
-    Parameter("initial_q3", "", "third component of its vector part", -0.8),
-    Parameter("initial_attitude_error_x_deg", "deg", "further rotation of the first attitude, about body x", 0.0),
-    Parameter("initial_attitude_error_y_deg", "deg", "further rotation of the first attitude, about body y", 0.0),
-    Parameter("initial_attitude_error_z_deg", "deg", "further rotation of the first attitude, about body z", 0.0),
-    Parameter("initial_omega_x_rad_s", "rad/s", "first inertial body rate about x", 0.07),
-    Parameter("initial_omega_y_rad_s", "rad/s", "first inertial body rate about y", -0.05),
-    Parameter("initial_omega_z_rad_s", "rad/s", "first inertial body rate about z", -0.04),
-    Parameter("orbit_rate_rad_s", "rad/s", "rate of the circular orbit", 1.078e-3),
+
+
+def _each(name: str, meaning: str, values: Mapping[Any, float], **more: Any) -> dict[str, Parameter]:
+    """Parameters of one kind by column; {} in name and meaning is the axis or mode, by which `values` are given."""
+    return {name.format(key): Parameter(value, meaning.format(key), **more) for key, value in values.items()}
+
+
+ONES, ZEROS = dict.fromkeys(AXES, 1.0), dict.fromkeys(AXES, 0.0)
+Inputs = inputs(
+    **_each("inertia_{}_kg_m2", "moment of inertia about {}",
+            {"x": 100.0, "y": 75.0, "z": 50.0}, low=0.0, unit="kg m^2"),
+    **_each("inertia_{}_kg_m2", "entry {} of the inertia matrix: minus the product of inertia",
+            {"xy": 0.0, "xz": 0.0, "yz": 0.0}, unit="kg m^2"),
+    **_each("inertia_{}_factor", "true over assumed moment of inertia about {}", ONES, low=0.0, unit=""),
+    **_each("modal_frequency_{}_rad_s", "frequency of mode {} on a body that is held",
+            {1: 0.7, 2: 1.0, 3: 1.8, 4: 2.5}, low=0.0),
+    **_each("modal_damping_{}", "damping ratio of mode {}",
+            {1: 0.0056, 2: 0.0086, 3: 0.0128, 4: 0.0252}, low=0.0, unit=""),
+    modal_frequency_factor=Parameter(1.0, "true over assumed frequency, all modes", low=0.0, unit=""),
+    modal_damping_factor=Parameter(1.0, "true over assumed damping ratio, all modes", low=0.0, unit=""),
+    coupling_factor=Parameter(1.0, "true over assumed coupling matrix c0 of modes and rotation", unit=""),
+    initial_q0=Parameter(0.4, "scalar part of the first attitude in the orbital frame", unit=""),
+    initial_q1=Parameter(0.2, "first component of its vector part", unit=""),
+    initial_q2=Parameter(0.4, "second component of its vector part", unit=""),
+    initial_q3=Parameter(-0.8, "third component of its vector part", unit=""),
+    **_each("initial_attitude_error_{}_deg", "further rotation of the first attitude, about body {}", ZEROS),
+    **_each("initial_omega_{}_rad_s", "first inertial body rate about {}", {"x": 0.07, "y": -0.05, "z": -0.04}),
+    orbit_rate_rad_s=Parameter(1.078e-3, "rate of the circular orbit"),
     # 5 sqrt(3)/3 1e-4 (sin t + rand) N m, the same about every axis
-    Parameter("disturbance_amplitude_n_m", "N m", "amplitude of the disturbing torque", 5e-4 / np.sqrt(3.0)),
-    Parameter("disturbance_frequency_rad_s", "rad/s", "frequency of its wave", 1.0),
-    Parameter("disturbance_offset", "", "its constant part, in amplitudes: the source's rand", 0.5),
-    Parameter("rate_noise_rad_s", "rad/s", "1-sigma of a fresh error on each measured rate", 0.0, low=0.0),
-    Parameter(
-        "attitude_noise_rad", "rad", "1-sigma of a fresh error of the measured attitude about each axis", 0.0, 0.0
+    disturbance_amplitude_n_m=Parameter(5e-4 / np.sqrt(3.0), "amplitude of the disturbing torque", unit="N m"),
+    disturbance_frequency_rad_s=Parameter(1.0, "frequency of its wave"),
+    disturbance_offset=Parameter(0.5, "its constant part, in amplitudes: the source's rand", unit=""),
+    rate_noise_rad_s=Parameter(0.0, "1-sigma of a fresh error on each measured rate", low=0.0),
+    attitude_noise_rad=Parameter(0.0, "1-sigma of a fresh error of the measured attitude about each axis", low=0.0),
+    kp=Parameter(5.0, "gain on the vector part of the attitude, N m", unit=""),
+    kd=Parameter(20.0, "gain on the rate, N m s", unit=""),
+    ki=Parameter(0.1, "gain on the integral, N m", unit=""),
+    integral_rate_gain=Parameter(0.025, "c1: share of the rate in the integrand", unit=""),
+    integral_attitude_gain_1_s=Parameter(0.005, "c2: share of the attitude in the integrand", unit="1/s"),
+    integral_gamma=Parameter(1.5, "multiple of qv - qv(0) that is taken off the integral", unit=""),
+    torque_limit_n_m=Parameter(0.5, "largest torque that the PID part may ask for", low=0.0, unit="N m"),
+    rate_limit_rad_s=Parameter(0.1, "rate from which on the law brakes", low=0.0),
+    delta_p=Parameter(2.0, "divides kp above the rate limit", low=_NOT_ZERO, unit=""),
+    delta_i=Parameter(5.0, "divides ki above the rate limit", low=_NOT_ZERO, unit=""),
+    delta_d=Parameter(10.0, "multiplies kd above the rate limit", low=0.0, unit=""),
+    dbar_n_m=Parameter(0.0, "size of the switching torque against disturbances", low=0.0, unit="N m"),
+    switching_rate_gain=Parameter(0.05, "beta: weight of the rate in the switching torque's sign", unit=""),
+    switching_attitude_gain_1_s=Parameter(0.01, "lambda2: weight of the attitude in that sign", unit="1/s"),
+    pwpf_gain=Parameter(7.39, "K_m: gain of the modulator", low=_NOT_ZERO, unit=""),
+    pwpf_time_constant_s=Parameter(0.713, "T_m: time constant of the modulator's lag", low=1e-4),
+    pwpf_u_off=Parameter(0.117, "U_off: lag output at which a pulse ends", low=0.0, unit=""),
+    pwpf_hysteresis=Parameter(0.225, "h: U_on - U_off", low=_NOT_ZERO, unit=""),
+    thrust_level=Parameter(1.07, "T: thrust level, N; pwpf_pairing says what follows from it", low=_NOT_ZERO, unit=""),
+    **_each("thrust_{}_factor", "true over commanded torque of the {} actuator", ONES, low=0.0, unit=""),
+    **_each("misalignment_{}_deg", "rotation of the actuators' axes about body {}", ZEROS),
+    valve_delay_s=Parameter(0.0, "time by which thrust follows the modulator, at opening and closing", low=0.0),
+    arm_m=Parameter(0.5, "arm of the thrusters, for the propellant", low=1e-6),
+    isp_s=Parameter(220.0, "specific impulse of the thrusters, for the propellant", low=1e-3),
+    actuator=control.ACTUATOR,
+    pwpf_pairing=PAIRING,
+    rate_used=control.RATE_USED,
+    disturbance_draw=control.DISTURBANCE_DRAW,
+    duration_s=Setting(300.0, "length of the flight, up to the end of the step that reaches it", low=1e-3, high=1e6),
+    step_s=Setting(0.01, "integration step", low=1e-4, high=1.0),
+    steps_per_sample=Setting(
+        1.0, "integration steps from one sample of the control to the next", low=1, high=1e6, unit=""
     ),
-)
-_LAW = (
-    Parameter("kp", "", "gain on the vector part of the attitude, N m", 5.0),
-    Parameter("kd", "", "gain on the rate, N m s", 20.0),
-    Parameter("ki", "", "gain on the integral, N m", 0.1),
-    Parameter("integral_rate_gain", "", "c1: share of the rate in the integrand", 0.025),
-    Parameter("integral_attitude_gain_1_s", "1/s", "c2: share of the attitude in the integrand", 0.005),
-    Parameter("integral_gamma", "", "multiple of qv - qv(0) that is taken off the integral", 1.5),
-    Parameter("torque_limit_n_m", "N m", "largest torque that the PID part may ask for", 0.5, low=0.0),
-    Parameter("rate_limit_rad_s", "rad/s", "rate from which on the law brakes", 0.1, low=0.0),
-    Parameter("delta_p", "", "divides kp above the rate limit", 2.0, low=_NOT_ZERO),
-    Parameter("delta_i", "", "divides ki above the rate limit", 5.0, low=_NOT_ZERO),
-    Parameter("delta_d", "", "multiplies kd above the rate limit", 10.0, low=0.0),
-    Parameter("dbar_n_m", "N m", "size of the switching torque against disturbances", 0.0, low=0.0),
-    Parameter("switching_rate_gain", "", "beta: weight of the rate in the switching torque's sign", 0.05),
-    Parameter("switching_attitude_gain_1_s", "1/s", "lambda2: weight of the attitude in that sign", 0.01),
-)
-_THRUSTERS = (
-    Parameter("pwpf_gain", "", "K_m: gain of the modulator", 7.39, low=_NOT_ZERO),
-    Parameter("pwpf_time_constant_s", "s", "T_m: time constant of the modulator's lag", 0.713, low=1e-4),
-    Parameter("pwpf_u_off", "", "U_off: lag output at which a pulse ends", 0.117, low=0.0),
-    Parameter("pwpf_hysteresis", "", "h: U_on - U_off", 0.225, low=_NOT_ZERO),
-    Parameter("thrust_level", "", "T: thrust level, N; pwpf_pairing says what follows from it", 1.07, low=_NOT_ZERO),
-    Parameter("thrust_x_factor", "", "true over commanded torque of the x actuator", 1.0, low=0.0),
-    Parameter("thrust_y_factor", "", "true over commanded torque of the y actuator", 1.0, low=0.0),
-    Parameter("thrust_z_factor", "", "true over commanded torque of the z actuator", 1.0, low=0.0),
-    Parameter("misalignment_x_deg", "deg", "rotation of the actuators' axes about body x", 0.0),
-    Parameter("misalignment_y_deg", "deg", "rotation of the actuators' axes about body y", 0.0),
-    Parameter("misalignment_z_deg", "deg", "rotation of the actuators' axes about body z", 0.0),
-    Parameter("valve_delay_s", "s", "time by which thrust follows the modulator, at opening and closing", 0.0, low=0.0),
-    Parameter("arm_m", "m", "arm of the thrusters, for the propellant", 0.5, low=1e-6),
-    Parameter("isp_s", "s", "specific impulse of the thrusters, for the propellant", 220.0, low=1e-3),
-)
-PARAMETERS = (*_CRAFT, *_FLIGHT, *_LAW, *_THRUSTERS)
-SETTINGS = (
-    Setting("actuator", "", "what turns command into torque", "ideal", ("ideal", "pwpf")),
-    Setting(
-        "pwpf_pairing",
-        "",
-        "level in the modulator, torque on the body: A is T, T; B is T, T/2; C is T/2, T/2",
-        "B",
-        ("A", "B", "C"),
-    ),
-    Setting("rate_used", "", "rate that the law works with", "inertial", ("inertial", "orbital")),
-    Setting(
-        "disturbance_draw",
-        "",
-        "disturbance_offset holds all the run, or every sample draws afresh, uniform within 0.5 of it",
-        "run",
-        ("run", "sample"),
-    ),
-    Setting(
-        "duration_s", "s", "length of the flight, up to the end of the step that reaches it", 300.0, low=1e-3, high=1e6
-    ),
-    Setting("step_s", "s", "integration step", 0.01, low=1e-4, high=1.0),
-    Setting(
-        "steps_per_sample", "", "integration steps from one sample of the control to the next", 1.0, low=1, high=1e6
-    ),
-)
-STATES = (
-    *(Field(f"q{i}", "", f"attitude in the orbital frame, component {i}, scalar first") for i in (0, 1, 2, 3)),
-    *(Field(f"momentum_{axis}_n_m_s", "N m s", f"total angular momentum along body {axis}") for axis in AXES),
-    *(Field(f"modal_momentum_{i}", "", f"momentum of mode {i}, kg^(1/2) m/s") for i in MODES),
-    *(Field(f"eta_{i}", "", f"displacement of mode {i}, kg^(1/2) m") for i in MODES),
-    *(Field(f"impulse_{axis}_n_m_s", "N m s", f"impulse of the {axis} actuator so far") for axis in AXES),
-    Field("attitude_effort_s", "s", "integral of |q1| + |q2| + |q3| so far"),
-    Field("scalar_effort_s", "s", "integral of |1 - q0| so far"),
-)
+)  # fmt: skip
 
 
-def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Kernel parameters of each case: matrices inverted, first state, gains, thrusters.
+def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
+    """Kernel parameters of each case: the inputs, matrices inverted, first state, gains, thrusters.
 
-    inputs : float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
+    i : inputs, float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
     """
-    i = inputs
-    coupling = i.coupling_factor[:, None, None] * structure.COUPLING
-    inertia = structure.inertia_matrix(
-        i.inertia_x * i.inertia_x_factor,
-        i.inertia_y * i.inertia_y_factor,
-        i.inertia_z * i.inertia_z_factor,
-        i.inertia_xy,
-        i.inertia_xz,
-        i.inertia_yz,
-    )
-    inverse = structure.refuse_unphysical(inertia, coupling, refusals)
-    rows = {f"m{AXES[a]}{AXES[b]}": inverse[:, a, b] for a in range(3) for b in range(a, 3)}
-    rows |= {f"c{AXES[a]}{mode}": coupling[:, a, mode - 1] for a in range(3) for mode in MODES}
-    b = inverse @ coupling
-    rows |= {f"b{AXES[a]}{mode}": b[:, a, mode - 1] for a in range(3) for mode in MODES}
-    rows |= _first_state(i, inertia, coupling, refusals)
+    coupling = i.coupling_factor[:, None, None] * COUPLING
+    xx, yy, zz = (getattr(i, f"inertia_{axis}") * getattr(i, f"inertia_{axis}_factor") for axis in AXES)
+    xy, xz, yz = i.inertia_xy, i.inertia_xz, i.inertia_yz
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
+    inverse = _inverse_of_rigid_part(inertia, coupling, refusals)
+    rows = vars(i) | _entries("m", inverse, AXES) | _entries("c", coupling, MODES)
+    rows |= _entries("b", inverse @ coupling, MODES) | _first_state(i, inertia, coupling, refusals)
     for mode in MODES:
         frequency = getattr(i, f"modal_frequency_{mode}") * i.modal_frequency_factor
         damping = getattr(i, f"modal_damping_{mode}") * i.modal_damping_factor
-        rows |= {f"k{mode}": frequency * frequency, f"d{mode}": 2.0 * damping * frequency}
-    return rows | _law_rows(i) | _thruster_rows(i, settings, refusals)
+        rows |= {f"k{mode}": frequency * frequency, f"d{mode}": 2.0 * damping * frequency}  # Lam^2 and 2 Xi Lam
+    rows |= {"kp_fast": i.kp / i.delta_p, "kd_fast": i.kd * i.delta_d, "ki_fast": i.ki / i.delta_i}  # (16)
+    return rows | _thruster_rows(i, settings, refusals)
+
+
+def _inverse_of_rigid_part(inertia: np.ndarray, coupling: np.ndarray, refusals: Refusals) -> np.ndarray:
+    """Inverse of J - c0 c0^T, float64[n, 3, 3], the inertia that is left to the body when the modes give way.
+
+    inertia : float64[n, 3, 3];  coupling : float64[n, 3, 4].  Cases that no body can be join `refusals` and have the
+    unit matrix.
+    """
+    finite = np.isfinite(inertia).all(axis=(1, 2)) & np.isfinite(coupling).all(axis=(1, 2))
+    refusals.add(~finite, "the inertia matrix is not finite")
+    unit = np.eye(3)
+    usable = finite[:, None, None]
+    inertia = np.where(usable, inertia, unit)
+    low, middle, high = np.linalg.eigvalsh(inertia).T
+    refusals.add(~(low > 0.0), "the inertia matrix is not positive definite")
+    refusals.add(
+        high > (low + middle) * (1.0 + 1e-12),
+        "the principal moments of inertia break the triangle inequality: the largest is above the sum of the others",
+    )
+    rigid = np.where(usable, inertia - coupling @ coupling.transpose(0, 2, 1), unit)
+    positive = np.linalg.eigvalsh(rigid)[:, 0] > 0.0
+    refusals.add(
+        ~positive, "J - c0 c0^T is not positive definite: the modes carry more inertia than the whole satellite has"
+    )
+    return np.linalg.inv(np.where(positive[:, None, None], rigid, unit))
+
+
+def _entries(name: str, matrix: np.ndarray, columns: Any) -> dict[str, np.ndarray]:
+    """Entries of a matrix [n, 3, ...] by axis and column."""
+    return {f"{name}{AXES[a]}{column}": matrix[:, a, b] for a in range(3) for b, column in enumerate(columns)}
 
 
 def _first_state(i: SimpleNamespace, inertia, coupling, refusals: Refusals) -> dict[str, np.ndarray]:
@@ -169,80 +157,44 @@ def _first_state(i: SimpleNamespace, inertia, coupling, refusals: Refusals) -> d
     w = np.array([i.initial_omega_x, i.initial_omega_y, i.initial_omega_z])
     h = np.einsum("nab,bn->an", inertia, w)
     psi = np.einsum("nam,an->mn", coupling, w)
-    names = (*(f"q{k}" for k in range(4)), *(f"h{axis}" for axis in AXES), *(f"psi{mode}" for mode in MODES))
-    return dict(zip(names, (*q, *h, *psi), strict=True))
-
-
-def _law_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Parameters of the law (11)-(17), the disturbance and the sensors, SI."""
-    return {
-        "orbit_rate": i.orbit_rate,
-        "disturbance_amplitude": i.disturbance_amplitude,
-        "disturbance_frequency": i.disturbance_frequency,
-        "disturbance_offset": i.disturbance_offset,
-        "kp": i.kp,
-        "kd": i.kd,
-        "ki": i.ki,
-        "kp_fast": i.kp / i.delta_p,
-        "kd_fast": i.kd * i.delta_d,
-        "ki_fast": i.ki / i.delta_i,
-        "gamma": i.integral_gamma,
-        "c1": i.integral_rate_gain,
-        "c2": i.integral_attitude_gain,
-        "beta": i.switching_rate_gain,
-        "lambda2": i.switching_attitude_gain,
-        "torque_limit": i.torque_limit,
-        "rate_limit": i.rate_limit,
-        "dbar": i.dbar,
-        "rate_noise": i.rate_noise,
-        "attitude_noise": i.attitude_noise,
-    }
+    rows = {f"q{k}": q[k] for k in range(4)} | {f"momentum_{axis}": h[a] for a, axis in enumerate(AXES)}
+    return rows | {f"modal_momentum_{mode}": psi[mode - 1] for mode in MODES}
 
 
 def _thruster_rows(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
     """Parameters of modulators (18)-(21), valves and thruster axes, SI."""
     period = settings.step * settings.steps_per_sample
-    half_level, half_torque = settings.pwpf_pairing == 2.0, settings.pwpf_pairing >= 1.0
     turn = np.array([i.misalignment_x, i.misalignment_y, i.misalignment_z])
-    # thruster axes are body axes turned: components along them become components along the body by the transpose
-    axes = body_matrix(rotation_quaternion(turn)).transpose(1, 0, 2)
-    rows = {f"a{AXES[a]}{AXES[b]}": axes[a, b] for a in range(3) for b in range(3)}
-    rows |= {
+    delay = i.valve_delay / period
+    refusals.add(delay > LONGEST_DELAY, f"valve_delay_s is longer than {LONGEST_DELAY} samples of the control")
+    return {
+        # thruster axes are body axes turned: components along them become components along the body by the transpose
+        **_entries("a", body_matrix(rotation_quaternion(turn)).T, AXES),
         "gain": i.pwpf_gain,
-        "level": i.thrust_level * np.where(half_level, 0.5, 1.0),
-        "torque": i.thrust_level * np.where(half_torque, 0.5, 1.0),
+        "level": i.thrust_level * np.where(settings.pwpf_pairing == PAIRING.code("C"), 0.5, 1.0),
+        "torque": i.thrust_level * np.where(settings.pwpf_pairing == PAIRING.code("A"), 1.0, 0.5),
         "on": i.pwpf_u_off + i.pwpf_hysteresis,  # (21a)
         "off": i.pwpf_u_off,
         "time_constant": i.pwpf_time_constant,
         "decay": np.exp(-period / i.pwpf_time_constant),
-        "thrust_x": i.thrust_x_factor,
-        "thrust_y": i.thrust_y_factor,
-        "thrust_z": i.thrust_z_factor,
-        "exhaust_arm": i.isp * STANDARD_GRAVITY * i.arm,
+        "exhaust_arm": i.isp * STANDARD_GRAVITY * i.arm,  # N m s of impulse per kg of propellant
+        # shares of a sample's thrust that come in that sample, the next and the one after: linear between whole
+        # samples of delay, derived here; they add to 1, and their mean delay is the one given
+        **{name: np.maximum(0.0, 1.0 - np.abs(delay - k)) for k, name in enumerate(("now", "next", "then"))},
     }
-    return rows | _delay_shares(i.valve_delay / period, refusals)
 
 
-def _delay_shares(delay: np.ndarray, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Shares of a sample's thrust that come in that sample and the next two; delay in samples, 0 to 2.
-
-    Linear between whole samples, derived here: the shares add to 1, and their mean delay is the one given.
-    """
-    refusals.add(delay > LONGEST_DELAY, f"valve_delay_s is longer than {LONGEST_DELAY} samples of the control")
-    return {name: np.maximum(0.0, 1.0 - np.abs(delay - k)) for k, name in enumerate(("now", "next", "then"))}
-
-
-MODEL = Model(
+MODEL = model(
     name="flexible_satellite",
     title="Flexible satellite under a robust PID and pulse-modulated thrusters",
-    source=SOURCE,
-    parameters=PARAMETERS,
-    settings=SETTINGS,
-    states=STATES,
-    quantities=outcome.QUANTITIES,
-    metrics=outcome.METRICS,
+    source="H. Taei, S. Ayati, S. F. Mousavi, Robust PID control of a flexible satellite considering thruster actuator "
+    "dynamics (in Persian), Iranian Journal of Mechanical Engineering 24(3), 2022, doi 10.30506/IJMEP.2022.525295.1770",
+    inputs=Inputs,
+    states=dynamics.State,
+    outputs=outcome.Outputs,
+    metrics=outcome.Metrics,
     clock=FixedStep("step", "duration", "steps_per_sample"),
-    kernel_parameters=dynamics.Parameters,
+    kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,
     initial=dynamics.initial,
     start=control.start,
@@ -250,7 +202,17 @@ MODEL = Model(
     control=control.control,
     observe=outcome.observe,
     evaluate=outcome.evaluate,
-    extrema=outcome.EXTREMA,
-    figures=figures.FIGURES,
+    figures=(
+        HistoryFigure(("q0", "q1", "q2", "q3"), "Attitude in the orbital frame"),
+        HistoryFigure(("omega_x_rad_s", "omega_y_rad_s", "omega_z_rad_s", "rate_rad_s"), "Inertial body rates"),
+        HistoryFigure(("eta_1", "eta_2", "eta_3", "eta_4"), "Displacement of the modes"),
+        HistoryFigure(("command_x_n_m", "command_y_n_m", "command_z_n_m"), "Torques asked for"),
+        HistoryFigure(("torque_x_n_m", "torque_y_n_m", "torque_z_n_m"), "Torques of the actuators"),
+        HistoryFigure(("pulse_count_x", "pulse_count_y", "pulse_count_z"), "Pulses fired so far"),
+        HistoryFigure(("attitude_error_deg", "control_effort_n_m_s"), "Attitude error and impulse spent"),
+        ScatterFigure("q1", "q2", "Attitude at the end"),
+        ScatterFigure("omega_x_rad_s", "omega_z_rad_s", "Rates at the end"),
+        ScatterFigure("control_effort_n_m_s", "attitude_effort_s", "The two objectives of the tuning"),
+    ),
     published=read_published(Path(__file__).with_name("published.toml")),
 )

@@ -7,51 +7,54 @@ errors; the program runs from the actual ignition of each burn.
 
 from collections import namedtuple
 
-from campaigns.geo_injection.aiming import Aim, aimed, known, stored, turned
-from campaigns.geo_injection.program_table import TERM_NAMES, burn_row, n_burns, segment_row, steering_row
+from campaigns.geo_injection.aiming import OPEN_LOOP, chosen, next_aim, of_burn, stored, turned
+from campaigns.geo_injection.program_table import burn_row, nominal, segment_row, steering_row
 from mc_engine.lanes import any_lane, fma, log, maximum, minimum, physics, sqrt, where
+from mc_engine.model import Event, states
 from mc_engine.physics.constants import MU_EARTH
 from mc_engine.physics.gravity import point_mass
+from mc_engine.physics.vectors import Vector
 
-State = namedtuple("State", "x y z vx vy vz mass")  # m, m/s, kg
-# steering of the segment; phase; burn and segment, counted from 0; until: time at which the phase ends [s];
-# segment_end [s]; middle, rate: of the steering's argument s; mass_ignited [kg]; sensed: speed change at which a burn
-# is shut down [m/s]; what re-aims the last burn (its thrust direction, stretch of its duration); tangents of the
-# pointing errors; time of the last ignition and burn-out times so far [s]
-Memory = namedtuple(  # type: ignore[misc]
-    "Memory",
-    (
-        *TERM_NAMES,
-        "phase", "burn", "segment", "until", "segment_end", "middle", "rate", "mass_ignited", "sensed",
-        "aim_x", "aim_y", "aim_z", "stretch", "pitch", "yaw", "ignited", "burn_out_1", "burn_out_2",
-    ),
-)  # fmt: skip
+State = states(
+    **{f"{axis}_m": f"inertial place, {axis}" for axis in "xyz"},
+    **{f"v{axis}_m_s": f"inertial velocity, {axis}" for axis in "xyz"},
+    mass_kg="mass",
+)
+# What `prepare` gives: at the first ignition; of the engine; ignition: nominal time of the burn plus its delay, after
+# the first [s]; pitch, yaw: tangents of the pointing errors; the inputs that are used as they are.  SI.
 Parameters = namedtuple(
     "Parameters",
-    "x y z vx vy vz mass thrust flow ignition_2 ignition_3 delay_2 delay_3 delay_1 "
-    "pitch_1 pitch_2 pitch_3 yaw_1 yaw_2 yaw_3 tail accelerometer "
-    "known_r known_t known_n known_vr known_vt known_vn",
+    "x y z vx vy vz mass thrust flow tail ignition_2 ignition_3 pitch_1 pitch_2 pitch_3 yaw_1 yaw_2 yaw_3 "
+    "ignition_delay_1 ignition_delay_2 ignition_delay_3 accelerometer_scale_error "
+    "navigation_position_r navigation_position_t navigation_position_n "
+    "navigation_velocity_r navigation_velocity_t navigation_velocity_n",
 )
-Events = namedtuple("Events", "ignite next_segment shut_down burn_out injected")
-Forward = namedtuple("Forward", "x y z size")
+# The segment that is flown.  end [s];  middle, rate: of the steering's argument s, from -1 to 1 over the segment
+Arc = namedtuple("Arc", "steering end middle rate")
+# burn, segment: counted from 0;  until: time at which the phase ends [s];  mass_ignited [kg];  pitch, yaw: of the burn
+# ignited, burn_out_1, burn_out_2: times so far [s]
+Memory = namedtuple(
+    "Memory",
+    "arc aim phase burn segment until mass_ignited pitch yaw ignited burn_out_1 burn_out_2",
+    defaults=(0.0, 0.0, 0.0),
+)
 
 COAST, BURN, TAIL = 0.0, 1.0, 2.0
-BY_TIME = 0.0
-OPEN_LOOP = 0.0
+BY_TIME = 0.0  # of the setting `shutdown`
 NEVER = -1.0  # value of an event that is not looked for
 
 
 @physics
-def initial(p, o):
+def initial(p):
     """State at the actual first ignition."""
-    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz, p.mass)
+    return State(x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz, mass=p.mass)
 
 
 @physics
-def _polynomial(s, c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11):
+def _polynomial(s, c):
     """Horner's rule."""
-    top = fma(fma(fma(fma(fma(c11, s, c10), s, c9), s, c8), s, c7), s, c6)
-    return fma(fma(fma(fma(fma(fma(top, s, c5), s, c4), s, c3), s, c2), s, c1), s, c0)
+    top = fma(fma(fma(fma(fma(c.c11, s, c.c10), s, c.c9), s, c.c8), s, c.c7), s, c.c6)
+    return fma(fma(fma(fma(fma(fma(top, s, c.c5), s, c.c4), s, c.c3), s, c.c2), s, c.c1), s, c.c0)
 
 
 @physics
@@ -62,180 +65,148 @@ def direction(t, m):
 
     Derived here from |d| = 1: e1 = (-y, x, 0) / level and e2 = (-z x, -z y, level^2) / level, no unit.
     """
-    s = (t - m.middle) * m.rate
-    x = _polynomial(s, m.x0, m.x1, m.x2, m.x3, m.x4, m.x5, m.x6, m.x7, m.x8, m.x9, m.x10, m.x11)
-    y = _polynomial(s, m.y0, m.y1, m.y2, m.y3, m.y4, m.y5, m.y6, m.y7, m.y8, m.y9, m.y10, m.y11)
-    z = _polynomial(s, m.z0, m.z1, m.z2, m.z3, m.z4, m.z5, m.z6, m.z7, m.z8, m.z9, m.z10, m.z11)
+    s, c = (t - m.arc.middle) * m.arc.rate, m.arc.steering
+    x, y, z = _polynomial(s, c.x), _polynomial(s, c.y), _polynomial(s, c.z)
     inverse = 1.0 / sqrt(maximum(x * x + y * y + z * z, 1e-300))
     x, y, z = x * inverse, y * inverse, z * inverse
     level = sqrt(maximum(x * x + y * y, 1e-300))  # of a thrust along the pole no pitch is told from yaw
     a, b = m.pitch / level, m.yaw / level
     unit = 1.0 / sqrt(1.0 + m.pitch * m.pitch + m.yaw * m.yaw)
-    return (x - a * y - b * z * x) * unit, (y + a * x - b * z * y) * unit, (z + b * level * level) * unit
+    return Vector((x - a * y - b * z * x) * unit, (y + a * x - b * z * y) * unit, (z + b * level * level) * unit)
 
 
 @physics
 def level_of(t, m, p):
     """Thrust over its full size, no unit: 1 in a burn, falling linearly in time in a tail-off."""
     falling = maximum(m.until - t, 0.0) / where(p.tail > 0.0, p.tail, 1.0)
-    return where(m.phase == BURN, 1.0, where(m.phase == TAIL, falling, 0.0 * t))
+    return where(m.phase == BURN, 1.0, where(m.phase == TAIL, falling, 0.0))
 
 
 @physics
-def push_of(t, s, m, p):
-    """Acceleration by thrust [m/s^2] with its components."""
-    level = level_of(t, m, p)
-    size = level * p.thrust / s.mass
-    dx, dy, dz = direction(t, m)
-    return Forward(size * dx, size * dy, size * dz, size)
-
-
-@physics
-def rhs(t, s, m, p, o):
+def rhs(t, s, m, p):
     """Time derivative of the state: eq. (1) of the source."""
-    gx, gy, gz = point_mass(s.x, s.y, s.z, MU_EARTH)
-    flow = 0.0 * s.mass
+    ax, ay, az = point_mass(s.x, s.y, s.z, MU_EARTH)
+    flow = 0.0
     if any_lane(m.phase > COAST):
-        push = push_of(t, s, m, p)
-        gx, gy, gz = gx + push.x, gy + push.y, gz + push.z
-        flow = -p.flow * level_of(t, m, p)
-    return State(s.vx, s.vy, s.vz, gx, gy, gz, flow)
+        level, to = level_of(t, m, p), direction(t, m)
+        push = level * p.thrust / s.mass
+        ax, ay, az = ax + push * to.x, ay + push * to.y, az + push * to.z
+        flow = -p.flow * level
+    return State(x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az, mass=flow)
 
 
 @physics
-def _counted(s, m, p):
-    """Speed change [m/s] that the accelerometer has counted since ignition, by the rocket equation."""
-    return (1.0 + p.accelerometer) * (p.thrust / p.flow) * log(maximum(m.mass_ignited / s.mass, 1e-300))
+def _past_command(t, s, m, p, o):
+    """Time [s] past the one at which a burn is shut down; by sensed velocity, speed change [m/s] past the commanded.
 
-
-@physics
-def events(t, s, m, p, o):
-    """Ignition, the next segment of a long burn, shut-down command, end of a tail-off, end of the flight.
-
-    Times [s] past the due time, or, for shut-down by sensed velocity, speed change [m/s] past the one commanded.
+    The accelerometer counts the speed change since ignition: by the rocket equation.
     """
-    never = NEVER + 0.0 * t
-    coasting, burning, falling = m.phase == COAST, m.phase == BURN, m.phase == TAIL
-    last = m.burn + 1.0 >= n_burns(o.tables)
-    left = t - m.until
-    shut = left
     if o.shutdown > BY_TIME:
-        shut = _counted(s, m, p) - m.sensed
-    ends_here = burning & last & (p.tail <= 0.0)
-    ended = falling & last
-    return Events(
-        where(coasting, left, never),
-        where(burning, t - m.segment_end, never),
-        where(ends_here, never, where(burning, shut, never)),
-        where(ended, never, where(falling, left, never)),
-        where(ends_here, shut, where(ended, left, never)),
-    )
+        scale = (1.0 + p.accelerometer_scale_error) * (p.thrust / p.flow)
+        return scale * log(maximum(m.mass_ignited / s.mass, 1e-300)) - m.aim.sensed
+    return t - m.until
 
 
 @physics
-def _of_burn(burn, first, second, third):
-    """The value that belongs to a burn, counted from 0, in its own unit."""
-    return where(burn < 0.5, first, where(burn < 1.5, second, third))
+def _is_last(m, o):
+    return m.burn + 1.0 >= nominal(o.tables).burns
 
 
 @physics
-def _memory(phase, burn, segment, until, ignited, mass_ignited, sensed, aim, out_1, out_2, p, o):
-    """Memory with the steering of the segment, SI; the steering's argument s goes from -1 to 1 over the segment."""
-    row = segment_row(o.tables, segment)
-    c = steering_row(o.tables, segment)
+def ignition(t, m):
+    """Time [s] past the end of a coast."""
+    return where(m.phase == COAST, t - m.until, NEVER)
+
+
+@physics
+def next_segment(t, m):
+    """Time [s] past the end of a segment of a long burn."""
+    return where(m.phase == BURN, t - m.arc.end, NEVER)
+
+
+@physics
+def shut_down(t, s, m, p, o):
+    """Past the command, as `_past_command`, that does not end the flight."""
+    goes_on = (m.phase == BURN) & ((not _is_last(m, o)) | (p.tail > 0.0))
+    return where(goes_on, _past_command(t, s, m, p, o), NEVER)
+
+
+@physics
+def burn_out(t, m, o):
+    """Time [s] past the end of a tail-off that does not end the flight."""
+    return where((m.phase == TAIL) & (not _is_last(m, o)), t - m.until, NEVER)
+
+
+@physics
+def injected(t, s, m, p, o):
+    """Past the end of the last burn: of its tail-off [s] or, without one, the command, as `_past_command`."""
+    at_command, after_tail = (m.phase == BURN) & (p.tail <= 0.0), m.phase == TAIL
+    past = where(at_command, _past_command(t, s, m, p, o), where(after_tail, t - m.until, NEVER))
+    return where(_is_last(m, o), past, NEVER)
+
+
+EVENTS = {
+    "ignite": Event(ignition, "rising", "switch"),
+    "next_segment": Event(next_segment, "rising", "switch"),
+    "shut_down": Event(shut_down, "rising", "switch"),
+    "burn_out": Event(burn_out, "rising", "switch", rare=True),
+    "injected": Event(injected, "rising", "stop"),
+}
+
+
+@physics
+def _arc(segment, ignited, aim, o):
+    """The arc of a segment of a burn that was ignited at a time [s]."""
+    row, steering = segment_row(o.tables, segment), steering_row(o.tables, segment)
     if o.guidance > OPEN_LOOP:
-        c = turned(c, aim, o)
+        steering = turned(steering, aim, o)
     half = 0.5 * row.length * aim.stretch
     after = ignited + row.start * aim.stretch
     end = where(row.more > 0.5, after + 2.0 * half, 1e300)
-    pitch, yaw = _of_burn(burn, p.pitch_1, p.pitch_2, p.pitch_3), _of_burn(burn, p.yaw_1, p.yaw_2, p.yaw_3)
-    return Memory(
-        x0=c[0], x1=c[1], x2=c[2], x3=c[3], x4=c[4], x5=c[5], x6=c[6], x7=c[7], x8=c[8], x9=c[9], x10=c[10], x11=c[11],
-        y0=c[12], y1=c[13], y2=c[14], y3=c[15], y4=c[16], y5=c[17], y6=c[18], y7=c[19], y8=c[20], y9=c[21], y10=c[22],
-        y11=c[23],
-        z0=c[24], z1=c[25], z2=c[26], z3=c[27], z4=c[28], z5=c[29], z6=c[30], z7=c[31], z8=c[32], z9=c[33], z10=c[34],
-        z11=c[35],
-        phase=phase, burn=burn, segment=segment, until=until, segment_end=end, middle=after + half, rate=1.0 / half,
-        mass_ignited=mass_ignited, sensed=sensed, aim_x=aim.x, aim_y=aim.y, aim_z=aim.z, stretch=aim.stretch,
-        pitch=pitch, yaw=yaw, ignited=ignited, burn_out_1=out_1, burn_out_2=out_2,
-    )  # fmt: skip
-
-
-@physics
-def _commanded(burn, sensed, p, o):
-    """Speed change [m/s] at which the command is due, so that a nominal tail-off makes up for the rest.
-
-    Derived here: the flow falls linearly, so a tail-off spends half of flow times its duration; rocket equation.
-    """
-    end = burn_row(o.tables, burn).end_mass
-    return sensed - o.thrust / o.mass_flow * log(1.0 + 0.5 * o.mass_flow * o.tail_off / end)
+    return Arc(steering=steering, end=end, middle=after + half, rate=1.0 / half)
 
 
 @physics
 def start(p, o):
     """Memory at the first ignition, SI; the command is due half a tail-off before the nominal duration is over."""
-    zero = 0.0 * p.mass
-    row, aim = burn_row(o.tables, zero), stored(zero, o)
-    sensed = _commanded(zero, row.sensed, p, o)
-    until = row.duration - 0.5 * o.tail_off
-    return _memory(BURN + zero, zero, zero, until, zero, p.mass, sensed, aim, zero, zero, p, o)
-
-
-@physics
-def _next_aim(t, s, burn, p, o):
-    """The aim [1, m/s, s] of the next burn, as a coast begins: as stored, or of the last burn, if guided, aimed now."""
-    zero = 0.0 * t
-    kept = stored(burn, o)
-    ignition = where(burn < 1.5, p.ignition_2, p.ignition_3)
-    x, y, z, stretch, sensed = kept.x, kept.y, kept.z, kept.stretch, kept.sensed
-    if o.guidance > OPEN_LOOP:
-        new = aimed(t, known(s, p), burn, o)
-        last = burn + 1.0 >= n_burns(o.tables)
-        x, y, z = where(last, new.x, x), where(last, new.y, y), where(last, new.z, z)
-        stretch, sensed = where(last, new.stretch, stretch), where(last, new.sensed, sensed)
-        delay = where(burn < 1.5, p.delay_2, p.delay_3)
-        ignition = where(last, maximum(new.ignition + delay, t), ignition)
-    return Aim(x + zero, y + zero, z + zero, stretch + zero, sensed + zero, ignition + zero)
+    aim = stored(0.0, p, o)
+    return Memory(
+        arc=_arc(0.0, 0.0, aim, o),
+        aim=aim,
+        phase=BURN,
+        burn=0.0,
+        segment=0.0,
+        until=burn_row(o.tables, 0.0).duration - 0.5 * o.tail_off,
+        mass_ignited=p.mass,
+        pitch=p.pitch_1,
+        yaw=p.yaw_1,
+    )
 
 
 @physics
 def switch(t, s, m, p, o, hit):
     """The phase that follows an event, and when it ends [s]."""
-    ignite, segment = hit.ignite > 0.5, hit.next_segment > 0.5
-    shut, over = hit.shut_down > 0.5, hit.burn_out > 0.5
+    ignite, shut = hit.ignite > 0.5, hit.shut_down > 0.5
     to_tail = shut & (p.tail > 0.0)
-    to_coast = over | (shut & (p.tail <= 0.0))
-    phase = where(ignite, BURN, where(to_tail, TAIL, where(to_coast, COAST, m.phase)))
-    n = n_burns(o.tables)
-    following = minimum(m.burn + 1.0, n - 1.0)
+    to_coast = (hit.burn_out > 0.5) | (shut & (p.tail <= 0.0))
+    following = minimum(m.burn + 1.0, nominal(o.tables).burns - 1.0)
+    row, new = burn_row(o.tables, following), next_aim(t, s, following, p, o)
+    aim = chosen(to_coast, new, m.aim)  # that of the next burn is kept from the start of the coast on
     burn = where(ignite, following, m.burn)
-    row = burn_row(o.tables, following)
-    new = _next_aim(t, s, following, p, o)
-    # the aim of the next burn is kept from the start of the coast on
-    aim = Aim(
-        where(to_coast, new.x, m.aim_x),
-        where(to_coast, new.y, m.aim_y),
-        where(to_coast, new.z, m.aim_z),
-        where(to_coast, new.stretch, m.stretch),
-        0.0,
-        0.0,
-    )
-    sensed = where(to_coast, _commanded(following, new.sensed, p, o), m.sensed)
-    duration = row.duration * aim.stretch - 0.5 * o.tail_off
-    until = where(ignite, t + duration, where(to_tail, t + p.tail, where(to_coast, new.ignition, m.until)))
-    out_1 = where(to_coast & (m.burn < 0.5), t, m.burn_out_1)
-    out_2 = where(to_coast & (m.burn > 0.5), t, m.burn_out_2)
-    return s, _memory(
-        phase,
-        burn,
-        where(ignite, row.first, where(segment, m.segment + 1.0, m.segment)),
-        until,
-        where(ignite, t, m.ignited),
-        where(ignite, s.mass, m.mass_ignited),
-        sensed,
-        aim,
-        out_1,
-        out_2,
-        p,
-        o,
+    segment = where(ignite, row.first, where(hit.next_segment > 0.5, m.segment + 1.0, m.segment))
+    ignited = where(ignite, t, m.ignited)
+    burnt = t + (row.duration * aim.stretch - 0.5 * o.tail_off)
+    return s, Memory(
+        arc=_arc(segment, ignited, aim, o),
+        aim=aim,
+        phase=where(ignite, BURN, where(to_tail, TAIL, where(to_coast, COAST, m.phase))),
+        burn=burn,
+        segment=segment,
+        until=where(ignite, burnt, where(to_tail, t + p.tail, where(to_coast, new.ignition, m.until))),
+        mass_ignited=where(ignite, s.mass, m.mass_ignited),
+        pitch=of_burn(burn, p.pitch_1, p.pitch_2, p.pitch_3),
+        yaw=of_burn(burn, p.yaw_1, p.yaw_2, p.yaw_3),
+        ignited=ignited,
+        burn_out_1=where(to_coast & (m.burn < 0.5), t, m.burn_out_1),
+        burn_out_2=where(to_coast & (m.burn > 0.5), t, m.burn_out_2),
     )

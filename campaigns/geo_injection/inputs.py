@@ -1,144 +1,99 @@
 """Inputs of an injection campaign: parameters, which may differ from case to case, and settings."""
 
-from mc_engine.model import Parameter, Setting
+from typing import Any
+
+from mc_engine.model import Parameter, Setting, inputs
 
 METHODS = ("optimal", "staged")
 SHUTDOWNS = ("time", "sensed_velocity")
 GUIDANCE = ("open_loop", "re_aimed")
-AXES = (("r", "radial"), ("t", "transverse"), ("n", "normal"))
+AXES = {"r": "radial", "t": "transverse", "n": "normal"}
 
-PARAMETERS = (
-    Parameter("thrust_factor", "", "thrust over its nominal value; the mass flow follows", 1.0, low=0.1, high=10.0),
-    Parameter("isp_factor", "", "specific impulse over its nominal value", 1.0, low=0.1, high=10.0),
-    Parameter("initial_mass_factor", "", "mass at the first ignition over its nominal value", 1.0, low=0.1, high=10.0),
-    *(
-        Parameter(f"ignition_delay_{k}_s", "s", f"delay of ignition {k} against its nominal time", 0.0, -1e4, 1e4)
+
+def _factor(description: str, low: float = 0.1, high: float = 10.0) -> Parameter:
+    return Parameter(1.0, description, low, high, unit="")
+
+
+def _error(description: str, most: float, **unit: Any) -> Parameter:
+    return Parameter(0.0, description, -most, most, **unit)
+
+
+Inputs = inputs(
+    thrust_factor=_factor("thrust over its nominal value; the mass flow follows"),
+    isp_factor=_factor("specific impulse over its nominal value"),
+    initial_mass_factor=_factor("mass at the first ignition over its nominal value"),
+    **{
+        f"ignition_delay_{k}_s": _error(f"delay of ignition {k} against its nominal time", 1e4, unit="s")
         for k in (1, 2, 3)
-    ),
-    Parameter("pitch_error_deg", "deg", "pointing error towards Z x d, all burns", 0.0, -80.0, 80.0),
-    Parameter(
-        "yaw_error_deg", "deg", "pointing error towards the pole, across the thrust, all burns", 0.0, -80.0, 80.0
-    ),
-    *(
-        Parameter(f"{name}_error_{k}_deg", "deg", f"{name} error of burn {k}, added to that of all", 0.0, -80.0, 80.0)
+    },
+    pitch_error_deg=_error("pointing error towards Z x d, all burns", 80.0),
+    yaw_error_deg=_error("pointing error towards the pole, across the thrust, all burns", 80.0),
+    **{
+        f"{name}_error_{k}_deg": _error(f"{name} error of burn {k}, added to that of all", 80.0)
         for name in ("pitch", "yaw")
         for k in (1, 2, 3)
-    ),
-    *(
-        Parameter(f"initial_position_{axis}_m", "m", f"{word} error of the first place", 0.0, -1e6, 1e6)
-        for axis, word in AXES
-    ),
-    *(
-        Parameter(f"initial_velocity_{axis}_m_s", "m/s", f"{word} error of the first velocity", 0.0, -1e3, 1e3)
-        for axis, word in AXES
-    ),
-    Parameter("tail_off_factor", "", "duration of the tail-off over its nominal value", 1.0, low=0.0, high=100.0),
-    Parameter("accelerometer_scale_error", "", "relative error of the sensed velocity", 0.0, -0.5, 0.5),
-    *(
-        Parameter(
-            f"navigation_position_{axis}_m",
-            "m",
-            f"{word} error of the place that the last burn is aimed from",
-            0.0,
-            -1e6,
-            1e6,
+    },
+    **{
+        f"initial_position_{axis}_m": _error(f"{word} error of the first place", 1e6, unit="m")
+        for axis, word in AXES.items()
+    },
+    **{
+        f"initial_velocity_{axis}_m_s": _error(f"{word} error of the first velocity", 1e3, unit="m/s")
+        for axis, word in AXES.items()
+    },
+    tail_off_factor=_factor("duration of the tail-off over its nominal value", 0.0, 100.0),
+    accelerometer_scale_error=_error("relative error of the sensed velocity", 0.5, unit=""),
+    **{
+        f"navigation_position_{axis}_m": _error(
+            f"{word} error of the place that the last burn is aimed from", 1e6, unit="m"
         )
-        for axis, word in AXES
-    ),
-    *(
-        Parameter(
-            f"navigation_velocity_{axis}_m_s",
-            "m/s",
-            f"{word} error of the velocity that the last burn is aimed from",
-            0.0,
-            -1e3,
-            1e3,
+        for axis, word in AXES.items()
+    },
+    **{
+        f"navigation_velocity_{axis}_m_s": _error(
+            f"{word} error of the velocity that the last burn is aimed from", 1e3, unit="m/s"
         )
-        for axis, word in AXES
+        for axis, word in AXES.items()
+    },
+    burns=Setting(2.0, "number of burns", low=2.0, high=3.0, whole=True, unit=""),
+    initial_inclination_deg=Setting(28.5, "inclination of the parking orbit", low=0.0, high=90.0),
+    final_inclination_deg=Setting(
+        0.0, "inclination of the final orbit, its node that of the parking orbit", low=0.0, high=90.0
     ),
-)
-
-SETTINGS = (
-    Setting("burns", "", "number of burns", 2.0, low=2.0, high=3.0, whole=True),
-    Setting("initial_inclination_deg", "deg", "inclination of the parking orbit", 28.5, low=0.0, high=90.0),
-    Setting(
-        "final_inclination_deg",
-        "deg",
-        "inclination of the final orbit, its node that of the parking orbit",
-        0.0,
-        low=0.0,
-        high=90.0,
+    planar=Setting(False, "the parking orbit lies in the plane of the final one"),
+    parking_altitude_km=Setting(
+        200.0, "altitude of the parking orbit's perigee over 6378.137 km", low=100.0, high=20000.0
     ),
-    Setting("planar", "", "the parking orbit lies in the plane of the final one", False),
-    Setting(
-        "parking_altitude_km",
-        "km",
-        "altitude of the parking orbit's perigee over 6378.137 km",
-        200.0,
-        low=100.0,
-        high=20000.0,
+    parking_eccentricity=Setting(0.0, "eccentricity of the parking orbit; 0 is a circle", low=0.0, high=0.9, unit=""),
+    parking_argument_of_perigee_deg=Setting(
+        0.0, "argument of the parking orbit's perigee, from its ascending node", low=-360.0, high=360.0
     ),
-    Setting("parking_eccentricity", "", "eccentricity of the parking orbit; 0 is a circle", 0.0, low=0.0, high=0.9),
-    Setting(
-        "parking_argument_of_perigee_deg",
-        "deg",
-        "argument of the parking orbit's perigee, from its ascending node",
-        0.0,
-        low=-360.0,
-        high=360.0,
-    ),
-    Setting("final_radius_km", "km", "radius of the final circle", 42164.137, low=10000.0, high=400000.0),
-    Setting("thrust_n", "N", "nominal thrust", 20000.0, low=1.0, dispersed_by="thrust_factor"),
-    Setting("mass_flow_kg_s", "kg/s", "nominal mass flow", 6.14, low=1e-6, dispersed_by="isp_factor"),
-    Setting(
-        "initial_mass_kg",
-        "kg",
-        "nominal mass at the first ignition",
-        22170.0,
-        low=1.0,
-        dispersed_by="initial_mass_factor",
-    ),
-    Setting("method", "", "how the burn program is designed", "optimal", choices=METHODS),
-    *(
-        setting
+    final_radius_km=Setting(42164.137, "radius of the final circle", low=10000.0, high=400000.0),
+    thrust_n=Setting(20000.0, "nominal thrust", low=1.0, dispersed_by="thrust_factor"),
+    mass_flow_kg_s=Setting(6.14, "nominal mass flow", low=1e-6, dispersed_by="isp_factor"),
+    initial_mass_kg=Setting(22170.0, "nominal mass at the first ignition", low=1.0, dispersed_by="initial_mass_factor"),
+    method=Setting("optimal", "how the burn program is designed", choices=METHODS),
+    **{
+        name: setting
         for k in (1, 2)
-        for setting in (
-            Setting(
-                f"transfer_{k}_semi_major_axis_km",
-                "km",
-                f"staged: orbit after burn {k}; 0: the source's for this number of burns",
-                0.0,
-                low=0.0,
+        for name, setting in {
+            f"transfer_{k}_semi_major_axis_km": Setting(
+                0.0, f"staged: orbit after burn {k}; 0: the source's for this number of burns", low=0.0
             ),
-            Setting(
-                f"transfer_{k}_eccentricity",
-                "",
-                f"staged: orbit after burn {k}; below 0: the source's",
-                -1.0,
-                low=-1.0,
-                high=0.99,
+            f"transfer_{k}_eccentricity": Setting(
+                -1.0, f"staged: orbit after burn {k}; below 0: the source's", low=-1.0, high=0.99, unit=""
             ),
-            Setting(
-                f"transfer_{k}_plane_change_deg",
-                "deg",
-                f"staged: plane change by the end of burn {k}; below 0: the source's",
-                -1.0,
-                low=-1.0,
-                high=90.0,
+            f"transfer_{k}_plane_change_deg": Setting(
+                -1.0, f"staged: plane change by the end of burn {k}; below 0: the source's", low=-1.0, high=90.0
             ),
-        )
+        }.items()
+    },
+    shutdown=Setting("time", "what ends a burn", choices=SHUTDOWNS),
+    tail_off_s=Setting(
+        0.0, "time in which the thrust falls to zero after the command, along a line", low=0.0, high=60.0
     ),
-    Setting("shutdown", "", "what ends a burn", "time", choices=SHUTDOWNS),
-    Setting(
-        "tail_off_s",
-        "s",
-        "time in which the thrust falls to zero after the command, along a line",
-        0.0,
-        low=0.0,
-        high=60.0,
-    ),
-    Setting("guidance", "", "the stored program, or its last burn aimed again", "open_loop", choices=GUIDANCE),
-    Setting("propellant_limit_kg", "kg", "propellant on board, for the margin; the total of table 2", 16775.0, low=0.0),
-    Setting("tolerance", "", "error of an integration step over the state's size", 1e-10, low=1e-14, high=1e-4),
-    Setting("time_limit_s", "s", "a flight that lasts longer ends without a result", 1e6, low=1.0),
+    guidance=Setting("open_loop", "the stored program, or its last burn aimed again", choices=GUIDANCE),
+    propellant_limit_kg=Setting(16775.0, "propellant on board, for the margin; the total of table 2", low=0.0),
+    tolerance=Setting(1e-10, "error of an integration step over the state's size", low=1e-14, high=1e-4, unit=""),
+    time_limit_s=Setting(1e6, "a flight that lasts longer ends without a result", low=1.0),
 )

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from campaigns.geo_injection.model import MODEL
 from mc_engine.flight.flight import fly
@@ -52,17 +53,13 @@ def _report(name: str, n_cases: int = 4000) -> None:
     drawn = case_table(campaign, ids)
     flown = fly(MODEL, {**campaign.nominal, **drawn}, ids, campaign.seed)
     sigmas = {dispersion.name: float(np.std(drawn[dispersion.name], ddof=1)) for dispersion in campaign.dispersions}
-    parts = contributions(campaign.nominal, sigmas)
+    table = pd.DataFrame(contributions(campaign.nominal, sigmas), index=list(sigmas))
+    table.loc["sigma, linear"] = predicted_sigmas(campaign.nominal, sigmas)
+    table.loc["sigma, flown"] = {metric: np.std(flown[metric], ddof=1) for metric in SMOOTH}
+    lengths = {metric: np.percentile(flown[metric], [50.0, 99.0]) for metric in LENGTHS}
     print(f"{name}: {n_cases} cases; change by one standard deviation of each dispersion")
-    print(f"{'':28}" + "".join(f"{metric:>26}" for metric in SMOOTH))
-    for k, dispersion in enumerate(sigmas):
-        print(f"{dispersion:28}" + "".join(f"{parts[metric][k]:26.6g}" for metric in SMOOTH))
-    linear = predicted_sigmas(campaign.nominal, sigmas)
-    print(f"{'sigma, linear':28}" + "".join(f"{linear[metric]:26.6g}" for metric in SMOOTH))
-    print(f"{'sigma, flown':28}" + "".join(f"{np.std(flown[metric], ddof=1):26.6g}" for metric in SMOOTH))
-    for metric in LENGTHS:
-        spread = np.percentile(flown[metric], [50.0, 99.0])
-        print(f"{metric:28} median {spread[0]:.6g}, 99 % {spread[1]:.6g}")
+    print(table.to_string(float_format="{:.6g}".format))
+    print(pd.DataFrame(lengths, index=["median", "99 %"]).T.to_string(float_format="{:.6g}".format))
 
 
 if __name__ == "__main__":

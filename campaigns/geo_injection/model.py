@@ -1,21 +1,23 @@
-"""The injection model as the engine sees it: inputs, settings, what each case starts from, and the MODEL record."""
+"""The injection model as the engine sees it: what each case starts from, the figures, and the MODEL record."""
 
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from campaigns.geo_injection import dynamics, figures, outcome
-from campaigns.geo_injection.aiming import nominal_aim
+from campaigns.geo_injection import dynamics, outcome
+from campaigns.geo_injection.aiming import nominal_impulse
 from campaigns.geo_injection.design.coast import kepler
 from campaigns.geo_injection.design.program import Program
 from campaigns.geo_injection.design.programs import program_for
 from campaigns.geo_injection.design.sequence import Sequence, source_orbits
-from campaigns.geo_injection.inputs import METHODS, PARAMETERS, SETTINGS
+from campaigns.geo_injection.inputs import AXES, METHODS, Inputs
 from campaigns.geo_injection.program_table import table_of
 from mc_engine.errors import ModelError
-from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
+from mc_engine.model import AdaptiveStep, Refusals, model
+from mc_engine.model.figures import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure
 from mc_engine.physics.frames import WGS84_RADIUS
 from mc_engine.studies.published import read_published
 
@@ -23,39 +25,28 @@ SOURCE = (
     "M. Alavipour, A. A. Nikkhah, J. Roshanian, Optimal trajectory design of an upper stage for satellite injection "
     "into geostationary orbit using limited thrust (in Persian), Journal of Space Science and Technology, after 2016"
 )
-STATES = (
-    *(Field(f"{axis}_m", "m", f"inertial place, {axis}") for axis in "xyz"),
-    *(Field(f"v{axis}_m_s", "m/s", f"inertial velocity, {axis}") for axis in "xyz"),
-    Field("mass_kg", "kg", "mass"),
-)
+ALLOWED = dynamics.State(x=1e-3, y=1e-3, z=1e-3, vx=1e-6, vy=1e-6, vz=1e-6, mass=1e-6)  # error of a step
 
 
 def sequence_of(o: Any) -> Sequence:
     """The sequence that settings by symbol (SI) ask for."""
-    burns = round(float(o.burns))
+    burns, method, e = round(float(o.burns)), METHODS[int(o.method)], float(o.parking_eccentricity)
     final = float(o.final_inclination)
     initial = final if o.planar > 0.5 else float(o.initial_inclination)
-    method = METHODS[int(o.method)]
-    between: tuple[tuple[float, float, float], ...] = ()
-    if method == "staged":
-        of_source = source_orbits(burns, abs(initial - final))
-        between = tuple(_transfer(o, k, row) for k, row in enumerate(of_source, start=1))
-    radius = WGS84_RADIUS + float(o.parking_altitude)
-    e = float(o.parking_eccentricity)
-    perigee = float(o.parking_argument_of_perigee) if e > 0.0 else 0.0  # a circle has none
+    of_source = source_orbits(burns, abs(initial - final)) if method == "staged" else ()
     return Sequence(
         method=method,
         burns=burns,
         initial_inclination=initial,
         final_inclination=final,
-        parking_radius=radius,
+        parking_radius=WGS84_RADIUS + float(o.parking_altitude),
         final_radius=float(o.final_radius),
         thrust=float(o.thrust),
         mass_flow=float(o.mass_flow),
         mass=float(o.initial_mass),
-        between=between,
+        between=tuple(_transfer(o, k, orbit) for k, orbit in enumerate(of_source, start=1)),
         parking_eccentricity=e,
-        parking_perigee=perigee,
+        parking_perigee=float(o.parking_argument_of_perigee) if e > 0.0 else 0.0,  # a circle has none
     )
 
 
@@ -73,7 +64,7 @@ def _transfer(o: Any, k: int, of_source: tuple[float, float, float]) -> tuple[fl
 def tables(o: Any) -> np.ndarray:
     """The burn program of the settings, for the flight."""
     program = program_for(sequence_of(o))
-    return table_of(program, nominal_aim(program))
+    return table_of(program, nominal_impulse(program))
 
 
 def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
@@ -81,55 +72,43 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
 
     inputs : float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
     """
-    rows: dict[str, np.ndarray] = {}
-    codes = np.stack([getattr(settings, setting.symbol) for setting in SETTINGS], axis=1)
+    codes = np.column_stack(list(vars(settings).values()))
+    rows = {name: np.zeros(len(codes)) for name in dynamics.Parameters._fields}
+    late = np.zeros(len(codes), dtype=bool)
     for row in np.unique(codes, axis=0):
         same = (codes == row).all(axis=1)
-        chosen = SimpleNamespace(**{setting.symbol: row[k] for k, setting in enumerate(SETTINGS)})
+        chosen = SimpleNamespace(**dict(zip(vars(settings), row, strict=True)))
         try:
             program = program_for(sequence_of(chosen))
         except ModelError as error:
             refusals.add(same, str(error))
             continue
         part = SimpleNamespace(**{name: column[same] for name, column in vars(inputs).items()})
-        columns, late = _rows(part, chosen, program)
-        for name, column in columns.items():
-            rows.setdefault(name, np.zeros(same.size))[same] = column
-        mask = np.zeros(same.size, dtype=bool)
-        mask[same] = late
-        refusals.add(mask, "an ignition comes before the burn ahead of it has ended")
-    return rows or {name: np.zeros(codes.shape[0]) for name in dynamics.Parameters._fields}
+        columns, late[same] = _rows(part, chosen.tail_off, program)
+        for name in rows:
+            rows[name][same] = columns[name]
+    refusals.add(late, "an ignition comes before the burn ahead of it has ended")
+    return rows
 
 
-def _rows(i: SimpleNamespace, o: SimpleNamespace, program: Program) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """(kernel parameters, where ignitions overlap burns) of the cases of one sequence."""
-    sequence = program.sequence
+def _rows(i: SimpleNamespace, tail_off: float, program: Program) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """(kernel parameters, where ignitions overlap burns) of the cases of one sequence.  tail_off : nominal [s]."""
+    sequence, given = program.sequence, vars(i)
     place, velocity = _first_states(i, program)
-    rows = {name: place[:, k] for k, name in enumerate("xyz")}
-    rows |= {name: velocity[:, k] for k, name in enumerate(("vx", "vy", "vz"))}
-    rows |= {
-        "mass": sequence.mass * i.initial_mass_factor,
-        "thrust": sequence.thrust * i.thrust_factor,
-        "flow": sequence.mass_flow * i.thrust_factor / i.isp_factor,
-        "tail": o.tail_off * i.tail_off_factor,
-        "accelerometer": i.accelerometer_scale_error,
-    }
-    for axis in "rtn":
-        rows[f"known_{axis}"] = getattr(i, f"navigation_position_{axis}")
-        rows[f"known_v{axis}"] = getattr(i, f"navigation_velocity_{axis}")
-    late = np.zeros(i.thrust_factor.size, dtype=bool)
+    rows = given | dict(zip("xyz", place.T, strict=True)) | dict(zip(("vx", "vy", "vz"), velocity.T, strict=True))
+    rows["mass"] = sequence.mass * i.initial_mass_factor
+    rows["thrust"] = sequence.thrust * i.thrust_factor
+    rows["flow"] = sequence.mass_flow * i.thrust_factor / i.isp_factor
+    rows["tail"] = tail_off * i.tail_off_factor
     for k in (1, 2, 3):
-        delay = getattr(i, f"ignition_delay_{k}")
-        rows[f"delay_{k}"] = delay
-        rows[f"pitch_{k}"] = np.tan(i.pitch_error + getattr(i, f"pitch_error_{k}"))
-        rows[f"yaw_{k}"] = np.tan(i.yaw_error + getattr(i, f"yaw_error_{k}"))
-        if k > 1:
-            row = program.burns[min(k, len(program.burns)) - 1]
-            rows[f"ignition_{k}"] = row.ignition + delay - i.ignition_delay_1
-        if 1 < k <= len(program.burns):
-            before = program.burns[k - 2]
-            end = before.ignition + getattr(i, f"ignition_delay_{k - 1}") + before.duration
-            late |= row.ignition + delay < end + rows["tail"]
+        rows[f"pitch_{k}"] = np.tan(i.pitch_error + given[f"pitch_error_{k}"])
+        rows[f"yaw_{k}"] = np.tan(i.yaw_error + given[f"yaw_error_{k}"])
+        burn = program.burns[min(k, len(program.burns)) - 1]
+        rows[f"ignition_{k}"] = burn.ignition + given[f"ignition_delay_{k}"] - i.ignition_delay_1
+    late = np.zeros(i.thrust_factor.size, dtype=bool)
+    for k, (before, burn) in enumerate(pairwise(program.burns), start=1):
+        end = before.ignition + given[f"ignition_delay_{k}"] + before.duration
+        late |= burn.ignition + given[f"ignition_delay_{k + 1}"] < end + rows["tail"]
     return rows, late
 
 
@@ -143,8 +122,8 @@ def _first_states(i: SimpleNamespace, program: Program) -> tuple[np.ndarray, np.
     normal = np.cross(r, v)
     radial, normal = r / np.linalg.norm(r), normal / np.linalg.norm(normal)
     axes = np.stack([radial, np.cross(normal, radial), normal])
-    place = r + np.stack([getattr(i, f"initial_position_{axis}") for axis in "rtn"], axis=1) @ axes
-    velocity = v + np.stack([getattr(i, f"initial_velocity_{axis}") for axis in "rtn"], axis=1) @ axes
+    place = r + np.stack([getattr(i, f"initial_position_{axis}") for axis in AXES], axis=1) @ axes
+    velocity = v + np.stack([getattr(i, f"initial_velocity_{axis}") for axis in AXES], axis=1) @ axes
     sequence = program.sequence
     scales = sequence.parking_radius, sequence.speed_unit
     moved = kepler(place / scales[0], velocity / scales[1], i.ignition_delay_1 / sequence.time_unit)
@@ -152,36 +131,41 @@ def _first_states(i: SimpleNamespace, program: Program) -> tuple[np.ndarray, np.
     return np.where(still, place, moved[0] * scales[0]), np.where(still, velocity, moved[1] * scales[1])
 
 
-MODEL = Model(
+MODEL = model(
     name="geo_injection",
     title="Injection into the geostationary circle",
     source=SOURCE,
-    parameters=PARAMETERS,
-    settings=SETTINGS,
-    states=STATES,
-    quantities=outcome.QUANTITIES,
-    metrics=outcome.METRICS,
-    clock=AdaptiveStep(
-        "time_limit", "tolerance", (1e-3, 1e-3, 1e-3, 1e-6, 1e-6, 1e-6, 1e-6), attempts=20_000, first_step=10.0
-    ),
+    inputs=Inputs,
+    states=dynamics.State,
+    outputs=outcome.Outputs,
+    metrics=outcome.Metrics,
+    clock=AdaptiveStep("time_limit", "tolerance", ALLOWED, attempts=20_000, first_step=10.0),
     kernel_parameters=dynamics.Parameters,
     prepare=prepare,
     initial=dynamics.initial,
     start=dynamics.start,
     tables=tables,
     rhs=dynamics.rhs,
-    events=dynamics.events,
+    events=dynamics.EVENTS,
     switch=dynamics.switch,
-    event_list=(
-        Event("ignite", "rising", "switch"),
-        Event("next_segment", "rising", "switch"),
-        Event("shut_down", "rising", "switch"),
-        Event("burn_out", "rising", "switch", rare=True),
-        Event("injected", "rising", "stop"),
-    ),
     observe=outcome.observe,
     evaluate=outcome.evaluate,
-    figures=figures.FIGURES,
+    figures=(
+        HistoryFigure(("radius_km", "speed_m_s", "radial_speed_m_s"), "Radius and speeds"),
+        HistoryFigure(("flight_path_angle_deg", "thrust_right_ascension_deg", "thrust_declination_deg"), "Angles"),
+        HistoryFigure(("mass_kg", "acceleration_m_s2"), "Mass and acceleration"),
+        HistoryFigure(
+            ("osculating_semi_major_axis_km", "osculating_eccentricity", "osculating_inclination_deg"),
+            "Osculating orbit",
+        ),
+        ProfileFigure("x_km", "y_km", "The flight in the plane of the equator"),
+        ScatterFigure("semi_major_axis_km", "eccentricity", "Injection: semi-major axis and eccentricity"),
+        ScatterFigure("semi_major_axis_km", "inclination_deg", "Injection: semi-major axis and inclination"),
+        ScatterFigure("eccentricity", "inclination_deg", "Injection: eccentricity and inclination"),
+        ScatterFigure("longitude_drift_deg_day", "correction_dv_m_s", "Drift and correction of the injected orbit"),
+        ScatterFigure("propellant_kg", "correction_dv_m_s", "Propellant and correction"),
+        MapFigure("correction_dv_m_s", "thrust_factor", "isp_factor", "Correction over the engine's errors"),
+    ),
     data=(
         "programs/three_burns_28_5.toml",
         "programs/three_burns_28_5_staged.toml",

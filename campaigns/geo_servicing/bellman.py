@@ -5,18 +5,12 @@ additive noise xi_k, which changes no correction.  Wanted: least mean of sum(x' 
 Equations (3.25)-(3.30) of the source (`model.SOURCE`), where they are destroyed; their remains in (3.53)-(3.57) agree.
 """
 
-from dataclasses import dataclass
+from collections import namedtuple
 
 import numpy as np
 
-
-@dataclass(frozen=True)
-class Corrections:
-    """u_k = -gains[k] x_k - offsets[k], and the matrices of the cost to go, `costs[k]` at step k."""
-
-    gains: np.ndarray  # float64[n, 2]
-    offsets: np.ndarray  # float64[n]
-    costs: np.ndarray  # float64[n + 1, 2, 2]
+# u_k = -gains[k] x_k - offsets[k], float64[n, 2] and [n]; costs[k]: matrix of the cost to go at step k, [n + 1, 2, 2]
+Corrections = namedtuple("Corrections", "gains offsets costs")
 
 
 def best_corrections(a, b, c, running, weight, terminal, sigma) -> Corrections:

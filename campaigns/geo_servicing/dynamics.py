@@ -5,9 +5,12 @@ mean sidereal rate.  The servicing module flies in all phases, the target module
 """
 
 from collections import namedtuple
+from typing import Any
 
 from campaigns.geo_servicing import plan_table
+from campaigns.geo_servicing.inputs import PHASES
 from mc_engine.lanes import any_lane, atan2, physics, sincos, sqrt
+from mc_engine.model import states
 from mc_engine.physics.frames import half_turn, orbital_axes, turned
 from mc_engine.physics.geopotential import MU_EGM2008, RADIUS_EGM2008, harmonics
 from mc_engine.physics.gravity import point_mass
@@ -21,47 +24,41 @@ RATE = 7.292115857915991e-05  # 2 pi over it
 R0 = 42_164_169.61350804  # m, radius at which a point mass gives that period
 V0 = R0 * RATE
 
-BURNS = plan_table.BURNS
-# servicing module, its mass [kg]; target module; integral of the longitude deviation [rad s]
-State = namedtuple("State", "x y z vx vy vz mass tx ty tz tvx tvy tvz longitude_sum")
-_BURN_ERRORS = [f"{error}_{k}" for k in range(1, BURNS + 1) for error in ("thrust", "normal", "radial")]
+State = states(
+    **{f"{axis}_m": f"place of the servicing module, {axis}" for axis in "xyz"},
+    **{f"v{axis}_m_s": f"velocity of the servicing module, {axis}" for axis in "xyz"},
+    mass_left_kg="mass of the servicing module",
+    **{f"target_{axis}_m": f"place of the target module, {axis}" for axis in "xyz"},
+    **{f"target_v{axis}_m_s": f"velocity of the target module, {axis}" for axis in "xyz"},
+    longitude_sum_s="integral of the longitude deviation, in radians",
+)
+BURN_NUMBERS = range(1, plan_table.BURNS + 1)
 Parameters = namedtuple(  # type: ignore[misc]
     "Parameters",
     [
-        *"x y z vx vy vz mass tx ty tz tvx tvy tvz".split(),  # first state
+        *State._fields[:-1],  # first state
         *"thrust exhaust light target_light".split(),  # N, m/s; C_R A [m^2], of the target over its mass [m^2/kg]
         *"sidereal aim sun_moon sun_moon_time".split(),  # angles [rad] of longitude 0 and the required one; ephemeris
-        *_BURN_ERRORS,  # of each burn of the phasing
+        *(f"{error}_{k}" for error in ("thrust", "radial", "normal") for k in BURN_NUMBERS),  # of the phasing
         *"thrust_noise pointing_noise nav_position nav_velocity".split(),  # 1-sigma, at inspection burns and at fixes
-        *"chi1 chi2 weight nominal around coast".split(),  # the inspection law
+        *"chi1 chi2 control_weight nominal around coast_revolutions".split(),  # the inspection law
     ],
 )
-# due: time of what comes next, mode: what that is (`corrections`); burns so far; thrust [N] outward, ahead, normal;
-# dv: commanded in the present burn; settled: 1 once the inspection counts as settled; second: 1 between two burns that
-# make a pair
-# end_...: at the end of the last phasing burn, and a sidereal day later
-# r, s, u, w: error of the estimate, place outward and ahead [m], velocity alike [m/s]; p..: its covariance as the
-# filter knows it; after_...: error of the single fix that follows the next burn; d1, d2, d3: fresh normal deviates for
-# that burn
-Memory = namedtuple(
-    "Memory",
-    "due mode burns outward ahead across dv settled second "
-    "end_time end_true end_mean end_drift end_e end_inclination end_sum day_mean day_drift "
-    "r s u w prr prs pru prw pss psu psw puu puw pww "
-    "after_r after_s after_u after_w d1 d2 d3",
-)
 
-# settings arrive as numbers: places in the lists of words of `inputs.py`
-PHASING, INSPECTION = 0.0, 1.0
+
+def tolerances(place: float, velocity: float) -> Any:
+    """A State of absolute errors allowed in a step; place [m], velocity [m/s]."""
+    by_unit = {"m": place, "m/s": velocity, "kg": 1e-6, "s": 1e-3}
+    return State(*(by_unit[field.unit] for field in State.declared))
 
 
 @physics
-def initial(p, o):
+def initial(p):
     """State at the epoch."""
     return State(
-        x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz, mass=p.mass,
-        tx=p.tx, ty=p.ty, tz=p.tz, tvx=p.tvx, tvy=p.tvy, tvz=p.tvz,
-        longitude_sum=0.0,
+        x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz, mass_left=p.mass_left,
+        target_x=p.target_x, target_y=p.target_y, target_z=p.target_z,
+        target_vx=p.target_vx, target_vy=p.target_vy, target_vz=p.target_vz, longitude_sum=0.0,
     )  # fmt: skip
 
 
@@ -110,38 +107,36 @@ def true_deviation(t, s, p):
 def thrust(s, m):
     """Acceleration [m/s^2] by the thrust that the memory holds."""
     rx, ry, rz, sx, sy, sz, nx, ny, nz = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
-    a, b, c = m.outward / s.mass, m.ahead / s.mass, m.across / s.mass
+    a, b, c = m.burn.outward / s.mass_left, m.burn.ahead / s.mass_left, m.burn.across / s.mass_left
     return a * rx + b * sx + c * nx, a * ry + b * sy + c * ny, a * rz + b * sz + c * nz
 
 
 @physics
 def rhs(t, s, m, p, o):
     """Time derivative of the state, SI, inertial axes: gravity, Sun and Moon, light, thrust, and mass flow F / c."""
-    zero = 0.0 * s.x
-    sx, sy, sz, mx, my, mz = zero, zero, zero, zero, zero, zero
+    sx, sy, sz, mx, my, mz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if o.sun_and_moon + o.sunlight > 0.5:
         sx, sy, sz, mx, my, mz = ephemeris(p.sun_moon_time + t, o.tables, p.sun_moon)
     sun, moon = (sx, sy, sz), (mx, my, mz)
-    ax, ay, az = field(t, s.x, s.y, s.z, sun, moon, p.light / s.mass, p, o)
-    flow = zero
-    if any_lane(abs(m.ahead) > 0.0):
+    ax, ay, az = field(t, s.x, s.y, s.z, sun, moon, p.light / s.mass_left, p, o)
+    flow = 0.0
+    if any_lane(abs(m.burn.ahead) > 0.0):
         fx, fy, fz = thrust(s, m)
         ax, ay, az = ax + fx, ay + fy, az + fz
-        flow = -push(m) / p.exhaust
-    if o.phase == INSPECTION:
-        bx, by, bz = field(t, s.tx, s.ty, s.tz, sun, moon, p.target_light, p, o)
-        ux, uy, uz, away = s.tvx, s.tvy, s.tvz, zero
+        flow = -push(m.burn) / p.exhaust
+    ux, uy, uz, bx, by, bz, away = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if o.phase == PHASES.inspection:
+        bx, by, bz = field(t, s.target_x, s.target_y, s.target_z, sun, moon, p.target_light, p, o)
+        ux, uy, uz = s.target_vx, s.target_vy, s.target_vz
     else:
-        ux, uy, uz, bx, by, bz = zero, zero, zero, zero, zero, zero
         away = true_deviation(t, s, p)
     return State(
-        x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az, mass=flow,
-        tx=ux, ty=uy, tz=uz, tvx=bx, tvy=by, tvz=bz,
-        longitude_sum=away,
+        x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az, mass_left=flow,
+        target_x=ux, target_y=uy, target_z=uz, target_vx=bx, target_vy=by, target_vz=bz, longitude_sum=away,
     )  # fmt: skip
 
 
 @physics
-def push(m):
+def push(burn):
     """Size of the thrust [N]."""
-    return sqrt(m.outward * m.outward + m.ahead * m.ahead + m.across * m.across)
+    return sqrt(burn.outward * burn.outward + burn.ahead * burn.ahead + burn.across * burn.across)

@@ -4,11 +4,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.geo_servicing.dynamics import MU
+from campaigns.geo_servicing.dynamics import MU, State
 from mc_engine.model import Refusals
 from mc_engine.physics.frames import TURN
-
-_AXES = ("x", "y", "z", "vx", "vy", "vz")
 
 
 def state_of(a, e, inclination, node, pericentre, anomaly) -> np.ndarray:
@@ -26,13 +24,7 @@ def state_of(a, e, inclination, node, pericentre, anomaly) -> np.ndarray:
     return np.concatenate([place, speed * (-np.sin(anomaly) * p + (e + np.cos(anomaly)) * q)])
 
 
-def above_longitude(right_ascension, inclination, node) -> np.ndarray:
-    """Argument of latitude [rad] at which an orbit passes a right ascension."""
-    ahead = right_ascension - node
-    return np.arctan2(np.sin(ahead) / np.cos(inclination), np.cos(ahead))
-
-
-def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals) -> dict[str, np.ndarray]:
+def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals) -> np.ndarray:
     """The servicing module above its longitude, osculating elements; sidereal : angle [rad] at the start."""
     period = o.initial_period + i.initial_period_error
     e = o.initial_eccentricity + i.initial_eccentricity_error
@@ -42,28 +34,26 @@ def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Re
     inclination = o.initial_inclination + i.initial_inclination_error
     refusals.add(~((period > 0.0) & (e < 0.9)), "the first orbit is none: its period or its eccentricity is impossible")
     a = np.cbrt(MU * (period / TURN) ** 2)
-    right_ascension = sidereal + o.initial_longitude + i.initial_longitude_error
-    latitude = above_longitude(right_ascension, inclination, o.initial_node)
-    state = state_of(a, e, inclination, o.initial_node, latitude - anomaly, anomaly)
-    return dict(zip(_AXES, state, strict=True))
+    ahead = sidereal + o.initial_longitude + i.initial_longitude_error - o.initial_node
+    latitude = np.arctan2(np.sin(ahead) / np.cos(inclination), np.cos(ahead))  # argument of, above the longitude
+    return state_of(a, e, inclination, o.initial_node, latitude - anomaly, anomaly)
 
 
 def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
     """State float64[6, n] of the craft whose parameters begin with `name`."""
-    e, pericentre = getattr(i, f"{name}_eccentricity"), getattr(i, f"{name}_argument_of_pericentre")
+    own = SimpleNamespace(**{key.removeprefix(f"{name}_"): value for key, value in vars(i).items()})
     return state_of(
-        getattr(i, f"{name}_pericentre_radius") / (1.0 - e),
-        e,
-        getattr(i, f"{name}_inclination"),
-        getattr(i, f"{name}_node"),
-        pericentre,
-        getattr(i, f"{name}_argument_of_latitude") - pericentre,
+        own.pericentre_radius / (1.0 - own.eccentricity),
+        own.eccentricity,
+        own.inclination,
+        own.node,
+        own.argument_of_pericentre,
+        own.argument_of_latitude - own.argument_of_pericentre,
     )
 
 
 def first_states(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals, two) -> dict[str, np.ndarray]:
-    """Rows of the first state of both craft; two : bool[n], the inspection, in which the second flies."""
-    phasing = phasing_start(i, o, sidereal, refusals)
-    module, target = craft_start(i, "module"), craft_start(i, "target")
-    rows = {axis: np.where(two, module[k], phasing[axis]) for k, axis in enumerate(_AXES)}
-    return rows | {f"t{axis}": np.where(two, target[k], 0.0) for k, axis in enumerate(_AXES)}
+    """Rows of the first places and velocities; two : bool[n], the inspection, in which the second craft flies."""
+    module = np.where(two, craft_start(i, "module"), phasing_start(i, o, sidereal, refusals))
+    target = np.where(two, craft_start(i, "target"), 0.0)
+    return dict(zip(State._fields[:6], module, strict=True)) | dict(zip(State._fields[7:13], target, strict=True))

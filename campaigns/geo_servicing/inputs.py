@@ -1,181 +1,145 @@
 """What can be set in a servicing campaign: parameters, which may differ from case to case, and settings."""
 
+from collections import namedtuple
+from typing import Any
+
 from campaigns.geo_servicing.plan_table import BURNS
-from mc_engine.model import Parameter, Setting
+from mc_engine.model import Parameter, Setting, inputs
 from mc_engine.physics.geopotential import LARGEST_DEGREE
 
-PHASES = ("phasing", "inspection", "free")
-SCHEDULES = ("published", "designed")
-AIMS = ("fuel", "time")
-NAVIGATION = ("perfect", "raw", "filtered")
-INSPECTION_LAWS = ("single", "pairs")
-GEOMETRIES = ("behind", "ahead", "around")
+
+def _words(*words: str) -> Any:
+    """The words of a setting, each with the number that stands for it in physics: PHASES.inspection is 1."""
+    made: Any = namedtuple("Words", words)  # type: ignore[misc]
+    return made(*map(float, range(len(words))))
 
 
-def _burn(k: int) -> tuple[Parameter, ...]:
-    return (
-        Parameter(f"burn_{k}_thrust_error_pct", "%", f"true less nominal thrust in phasing burn {k}", 0.0, -50, 50),
-        Parameter(f"burn_{k}_out_of_plane_deg", "deg", f"tilt of the thrust to the normal in burn {k}", 0.0, -45, 45),
-        Parameter(f"burn_{k}_radial_deg", "deg", f"tilt of the thrust outward in burn {k}", 0.0, -45, 45),
-    )
+PHASES = _words("phasing", "inspection", "free")
+SCHEDULES = _words("published", "designed")
+AIMS = _words("fuel", "time")
+NAVIGATION = _words("perfect", "raw", "filtered")
+INSPECTION_LAWS = _words("single", "pairs")
+GEOMETRIES = _words("behind", "ahead", "around")
 
 
-def _craft(name: str, words: str, radius: float, e: float, latitude: float) -> tuple[Parameter, ...]:
-    return (
-        Parameter(f"{name}_pericentre_radius_km", "km", f"pericentre radius of the {words}", radius, low=1e4),
-        Parameter(f"{name}_eccentricity", "", f"eccentricity of the {words}", e, 0.0, 0.9),
-        Parameter(f"{name}_argument_of_latitude_deg", "deg", f"argument of latitude, {words}", latitude, -360, 360),
-        Parameter(f"{name}_argument_of_pericentre_deg", "deg", f"argument of pericentre, {words}", 0.0, -360, 360),
-        Parameter(f"{name}_inclination_deg", "deg", f"inclination of the {words}", 0.05, 0.0, 90.0),
-        Parameter(f"{name}_node_deg", "deg", f"right ascension of the ascending node of the {words}", 60.0, -360, 360),
-    )
+def _angle(default: float, description: str, largest: float = 360.0) -> Parameter:
+    return Parameter(default, description, -largest, largest)
 
 
-PARAMETERS = (
-    Parameter("epoch_error_days", "day", "true start later than epoch_utc by", 0.0),
-    Parameter("mass_error_kg", "kg", "true less planned mass of the servicing module at the start", 0.0),
-    Parameter("area_factor", "", "true over planned area towards the Sun", 1.0, low=0.0),
-    Parameter("reflectivity_factor", "", "true over planned radiation pressure coefficient", 1.0, low=0.0),
-    Parameter("initial_longitude_error_deg", "deg", "true less planned longitude at the start", 0.0, -180, 180),
-    Parameter("initial_period_error_s", "s", "true less planned osculating period at the start", 0.0),
-    Parameter("initial_eccentricity_error", "", "true less planned eccentricity at the start", 0.0, -0.1, 0.1),
-    Parameter("initial_inclination_error_deg", "deg", "true less planned inclination at the start", 0.0, -90, 90),
-    Parameter("initial_true_anomaly_error_deg", "deg", "true less planned anomaly at the start", 0.0, -180, 180),
-    Parameter("thrust_error_pct", "%", "true less nominal thrust, all burns", 0.0, -50, 50),
-    Parameter("out_of_plane_deg", "deg", "tilt of the thrust to the normal, all burns", 0.0, -45, 45),
-    Parameter("radial_deg", "deg", "tilt of the thrust outward, all burns", 0.0, -45, 45),
-    *(parameter for k in range(1, BURNS + 1) for parameter in _burn(k)),
-    Parameter("thrust_noise_pct", "%", "1-sigma of a fresh thrust error at every inspection burn", 0.0, low=0.0),
-    Parameter("pointing_noise_deg", "deg", "1-sigma of a fresh tilt each way at every inspection burn", 0.0, 0.0),
-    Parameter("nav_position_m", "m", "1-sigma of a fix of the module along each axis", 10.0, low=0.0),
-    Parameter("nav_velocity_m_s", "m/s", "1-sigma of a fix of the module along each axis", 0.1, low=0.0),
-    Parameter("target_nav_position_m", "m", "the same of the target; 0: fixes are relative to it", 0.0, low=0.0),
-    Parameter("target_nav_velocity_m_s", "m/s", "the same of the target; 0: fixes are relative to it", 0.0, low=0.0),
-    *_craft("module", "servicing module", 42150.26012, 0.000325, 54.99),
-    *_craft("target", "target module", 42150.93311, 0.000315, 55.0),
-    Parameter("target_area_to_mass_factor", "", "C_R A/m of the target over that of the module", 1.0, low=0.0),
-    Parameter("standoff_m", "m", "nominal separation ahead or behind", 39.5, low=0.0),
-    Parameter("around_low_m", "m", "fly-around: least range wanted", 20.0, low=0.0),
-    Parameter("around_high_m", "m", "fly-around: largest range wanted", 80.0, low=0.0),
-    Parameter("chi1", "", "L22/L11 of the terminal matrix of the inspection law, rev^2", 0.85, low=0.0),
-    Parameter("chi2", "", "L12/L11 of it, rev", 0.0),
-    Parameter("control_weight", "", "w/L11 of the inspection law", 0.0, low=0.0),
-    Parameter("coast_revolutions", "", "coast that the inspection law works with, m", 1.0, low=0.5),
-)
-SETTINGS = (
-    Setting("phase", "", "task", "phasing", PHASES),
-    Setting(
-        "epoch_utc",
-        "",
-        "planned start of the flight, UTC",
+def _burn(k: int) -> dict[str, Parameter]:
+    return {
+        f"burn_{k}_thrust_error_pct": Parameter(0.0, f"true less nominal thrust in phasing burn {k}", -50, 50),
+        f"burn_{k}_out_of_plane_deg": _angle(0.0, f"tilt of the thrust to the normal in burn {k}", 45.0),
+        f"burn_{k}_radial_deg": _angle(0.0, f"tilt of the thrust outward in burn {k}", 45.0),
+    }
+
+
+def _craft(name: str, words: str, radius: float, e: float, latitude: float) -> dict[str, Parameter]:
+    return {
+        f"{name}_pericentre_radius_km": Parameter(radius, f"pericentre radius of the {words}", low=1e4),
+        f"{name}_eccentricity": Parameter(e, f"eccentricity of the {words}", 0.0, 0.9, unit=""),
+        f"{name}_argument_of_latitude_deg": _angle(latitude, f"argument of latitude, {words}"),
+        f"{name}_argument_of_pericentre_deg": _angle(0.0, f"argument of pericentre, {words}"),
+        f"{name}_inclination_deg": Parameter(0.05, f"inclination of the {words}", 0.0, 90.0),
+        f"{name}_node_deg": _angle(60.0, f"right ascension of the ascending node of the {words}"),
+    }
+
+
+def _planned(default: float, description: str, low: float, high: float, error: str, unit: str = "deg") -> Setting:
+    """A planned number of the start, from which a case deviates by the parameter `error`."""
+    return Setting(default, f"planned {description} at the start", low=low, high=high, dispersed_by=error, unit=unit)
+
+
+Inputs = inputs(
+    epoch_error_days=Parameter(0.0, "true start later than epoch_utc by"),
+    mass_error_kg=Parameter(0.0, "true less planned mass of the servicing module at the start"),
+    area_factor=Parameter(1.0, "true over planned area towards the Sun", low=0.0, unit=""),
+    reflectivity_factor=Parameter(1.0, "true over planned radiation pressure coefficient", low=0.0, unit=""),
+    initial_longitude_error_deg=_angle(0.0, "true less planned longitude at the start", 180.0),
+    initial_period_error_s=Parameter(0.0, "true less planned osculating period at the start"),
+    initial_eccentricity_error=Parameter(0.0, "true less planned eccentricity at the start", -0.1, 0.1, unit=""),
+    initial_inclination_error_deg=_angle(0.0, "true less planned inclination at the start", 90.0),
+    initial_true_anomaly_error_deg=_angle(0.0, "true less planned anomaly at the start", 180.0),
+    thrust_error_pct=Parameter(0.0, "true less nominal thrust, all burns", -50, 50),
+    out_of_plane_deg=_angle(0.0, "tilt of the thrust to the normal, all burns", 45.0),
+    radial_deg=_angle(0.0, "tilt of the thrust outward, all burns", 45.0),
+    **{name: parameter for k in range(1, BURNS + 1) for name, parameter in _burn(k).items()},
+    thrust_noise_pct=Parameter(0.0, "1-sigma of a fresh thrust error at every inspection burn", low=0.0),
+    pointing_noise_deg=Parameter(0.0, "1-sigma of a fresh tilt each way at every inspection burn", low=0.0),
+    nav_position_m=Parameter(10.0, "1-sigma of a fix of the module along each axis", low=0.0),
+    nav_velocity_m_s=Parameter(0.1, "1-sigma of a fix of the module along each axis", low=0.0),
+    target_nav_position_m=Parameter(0.0, "the same of the target; 0: fixes are relative to it", low=0.0),
+    target_nav_velocity_m_s=Parameter(0.0, "the same of the target; 0: fixes are relative to it", low=0.0),
+    **_craft("module", "servicing module", 42150.26012, 0.000325, 54.99),
+    **_craft("target", "target module", 42150.93311, 0.000315, 55.0),
+    target_area_to_mass_factor=Parameter(1.0, "C_R A/m of the target over that of the module", low=0.0, unit=""),
+    standoff_m=Parameter(39.5, "nominal separation ahead or behind", low=0.0),
+    around_low_m=Parameter(20.0, "fly-around: least range wanted", low=0.0),
+    around_high_m=Parameter(80.0, "fly-around: largest range wanted", low=0.0),
+    chi1=Parameter(0.85, "L22/L11 of the terminal matrix of the inspection law, rev^2", low=0.0, unit=""),
+    chi2=Parameter(0.0, "L12/L11 of it, rev", unit=""),
+    control_weight=Parameter(0.0, "w/L11 of the inspection law", low=0.0, unit=""),
+    coast_revolutions=Parameter(1.0, "coast that the inspection law works with, m", low=0.5, unit=""),
+    phase=Setting("phasing", "task", choices=PHASES._fields),
+    epoch_utc=Setting(
         "2019-01-01T12:00:00",
-        (),
-        33282,
-        88068,
+        "planned start of the flight, UTC",
+        low=33282,
+        high=88068,
         date=True,
         dispersed_by="epoch_error_days",
     ),
-    Setting("duration_days", "day", "length of the flight", 10.0, (), 1e-3, 3660.0),
-    Setting("gravity_degree", "", "degree of the geopotential; 0 is a point", 4.0, (), 0, LARGEST_DEGREE, True),
-    Setting("gravity_order", "", "order of the geopotential", 4.0, (), 0, LARGEST_DEGREE, True),
-    Setting("sun_and_moon", "", "attraction by Sun and Moon", True),
-    Setting("sunlight", "", "pressure of sunlight", True),
-    Setting("mass_kg", "kg", "planned mass of the servicing module", 2500.0, (), 1.0, dispersed_by="mass_error_kg"),
-    Setting("thrust_n", "N", "its nominal thrust", 1.0, (), 1e-6, dispersed_by="thrust_error_pct"),
-    Setting("isp_s", "s", "its specific impulse", 1600.0, (), 1.0),
-    Setting("area_m2", "m^2", "its area towards the Sun", 50.0, (), 0.0, dispersed_by="area_factor"),
-    Setting(
-        "reflectivity",
-        "",
-        "its radiation pressure coefficient C_R",
-        1.3,
-        (),
-        0.0,
-        2.0,
-        dispersed_by="reflectivity_factor",
+    duration_days=Setting(10.0, "length of the flight", low=1e-3, high=3660.0),
+    gravity_degree=Setting(
+        4.0, "degree of the geopotential; 0 is a point", low=0, high=LARGEST_DEGREE, whole=True, unit=""
     ),
-    Setting(
-        "initial_longitude_deg",
-        "deg",
-        "planned longitude at the start, east",
-        92.5,
-        (),
-        -360.0,
-        360.0,
-        dispersed_by="initial_longitude_error_deg",
+    gravity_order=Setting(4.0, "order of the geopotential", low=0, high=LARGEST_DEGREE, whole=True, unit=""),
+    sun_and_moon=Setting(True, "attraction by Sun and Moon"),
+    sunlight=Setting(True, "pressure of sunlight"),
+    mass_kg=Setting(2500.0, "planned mass of the servicing module", low=1.0, dispersed_by="mass_error_kg"),
+    thrust_n=Setting(1.0, "its nominal thrust", low=1e-6, dispersed_by="thrust_error_pct"),
+    isp_s=Setting(1600.0, "its specific impulse", low=1.0),
+    area_m2=Setting(50.0, "its area towards the Sun", low=0.0, dispersed_by="area_factor"),
+    reflectivity=Setting(
+        1.3, "its radiation pressure coefficient C_R", low=0.0, high=2.0, dispersed_by="reflectivity_factor", unit=""
     ),
-    Setting(
-        "initial_period_s",
-        "s",
-        "planned osculating period at the start",
-        85796.0,
-        (),
-        3e4,
-        3e5,
-        dispersed_by="initial_period_error_s",
+    initial_longitude_deg=Setting(
+        92.5, "planned longitude at the start, east", low=-360.0, high=360.0, dispersed_by="initial_longitude_error_deg"
     ),
-    Setting(
-        "initial_eccentricity",
-        "",
-        "planned eccentricity at the start",
-        0.0005,
-        (),
-        0.0,
-        0.5,
-        dispersed_by="initial_eccentricity_error",
+    initial_period_s=_planned(85796.0, "osculating period", 3e4, 3e5, "initial_period_error_s", "s"),
+    initial_eccentricity=_planned(0.0005, "eccentricity", 0.0, 0.5, "initial_eccentricity_error", ""),
+    initial_inclination_deg=_planned(0.1, "inclination", 0.0, 90.0, "initial_inclination_error_deg"),
+    initial_node_deg=Setting(0.0, "right ascension of the ascending node at the start", low=-360.0, high=360.0),
+    initial_true_anomaly_deg=_planned(0.0, "anomaly", -360.0, 360.0, "initial_true_anomaly_error_deg"),
+    target_longitude_deg=Setting(95.0, "required longitude, east", low=-360.0, high=360.0),
+    schedule=Setting("designed", "the source's corrections, or the designed ones", choices=SCHEDULES._fields),
+    planned_corrections=Setting(
+        3.0, "number of corrections of the designed schedule", low=2, high=BURNS, whole=True, unit=""
     ),
-    Setting(
-        "initial_inclination_deg",
-        "deg",
-        "planned inclination at the start",
-        0.1,
-        (),
-        0.0,
-        90.0,
-        dispersed_by="initial_inclination_error_deg",
-    ),
-    Setting("initial_node_deg", "deg", "right ascension of the ascending node at the start", 0.0, (), -360.0, 360.0),
-    Setting(
-        "initial_true_anomaly_deg",
-        "deg",
-        "planned anomaly at the start",
-        0.0,
-        (),
-        -360.0,
-        360.0,
-        dispersed_by="initial_true_anomaly_error_deg",
-    ),
-    Setting("target_longitude_deg", "deg", "required longitude, east", 95.0, (), -360.0, 360.0),
-    Setting("schedule", "", "the source's corrections, or the designed ones", "designed", SCHEDULES),
-    Setting("planned_corrections", "", "number of corrections of the designed schedule", 3.0, (), 2, BURNS, True),
-    Setting("aim", "", "what the designed schedule spares", "fuel", AIMS),
-    Setting("aim_drift_deg_rev", "deg/rev", "actual drift that the designed schedule ends with", 0.012, (), -1.0, 1.0),
-    Setting("first_coast_h", "h", "least coast before the first correction of the phasing", 12.0, (), 0.0),
-    Setting(
-        "least_coast_h", "h", "least coast before every later one, and between those of the inspection", 6.0, (), 0.0
-    ),
-    Setting("longest_transfer_days", "day", "longest time that the designed schedule may take", 10.0, (), 0.1, 1000.0),
-    Setting("largest_last_deg_rev", "deg/rev", "largest last correction; 0: by (3.31)", 0.0, (), 0.0, 10.0),
-    Setting("longitude_tolerance_deg", "deg", "of the end, for the schedule and its gains", 0.05, (), 1e-6, 10.0),
-    Setting("period_tolerance_s", "s", "of the end, for the schedule and its gains", 5.0, (), 1e-6, 1e4),
-    Setting("eccentricity_tolerance", "", "of the end, for the schedule", 4e-4, (), 1e-7, 0.1),
-    Setting("feedback", "", "corrections answer what navigation tells at ignition", True),
-    Setting("navigation", "", "what navigation knows", "filtered", NAVIGATION),
-    Setting("fix_period_s", "s", "time from one fix to the next", 3600.0, (), 10.0, 1e6),
-    Setting("filter_noise_m_s2", "m/s^2", "1-sigma of the acceleration that the filter does not know", 1e-9, (), 0.0),
-    Setting("assumed_thrust_pct", "%", "1-sigma of the thrust error that laws and filter expect", 0.5, (), 0.0),
-    Setting("assumed_pointing_deg", "deg", "1-sigma of the tilt that the filter expects", 0.5, (), 0.0),
-    Setting("geometry", "", "place of the module beside the target", "behind", GEOMETRIES),
-    Setting(
-        "inspection_law",
-        "",
-        "one correction at a time, or pairs that take the relative ellipse away",
+    aim=Setting("fuel", "what the designed schedule spares", choices=AIMS._fields),
+    aim_drift_deg_rev=Setting(0.012, "actual drift that the designed schedule ends with", low=-1.0, high=1.0),
+    first_coast_h=Setting(12.0, "least coast before the first correction of the phasing", low=0.0),
+    least_coast_h=Setting(6.0, "least coast before every later one, and between those of the inspection", low=0.0),
+    longest_transfer_days=Setting(10.0, "longest time that the designed schedule may take", low=0.1, high=1000.0),
+    largest_last_deg_rev=Setting(0.0, "largest last correction; 0: by (3.31)", low=0.0, high=10.0),
+    longitude_tolerance_deg=Setting(0.05, "of the end, for the schedule and its gains", low=1e-6, high=10.0),
+    period_tolerance_s=Setting(5.0, "of the end, for the schedule and its gains", low=1e-6, high=1e4),
+    eccentricity_tolerance=Setting(4e-4, "of the end, for the schedule", low=1e-7, high=0.1, unit=""),
+    feedback=Setting(True, "corrections answer what navigation tells at ignition"),
+    navigation=Setting("filtered", "what navigation knows", choices=NAVIGATION._fields),
+    fix_period_s=Setting(3600.0, "time from one fix to the next", low=10.0, high=1e6),
+    filter_noise_m_s2=Setting(1e-9, "1-sigma of the acceleration that the filter does not know", low=0.0),
+    assumed_thrust_pct=Setting(0.5, "1-sigma of the thrust error that laws and filter expect", low=0.0),
+    assumed_pointing_deg=Setting(0.5, "1-sigma of the tilt that the filter expects", low=0.0),
+    geometry=Setting("behind", "place of the module beside the target", choices=GEOMETRIES._fields),
+    inspection_law=Setting(
         "single",
-        INSPECTION_LAWS,
+        "one correction at a time, or pairs that take the relative ellipse away",
+        choices=INSPECTION_LAWS._fields,
     ),
-    Setting("observation_days", "day", "time before the inspection first decides", 0.0, (), 0.0),
-    Setting("settle_time_days", "day", "when the inspection counts as settled", 15.0, (), 0.0),
-    Setting("range_low_m", "m", "least settled range that counts as steady", 19.1, (), 0.0),
-    Setting("range_high_m", "m", "largest settled range that counts as steady", 82.0, (), 0.0),
-    Setting("tolerance", "", "relative error of an integration step", 1e-11, (), 1e-14, 1e-6),
+    observation_days=Setting(0.0, "time before the inspection first decides", low=0.0),
+    settle_time_days=Setting(15.0, "when the inspection counts as settled", low=0.0),
+    range_low_m=Setting(19.1, "least settled range that counts as steady", low=0.0),
+    range_high_m=Setting(82.0, "largest settled range that counts as steady", low=0.0),
+    tolerance=Setting(1e-11, "relative error of an integration step", low=1e-14, high=1e-6, unit=""),
 )

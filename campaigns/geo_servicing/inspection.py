@@ -6,6 +6,7 @@ Numbers in brackets are equations of the source (`model.SOURCE`); the procedure 
 from collections import namedtuple
 
 from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY
+from campaigns.geo_servicing.inputs import INSPECTION_LAWS
 from campaigns.geo_servicing.navigation import navigated_elements
 from mc_engine.lanes import atan2, floor, maximum, minimum, physics, sqrt, where
 from mc_engine.physics.frames import TURN, half_turn
@@ -14,7 +15,6 @@ from mc_engine.physics.orbital_elements import equinoctial
 # along: mean distance ahead of the target [m], drift of it [m/rev]; e: length of the difference of the eccentricity
 # vectors, phase: anomaly on the relative ellipse [rad], 0 where the module is lowest
 Relative = namedtuple("Relative", "along drift e phase")
-PAIRS = 1.0
 LAST = 0.25  # rev by which a coast may fall short of its whole revolutions
 
 
@@ -30,14 +30,14 @@ def correction(y, v, t, chi1, chi2, weight, sigma):
 
 
 @physics
-def relative_orbit(s, m):
-    """The module's motion about the target, as navigation measures it [m, m/rev, 1, rad].
+def relative_orbit(s, error):
+    """The module's motion about the target, as navigation with this error measures it [m, m/rev, 1, rad].
 
     The distance is R0 times the difference of the mean longitudes, e and phase those of (3.43), (3.44); the drift,
     -3 pi R0 (a - a_target) / a_target per revolution, is derived here from T ~ a^1.5.
     """
-    module = navigated_elements(s, m)
-    target = equinoctial(s.tx, s.ty, s.tz, s.tvx, s.tvy, s.tvz, MU)
+    module = navigated_elements(s, error)
+    target = equinoctial(s.target_x, s.target_y, s.target_z, s.target_vx, s.target_vy, s.target_vz, MU)
     dk, dh = module.k - target.k, module.h - target.h
     return Relative(
         R0 * half_turn(module.mean - target.mean),
@@ -58,9 +58,17 @@ def wait_until(x, phase, least):
 @physics
 def candidate(x, phase, sign, p, o):
     """(coast [rev], 1 if the law asks there for a correction of this sign)."""
-    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast - LAST)
+    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast_revolutions - LAST)
     wait = wait_until(x, phase, least)
-    u = correction(x.along - p.nominal + x.drift * wait, x.drift, p.coast, p.chi1, p.chi2, p.weight, o.assumed_thrust)
+    u = correction(
+        x.along - p.nominal + x.drift * wait,
+        x.drift,
+        p.coast_revolutions,
+        p.chi1,
+        p.chi2,
+        p.control_weight,
+        o.assumed_thrust,
+    )
     return wait, where(u * sign > 0.0, 1.0, 0.0)
 
 
@@ -82,7 +90,7 @@ def next_coast(x, p, o):
 @physics
 def next_pair(x, p, o):
     """Coast [rev] to the first burn of a pair: to the next end of the relative ellipse that is far enough away."""
-    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast - LAST)
+    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast_revolutions - LAST)
     return minimum(wait_until(x, 0.0, least), wait_until(x, 0.5 * TURN, least))
 
 
@@ -93,20 +101,14 @@ def first_of_pair(x, p, o):
     Both together change the eccentricity vectors' difference by what is too much of it, u_a - u_p = -+E with E the
     drift that belongs to V0 (e - wanted)/2, and u_p is the law's at its own time; two equations, solved for u_a.
     """
-    q = p.coast * p.coast + 2.0 * p.chi2 * p.coast + p.chi1
-    size = p.weight + (1.0 + o.assumed_thrust * o.assumed_thrust) * q
-    g_y, g_v = (p.coast + p.chi2) / size, q / size
-    low = _low(x)
+    q = p.coast_revolutions * p.coast_revolutions + 2.0 * p.chi2 * p.coast_revolutions + p.chi1
+    size = p.control_weight + (1.0 + o.assumed_thrust * o.assumed_thrust) * q
+    g_y, g_v = (p.coast_revolutions + p.chi2) / size, q / size
+    low = where(abs(half_turn(x.phase)) < 0.25 * TURN, 1.0, -1.0)  # in the lower half of the relative ellipse
     apart = low * 1.5 * TURN * R0 * (x.e - p.around)  # drift of V0 e/2: 6 pi/w V0 e/2 = 3 pi R0 e
     y = x.along - p.nominal
     feedback = -g_y * (y + 0.5 * x.drift) - g_v * x.drift
     return (feedback + apart) / (1.0 + 0.5 * g_y + g_v)
-
-
-@physics
-def _low(x):
-    """1 in the lower half of the relative ellipse, phase [rad] within a quarter turn of 0, and -1 in the upper one."""
-    return where(abs(half_turn(x.phase)) < 0.25 * TURN, 1.0, -1.0)
 
 
 @physics
@@ -115,7 +117,9 @@ def velocity_change(x, first, p, o):
 
     first : 1 for the first burn of a pair
     """
-    u = correction(x.along - p.nominal, x.drift, p.coast, p.chi1, p.chi2, p.weight, o.assumed_thrust)
-    if o.inspection_law == PAIRS:
+    u = correction(
+        x.along - p.nominal, x.drift, p.coast_revolutions, p.chi1, p.chi2, p.control_weight, o.assumed_thrust
+    )
+    if o.inspection_law == INSPECTION_LAWS.pairs:
         u = where(first > 0.5, first_of_pair(x, p, o), u)
     return -u * RATE / (3.0 * TURN)

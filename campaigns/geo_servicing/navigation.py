@@ -13,15 +13,18 @@ R. E. Kalman, Journal of Basic Engineering 82 (1960) 35-45; G. W. Hill, American
 
 from collections import namedtuple
 
-from campaigns.geo_servicing.dynamics import MU, RATE, Memory
-from mc_engine.lanes import physics, sincos, where
+from campaigns.geo_servicing.dynamics import MU, RATE
+from campaigns.geo_servicing.inputs import NAVIGATION
+from mc_engine.lanes import physics, replace, sincos, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.frames import orbital_axes
 from mc_engine.physics.orbital_elements import equinoctial
 
-# error and covariance of the estimate
+Error = namedtuple("Error", "r s u w")
+EXACT = Error(0.0, 0.0, 0.0, 0.0)
+# an error, and its covariance as the filter knows it
 Estimate = namedtuple("Estimate", "r s u w prr prs pru prw pss psu psw puu puw pww")
-RAW, FILTERED = 1.0, 2.0
+NO_ESTIMATE = Estimate(*[0.0] * 14)
 
 
 @physics
@@ -56,21 +59,9 @@ def propagated(e, t, noise):
     _, _, _, pww = hill(a3, b3, c3, d3, sine, cosine, t)
     q = noise * noise
     return Estimate(
-        r=r,
-        s=s,
-        u=u,
-        w=w,
-        prr=prr,
-        prs=prs,
-        pru=pru,
-        prw=prw,
-        pss=pss,
-        psu=psu,
-        psw=psw,
-        puu=puu + q,
-        puw=puw,
-        pww=pww + q,
-    )
+        r=r, s=s, u=u, w=w,
+        prr=prr, prs=prs, pru=pru, prw=prw, pss=pss, psu=psu, psw=psw, puu=puu + q, puw=puw, pww=pww + q,
+    )  # fmt: skip
 
 
 @physics
@@ -112,23 +103,9 @@ def fixed(e, n1, n2, n3, n4, place, velocity):
 @physics
 def single_fix(n1, n2, n3, n4, place, velocity):
     """The estimate [m, m/s] that one fix alone gives: its errors, and their variances on the diagonal."""
-    zero = 0.0 * n1
-    a, b = place * place + zero, velocity * velocity + zero
-    return Estimate(
-        r=place * n1,
-        s=place * n2,
-        u=velocity * n3,
-        w=velocity * n4,
-        prr=a,
-        prs=zero,
-        pru=zero,
-        prw=zero,
-        pss=a,
-        psu=zero,
-        psw=zero,
-        puu=b,
-        puw=zero,
-        pww=b,
+    a, b = place * place, velocity * velocity
+    return replace(
+        NO_ESTIMATE, r=place * n1, s=place * n2, u=velocity * n3, w=velocity * n4, prr=a, pss=a, puu=b, pww=b
     )
 
 
@@ -136,36 +113,11 @@ def single_fix(n1, n2, n3, n4, place, velocity):
 def burnt(e, outward, ahead, dv, thrust_sigma, pointing_sigma):
     """The estimate after a burn of dv [m/s] that gave so much more than commanded outward and ahead [m/s]."""
     a, b = pointing_sigma * dv, thrust_sigma * dv
-    return Estimate(
-        r=e.r, s=e.s, u=e.u - outward, w=e.w - ahead,
-        prr=e.prr, prs=e.prs, pru=e.pru, prw=e.prw, pss=e.pss, psu=e.psu, psw=e.psw, puu=e.puu + a * a, puw=e.puw,
-        pww=e.pww + b * b,
-    )  # fmt: skip
+    return replace(e, u=e.u - outward, w=e.w - ahead, puu=e.puu + a * a, pww=e.pww + b * b)
 
 
 @physics
-def estimate_of(m):
-    """The part of the memory that is the estimate."""
-    return Estimate(
-        r=m.r,
-        s=m.s,
-        u=m.u,
-        w=m.w,
-        prr=m.prr,
-        prs=m.prs,
-        pru=m.pru,
-        prw=m.prw,
-        pss=m.pss,
-        psu=m.psu,
-        psw=m.psw,
-        puu=m.puu,
-        puw=m.puw,
-        pww=m.pww,
-    )
-
-
-@physics
-def control(t, s, m, p, o, draws):
+def control(t, m, p, o, draws):
     """A fix [m, m/s], if there are any, and what a burn before the next needs.
 
     That is fresh deviates for the burn's errors, and the single fix that follows it.
@@ -176,51 +128,30 @@ def control(t, s, m, p, o, draws):
     d3, _ = normal_pair(draws, 3)
     n5, n6 = normal_pair(draws, 4)
     n7, n8 = normal_pair(draws, 5)
-    e = estimate_of(m)
-    if o.navigation == RAW:
-        e = single_fix(n1, n2, n3, n4, p.nav_position, p.nav_velocity)
-    elif o.navigation == FILTERED:
-        alone = single_fix(n1, n2, n3, n4, p.nav_position, p.nav_velocity)
+    place, velocity, e = p.nav_position, p.nav_velocity, m.estimate
+    if o.navigation == NAVIGATION.raw:
+        e = single_fix(n1, n2, n3, n4, place, velocity)
+    elif o.navigation == NAVIGATION.filtered:
+        alone = single_fix(n1, n2, n3, n4, place, velocity)
         going = propagated(e, o.fix_period, o.filter_noise * o.fix_period)
-        going = fixed(going, n1, n2, n3, n4, p.nav_position, p.nav_velocity)
-        e = chosen(t > 0.0, going, alone)
-    return Memory(
-        due=m.due, mode=m.mode, burns=m.burns, outward=m.outward, ahead=m.ahead, across=m.across, dv=m.dv,
-        settled=m.settled, second=m.second,
-        end_time=m.end_time, end_true=m.end_true, end_mean=m.end_mean, end_drift=m.end_drift, end_e=m.end_e,
-        end_inclination=m.end_inclination, end_sum=m.end_sum, day_mean=m.day_mean, day_drift=m.day_drift,
-        r=e.r, s=e.s, u=e.u, w=e.w, prr=e.prr, prs=e.prs, pru=e.pru, prw=e.prw, pss=e.pss, psu=e.psu, psw=e.psw,
-        puu=e.puu, puw=e.puw, pww=e.pww,
-        after_r=p.nav_position * n5, after_s=p.nav_position * n6, after_u=p.nav_velocity * n7,
-        after_w=p.nav_velocity * n8, d1=d1, d2=d2, d3=d3,
-    )  # fmt: skip
+        e = where(t > 0.0, fixed(going, n1, n2, n3, n4, place, velocity), alone)
+    after = Error(r=place * n5, s=place * n6, u=velocity * n7, w=velocity * n8)
+    return replace(m, estimate=e, after=after, d1=d1, d2=d2, d3=d3)
 
 
 @physics
-def chosen(mask, a, b):
-    """Estimate a where the mask holds, b elsewhere."""
-    return Estimate(
-        r=where(mask, a.r, b.r), s=where(mask, a.s, b.s), u=where(mask, a.u, b.u), w=where(mask, a.w, b.w),
-        prr=where(mask, a.prr, b.prr), prs=where(mask, a.prs, b.prs), pru=where(mask, a.pru, b.pru),
-        prw=where(mask, a.prw, b.prw),
-        pss=where(mask, a.pss, b.pss), psu=where(mask, a.psu, b.psu), psw=where(mask, a.psw, b.psw),
-        puu=where(mask, a.puu, b.puu), puw=where(mask, a.puw, b.puw), pww=where(mask, a.pww, b.pww),
-    )  # fmt: skip
-
-
-@physics
-def navigated_elements(s, m):
-    """Equinoctial elements of the module as navigation measures them: m.r, m.s [m] and m.u, m.w [m/s] are its errors.
+def navigated_elements(s, e):
+    """Equinoctial elements of the module as navigation measures them: e.r, e.s [m] and e.u, e.w [m/s] are its errors.
 
     r, u : outward;  s, w : ahead.
     """
     rx, ry, rz, ax, ay, az, _, _, _ = orbital_axes(s.x, s.y, s.z, s.vx, s.vy, s.vz)
     return equinoctial(
-        s.x + m.r * rx + m.s * ax,
-        s.y + m.r * ry + m.s * ay,
-        s.z + m.r * rz + m.s * az,
-        s.vx + m.u * rx + m.w * ax,
-        s.vy + m.u * ry + m.w * ay,
-        s.vz + m.u * rz + m.w * az,
+        s.x + e.r * rx + e.s * ax,
+        s.y + e.r * ry + e.s * ay,
+        s.z + e.r * rz + e.s * az,
+        s.vx + e.u * rx + e.w * ax,
+        s.vy + e.u * ry + e.w * ay,
+        s.vz + e.u * rz + e.w * az,
         MU,
     )

@@ -5,18 +5,18 @@ full dynamics tells what the model lacks at the end, and so on; two or three pas
 all cases of the same settings.
 """
 
-from dataclasses import dataclass
+from collections import namedtuple
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
 
-from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.bellman import Corrections, best_corrections, planned_cost
 from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, E_PER_DV, after_correction, braking, fastest, largest_last
 from campaigns.geo_servicing.dynamics import SIDEREAL_DAY
 from campaigns.geo_servicing.inputs import AIMS, SCHEDULES
-from campaigns.geo_servicing.planned_flight import Craft, End, Flight, fly_plan
+from campaigns.geo_servicing.plan_table import Row, plan_rows
+from campaigns.geo_servicing.planned_flight import Craft, End, Plan
 from mc_engine.errors import ModelError
 from mc_engine.physics.frames import TURN
 
@@ -28,57 +28,18 @@ SETTLED = 1e-3  # of the tolerances: a plan is done when its flight ends as near
 DV_OF_COST = 0.1  # m/s that one unit of expected cost is worth: a plan may spend so much to be surer of its end
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Coasts before the corrections [s] and their velocity changes [m/s], float64[n]."""
-
-    coasts: np.ndarray
-    dv: np.ndarray
+# what a plan must keep: tolerances of the end [rad, rad/rev, 1], first and later coasts and the whole transfer [rev],
+# largest last correction [rad/rev]
+Limits = namedtuple("Limits", "y v e first least longest last")
 
 
-@dataclass(frozen=True)
-class Limits:
-    """What a plan must keep.
-
-    y, v, e : tolerances of the end [rad, rad/rev, 1];  first, least, longest : coasts and whole transfer [rev]
-    last : largest last correction [rad/rev]
-    """
-
-    y: float
-    v: float
-    e: float
-    first: float
-    least: float
-    longest: float
-    last: float
-
-    def coasts(self, n: int) -> np.ndarray:
-        """Least coasts before n corrections [rev]."""
-        return np.array([self.first, *[self.least] * (n - 1)])
-
-
-@dataclass(frozen=True)
-class Lacking:
-    """What the flight has at the end beyond the drift model: longitude [rad], drift [rad/rev], eccentricity vector."""
-
-    y: float = 0.0
-    v: float = 0.0
-    e: complex = 0.0
-
-
-def plan_of(o: Any, tables: np.ndarray, first: Any) -> np.ndarray:
-    """The table of the plan for the settings o (see `plan_table`).
-
-    tables : of the model behind the plan;  first : the nominal case's kernel parameters
-    """
-    craft = Craft(o, tables, first)
-    if SCHEDULES[int(o.schedule)] == "published":
-        plan = published_plan(craft)
-        flight = fly_plan(craft, plan.coasts, plan.dv)
-    else:
-        plan, flight = design(o, craft)
-    gains = gains_of(craft, plan, limits_of(o), float(o.assumed_thrust)).gains
-    return plan_table.plan_rows(flight.ignition, plan.dv, flight.longitude, flight.drift, gains)
+def plan_of(o: Any, first: Any) -> np.ndarray:
+    """The table of the plan (see `plan_table`); o, first : see `Craft`."""
+    craft = Craft(o, first)
+    plan = published_plan(craft) if o.schedule == SCHEDULES.published else design(craft)
+    (ignition, longitude, drift), _ = craft.fly_plan(plan)
+    gains = gains_of(craft, plan, limits_of(o)).gains
+    return plan_rows(Row(ignition, plan.dv, longitude, drift, *gains.T))
 
 
 def published_plan(craft: Craft) -> Plan:
@@ -94,9 +55,10 @@ def middles(craft: Craft, plan: Plan) -> tuple[np.ndarray, float]:
     return (ends - 0.5 * burns) / SIDEREAL_DAY, float(ends[-1]) / SIDEREAL_DAY
 
 
-def modelled(craft: Craft, plan: Plan, lacking: Lacking) -> End:
+def modelled(craft: Craft, plan: Plan, lacking: End) -> End:
     """The end of the plan by the drift model: impulses in the middles of the burns, the mean pull between them.
 
+    lacking : what the flight has beyond the drift model.
     Longitude [rad] and drift [rad/rev] by (3.46) over each coast; an impulse moves the eccentricity vector by 2 dv / V0
     along the radius.
     """
@@ -120,45 +82,51 @@ def steps(craft: Craft, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
     return a, np.column_stack([following - when, np.ones(len(when))])
 
 
-def gains_of(craft: Craft, plan: Plan, limits: Limits, sigma: float) -> Corrections:
+def gains_of(craft: Craft, plan: Plan, limits: Limits) -> Corrections:
     """Gains for deviations [rad, rad/rev] from the plan, (3.25)-(3.30); the end counts in thirds of its tolerances."""
     a, b = steps(craft, plan)
+    sigma = float(craft.o.assumed_thrust)
     terminal = np.diag([(3.0 / limits.y) ** 2, (3.0 / limits.v) ** 2])
     return best_corrections(a, b, np.zeros_like(b), np.zeros((2, 2)), 1e-6 * terminal[1, 1], terminal, sigma)
 
 
-def design(o: Any, craft: Craft) -> tuple[Plan, Flight]:
-    """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity; their flight.
+def design(craft: Craft) -> Plan:
+    """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity.
 
     The source's successive approximations: the plan of the drift model is flown in the full dynamics, and what the
-    model lacks at the end [rad, rad/rev] is added to the next plan's aim.
+    model lacks at the end is added to the next plan's aim.
     """
-    limits, lacking, plan = limits_of(o), Lacking(), None
+    limits, lacking = limits_of(craft.o), End(0.0, 0.0, 0.0, 0.0)
+    starts = first_approximations(craft, limits)
     for _ in range(PASSES):
-        plan = _best(o, craft, limits, lacking, [plan] if plan else first_approximations(o, craft, limits))
-        flight = fly_plan(craft, plan.coasts, plan.dv)
-        flown = flight.end
-        wrong = modelled(craft, plan, lacking)
-        lacking = Lacking(lacking.y + flown.y - wrong.y, lacking.v + flown.v - wrong.v, lacking.e + flown.e - wrong.e)
-        if abs(flown.y) < SETTLED * limits.y and abs(flown.v - o.aim_drift) < SETTLED * limits.v:
-            return plan, flight
+        plan = _best(craft, limits, lacking, starts)
+        _, flown = craft.fly_plan(plan)
+        if abs(flown.y) < SETTLED * limits.y and abs(flown.v - craft.o.aim_drift) < SETTLED * limits.v:
+            return plan
+        wrong, starts = modelled(craft, plan, lacking), [plan]
+        lacking = End(*(have + flew - model for have, flew, model in zip(lacking, flown, wrong, strict=True)))
     raise ModelError("the phasing plan does not settle; another number of corrections, or more time, may do")
 
 
-def first_approximations(o: Any, craft: Craft, limits: Limits) -> list[Plan]:
+def first_approximations(craft: Craft, limits: Limits) -> list[Plan]:
     """Plans to start the search from: the source's profiles at several lengths of the coasts."""
-    n = int(o.planned_corrections)
+    n = int(craft.o.planned_corrections)
+    profile = braking if craft.o.aim == AIMS.fuel else fastest
     plans = []
     for longer in (0.0, 0.25, 0.5):
-        shortest = limits.coasts(n)
+        shortest = least_coasts(limits, n)
         shortest[1:] += longer
-        profile = braking if AIMS[int(o.aim)] == "fuel" else fastest
         u, t = profile(craft.y, craft.v, limits.last, shortest)
         dv = u / DRIFT_PER_DV
         burns = craft.burn_times(dv)
         coasts = t * SIDEREAL_DAY - 0.5 * (burns + np.concatenate([[0.0], burns[:-1]]))
         plans.append(Plan(np.maximum(coasts, shortest * SIDEREAL_DAY), dv))
     return plans
+
+
+def least_coasts(limits: Limits, n: int) -> np.ndarray:
+    """Least coasts before n corrections [rev]."""
+    return np.array([limits.first, *[limits.least] * (n - 1)])
 
 
 def limits_of(o: Any) -> Limits:
@@ -170,21 +138,19 @@ def limits_of(o: Any) -> Limits:
     return Limits(y, v, e, first, least, longest, float(o.largest_last) or float(last))
 
 
-def _best(o: Any, craft: Craft, limits: Limits, lacking: Lacking, starts: list[Plan]) -> Plan:
+def _best(craft: Craft, limits: Limits, lacking: End, starts: list[Plan]) -> Plan:
     """The plan of least cost among those that the starts lead to."""
-    improved = [_improved(o, craft, limits, lacking, start) for start in starts]
+    improved = [_improved(craft, limits, lacking, start) for start in starts]
     feasible = [candidate for candidate in improved if candidate is not None]
     if not feasible:
         raise ModelError("no phasing plan meets the limits on coasts, time, last correction and eccentricity")
     return min(feasible, key=lambda pair: pair[0])[1]
 
 
-def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Plan) -> tuple[float, Plan] | None:
+def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[float, Plan] | None:
     """(cost [m/s or rev], plan) of least cost near a start; None where the limits cannot be met from there."""
     n = len(start.dv)
     signs = np.sign(start.dv)
-    sigma = float(o.assumed_thrust)
-    sooner = AIMS[int(o.aim)] == "time"
 
     def plan(z):
         return Plan(SIDEREAL_DAY * z[:n], z[n:])
@@ -192,14 +158,14 @@ def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Pla
     def cost(z):
         candidate = plan(z)
         _, b = steps(craft, candidate)
-        corrections = gains_of(craft, candidate, limits, sigma)
-        spread = planned_cost(b, corrections.costs, DRIFT_PER_DV * candidate.dv, sigma)
+        costs = gains_of(craft, candidate, limits).costs
+        spread = planned_cost(b, costs, DRIFT_PER_DV * candidate.dv, float(craft.o.assumed_thrust))
         spent = (signs * candidate.dv).sum() + DV_OF_COST * spread
-        return modelled(craft, candidate, lacking).time + 0.02 * spent if sooner else spent
+        return modelled(craft, candidate, lacking).time + 0.02 * spent if craft.o.aim == AIMS.time else spent
 
     def equal(z):
         end = modelled(craft, plan(z), lacking)
-        return np.array([end.y / limits.y, (end.v - o.aim_drift) / limits.v])
+        return np.array([end.y / limits.y, (end.v - craft.o.aim_drift) / limits.v])
 
     def inside(z):
         end = modelled(craft, plan(z), lacking)
@@ -207,7 +173,7 @@ def _improved(o: Any, craft: Craft, limits: Limits, lacking: Lacking, start: Pla
 
     largest = np.full(n, 20.0)
     largest[-1] = abs(limits.last / DRIFT_PER_DV)
-    bounds = [(low, limits.longest) for low in limits.coasts(n)]
+    bounds = [(low, limits.longest) for low in least_coasts(limits, n)]
     bounds += [(0.0, size) if sign > 0.0 else (-size, 0.0) for sign, size in zip(signs, largest, strict=True)]
     conditions = ({"type": "eq", "fun": equal}, {"type": "ineq", "fun": inside})
     first = np.concatenate([start.coasts / SIDEREAL_DAY, start.dv])

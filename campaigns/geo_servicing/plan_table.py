@@ -3,16 +3,18 @@
 The rows of the gravity harmonics follow.
 """
 
+from collections import namedtuple
+
 import numpy as np
 
 from mc_engine.lanes import look_up, physics
 
 BURNS = 5  # corrections that a plan may have
-# of a row: ignition [s], velocity change [m/s]; mean longitude deviation [rad] and drift [rad/rev] that the plan has
-# at ignition; gains by which the correction [rad/rev] answers deviations from them
-ROW = 6
-IGNITION, DV, LONGITUDE, DRIFT, GAIN_Y, GAIN_V = (float(i) for i in range(ROW))
-LENGTH = 1.0 + ROW * BURNS
+# ignition [s], velocity change [m/s]; mean longitude deviation [rad] and drift [rad/rev] that the plan has at ignition;
+# gains by which the correction [rad/rev] answers deviations from them
+Row = namedtuple("Row", "ignition dv longitude drift gain_y gain_v")
+_WIDTH = len(Row._fields)
+LENGTH = 1 + _WIDTH * BURNS
 
 
 @physics
@@ -22,20 +24,20 @@ def corrections(tables):
 
 
 @physics
-def planned(tables, burn, column):
-    """A column of the row of one correction, counted from 0; an index past the last row reads the last row."""
-    return look_up(tables, 1.0 + ROW * burn + column)
+def planned(tables, burn):
+    """The row of one correction, counted from 0."""
+    at = 1.0 + _WIDTH * burn
+    return Row(
+        ignition=look_up(tables, at),
+        dv=look_up(tables, at + 1.0),
+        longitude=look_up(tables, at + 2.0),
+        drift=look_up(tables, at + 3.0),
+        gain_y=look_up(tables, at + 4.0),
+        gain_v=look_up(tables, at + 5.0),
+    )
 
 
-def no_plan() -> np.ndarray:
-    """The table of a flight without corrections."""
-    return np.zeros(int(LENGTH))
-
-
-def plan_rows(ignition, dv, longitude, drift, gains) -> np.ndarray:
-    """The table of a plan; all arguments float64[n], gains float64[n, 2]."""
-    out = no_plan()
-    n = len(dv)
-    out[0] = n
-    out[1 : 1 + ROW * n] = np.column_stack([ignition, dv, longitude, drift, gains]).ravel()
-    return out
+def plan_rows(rows: Row) -> np.ndarray:
+    """The table of a plan, of all its corrections in one Row of float64[n]."""
+    written = np.append(len(rows.dv), np.column_stack(rows).ravel())
+    return np.pad(written, (0, LENGTH - len(written)))

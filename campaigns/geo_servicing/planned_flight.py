@@ -3,66 +3,52 @@
 Run once for each plan that the design looks at; the campaign's flights are compiled.
 """
 
-from dataclasses import dataclass
+from collections import namedtuple
 from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from campaigns.geo_servicing.corrections import drift_of
+from campaigns.geo_servicing.corrections import Burn, Memory, drift_of
 from campaigns.geo_servicing.drift_model import perturbation_coefficients
-from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, State, field, longitudes, rhs
+from campaigns.geo_servicing.dynamics import (
+    MU,
+    R0,
+    RATE,
+    SIDEREAL_DAY,
+    State,
+    field,
+    initial,
+    longitudes,
+    rhs,
+    tolerances,
+)
 from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.sun_moon import ephemeris
 
-_TOLERANCES = {"rtol": 1e-9, "atol": [*[1e-3] * 3, *[1e-7] * 3, 1e-6, *[1.0] * 6, 1e-3]}
+_TOLERANCES = {"rtol": 1e-9, "atol": tolerances(1e-3, 1e-7)}
 
 
-@dataclass(frozen=True)
-class End:
-    """End of a flown plan.
-
-    y : mean longitude deviation of the sidereal day after [rad];  v : actual drift in it [rad/rev]
-    e : osculating eccentricity vector at the last cut-off, x + i y;  time : of that [rev]
-    """
-
-    y: float
-    v: float
-    e: complex
-    time: float
-
-
-@dataclass(frozen=True)
-class Flight:
-    """ignition [s], with mean longitude deviation [rad] and osculating drift [rad/rev] there, float64[n]; the end."""
-
-    ignition: np.ndarray
-    longitude: np.ndarray
-    drift: np.ndarray
-    end: End
-
-
-@dataclass(frozen=True)
-class _Thrust:
-    """The part of the memory that the motion needs [N]."""
-
-    outward: float
-    ahead: float
-    across: float
+Plan = namedtuple("Plan", "coasts dv")  # before the corrections [s], and their velocity changes [m/s], float64[n]
+# end of a flown plan, or a difference of two: mean longitude deviation of the sidereal day after [rad], actual drift in
+# it [rad/rev], osculating eccentricity vector x + i y at the last cut-off, and the time of that [rev]
+End = namedtuple("End", "y v e time")
 
 
 class Craft:
     """The servicing module at the start, without errors."""
 
-    def __init__(self, o: Any, tables: np.ndarray, first: Any):
-        """o : settings;  tables : all tables of the model, with room for the plan;  first : kernel parameters, SI."""
-        self.o, self.p = o._replace(tables=tables), first
-        self.start = np.array([getattr(first, name) for name in State._fields[:7]] + [0.0] * 7)
-        _, self.y, elements = longitudes(0.0, State(*self.start), first)
-        self.v = drift_of(elements.a)
-        self.e = complex(elements.k, elements.h)
-        self.aim = first.aim
+    def __init__(self, o: Any, first: Any):
+        """o : settings, with all tables of the model and room for the plan;  first : kernel parameters, SI."""
+        self.o, self.p, self.aim = o, first, first.aim
+        self.start = np.array(initial(first))
+        self.y, self.v, self.e = self.seen(0.0, self.start)
         self.pull = self.mean_pull()
+
+    def seen(self, t: float, s: np.ndarray) -> tuple[float, float, complex]:
+        """(mean longitude deviation [rad], osculating drift [rad/rev], eccentricity vector) of a state float64[14]."""
+        _, mean, elements = longitudes(t, State(*s), self.p)
+        return mean, drift_of(elements.a), complex(elements.k, elements.h)
 
     def mean_pull(self) -> tuple[float, float]:
         """(b_s, b_r) of (3.46), of the perturbations averaged over the first sidereal day at the required longitude."""
@@ -70,7 +56,7 @@ class Craft:
         angle = self.aim + RATE * t
         x, y, z = R0 * np.cos(angle), R0 * np.sin(angle), 0.0 * t
         sx, sy, sz, mx, my, mz = ephemeris(self.p.sun_moon_time + t, self.o.tables, self.p.sun_moon)
-        light = self.p.light / self.p.mass
+        light = self.p.light / self.p.mass_left
         ax, ay, _ = field(t, x, y, z, (sx, sy, sz), (mx, my, mz), light, self.p, self.o)
         px, py, _ = point_mass(x, y, z, MU)
         ax, ay = ax - px, ay - py
@@ -79,37 +65,33 @@ class Craft:
 
     def burn_times(self, dv: np.ndarray) -> np.ndarray:
         """Lengths [s] of burns of velocity changes dv [m/s], one after the other."""
-        before = self.p.mass * np.exp(-np.concatenate([[0.0], np.cumsum(np.abs(dv))[:-1]]) / self.p.exhaust)
+        before = self.p.mass_left * np.exp(-np.concatenate([[0.0], np.cumsum(np.abs(dv))[:-1]]) / self.p.exhaust)
         return before * self.p.exhaust / self.p.thrust * -np.expm1(-np.abs(dv) / self.p.exhaust)
 
     def velocity_changes(self, burns: np.ndarray) -> np.ndarray:
         """Velocity changes [m/s] of burns of these lengths [s], one after the other."""
         flow = self.p.thrust / self.p.exhaust
-        after = self.p.mass - flow * np.cumsum(burns)
+        after = self.p.mass_left - flow * np.cumsum(burns)
         return self.p.exhaust * np.log((after + flow * burns) / after)
 
     def fly(self, t: float, s: np.ndarray, length: float, push: float) -> np.ndarray:
         """State float64[14] after an arc of this length [s] under a thrust ahead [N]."""
-        m = _Thrust(0.0, push, 0.0)
+        m = Memory(burn=Burn(dv=0.0, outward=0.0, ahead=push, across=0.0))
         flight = solve_ivp(
             lambda time, y: rhs(time, State(*y), m, self.p, self.o), (t, t + length), s, "DOP853", **_TOLERANCES
         )
         return np.asarray(flight.y[:, -1])
 
-
-def fly_plan(craft: Craft, coasts: np.ndarray, dv: np.ndarray) -> Flight:
-    """Coasts [s] and burns [m/s] of a plan, one after the other, and the sidereal day after."""
-    t, s, seen = 0.0, craft.start, []
-    for coast, change, burn in zip(coasts, dv, craft.burn_times(dv), strict=True):
-        s = craft.fly(t, s, coast, 0.0)
-        t += coast
-        _, mean, elements = longitudes(t, State(*s), craft.p)
-        seen.append((t, mean, drift_of(elements.a)))
-        s = craft.fly(t, s, burn, np.copysign(craft.p.thrust, change))
-        t += burn
-    _, mean, elements = longitudes(t, State(*s), craft.p)
-    after = craft.fly(t, s, SIDEREAL_DAY, 0.0)
-    _, later, _ = longitudes(t + SIDEREAL_DAY, State(*after), craft.p)
-    end = End((after[-1] - s[-1]) / SIDEREAL_DAY, later - mean, complex(elements.k, elements.h), t / SIDEREAL_DAY)
-    ignition, longitude, drift = np.array(seen).T
-    return Flight(ignition, longitude, drift, end)
+    def fly_plan(self, plan: Plan) -> tuple[np.ndarray, End]:
+        """(time [s], mean longitude deviation [rad] and osculating drift [rad/rev] at the ignitions, [3, n]; end)."""
+        t, s, ignitions = 0.0, self.start, []
+        for coast, change, burn in zip(plan.coasts, plan.dv, self.burn_times(plan.dv), strict=True):
+            s = self.fly(t, s, coast, 0.0)
+            t += coast
+            ignitions.append((t, *self.seen(t, s)[:2]))
+            s = self.fly(t, s, burn, np.copysign(self.p.thrust, change))
+            t += burn
+        mean, _, e = self.seen(t, s)
+        after = self.fly(t, s, SIDEREAL_DAY, 0.0)
+        later, _, _ = self.seen(t + SIDEREAL_DAY, after)
+        return np.array(ignitions).T, End((after[-1] - s[-1]) / SIDEREAL_DAY, later - mean, e, t / SIDEREAL_DAY)

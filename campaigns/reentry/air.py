@@ -2,10 +2,10 @@
 
 import math
 
+from campaigns.reentry.inputs import US76
 from mc_engine.lanes import any_lane, physics, sqrt, where
 from mc_engine.physics.atmosphere import us76_logarithm
 
-US76 = 0.0
 GAS_CONSTANT = 287.05287  # of air [J/(kg K)], U.S. Standard Atmosphere, 1976
 HEAT_RATIO = 1.4
 
@@ -21,14 +21,11 @@ _SLOPE = tuple((_SIGMA[i + 1] - _SIGMA[i]) / (_BASE[i + 1] - _BASE[i]) for i in 
 @physics
 def slow_sigma(h):
     """(1-sigma of the logarithm of the density, its slope [1/m]) of the slow part at altitude h [m]."""
-    base, sigma, slope = _BASE[0], _SIGMA[0], 0.0 * h
+    base, sigma, slope = _BASE[0], _SIGMA[0], 0.0
     for i in range(len(_SLOPE)):
         inside = h >= _BASE[i]
-        base, sigma, slope = (
-            where(inside, _BASE[i], base),
-            where(inside, _SIGMA[i], sigma),
-            where(inside, _SLOPE[i], slope),
-        )
+        base, sigma = where(inside, _BASE[i], base), where(inside, _SIGMA[i], sigma)
+        slope = where(inside, _SLOPE[i], slope)
     top = h >= _BASE[-1]
     return where(top, _SIGMA[-1], sigma + slope * (h - base)), where(top, 0.0, slope)
 
@@ -39,14 +36,10 @@ def logarithm_of_density(h, p, o):
     if o.atmosphere == US76:
         value, slope, temperature = us76_logarithm(h)
     else:
-        value, slope, temperature = (
-            p.log_density - p.inverse_scale * h,
-            0.0 * h - p.inverse_scale,
-            p.temperature + 0.0 * h,
-        )
-    if any_lane(abs(p.deviation) > 0.0):
+        value, slope, temperature = p.log_density - p.inverse_scale * h, -p.inverse_scale, p.temperature
+    if any_lane(abs(p.density_deviation) > 0.0):
         sigma, change = slow_sigma(h)
-        value, slope = value + p.deviation * sigma, slope + p.deviation * change
+        value, slope = value + p.density_deviation * sigma, slope + p.density_deviation * change
     return value, slope, temperature
 
 

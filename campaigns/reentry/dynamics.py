@@ -9,43 +9,61 @@ from collections import namedtuple
 
 from campaigns.reentry.air import logarithm_of_density, sound_speed
 from campaigns.reentry.bank import angle_at
+from campaigns.reentry.inputs import APOLLO, FLAT, J2, NO_GRAVITY, STOP_ON_EXIT, SUTTON_GRAVES, UNGUIDED
+from campaigns.reentry.vehicles import apollo_shares
 from campaigns.reentry.weather import weather_at
 from mc_engine.lanes import any_lane, atan2, exp, maximum, physics, sincos, sqrt, where
-from mc_engine.physics.aerodynamics import axial_coefficient, lift_direction, over_mach
+from mc_engine.model import states
+from mc_engine.physics.aerodynamics import axial_coefficient, lift_direction
 from mc_engine.physics.frames import over_ellipsoid, velocity_angles
 from mc_engine.physics.gravity import j2_perturbation, point_mass
 from mc_engine.physics.heating import DKR_EXPONENT, detra_kemp_riddell, sutton_graves
 
-State = namedtuple("State", "x y z vx vy vz heat")  # place [m], velocity [m/s] over ground, heat load [J/m^2]
-# largest dynamic pressure so far with the areas over mass of the load there, and largest heat rate, each with time,
-# altitude and speed; first pull-out; present lift direction
-# and how often it was changed; first exit from the atmosphere; of a guided flight, time of the last sample, bank
-# there and at the next, and what the laws keep
-Memory = namedtuple(
-    "Memory",
-    "pressure pressure_time pressure_altitude pressure_speed pressure_total pressure_axial "
-    "flux flux_time flux_altitude flux_speed "
-    "low low_time cos_bank sin_bank rolls "
-    "exits exit_time exit_speed exit_angle exit_inertial exit_apoapsis "
-    "sampled bank bank_rate next_bank next_rate side active lost reckoned range_rate axial excess "  # see `guidance`
-    "samples saturated reversals",
+NEVER = -1.0  # value of an event that is not looked for
+UNKNOWN = 1e300  # the pull-out, or the exit, has not come
+
+State = states(
+    x_m="place, planet-fixed x",
+    y_m="place, planet-fixed y",
+    z_m="place, planet-fixed z",
+    vx_m_s="velocity over ground, planet-fixed x",
+    vy_m_s="velocity over ground, planet-fixed y",
+    vz_m_s="velocity over ground, planet-fixed z",
+    heat_load_j_m2="convective heat load at the stagnation point",
 )
+# the discrete state: what the flight has met so far, and what the guidance keeps
+Memory = namedtuple("Memory", "met steering")
+Met = namedtuple("Met", "pressure loads flux pull_out lift exits first_exit")
+Peak = namedtuple("Peak", "value time altitude speed")  # largest dynamic pressure and heat rate so far; SI
+Loads = namedtuple("Loads", "total axial")  # areas over mass of the loads at the largest dynamic pressure
+PullOut = namedtuple("PullOut", "altitude time", defaults=(UNKNOWN, UNKNOWN))
+Lift = namedtuple("Lift", "cos_bank sin_bank rolls")  # present direction, and how often it was changed
+# from the atmosphere: speed and flight-path angle over ground, inertial speed, altitude of the apoapsis
+Exit = namedtuple("Exit", "time speed angle inertial apoapsis", defaults=(UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN, UNKNOWN))
+Steering = namedtuple(
+    "Steering", "turn reckoning side active samples saturated reversals", defaults=(0.0, 0.0, 0.0, 0.0)
+)
+# time of the last sample, bank [rad] and its rate there and at the next
+Turn = namedtuple("Turn", "sampled bank bank_rate next_bank next_rate", defaults=(0.0, 0.0, 0.0, 0.0, 0.0))
+# what law 3 keeps: speed lost W, reckoned range, present rate of it, measured deceleration, its logarithm over the
+# stored one
+Reckoning = namedtuple("Reckoning", "lost range rate axial excess", defaults=(0.0, 0.0, 0.0, 0.0, 0.0))
 Parameters = namedtuple(
     "Parameters",
     "x y z vx vy vz "  # first state
     "mu rate polar_radius e2 gravity "  # planet; gravity: of a flat Earth
-    "log_density inverse_scale temperature density deviation "  # exponential atmosphere; dispersions of the density
+    "log_density inverse_scale temperature density_factor density_deviation "  # exponential atmosphere; its dispersions
     "drag lift total axial heating "  # areas over mass [m^2/kg]; coefficient of the heating correlation
-    "coefficients cos_trim sin_trim cos_tilted sin_tilted "  # place of the table over Mach, or -1; of body axes
+    "cos_trim sin_trim cos_tilted sin_tilted "  # of the body axis and the accelerometer's
     "cos_bank sin_bank cos_rolled sin_rolled roll_at roll_back_at "  # lift directions; sines of flight-path angles
-    "stop exit stop_time "
+    "stop_altitude exit stop_time "
     "ex ey ez fx fy fz nx ny nz "  # unit vectors to the planned entry place, ahead and to the right of it
-    "radius heading speed path aim_down aim_cross aimed tx ty tz "  # of the ground; entry over ground; target
+    "radius heading speed path aim_down target_crossrange aimed tx ty tz "  # of the ground; entry over ground; target
     "first_bank bank_error bank_lag bank_rate_limit reversal_floor reversal_width load_limit "
-    "reference planned_range planned_share planned_lift_to_drag "  # place in the tables; what the laws know
-    "sensed cos_misaligned sin_misaligned accelerometer_bias accelerometer_scale accelerometer_noise "
-    "weather corridor_load corridor_heat_rate corridor_heat_load corridor_pressure "
-    "nav_range nav_altitude nav_speed nav_path nav_climb",
+    "reference planned_range planned_share planned_lift_to_drag "  # index in the tables; what the laws know
+    "sensed cos_misaligned sin_misaligned accelerometer_bias accelerometer_scale_error accelerometer_noise weather "
+    "corridor_load corridor_heat_rate corridor_heat_load corridor_dynamic_pressure "
+    "nav_range_error nav_altitude_error nav_speed_error nav_flight_path_angle_error nav_climb_error",
 )
 Events = namedtuple("Events", "pressure_peak heat_peak pull_out roll leave stop left over")
 Place = namedtuple("Place", "altitude climb ux uy uz")  # climb: rate of the altitude; u: unit vector up
@@ -57,20 +75,11 @@ Force = namedtuple("Force", "drag lift total axial sensed")
 # what peaks, and where: dynamic pressure [Pa], heat rate [W/m^2], altitude [m], speed over ground [m/s], `Force`
 Exposure = namedtuple("Exposure", "pressure flux altitude speed force")
 
-# settings arrive as numbers: places in the lists of words of `model.py`
-FLAT = 2.0
-J2, NO_GRAVITY = 0.0, 2.0
-SUTTON_GRAVES = 0.0
-UNGUIDED = 0.0
-STOP_ON_EXIT = 0.0
-NEVER = -1.0  # value of an event that is not looked for
-UNKNOWN = 1e300  # the pull-out has not come
-
 
 @physics
-def initial(p, o):
+def initial(p):
     """State at entry."""
-    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz, 0.0)
+    return State(x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz, heat_load=0.0)
 
 
 @physics
@@ -80,8 +89,7 @@ def place_of(s, p, o):
     The rate is that of r less the ellipsoid's radius: r' - (dR/d sin^2) (sin^2)', derived here with sin = z / r.
     """
     if o.shape == FLAT:
-        zero = 0.0 * s.x
-        altitude, climb, ux, uy, uz = s.z + zero, s.vz + zero, zero, zero, 1.0 + zero
+        place = Place(altitude=s.z, climb=s.vz, ux=0.0, uy=0.0, uz=1.0)
     else:
         r2 = s.x * s.x + s.y * s.y + s.z * s.z
         inverse2 = 1.0 / r2
@@ -91,8 +99,8 @@ def place_of(s, p, o):
         radial = (s.x * s.vx + s.y * s.vy + s.z * s.vz) * inverse
         # rate of the squared sine of latitude, z^2 / r^2
         climb = radial - slope * (2.0 * s.z * inverse2 * (s.vz - s.z * radial * inverse))
-        ux, uy, uz = s.x * inverse, s.y * inverse, s.z * inverse
-    return Place(altitude, climb, ux, uy, uz)
+        place = Place(altitude, climb, ux=s.x * inverse, uy=s.y * inverse, uz=s.z * inverse)
+    return place
 
 
 @physics
@@ -102,7 +110,7 @@ def air_of(s, place, p, o):
     Derived here: shear = -(V . dW/dh), by which the speed through the air changes per metre climbed, times that speed.
     """
     value, slope, temperature = logarithm_of_density(place.altitude, p, o)
-    vx, vy, vz, shear = s.vx, s.vy, s.vz, 0.0 * s.vx
+    vx, vy, vz, shear = s.vx, s.vy, s.vz, 0.0
     if o.weather > 0.5:
         w = weather_at(place.altitude, p.weather, o.tables)
         value, slope = value + w.density, slope + w.density_slope
@@ -112,29 +120,31 @@ def air_of(s, place, p, o):
         nx, ny = -place.uz * place.ux * inverse, -place.uz * place.uy * inverse
         vx, vy, vz = vx - w.east * ex - w.north * nx, vy - w.east * ey - w.north * ny, vz - w.north * level
         shear = -(w.east_slope * (vx * ex + vy * ey) + w.north_slope * (vx * nx + vy * ny + vz * level))
-    return Air(p.density * exp(value), slope, temperature, vx, vy, vz, shear)
+    return Air(p.density_factor * exp(value), slope, temperature, vx, vy, vz, shear)
 
 
 @physics
 def force_of(air, speed, p, o):
-    """Areas over mass at a speed [m/s] through the air; by the Mach number if the vehicle has a table of it."""
-    drag, lift, total, axial, sensed = p.drag, p.lift, p.total, p.axial, p.sensed
-    if any_lane(p.coefficients >= 0.0):
-        of_drag, of_lift = over_mach(o.tables, p.coefficients, speed / sound_speed(air.temperature))
+    """Areas over mass at a speed [m/s] through the air; by the Mach number if the vehicle has curves over it."""
+    force = Force(p.drag, p.lift, p.total, p.axial, p.sensed)
+    if o.vehicle == APOLLO:
+        of_drag, of_lift = apollo_shares(speed / sound_speed(air.temperature))
         drag, lift = of_drag * p.drag, of_lift * p.lift
-        total = sqrt(drag * drag + lift * lift)
-        axial = axial_coefficient(drag, lift, p.cos_trim, p.sin_trim)
-        sensed = axial_coefficient(drag, lift, p.cos_tilted, p.sin_tilted)
-    return Force(drag, lift, total, axial, sensed)
+        force = Force(
+            drag, lift, total=sqrt(drag * drag + lift * lift),
+            axial=axial_coefficient(drag, lift, p.cos_trim, p.sin_trim),
+            sensed=axial_coefficient(drag, lift, p.cos_tilted, p.sin_tilted),
+        )  # fmt: skip
+    return force
 
 
 @physics
 def field(s, p, o):
     """Acceleration [m/s^2] by gravity and, on a turning planet, the centrifugal force."""
     if o.gravity == NO_GRAVITY:
-        gx, gy, gz = 0.0 * s.x, 0.0 * s.y, 0.0 * s.z
+        gx, gy, gz = 0.0, 0.0, 0.0
     elif o.shape == FLAT:
-        gx, gy, gz = 0.0 * s.x, 0.0 * s.y, -p.gravity + 0.0 * s.z
+        gx, gy, gz = 0.0, 0.0, -p.gravity
     else:
         gx, gy, gz = point_mass(s.x, s.y, s.z, p.mu)
     if o.gravity == J2:
@@ -164,9 +174,9 @@ def speed2(s):
 def bank_of(t, m, o):
     """(cosine, sine) of the bank angle [rad]; the sine is 0 in a planar flight."""
     if o.guidance == UNGUIDED:
-        cosine, sine = m.cos_bank, m.sin_bank
+        cosine, sine = m.met.lift.cos_bank, m.met.lift.sin_bank
     else:
-        sine, cosine = sincos(angle_at(t, m, o.guidance_period))
+        sine, cosine = sincos(angle_at(t, m.steering.turn, o.guidance_period))
         sine = (1.0 - o.planar) * sine
     return cosine, sine
 
@@ -187,11 +197,11 @@ def rhs(t, s, m, p, o):
         lx, ly, lz = lift_direction(air.vx, air.vy, air.vz, place.ux, place.uy, place.uz, v, cos_bank, sin_bank)
         lift = push * v * force.lift
         ax, ay, az = ax + lift * lx, ay + lift * ly, az + lift * lz
-    return State(s.vx, s.vy, s.vz, ax, ay, az, heat_rate(air.density, v, p, o))
+    return State(x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az, heat_load=heat_rate(air.density, v, p, o))
 
 
 @physics
-def events(t, s, m, p, o):
+def crossings(t, s, m, p, o):
     """Peaks of dynamic pressure and heat rate, pull-out, rolls, and the ends of the flight.
 
     A peak is where the rate falls through zero.  Both quantities are rho^a V^b, whose logarithm has the rate
@@ -209,18 +219,18 @@ def events(t, s, m, p, o):
     thicker = air.slope * place.climb * v2
     power = 3.0 if o.heating == SUTTON_GRAVES else DKR_EXPONENT
     sine = (s.vx * place.ux + s.vy * place.uy + s.vz * place.uz) / where(v > 0.0, v, 1.0)  # winds are level
-    roll = where(m.rolls == 0.0, sine - p.roll_at, where(m.rolls == 1.0, p.roll_back_at - sine, NEVER))
+    rolls = m.met.lift.rolls
     above = place.altitude - p.exit
     stops = o.on_exit == STOP_ON_EXIT
     return Events(
-        thicker + 2.0 * gain,
-        0.5 * thicker + power * gain,
-        where(m.low < UNKNOWN, NEVER, place.climb),
-        roll,
-        NEVER + 0.0 * above if stops else above,
-        place.altitude - p.stop,
-        above if stops else NEVER + 0.0 * above,
-        p.stop_time - t,
+        pressure_peak=thicker + 2.0 * gain,
+        heat_peak=0.5 * thicker + power * gain,
+        pull_out=where(m.met.pull_out.altitude < UNKNOWN, NEVER, place.climb),
+        roll=where(rolls == 0.0, sine - p.roll_at, where(rolls == 1.0, p.roll_back_at - sine, NEVER)),
+        leave=NEVER if stops else above,
+        stop=place.altitude - p.stop_altitude,
+        left=above if stops else NEVER,
+        over=p.stop_time - t,
     )
 
 
@@ -237,33 +247,30 @@ def exposure_of(s, p, o):
 
 @physics
 def start(p, o):
-    """Memory at entry, SI: peaks begin with the values there."""
-    pressure, flux, altitude, v, force = exposure_of(initial(p, o), p, o)
-    zero = 0.0 * v
-    unknown = zero + UNKNOWN
-    return Memory(
-        pressure=pressure, pressure_time=zero, pressure_altitude=altitude, pressure_speed=v, pressure_total=force.total,
-        pressure_axial=force.axial, flux=flux, flux_time=zero, flux_altitude=altitude, flux_speed=v,
-        low=unknown, low_time=unknown, cos_bank=p.cos_bank, sin_bank=p.sin_bank,
-        rolls=zero, exits=zero, exit_time=unknown, exit_speed=unknown, exit_angle=unknown, exit_inertial=unknown,
-        exit_apoapsis=unknown,
-        sampled=zero, bank=p.first_bank, bank_rate=zero, next_bank=p.first_bank, next_rate=zero,
-        side=where(p.first_bank < 0.0, -1.0, 1.0), active=zero,
-        lost=zero, reckoned=zero, range_rate=zero, axial=zero, excess=zero, samples=zero, saturated=zero,
-        reversals=zero,
-    )  # fmt: skip
+    """The discrete state at entry, SI: peaks begin with the values there."""
+    pressure, flux, altitude, v, force = exposure_of(initial(p), p, o)
+    met = Met(
+        pressure=Peak(pressure, 0.0, altitude, v),
+        loads=Loads(force.total, force.axial),
+        flux=Peak(flux, 0.0, altitude, v),
+        pull_out=PullOut(),
+        lift=Lift(p.cos_bank, p.sin_bank, rolls=0.0),
+        exits=0.0,
+        first_exit=Exit(),
+    )
+    turn = Turn(bank=p.first_bank, next_bank=p.first_bank)
+    return Memory(met, Steering(turn, Reckoning(), side=where(p.first_bank < 0.0, -1.0, 1.0)))
 
 
 @physics
-def exit_of(s, p, o):
-    """(speed, flight-path angle, inertial speed, apoapsis altitude [m]) of a vehicle that leaves the atmosphere.
+def exit_of(t, s, p, o):
+    """The `Exit` of a vehicle that leaves the atmosphere, SI.
 
-    SI; relative to the ground but for the inertial speed.  The apoapsis is that of a point mass; on a hyperbola, and
-    over a flat Earth, it is UNKNOWN.
+    The apoapsis is that of a point mass; on a hyperbola, and over a flat Earth, it is UNKNOWN.
     """
     v = sqrt(speed2(s))
     if o.shape == FLAT:
-        angle, inertial, apoapsis = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy)), v, UNKNOWN + 0.0 * v
+        angle, inertial, apoapsis = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy)), v, UNKNOWN
     else:
         angle = velocity_angles(s.x, s.y, s.z, s.vx, s.vy, s.vz)[0]
         wx, wy = s.vx - p.rate * s.y, s.vy + p.rate * s.x
@@ -275,56 +282,28 @@ def exit_of(s, p, o):
         a = 1.0 / where(bound, inverse_a, 1.0)
         e2 = maximum(1.0 - (hx * hx + hy * hy + hz * hz) / (p.mu * a), 0.0)
         inertial, apoapsis = sqrt(w2), where(bound, a * (1.0 + sqrt(e2)) - p.radius, UNKNOWN)
-    return v, angle, inertial, apoapsis
+    return Exit(t, v, angle, inertial, apoapsis)
 
 
 @physics
 def switch(t, s, m, p, o, hit):
     """Keep the larger of each peak, the first pull-out and the first exit, SI; change the bank where a roll is due."""
     pressure, flux, altitude, v, force = exposure_of(s, p, o)
-    push = (hit.pressure_peak > 0.5) & (pressure > m.pressure)
-    heat = (hit.heat_peak > 0.5) & (flux > m.flux)
-    low = hit.pull_out > 0.5
+    met, lift = m.met, m.met.lift
+    push = (hit.pressure_peak > 0.5) & (pressure > met.pressure.value)
+    heat = (hit.heat_peak > 0.5) & (flux > met.flux.value)
     roll = hit.roll > 0.5
     leaving = hit.leave > 0.5
-    first = leaving & (m.exits == 0.0)
-    speed, angle, inertial, apoapsis = exit_of(s, p, o)
-    over = roll & (m.rolls == 0.0)
-    return s, Memory(
-        pressure=where(push, pressure, m.pressure),
-        pressure_time=where(push, t, m.pressure_time),
-        pressure_altitude=where(push, altitude, m.pressure_altitude),
-        pressure_speed=where(push, v, m.pressure_speed),
-        pressure_total=where(push, force.total, m.pressure_total),
-        pressure_axial=where(push, force.axial, m.pressure_axial),
-        flux=where(heat, flux, m.flux),
-        flux_time=where(heat, t, m.flux_time),
-        flux_altitude=where(heat, altitude, m.flux_altitude),
-        flux_speed=where(heat, v, m.flux_speed),
-        low=where(low, altitude, m.low),
-        low_time=where(low, t, m.low_time),
-        cos_bank=where(over, p.cos_rolled, where(roll, p.cos_bank, m.cos_bank)),
-        sin_bank=where(over, p.sin_rolled, where(roll, p.sin_bank, m.sin_bank)),
-        rolls=where(roll, m.rolls + 1.0, m.rolls),
-        exits=where(leaving, m.exits + 1.0, m.exits),
-        exit_time=where(first, t, m.exit_time),
-        exit_speed=where(first, speed, m.exit_speed),
-        exit_angle=where(first, angle, m.exit_angle),
-        exit_inertial=where(first, inertial, m.exit_inertial),
-        exit_apoapsis=where(first, apoapsis, m.exit_apoapsis),
-        sampled=m.sampled,
-        bank=m.bank,
-        bank_rate=m.bank_rate,
-        next_bank=m.next_bank,
-        next_rate=m.next_rate,
-        side=m.side,
-        active=m.active,
-        lost=m.lost,
-        reckoned=m.reckoned,
-        range_rate=m.range_rate,
-        axial=m.axial,
-        excess=m.excess,
-        samples=m.samples,
-        saturated=m.saturated,
-        reversals=m.reversals,
-    )
+    over = roll & (lift.rolls == 0.0)
+    now = Met(
+        pressure=where(push, Peak(pressure, t, altitude, v), met.pressure),
+        loads=where(push, Loads(force.total, force.axial), met.loads),
+        flux=where(heat, Peak(flux, t, altitude, v), met.flux),
+        pull_out=where(hit.pull_out > 0.5, PullOut(altitude, t), met.pull_out),
+        lift=where(
+            over, Lift(p.cos_rolled, p.sin_rolled, 1.0), where(roll, Lift(p.cos_bank, p.sin_bank, 2.0), lift)
+        ),
+        exits=where(leaving, met.exits + 1.0, met.exits),
+        first_exit=where(leaving & (met.exits == 0.0), exit_of(t, s, p, o), met.first_exit),
+    )  # fmt: skip
+    return s, Memory(now, m.steering)

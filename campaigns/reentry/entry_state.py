@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.reentry.inputs import SHAPES
+from campaigns.reentry.inputs import ELLIPSOID, FLAT, HYPERBOLA, INERTIAL
 from campaigns.reentry.planets import of_planets
 from mc_engine.model import Refusals
 from mc_engine.physics.frames import (
@@ -15,10 +15,6 @@ from mc_engine.physics.frames import (
     radius_at_altitude,
     velocity_components,
 )
-
-ELLIPSOID, FLAT = float(SHAPES.index("ellipsoid")), float(SHAPES.index("flat"))
-INERTIAL = 0.0
-HYPERBOLA = 1.0
 
 
 @dataclass

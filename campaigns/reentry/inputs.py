@@ -2,158 +2,147 @@
 
 from campaigns.reentry.planets import PLANETS
 from campaigns.reentry.vehicles import VEHICLES
-from mc_engine.model import Parameter, Setting
+from mc_engine.model import Parameter, Setting, inputs
 
-SHAPES = ("ellipsoid", "sphere", "flat")
 GUIDANCE = ("none", "law1", "law2", "law2r", "law3", "law3r", "apollo")
-PLANS = ("entry", "given")
 
-PARAMETERS = (
-    Parameter("entry_speed_m_s", "m/s", "speed at entry, in the frame speed_frame", 7800.0, low=0.0),
-    Parameter("entry_flight_path_angle_deg", "deg", "flight-path angle at entry, negative down", -2.0, -90.0, 90.0),
-    Parameter("entry_heading_deg", "deg", "heading at entry, from north, clockwise", 90.0, -360.0, 360.0),
-    Parameter("entry_latitude_deg", "deg", "geocentric latitude of entry", 0.0, -90.0, 90.0),
-    Parameter("entry_longitude_deg", "deg", "longitude of entry, east", 0.0, -360.0, 360.0),
-    Parameter("entry_altitude_km", "km", "geodetic altitude of entry", 120.0, low=0.0),
-    Parameter(
-        "entry_radius_km", "km", "distance of entry from the planet's centre; 0 takes entry_altitude_km", 0.0, 0.0
+Inputs = inputs(
+    entry_speed_m_s=Parameter(7800.0, "speed at entry, in the frame speed_frame", low=0.0),
+    entry_flight_path_angle_deg=Parameter(-2.0, "flight-path angle at entry, negative down", low=-90.0, high=90.0),
+    entry_heading_deg=Parameter(90.0, "heading at entry, from north, clockwise", low=-360.0, high=360.0),
+    entry_latitude_deg=Parameter(0.0, "geocentric latitude of entry", low=-90.0, high=90.0),
+    entry_longitude_deg=Parameter(0.0, "longitude of entry, east", low=-360.0, high=360.0),
+    entry_altitude_km=Parameter(120.0, "geodetic altitude of entry", low=0.0),
+    entry_radius_km=Parameter(0.0, "distance of entry from the planet's centre; 0 takes entry_altitude_km", low=0.0),
+    excess_speed_m_s=Parameter(3000.0, "hyperbolic excess speed of an arrival from far away", low=0.0),
+    vacuum_periapsis_km=Parameter(80.0, "altitude of the periapsis of that arrival, were there no air"),
+    entry_speed_error_m_s=Parameter(0.0, "error of the speed at entry"),
+    entry_flight_path_angle_error_deg=Parameter(0.0, "error of the flight-path angle at entry", low=-90.0, high=90.0),
+    entry_heading_error_deg=Parameter(0.0, "error of the heading at entry", low=-360.0, high=360.0),
+    entry_latitude_error_deg=Parameter(0.0, "error of the latitude of entry", low=-90.0, high=90.0),
+    entry_longitude_error_deg=Parameter(0.0, "error of the longitude of entry", low=-360.0, high=360.0),
+    entry_altitude_error_km=Parameter(0.0, "error of the altitude of entry"),
+    mass_kg=Parameter(5498.22, "mass", low=1e-6),
+    reference_area_m2=Parameter(12.017, "area that the coefficients belong to", low=0.0),
+    drag_coefficient=Parameter(1.2569, "drag coefficient", low=0.0, unit=""),
+    lift_coefficient=Parameter(0.37707, "lift coefficient, 0.30 of the drag coefficient", unit=""),
+    trim_angle_deg=Parameter(0.0, "trim angle of attack: turns drag and lift into axial force", low=-90.0, high=90.0),
+    nose_radius_m=Parameter(3.05, "radius of the nose, for the heating", low=1e-6),
+    mass_factor=Parameter(1.0, "true over planned mass", low=1e-6, unit=""),
+    cd_factor=Parameter(1.0, "true over planned drag coefficient; the lift grows alike", low=0.0, unit=""),
+    ld_factor=Parameter(1.0, "true over planned lift-to-drag ratio", unit=""),
+    nose_radius_factor=Parameter(1.0, "true over planned nose radius", low=1e-6, unit=""),
+    heating_factor=Parameter(1.0, "true over computed heat rate", low=0.0, unit=""),
+    density_factor=Parameter(1.0, "true over standard density, at all altitudes", low=0.0, unit=""),
+    density_deviation=Parameter(
+        0.0, "slow density error, in sigmas of its profile over altitude", low=-10.0, high=10.0, unit=""
     ),
-    Parameter("excess_speed_m_s", "m/s", "hyperbolic excess speed of an arrival from far away", 3000.0, low=0.0),
-    Parameter("vacuum_periapsis_km", "km", "altitude of the periapsis of that arrival, were there no air", 80.0),
-    Parameter("entry_speed_error_m_s", "m/s", "error of the speed at entry", 0.0),
-    Parameter("entry_flight_path_angle_error_deg", "deg", "error of the flight-path angle at entry", 0.0, -90.0, 90.0),
-    Parameter("entry_heading_error_deg", "deg", "error of the heading at entry", 0.0, -360.0, 360.0),
-    Parameter("entry_latitude_error_deg", "deg", "error of the latitude of entry", 0.0, -90.0, 90.0),
-    Parameter("entry_longitude_error_deg", "deg", "error of the longitude of entry", 0.0, -360.0, 360.0),
-    Parameter("entry_altitude_error_km", "km", "error of the altitude of entry", 0.0),
-    Parameter("mass_kg", "kg", "mass", 5498.22, low=1e-6),
-    Parameter("reference_area_m2", "m^2", "area that the coefficients belong to", 12.017, low=0.0),
-    Parameter("drag_coefficient", "", "drag coefficient", 1.2569, low=0.0),
-    Parameter("lift_coefficient", "", "lift coefficient, 0.30 of the drag coefficient", 0.37707),
-    Parameter("trim_angle_deg", "deg", "trim angle of attack: turns drag and lift into axial force", 0.0, -90.0, 90.0),
-    Parameter("nose_radius_m", "m", "radius of the nose, for the heating", 3.05, low=1e-6),
-    Parameter("mass_factor", "", "true over planned mass", 1.0, low=1e-6),
-    Parameter("cd_factor", "", "true over planned drag coefficient; the lift grows alike", 1.0, low=0.0),
-    Parameter("ld_factor", "", "true over planned lift-to-drag ratio", 1.0),
-    Parameter("nose_radius_factor", "", "true over planned nose radius", 1.0, low=1e-6),
-    Parameter("heating_factor", "", "true over computed heat rate", 1.0, low=0.0),
-    Parameter("density_factor", "", "true over standard density, at all altitudes", 1.0, low=0.0),
-    Parameter("density_deviation", "", "slow density error, in sigmas of its profile over altitude", 0.0, -10.0, 10.0),
-    Parameter(
-        "weather_draw",
-        "",
+    weather_draw=Parameter(
+        0.0,
         "names the air of the day: another number, another air; 0 is the mean one",
-        default=0.0,
         low=0.0,
         high=1.0,
         random_draw=True,
+        unit="",
     ),
-    Parameter("density_random_size", "", "size of the random density, in multiples of weather.py", 1.0, low=0.0),
-    Parameter("wind_random_size", "", "size of the random winds, in multiples of weather.py", 1.0, low=0.0),
-    Parameter("wind_mean_size", "", "size of the mean wind, in multiples of weather.py", 1.0),
-    Parameter("bank_deg", "deg", "bank angle: 0 lift up, 90 to the right, 180 down", 60.0, -360.0, 360.0),
-    Parameter("bank_error_deg", "deg", "error of every bank angle", 0.0, -360.0, 360.0),
-    Parameter(
-        "roll_flight_path_angle_deg", "deg", "climbing through this angle, roll to rolled_bank_deg", 90.0, -90, 90
+    density_random_size=Parameter(1.0, "size of the random density, in multiples of weather.py", low=0.0, unit=""),
+    wind_random_size=Parameter(1.0, "size of the random winds, in multiples of weather.py", low=0.0, unit=""),
+    wind_mean_size=Parameter(1.0, "size of the mean wind, in multiples of weather.py", unit=""),
+    bank_deg=Parameter(60.0, "bank angle: 0 lift up, 90 to the right, 180 down", low=-360.0, high=360.0),
+    bank_error_deg=Parameter(0.0, "error of every bank angle", low=-360.0, high=360.0),
+    roll_flight_path_angle_deg=Parameter(
+        90.0, "climbing through this angle, roll to rolled_bank_deg", low=-90.0, high=90.0
     ),
-    Parameter("rolled_bank_deg", "deg", "bank angle after that roll", 180.0, -360.0, 360.0),
-    Parameter("roll_back_flight_path_angle_deg", "deg", "sinking through this angle, roll back", -90.0, -90.0, 90.0),
-    Parameter("stop_altitude_km", "km", "geodetic altitude at which the flight ends on the way down", 10.0),
-    Parameter(
-        "exit_altitude_km", "km", "altitude at which a rising vehicle leaves; 0 takes that of entry", 0.0, low=0.0
+    rolled_bank_deg=Parameter(180.0, "bank angle after that roll", low=-360.0, high=360.0),
+    roll_back_flight_path_angle_deg=Parameter(-90.0, "sinking through this angle, roll back", low=-90.0, high=90.0),
+    stop_altitude_km=Parameter(10.0, "geodetic altitude at which the flight ends on the way down"),
+    exit_altitude_km=Parameter(0.0, "altitude at which a rising vehicle leaves; 0 takes that of entry", low=0.0),
+    stop_time_s=Parameter(1e9, "time at which the flight ends, wherever it is", low=0.0),
+    target_downrange_km=Parameter(
+        0.0, "planned distance to the end; 0: of a law's reference path, without a law no target", low=0.0
     ),
-    Parameter("stop_time_s", "s", "time at which the flight ends, wherever it is", 1e9, low=0.0),
-    Parameter(
-        "target_downrange_km",
-        "km",
-        "planned distance to the end; 0: of a law's reference path, without a law no target",
-        0.0,
-        low=0.0,
-    ),
-    Parameter("target_crossrange_km", "km", "planned distance to the right", 0.0),
-    Parameter("corridor_load_g", "g", "limit of the load", 10.0, low=0.0),
-    Parameter("corridor_heat_rate_w_m2", "W/m^2", "limit of the heat rate", 1e12, low=0.0),
-    Parameter("corridor_heat_load_j_m2", "J/m^2", "limit of the heat load", 1e15, low=0.0),
-    Parameter("corridor_dynamic_pressure_pa", "Pa", "limit of the dynamic pressure", 1e9, low=0.0),
-    Parameter("bank_lag_s", "s", "time by which the bank follows a slow command late; 0 is at once", 0.0, low=0.0),
-    Parameter("bank_rate_limit_deg_s", "deg/s", "largest rate of the bank", 20.0, low=1e-3),
-    Parameter("reversal_floor_km", "km", "lateral miss at which the lift changes sides, at no speed", 1.0, low=0.0),
-    Parameter(
-        "reversal_width_km", "km", "what is added to it at the planned speed, falling with its square", 40.0, low=0.0
-    ),
-    Parameter("load_limit_g", "g", "load above which a law asks for all its lift upwards", 10.0, low=0.0),
-    Parameter("nav_range_error_km", "km", "navigated less true range", 0.0),
-    Parameter("nav_altitude_error_m", "m", "navigated less true altitude", 0.0),
-    Parameter("nav_speed_error_m_s", "m/s", "navigated less true speed", 0.0),
-    Parameter("nav_flight_path_angle_error_deg", "deg", "navigated less true flight-path angle", 0.0, -90.0, 90.0),
-    Parameter("nav_climb_error_m_s", "m/s", "navigated less true altitude rate", 0.0),
-    Parameter("accelerometer_bias_g", "g", "measured less true deceleration", 0.0),
-    Parameter("accelerometer_scale_error", "", "error of the measured deceleration, in shares of it", 0.0),
-    Parameter("accelerometer_misalignment_deg", "deg", "of the accelerometer's axis, towards the normal force", 0.0),
-    Parameter("accelerometer_noise_g", "g", "1-sigma of a fresh error at every sample", 0.0, low=0.0),
-    Parameter("surface_radius_km", "km", "equatorial radius; 0 takes that of the planet", 0.0, low=0.0),
-)
-SETTINGS = (
-    Setting("planet", "", "planet", "earth", tuple(PLANETS)),
-    Setting(
-        "shape",
-        "",
-        "shape of the planet; one without an ellipsoid of its own, as Mars, is a sphere",
+    target_crossrange_km=Parameter(0.0, "planned distance to the right"),
+    corridor_load_g=Parameter(10.0, "limit of the load", low=0.0),
+    corridor_heat_rate_w_m2=Parameter(1e12, "limit of the heat rate", low=0.0),
+    corridor_heat_load_j_m2=Parameter(1e15, "limit of the heat load", low=0.0),
+    corridor_dynamic_pressure_pa=Parameter(1e9, "limit of the dynamic pressure", low=0.0),
+    bank_lag_s=Parameter(0.0, "time by which the bank follows a slow command late; 0 is at once", low=0.0),
+    bank_rate_limit_deg_s=Parameter(20.0, "largest rate of the bank", low=1e-3),
+    reversal_floor_km=Parameter(1.0, "lateral miss at which the lift changes sides, at no speed", low=0.0),
+    reversal_width_km=Parameter(40.0, "what is added to it at the planned speed, falling with its square", low=0.0),
+    load_limit_g=Parameter(10.0, "load above which a law asks for all its lift upwards", low=0.0),
+    nav_range_error_km=Parameter(0.0, "navigated less true range"),
+    nav_altitude_error_m=Parameter(0.0, "navigated less true altitude"),
+    nav_speed_error_m_s=Parameter(0.0, "navigated less true speed"),
+    nav_flight_path_angle_error_deg=Parameter(0.0, "navigated less true flight-path angle", low=-90.0, high=90.0),
+    nav_climb_error_m_s=Parameter(0.0, "navigated less true altitude rate"),
+    accelerometer_bias_g=Parameter(0.0, "measured less true deceleration"),
+    accelerometer_scale_error=Parameter(0.0, "error of the measured deceleration, in shares of it", unit=""),
+    accelerometer_misalignment_deg=Parameter(0.0, "of the accelerometer's axis, towards the normal force"),
+    accelerometer_noise_g=Parameter(0.0, "1-sigma of a fresh error at every sample", low=0.0),
+    surface_radius_km=Parameter(0.0, "equatorial radius; 0 takes that of the planet", low=0.0),
+    planet=Setting("earth", "planet", choices=tuple(PLANETS)),
+    shape=Setting(
         "ellipsoid",
-        SHAPES,
+        "shape of the planet; one without an ellipsoid of its own, as Mars, is a sphere",
+        choices=("ellipsoid", "sphere", "flat"),
     ),
-    Setting("planar", "", "no lift to the side: banking takes lift out of the vertical plane, and that is all", False),
-    Setting("gravity", "", "gravity", "j2", ("j2", "point", "none")),
-    Setting("rotating", "", "the planet turns", True),
-    Setting("atmosphere", "", "density over altitude", "us76", ("us76", "exponential")),
-    Setting("weather", "", "random density and winds over altitude, of each case", False),
-    Setting("heating", "", "correlation of the heat rate", "sutton_graves", ("sutton_graves", "detra_kemp_riddell")),
-    Setting("speed_frame", "", "frame of the speed at entry", "inertial", ("inertial", "relative")),
-    Setting(
-        "arrival", "", "whether the entry is given by its state or by a hyperbola", "state", ("state", "hyperbola")
+    planar=Setting(False, "no lift to the side: banking takes lift out of the vertical plane, and that is all"),
+    gravity=Setting("j2", "gravity", choices=("j2", "point", "none")),
+    rotating=Setting(True, "the planet turns"),
+    atmosphere=Setting("us76", "density over altitude", choices=("us76", "exponential")),
+    weather=Setting(False, "random density and winds over altitude, of each case"),
+    heating=Setting("sutton_graves", "correlation of the heat rate", choices=("sutton_graves", "detra_kemp_riddell")),
+    speed_frame=Setting("inertial", "frame of the speed at entry", choices=("inertial", "relative")),
+    arrival=Setting(
+        "state", "whether the entry is given by its state or by a hyperbola", choices=("state", "hyperbola")
     ),
-    Setting("vehicle", "", "a vehicle of vehicles.py, or the one given here", "given", ("given", *VEHICLES)),
-    Setting("on_exit", "", "what happens when the vehicle leaves the atmosphere", "stop", ("stop", "continue")),
-    Setting("guidance", "", "guidance law", "none", GUIDANCE),
-    Setting("guidance_period_s", "s", "time from one command of the law to the next", 1.0, low=0.01, high=100.0),
-    Setting(
-        "plan",
-        "",
-        "what distances and reference path count from: each case's own entry without errors, or plan_...",
+    vehicle=Setting("given", "a vehicle of vehicles.py, or the one given here", choices=("given", *VEHICLES)),
+    on_exit=Setting("stop", "what happens when the vehicle leaves the atmosphere", choices=("stop", "continue")),
+    guidance=Setting("none", "guidance law", choices=GUIDANCE),
+    guidance_period_s=Setting(1.0, "time from one command of the law to the next", low=0.01, high=100.0),
+    plan=Setting(
         "entry",
-        PLANS,
+        "what distances and reference path count from: each case's own entry without errors, or plan_...",
+        choices=("entry", "given"),
     ),
-    Setting("plan_speed_m_s", "m/s", "planned speed at entry, in the frame speed_frame", 7800.0, low=1.0),
-    Setting("plan_flight_path_angle_deg", "deg", "planned flight-path angle at entry", -2.0, low=-90.0, high=90.0),
-    Setting("plan_heading_deg", "deg", "planned heading at entry, from north, clockwise", 90.0, low=-360.0, high=360.0),
-    Setting("plan_latitude_deg", "deg", "planned geocentric latitude of entry", 0.0, low=-90.0, high=90.0),
-    Setting("plan_longitude_deg", "deg", "planned longitude of entry", 0.0, low=-360.0, high=360.0),
-    Setting("plan_altitude_km", "km", "planned geodetic altitude of entry", 120.0, low=1.0),
-    Setting(
-        "plan_radius_km",
-        "km",
-        "planned distance of entry from the planet's centre; 0 takes plan_altitude_km",
-        0.0,
-        low=0.0,
+    plan_speed_m_s=Setting(7800.0, "planned speed at entry, in the frame speed_frame", low=1.0),
+    plan_flight_path_angle_deg=Setting(-2.0, "planned flight-path angle at entry", low=-90.0, high=90.0),
+    plan_heading_deg=Setting(90.0, "planned heading at entry, from north, clockwise", low=-360.0, high=360.0),
+    plan_latitude_deg=Setting(0.0, "planned geocentric latitude of entry", low=-90.0, high=90.0),
+    plan_longitude_deg=Setting(0.0, "planned longitude of entry", low=-360.0, high=360.0),
+    plan_altitude_km=Setting(120.0, "planned geodetic altitude of entry", low=1.0),
+    plan_radius_km=Setting(
+        0.0, "planned distance of entry from the planet's centre; 0 takes plan_altitude_km", low=0.0
     ),
-    Setting(
-        "plan_ballistic_coefficient_kg_m2",
-        "kg/m^2",
-        "of the planned vehicle; one of vehicles.py brings its own",
+    plan_ballistic_coefficient_kg_m2=Setting(
         5498.22 / (12.017 * 1.2569),
-        low=1e-3,
-    ),
-    Setting("plan_lift_to_drag", "", "of the planned vehicle; one of vehicles.py brings its own", 0.30, low=1e-3),
-    Setting(
-        "plan_trim_angle_deg",
-        "deg",
         "of the planned vehicle; one of vehicles.py brings its own",
-        0.0,
-        low=-90.0,
-        high=90.0,
+        low=1e-3,
+        unit="kg/m^2",
     ),
-    Setting("plan_bank_deg", "deg", "bank of the reference path", 60.0, low=0.0, high=165.0),
-    Setting("plan_stop_altitude_km", "km", "altitude at which the reference path ends", 10.0, low=0.0),
-    Setting("tolerance", "", "relative error of an integration step", 1e-8, low=1e-14, high=1e-3),
-    Setting("time_limit_s", "s", "longest flight; a case that has not ended by then is no-stop", 20_000.0, low=1.0),
+    plan_lift_to_drag=Setting(0.30, "of the planned vehicle; one of vehicles.py brings its own", low=1e-3, unit=""),
+    plan_trim_angle_deg=Setting(0.0, "of the planned vehicle; one of vehicles.py brings its own", low=-90.0, high=90.0),
+    plan_bank_deg=Setting(60.0, "bank of the reference path", low=0.0, high=165.0),
+    plan_stop_altitude_km=Setting(10.0, "altitude at which the reference path ends", low=0.0),
+    tolerance=Setting(1e-8, "relative error of an integration step", low=1e-14, high=1e-3, unit=""),
+    time_limit_s=Setting(20_000.0, "longest flight; a case that has not ended by then is no-stop", low=1.0),
 )
+
+
+def _code(name: str, word: str) -> float:
+    """The number that stands for a word of a setting inside physics."""
+    return next(float(item.code(word)) for item in Inputs.declared if item.name == name)
+
+
+EARTH = _code("planet", "earth")
+ELLIPSOID, FLAT = _code("shape", "ellipsoid"), _code("shape", "flat")
+J2, NO_GRAVITY = _code("gravity", "j2"), _code("gravity", "none")
+US76 = _code("atmosphere", "us76")
+SUTTON_GRAVES, DETRA_KEMP_RIDDELL = _code("heating", "sutton_graves"), _code("heating", "detra_kemp_riddell")
+INERTIAL = _code("speed_frame", "inertial")
+HYPERBOLA = _code("arrival", "hyperbola")
+APOLLO = _code("vehicle", "apollo")
+STOP_ON_EXIT = _code("on_exit", "stop")
+PLAN_IS_GIVEN = _code("plan", "given")
+UNGUIDED, LAW1, LAW2, LAW2R, LAW3, LAW3R, APOLLO_LAW = (_code("guidance", law) for law in GUIDANCE)

@@ -8,28 +8,21 @@ import numpy as np
 
 from campaigns.reentry import dynamics, figures, outcome, weather
 from campaigns.reentry.air import GAS_CONSTANT
-from campaigns.reentry.airframe import COEFFICIENTS, DETRA_KEMP_RIDDELL, airframe_of, airframe_rows
-from campaigns.reentry.entry_state import FLAT, Entry, World, entry_of, world_of
+from campaigns.reentry.airframe import airframe_of, airframe_rows
+from campaigns.reentry.entry_state import Entry, World, entry_of, world_of
 from campaigns.reentry.guidance import laws
 from campaigns.reentry.guidance.plan import planned_entry, plans_of
 from campaigns.reentry.guidance.reference import stored_references
-from campaigns.reentry.inputs import PARAMETERS, SETTINGS
+from campaigns.reentry.inputs import DETRA_KEMP_RIDDELL, EARTH, FLAT, J2, US76, Inputs
 from campaigns.reentry.planets import of_planets
-from mc_engine.model import AdaptiveStep, Event, Field, Model, Refusals
+from mc_engine.model import AdaptiveStep, Event, Refusals, model
 from mc_engine.studies.published import read_published
 
 SOURCE = (
     "N. Mahmoudian, Design of a re-entry guidance and control system based on nominal-trajectory tracking "
     "(in Persian), M.Sc. thesis, K. N. Toosi University of Technology, early 2000s"
 )
-STATES = (
-    *(Field(f"{axis}_m", "m", f"place, planet-fixed {axis}") for axis in "xyz"),
-    *(Field(f"v{axis}_m_s", "m/s", f"velocity over ground, planet-fixed {axis}") for axis in "xyz"),
-    Field("heat_load_j_m2", "J/m^2", "convective heat load at the stagnation point"),
-)
-EARTH = 0.0
-J2 = 0.0
-US76 = 0.0
+FIRST = 1  # index at which the tables of the cases begin
 
 
 def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
@@ -44,24 +37,27 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     airframe = airframe_of(inputs, settings, refusals)
     exit_altitude = np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, entry.altitude)
     refusals.add(entry.altitude <= inputs.stop_altitude, "the entry is not above stop_altitude_km")
-    names = ("x", "y", "z", "vx", "vy", "vz")
-    rows = dict(zip(names, (*entry.position, *entry.velocity), strict=True))
-    rows |= {"stop": inputs.stop_altitude, "exit": exit_altitude, "stop_time": inputs.stop_time}
-    rows |= {"speed": entry.speed, "path": entry.path} | _planet_rows(inputs, settings, world)
-    rows |= airframe_rows(inputs, settings, airframe) | _bank_rows(inputs, settings) | _sensor_rows(inputs)
+    rows = vars(inputs) | _axes("", entry.position) | _axes("v", entry.velocity)
+    rows |= {"exit": exit_altitude, "speed": entry.speed, "path": entry.path} | _planet_rows(settings, world)
+    rows |= airframe_rows(inputs, settings, airframe) | _bank_rows(inputs, settings)
     plan = plans_of(inputs, settings, world, planned, airframe)
     guided = settings.guidance > 0.5
     refusals.add(guided & ~(plan.lift_to_drag > 0.0), "a guidance law needs a vehicle with lift")
-    references = stored_references(plan, guided, COEFFICIENTS.size, refusals)
+    references = stored_references(plan, guided, FIRST, refusals)
     rows |= _target(inputs, world, planned, np.where(guided, references.range, inputs.target_downrange))
     rows |= {"reference": references.start, "planned_range": references.range, "planned_share": plan.share}
     rows |= {"planned_lift_to_drag": plan.lift_to_drag}
     return rows | _case_tables(inputs, settings, references.tables)
 
 
-def shared_tables(_: Any) -> np.ndarray:
-    """What all cases share: coefficients over the Mach number.  Those of `prepare` lie behind them."""
-    return COEFFICIENTS
+def no_tables(_: Any) -> np.ndarray:
+    """What all cases share is nothing, a zero: reference paths and air are those of `prepare`, and lie behind it."""
+    return np.zeros(FIRST)
+
+
+def _axes(letters: str, vectors: np.ndarray) -> dict[str, np.ndarray]:
+    """Components [3, n] by name."""
+    return {f"{letters}{axis}": vectors[k] for k, axis in enumerate("xyz")}
 
 
 def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> None:
@@ -80,26 +76,20 @@ def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> 
     refusals.add(flat & (settings.gravity == J2), 'a flat Earth has the gravity "point", which is uniform, or "none"')
 
 
-def _planet_rows(i: SimpleNamespace, settings: SimpleNamespace, world: World) -> dict[str, np.ndarray]:
-    """Gravity, rotation and air of each case's planet, and its corridor limits, SI; temperature [K] g H0 / R."""
+def _planet_rows(settings: SimpleNamespace, world: World) -> dict[str, np.ndarray]:
+    """Gravity, rotation and air of each case's planet, SI; temperature [K] g H0 / R."""
     air = of_planets(settings.planet, "air")
     gravity = world.mu / world.radius**2
     return {
         "mu": world.mu,
         "rate": world.rate,
         "polar_radius": world.polar_radius,
+        "radius": world.radius,
         "e2": world.e2,
         "gravity": gravity,
         "log_density": np.log(air[:, 0]),
         "inverse_scale": 1.0 / air[:, 1],
         "temperature": gravity * air[:, 1] / GAS_CONSTANT,
-        "density": i.density_factor,
-        "deviation": i.density_deviation,
-        "corridor_load": i.corridor_load,
-        "corridor_heat_rate": i.corridor_heat_rate,
-        "corridor_heat_load": i.corridor_heat_load,
-        "corridor_pressure": i.corridor_dynamic_pressure,
-        "radius": world.radius,
     }
 
 
@@ -109,6 +99,7 @@ def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.nd
     first, rolled = i.bank + i.bank_error, i.rolled_bank + i.bank_error
     never = 0.5 * np.pi * (1.0 - 1e-12)
     return {
+        "first_bank": first,
         "cos_bank": np.cos(first),
         "sin_bank": side * np.sin(first),
         "cos_rolled": np.cos(rolled),
@@ -118,43 +109,14 @@ def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.nd
     }
 
 
-def _sensor_rows(i: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Bank execution, reversals and sensor errors, SI and radians."""
-    return {
-        "first_bank": i.bank + i.bank_error,
-        "bank_error": i.bank_error,
-        "bank_lag": i.bank_lag,
-        "bank_rate_limit": i.bank_rate_limit,
-        "reversal_floor": i.reversal_floor,
-        "reversal_width": i.reversal_width,
-        "load_limit": i.load_limit,
-        "accelerometer_bias": i.accelerometer_bias,
-        "accelerometer_scale": i.accelerometer_scale_error,
-        "accelerometer_noise": i.accelerometer_noise,
-        "nav_range": i.nav_range_error,
-        "nav_altitude": i.nav_altitude_error,
-        "nav_speed": i.nav_speed_error,
-        "nav_path": i.nav_flight_path_angle_error,
-        "nav_climb": i.nav_climb_error,
-    }
-
-
 def _target(i: SimpleNamespace, world: World, entry: Entry, end: np.ndarray) -> dict[str, np.ndarray]:
     """Unit axes of the distances, and the target; end : its downrange [m] where the inputs name none, 0 for none."""
-    rows: dict[str, np.ndarray] = {}
-    for letter, vectors in (("e", entry.place), ("f", entry.ahead), ("n", entry.right)):
-        rows |= {f"{letter}{axis}": vectors[k] for k, axis in enumerate("xyz")}
     downrange = np.where(i.target_downrange > 0.0, i.target_downrange, end)
     along, across = downrange / world.radius, i.target_crossrange / world.radius
     ahead = np.cos(along) * entry.place + np.sin(along) * entry.ahead
     target = np.cos(across) * ahead + np.sin(across) * entry.right
-    rows |= {f"t{axis}": target[k] for k, axis in enumerate("xyz")}
-    return rows | {
-        "heading": entry.heading,
-        "aim_down": downrange,
-        "aim_cross": i.target_crossrange,
-        "aimed": np.where(downrange > 0.0, 1.0, 0.0),
-    }
+    rows = _axes("e", entry.place) | _axes("f", entry.ahead) | _axes("n", entry.right) | _axes("t", target)
+    return rows | {"heading": entry.heading, "aim_down": downrange, "aimed": np.where(downrange > 0.0, 1.0, 0.0)}
 
 
 def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.ndarray) -> dict[str, np.ndarray]:
@@ -163,19 +125,22 @@ def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.n
     if not asked.any():
         return {"weather": np.zeros(asked.size), "tables": references}
     nodes = weather.weather_nodes(i.weather_draw, i.density_random_size, i.wind_random_size, i.wind_mean_size)
-    start = COEFFICIENTS.size + references.size + weather.LENGTH * np.arange(asked.size)
+    start = FIRST + references.size + weather.LENGTH * np.arange(asked.size)
     return {"weather": start, "tables": np.concatenate([references, nodes.ravel()])}
 
 
-MODEL = Model(
+def _crossing(direction: str, action: str, rare: bool = False) -> Event:
+    return Event(dynamics.crossings, direction, action, rare=rare)
+
+
+MODEL = model(
     name="reentry",
     title="Atmospheric entry",
     source=SOURCE,
-    parameters=PARAMETERS,
-    settings=SETTINGS,
-    states=STATES,
-    quantities=outcome.QUANTITIES,
-    metrics=outcome.METRICS,
+    inputs=Inputs,
+    states=dynamics.State,
+    outputs=outcome.Outputs,
+    metrics=outcome.Metrics,
     clock=AdaptiveStep(
         "time_limit",
         "tolerance",
@@ -186,23 +151,22 @@ MODEL = Model(
     ),
     kernel_parameters=dynamics.Parameters,
     prepare=prepare,
+    tables=no_tables,
     initial=dynamics.initial,
     start=dynamics.start,
     control=laws.control,
-    tables=shared_tables,
     rhs=dynamics.rhs,
-    events=dynamics.events,
+    events={
+        "pressure_peak": _crossing("falling", "switch"),
+        "heat_peak": _crossing("falling", "switch"),
+        "pull_out": _crossing("rising", "switch", rare=True),
+        "roll": _crossing("rising", "switch", rare=True),
+        "leave": _crossing("rising", "switch", rare=True),
+        "stop": _crossing("falling", "stop"),
+        "left": _crossing("rising", "stop", rare=True),
+        "over": _crossing("falling", "stop", rare=True),
+    },
     switch=dynamics.switch,
-    event_list=(
-        Event("pressure_peak", "falling", "switch"),
-        Event("heat_peak", "falling", "switch"),
-        Event("pull_out", "rising", "switch", rare=True),
-        Event("roll", "rising", "switch", rare=True),
-        Event("leave", "rising", "switch", rare=True),
-        Event("stop", "falling", "stop"),
-        Event("left", "rising", "stop", rare=True),
-        Event("over", "falling", "stop", rare=True),
-    ),
     observe=outcome.observe,
     evaluate=outcome.evaluate,
     figures=figures.FIGURES,

@@ -1,14 +1,14 @@
-"""Quantities along an entry and metrics at its end.  SI, radians."""
+"""Outputs along an entry and metrics at its end.  SI, radians."""
 
 from collections import namedtuple
 
 from campaigns.reentry.air import sound_speed
 from campaigns.reentry.bank import angle_at
 from campaigns.reentry.dynamics import (
-    FLAT,
-    STOP_ON_EXIT,
-    UNGUIDED,
     UNKNOWN,
+    Loads,
+    Peak,
+    PullOut,
     air_of,
     exit_of,
     exposure_of,
@@ -17,93 +17,86 @@ from campaigns.reentry.dynamics import (
     place_of,
     speed2,
 )
+from campaigns.reentry.inputs import FLAT, STOP_ON_EXIT, UNGUIDED
 from mc_engine.lanes import atan2, physics, sqrt, where
-from mc_engine.model import Field
+from mc_engine.model import Field, at_end, metrics, outputs
 from mc_engine.physics.frames import TURN, full_turn, geodetic_latitude, spherical, velocity_angles
 
-QUANTITIES = (
-    Field("altitude_km", "km", "geodetic altitude"),
-    Field("speed_m_s", "m/s", "speed over ground"),
-    Field("flight_path_angle_deg", "deg", "flight-path angle over ground, negative below the horizon"),
-    Field("heading_deg", "deg", "heading over ground, from north, clockwise"),
-    Field("latitude_deg", "deg", "geodetic latitude"),
-    Field("longitude_deg", "deg", "longitude, east"),
-    Field("downrange_km", "km", "distance over ground along the planned great circle"),
-    Field("crossrange_km", "km", "distance over ground to the right of the planned great circle"),
-    Field("load_g", "g", "total aerodynamic load"),
-    Field("axial_load_g", "g", "load along the body axis"),
-    Field("dynamic_pressure_pa", "Pa", "dynamic pressure"),
-    Field("heat_rate_w_m2", "W/m^2", "convective heat rate at the stagnation point"),
-    Field("heat_load_j_m2", "J/m^2", "convective heat load at the stagnation point"),
-    Field("mach", "", "Mach number"),
-    Field("density_kg_m3", "kg/m^3", "density of the air"),
-    Field("bank_deg", "deg", "bank angle, positive to the right"),
-)
-_PEAKS = (
-    ("load_g", "g", "largest total aerodynamic load"),
-    ("axial_load_g", "g", "largest load along the body axis"),
-    ("dynamic_pressure_pa", "Pa", "largest dynamic pressure"),
-    ("heat_rate_w_m2", "W/m^2", "largest convective heat rate at the stagnation point"),
+NAN = float("nan")
+Outputs = outputs(
+    altitude_km="geodetic altitude",
+    speed_m_s="speed over ground",
+    flight_path_angle_deg="flight-path angle over ground, negative below the horizon",
+    heading_deg="heading over ground, from north, clockwise",
+    latitude_deg="geodetic latitude",
+    longitude_deg="longitude, east",
+    downrange_km="distance over ground along the planned great circle",
+    crossrange_km="distance over ground to the right of the planned great circle",
+    load_g="total aerodynamic load",
+    axial_load_g="load along the body axis",
+    dynamic_pressure_pa="dynamic pressure",
+    heat_rate_w_m2="convective heat rate at the stagnation point",
+    heat_load_j_m2="convective heat load at the stagnation point",
+    mach=Field("Mach number", unit=""),
+    density_kg_m3="density of the air",
+    bank_deg="bank angle, positive to the right",
 )
 
 
-def _peak(name: str, unit: str, text: str) -> tuple[Field, ...]:
-    """The peak itself, and when, where and how fast it was."""
-    stem = f"peak_{Field(name, unit, text).symbol}"
-    return (
-        Field(f"peak_{name}", unit, text, low=0.0),
-        Field(f"{stem}_time_s", "s", f"{text}: when", low=0.0),
-        Field(f"{stem}_altitude_km", "km", f"{text}: at what altitude", low=0.0),
-        Field(f"{stem}_speed_m_s", "m/s", f"{text}: at what speed over ground", low=0.0),
-    )
+def _peak(what: str, unit: str, text: str) -> dict[str, Field]:
+    """Columns of a peak: its value, and when, where and how fast it was."""
+    return {
+        f"peak_{what}_{unit}": Field(text, low=0.0),
+        f"peak_{what}_time_s": Field(f"{text}: when", low=0.0),
+        f"peak_{what}_altitude_km": Field(f"{text}: at what altitude", low=0.0),
+        f"peak_{what}_speed_m_s": Field(f"{text}: at what speed over ground", low=0.0),
+    }
 
 
-METRICS = (
-    *(field for peak in _PEAKS for field in _peak(*peak)),
-    Field("heat_load_j_m2", "J/m^2", "convective heat load at the stagnation point", low=0.0),
-    Field("corridor_violations", "", "how many of the corridor's four limits were passed", low=0.0),
-    Field("min_altitude_km", "km", "altitude of the first pull-out, or of the end of a flight without one"),
-    Field("min_altitude_time_s", "s", "when that was", low=0.0),
-    Field("exits", "", "how often the vehicle left the atmosphere, upwards through the exit altitude", low=0.0),
-    Field("exit_time_s", "s", "first exit", sometimes=True, low=0.0),
-    Field("exit_speed_m_s", "m/s", "speed over ground at the first exit", sometimes=True, low=0.0),
-    Field("exit_flight_path_angle_deg", "deg", "flight-path angle over ground at the first exit", sometimes=True),
-    Field("exit_inertial_speed_m_s", "m/s", "inertial speed at the first exit", sometimes=True, low=0.0),
-    Field("exit_apoapsis_altitude_km", "km", "altitude of the apoapsis that the first exit leads to", sometimes=True),
-    Field("flight_time_s", "s", "length of the flight", low=0.0),
-    Field("final_altitude_km", "km", "geodetic altitude at the end"),
-    Field("final_speed_m_s", "m/s", "speed over ground at the end", low=0.0),
-    Field("final_flight_path_angle_deg", "deg", "flight-path angle over ground at the end", low=-90.0, high=90.0),
-    Field("final_mach", "", "Mach number at the end", low=0.0),
-    Field("final_latitude_deg", "deg", "geodetic latitude of the end", low=-90.0, high=90.0),
-    Field("final_longitude_deg", "deg", "longitude of the end, east"),
-    Field("downrange_km", "km", "distance over ground to the end, along the planned great circle"),
-    Field("crossrange_km", "km", "distance over ground to the end, to the right of the planned great circle"),
-    Field("miss_km", "km", "distance of the end from the target", sometimes=True, low=0.0),
-    Field("target_latitude_deg", "deg", "geodetic latitude of the target", sometimes=True),
-    Field("target_longitude_deg", "deg", "longitude of the target, east", sometimes=True),
-    Field("reference_range_km", "km", "distance over ground to the end of the reference path", sometimes=True),
-    Field(
-        "saturated_share",
-        "",
+Metrics = metrics(
+    **_peak("load", "g", "largest total aerodynamic load"),
+    **_peak("axial_load", "g", "largest load along the body axis"),
+    **_peak("dynamic_pressure", "pa", "largest dynamic pressure"),
+    **_peak("heat_rate", "w_m2", "largest convective heat rate at the stagnation point"),
+    heat_load_j_m2=at_end("heat_load_j_m2", "convective heat load at the stagnation point", low=0.0),
+    corridor_violations=Field("how many of the corridor's four limits were passed", low=0.0, unit=""),
+    min_altitude_km="altitude of the first pull-out, or of the end of a flight without one",
+    min_altitude_time_s=Field("when that was", low=0.0),
+    exits=Field("how often the vehicle left the atmosphere, upwards through the exit altitude", low=0.0, unit=""),
+    exit_time_s=Field("first exit", sometimes=True, low=0.0),
+    exit_speed_m_s=Field("speed over ground at the first exit", sometimes=True, low=0.0),
+    exit_flight_path_angle_deg=Field("flight-path angle over ground at the first exit", sometimes=True),
+    exit_inertial_speed_m_s=Field("inertial speed at the first exit", sometimes=True, low=0.0),
+    exit_apoapsis_altitude_km=Field("altitude of the apoapsis that the first exit leads to", sometimes=True),
+    flight_time_s=at_end("t_s", "length of the flight", low=0.0),
+    final_altitude_km=at_end("altitude_km", "geodetic altitude at the end"),
+    final_speed_m_s=at_end("speed_m_s", "speed over ground at the end", low=0.0),
+    final_flight_path_angle_deg=at_end(
+        "flight_path_angle_deg", "flight-path angle over ground at the end", low=-90.0, high=90.0
+    ),
+    final_mach=at_end("mach", "Mach number at the end", low=0.0, unit=""),
+    final_latitude_deg=at_end("latitude_deg", "geodetic latitude of the end", low=-90.0, high=90.0),
+    final_longitude_deg=at_end("longitude_deg", "longitude of the end, east"),
+    downrange_km=at_end("downrange_km", "distance over ground to the end, along the planned great circle"),
+    crossrange_km=at_end("crossrange_km", "distance over ground to the end, to the right of the planned great circle"),
+    miss_km=Field("distance of the end from the target", sometimes=True, low=0.0),
+    target_latitude_deg=Field("geodetic latitude of the target", sometimes=True),
+    target_longitude_deg=Field("longitude of the target, east", sometimes=True),
+    reference_range_km=Field("distance over ground to the end of the reference path", sometimes=True),
+    saturated_share=Field(
         "share of the guidance's samples at which its command was at a limit",
         sometimes=True,
         low=0.0,
         high=1.0,
+        unit="",
     ),
-    Field("reversals", "", "how often the guidance changed the side of the lift", low=0.0),
-    Field("relative_speed_m_s", "m/s", "speed over ground at entry", low=0.0),
-    Field("relative_flight_path_angle_deg", "deg", "flight-path angle over ground at entry"),
-    Field(
-        "ballistic_coefficient_kg_m2", "kg/m^2", "mass over drag area in hypersonic flow, dispersions included", low=0.0
+    reversals=Field("how often the guidance changed the side of the lift", low=0.0, unit=""),
+    relative_speed_m_s=Field("speed over ground at entry", low=0.0),
+    relative_flight_path_angle_deg="flight-path angle over ground at entry",
+    ballistic_coefficient_kg_m2=Field(
+        "mass over drag area in hypersonic flow, dispersions included", low=0.0, unit="kg/m^2"
     ),
 )
-Quantities = namedtuple(
-    "Quantities",
-    "altitude speed path heading latitude longitude downrange crossrange load axial pressure flux heat mach density "
-    "bank",
-)
-Metrics = namedtuple("Metrics", [field.symbol for field in METRICS])  # type: ignore[misc]
 Ground = namedtuple("Ground", "latitude longitude downrange crossrange path heading")
 
 
@@ -115,7 +108,7 @@ def ground_of(s, altitude, p, o):
     Downrange goes on beyond the antipodes, from a quarter of a turn behind the entry place to three quarters ahead.
     """
     if o.shape == FLAT:
-        latitude, longitude, downrange, crossrange = 0.0 * s.x, 0.0 * s.x, s.x + 0.0 * s.x, -s.y
+        latitude, longitude, downrange, crossrange = 0.0, 0.0, s.x, -s.y
         path = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy))
         heading = p.heading + atan2(-s.vy, s.vx)
     else:
@@ -133,7 +126,7 @@ def ground_of(s, altitude, p, o):
 
 @physics
 def observe(t, s, m, p, o):
-    """The quantities in the order of QUANTITIES, SI and radians."""
+    """Outputs, SI and radians."""
     place = place_of(s, p, o)
     air = air_of(s, place, p, o)
     v2 = speed2(air)
@@ -142,23 +135,23 @@ def observe(t, s, m, p, o):
     force = force_of(air, through, p, o)
     ground = ground_of(s, place.altitude, p, o)
     if o.guidance == UNGUIDED:
-        bank = atan2(m.sin_bank, m.cos_bank)
+        bank = atan2(m.met.lift.sin_bank, m.met.lift.cos_bank)
     else:
-        bank = angle_at(t, m, o.guidance_period)
-    return Quantities(
+        bank = angle_at(t, m.steering.turn, o.guidance_period)
+    return Outputs(
         altitude=place.altitude,
         speed=sqrt(speed2(s)),
-        path=ground.path,
+        flight_path_angle=ground.path,
         heading=ground.heading,
         latitude=ground.latitude,
         longitude=ground.longitude,
         downrange=ground.downrange,
         crossrange=ground.crossrange,
         load=pressure * force.total,
-        axial=pressure * force.axial,
-        pressure=pressure,
-        flux=heat_rate(air.density, through, p, o),
-        heat=s.heat,
+        axial_load=pressure * force.axial,
+        dynamic_pressure=pressure,
+        heat_rate=heat_rate(air.density, through, p, o),
+        heat_load=s.heat_load,
         mach=through / sound_speed(air.temperature),
         density=air.density,
         bank=bank,
@@ -168,105 +161,81 @@ def observe(t, s, m, p, o):
 @physics
 def known(value):
     """The value, or not a number where it is unknown."""
-    return where(abs(value) < UNKNOWN, value, float("nan"))
+    return where(abs(value) < UNKNOWN, value, NAN)
 
 
 @physics
-def violations(load, pressure, flux, heat, p):
-    """How many of load [m/s^2], heat rate [W/m^2], heat load [J/m^2], dynamic pressure [Pa] were above their limits."""
-    return (
-        where(load > p.corridor_load, 1.0, 0.0)
-        + where(flux > p.corridor_heat_rate, 1.0, 0.0)
-        + where(heat > p.corridor_heat_load, 1.0, 0.0)
-        + where(pressure > p.corridor_pressure, 1.0, 0.0)
-    )
-
-
-@physics
-def target_of(t, p, o):
+def target_of(p, o):
     """(geodetic latitude, longitude) of the target [rad], not numbers without one or over a flat Earth."""
     if o.shape == FLAT:
-        latitude, longitude = float("nan") + t, float("nan") + t
+        latitude, longitude = NAN, NAN
     else:
         # at the altitude where the flight ends, so that a hit lies no distance from it
-        r = p.polar_radius / sqrt(1.0 - p.e2 * (1.0 - p.tz * p.tz)) + p.stop
-        aimed = p.aimed > 0.5
-        latitude = geodetic_latitude(r * p.tx, r * p.ty, r * p.tz, p.stop, p.polar_radius, p.e2)
-        latitude = where(aimed, latitude, float("nan")) + 0.0 * t
-        longitude = where(aimed, spherical(p.tx, p.ty, p.tz)[1], float("nan")) + 0.0 * t
-    return latitude, longitude
+        r = p.polar_radius / sqrt(1.0 - p.e2 * (1.0 - p.tz * p.tz)) + p.stop_altitude
+        latitude = geodetic_latitude(r * p.tx, r * p.ty, r * p.tz, p.stop_altitude, p.polar_radius, p.e2)
+        longitude = spherical(p.tx, p.ty, p.tz)[1]
+    aimed = p.aimed > 0.5
+    return where(aimed, latitude, NAN), where(aimed, longitude, NAN)
 
 
 @physics
-def planned_range(t, p, o):
-    """Range [m] of the reference path, not a number without one."""
-    if o.guidance == UNGUIDED:
-        value = float("nan") + t
-    else:
-        value = p.planned_range + 0.0 * t
-    return value
-
-
-@physics
-def evaluate(t, s, m, p, o, best, when):
-    """The metrics in the order of METRICS, at the end of the flight, SI and radians."""
+def evaluate(t, s, m, p, o):
+    """The metrics that are no outputs at the end of the flight, SI and radians."""
     pressure, flux, altitude, v, force = exposure_of(s, p, o)
     ground = ground_of(s, altitude, p, o)
-    push, heat = pressure > m.pressure, flux > m.flux  # the flight may end before a peak
-    pressure, flux = where(push, pressure, m.pressure), where(heat, flux, m.flux)
-    load = pressure * where(push, force.total, m.pressure_total)
+    met, steering = m.met, m.steering
+    push = pressure > met.pressure.value  # the flight may end before a peak
     # the load peaks with the dynamic pressure
-    load_time, load_altitude = where(push, t, m.pressure_time), where(push, altitude, m.pressure_altitude)
-    load_speed = where(push, v, m.pressure_speed)
-    target_latitude, target_longitude = target_of(t, p, o)
+    peak = where(push, Peak(pressure, t, altitude, v), met.pressure)
+    loads = where(push, Loads(force.total, force.axial), met.loads)
+    hottest = where(flux > met.flux.value, Peak(flux, t, altitude, v), met.flux)
+    load = peak.value * loads.total
+    lowest = where(met.pull_out.altitude < UNKNOWN, met.pull_out, PullOut(altitude, t))
     leaves = (o.on_exit == STOP_ON_EXIT) & (altitude > p.exit - 1e-3) & (ground.path > 0.0)
-    speed, angle, inertial, apoapsis = exit_of(s, p, o)
-    pulled = m.low < UNKNOWN
-    air = air_of(s, place_of(s, p, o), p, o)
-    miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.aim_cross
+    first = where(leaves, exit_of(t, s, p, o), met.first_exit)
+    violations = (
+        where(load > p.corridor_load, 1.0, 0.0)
+        + where(hottest.value > p.corridor_heat_rate, 1.0, 0.0)
+        + where(s.heat_load > p.corridor_heat_load, 1.0, 0.0)
+        + where(peak.value > p.corridor_dynamic_pressure, 1.0, 0.0)
+    )
+    miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.target_crossrange
+    target_latitude, target_longitude = target_of(p, o)
+    reference_range = NAN if o.guidance == UNGUIDED else p.planned_range
+    sampled = steering.samples > 0.0
     return Metrics(
         peak_load=load,
-        peak_load_time=load_time,
-        peak_load_altitude=load_altitude,
-        peak_load_speed=load_speed,
-        peak_axial_load=pressure * where(push, force.axial, m.pressure_axial),
-        peak_axial_load_time=load_time,
-        peak_axial_load_altitude=load_altitude,
-        peak_axial_load_speed=load_speed,
-        peak_dynamic_pressure=pressure,
-        peak_dynamic_pressure_time=load_time,
-        peak_dynamic_pressure_altitude=load_altitude,
-        peak_dynamic_pressure_speed=load_speed,
-        peak_heat_rate=flux,
-        peak_heat_rate_time=where(heat, t, m.flux_time),
-        peak_heat_rate_altitude=where(heat, altitude, m.flux_altitude),
-        peak_heat_rate_speed=where(heat, v, m.flux_speed),
-        heat_load=s.heat,
-        corridor_violations=violations(load, pressure, flux, s.heat, p),
-        min_altitude=where(pulled, m.low, altitude),
-        min_altitude_time=where(pulled, m.low_time, t),
-        exits=where(leaves, 1.0, m.exits),
-        exit_time=known(where(leaves, t, m.exit_time)),
-        exit_speed=known(where(leaves, speed, m.exit_speed)),
-        exit_flight_path_angle=known(where(leaves, angle, m.exit_angle)),
-        exit_inertial_speed=known(where(leaves, inertial, m.exit_inertial)),
-        exit_apoapsis_altitude=known(where(leaves, apoapsis, m.exit_apoapsis)),
-        flight_time=t,
-        final_altitude=altitude,
-        final_speed=v,
-        final_flight_path_angle=ground.path,
-        final_mach=sqrt(speed2(air)) / sound_speed(air.temperature),
-        final_latitude=ground.latitude,
-        final_longitude=ground.longitude,
-        downrange=ground.downrange,
-        crossrange=ground.crossrange,
-        miss=where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), float("nan")),
+        peak_load_time=peak.time,
+        peak_load_altitude=peak.altitude,
+        peak_load_speed=peak.speed,
+        peak_axial_load=peak.value * loads.axial,
+        peak_axial_load_time=peak.time,
+        peak_axial_load_altitude=peak.altitude,
+        peak_axial_load_speed=peak.speed,
+        peak_dynamic_pressure=peak.value,
+        peak_dynamic_pressure_time=peak.time,
+        peak_dynamic_pressure_altitude=peak.altitude,
+        peak_dynamic_pressure_speed=peak.speed,
+        peak_heat_rate=hottest.value,
+        peak_heat_rate_time=hottest.time,
+        peak_heat_rate_altitude=hottest.altitude,
+        peak_heat_rate_speed=hottest.speed,
+        corridor_violations=violations,
+        min_altitude=lowest.altitude,
+        min_altitude_time=lowest.time,
+        exits=where(leaves, 1.0, met.exits),
+        exit_time=known(first.time),
+        exit_speed=known(first.speed),
+        exit_flight_path_angle=known(first.angle),
+        exit_inertial_speed=known(first.inertial),
+        exit_apoapsis_altitude=known(first.apoapsis),
+        miss=where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), NAN),
         target_latitude=target_latitude,
         target_longitude=target_longitude,
-        reference_range=planned_range(t, p, o),
-        saturated_share=where(m.samples > 0.0, m.saturated / where(m.samples > 0.0, m.samples, 1.0), float("nan")),
-        reversals=m.reversals,
+        reference_range=reference_range,
+        saturated_share=where(sampled, steering.saturated / where(sampled, steering.samples, 1.0), NAN),
+        reversals=steering.reversals,
         relative_speed=p.speed,
         relative_flight_path_angle=p.path,
-        ballistic_coefficient=where(p.drag > 0.0, 1.0 / where(p.drag > 0.0, p.drag, 1.0), float("nan")),
+        ballistic_coefficient=where(p.drag > 0.0, 1.0 / where(p.drag > 0.0, p.drag, 1.0), NAN),
     )

@@ -11,6 +11,7 @@ from mc_engine.model.simulator import System
 from mc_engine.store.parts import Column
 
 END_TIME = "end_time_s"
+END_PHASE = "end_phase"  # of a model with phases
 
 
 def input_column(item: Parameter | Setting) -> Column:
@@ -29,6 +30,8 @@ def result_columns(model: System) -> list[Column]:
     if not model.states:
         return columns
     columns.append(Column(END_TIME, "s", "state", "time at the end of the flight, from its start"))
+    if getattr(model, "phases", ()):
+        columns.append(Column(END_PHASE, "", "state", "phase at the end of the flight", "word"))
     columns += [
         Column(f"end_{state.name}", state.unit, "state", f"{state.description}, at the end") for state in model.states
     ]

@@ -23,8 +23,9 @@ from mc_engine.campaign.sections import (
 from mc_engine.errors import MOST_SHOWN, ModelError
 from mc_engine.model.faults import naming_faults
 from mc_engine.model.fields import AdaptiveStep, Parameter, Setting
+from mc_engine.model.fmu import fmu_simulator
 from mc_engine.model.preparation import call_prepare
-from mc_engine.model.program import ProgramSection, program_simulator
+from mc_engine.model.program import SimulatorSection, program_simulator
 from mc_engine.model.record import Refusals, load_model
 from mc_engine.model.simulator import Simulator, System, load_simulator
 from mc_engine.sampling.correlation import group_matrix, is_positive_definite
@@ -80,7 +81,7 @@ class Retention:
 
 
 def system_of(
-    document: Mapping[str, Any], program: ProgramSection | None, directory: Path, findings: Findings
+    document: Mapping[str, Any], program: SimulatorSection | None, directory: Path, findings: Findings
 ) -> System | None:
     """What flies, even where other keys of [campaign] are wrong: the rest of the file is checked against it."""
     section, inside = document.get("campaign"), findings.under("campaign")
@@ -104,10 +105,11 @@ def system_of(
         return None
 
 
-def _program(section: ProgramSection, directory: Path, findings: Findings) -> System | None:
-    """The program of [simulator], or None with its mistakes noted."""
+def _program(section: SimulatorSection, directory: Path, findings: Findings) -> System | None:
+    """The program or FMU of [simulator], or None with its mistakes noted."""
     problems: list[tuple[str, str]] = []
-    simulator = program_simulator(section, directory, problems)
+    described = program_simulator if section.fmu is None else fmu_simulator
+    simulator = described(section, directory, problems)
     for key, message in problems:
         findings.under("simulator").add(key, message)
     return simulator

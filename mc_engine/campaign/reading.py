@@ -34,7 +34,7 @@ from mc_engine.campaign.sections import (
     Value,
 )
 from mc_engine.errors import MOST_SHOWN, CampaignError, Problem
-from mc_engine.model.program import ProgramSection
+from mc_engine.model.program import SimulatorSection
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.section import ReportSection, Section
 from mc_engine.suggestions import hint, listed, nearest
@@ -108,7 +108,7 @@ class Sections:
     inputs: InputsSection | None
     sensitivity: SensitivitySection | None
     report: ReportSection | None
-    program: ProgramSection | None
+    program: SimulatorSection | None
 
 
 @dataclass(frozen=True)
@@ -162,7 +162,7 @@ def read_sections(document: dict[str, Any], findings: Findings) -> Sections:
         inputs=_optional(InputsSection, document, inside),
         sensitivity=_optional(SensitivitySection, document, inside),
         report=read(ReportSection, document.get("report", {}), inside["report"]),
-        program=read(ProgramSection, document["simulator"], inside["simulator"]) if "simulator" in document else None,
+        program=read(SimulatorSection, document["simulator"], inside["simulator"]) if "simulator" in document else None,
     )
 
 

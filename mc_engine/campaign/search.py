@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mc_engine.errors import CampaignError, ModelError, Problem
-from mc_engine.store.run_folder import NO_TEXT, readable
+from mc_engine.store.run_files import NO_TEXT, readable
 from mc_engine.store.urls import is_url, without_secrets
 from mc_engine.suggestions import hint
 

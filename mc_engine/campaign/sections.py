@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Discriminator, Field, PlainValidator, Tag, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
-from mc_engine.model.program import ProgramSection
+from mc_engine.model.program import SimulatorSection
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.section import ReportSection, Section, Share
 from mc_engine.status import MOST_CASES
@@ -268,7 +268,7 @@ class HistoriesSection(Section):
     nominal: bool = True
     first: int = Field(default=0, ge=0, le=100_000, description="the first cases")
     cases: list[Annotated[int, Field(ge=0)]] = Field(default_factory=list, description="these cases")
-    rows: int = Field(default=1500, ge=10, le=1_000_000, description="about how many instants each history has")
+    rows: int = Field(default=1500, ge=10, le=1_000_000, description="about how many rows each history has")
     worst: Worst | None = Field(default=None, description="the worst cases of a metric")
 
 
@@ -377,7 +377,7 @@ class CampaignFile(Section):
     requirement: dict[str, RequirementSection] = Field(default_factory=dict)
     retention: RetentionSection = Field(default_factory=RetentionSection)
     sensitivity: SensitivitySection | None = Field(default=None, description="contributions of the inputs")
-    simulator: ProgramSection | None = Field(default=None, description="a program that flies, in place of a model")
+    simulator: SimulatorSection | None = Field(default=None, description="a program or FMU, in place of a model")
     report: ReportSection = Field(default=ReportSection(), description="probability and confidence of the report")
     tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")
 

@@ -110,7 +110,7 @@ def _groups(
         home = {name: joined if group in (first, second) else group for name, group in home.items()}
     for group in dict.fromkeys(home[name] for name in names if name not in draws):
         yield group, tuple(name for name in names if home[name] == group)
-    if draws or isinstance(model, Simulator) or model.control is not None:  # a simulator may draw by `case.rng`
+    if draws or (model.may_draw if isinstance(model, Simulator) else model.control is not None):
         yield RANDOM_DRAWS, tuple(draws)
 
 

@@ -23,7 +23,7 @@ from mc_engine.errors import DiskError, EngineError, RunInterrupted, StoreError
 from mc_engine.interruption import INTERRUPTED, interruption_message, under_way
 from mc_engine.numbers_in_text import LARGEST_WHOLE, is_real, is_whole
 from mc_engine.shell_words import shell_word
-from mc_engine.store.run_folder import NO_TEXT, readable
+from mc_engine.store.run_files import NO_TEXT, readable
 from mc_engine.store.urls import is_url, store_url
 from mc_engine.unforeseen import UNFORESEEN, unforeseen
 
@@ -198,7 +198,7 @@ def existing_run(path: Path) -> "Store":
 def _no_run(path: Path) -> str:
     """Why a path is no run directory, and what to do."""
     from mc_engine.campaign.search import campaign_names
-    from mc_engine.store.run_folder import runs_in
+    from mc_engine.store.run_files import runs_in
 
     if str(path) in campaign_names():
         return f"is a campaign and no run; `mc-engine run {shell_word(path)}` flies it"
@@ -262,6 +262,18 @@ def write_reports(path: Path, formats: tuple[str, ...], **options: Any) -> list[
     except DiskError as error:
         report = f"`mc-engine report {shell_word(path)}`"
         raise DiskError(f"{error}; what was flown is safe, {report} writes the reports") from error
+
+
+def echo_preparation(system: Any) -> None:
+    """Say that a model may have to be compiled; nothing of a simulator.
+
+    system : a Model, a Simulator, or the folder of a run.
+    """
+    from mc_engine.model.record import Model
+    from mc_engine.runner.summary import is_compiled
+
+    if isinstance(system, Model) or (isinstance(system, Path) and is_compiled(existing_run(system))):
+        typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
 
 
 def replay_picture(store: Any, case: int, history: Any) -> bytes:

@@ -6,14 +6,20 @@ nor matplotlib.
 
 from typer.models import CommandInfo
 
-from mc_engine.command_line import after_flight, before_flight, flight, studies  # noqa: F401 - each adds its commands
+from mc_engine.command_line import (  # noqa: F401 - each adds its commands
+    after_flight,
+    before_flight,
+    flight,
+    inspection,
+    studies,
+)
 from mc_engine.command_line.app import app
 
 __all__ = ["RUNS_CODE", "RUNS_NO_CODE", "app"]
 
 _IN_ORDER = (
     *("init", "check", "plan", "sample", "list", "schema"),
-    *("run", "resume", "extend", "rerun", "merge", "import", "replay"),
+    *("run", "resume", "extend", "rerun", "merge", "import", "replay", "debug"),
     *("tune", "rare", "report", "status", "summary", "verify", "compare", "export", "publish", "fetch"),
     *("published", "bench", "units"),
 )
@@ -21,7 +27,7 @@ _IN_ORDER = (
 RUNS_CODE = frozenset(
     (
         *("check", "plan", "sample", "run", "resume", "extend", "rerun", "merge", "import", "replay"),
-        *("tune", "rare", "bench"),
+        *("debug", "tune", "rare", "bench"),
         "published",  # with --compute
     )
 )

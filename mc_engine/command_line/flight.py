@@ -1,4 +1,4 @@
-"""The commands that fly cases: run, resume, extend, rerun, merge, replay."""
+"""The commands that fly cases: run, resume, extend, rerun, merge."""
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -9,7 +9,6 @@ import typer
 
 from mc_engine.command_line.after_flight import echo_publication
 from mc_engine.command_line.app import (
-    DAMAGED,
     NOT_MET,
     TOO_MANY_FAILED,
     USAGE,
@@ -25,13 +24,13 @@ from mc_engine.command_line.app import (
     Scheduler,
     Workers,
     app,
+    echo_preparation,
     existing_run,
     exit_status,
     leave,
     new_folder,
     ranges,
     refuse_occupied_folder,
-    replay_picture,
     run_here,
     write_reports,
 )
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
 @app.command()
 @exit_status()
 def run(
+    context: typer.Context,
     file: CampaignFile,
     out: Annotated[
         Path | None,
@@ -81,11 +81,20 @@ def run(
         str | None,
         typer.Option(help='"verdict": stop when every requirement passes or fails, at the number of cases at latest.'),
     ] = None,
+    watch: Annotated[
+        bool,
+        typer.Option("--watch", help="Fly 200 cases, or --cases, again on every saved change; redraw a page in --out."),
+    ] = False,
 ) -> None:
     """Fly a campaign and write its reports."""
+    if watch:
+        from mc_engine.command_line.watching import watch_campaign
+
+        watch_campaign(file, out, context)
+        return
     advise(lambda: after_flight(None))
     from mc_engine.campaign.loading import load_campaign
-    from mc_engine.store.run_folder import default_folder
+    from mc_engine.store.run_files import default_folder
 
     if upstream is not None:
         existing_run(upstream)
@@ -105,13 +114,17 @@ def run(
     if until is None:
         piece = _shard(shard)
         store = _with_progress(
-            lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **options), publisher
+            lambda runner, note: runner.run(campaign, path, progress=note, shard=piece, **options),
+            campaign.model,
+            publisher,
         )
     else:
         from mc_engine.runner.stopping import fly_until_decided, refuse_undecidable
 
         refuse_undecidable(campaign)
-        store = _with_progress(lambda _, note: fly_until_decided(campaign, path, progress=note, **options), publisher)
+        store = _with_progress(
+            lambda _, note: fly_until_decided(campaign, path, progress=note, **options), campaign.model, publisher
+        )
     finish(store, no_report, judge, max_failed, publish, file)
 
 
@@ -163,14 +176,16 @@ def _publisher(path: Path, url: str | None) -> AbstractContextManager[Any]:
     return Publisher(path, url)
 
 
-def _with_progress(fly: Callable[[Any, Any], "Store"], publisher: AbstractContextManager[Any] | None = None) -> "Store":
+def _with_progress(
+    fly: Callable[[Any, Any], "Store"], system: Any, publisher: AbstractContextManager[Any] | None = None
+) -> "Store":
     """What `fly(runner, progress)` returns, with the progress shown and the run published during the flight."""
     from mc_engine.runner import runner
     from mc_engine.runner.progress import Progress
 
     with Progress() as progress, publisher or nullcontext():
         if not progress.stream.isatty():
-            typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
+            echo_preparation(system)
         store = fly(runner, progress)
     raise_if_signalled()  # by a signal after the last case, which has stopped nothing
     return store
@@ -189,8 +204,8 @@ def finish(
         analyses_line,
         case_line,
         failed_cases,
-        first_not_finite,
         judgement,
+        not_finite_line,
         verdict_line,
     )
 
@@ -215,8 +230,8 @@ def finish(
     if failed == sum(store.status_counts().values()):
         named = shell_word(campaign or store.path / "campaign.toml")
         typer.echo(f"no case completed; `mc-engine check {named}` looks for the reason in the model", err=True)
-    elif (case := first_not_finite(store)) is not None:
-        typer.echo(f"not finite   `mc-engine replay {shell_word(store.path)} {case}` names the line of the model")
+    elif line := not_finite_line(store):
+        typer.echo(f"not finite   {line}")
     _judge_failures(failed, max_failed)
     if judge and any(verdict.outcome != "pass" for verdict in judged):
         leave(NOT_MET, "not every requirement is met")
@@ -266,10 +281,12 @@ def resume(
     if looks:
         from mc_engine.runner.stopping import carry_on
 
-        store = _with_progress(lambda _, note: carry_on(folder, progress=note, **options), _publisher(folder, publish))
+        store = _with_progress(
+            lambda _, note: carry_on(folder, progress=note, **options), folder, _publisher(folder, publish)
+        )
     else:
         store = _with_progress(
-            lambda runner, note: runner.resume(folder, progress=note, **options), _publisher(folder, publish)
+            lambda runner, note: runner.resume(folder, progress=note, **options), folder, _publisher(folder, publish)
         )
     finish(store, no_report, url=publish)
 
@@ -307,7 +324,7 @@ def extend(
         leave(USAGE, f"{folder}: {sentence}")
     options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, publish)
     store = _with_progress(
-        lambda runner, note: runner.extend(folder, cases, progress=note, **options), _publisher(folder, publish)
+        lambda runner, note: runner.extend(folder, cases, progress=note, **options), folder, _publisher(folder, publish)
     )
     finish(store, no_report, url=publish)
 
@@ -335,7 +352,8 @@ def rerun(
         typer.echo(f"{folder}: no case failed; there is nothing to fly again")
         return
     options = _worker_options(folder, workers, backend, scheduler, case_seconds, memory, patience, rerun=True)
-    finish(_with_progress(lambda runner, progress: runner.rerun(folder, progress=progress, **options)), no_report)
+    again = _with_progress(lambda runner, progress: runner.rerun(folder, progress=progress, **options), folder)
+    finish(again, no_report)
 
 
 @app.command()
@@ -357,30 +375,7 @@ def merge(
     refuse_occupied_folder(out)
     advise(lambda: after_flight(out))
     store = _with_progress(
-        lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk)
+        lambda runner, progress: runner.merge(out, shards, progress=progress, workers=workers, chunk=chunk),
+        shards[0],
     )
     finish(store, no_report)
-
-
-# then the message for -1 is that it is no case, instead of no option
-@app.command(context_settings={"ignore_unknown_options": True})
-@exit_status()
-def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:
-    """Fly one case again, alone: compare every stored number bit for bit, and write and plot its history."""
-    store = existing_run(folder)
-    if store.missing(range(case, case + 1)):
-        leave(USAGE, f"{folder}: case {case} is not there; the run has {ranges(store.committed())}")
-    from mc_engine.runner import runner
-    from mc_engine.studies.replay_files import write_replay
-
-    flight = runner.replay(folder, case)
-    if store.manifest.get("quantities"):  # a simulator without outputs has no history
-        for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
-            typer.echo(str(path))
-    if flight.lost:
-        typer.echo(flight.lost)
-    if not flight.equal:
-        for difference in flight.differences:
-            typer.echo(str(difference), err=True)
-        leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")
-    typer.echo(f"case {case}: every stored number has the same bits")

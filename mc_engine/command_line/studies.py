@@ -15,6 +15,7 @@ from mc_engine.command_line.app import (
     Workers,
     app,
     beginning,
+    echo_preparation,
     existing_run,
     exit_status,
     leave,
@@ -86,7 +87,7 @@ def tune(
     """Search parameters for the best metrics, as the section tuning of FILE says (needs pymoo)."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
-    from mc_engine.store.run_folder import default_folder
+    from mc_engine.store.run_files import default_folder
 
     campaign = load_campaign(file)
     path = out if out is not None else default_folder(campaign.name)
@@ -135,7 +136,7 @@ def rare(
     """The probability that a requirement of FILE is not met, down to one in millions, with its interval."""
     advise(lambda: NOTHING_BEGUN)
     from mc_engine.campaign.loading import load_campaign
-    from mc_engine.store.run_folder import default_folder
+    from mc_engine.store.run_files import default_folder
     from mc_engine.studies.limit_state import chosen_requirement, refuse_unmappable
     from mc_engine.studies.rare_event import METHODS, estimate_rare_event
     from mc_engine.studies.rare_event_folder import rare_event_lines
@@ -149,7 +150,7 @@ def rare(
     path = out if out is not None else default_folder(f"{campaign.name}-rare")
     refuse_occupied_folder(path)
     advise(lambda: after_search(path, "rare.json", "the estimate is"))
-    typer.echo("preparing; a model that is new takes some seconds to compile", err=True)
+    echo_preparation(campaign.model)
     lines = _ProgressLines()
     estimate = estimate_rare_event(
         campaign,

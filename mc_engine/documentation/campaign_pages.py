@@ -9,7 +9,7 @@ import numpy as np
 
 from mc_engine.campaign.loading import SHIPPED, ShippedCampaign, list_campaigns
 from mc_engine.documentation.markdown_text import code, escaped, table
-from mc_engine.model import AdaptiveStep, Model, Named, Parameter, Setting, load_model
+from mc_engine.model import AdaptiveStep, Event, Model, Named, Parameter, Setting, load_model
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
 from mc_engine.studies.published_table import campaign_table
 
@@ -139,12 +139,17 @@ def _flight(model: Model) -> str:
         if isinstance(clock, AdaptiveStep)
         else f"Steps of {_shown(clock.step)} on a common grid ({clock.method})"
     )
-    events = [
-        (code(event.name), event.direction, "ends the case" if event.action == "stop" else "switches the model")
-        for event in model.event_list
-    ]
+    events = [(code(event.name), event.direction, _action(event)) for event in model.event_list]
     listed = "\n\n" + table(("Event", "Crossing", "Then"), events) if events else ""
     return f"{stepping}, up to {_shown(clock.until)}.{listed}"
+
+
+def _action(event: Event) -> str:
+    if event.after:
+        return f"acts after {code(event.after) if isinstance(event.after, str) else f'{event.after:g} s'}"
+    if event.to:
+        return f"begins the phase {code(event.to)}"
+    return "ends the case" if event.action == "stop" else "switches the model"
 
 
 def _shown(value: object) -> str:

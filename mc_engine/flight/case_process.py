@@ -5,6 +5,7 @@ Processes wait for the next chunk of their simulator, and are started anew where
 
 import atexit
 import os
+import select
 import shutil
 import signal
 import socket
@@ -19,11 +20,12 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from mc_engine.errors import DiskError, ModelError
+from mc_engine.errors import DiskError, ModelError, StoreError
 from mc_engine.flight.case_worker import STDERR, STDOUT, Order, Setup, end_of
 from mc_engine.flight.flyer import RunStopped
-from mc_engine.flight.program_flight import end_noted, how_it_ended, last_lines
-from mc_engine.safe_path import SAFE_PATH
+from mc_engine.flight.program_flight import end_noted, last_lines
+from mc_engine.process_tree import how_it_ended
+from mc_engine.safe_path import safe_environment
 from mc_engine.status import CRASHED, TIME_LIMIT
 
 START_S = 600.0  # for `start`
@@ -56,6 +58,8 @@ class CaseProcess:
         finally:
             theirs.close()
         self._connection: Connection[Any, Any] = Connection(ours.detach())
+        self._replies = select.poll()  # once, as `Connection.poll` makes a new one each time
+        self._replies.register(self._connection.fileno(), select.POLLIN)
         try:
             self._connection.send(setup)
             fault = self._connection.recv() if self._connection.poll(START_S) else f"took longer than {START_S:.0f} s"
@@ -66,8 +70,6 @@ class CaseProcess:
             raise ModelError(f"{setup.reference}: {fault}")
 
     def _start(self, descriptor: int) -> "subprocess.Popen[bytes]":
-        path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the same packages as here
-        environment = {**os.environ, **SAFE_PATH, "PYTHONPATH": path}
         command = [sys.executable, "-m", "mc_engine.flight.case_worker", str(descriptor), str(self.work)]
         with open(self.work / STDOUT, "ab") as stdout, open(self.work / STDERR, "ab") as stderr:
             return subprocess.Popen(
@@ -77,7 +79,7 @@ class CaseProcess:
                 stderr=stderr,
                 pass_fds=(descriptor,),
                 start_new_session=True,
-                env=environment,
+                env=safe_environment(),
             )
 
     def replies(self, order: Order, count: int, limit_s: float | None, stopped: Callable[[], bool]) -> Iterator[Any]:
@@ -93,6 +95,8 @@ class CaseProcess:
                 reply = self._connection.recv()
                 if isinstance(reply, str):
                     raise DiskError(reply)
+                if isinstance(reply, StoreError):
+                    raise reply
                 yield reply
         except (EOFError, ConnectionError):
             code = self._process.wait()
@@ -100,7 +104,8 @@ class CaseProcess:
 
     def _wait(self, limit_s: float | None, stopped: Callable[[], bool]) -> None:
         begin = time.monotonic()
-        while not self._connection.poll(LOOK_EVERY_S if limit_s is None else min(LOOK_EVERY_S, limit_s)):
+        look_every_ms = 1e3 * (LOOK_EVERY_S if limit_s is None else min(LOOK_EVERY_S, limit_s))
+        while not self._replies.poll(look_every_ms):
             if stopped():
                 raise RunStopped
             if limit_s is not None and time.monotonic() - begin >= limit_s:

@@ -6,7 +6,6 @@ a batch.  What a case prints goes into files, of which the end is kept where the
 
 import errno
 import json
-import math
 import os
 import shutil
 import signal
@@ -23,18 +22,20 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.errors import EngineError
+from mc_engine.errors import EngineError, StoreError
 from mc_engine.flight.flyer import NOMINAL_NOISE
-from mc_engine.flight.program_flight import Flown, ProgramFlight, end_children, flown, own_children
+from mc_engine.flight.program_flight import Flown, ProgramFlight, flown
 from mc_engine.model.faults import fault_of
 from mc_engine.model.simulator import Refuse, Simulator, load_simulator
+from mc_engine.process_tree import adopt_orphans, die_with_parent, end_children, own_children
 from mc_engine.sampling.streams import stream
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, REFUSED
+from mc_engine.store.case_rows import MOST_KEPT, RowLog, keep_case
 from mc_engine.text import clean
 
 IDLE_S = 10.0  # without an order, after which the process ends and frees what `start` took
 STDOUT, STDERR = "stdout.txt", "stderr.txt"
-MOST_KEPT, KEPT_BYTES = 1000, 2**16  # folders of failed cases in a run; of each stream
+KEPT_BYTES = 2**16  # of each stream
 _LONGEST_REASON = 600  # characters
 _MIB = 2**20
 _STREAM, _SEED = "simulator.rng", "simulator.seed"  # names with a dot, which no dispersion has
@@ -42,7 +43,7 @@ _STREAM, _SEED = "simulator.rng", "simulator.seed"  # names with a dot, which no
 
 @dataclass(frozen=True)
 class Setup:
-    """What the process needs to know.  simulator : of a program; of a Python simulator None, and it is loaded."""
+    """What the process needs to know.  simulator : of a program or an FMU; else None, and it is loaded from files."""
 
     reference: str
     directory: str
@@ -54,21 +55,25 @@ class Setup:
 
 @dataclass(frozen=True)
 class Order:
-    """Cases to fly: a column of values per input, and what addresses their noise.  keep : folder of kept cases."""
+    """Cases to fly: a column of values per input, and what addresses their noise.
+
+    keep : run directory.  log : of their rows, which are added in this process; None adds none.
+    """
 
     inputs: Mapping[str, Any]
     noise: np.ndarray
     history: bool = False
     keep: str | None = None
+    log: RowLog | None = None
 
 
 class Case:
     """What the function of a simulator learns of its case, beside the inputs."""
 
-    def __init__(self, noise: int, seed: int, folder: Path, shared: Any):
+    def __init__(self, noise: int, seed: int, work: Path, shared: Any):
         self.id = -1 if noise == NOMINAL_NOISE else noise
         self.shared = shared
-        self._noise, self._campaign_seed, self._folder = noise, seed, folder
+        self._noise, self._campaign_seed, self._work = noise, seed, work
 
     @cached_property
     def seed(self) -> int:
@@ -83,16 +88,24 @@ class Case:
     @cached_property
     def folder(self) -> Path:
         """A folder of its own, empty at first."""
-        self._folder.mkdir(parents=True)
-        return self._folder
+        folder = self._work / folder_name(self._noise)
+        folder.mkdir(parents=True)
+        return folder
 
 
 class BatchCase:
     """The same for many cases at a time: arrays of `id` and `seed`, and a list of generators."""
 
-    def __init__(self, cases: list[Case], shared: Any):
-        self.id = np.array([case.id for case in cases])
-        self.shared, self._cases = shared, cases
+    def __init__(self, noise: np.ndarray, seed: int, work: Path, shared: Any):
+        self.id = np.where(noise == NOMINAL_NOISE, -1, noise)
+        self.shared = shared
+        self._first = Case(int(noise[0]), seed, work, shared)
+        self._noise, self._campaign_seed = noise, seed
+
+    @cached_property
+    def _cases(self) -> list[Case]:
+        """Without folders of their own."""
+        return [Case(noise, self._campaign_seed, Path(), None) for noise in self._noise.tolist()]
 
     @cached_property
     def seed(self) -> np.ndarray:
@@ -104,7 +117,7 @@ class BatchCase:
 
     @property
     def folder(self) -> Path:
-        return self._cases[0].folder
+        return self._first.folder
 
 
 class Worker:
@@ -113,9 +126,13 @@ class Worker:
     def __init__(self, setup: Setup, work: Path):
         self._seed, self._work = setup.seed, work
         self._simulator = setup.simulator or _loaded(setup)
-        self._shared, self._program = None, None
+        self._shared, self._program, self._fly = None, None, self._simulator.fly
         if self._simulator.program is not None:
             self._program = ProgramFlight(self._simulator, work / "home")
+        elif self._simulator.fmu is not None:
+            from mc_engine.flight.fmu_flight import FmuFlight
+
+            self._fly = FmuFlight(self._simulator.fmu, work / "home").fly
         elif self._simulator.start is not None:
             self._shared = self._simulator.start()
         self._before = own_children()  # which `start` may have begun, and which live on
@@ -127,13 +144,21 @@ class Worker:
             return
         names = [*order.inputs]
         columns = [np.asarray(order.inputs[name]).tolist() for name in names]
-        for place, noise in enumerate(order.noise.tolist()):
-            inputs = {name: values[place] for name, values in zip(names, columns, strict=True)}
-            reply(self._one(inputs, noise, order))
+        metrics = [metric.name for metric in self._simulator.metrics]
+        try:
+            for place, noise in enumerate(order.noise.tolist()):
+                inputs = {name: values[place] for name, values in zip(names, columns, strict=True)}
+                result = self._one(inputs, noise, order)
+                if order.log is not None:
+                    order.log.add(place, result.row(metrics))
+                reply(result)
+        finally:
+            if order.log is not None:
+                order.log.close()
 
     def _one(self, inputs: dict[str, Any], noise: int, order: Order) -> Flown:
         name = folder_name(noise)
-        case = Case(noise, self._seed, self._work / name, self._shared)
+        case = Case(noise, self._seed, self._work, self._shared)
         if self._program is not None:
             result = self._program.fly(inputs, case, order.history)
         else:
@@ -143,41 +168,41 @@ class Worker:
         sys.stderr.flush()
         keep = None if order.keep is None else Path(order.keep)
         settle(self._simulator.keep, self._work, name, result.status, keep, inputs)
+        _empty_streams()
         return result
 
     def _called(self, inputs: dict[str, Any], case: Any, history: bool) -> Flown:
         """What the function gives for one case."""
-        assert self._simulator.fly is not None  # no program
+        assert self._fly is not None  # no program
         try:
-            given = self._simulator.fly(inputs, case)
-            return read_metrics(self._simulator, given, history)
+            given = self._fly(inputs, case)
         except BaseException as error:
             return _failed(error, self._simulator.reference)
+        return self._result(_read, given, history)
 
     def _batch(self, order: Order) -> Any:
-        """(metrics by name, Flown for all, history): arrays [n]; of an error, Flown with its status alone."""
-        assert self._simulator.fly is not None  # no program
-        n = order.noise.size
-        cases = [Case(noise, self._seed, self._work / folder_name(noise), None) for noise in order.noise.tolist()]
+        """(metrics by name, Flown of all with the history): arrays [n]; of an error, Flown with its status alone."""
+        assert self._fly is not None  # no program
         inputs = {name: np.asarray(values) for name, values in order.inputs.items()}
+        folder = self._work / folder_name(int(order.noise[0]))
         try:
-            given = self._simulator.fly(inputs, BatchCase(cases, self._shared))
-            metrics, history = given if isinstance(given, tuple) else (given, None)
-            if problem := _problem_of(self._simulator, metrics):
-                return flown(NO_RESULT, problem)
-            arrays = {}
-            for metric in self._simulator.metrics:
-                column = np.asarray(metrics[metric.name], dtype=np.float64)
-                if column.shape != (n,):
-                    return flown(NO_RESULT, f'"{metric.name}" has the shape {column.shape}; it must be ({n},)')
-                arrays[metric.name] = column
-            result = flown(OK, "", history=_history(self._simulator, history) if order.history else None)
-            return arrays, result
+            given = self._fly(inputs, BatchCase(order.noise, self._seed, self._work, self._shared))
         except BaseException as error:
             return _failed(error, self._simulator.reference)
         finally:
             end_children(self._before)
-            shutil.rmtree(self._work / folder_name(int(order.noise[0])), ignore_errors=True)
+            if folder.exists():
+                shutil.rmtree(folder, ignore_errors=True)
+        return self._result(_read_batch, given, order)
+
+    def _result(self, read: Callable[..., Any], given: Any, *how: Any) -> Any:
+        """What `read` finds in what the function returned, or Flown with the status of what is wrong with it."""
+        try:
+            return read(self._simulator, given, *how)
+        except ValueError as fault:
+            return flown(NO_RESULT, str(fault))
+        except BaseException as error:  # of the user's own mapping
+            return _failed(error, self._simulator.reference)
 
 
 def _loaded(setup: Setup) -> Simulator:
@@ -201,51 +226,72 @@ def _failed(error: BaseException, reference: str) -> Flown:
     return flown(CRASHED, fault_of(error, reference))
 
 
-def read_metrics(simulator: Simulator, given: Any, history: bool) -> Flown:
-    """The metrics in what a function returned."""
-    metrics, table = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
-    if problem := _problem_of(simulator, metrics):
-        return flown(NO_RESULT, problem)
+def _read(simulator: Simulator, given: Any, history: bool) -> Flown:
+    """The metrics in what a function returned; ValueError with a sentence where they are not there.
+
+    A history is read of every case, so that its status is the same whether its history is kept or not.
+    """
+    metrics, table = _parts(simulator, given)
     values = {}
     for metric in simulator.metrics:
         try:
             values[metric.name] = float(metrics[metric.name])
         except (TypeError, ValueError):
-            return flown(NO_RESULT, f'"{metric.name}" is {clean(repr(metrics[metric.name])[:60])}, which is no number')
-    if lost := lost_metric(simulator, values):
+            value = clean(repr(metrics[metric.name])[:60])
+            raise ValueError(f'"{metric.name}" is {value}, which is no number') from None
+    if lost := simulator.lost_metric(values):
         return flown(NOT_FINITE, lost)
-    return flown(OK, "", values, _history(simulator, table) if history else None)
+    past = _history(simulator, table)
+    return flown(OK, "", values, past if history else None)
 
 
-def lost_metric(simulator: Simulator, values: Mapping[str, float]) -> str:
-    """The first metric that is infinite or not a number, as a sentence; empty if there is none."""
+def _read_batch(simulator: Simulator, given: Any, order: Order) -> tuple[dict[str, np.ndarray], Flown]:
+    """The same of many cases, each of which may end not-finite by itself."""
+    metrics, table = _parts(simulator, given)
+    arrays = {}
     for metric in simulator.metrics:
-        value = values[metric.name]
-        if math.isinf(value) or (math.isnan(value) and not metric.sometimes):
-            return f'"{metric.name}" is {"not a number" if math.isnan(value) else "infinite"}'
-    return ""
+        try:
+            column = np.asarray(metrics[metric.name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f'"{metric.name}" is no array of numbers') from None
+        if column.shape != order.noise.shape:
+            raise ValueError(f'"{metric.name}" has the shape {column.shape}; it must be {order.noise.shape}')
+        arrays[metric.name] = column
+    past = _history(simulator, table)
+    return arrays, flown(OK, "", history=past if order.history else None)
 
 
-def _problem_of(simulator: Simulator, metrics: Any) -> str:
-    """What is wrong with the names of the metrics that a function returned; empty if nothing."""
+def _parts(simulator: Simulator, given: Any) -> tuple[Mapping[str, Any], Any]:
+    """(metrics, history or None) that a function returned; ValueError where the metrics are not those declared."""
+    metrics, table = given if isinstance(given, tuple) and len(given) == 2 else (given, None)
     if not isinstance(metrics, Mapping):
-        return f"`fly` returned {type(metrics).__name__}; it must be a mapping of the metrics"
+        raise ValueError(f"`fly` returned {type(metrics).__name__}; it must be a mapping of the metrics")
     names = [metric.name for metric in simulator.metrics]
     if missing := [name for name in names if name not in metrics]:
-        return f'the metric "{missing[0]}" is missing'
+        raise ValueError(f'the metric "{missing[0]}" is missing')
     if unknown := [name for name in metrics if name not in names]:
-        return f'"{clean(str(unknown[0]))}" is no metric of the simulator'
-    return ""
+        raise ValueError(f'"{clean(str(unknown[0]))}" is no metric of the simulator')
+    return metrics, table
 
 
 def _history(simulator: Simulator, table: Any) -> dict[str, np.ndarray]:
-    """The history of a case by column; ValueError with a sentence if a column is missing."""
+    """The history of a case by column; ValueError with a sentence if it is not there."""
     if not simulator.outputs or table is None:
         return {}
-    names = ["t_s", *(output.name for output in simulator.outputs)]
-    if missing := [name for name in names if name not in table]:
-        raise ValueError(f'the history has no column "{missing[0]}"')
-    return {name: np.asarray(table[name], dtype=np.float64) for name in names}
+    known = table if isinstance(table, Mapping) else getattr(table, "columns", None)
+    if known is None:
+        raise ValueError(f"the history is a {type(table).__name__}; it must be a DataFrame")
+    columns = {}
+    for name in ("t_s", *(output.name for output in simulator.outputs)):
+        if name not in known:
+            raise ValueError(f'the history has no column "{name}"')
+        try:
+            columns[name] = np.asarray(table[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise ValueError(f'the column "{name}" of the history is no numbers') from None
+    if len(counts := {np.size(column): None for column in columns.values()}) > 1:
+        raise ValueError(f"columns of the history have {' and '.join(map(str, counts))} rows")
+    return columns
 
 
 def folder_name(noise: int) -> str:
@@ -254,28 +300,27 @@ def folder_name(noise: int) -> str:
 
 
 def settle(rule: str, work: Path, name: str, status: int, keep: Path | None, inputs: Mapping[str, Any]) -> None:
-    """Keep or remove what a case left behind, and empty the files of its streams.  rule : whose folders are kept."""
-    folder = work / name
-    wanted = keep is not None and (rule == "all" or (rule == "failed" and status != OK))
-    if wanted and (rule == "all" or not keep.is_dir() or len(os.listdir(keep)) < MOST_KEPT):  # type: ignore[union-attr]
-        assert keep is not None
-        folder.mkdir(exist_ok=True)
+    """Keep or remove what a case left behind.
+
+    rule : whose folders are kept.  keep : the run directory, or None.
+    """
+    if keep is not None and (rule == "all" or (rule == "failed" and status != OK)):
+        folder = work / name
+        streams = {file: end_of(folder / file) or end_of(work / file) for file in (STDOUT, STDERR)}
+        texts = {file: text for file, text in streams.items() if text}
         if not (folder / "case.json").exists():
-            (folder / "case.json").write_text(json.dumps(dict(inputs), default=str))
-        for file in (STDOUT, STDERR):
-            if text := end_of(work / file):
-                (folder / file).write_bytes(text)
-        target = keep / name
-        keep.mkdir(exist_ok=True)
-        if target.is_dir() and not target.is_symlink():
-            shutil.rmtree(target)
-        shutil.move(folder, target)
-    elif folder.exists():
-        shutil.rmtree(folder, ignore_errors=True)
-    for file in (STDOUT, STDERR):
+            texts["case.json"] = json.dumps(dict(inputs), default=str).encode()
+        keep_case(keep, name, folder, texts, None if rule == "all" else MOST_KEPT)
+    if os.path.exists(f"{work}/{name}"):
+        shutil.rmtree(work / name, ignore_errors=True)
+
+
+def _empty_streams() -> None:
+    """Empty the files that stdout and stderr of this process go to."""
+    for descriptor in (1, 2):
         with suppress(OSError):
-            if os.stat(work / file).st_size:
-                os.truncate(work / file, 0)
+            if os.fstat(descriptor).st_size:
+                os.ftruncate(descriptor, 0)
 
 
 def end_of(path: Path) -> bytes:
@@ -303,8 +348,6 @@ def _end_at_once(*_: Any) -> None:
 
 
 def _prepare_process(work: Path, parent: int, memory_mib: float | None, of_program: bool) -> None:
-    from mc_engine.flight.program_flight import adopt_orphans, die_with_parent
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all processes of a terminal; the parent decides
     signal.signal(signal.SIGTERM, _end_at_once)
     die_with_parent(parent, signal.SIGTERM if of_program else signal.SIGKILL)
@@ -324,7 +367,8 @@ def main(descriptor: int, work: Path, parent: int) -> None:
     faulthandler.enable()  # a crash in compiled code names the line of Python
     connection: Connection[Any, Any] = Connection(descriptor)
     setup = connection.recv()
-    _prepare_process(work, parent, setup.memory_mib, setup.simulator is not None)
+    program = setup.simulator is not None and setup.simulator.program is not None
+    _prepare_process(work, parent, setup.memory_mib, program)
     try:
         worker = Worker(setup, work)
     except BaseException as error:
@@ -342,6 +386,8 @@ def main(descriptor: int, work: Path, parent: int) -> None:
                 worker.fly(order, connection.send)
             except OSError as error:  # of the disk, not of a case
                 connection.send(f"{error.filename or work}: {error.strerror}")
+            except StoreError as error:  # of the run directory
+                connection.send(error)
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ def chosen_case(model: Model, inputs: Inputs, *, seed: int = 0) -> dict[str, Any
 
 
 def chosen_history(model: Model, inputs: Inputs, *, rows: int = 2001, seed: int = 0) -> dict[str, np.ndarray]:
-    """`t_s` and the model's quantities along the flight of one case; rows as in `fly_history`."""
+    """`t_s` and the model's outputs along the flight of one case; rows as in `fly_history`."""
     return fly_history(model, _complete(model, inputs), 0, seed, rows=rows)[1]
 
 

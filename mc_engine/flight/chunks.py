@@ -15,12 +15,12 @@ import numpy as np
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import noise_ids, upstream_ids
-from mc_engine.flight.case_rows import FOLDER, RowLog
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Row, never
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, never
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.model.faults import naming_faults
 from mc_engine.sampling.distributions import column
 from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store.case_rows import Row, RowLog
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, Written, read_part, revised_name, write_aside
 
 SMALLEST_CHUNK, LARGEST_CHUNK = 64, 32_768
@@ -103,7 +103,7 @@ def run_task(
     fresh = flown[~np.isin(flown, [*known])]
     flights = []
     if fresh.size:
-        flight = fly_cases(campaign, fresh, batch, guard or _unguarded, len(task.alone), run / FOLDER, log, stopped)
+        flight = fly_cases(campaign, fresh, batch, guard or _unguarded, len(task.alone), run, log, stopped)
         flights.append({**flight, "case_id": fresh})
     names = [column.name for column in columns]
     if known:
@@ -134,8 +134,8 @@ def fly_cases(
 ) -> Columns:
     """All columns but case_id of some cases.  case_ids : int64[n], n > 0.
 
-    batch : cases at a time, if not all.  alone : how many of the first ones fly one by one.  keep : folder for what the
-    cases of a simulator leave behind.  log : of the rows of complete cases.
+    batch : cases at a time, if not all.  alone : how many of the first ones fly one by one.  keep : run directory for
+    what the cases of a simulator leave behind.  log : of the rows of complete cases.
     """
     table = case_table(campaign, case_ids)
     edges = [*range(alone), *range(alone, case_ids.size, batch or case_ids.size), case_ids.size]
@@ -145,8 +145,8 @@ def fly_cases(
             inputs = full_inputs(campaign, {name: column[piece] for name, column in table.items()})
             with guard(case_ids[piece]):
                 noise = noise_ids(campaign, case_ids[piece])
-                on_row = None if log is None else log.adding(case_ids[piece])
-                flights.append(flyer.fly(inputs, noise, on_row, keep, stopped))
+                rows = None if log is None else log.of(case_ids[piece])
+                flights.append(flyer.fly(inputs, noise, rows, keep, stopped))
     flight = flights[0] if len(flights) == 1 else _stacked(flights)
     name_upstream(campaign, case_ids, flight)
     return {**table, **flight}

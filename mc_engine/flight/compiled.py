@@ -8,16 +8,17 @@ import numpy as np
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight import flight
 from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
-from mc_engine.flight.flyer import Columns, Flyer, Inputs, OnRow, never
+from mc_engine.flight.flyer import Columns, Flyer, Inputs, never
 from mc_engine.flight.kernel import source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
 from mc_engine.model.record import compiled_model
+from mc_engine.store.case_rows import RowLog
 
 
 class CompiledFlyer(Flyer):
     """A compiled model: eight or sixteen cases at a time, each independent of the others.
 
-    It needs neither `on_row` nor `keep`: a chunk takes seconds at most, and leaves no files.
+    It needs neither `log` nor `keep`: a chunk takes seconds at most, and leaves no files.
     """
 
     def __init__(self, campaign: Campaign):
@@ -29,7 +30,7 @@ class CompiledFlyer(Flyer):
         self,
         inputs: Inputs,
         noise: np.ndarray,
-        on_row: OnRow | None = None,
+        log: RowLog | None = None,
         keep: Path | None = None,
         stopped: Callable[[], bool] = never,
     ) -> Columns:

@@ -19,7 +19,7 @@ from mc_engine.model.faults import MORE
 from mc_engine.model.reading import is_shipped, source_faults
 from mc_engine.model.record import compiled_model
 from mc_engine.model.trial import run_through
-from mc_engine.safe_path import SAFE_PATH
+from mc_engine.safe_path import safe_environment
 
 _PATIENCE = 600.0  # s, for all flights and compilation; one case has a limit of its own
 
@@ -50,9 +50,8 @@ def _trial_faults(campaign: Campaign) -> list[str]:
 def flight_faults(campaign: Campaign, file: str) -> list[str]:
     """What `mc_engine.flight.contract_flight` finds in a process of its own, which the model may kill or hang."""
     command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, json.dumps(model_digests(campaign))]
-    path = os.pathsep.join(entry or os.getcwd() for entry in sys.path)  # the same packages as here
     other = {"PYTHONHASHSEED": "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0", "TZ": "UTC-14"}
-    environment = {**os.environ, **SAFE_PATH, **other, "PYTHONPATH": path}
+    environment = {**safe_environment(), **other}
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, env=environment)
     except subprocess.TimeoutExpired:

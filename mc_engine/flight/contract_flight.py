@@ -27,7 +27,8 @@ from mc_engine.flight.lost_numbers import first_lost
 from mc_engine.flight.repeatability import influences, model_digests, nominal_inputs, note_environment
 from mc_engine.model.faults import MORE, fault_of
 from mc_engine.model.fields import AdaptiveStep, FixedStep
-from mc_engine.model.record import compiled_model
+from mc_engine.model.phases import noted_field
+from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.trial import fixed_metrics
 from mc_engine.sampling.distributions import column, quantiles
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME, STATUS_TEXT
@@ -248,6 +249,9 @@ def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarr
         return
     reached = fly(watching_events(model), inputs, ids, campaign.seed, folder=campaign.directory)
     ok = reached["status"] == STATUS_NAME[OK]
+    if model.phases:
+        yield from _never_firing(model, reached, ok)
+        return
     for event in model.event_list:
         least, most = reached[f"least_{event.name}"][ok], reached[f"most_{event.name}"][ok]
         zero = _ZERO * np.fmax(np.abs(least), np.abs(most))
@@ -256,6 +260,15 @@ def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarr
             yield (
                 f'the event "{event.name}" crosses zero in none of {ok.sum()} cases, its function stays {sign} it; '
                 "mend the function, or declare it with rare=True if it is for unusual cases"
+            )
+
+
+def _never_firing(model: Model, reached: Columns, ok: np.ndarray) -> Iterator[str]:
+    for event in model.event_list:
+        if not event.rare and np.isnan(reached[noted_field(event.name)][ok]).all():
+            yield (
+                f'the event "{event.name}" happens in none of {ok.sum()} cases, in the phases that look for it; mend '
+                "its function or its direction, or declare it with rare=True if it is for unusual cases"
             )
 
 

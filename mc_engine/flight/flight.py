@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mc_engine.campaign.columns import END_TIME
+from mc_engine.campaign.columns import END_PHASE, END_TIME
 from mc_engine.errors import ModelError
 from mc_engine.flight.kernel import build_kernel, usual_width
 from mc_engine.flight.kernel_parts import blocks_of, settings_class
@@ -24,6 +24,7 @@ from mc_engine.model.reading import place_of
 from mc_engine.model.record import Model, Refusals
 from mc_engine.model.trial import refuse_unfit
 from mc_engine.status import OK, REFUSED, STATUS_NAME
+from mc_engine.store.histories import PHASE_COLUMN, rows_to_keep
 from mc_engine.suggestions import hint
 
 if TYPE_CHECKING:
@@ -31,6 +32,8 @@ if TYPE_CHECKING:
 
 Inputs = Mapping[str, Any]
 _NO_TABLES = np.empty(0)
+_MOST_RECORDED = 200_000  # rows of a flight, of which its history keeps some
+_OVERSAMPLED = 4  # times as many rows as are kept, where steps are so long that they are divided
 _MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
@@ -134,18 +137,37 @@ def fly(
     status = np.where(ready.refusals.mask, REFUSED, OK).astype(np.float64)
     time = np.full(n, np.nan)
     states = np.full((len(model.states), n), np.nan)
-    metrics = np.full((len(model.metrics), n), np.nan)
+    metrics = np.full((_n_results(model), n), np.nan)
     for chosen in _groups_by_settings(ready):
         flight = _fly_group(model, clock or model.clock, ready, chosen, case_ids, seed, folder, width)
         time[chosen], status[chosen], states[:, chosen], metrics[:, chosen] = flight
+    last_phase = phase_words(model, metrics[-1])
+    metrics = metrics[: len(model.metrics)]
     metrics[:, status != OK] = np.nan
+    reason = ready.refusals.reason.astype(object)
+    failed = (status != OK) & (last_phase != "")
+    reason[failed] = [f'in the phase "{word}"' for word in last_phase[failed]]
     columns: dict[str, np.ndarray] = {
         "status": _STATUS_WORDS[status.astype(int)],
-        "reason": ready.refusals.reason.astype(object),
+        "reason": reason,
         END_TIME: time,
     }
+    if model.phases:
+        columns[END_PHASE] = last_phase
     columns |= {f"end_{field.name}": row / field.si_factor for field, row in zip(model.states, states, strict=True)}
     return columns | {field.name: row / field.si_factor for field, row in zip(model.metrics, metrics, strict=True)}
+
+
+def phase_words(model: Model, numbers: np.ndarray) -> np.ndarray:
+    """object[n] of str, the names of the phases with these numbers; empty for NaN and in a model without phases."""
+    words = np.array([*model.phases, ""], dtype=object)
+    known = np.isfinite(numbers) & bool(model.phases)
+    return words[np.where(known, np.nan_to_num(numbers), -1).astype(int)]
+
+
+def _n_results(model: Model) -> int:
+    """Numbers that a kernel gives for each case: the metrics, and the last phase of a model with phases."""
+    return len(model.metrics) + bool(model.phases)
 
 
 def _groups_by_settings(ready: Prepared) -> list[np.ndarray]:
@@ -237,7 +259,7 @@ _NO_HISTORY = np.empty((0, 0))
 
 
 def _outputs(model: Model, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    return np.empty(n), np.empty(n), np.empty((len(model.states), n)), np.empty((len(model.metrics), n))
+    return np.empty(n), np.empty(n), np.empty((len(model.states), n)), np.empty((_n_results(model), n))
 
 
 def _bound_kernel(
@@ -256,13 +278,14 @@ def _bound_kernel(
     """The kernel with all its arguments.
 
     inputs : parameters [n_kernel_parameters, n], setting codes, tables of the cases
-    pace : distance of two history rows, in steps or, if the steps are adaptive, seconds
+    pace : of the history, in steps from row to row or, if the steps are adaptive, in rows of a step
     kernel : in place of the model's own
     """
     parameters, settings, tables = inputs
     chosen = settings_of(model, settings, tables)
-    refuse_unfit(model, parameters, chosen)
-    kernel = kernel or build_kernel(model, folder, width)
+    if kernel is None:
+        refuse_unfit(model, parameters, chosen)
+        kernel = build_kernel(model, folder, width)
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
     kernel_settings = _kernel_settings(model, settings, chosen)
     data = gathered(blocks_of(model))
@@ -293,22 +316,19 @@ def bound_flight(
 
 
 def fly_interpreted(
-    model: Model, inputs: Inputs, case_id: int, seed: int, seconds: float
-) -> tuple[tuple[np.ndarray, ...], "InterpretedFlight"]:
-    """((time, status, states, metrics) of one case in SI, what its flight knows of numbers that are not finite).
+    flight: "InterpretedFlight", inputs: Inputs, case_id: int, seed: int, history: Any = _NO_HISTORY
+) -> tuple[np.ndarray, ...]:
+    """(time, status, states, metrics) of one case in SI, flown by Python.
 
-    By Python, which takes some thousand times as long as a kernel; OutOfTime after so many seconds.  The case must be
-    able to start.
+    It takes some thousand times as long as a kernel; OutOfTime after the seconds that the flight may take.  The case
+    must be able to start.  history : as the kernel takes it, a row for every step.
     """
-    from mc_engine.flight.interpreted import InterpretedFlight  # which loads the compiler
-
-    ready = prepare(model, inputs, 1)
-    settings, out = np.ascontiguousarray(ready.settings[0]), _outputs(model, 1)
-    flight = InterpretedFlight(model, seconds)
+    ready = prepare(flight.model, inputs, 1)
+    settings, out = np.ascontiguousarray(ready.settings[0]), _outputs(flight.model, 1)
     cases = ready.parameters, settings, ready.tables
-    ids = np.array([case_id])
-    _bound_kernel(model, model.clock, None, 1, cases, seed, ids, out, _NO_HISTORY, 1.0, flight.kernel)()
-    return out, flight
+    clock, ids = flight.model.clock, np.array([case_id])
+    _bound_kernel(flight.model, clock, None, 1, cases, seed, ids, out, history, 1.0, flight.kernel)()
+    return out
 
 
 def fly_history(
@@ -323,31 +343,45 @@ def fly_history(
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """(columns, history) of one case alone: the same bits as among others, whatever the width of the build.
 
-    rows : about how many instants the history of a flight to the time limit has, the start and the end among them;
-        with adaptive steps, the history of this flight.
-    history : t_s and the model's quantities in declared units; empty if the case was refused.
+    rows : of the history, see `mc_engine.store.histories.rows_to_keep`; fewer where a fixed grid has fewer steps
+    history : t_s and the model's outputs in declared units; empty if the case was refused.  Of a time with two rows
+        the first is before an event or a sample of the control, the second after it.
     """
     width = width or usual_width(model)
     ready = prepare(model, inputs, 1)
     columns = fly(model, inputs, np.array([case_id]), seed, folder=folder, width=width)
-    names = ["t_s", *(quantity.name for quantity in model.quantities)]
+    names = ["t_s", *(quantity.name for quantity in model.quantities), *([PHASE_COLUMN] if model.phases else [])]
     if ready.refusals.mask[0]:
         return columns, {name: np.empty(0) for name in names}
     settings = np.ascontiguousarray(ready.settings[0])
-    n_rows, pace = _history_grid(model, settings, float(columns[END_TIME][0]), rows)
-    history = np.empty((n_rows, len(names)))
     ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
     cases = parameters, settings, ready.tables
-    out = _outputs(model, width)
-    n = in_another_thread(_bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, history, pace))
-    factors = [1.0, *(quantity.si_factor for quantity in model.quantities)]
-    return columns, {name: history[:n, i] / factors[i] for i, name in enumerate(names)}
+
+    def recorded(room: int, pace: float) -> tuple[int, np.ndarray]:
+        """(rows that the flight has, as many of them as there is room for)."""
+        history, out = np.empty((room, len(names))), _outputs(model, width)
+        bound = _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, history, pace)
+        return in_another_thread(bound), history
+
+    pace = _history_pace(model, settings, rows, lambda: recorded(1, 1.0)[0])
+    _, table = recorded(recorded(1, pace)[0], pace)
+    table[:, 1 : 1 + len(model.quantities)] /= [quantity.si_factor for quantity in model.quantities]
+    kept = table[rows_to_keep(table, rows)]
+    history = {name: kept[:, i] for i, name in enumerate(names)}
+    if model.phases:
+        history[PHASE_COLUMN] = phase_words(model, kept[:, -1])
+    return columns, history
 
 
-def _history_grid(model: Model, settings: np.ndarray, end_time: float, rows: int) -> tuple[int, float]:
-    """(room for rows, pace) of a history of about `rows` rows."""
-    if isinstance(model.clock, AdaptiveStep):
-        return rows, max(end_time, 1e-9) / (rows - 1)
-    n_steps = grid_of(model.clock, settings_of(model, settings))[0]
-    stride = max(1, n_steps // rows)
-    return n_steps // stride + 4, float(stride)
+def _history_pace(model: Model, settings: np.ndarray, rows: int, at_steps: Callable[[], int]) -> float:
+    """Pace at which a history is recorded, of which `rows` rows are kept: all steps of the flight if memory allows.
+
+    at_steps : tells how many rows an adaptive flight has at its own steps.  Steps so long that there are fewer than
+    wanted are divided.  On a fixed grid the pace is in steps.
+    """
+    most = max(_MOST_RECORDED, _OVERSAMPLED * rows)
+    if isinstance(model.clock, FixedStep):
+        n_steps = grid_of(model.clock, settings_of(model, settings))[0]
+        return float(-(-2 * n_steps // most))
+    n = at_steps()
+    return most / n if n > most else float(max(1, -(-_OVERSAMPLED * rows // n)))

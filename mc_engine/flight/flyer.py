@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import EngineError
+from mc_engine.store.case_rows import RowLog
 
 NOMINAL_NOISE = 2**52  # the nominal draws its noise where no case does
 Columns = dict[str, np.ndarray]
 Inputs = Mapping[str, Any]
-Row = dict[str, Any]
-OnRow = Callable[[int, Row], None]
 
 
 class RunStopped(EngineError):
@@ -46,7 +45,7 @@ class Flyer(ABC):
         self,
         inputs: Inputs,
         noise: np.ndarray,
-        on_row: OnRow | None = None,
+        log: RowLog | None = None,
         keep: Path | None = None,
         stopped: Callable[[], bool] = never,
     ) -> Columns:
@@ -54,8 +53,8 @@ class Flyer(ABC):
 
         inputs : every parameter and setting by column name, in declared units; one value, or an array [n] of cases.
         noise : int64[n], what addresses the random draws in the flight of each case.
-        on_row : called with place and row of each case that is complete, where `keeps_rows`.
-        keep : folder for what cases leave behind; None keeps nothing.
+        log : of these cases; the row of each that is complete is added, where `keeps_rows`.
+        keep : run directory, for what cases leave behind; None keeps nothing.
         Raises RunStopped once `stopped()` is true, where `keeps_rows`.
         """
 

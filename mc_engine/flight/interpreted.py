@@ -1,4 +1,4 @@
-"""The engine's integration loops run by Python on one case, to find the operation that made a number infinite or NaN.
+"""The engine's integration loops run by Python on one case: to find what made a number not finite, to trace, to debug.
 
 The loops are the ones that kernels are compiled from.  Their intrinsics exist in compiled code only, so each has an
 interpreted twin of the same name here.
@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from mc_engine.lanes.composed import ComposedFunction
+from mc_engine.lanes.block_search import has_powers
+from mc_engine.lanes.composed import Alternatives, ComposedFunction
 from mc_engine.lanes.functions import TABLES, fma
-from mc_engine.lanes.number import Number, Origin, calling, number
+from mc_engine.lanes.number import Number, Origin, calling, number, numbers
 from mc_engine.model.fields import AdaptiveStep
 from mc_engine.model.record import Model
 
@@ -31,49 +32,59 @@ class OutOfTime(Exception):
 
 
 class InterpretedFlight:
-    """The loops of a model's clock, on one case.
+    """The loops of a model's clock, on one case.  Subclasses override `call`, `record` or `any_of` to look on.
 
+    seconds : how long the flight may take.  t : of the latest call of a function [s].
     origin : of the latest number that made a state, or an error of one, not finite.  metrics : what `evaluate` gave.
     """
 
-    def __init__(self, model: Model, seconds: float):
-        from mc_engine.flight.kernel_parts import functions_of, settings_class
+    def __init__(self, model: Model, seconds: float = math.inf):
+        from mc_engine.flight.kernel_parts import PHYSICS, functions_of, settings_class
 
         self.origin: Origin | None = None
         self.metrics: tuple[Any, ...] = ()
         self._end = time.monotonic() + seconds
-        self._t = 0.0
+        self.t = 0.0
         self._names: dict[str, dict[str, Any]] = {}
+        self._has_powers = has_powers(getattr(model, name) for name in PHYSICS)
         functions = functions_of(model, self)
-        self._functions = functions._replace(
-            **{name: self._called(name, getattr(functions, name)) for name in functions._fields[:8]}
-        )
-        self._model, self._settings = model, settings_class(model)
+        self._functions = functions._replace(**{name: self._called(name, getattr(functions, name)) for name in PHYSICS})
+        self.model, self._settings = model, settings_class(model)
 
     def kernel(
         self, parameters: np.ndarray, settings: np.ndarray, data: Any, key: Any, cases: np.ndarray, *rest: Any
     ) -> int:
         """Fly the first case; arguments and results are those of the model's kernel."""
-        model, adaptive = self._model, isinstance(self._model.clock, AdaptiveStep)
+        model, adaptive = self.model, isinstance(self.model.clock, AdaptiveStep)
         fly = self._interpreted("adaptive_flight" if adaptive else "fixed_step")["fly"]
         actions = [event.action for event in model.event_list]
         inputs = (parameters, settings, key, cases)
         common, must_stop = (model.kernel_parameters, self._settings, 1), "stop" in actions
         if adaptive:
-            tables, (clock, atol, *out, history, spacing) = rest[:4], rest[4:]
+            tables, (clock, atol, *out, history, pace) = rest[:4], rest[4:]
             order = (np.zeros(1, dtype=np.int64), *inputs, [Number(value) for value in clock], atol, must_stop)
-            return int(fly(self._functions, tables, *common, *order, out, history, spacing))
+            return int(fly(self._functions, tables, *common, *order, out, history, pace))
         n_steps, h, every, *out, history, stride = rest
         kinds = bool(actions), must_stop
         return int(fly(self._functions, *common, *inputs, (n_steps, h, every), kinds, out, history, stride))
 
     def _called(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*arguments: Any) -> Any:
+        def called(*arguments: Any) -> Any:
             if name not in ("initial", "start"):
-                self._t = float(arguments[0])
-            return calling(name, function, *arguments)
+                self.t = float(arguments[0])
+            return self.call(name, function, arguments)
 
-        return call
+        return called
+
+    def call(self, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        """The result of one function of the model.  name : what the engine calls it, such as "rhs"."""
+        if self._has_powers:
+            return function(*(numbers(argument) for argument in arguments))
+        return calling(name, function, *arguments)
+
+    def record(self, array: np.ndarray, row: int, t: Any, fields: Any) -> None:
+        """Write a row of the history.  fields : what `observe` has just given."""
+        array[row] = (t, *fields)
 
     def _interpreted(self, module: str) -> dict[str, Any]:
         """The names of a module of loops, its compiled functions and intrinsics as Python runs them."""
@@ -85,13 +96,13 @@ class InterpretedFlight:
                     names[name] = FunctionType(value.py_func.__code__, self._interpreted(home))
                 elif name in _INTRINSICS:
                     names[name] = _INTRINSICS[name]
-            names |= {"total": self.total, "map_fields": self.map_fields}
+            names |= {"total": self.total, "map_fields": self.map_fields, "record": self.record}
         return self._names[module]
 
     def total(self, fields: Sequence[Number]) -> Number:
         """Sum of the fields; the flight's `origin` is theirs, where it is not finite."""
         if time.monotonic() > self._end:
-            raise OutOfTime(self._t)
+            raise OutOfTime(self.t)
         value: Any = functools.reduce(operator.add, fields)
         if not math.isfinite(value):
             self.origin = value.origin
@@ -117,6 +128,9 @@ class InterpretedFlight:
     def composed(self, calls: Any, record: Any, picks: Any) -> Callable[..., Any]:
         return ComposedFunction(calls, record, picks)
 
+    def alternatives(self, number: Any, functions: Any) -> Callable[..., Any]:
+        return Alternatives(number, functions)
+
     def picker(self, cls: Any, picks: Sequence[tuple[int, float, float]], count: Any = None) -> Callable[[Any], Any]:
         def pick(fields: Any) -> Any:
             values = [(-fields[i] if sign < 0 else fields[i], offset) for i, sign, offset in picks]
@@ -136,7 +150,9 @@ def _record(cls: Any, values: Sequence[Any]) -> Any:
 
 
 def _spread(value: Any, like: Any) -> Any:
-    return _record(type(value), [number(field) for field in value]) if isinstance(value, tuple) else number(value)
+    if not isinstance(value, tuple):
+        return number(value)
+    return _record(type(value), [_spread(field, like) for field in value])
 
 
 def _load_scalars(cls: Any, array: np.ndarray) -> Any:
@@ -146,10 +162,6 @@ def _load_scalars(cls: Any, array: np.ndarray) -> Any:
 
 def _store(array: np.ndarray, column: int, value: Any, lane: int = 0) -> None:
     array[..., column] = value
-
-
-def _record_row(array: np.ndarray, row: int, t: Any, fields: Any) -> None:
-    array[row] = (t, *fields)
 
 
 def _stage_sum(memory: list[Any], like: Any, first: int, last: int, columns: np.ndarray, weights: np.ndarray) -> Any:
@@ -174,7 +186,6 @@ _INTRINSICS: dict[str, Callable[..., Any]] = {
     "store": _store,
     "store_fields": _store,
     "store_lane": lambda array, column, value, lane: _store(array, column, value),
-    "record": _record_row,
     "lane_holds": lambda mask, lane: mask,
     "with_lane": lambda value, lane, item: number(item),
     "align_stack": lambda: None,

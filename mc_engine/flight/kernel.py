@@ -69,14 +69,14 @@ _F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 @compile_kernel
 def kernel(
     parameters, settings, data, key, cases, nodes, starts, columns, weights, clock, atol, time, status, state, metrics,
-    history, spacing,
+    history, pace,
 ):
     hand_over(BLOCKS, data)
     f = Functions({names})
     tables, out = (nodes, starts, columns, weights), (time, status, state, metrics)
     return fly(
         f, tables, Parameters, Settings, {width}, np.arange({width}), parameters, settings, key, cases, clock, atol,
-        MUST_STOP, out, history, spacing,
+        MUST_STOP, out, history, pace,
     )
 '''
 

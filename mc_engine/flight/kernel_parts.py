@@ -1,30 +1,32 @@
 """What a kernel takes from its model: the physics, defaults for functions left out, and selections of fields."""
 
 from collections import namedtuple
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 from mc_engine.lanes import physics
 from mc_engine.lanes.block_search import blocks_in
-from mc_engine.lanes.composed import made_by
+from mc_engine.lanes.composed import ComposedFunction, Pick, made_by, whole
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.kernel_data import Blocks, DataBlock
 from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum, Field
+from mc_engine.model.phases import PHASE, noted_field
+from mc_engine.model.reading import ARGUMENTS
 from mc_engine.model.record import Model, NoMemory
 
 # The physics of a model, and intrinsics that pick or fill fields of tuples:
-# peaks_of, lasts_of : from the quantities, the values of which peaks and last times above zero are wanted
+# peaks_of, lasts_of : from the outputs, the values of which peaks and last times above zero are wanted
 # best_of, when_of : the model's extrema, from what the loop tracked;  smooth_of, kinds_of, signs_of : constants
 # states_of, metrics_of : refuse to be compiled for another number of fields than the model declares
-# stops_of, switches_of : whether an event fired that ends the case, or that calls `switch`
+# stops_of, switches_of, notes_of : whether an event fired that ends the case, that calls `switch`, that calls `note`
 Functions = namedtuple(
     "Functions",
-    "initial start rhs control events switch observe evaluate peaks_of lasts_of best_of when_of smooth_of kinds_of "
-    "signs_of stops_of switches_of states_of metrics_of",
+    "initial start rhs control events switch note observe evaluate peaks_of lasts_of best_of when_of smooth_of "
+    "kinds_of signs_of stops_of switches_of notes_of states_of metrics_of",
 )
-_PHYSICS = Functions._fields[:8]
+PHYSICS = Functions._fields[:9]
 NoEvents = namedtuple("NoEvents", "unused")
 
 
@@ -46,6 +48,11 @@ def _no_events(t, s, m, p, o):
 @physics
 def _no_switch(t, s, m, p, o, hit):
     return s, m
+
+
+@physics
+def _no_note(t, s, m, p, o, hit):
+    return m
 
 
 class Parts(NamedTuple):
@@ -80,14 +87,14 @@ def parts_of(model: Model, watching: bool, makers: Any = None) -> Parts:
 @lru_cache(maxsize=64)
 def blocks_of(model: Model) -> tuple[DataBlock, ...]:
     """The data that the physics of a model reads by their names, such as curves, in the order of its kernel."""
-    return blocks_in(getattr(model, name) for name in _PHYSICS)
+    return blocks_in(getattr(model, name) for name in PHYSICS)
 
 
 def functions_of(model: Model, makers: Any = None) -> Functions:
     """The physics of a model, and picks of its fields as `makers` makes them: intrinsics by default."""
-    from mc_engine.lanes import tuples
+    from mc_engine.lanes import model_intrinsics
 
-    makers = makers or tuples
+    makers = makers or model_intrinsics
     physics_of_model = (
         model.initial,
         model.start or _no_start,
@@ -95,10 +102,22 @@ def functions_of(model: Model, makers: Any = None) -> Functions:
         model.control or _no_control,
         model.events or _no_events,
         model.switch or _no_switch,
-        model.observe,
-        model.evaluate,
+        model.note or _no_note,
+        _with_phase(model, "observe"),
+        _with_phase(model, "evaluate"),
     )
     return Functions(*(made_by(function, makers) for function in physics_of_model), *_picks(model, makers))
+
+
+def _with_phase(model: Model, name: str) -> Any:
+    """`observe` or `evaluate`; in a model with phases the number of the phase follows what it gives."""
+    function, declared = getattr(model, name), model.quantities if name == "observe" else model.metrics
+    if not model.phases:
+        return function
+    arguments = ARGUMENTS[name].split(", ")
+    picks: list[Pick] = [("result", 0, i) for i in range(len(declared))]
+    picks.append(("argument", arguments.index("m"), PHASE))
+    return ComposedFunction([(function, whole(range(len(arguments))))], tuple, picks, function)
 
 
 def _picks(model: Model, makers: Any) -> list[Any]:
@@ -107,7 +126,7 @@ def _picks(model: Model, makers: Any) -> list[Any]:
     names = [quantity.name for quantity in model.quantities]
     peaks = [e for e in model.extrema if e.kind in ("max", "min")]
     lasts = [e for e in model.extrema if e.kind == "last_above"]
-    # a model without peaks or last times tracks its first quantity instead, so that no tuple of a loop is empty
+    # a model without peaks or last times tracks its first output instead, so that no tuple of a loop is empty
     peak_picks = [(names.index(e.quantity), _sign(e), 0.0) for e in peaks] or [(0, 1.0, 0.0)]
     last_picks = [(names.index(e.quantity), 1.0, e.level) for e in lasts] or [(0, 1.0, 0.0)]
     n_events = max(1, len(model.event_list))
@@ -121,8 +140,8 @@ def _picks(model: Model, makers: Any) -> list[Any]:
         signs += [-1.0] * (len(kinds) - n_events)
     actions = [event.action for event in model.event_list]
     return [
-        makers.picker(None, peak_picks, len(names)),
-        makers.picker(None, last_picks, len(names)),
+        makers.picker(None, peak_picks, len(names) + bool(model.phases)),
+        makers.picker(None, last_picks, len(names) + bool(model.phases)),
         makers.picker(best_class, best_picks),
         makers.picker(best_class, [(i, 1.0, 0.0) for i, _, _ in best_picks]),
         makers.directions(smooth),
@@ -130,8 +149,9 @@ def _picks(model: Model, makers: Any) -> list[Any]:
         makers.directions(signs),
         makers.any_of([i for i, action in enumerate(actions) if action == "stop"]),
         makers.any_of([i for i, action in enumerate(actions) if action == "switch"]),
+        makers.any_of([i for i in range(len(actions)) if model.note is not None]),
         makers.counted("initial", len(model.states)),
-        makers.counted("evaluate", len(model.metrics)),
+        makers.counted("evaluate", len(model.metrics) + bool(model.phases)),
     ]
 
 
@@ -160,17 +180,34 @@ def _reached(t, s, m, p, o, best, when):
 
 def watching_events(model: Model) -> Model:
     """The same flight, with metrics `least_<event>` and `most_<event>`: the extremes of each event's function at the
-    steps.  The model must have events."""
+    steps; of a model with phases `time_of_<event>`, NaN where it did not happen.  The model must have events."""
     assert model.events is not None
     names = [event.name for event in model.event_list]
+    if model.noting is not None:
+        return _noting_events(model, model.noting())
     kinds = [(f"{word}_{name}", name, kind) for name in names for word, kind in (("least", "min"), ("most", "max"))]
     return replace(
         model,
-        quantities=tuple(Field(name, "", "the event's function") for name in names),
+        quantities=tuple(Field("the event's function", name=name, unit="") for name in names),
         observe=model.events,
         extrema=tuple(Extremum(name, event, kind, smooth=False) for name, event, kind in kinds),
-        metrics=tuple(Field(name, "", "an extreme of an event's function") for name, _, _ in kinds),
+        metrics=tuple(Field("an extreme of an event's function", name=name, unit="") for name, _, _ in kinds),
         evaluate=_reached,
+        figures=(),
+        published=(),
+        watching=True,
+    )
+
+
+def _noting_events(model: Model, functions: Mapping[str, Any]) -> Model:
+    names = [noted_field(event.name) for event in model.event_list if not event.rare]
+    memory = ARGUMENTS["evaluate"].split(", ").index("m")
+    picks: list[Pick] = [("argument", memory, name) for name in names]
+    return replace(
+        model,
+        **functions,
+        evaluate=ComposedFunction([], namedtuple("Times", names), picks),
+        metrics=tuple(Field("time of an event", name=name, unit="") for name in names),
         figures=(),
         published=(),
         watching=True,

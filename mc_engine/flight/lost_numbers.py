@@ -2,15 +2,18 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from mc_engine.flight.flight import fly_interpreted
-from mc_engine.model.faults import place_in_model
-from mc_engine.model.origins import sentence
+from mc_engine.lanes.number import Origin
+from mc_engine.model.faults import origin_sentence, place_in_model
 from mc_engine.model.record import Model
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
+
+if TYPE_CHECKING:
+    from mc_engine.flight.interpreted import InterpretedFlight
 
 PATIENCE_S = 60.0  # of a flight to find the line
 
@@ -30,18 +33,30 @@ def first_lost(
     By an interpreted flight of the case, which takes some milliseconds a step; it is given up after so many seconds.
     who : the case in words.
     """
-    from mc_engine.flight.interpreted import OutOfTime  # which loads the compiler
+    from mc_engine.flight.interpreted import InterpretedFlight, OutOfTime  # which loads the compiler
 
+    flight = InterpretedFlight(model, seconds)
     try:
-        (_, status, _, _), flight = fly_interpreted(model, inputs, case_id, seed, seconds)
+        _, status, _, _ = fly_interpreted(flight, inputs, case_id, seed)
     except OutOfTime as late:
         return (f"{who}: the flight that looks for the line was given up after {seconds:.0f} s, at t = {late.t:.6g} s; "
                 "it was finite until then")  # fmt: skip
     except ArithmeticError as error:  # of two numbers outside of the physics: kernels go on with an infinity
         return f"{who}: the flight that looks for the line cannot go on from {place_in_model(error)}: {error}"
-    if status[0] == NOT_FINITE:
-        return sentence(flight.origin, who) if flight.origin is not None else ""
-    for metric, value in zip(model.metrics, flight.metrics, strict=False):
-        if status[0] == OK and math.isnan(value) and not metric.sometimes and value.origin is not None:
-            return f'"{metric.name}": {sentence(value.origin, who)}'
-    return ""
+    origin, metric = origin_of(flight, int(status[0]))
+    if origin is None:
+        return ""
+    return f'"{metric}": {origin_sentence(origin, who)}' if metric else origin_sentence(origin, who)
+
+
+def origin_of(flight: "InterpretedFlight", status: int) -> tuple[Origin | None, str]:
+    """What broke a flight that has ended, and ""; or what made a metric not a number, and its name; or None.
+
+    status : as the flight ended.
+    """
+    if status == NOT_FINITE:
+        return flight.origin, ""
+    for metric, value in zip(flight.model.metrics, flight.metrics, strict=False):
+        if status == OK and math.isnan(value) and not metric.sometimes and value.origin is not None:
+            return value.origin, metric.name
+    return None, ""

@@ -1,21 +1,15 @@
-"""Flight of one case by a program: its files, its start, its limits, its results, and what it leaves behind.
-
-Linux has the means to end every process that a program began, to see its memory while it runs, and to end it with the
-engine; elsewhere only its own process group is ended.
-"""
+"""Flight of one case by a program: its files, its start, its limits, its results, and what it leaves behind."""
 
 import csv
-import ctypes
 import io
 import json
 import os
 import re
 import selectors
-import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -24,7 +18,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from mc_engine.model.simulator import Simulator
-from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, TIME_LIMIT
+from mc_engine.process_tree import end_children, how_it_ended, kill_group, memory_mib
+from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, STATUS_NAME, TIME_LIMIT
 from mc_engine.text import clean
 
 if TYPE_CHECKING:
@@ -33,9 +28,7 @@ if TYPE_CHECKING:
 PROGRAM_ID = "program_id"  # file with the process group of the program in flight, for whoever must end it
 LOOK_EVERY_S = 0.02  # between two looks at the memory of a program, and whether it has ended
 MOST_STDOUT, MOST_STDERR, MOST_RESULT = 2**24, 2**16, 2**26  # bytes
-_PAGE = os.sysconf("SC_PAGE_SIZE") if hasattr(os, "sysconf") else 4096
 _MIB = 2**20
-_SET_PARENT_SIGNAL, _SET_SUBREAPER = 1, 36  # of prctl
 _LINUX = sys.platform.startswith("linux")
 
 
@@ -46,6 +39,11 @@ class Flown(NamedTuple):
     reason: str
     metrics: dict[str, float]
     history: dict[str, np.ndarray]
+
+    def row(self, names: Sequence[str]) -> dict[str, Any]:
+        """Status, reason and metrics by column; a metric that is not there is not a number."""
+        metrics = {name: self.metrics.get(name, float("nan")) for name in names}
+        return {"status": STATUS_NAME[self.status], "reason": self.reason, **metrics}
 
 
 def flown(
@@ -135,7 +133,7 @@ class ProgramFlight:
                 limit = self._exceeded(process.pid, time.monotonic() - begin)
                 if limit != OK:
                     break
-            _kill_group(process.pid)
+            kill_group(process.pid)
             (self._home.parent / PROGRAM_ID).unlink()
             _, code, usage = os.wait4(process.pid, 0)
             process.returncode = os.waitstatus_to_exitcode(code)
@@ -148,7 +146,7 @@ class ProgramFlight:
         if self._simulator.time_limit_s is not None and seconds > self._simulator.time_limit_s:
             return TIME_LIMIT
         most = self._simulator.memory_limit_mib
-        return MEMORY_LIMIT if most is not None and _memory_mib(pid) > most else OK
+        return MEMORY_LIMIT if most is not None and memory_mib(pid) > most else OK
 
     def _ended_badly(self, ended: _Ended) -> tuple[int, str] | None:
         """Status and reason of a program that did not end by itself with exit code 0."""
@@ -170,34 +168,20 @@ class ProgramFlight:
         for metric in self._simulator.metrics:
             path, pattern = self._program.reads[metric.name]
             values[metric.name] = _number(metric.name, document, path, pattern, text, metric.sometimes)
-        for metric in self._simulator.metrics:
-            value = values[metric.name]
-            if np.isinf(value) or (np.isnan(value) and not metric.sometimes):
-                return flown(NOT_FINITE, f'"{metric.name}" is {"not a number" if np.isnan(value) else "infinite"}')
-        return flown(OK, "", values, self._history(folder) if history else None)
+        if lost := self._simulator.lost_metric(values):
+            return flown(NOT_FINITE, lost)
+        past = self._history(folder)
+        return flown(OK, "", values, past if history else None)
 
     def _history(self, folder: Path) -> dict[str, np.ndarray]:
         if self._program.history is None or not self._simulator.outputs:
             return {}
-        rows = list(csv.reader(io.StringIO(_content(folder, self._program.history).decode())))
-        names = [name.strip() for name in rows[0]] if rows else []
-        table = np.array([[float(value) for value in row] for row in rows[1:]]).reshape(-1, max(len(names), 1))
+        names, table = _table(folder, self._program.history)
         wanted = ["t_s", *(output.name for output in self._simulator.outputs)]
         if missing := [name for name in wanted[1:] if name not in names]:
             raise ValueError(f'{self._program.history} has no column "{missing[0]}"')
         places = [0, *(names.index(name) for name in wanted[1:])]  # the first column is the time, whatever its name
         return {name: table[:, place] for name, place in zip(wanted, places, strict=True)}
-
-
-def how_it_ended(code: int) -> str:
-    """An exit code, or the signal that a negative one stands for, in words."""
-    if code >= 0:
-        return f"ended with exit code {code}"
-    try:
-        name = signal.Signals(-code).name
-    except ValueError:
-        name = f"signal {-code}"
-    return f"ended by {name}"
 
 
 def last_lines(stderr: bytes, count: int = 3) -> str:
@@ -258,6 +242,21 @@ def _document(folder: Path, name: str) -> Any:
     return {key.strip(): value for key, value in zip(*rows, strict=True)}
 
 
+def _table(folder: Path, name: str) -> tuple[list[str], np.ndarray]:
+    """(names of the columns, float64[rows, columns]) of a CSV."""
+    first, _, rest = _content(folder, name).decode().partition("\n")
+    names = [column.strip() for column in next(csv.reader([first]), [])]
+    if not rest.strip():
+        return names, np.empty((0, len(names)))
+    try:
+        table = np.loadtxt(io.StringIO(rest), delimiter=",", ndmin=2)
+    except ValueError as error:
+        raise ValueError(f"{name} cannot be read: {error}") from None
+    if table.shape[1] != len(names):
+        raise ValueError(f"{name} has {table.shape[1]} columns, and names of {len(names)}")
+    return names, table
+
+
 def _at(document: Any, path: str) -> Any:
     """What is in a document under a key, or under keys and places with dots between them; KeyError if nothing."""
     if isinstance(document, dict) and path in document:
@@ -310,76 +309,9 @@ def _difference(document: Any, path: str, inputs: Mapping[str, Any]) -> str:
     return ""
 
 
-def _memory_mib(pid: int) -> float:
-    """Memory of a process and its descendants; 0 where the system does not show it."""
-    pages = 0
-    for one in [pid, *_descendants(pid)]:
-        try:
-            pages += int(Path(f"/proc/{one}/statm").read_text().split()[1])
-        except (OSError, IndexError):
-            continue
-    return pages * _PAGE / _MIB
-
-
-def _descendants(pid: int) -> list[int]:
-    children = _children(pid)
-    return [*children, *(below for child in children for below in _descendants(child))]
-
-
-def _children(pid: int) -> list[int]:
-    try:
-        tasks = os.listdir(f"/proc/{pid}/task")
-        texts = [Path(f"/proc/{pid}/task/{task}/children").read_text() for task in tasks]
-    except OSError:
-        return []
-    return [int(word) for text in texts for word in text.split()]
-
-
-def own_children() -> set[int]:
-    """Children of this process."""
-    return set(_children(os.getpid())) if _LINUX else set()
-
-
-def end_children(keep: set[int]) -> None:
-    """Kill the descendants of this process that a case left behind.  keep : children that live on."""
-    for _ in range(50):  # the children of one that dies become this process's own
-        left = own_children() - keep
-        if not left:
-            return
-        for pid in left:
-            _kill_group(pid)
-            try:
-                os.kill(pid, signal.SIGKILL)
-                os.waitpid(pid, 0)
-            except (ProcessLookupError, ChildProcessError):
-                continue
-
-
 def end_noted(work: Path) -> None:
     """Kill the program whose start was noted in `work`, where its own process could not."""
     try:
-        _kill_group(int((work / PROGRAM_ID).read_text()))
+        kill_group(int((work / PROGRAM_ID).read_text()))
     except (OSError, ValueError):
         pass
-
-
-def _kill_group(pid: int) -> None:
-    try:
-        if os.getpgid(pid) != os.getpgrp():
-            os.killpg(os.getpgid(pid), signal.SIGKILL)
-    except (ProcessLookupError, PermissionError):
-        pass
-
-
-def adopt_orphans() -> None:
-    """From now on, descendants whose parent dies become children of this process."""
-    if _LINUX:
-        ctypes.CDLL(None).prctl(_SET_SUBREAPER, 1)
-
-
-def die_with_parent(parent: int, by: int) -> None:
-    """Have this process end by the signal `by` when its parent dies, even in code that lets no Python run."""
-    if _LINUX:
-        ctypes.CDLL(None).prctl(_SET_PARENT_SIGNAL, by)
-        if os.getppid() != parent:  # it died before
-            os._exit(1)

@@ -1,8 +1,7 @@
 """The nominal inputs as physics receives them, and whether they are the same in every process.
 
-Values that differ depend on the clock, randomness or the environment.
-
-`check` computes the same digests in two processes, at two times, with different hash seeds and time zones.
+`check` computes the same digests in two processes, at two times, with different hash seeds and time zones.  Values that
+differ depend on the clock, randomness or the environment.
 """
 
 import inspect

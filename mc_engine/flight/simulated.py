@@ -14,19 +14,20 @@ from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import ModelError
 from mc_engine.flight.case_process import CaseEnded, CaseProcess, give_back, take
-from mc_engine.flight.case_worker import Order, Setup, folder_name, lost_metric, settle
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, OnRow, Row, RunStopped, never
+from mc_engine.flight.case_worker import Order, Setup, folder_name, settle
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, RunStopped, never
 from mc_engine.flight.program_flight import Flown
 from mc_engine.model.fields import Parameter, Setting
 from mc_engine.model.record import Refusals
 from mc_engine.model.simulator import Simulator
 from mc_engine.status import NOT_FINITE, OK, REFUSED, STATUS_NAME
+from mc_engine.store.case_rows import Row, RowLog
 
 _TOGETHER = 64  # cases of a batch, where one may end the worker of all
 
 
 class SimulatorFlyer(Flyer):
-    """A Python function or a program."""
+    """A Python function, a program or an FMU."""
 
     def __init__(self, campaign: Campaign):
         assert isinstance(campaign.model, Simulator)  # the caller looked
@@ -41,29 +42,18 @@ class SimulatorFlyer(Flyer):
         self,
         inputs: Inputs,
         noise: np.ndarray,
-        on_row: OnRow | None = None,
+        log: RowLog | None = None,
         keep: Path | None = None,
         stopped: Callable[[], bool] = never,
     ) -> Columns:
         n = len(noise)
         columns = {name: np.broadcast_to(np.asarray(value), n) for name, value in inputs.items()}
-        rows = self._refusals(columns, n)
-        able = [place for place in range(n) if rows[place] is None]
+        flight = _Flight(self, columns, noise, keep, stopped, log)
+        flight.fly()
+        return flight.results
 
-        def note(place: int, row: Row) -> None:
-            rows[place] = row
-            if on_row is not None:
-                on_row(place, row)
-
-        flight = _Flight(self, columns, noise, note, keep, stopped)
-        if self._simulator.batch:
-            flight.fly_together(able)
-        else:
-            flight.fly_in_turn(able)
-        return self._table(rows)
-
-    def _refusals(self, columns: Columns, n: int) -> list[Row | None]:
-        """The row of each case whose inputs are outside what the simulator accepts; None where they are inside."""
+    def refusals(self, columns: Columns, n: int) -> list[str]:
+        """Why each case cannot be flown whose inputs are outside what the simulator accepts; else empty."""
         refusals = Refusals.none(n)
         items: tuple[Parameter | Setting, ...] = (*self._simulator.parameters, *self._simulator.settings)
         for item in items:
@@ -74,33 +64,19 @@ class SimulatorFlyer(Flyer):
             refusals.add(np.isinf(column), f"{item.name} is infinite")
             outside = f"{item.name} is outside {item.low:g} to {item.high:g} {item.unit}".rstrip()
             refusals.add(~((column >= item.low) & (column <= item.high)), outside)
-        return [self.row(REFUSED, reason) if reason else None for reason in refusals.reason]
-
-    def row(self, status: int, reason: str, metrics: dict[str, float] | None = None) -> Row:
-        """One row of results; metrics of a failed case are not a number."""
-        values = {name: (metrics or {}).get(name, float("nan")) for name in self._names}
-        return {"status": STATUS_NAME[status], "reason": reason, **values}
-
-    def _table(self, rows: list[Any]) -> Columns:
-        words = {name: np.array([row[name] for row in rows], dtype=object) for name in ("status", "reason")}
-        return {**words, **{name: np.array([row[name] for row in rows], dtype=np.float64) for name in self._names}}
+        return list(refusals.reason)
 
     def history(self, inputs: Inputs, noise: int, rows: int, alone: bool = False) -> tuple[Columns, Columns]:
-        names = ["t_s", *(output.name for output in self._simulator.outputs)]
-        empty = {name: np.empty(0) for name in names}
         found: list[Columns] = []
         columns = {name: np.broadcast_to(np.asarray(value), 1) for name, value in inputs.items()}
-        row = self._refusals(columns, 1)[0]
-        if row is None:
-            kept: dict[int, Row] = {}
-            flight = _Flight(self, columns, np.array([noise]), kept.__setitem__, None, never, found.append)
-            flight.fly_together([0]) if self._simulator.batch else flight.fly_in_turn([0])
-            row = kept[0]
-        history = found[0] if found and found[0] else empty
+        flight = _Flight(self, columns, np.array([noise]), None, never, on_history=found.append)
+        flight.fly()
+        names = ["t_s", *(output.name for output in self._simulator.outputs)]
+        history = found[0] if found and found[0] else {name: np.empty(0) for name in names}
         every = max(1, -(-len(history["t_s"]) // rows))
         chosen = np.arange(len(history["t_s"]))
         chosen = chosen[(chosen % every == 0) | (chosen == len(chosen) - 1)]
-        return self._table([row]), {name: values[chosen] for name, values in history.items()}
+        return flight.results, {name: values[chosen] for name, values in history.items()}
 
     def digest(self) -> str:
         return self._simulator.digest()
@@ -109,10 +85,8 @@ class SimulatorFlyer(Flyer):
         """Nothing: each worker starts a process of its own."""
 
     def faults(self) -> list[str]:
-        if self._simulator.fly is None and self._simulator.program is None:
-            why = (
-                "has neither a function `fly` nor a command; `mc-engine import` reads results that were flown elsewhere"
-            )
+        if self._simulator.fly is None and not self._simulator.is_described:
+            why = "has no function `fly`, no command and no FMU; `mc-engine import` reads results from elsewhere"
             return [f"{self._simulator.reference}: {why}"]
         return []  # all else that is wrong with a simulator is found where it is loaded
 
@@ -156,7 +130,8 @@ class SimulatorFlyer(Flyer):
             lines.append(f"the same in the nominal and in case 0: {', '.join(still)}; does an input move it?")
         if dispersed["status"] != STATUS_NAME[OK]:
             lines.append(f"case 0 ends as {dispersed['status']}: {dispersed['reason']}")
-        workers = min(os.cpu_count() or 1, self.most_workers or _TOGETHER**3)
+        cores = os.cpu_count() or 1
+        workers = min(cores, self.most_workers or cores)
         hours = seconds * self._campaign.cases / workers / 3600.0
         lines.append(
             f"{seconds:.3g} s a case, {hours:.2g} hours for {self._campaign.cases:,} cases on {workers} workers"
@@ -183,9 +158,9 @@ class SimulatorFlyer(Flyer):
 
     def _setup(self) -> Setup:
         simulator, folder = self._simulator, str(self._campaign.directory)
-        of_program = simulator.program is not None
-        sent = replace(simulator, sources=None, figures=(), published=()) if of_program else None
-        memory = None if of_program else simulator.memory_limit_mib  # a program is limited, not what starts it
+        sent = replace(simulator, sources=None, figures=(), published=()) if simulator.is_described else None
+        of_program = simulator.program is not None  # which is limited itself, and not what starts it
+        memory = None if of_program else simulator.memory_limit_mib
         return Setup(simulator.reference, folder, self._key[2], self._campaign.seed, sent, memory)
 
     @property
@@ -194,22 +169,41 @@ class SimulatorFlyer(Flyer):
 
 
 class _Flight:
-    """The cases of one call, and where their rows go."""
+    """The cases of one call.  results : their columns, filled as cases end."""
 
     def __init__(
         self,
         flyer: SimulatorFlyer,
         columns: Columns,
         noise: np.ndarray,
-        note: Callable[[int, Row], None],
         keep: Path | None,
         stopped: Callable[[], bool],
+        log: RowLog | None = None,
         on_history: Callable[[Columns], None] | None = None,
     ):
-        self._flyer, self._columns, self._noise, self._note = flyer, columns, noise, note
-        self._keep, self._stopped, self._on_history = keep, stopped, on_history
+        self._flyer, self._columns, self._noise = flyer, columns, noise
+        self._keep, self._stopped, self._log, self._on_history = keep, stopped, log, on_history
         simulator = flyer.simulator
         self._limit_s = simulator.time_limit_s if simulator.program is None else None  # which keeps its own
+        n, self._names = len(noise), [metric.name for metric in simulator.metrics]
+        self.results: Columns = {name: np.full(n, "", dtype=object) for name in ("status", "reason")}
+        self.results |= {metric.name: np.full(n, np.nan) for metric in simulator.metrics}
+
+    def fly(self) -> None:
+        """Fly all cases whose inputs are inside what the simulator accepts."""
+        reasons = self._flyer.refusals(self._columns, len(self._noise))
+        for place, reason in enumerate(reasons):
+            if reason:
+                self._put(place, Flown(REFUSED, reason, {}, {}))
+        able = [place for place, reason in enumerate(reasons) if not reason]
+        if self._flyer.simulator.batch:
+            self.fly_together(able)
+        else:
+            self.fly_in_turn(able)
+
+    def _put(self, place: int, flown: Flown) -> None:
+        for name, value in flown.row(self._names).items():
+            self.results[name][place] = value
 
     def fly_in_turn(self, places: list[int]) -> None:
         """Cases one after another; one that ends the process costs itself."""
@@ -258,15 +252,22 @@ class _Flight:
             self._take_batch(places, *reply)
 
     def _take_batch(self, places: list[int], metrics: Columns, shared: Flown) -> None:
-        for k, place in enumerate(places):
+        lost = np.zeros(len(places), dtype=bool)
+        for metric in self._flyer.simulator.metrics:
+            column = metrics[metric.name]
+            lost |= np.isinf(column) if metric.sometimes else ~np.isfinite(column)
+        well = np.array(places)[~lost]
+        self.results["status"][well] = STATUS_NAME[OK]
+        for name, column in metrics.items():
+            self.results[name][well] = column[~lost]
+        for k in np.flatnonzero(lost).tolist():
             values = {name: float(column[k]) for name, column in metrics.items()}
-            lost = lost_metric(self._flyer.simulator, values)
-            self._note(place, self._flyer.row(NOT_FINITE, lost) if lost else self._flyer.row(OK, "", values))
+            self._put(places[k], Flown(NOT_FINITE, self._flyer.simulator.lost_metric(values), {}, {}))
         if self._on_history is not None:
             self._on_history(shared.history)
 
     def _take(self, place: int, reply: Flown) -> None:
-        self._note(place, self._flyer.row(reply.status, reply.reason, reply.metrics if reply.status == OK else None))
+        self._put(place, reply)
         if self._on_history is not None:
             self._on_history(reply.history)
 
@@ -278,9 +279,15 @@ class _Flight:
         noise, rule = int(self._noise[place]), self._flyer.simulator.keep
         inputs = {name: column[[place]].tolist()[0] for name, column in self._columns.items()}
         process.end(lambda work: settle(rule, work, folder_name(noise), -1, self._keep, inputs))
-        self._note(place, self._flyer.row(end.status, end.reason))
+        ended = Flown(end.status, end.reason, {}, {})
+        self._put(place, ended)
+        if self._log is not None:
+            log = self._log.at([place])
+            log.add(0, ended.row(self._names))
+            log.close()
 
     def _order(self, places: list[int]) -> Order:
         columns = {name: column[places] for name, column in self._columns.items()}
         keep = None if self._keep is None else str(self._keep)
-        return Order(columns, self._noise[places], self._on_history is not None, keep)
+        log = None if self._log is None else self._log.at(places)
+        return Order(columns, self._noise[places], self._on_history is not None, keep, log)

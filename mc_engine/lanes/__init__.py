@@ -1,7 +1,20 @@
 """The lane engine: physics written once on plain numbers, compiled for one case and for vectors of cases."""
 
 from mc_engine.lanes.elementary import acos, asin, atan, atan2, cos, exp, log, pow, sin, sincos, tan
-from mc_engine.lanes.functions import any_lane, copysign, floor, fma, look_up, maximum, minimum, rint, sqrt, where
+from mc_engine.lanes.functions import (
+    any_lane,
+    copysign,
+    floor,
+    fma,
+    look_up,
+    look_up_record,
+    maximum,
+    minimum,
+    replace,
+    rint,
+    sqrt,
+    where,
+)
 from mc_engine.lanes.physics_function import physics
 
 __all__ = [
@@ -17,10 +30,12 @@ __all__ = [
     "fma",
     "log",
     "look_up",
+    "look_up_record",
     "maximum",
     "minimum",
     "physics",
     "pow",
+    "replace",
     "rint",
     "sin",
     "sincos",

@@ -13,27 +13,27 @@ An event is a zero of a sense (see `adaptive_step`); peaks are zeros of rates, s
 from collections import namedtuple
 
 from mc_engine.lanes.adaptive_step import (
-    CORNER,
-    EVENT,
-    LAST,
     PEAK,
+    Instant,
+    arm,
     arrive,
     best_time,
     best_value,
     first_length,
-    glance,
     ideal_factor,
     is_lost,
     leap,
     next_length,
     sense,
     sense_shared,
+    turn_length,
 )
 from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import crossed
 from mc_engine.lanes.extrema import first_time
 from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, where
+from mc_engine.lanes.history import record_change, record_row, record_step
 from mc_engine.lanes.lane_access import lane_holds, store_lane, with_column, with_lane
 from mc_engine.lanes.philox import Draws
 from mc_engine.lanes.physics_function import physics
@@ -45,7 +45,6 @@ from mc_engine.lanes.tuples import (
     load_fields,
     load_scalars,
     map_fields,
-    record,
     scalars_like,
     select,
     spread,
@@ -66,15 +65,6 @@ _CHORDS = 8.0  # then every other look halves the bracket, so that none stalls
 _CLOSED = 2e-15  # of time and length: the width at which the bracket of an event is closed
 _CREST = 1e-7  # of a step: the same for a peak, which is flat and differs by the square of this
 _NEVER, _NONE, _NAN = 1e300, 1e-300, float("nan")
-
-
-@physics
-def _arm(kind, sense0, value0, sense1, value1, best, h):
-    """1 where a crossing counts; a peak counts if its top, bounded by the tangents, may beat the best so far."""
-    hill = (sense0 > 0.0) & (sense1 < 0.0)
-    x = (value1 - value0 - sense1 * h) / where(hill, sense0 - sense1, 1.0)
-    promising = hill & (value0 + sense0 * x > best)
-    return where(kind == PEAK, where(promising, 1.0, 0.0), where(kind == CORNER, 0.0, 1.0))
 
 
 @physics
@@ -103,20 +93,6 @@ def _near(kind, root, before, after, rate, direction, high, width):
     """Not negative where the side that has crossed is near the zero, and its sense is as small as its rate says."""
     small = (kind == PEAK) | (abs(after) < 2.0 * width * abs(rate))
     return where(crossed(before, after, direction), where(small, root + width - high, -1.0), 1.0)
-
-
-@physics
-def _turn(kind, sense0, rate0, sense1, rate1, direction, h):
-    """Length to the turn of a sense that may have crossed zero and come back; h where it has not.
-
-    The tangents at both ends bound a sense that is bent one way; where they meet beyond zero it is worth a look.
-    """
-    down = (sense0 > 0.0) & (sense1 > 0.0) & (rate0 < 0.0) & (rate1 > 0.0) & (direction <= 0.0)
-    up = (sense0 < 0.0) & (sense1 < 0.0) & (rate0 > 0.0) & (rate1 < 0.0) & (direction >= 0.0)
-    turning = (down | up) & ((kind == EVENT) | (kind == LAST))
-    x = (sense1 - sense0 - rate1 * h) / where(turning, rate0 - rate1, 1.0)
-    reaches = (sense0 + rate0 * x) * sense0 <= 0.0
-    return where(turning & reaches & (x > 0.02 * h) & (x < 0.98 * h), x, h)
 
 
 @physics
@@ -203,6 +179,16 @@ def _metrics_at_end(f, here, best, when, p, o):
 finish = compile_callable(_metrics_at_end)
 
 
+def _noted(f, here, fired, noting, p, o):
+    """The discrete state after what the model notes at an event, also at one that ends the case."""
+    like = spread(f.events(here.t, here.s, here.m, p, o), here.t)
+    hit = first_fields(map_fields(_fired_flag, fired, here.t), like)
+    return select(noting, spread(f.note(here.t, here.s, here.m, p, o, hit), here.t), here.m)
+
+
+noted = compile_callable(_noted)
+
+
 def _changed(f, key, case, sample, here, fired, switching, sampling, p, o, reach):
     """The instant after what the model does at it: `switch` on events, `control` at samples."""
     t = here.t
@@ -214,27 +200,6 @@ def _changed(f, key, case, sample, here, fired, switching, sampling, p, o, reach
 
 
 changed = compile_callable(_changed)
-
-
-def _record_between(f, tables, history, rows, spacing, here, end, p, o):
-    """Number of history rows after those of the first lane up to the time `end`; each is a step of its own."""
-    while rows < history.shape[0] - 1 and lane_holds(here.t * 0.0 + float(rows) * spacing <= end, 0):
-        t = here.t * 0.0 + float(rows) * spacing
-        s = glance(f, tables, t - here.t, here, p, o)
-        record(history, rows, t, spread(f.observe(t, s, here.m, p, o), t))
-        rows += 1
-    return rows
-
-
-record_between = compile_callable(_record_between)
-
-
-def _record_last(f, history, rows, here, p, o):
-    record(history, rows, here.t, spread(f.observe(here.t, here.s, here.m, p, o), here.t))
-    return rows + 1
-
-
-record_last = compile_callable(_record_last)
 
 
 def _fly(
@@ -253,7 +218,7 @@ def _fly(
     must_stop,
     out,
     history,
-    spacing,
+    pace,
 ):
     """Fly all cases of a chunk, the lanes taking them in turn.
 
@@ -262,8 +227,9 @@ def _fly(
     settings : float64[n_settings];  key : uint64;  cases : float64[n], case numbers
     clock : the fields of `Clock`, float64;  atol : float64[n_states], SI
     out : (time, status) float64[n], state float64[n_states, n], metrics float64[n_metrics, n]
-    history : float64[n_rows, 1 + n_quantities] of the first lane, a row every `spacing` [s]; no rows, no history
-    Returns the number of history rows.
+    history : float64[n_rows, 1 + n_quantities] of the first lane; no rows, no history
+    pace : history rows of a step; below 1 one for so many steps, and events have theirs all the same
+    Returns the number of history rows that the flight has.
     """
     align_stack()
     end_time, end_status, end_state, metrics = out
@@ -281,9 +247,9 @@ def _fly(
     closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
     bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
     best, when = here.values, map_fields(first_time, here.values, zero)
-    rows = 0
+    rows, due = 0, 0.0
     if history.shape[0] > 0:
-        rows = record_last(f, history, rows, here, p, o)
+        rows = record_row(f, history, rows, here.t, here.s, here.m, p, o)
     while True:
         flying = active > 0.5
         target = minimum(clock.until + zero, sample * clock.period)
@@ -297,13 +263,13 @@ def _fly(
         attempts = attempts + 1.0
         stepping, looking = flying & (not closing), flying & closing
         good = stepping & (error <= 1.0)
-        hopes = map_fields(_arm, kinds, here.senses, here.values, there.senses, there.values, best, trial)
+        hopes = map_fields(arm, kinds, here.senses, here.values, there.senses, there.values, best, trial)
         over = any_field(map_fields(_fires, hopes, here.senses, there.senses, signs, good))
         # whether such a step met an event cannot be told: it is tried shorter, as if its error were not a number
         error = where(any_field(map_fields(is_lost, kinds, there.values)) & (not over), _NAN, error)
         good = good & (error <= 1.0)
         poor = stepping & (not good)
-        turn = least(map_fields(_turn, kinds, here.senses, here.rates, there.senses, there.rates, signs, trial))
+        turn = least(map_fields(turn_length, kinds, here.senses, here.rates, there.senses, there.rates, signs, trial))
         dip = good & (not over) & (turn < trial)
         fits = good & (not over) & (not dip)
         cut = (length < h) & (not poor)
@@ -338,10 +304,19 @@ def _fly(
         status = where(stuck | capped, failure, status)
         if must_stop:
             status = where(ended & (not stopped), _UNSTOPPED, status)
+        recorded = False
         if history.shape[0] > 0 and lane_holds(arrived, 0):
-            rows = record_between(f, tables, history, rows, spacing, here, now.t, p, o)
+            due += pace
+            recorded = due >= 1.0 or lane_holds(closed, 0)
+            if recorded:
+                rows = record_step(f, tables, history, rows, int(due), here, now, p, o)
+                due -= float(int(due))
         here = select(arrived, now, here)
         closing = closing & (not arrived)
+        noting = closed & f.notes_of(fired)
+        if any_lane(noting):
+            m = noted(f, here, fired, noting, p, o)
+            here = Instant(here.t, here.s, m, here.k, here.senses, here.rates, here.values)
         sampling = arrived & (not ended) & (here.t >= sample * clock.period)
         switching = closed & (not ended) & f.switches_of(fired)
         if any_lane(sampling | switching):
@@ -351,9 +326,10 @@ def _fly(
             sample = where(sampling, sample + 1.0, sample)
             last_ideal = where(sampling | switching, _NONE, last_ideal)
         done = ended | stuck | capped
+        if (recorded and lane_holds(closed | sampling, 0)) or (history.shape[0] > 0 and lane_holds(done, 0)):
+            is_event = lane_holds(closed, 0)
+            rows = record_change(f, history, rows, is_event, here.t, here.s, here.m, p, o)
         if any_lane(done):
-            if rows > 0 and lane_holds(done, 0) and columns[0] == 0:
-                rows = record_last(f, history, rows, here, p, o)
             results = finish(f, here, best, when, p, o)
             fresh = zero
             for lane in range(width):

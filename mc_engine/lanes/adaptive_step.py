@@ -156,6 +156,29 @@ def is_lost(kind, value):
     return (kind == EVENT) & (value != value)
 
 
+@physics
+def arm(kind, sense0, value0, sense1, value1, best, h):
+    """1 where a crossing counts; a peak counts if its top, bounded by the tangents, may beat the best so far."""
+    hill = (sense0 > 0.0) & (sense1 < 0.0)
+    x = (value1 - value0 - sense1 * h) / where(hill, sense0 - sense1, 1.0)
+    promising = hill & (value0 + sense0 * x > best)
+    return where(kind == PEAK, where(promising, 1.0, 0.0), where(kind == CORNER, 0.0, 1.0))
+
+
+@physics
+def turn_length(kind, sense0, rate0, sense1, rate1, direction, h):
+    """Length to the turn of a sense that may have crossed zero and come back; h where it has not.
+
+    The tangents at both ends bound a sense that is bent one way; where they meet beyond zero it is worth a look.
+    """
+    down = (sense0 > 0.0) & (sense1 > 0.0) & (rate0 < 0.0) & (rate1 > 0.0) & (direction <= 0.0)
+    up = (sense0 < 0.0) & (sense1 < 0.0) & (rate0 > 0.0) & (rate1 < 0.0) & (direction >= 0.0)
+    turning = (down | up) & ((kind == EVENT) | (kind == LAST))
+    x = (sense1 - sense0 - rate1 * h) / where(turning, rate0 - rate1, 1.0)
+    reaches = (sense0 + rate0 * x) * sense0 <= 0.0
+    return where(turning & reaches & (x > 0.02 * h) & (x < 0.98 * h), x, h)
+
+
 def _watch(f, t, s, m, p, o):
     """Events, then the values of which peaks and last times are sought, in one tuple."""
     seen = spread(f.observe(t, s, m, p, o), t)

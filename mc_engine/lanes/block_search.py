@@ -1,10 +1,11 @@
-"""The data blocks that physics reads: found by the names in its functions, without running or compiling them."""
+"""What physics consists of: found by the names in its functions, without running or compiling them."""
 
+import dis
 from collections.abc import Iterable, Iterator
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
-from mc_engine.lanes.composed import ComposedFunction
+from mc_engine.lanes.composed import Alternatives, ComposedFunction
 from mc_engine.lanes.kernel_data import DataBlock
 from mc_engine.lanes.physics_function import PhysicsFunction
 
@@ -14,6 +15,20 @@ def blocks_in(functions: Iterable[Any]) -> tuple[DataBlock, ...]:
 
     The order depends on the sources alone, so that a kernel that was compiled in another process finds them.
     """
+    return tuple(value for value in _reached(functions) if isinstance(value, DataBlock))
+
+
+def has_powers(functions: Iterable[Any]) -> bool:
+    """Whether these functions, or those that they call, have an operator `**`, which Python and kernels round apart."""
+    codes = [
+        value.function.__code__
+        for value in _reached(functions)
+        if isinstance(value, PhysicsFunction) and isinstance(value.function, FunctionType)
+    ]
+    return any(step.argrepr in ("**", "**=") for code in codes for step in dis.get_instructions(code))
+
+
+def _reached(functions: Iterable[Any]) -> list[Any]:
     found: dict[int, Any] = {}  # what was seen, by identity
     waiting = list(functions)[::-1]
     while waiting:
@@ -23,11 +38,11 @@ def blocks_in(functions: Iterable[Any]) -> tuple[DataBlock, ...]:
         found[id(value)] = value
         if isinstance(value, tuple):
             waiting += value[::-1]
-        elif isinstance(value, ComposedFunction):
-            waiting += [function for function, _ in value.calls[::-1]]
+        elif isinstance(value, ComposedFunction | Alternatives):
+            waiting += value.parts[::-1]
         elif isinstance(value, PhysicsFunction) and isinstance(value.function, FunctionType):
             waiting += [*_named(value.function)][::-1]
-    return tuple(value for value in found.values() if isinstance(value, DataBlock))
+    return [*found.values()]
 
 
 def _named(function: FunctionType) -> Iterator[Any]:

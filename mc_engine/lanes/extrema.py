@@ -1,6 +1,6 @@
-"""Running extrema of quantities along a flight, interpolated between the grid points.
+"""Running extrema of outputs along a flight, interpolated between the grid points.
 
-A quantity that is NaN once has no extreme value; it has a last time above a level if it is above it later.
+An output that is NaN once has no extreme value; it has a last time above a level if it is above it later.
 """
 
 from mc_engine.lanes.functions import where

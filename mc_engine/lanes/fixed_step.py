@@ -6,9 +6,11 @@ rejoins.  Lanes never look at each other: a lane that has ended or failed keeps 
 
 from mc_engine.lanes import extrema
 from mc_engine.lanes.aligned_stack import align_stack
-from mc_engine.lanes.compiler import compile_callable, compile_inline
+from mc_engine.lanes.compiler import compile_inline
 from mc_engine.lanes.events import follow, may_have_crossed
 from mc_engine.lanes.functions import any_lane, where
+from mc_engine.lanes.history import look_shared, record_row
+from mc_engine.lanes.lane_access import lane_holds
 from mc_engine.lanes.philox import Draws
 from mc_engine.lanes.runge_kutta import rk4
 from mc_engine.lanes.tuples import (
@@ -17,7 +19,6 @@ from mc_engine.lanes.tuples import (
     load_fields,
     load_scalars,
     map_fields,
-    record,
     select,
     spread,
     store,
@@ -30,7 +31,7 @@ _OVERRUN, _BROKEN, _UNSTOPPED = float(EVENT_LIMIT), float(NOT_FINITE), float(NO_
 
 
 def _track(flying, smooth, seen, times, lasts, best, when, last):
-    """Running extrema after one more look at the quantities; the newest look is the last of `seen`."""
+    """Running extrema after one more look at the outputs; the newest look is the last of `seen`."""
     v0, v1, v2 = seen
     t0, t1, t2 = times
     crests = flying & any_field(map_fields(extrema.crest, v0, v1, v2, best))
@@ -47,16 +48,8 @@ def _track(flying, smooth, seen, times, lasts, best, when, last):
 track = compile_inline(_track)
 
 
-def _look(f, t, s, m, p, o):
-    return spread(f.observe(t, s, m, p, o), t)
-
-
-# for places off the main path: one copy in the kernel, called where needed
-look_shared = compile_callable(_look)
-
-
-def _step(f, has_events, t, finish, h, s, m, p, o, flying):
-    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken) of every lane.
+def _step(f, has_events, t, finish, h, s, m, p, o, flying, history, rows):
+    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken) of every lane, history rows.
 
     The event values at the start are taken anew, not handed on: they share what the first derivative computes.
     """
@@ -66,10 +59,12 @@ def _step(f, has_events, t, finish, h, s, m, p, o, flying):
     if has_events:
         g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
         if any_lane(flying & any_field(map_fields(may_have_crossed, g, g_end, f.signs_of(g)))):
-            end, m, now, stopped, overrun, lost = follow(f, t, finish, h, s, end, m, p, o, g, g_end, flying)
+            end, m, now, stopped, overrun, lost, rows = follow(
+                f, t, finish, h, s, end, m, p, o, g, g_end, flying, history, rows
+            )
     size = total(end)
     broken = lost | (flying & (not (size - size == 0.0)))
-    return end, m, now, stopped, overrun & (not broken), broken
+    return end, m, now, stopped, overrun & (not broken), broken, rows
 
 
 step = compile_inline(_step)
@@ -78,10 +73,10 @@ step = compile_inline(_step)
 def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, history, stride):
     """Fly one block from its first state to the stop or the time limit.
 
-    The quantities are looked at where a step begins, beside its first derivative, with which they share most of
+    The outputs are looked at where a step begins, beside its first derivative, with which they share most of
     their work, and where a flight ends.
     Returns (time, state, memory, status, unstopped, best, when, last, rows): per lane, and the history rows
-    written, those of the first lane.  Row 0 is the start; then every `stride` steps, and the end.
+    written, those of the first lane: the start, every `stride` steps and their samples, all events, and the end.
     """
     t = case * 0.0
     flying, status, rows = t == t, t, 0
@@ -93,19 +88,22 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
     when, last = map_fields(extrema.first_time, v1, t), map_fields(extrema.first_time, w1, t)
     t0 = t1 = t2 = t
     for k in range(n_steps):
+        recorded = history.shape[0] > 0 and lane_holds(flying, 0) and k % stride == 0
         if k > 0 and k % control_every == 0:
+            if recorded:
+                rows = record_row(f, history, rows, t2, s, m, p, o)
             held = spread(f.control(t2, s, m, p, o, Draws(key, case, float(k // control_every))), t)
             m = select(flying, held, m)
         seen = spread(f.observe(t2, s, m, p, o), t)
         v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
         best, when, last = track(flying, f.smooth_of(v2), (v0, v1, v2), (t0, t1, t2), (w1, w2), best, when, last)
-        if rows < history.shape[0] and k % stride == 0:
-            # looked at anew: so the quantities that only a history wants cost nothing where there is none
-            record(history, rows, t2, look_shared(f, t2, s, m, p, o))
-            rows += 1
+        if recorded:  # looked at anew: so the outputs that only a history wants cost nothing where there is none
+            rows = record_row(f, history, rows, t2, s, m, p, o)
         # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
         finish = case * 0.0 + float(k + 1) * h
-        end, memory, now, stopped, overrun, broken = step(f, has_events, t2, finish, h, s, m, p, o, flying)
+        end, memory, now, stopped, overrun, broken, rows = step(
+            f, has_events, t2, finish, h, s, m, p, o, flying, history, rows
+        )
         moved = flying & (not broken)
         if any_lane(not moved):  # a branch, foretold by the processor: the next step need not wait for the check
             end, memory, now = select(moved, end, s), select(moved, memory, m), where(moved, now, t)
@@ -120,9 +118,8 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
             best, when, last = track(at_end, f.smooth_of(v3), (v1, v2, v3), (t1, t2, t), (w2, w3), best, when, last)
             when = map_fields(extrema.end_time, when, best, v3, t, at_end, t)
             best = map_fields(extrema.end_value, best, v3, at_end)
-            if rows < history.shape[0]:
-                record(history, rows, t, seen)
-                rows += 1
+            if history.shape[0] > 0 and lane_holds(at_end, 0):
+                rows = record_row(f, history, rows, t, s, m, p, o)
         if not any_lane(flying):
             break
         v0, v1, w1, t0, t1, t2 = v1, v2, w2, t1, t2, finish

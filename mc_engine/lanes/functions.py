@@ -12,6 +12,7 @@ import numpy as np
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes.number import Number, result_of, taking_numbers
+from mc_engine.suggestions import hint
 
 
 @taking_numbers
@@ -68,15 +69,31 @@ def sign_copied(x, y):
 def where(mask, x, y):
     """x where mask holds, y elsewhere.  Both are computed, so their arguments must be in range.
 
-    mask : truth values, as a comparison gives them.  x, y : numbers.  ModelError for others, which kernels refuse, too.
+    mask : truth values, as a comparison gives them.  x, y : numbers, or named tuples of one class, whose fields are
+    chosen.  ModelError for others, which kernels refuse, too.
     """
     _refuse_number(mask, "where")
+    if hasattr(x, "_fields") or hasattr(y, "_fields"):
+        if type(x) is not type(y):
+            raise ModelError("`where` chooses between numbers, or between named tuples of one class")
+        return type(x)(*(where(mask, *fields) for fields in zip(x, y, strict=True)))
     if _is_condition(x) or _is_condition(y):
         raise ModelError("`where` chooses between numbers; between conditions, write (mask & x) | ((not mask) & y)")
     if isinstance(mask, bool) and isinstance(x, float | int) and isinstance(y, float | int):
         chosen = x if mask else y
         return result_of("where", (chosen,), chosen) if Number in (type(x), type(y)) else float(chosen)
     return _plain(np.where(mask, x, y))
+
+
+def replace(record, /, **fields):
+    """The record with other values in some fields, such as replace(m, mode=2.0, due=t + 60.0).
+
+    record : a named tuple.  fields : the new values by name; ModelError for a name that the record does not have.
+    """
+    for name in fields:
+        if name not in record._fields:
+            raise ModelError(f'{type(record).__name__}(...) has no field "{name}"{hint(name, record._fields)}')
+    return record._replace(**fields)
 
 
 @taking_numbers
@@ -112,6 +129,14 @@ def look_up(tables, place):
     place = np.asarray(place, dtype=np.float64)
     inside = np.clip(np.nan_to_num(place), 0.0, len(tables) - 1.0)
     return where(place == place, tables[inside.astype(int)], place)
+
+
+def look_up_record(tables, place, record):
+    """The record whose numbers are in the model's tables one after another, the first at `place`; see `look_up`.
+
+    record : class of a named tuple of numbers, from which the tables are made, too: [*Row(start=0.0, length=1.0)]
+    """
+    return record(*(look_up(tables, place + index) for index in range(len(record._fields))))
 
 
 def any_lane(mask):

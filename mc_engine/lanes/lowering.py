@@ -186,6 +186,33 @@ def _look_up(context, builder, sig, args):
     return value
 
 
+@infer_global(functions.look_up_record)
+class _LookUpRecordTyping(AbstractTemplate):
+    key = functions.look_up_record
+
+    def generic(self, args, kws):
+        if len(args) != 3 or not isinstance(args[2], types.NamedTupleClass):
+            return None
+        one = _LookUpTyping.generic(self, args[:2], kws)
+        cls = args[2].instance_class
+        fields = (one.return_type,) * len(cls._fields) if one else ()
+        return signature(types.BaseTuple.from_types(fields, cls), *one.args, args[2]) if one else None
+
+
+@lower_builtin(functions.look_up_record, types.CPointer, types.Any, types.NamedTupleClass)
+def _look_up_record(context, builder, sig, args):
+    place, width = sig.args[1], common_width(sig.args[1])
+    one = signature(sig.return_type[0], *sig.args[:2])
+    numbers = []
+    for index in range(len(sig.return_type)):
+        if place == types.int64:
+            at = builder.add(args[1], ir.Constant(I64, index))
+        else:
+            at = builder.fadd(args[1], constant(width, float(index)))
+        numbers.append(_look_up(context, builder, one, [args[0], at]))
+    return context.make_tuple(builder, sig.return_type, numbers)
+
+
 @infer_global(functions.any_lane)
 class _AnyTyping(AbstractTemplate):
     key = functions.any_lane
@@ -196,10 +223,14 @@ class _AnyTyping(AbstractTemplate):
 
 @lower_builtin(functions.any_lane, types.Any)
 def _any_lane(context, builder, sig, args):
-    width = common_width(sig.args[0])
+    return any_bit(builder, args[0], common_width(sig.args[0]))
+
+
+def any_bit(builder: Any, mask: Any, width: int) -> Any:
+    """LLVM truth value: the mask holds in at least one lane."""
     if width == 1:
-        return args[0]
-    word = builder.bitcast(args[0], ir.IntType(width))
+        return mask
+    word = builder.bitcast(mask, ir.IntType(width))
     return builder.icmp_unsigned("!=", word, ir.Constant(ir.IntType(width), 0))
 
 

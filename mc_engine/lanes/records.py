@@ -1,19 +1,22 @@
-"""Named tuples that hold plain numbers in one place and lanes in another: the compiler treats them as one type.
+"""Named tuples in kernels, as numba itself does not have them.  Registered on import.
 
-Physics may return `State(s.v, 0.0)` in one branch and `State(s.v, s.x)` in the other, or begin a loop with a record of
-plain numbers.  numba itself unifies numbers and plain tuples in this way, but not named tuples.
+One that holds plain numbers in one place and lanes in another is one type: physics may return `State(s.v, 0.0)` in one
+branch and `State(s.v, s.x)` in the other, or begin a loop with a record of plain numbers.
 
-A field that is left out has the default of its class, as in Python; numba itself makes a record without it.
-Registered on import.
+A field that is left out has the default of its class, as in Python.  A field may be a record itself; `replace` and
+`where` are here for records.
 """
 
+import inspect
 from typing import Any
 
-from numba import types
+from numba import typeof, types
 from numba.core import utils
 from numba.core.typing.collections import NamedTupleClassAttribute
-from numba.core.typing.templates import AbstractTemplate, signature
-from numba.extending import lower_cast
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import lower_builtin, lower_cast
+
+from mc_engine.lanes import functions
 
 
 def _of_one_class(record: Any, other: Any) -> bool:
@@ -60,10 +63,70 @@ def _constructor(self: Any, class_type: Any) -> Any:
             bound = written.bind(*args, **kws)
             bound.apply_defaults()
             # the values that are no types are defaults, which numba then gives as constants
-            fields = [value if isinstance(value, types.Type) else types.float64 for value in bound.args]
+            fields = [value if isinstance(value, types.Type) else _type_of_default(value) for value in bound.args]
             return signature(types.BaseTuple.from_types(tuple(fields), made), *fields).replace(pysig=written)
 
     return types.Function(Constructor)
 
 
+def _type_of_default(value: Any) -> Any:
+    return typeof(value) if isinstance(value, tuple) else types.float64
+
+
 NamedTupleClassAttribute.resolve___call__ = _constructor  # type: ignore[method-assign]
+
+
+@infer_global(functions.replace)
+class _Replace(AbstractTemplate):
+    key = functions.replace
+
+    def generic(self, args, kws):
+        record = args[0] if len(args) == 1 else None
+        if not isinstance(record, types.BaseNamedTuple) or not set(kws) <= set(record.fields):
+            return None
+        fields = [kws.get(name, field) for name, field in zip(record.fields, record, strict=True)]
+        named = [inspect.Parameter(name, inspect.Parameter.POSITIONAL_OR_KEYWORD) for name in ("_record", *kws)]
+        made = types.BaseTuple.from_types(fields, record.instance_class)
+        return signature(made, record, *kws.values()).replace(pysig=inspect.Signature(named))
+
+
+@lower_builtin(functions.replace, types.BaseNamedTuple, types.VarArg(types.Any))
+def _lower_replace(context, builder, sig, args):
+    given = dict(zip(sig.pysig.parameters, args, strict=True))
+    fields = [
+        given[name] if name in given else builder.extract_value(args[0], i) for i, name in enumerate(sig.args[0].fields)
+    ]
+    return context.make_tuple(builder, sig.return_type, fields)
+
+
+@infer_global(functions.where)
+class _Where(AbstractTemplate):
+    """`where` on two records of one class: in every field as on numbers."""
+
+    key = functions.where
+
+    def generic(self, args, kws):
+        if len(args) != 3 or not isinstance(args[1], types.BaseNamedTuple) or not _of_one_class(*args[1:]):
+            return None
+        fields = [_choice(self.context, args, i) for i in range(len(args[1]))]
+        made = types.BaseTuple.from_types([field.return_type for field in fields], args[1].instance_class)
+        return signature(made, *args)
+
+
+def _choice(typingctx: Any, args: Any, i: int) -> Any:
+    """The signature of `where` on field i of two records."""
+    function = typingctx.resolve_value_type(functions.where)
+    return function.get_call_type(typingctx, (args[0], args[1][i], args[2][i]), {})
+
+
+@lower_builtin(functions.where, types.Any, types.BaseNamedTuple, types.BaseNamedTuple)
+def _lower_where(context, builder, sig, args):
+    function = context.typing_context.resolve_value_type(functions.where)
+    fields = []
+    for i in range(len(sig.return_type)):
+        own = _choice(context.typing_context, sig.args, i)
+        values = [args[0], *(builder.extract_value(record, i) for record in args[1:])]
+        given = [sig.args[0], sig.args[1][i], sig.args[2][i]]
+        cast = [context.cast(builder, *one) for one in zip(values, given, own.args, strict=True)]
+        fields.append(context.get_function(function, own)(builder, cast))
+    return context.make_tuple(builder, sig.return_type, fields)

@@ -14,8 +14,8 @@ from numba.np import arrayobj
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes.functions import TABLES
-from mc_engine.lanes.lane_type import I1, Lanes, common_width, convert, number_type
-from mc_engine.lanes.lowering import constant, fused, llvm_type
+from mc_engine.lanes.lane_type import Lanes, common_width, convert, number_type
+from mc_engine.lanes.lowering import fused, llvm_type
 
 
 def _tuple_type(fields: Sequence[Any], like: Any = None) -> Any:
@@ -44,22 +44,17 @@ def _refuse_other_count(what: str, fields: Any, count: int) -> None:
         raise ModelError(f"{what}: the physics gives {len(fields)} numbers where the model declares {count}")
 
 
+def _spread_type(value, width):
+    if isinstance(value, types.BaseTuple):
+        return _tuple_type([_spread_type(field, width) for field in value], value)
+    return number_type(width)
+
+
 @intrinsic
 def spread(typingctx, value, like):
-    """Every field of a tuple (or a plain number) as lanes of the width of `like`."""
-    width = common_width(like)
-    if isinstance(value, types.BaseTuple):
-        result = _tuple_type([number_type(width)] * len(value), value)
-    else:
-        result = number_type(width)
-
-    def codegen(context, builder, sig, args):
-        if not isinstance(value, types.BaseTuple):
-            return convert(context, builder, args[0], value, result)
-        fields = [convert(context, builder, _item(builder, args[0], i), value[i], result[i]) for i in range(len(value))]
-        return _pack(context, builder, result, fields)
-
-    return result(value, like), codegen
+    """Every number of a record, of a record in it, or a plain number as lanes of the width of `like`."""
+    result = _spread_type(value, common_width(like))
+    return result(value, like), lambda context, builder, sig, args: convert(context, builder, args[0], value, result)
 
 
 @intrinsic
@@ -291,107 +286,3 @@ def record(typingctx, array, row, time, fields):
         return context.get_dummy_value()
 
     return types.none(array, types.intp, time, fields), codegen
-
-
-def counted(what: str, count: int) -> Any:
-    """Intrinsic handing a tuple on that has `count` fields; ModelError when a kernel is built with another."""
-
-    @intrinsic
-    def hand_on(typingctx, fields):
-        _refuse_other_count(what, fields, count)
-        return fields(fields), lambda context, builder, sig, args: args[0]
-
-    return hand_on
-
-
-def picker(cls: type | None, picks: Sequence[tuple[int, float, float]], count: int | None = None) -> Any:
-    """Intrinsic taking a tuple of lanes to (sign * field - offset, ...) for each (field, sign, offset).
-
-    count : how many fields the tuple must have, if that is known.
-    """
-
-    @intrinsic
-    def pick(typingctx, fields):
-        _refuse_other_count("quantities", fields, len(fields) if count is None else count)
-        result = types.BaseTuple.from_types(tuple(fields[i] for i, _, _ in picks), cls)
-
-        def codegen(context, builder, sig, args):
-            values = []
-            for i, sign, offset in picks:
-                width, value = common_width(fields[i]), _item(builder, args[0], i)
-                value = builder.fneg(value) if sign < 0 else value
-                values.append(builder.fsub(value, constant(width, offset)) if offset else value)
-            return _pack(context, builder, result, values)
-
-        return result(fields), codegen
-
-    return pick
-
-
-def directions(signs: Sequence[float]) -> Any:
-    """Intrinsic giving a tuple of constant lanes like the one it is handed."""
-
-    @intrinsic
-    def give(typingctx, fields):
-        _refuse_other_count("events or quantities", fields, len(signs))
-
-        def codegen(context, builder, sig, args):
-            values = [constant(common_width(fields[i]), sign) for i, sign in enumerate(signs)]
-            return _pack(context, builder, fields, values)
-
-        return fields(fields), codegen
-
-    return give
-
-
-def any_of(indices: Sequence[int]) -> Any:
-    """Intrinsic giving the mask of lanes in which at least one of the chosen mask fields holds."""
-
-    @intrinsic
-    def chosen(typingctx, masks):
-        def codegen(context, builder, sig, args):
-            value = constant(common_width(masks[0]), 0, I1)
-            for i in indices:
-                value = builder.or_(value, _item(builder, args[0], i))
-            return value
-
-        return masks[0](masks), codegen
-
-    return chosen
-
-
-def composed(calls: Sequence[tuple[Any, tuple[int, ...]]], record: Any, picks: Sequence[tuple[str, int, str]]) -> Any:
-    """Intrinsic that calls the functions, each with some of its arguments; see `mc_engine.lanes.composed`."""
-
-    @intrinsic
-    def call(typingctx, *args):
-        functions = [typingctx.resolve_value_type(function) for function, _ in calls]
-        chosen = [tuple(args[i] for i in indices) for _, indices in calls]
-        sigs = [function.get_call_type(typingctx, own, {}) for function, own in zip(functions, chosen, strict=True)]
-        given: dict[str, Sequence[Any]] = {"argument": args, "result": [sig.return_type for sig in sigs]}
-        places = [(source, i, _place(given[source][i], field)) for source, i, field in picks]
-        fields = [given[source][i] if place is None else given[source][i][place] for source, i, place in places]
-        result = given["result"][0] if record is None else types.BaseTuple.from_types(tuple(fields), record)
-
-        def codegen(context, builder, sig, values):
-            own = [_item(builder, values[0], i) for i in range(len(args))]
-            results = []
-            for function, call_sig, (_, indices) in zip(functions, sigs, calls, strict=True):
-                handed = [own[i] for i in indices]
-                if call_sig.args and isinstance(call_sig.args[0], types.StarArgTuple):  # of a composed function
-                    handed = [_pack(context, builder, call_sig.args[0], handed)]
-                results.append(context.get_function(function, call_sig)(builder, handed))
-            if record is None:
-                return results[0]
-            held: dict[str, Sequence[Any]] = {"argument": own, "result": results}
-            parts = [held[s][i] if place is None else _item(builder, held[s][i], place) for s, i, place in places]
-            return _pack(context, builder, result, parts)
-
-        return result(types.StarArgTuple.from_types(args)), codegen
-
-    return call
-
-
-def _place(record: Any, field: str) -> int | None:
-    """Index of a field of a named tuple's type; None where the whole is meant."""
-    return record.fields.index(field) if field else None

@@ -9,10 +9,12 @@ from mc_engine.model.declarations import (
     minimum_of,
     outputs,
     states,
+    time_of,
     time_of_maximum,
     time_of_minimum,
+    value_at,
 )
-from mc_engine.model.declared import model
+from mc_engine.model.declared import model, prepared
 from mc_engine.model.designs import kept_design
 from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedStep, Named, Parameter, Setting
 from mc_engine.model.figures import (
@@ -23,6 +25,7 @@ from mc_engine.model.figures import (
     ProfileFigure,
     ScatterFigure,
 )
+from mc_engine.model.phases import Phase
 from mc_engine.model.record import Model, Refusals, load_model
 
 __all__ = [
@@ -38,6 +41,7 @@ __all__ = [
     "Model",
     "Named",
     "Parameter",
+    "Phase",
     "ProfileFigure",
     "Refusals",
     "ScatterFigure",
@@ -52,7 +56,10 @@ __all__ = [
     "minimum_of",
     "model",
     "outputs",
+    "prepared",
     "states",
+    "time_of",
     "time_of_maximum",
     "time_of_minimum",
+    "value_at",
 ]

@@ -11,7 +11,7 @@ from typing import Any
 
 from mc_engine.errors import ModelError
 from mc_engine.model.fields import OF_NAME, Extremum, Field, Named, Parameter, Setting
-from mc_engine.units import UNITS, nearest_unit, unit_suffix
+from mc_engine.units import UNITS, nearest_unit, unit_hint, unit_suffix
 
 _LONGEST_ENDING = 5  # words of a unit at the end of a name, as in _n_m_s or _deg_sqrt_h
 
@@ -20,9 +20,10 @@ _LONGEST_ENDING = 5  # words of a unit at the end of a name, as in _n_m_s or _de
 class Metric:
     """A metric that the engine computes: made by `maximum_of`, `at_end` and the like.
 
-    source : str, "value" or "time" of an extremum, "end" for the output at the end of the case
-    extremum : the output and the kind of its extreme value; None for the end
-    output : str, the output at the end
+    source : str, "value" or "time" of an extremum, "end" or "event" for the output there
+    extremum : the output and the kind of its extreme value; None for the others
+    output : str, the output at the end or at an event; of a time, "t_s" or ""
+    event : str, the event
     description, low, high, sometimes, unit : of the metric, see `Field`
     """
 
@@ -30,6 +31,7 @@ class Metric:
     extremum: Extremum | None = None
     output: str = ""
     description: str = ""
+    event: str = field(default="", kw_only=True)
     low: float = field(default=-float("inf"), kw_only=True)
     high: float = field(default=float("inf"), kw_only=True)
     sometimes: bool = field(default=False, kw_only=True)
@@ -37,8 +39,8 @@ class Metric:
 
     def as_field(self, name: str) -> Field:
         """The metric's column."""
-        more = {"low": self.low, "high": self.high, "sometimes": self.sometimes, "unit": self.unit}
-        return Field(self.description, name=name, **more)
+        low, high, sometimes = self.low, self.high, self.sometimes
+        return Field(self.description, low=low, high=high, sometimes=sometimes, name=name, unit=self.unit)
 
 
 def maximum_of(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
@@ -50,7 +52,6 @@ def maximum_of(output: str, description: str, *, smooth: bool = True, **more: An
     more : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
-
     Raises TypeError for another argument.
 
     >>> maximum_of("speed_m_s", "largest speed").extremum.kind
@@ -60,15 +61,11 @@ def maximum_of(output: str, description: str, *, smooth: bool = True, **more: An
 
 
 def minimum_of(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
-    """The smallest value of an output along the flight; see `maximum_of`.
+    """The smallest value of an output along the flight.
 
-    output : str, the name of an output
-    description : str, one line
-    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
-    more : low, high, sometimes, unit; see `Field`
+    output, description, smooth, more : as of `maximum_of`
 
-    Returns the Metric, for `metrics`.
-
+    Returns the Metric.
     Raises TypeError for another argument.
 
     >>> minimum_of("altitude_km", "lowest altitude").extremum.kind
@@ -78,15 +75,11 @@ def minimum_of(output: str, description: str, *, smooth: bool = True, **more: An
 
 
 def time_of_maximum(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
-    """The time of the largest value of an output; see `maximum_of`.
+    """The time of the largest value of an output.
 
-    output : str, the name of an output
-    description : str, one line
-    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
-    more : low, high, sometimes, unit; see `Field`
+    output, description, smooth, more : as of `maximum_of`
 
-    Returns the Metric, for `metrics`.
-
+    Returns the Metric.
     Raises TypeError for another argument.
 
     >>> time_of_maximum("altitude_km", "time of the apogee").source
@@ -96,15 +89,11 @@ def time_of_maximum(output: str, description: str, *, smooth: bool = True, **mor
 
 
 def time_of_minimum(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
-    """The time of the smallest value of an output; see `maximum_of`.
+    """The time of the smallest value of an output.
 
-    output : str, the name of an output
-    description : str, one line
-    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
-    more : low, high, sometimes, unit; see `Field`
+    output, description, smooth, more : as of `maximum_of`
 
-    Returns the Metric, for `metrics`.
-
+    Returns the Metric.
     Raises TypeError for another argument.
 
     >>> time_of_minimum("altitude_km", "time of the perigee").source
@@ -114,15 +103,12 @@ def time_of_minimum(output: str, description: str, *, smooth: bool = True, **mor
 
 
 def last_above(output: str, level: float, description: str, **more: Any) -> Metric:
-    """The last time at which an output was above `level`, in SI; see `maximum_of`.
+    """The last time at which an output was above `level`.
 
-    output : str, the name of an output
-    description : str, one line
+    output, description, more : as of `maximum_of`
     level : float, in SI
-    more : low, high, sometimes, unit; see `Field`
 
-    Returns the Metric, for `metrics`.
-
+    Returns the Metric.
     Raises TypeError for another argument.
 
     >>> last_above("error_deg", 0.01, "settling time").extremum.level
@@ -132,8 +118,26 @@ def last_above(output: str, level: float, description: str, **more: Any) -> Metr
 
 
 def at_end(output: str, description: str, **more: Any) -> Metric:
-    """The value of an output, or of the time "t_s", at the end of the case; see `maximum_of`.
+    """The value of an output, or of the time "t_s", at the end of the case.
 
+    output, description, more : as of `maximum_of`
+
+    Returns the Metric.
+    Raises TypeError for another argument.
+
+    >>> at_end("altitude_km", "altitude of the apogee").output
+    'altitude_km'
+    """
+    return Metric("end", None, output, description, **more)
+
+
+def value_at(event: str, output: str, description: str, **more: Any) -> Metric:
+    """The value of an output where an event first crosses zero: value_at("apogee", "altitude_km", "altitude there").
+
+    Of a delayed event, where it crosses, not where it acts.  In a case without the event it is not a number, which
+    needs sometimes=True if it is so in all.
+
+    event : str, the name of an event
     output : str, the name of an output
     description : str, one line
     more : low, high, sometimes, unit; see `Field`
@@ -142,10 +146,27 @@ def at_end(output: str, description: str, **more: Any) -> Metric:
 
     Raises TypeError for another argument.
 
-    >>> at_end("altitude_km", "altitude of the apogee").output
-    'altitude_km'
+    >>> value_at("apogee", "altitude_km", "altitude of the apogee").event
+    'apogee'
     """
-    return Metric("end", None, output, description, **more)
+    return Metric("event", None, output, description, event=event, **more)
+
+
+def time_of(event: str, description: str, **more: Any) -> Metric:
+    """The time at which an event first crosses zero; see `value_at`.
+
+    event : str, the name of an event
+    description : str, one line
+    more : low, high, sometimes, unit; see `Field`
+
+    Returns the Metric, for `metrics`.
+
+    Raises TypeError for another argument.
+
+    >>> time_of("apogee", "time of the apogee").output
+    ''
+    """
+    return Metric("event", None, "", description, event=event, **more)
 
 
 def inputs(**declared: Parameter | Setting) -> Any:
@@ -253,6 +274,10 @@ def _field(what: str, name: str, item: Any) -> Field:
 def _with_unit(item: Any, name: str) -> Any:
     """The number with its name, and the unit that the name says."""
     unit = item.unit
+    if not isinstance(unit, str):
+        raise ModelError(f'"{name}" has {unit!r} as its `unit`; it must be a text, such as "m/s"')
+    if unit not in (OF_NAME, *UNITS):
+        raise ModelError(f'"{name}" has the unit "{unit}"{unit_hint(unit)}')
     if unit == OF_NAME:
         has_none = isinstance(item, Setting) and (item.choices or item.date or isinstance(item.default, bool))
         unit = "" if has_none else unit_of(name)

@@ -6,21 +6,24 @@ are composed in the same way.
 """
 
 import inspect
-from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from mc_engine.errors import ModelError
-from mc_engine.lanes.composed import Call, ComposedFunction, Pick
+from mc_engine.lanes.composed import Call, ComposedFunction, Pick, whole
+from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.declarations import Metric
 from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedStep, Parameter, Setting
 from mc_engine.model.figures import Figure
+from mc_engine.model.phases import Memory, Phase, checked_events, events_of, noted_field, record_class
+from mc_engine.model.preparation import MISUSES, misuse
 from mc_engine.model.reading import ARGUMENTS
-from mc_engine.model.record import Model
+from mc_engine.model.record import Model, Refusals
 from mc_engine.suggestions import hint, nearest
 from mc_engine.units import UNITS
 
@@ -40,8 +43,9 @@ def model(
     metrics: Any,
     clock: FixedStep | AdaptiveStep,
     initial: Physics,
-    rhs: Physics,
     observe: Physics,
+    rhs: Physics | None = None,
+    phases: Mapping[str, Phase] | None = None,
     evaluate: Physics | None = None,
     events: Mapping[str, Event] | None = None,
     switch: Physics | None = None,
@@ -69,13 +73,19 @@ def model(
     clock : FixedStep or AdaptiveStep, the integrator
     initial : p, o; gives the first state
     rhs : gives the derivative of the state
+    phases : dict of Phase by name, in place of `rhs`, `control` and `events`: stretches of a flight, of which each has
+        its own.  A case begins in the first.  Functions of such a model may also take `since`, the time [s] since the
+        phase began, and `phase`, which has 1.0 for the phase that the case is in: `phase.rail`
     observe : gives the outputs, which histories show
     evaluate : best and when too, value and time of each extremum; gives the metrics that the engine does not compute
-    events : dict of Event by name
-    switch : hit too, which has 1.0 where an event fired; gives (state, discrete state) after events with the action
-        "switch"
-    memory : class of the discrete state, a named tuple with defaults, with which a case starts; or see `start`
-    start : p, o; gives the first discrete state
+    events : dict of Event by name.  Events with the same function share its call; it may give a named tuple, with a
+        number for each of them by name.
+    switch : hit too, which has 1.0 where an event acts; gives (state, discrete state) after events with the action
+        "switch", and where a phase begins: of the phase before it are m, since and phase
+    memory : class of the discrete state, a named tuple of numbers, or of records of them, with defaults, with which a
+        case starts; or see `start`
+    start : p, o; gives the first discrete state.  A model with phases, delayed events or metrics at events names its
+        class in `memory`, too
     control : draws too; gives the next discrete state, at each sample, the first at t = 0
     extrema : dict of extremes that `evaluate` finds in `best` and `when`, such as {"force": maximum_of("force_n", "")}.
         Those of the metrics are there under the metrics' own names, without unit.
@@ -83,9 +93,9 @@ def model(
         cases, such as {**vars(inputs), "burn_dv": dv}.  NumPy, for many cases at once: inputs and settings have an
         attribute for each symbol, `inputs.altitude` for altitude_km.  Cases that cannot start are added to `refusals`.
         An array "tables" [n, k] is put after the model's tables: a parameter must say where each case's begins.
-    kernel_parameters : class of p, a named tuple; by default `inputs`
+    kernel_parameters : class of p, a named tuple; by default `inputs`; see `prepared`
     tables(o) : float64[n], NumPy, numbers that all cases with the same settings share, such as a reference path;
-        physics reads them with look_up(o.tables, index)
+        physics reads them with look_up(o.tables, index), or look_up_record(o.tables, index, Row) for a named tuple
     source : str, the publication that the physics is from
     figures : tuple of figure records, such as `MapFigure`, that every report shows
     data : tuple of str, files that the model reads while it is imported, such as ("aero.csv", "tables/wind.csv"),
@@ -102,11 +112,32 @@ def model(
     for what, record in (("inputs", inputs), ("states", states), ("outputs", outputs), ("metrics", metrics)):
         if not hasattr(record, "declared"):
             raise ModelError(f"`{what}` is {record!r}; declare it, {_DECLARATIONS[what]} = {what}(...)")
-    listed = tuple(replace(event, name=key) for key, event in _events(events).items())
+    phases = _phases(phases, rhs=rhs, control=control, events=events)
+    declared = events_of(phases, checked_events(events))
+    kept = _memory(memory, start, phases, declared, metrics, outputs)
+    _refuse_idle_events(declared, switch, (kernel_parameters or inputs)._fields)
     tracked, places = _extrema(metrics, outputs, extrema or {})
-    seen = _called("observe", observe)
+    seen = _called("observe", observe, kept)
     if memory is not None and start is None:
         start = _starting(memory)
+    parts = [*phases.values()] if phases else [Phase(rhs, control)]  # type: ignore[arg-type]
+    derivatives = [_called("rhs", part.rhs, kept) for part in parts]
+    controls = [part.control and _called("control", part.control, kept) for part in parts]
+    calls = {name: _call("events", f'the function of the event "{name}"', event.function, kept)
+             for name, event in declared.items()}  # fmt: skip
+    switch = _called("switch", switch, kept)
+    start = _called("start", start, kept)
+
+    def functions(kept: Memory) -> dict[str, Any]:
+        return {
+            "rhs": kept.rhs(derivatives) if phases else derivatives[0],
+            "start": kept.start(start) if kept.kept else start,
+            "control": kept.control(controls) if kept.kept else controls[0],
+            "events": kept.watched(calls) if calls else None,
+            "switch": kept.switch(switch) if kept.kept else switch,
+            "note": kept.note(seen, outputs._fields),
+        }
+
     return Model(
         name=name,
         title=title,
@@ -118,16 +149,14 @@ def model(
         metrics=metrics.declared,
         clock=clock,
         kernel_parameters=kernel_parameters or inputs,
-        initial=_called("initial", initial),
-        rhs=_called("rhs", rhs),
+        initial=_called("initial", initial, kept),
         observe=seen,
-        evaluate=_metrics(metrics, outputs, seen, evaluate, places),
+        evaluate=_metrics(metrics, outputs, seen, evaluate, places, kept),
         prepare=prepare,
-        start=_called("start", start),
-        control=_called("control", control),
-        events=_event_functions(listed) if listed else None,
-        switch=_called("switch", switch),
-        event_list=listed,
+        event_list=kept.event_list(),
+        phases=tuple(phases),
+        noting=(lambda: functions(kept.noting_all())) if phases else None,
+        **functions(kept),
         extrema=tracked,
         tables=tables,
         figures=figures,
@@ -136,53 +165,116 @@ def model(
     )
 
 
-def _called(name: str, function: Any) -> Any:
+def prepared(prepare: Callable[..., Any], inputs: Any) -> Any:
+    """The class of p of a model with `prepare`: model(..., kernel_parameters=prepared(prepare, Inputs)).
+
+    prepare : see `model`; it is called once, for one case of the nominal inputs
+    inputs : made by the function of this name
+
+    Returns the named tuple, whose fields are the keys of what `prepare` returns.
+
+    Raises ModelError where it misuses what it is handed, or returns no dictionary.
+
+    >>> Inputs = inputs(altitude_km=Parameter(300.0, "altitude of the orbit"))
+    >>> prepared(lambda inputs, settings, refusals: {"radius": 6378e3 + inputs.altitude}, Inputs)._fields
+    ('radius',)
+    """
+    parameters, settings = SimpleNamespace(), SimpleNamespace()
+    for item in inputs.declared:
+        if isinstance(item, Setting):
+            setattr(settings, item.symbol, np.full(1, item.code(item.default)))
+        else:
+            setattr(parameters, item.symbol, np.full(1, item.default * item.si_factor))
+    try:
+        with np.errstate(all="ignore"):
+            given = prepare(parameters, settings, Refusals.none(1))
+    except MISUSES as error:  # with its traceback, which leads to the line
+        known = [item for item in inputs.declared if isinstance(item, Parameter)]
+        raise ModelError(misuse(error, known)).with_traceback(error.__traceback__) from error
+    if not isinstance(given, Mapping):
+        raise ModelError(f"`prepare` gives {type(given).__name__}; it must return a dictionary of arrays, by the names "
+                         "that physics reads from p")  # fmt: skip
+    return record_class("Parameters", [name for name in given if name != TABLES])
+
+
+def _phases(phases: Any, **others: Any) -> Mapping[str, Phase]:
+    """The phases, none of a model without; ModelError where something of theirs is declared beside them."""
+    if phases is None:
+        if others["rhs"] is None:
+            raise ModelError("the model has no `rhs`; write rhs(s), which gives the derivative of the state, or phases")
+        return {}
+    if not isinstance(phases, Mapping) or not phases:
+        raise ModelError('`phases` is no dictionary; declare it so: phases={"rail": Phase(rhs=slide), ...}')
+    for name, given in others.items():
+        if given is not None:
+            raise ModelError(f"the model has both `{name}` and `phases`; each phase has its own: Phase({name}=...)")
+    record_class("Phases", [*phases])
+    return phases
+
+
+def _memory(
+    memory: Any, start: Any, phases: Mapping[str, Phase], events: Mapping[str, Event], metrics: Any, outputs: Any
+) -> Memory:
+    """The discrete state with what the engine keeps in it for phases, delayed events and metrics at events."""
+    symbols = {item.name: item.symbol for item in outputs.declared}
+    noted = []
+    for name, metric in metrics.computed.items():
+        if metric.source != "event":
+            continue
+        if metric.event not in events:
+            raise ModelError(f'metric "{name}": there is no event "{metric.event}"{hint(metric.event, events)}')
+        if metric.output not in ("", *symbols):
+            raise ModelError(f'metric "{name}": there is no output "{metric.output}"{hint(metric.output, symbols)}')
+        noted.append((metric.event, symbols.get(metric.output, "")))
+    kept = Memory(memory, phases, events, noted)
+    controls = any(phase.control for phase in phases.values())
+    if kept.kept and memory is None and (start is not None or controls):
+        raise ModelError("the model has a discrete state; name its class, memory=Memory, beside phases, delayed events "
+                         "and metrics at events")  # fmt: skip
+    return kept
+
+
+def _refuse_idle_events(events: Mapping[str, Event], switch: Any, parameters: tuple[str, ...]) -> None:
+    """ModelError for an event that switches nothing, or waits for what is no parameter."""
+    for name, event in events.items():
+        if event.action == "switch" and not event.to and switch is None:
+            raise ModelError(f'event "{name}" has the action "switch", but the model has no function `switch`')
+        if isinstance(event.after, str) and event.after not in parameters:
+            raise ModelError(f'the event "{name}" acts after "{event.after}", and no parameter has this name without '
+                             f"its unit{hint(event.after, parameters)}")  # fmt: skip
+
+
+def _called(name: str, function: Any, kept: Memory) -> Any:
     """The function as the engine calls it, with all arguments of `name` in their order."""
     given = ARGUMENTS[name].split(", ")
     if not callable(function) or list(inspect.signature(function).parameters) == given:
         return function  # what is no function, `source_faults` tells
-    return ComposedFunction([_call(name, f"`{name}`", function)], written=function)
+    called, picks = _call(name, f"`{name}`", function, kept)
+    return ComposedFunction([(called, picks)], written=function)
 
 
-def _call(name: str, what: str, function: Any) -> Call:
-    """A function and the indices of what it takes of the arguments of `name`; ModelError for one that there is not."""
+def _call(name: str, what: str, function: Any, kept: Memory) -> Call:
+    """A function and what it takes of the arguments of `name`; ModelError for an argument that there is not."""
     given = ARGUMENTS[name].split(", ")
     known = {**{word: word for word in given}, **{word: short for word, short in _LONG.items() if short in given}}
-    chosen = []
+    in_phase = ["since", "phase"] if kept.phases and {"t", "m"} <= {*given} else []
+    calls: list[Call] = []
+    chosen: list[Pick] = []
     for argument in inspect.signature(function).parameters.values():
         if argument.name in known:
-            chosen.append(given.index(known[argument.name]))
+            chosen.append(("argument", given.index(known[argument.name]), ""))
+        elif argument.name in in_phase:
+            chosen.append(kept.handed(calls, argument.name, *map(given.index, "tm")))
         else:
             code = getattr(inspect.unwrap(getattr(function, "function", function)), "__code__", None)
             where = f" in line {code.co_firstlineno}" if code else ""
-            near = nearest(argument.name, known)
+            near = nearest(argument.name, [*known, *in_phase])
             meant = f'; did you mean "{near}"?' if near else ""
             raise ModelError(f'{what}{where} takes "{argument.name}"{meant}; a function takes what it names of '
-                             f"{', '.join(given)}")  # fmt: skip
-    return function, tuple(chosen)
-
-
-def _events(events: Any) -> Mapping[str, Event]:
-    if not isinstance(events, Mapping | None):
-        raise ModelError('`events` is no dictionary; declare it so: events={"apogee": Event(climb_rate, "falling")}')
-    for name, event in (events or {}).items():
-        if not isinstance(event, Event) or not callable(event.function):
-            raise ModelError(f'the event "{name}" has no function; declare it so: "{name}": Event(function, "falling")')
-    return events or {}
-
-
-def _event_functions(events: tuple[Event, ...]) -> ComposedFunction:
-    calls = [_call("events", f'the function of the event "{event.name}"', event.function) for event in events]
-    picks: list[Pick] = [("result", i, "") for i in range(len(events))]
-    written = events[0].function if len(events) == 1 else None
-    return ComposedFunction(calls, _tuple("Events", [event.name for event in events]), picks, written)
-
-
-def _tuple(title: str, names: list[str]) -> Any:
-    try:
-        return namedtuple(title, names)
-    except ValueError as error:
-        raise ModelError(f"{title}: {error}; take letters, digits and _") from None
+                             f"{', '.join([*given, *in_phase])}")  # fmt: skip
+    if not calls:
+        return function, tuple(chosen)
+    return ComposedFunction([*calls, (function, tuple(chosen))], written=function), whole(range(len(given)))
 
 
 def _starting(memory: Any) -> PhysicsFunction:
@@ -210,10 +302,10 @@ def _extrema(metrics: Any, outputs: Any, named: Mapping[str, Metric]) -> tuple[t
                              "last_above(...)")  # fmt: skip
         tracked[metric.extremum] = key
     for name, metric in metrics.computed.items():
-        output = metric.output or getattr(metric.extremum, "quantity", "")
+        output = metric.output or getattr(metric.extremum, "quantity", _TIME.name)
         if output not in known:
             raise ModelError(f'metric "{name}": there is no output "{output}"{hint(output, known)}')
-        if output == _TIME.name and metric.source != "end":
+        if output == _TIME.name and metric.source not in ("end", "event"):
             raise ModelError(f'metric "{name}": the time "t_s" has no extremum; use at_end')
         unit = "s" if metric.source == "time" else known[output].unit
         if UNITS[units[name]].quantity != UNITS[unit].quantity:
@@ -224,7 +316,7 @@ def _extrema(metrics: Any, outputs: Any, named: Mapping[str, Metric]) -> tuple[t
     return tuple(replace(extremum, name=name) for extremum, name in tracked.items()), places
 
 
-def _metrics(metrics: Any, outputs: Any, observe: Any, evaluate: Any, places: Mapping[str, str]) -> Any:
+def _metrics(metrics: Any, outputs: Any, observe: Any, evaluate: Any, places: Mapping[str, str], kept: Memory) -> Any:
     """The function that gives all metrics: those of `evaluate`, and those that the engine computes."""
     rest = [item.name for item in metrics.declared if item.name not in metrics.computed]
     if evaluate is None and rest:
@@ -235,9 +327,9 @@ def _metrics(metrics: Any, outputs: Any, observe: Any, evaluate: Any, places: Ma
     outputs_by_name = {item.name: item.symbol for item in outputs.declared}
     arguments = ARGUMENTS["evaluate"].split(", ")
     picks: list[Pick] = []
-    calls: list[Call] = [] if evaluate is None else [_call("evaluate", "`evaluate`", evaluate)]
+    calls: list[Call] = [] if evaluate is None else [_call("evaluate", "`evaluate`", evaluate, kept)]
     if any(metric.source == "end" and metric.output != _TIME.name for metric in metrics.computed.values()):
-        calls.append((observe, tuple(range(len(ARGUMENTS["observe"].split(", "))))))
+        calls.append((observe, whole(range(len(ARGUMENTS["observe"].split(", "))))))
     for item in metrics.declared:
         metric = metrics.computed.get(item.name)
         if metric is None:
@@ -245,9 +337,12 @@ def _metrics(metrics: Any, outputs: Any, observe: Any, evaluate: Any, places: Ma
         elif metric.extremum is not None:
             picks.append(("argument", arguments.index("best" if metric.source == "value" else "when"),
                           places[item.name]))  # fmt: skip
+        elif metric.source == "event":
+            noted = noted_field(metric.event, outputs_by_name.get(metric.output, ""))
+            picks.append(("argument", arguments.index("m"), noted))
         elif metric.output == _TIME.name:
             picks.append(("argument", arguments.index("t"), ""))
         else:
             picks.append(("result", len(calls) - 1, outputs_by_name[metric.output]))
-    symbols = [item.symbol for item in metrics.declared]
-    return ComposedFunction(calls, _tuple("AllMetrics", symbols), picks, evaluate)
+    names = [item.name for item in metrics.declared]
+    return ComposedFunction(calls, record_class("AllMetrics", names), picks, evaluate)

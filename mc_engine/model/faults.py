@@ -6,6 +6,7 @@ the compiler do not mention the user's code.
 
 import inspect
 import linecache
+import math
 import re
 import sysconfig
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from types import FrameType, FunctionType
 from typing import Any
 
 from mc_engine.errors import EngineError, ModelError
+from mc_engine.lanes.number import Origin
 from mc_engine.suggestions import hint, nearest
 
 MORE = "; `mc-engine check` tells more"
@@ -37,9 +39,13 @@ _LEFT_OUT = re.compile(r"(\w+)\.__new__\(\) missing \d+ required positional argu
 _UNKNOWN_FIELD = re.compile(r"(\w+)\.__new__\(\) got an unexpected keyword argument '(\w+)'")
 _ARRAY = re.compile(r"'?(numpy\.)?ndarray'?( object)?")
 _COMPILER = ("numba", "llvmlite")
+_FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the arc sine", "acos": "the arc cosine",
+              "tan": "the tangent", "exp": "the exponential"}  # fmt: skip
 _ENGINE = Path(__file__).resolve().parents[1]
 _PYTHON = Path(sysconfig.get_path("stdlib")).resolve()
 _LONG = 60  # characters of a source line in a sentence
+_FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the arc sine", "acos": "the arc cosine",
+              "tan": "the tangent", "exp": "the exponential"}  # fmt: skip
 
 
 @contextmanager
@@ -173,3 +179,32 @@ def _compiler_fault(text: str) -> tuple[str, str]:
     telling = (line for line in lines if line and not line.startswith(idle) and "<intrinsic " not in line)
     words = re.sub(r" at 0x\w+|(?<=\s)(?:[A-Za-z]:)?[/\\]\S*[/\\]", "", next(telling, "no reason given"))
     return source_place(file, number) if file else "", f"kernels cannot run this ({words.rstrip(':.')}); {PHYSICS}"
+
+
+def origin_sentence(origin: Origin, who: str = "") -> str:
+    """Where a number became infinite or NaN: operation, place in the model's source, operands, and when.
+
+    who : the case in words.
+    """
+    when = f"t = {origin.t:.6g} s" if math.isfinite(origin.t) else ""
+    happened = f"{_operation(origin)} ({', '.join(part for part in (when, who) if part)})"
+    if not origin.places:
+        return happened
+    ours = [place for place in origin.places if is_the_users(Path(place.file))] or [origin.places[-1]]
+    if ours[0] is not origin.places[0]:
+        happened = f"in {origin.places[0]}, {happened}"
+    if len(ours) > 1:
+        happened += f", called by {ours[-1]}"
+    return f"{source_place(*ours[0])}: {happened}"
+
+
+def _operation(origin: Origin) -> str:
+    if not origin.arguments:
+        return origin.operation
+    result = "not a number" if math.isnan(origin.result) else "infinite"
+    values = [f"{argument:.6g}" for argument in origin.arguments if isinstance(argument, float | int)]
+    if origin.operation in _FUNCTIONS:
+        return f"{_FUNCTIONS[origin.operation]} of {values[0]} is {result}"
+    if origin.operation.isidentifier():
+        return f"{origin.operation}({', '.join(values)}) is {result}"
+    return f"{f' {origin.operation} '.join(values)} is {result}"

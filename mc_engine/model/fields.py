@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from mc_engine.dates import modified_julian_date
+from mc_engine.errors import ModelError
 from mc_engine.units import UNITS, unit_suffix
 
 Number = float | np.ndarray
@@ -14,20 +16,7 @@ OF_NAME = "that of the name"  # in place of a unit, until the declaration has gi
 DIRECTIONS = {"rising": 1.0, "falling": -1.0, "either": 0.0}  # of events, and their signs
 
 
-class _TakesName(type):
-    """Accepts name and unit in front, too, as models did before 0.2: Parameter("mass_kg", "kg", "mass", 1.0)."""
-
-    def __call__(cls, *arguments: Any, **named: Any) -> Any:
-        if len(arguments) + ("default" in named) > 2 and isinstance(arguments[0], str):
-            name, unit, description, *rest = arguments
-            named |= {"name": name, "unit": unit}
-            if not rest:
-                return super().__call__(description=description, **named)
-            return super().__call__(rest[0], description, *rest[1:], **named)
-        return super().__call__(*arguments, **named)
-
-
-class Named(metaclass=_TakesName):
+class Named:
     """A number with a name: what `Field`, `Parameter` and `Setting` have in common.
 
     name : str, the column, which ends in its unit: "altitude_km".  The declaration gives it.
@@ -83,10 +72,6 @@ class Field(Named):
     name: str = field(default="", kw_only=True)
     unit: str = field(default=OF_NAME, kw_only=True)
 
-    if TYPE_CHECKING:  # both orders, see the metaclass
-
-        def __init__(self, *arguments: Any, **named: Any) -> None: ...
-
 
 @dataclass(frozen=True)
 class Parameter(Named):
@@ -115,10 +100,6 @@ class Parameter(Named):
     sometimes: bool = field(default=False, kw_only=True)
     name: str = field(default="", kw_only=True)
     unit: str = field(default=OF_NAME, kw_only=True)
-
-    if TYPE_CHECKING:  # both orders, see the metaclass
-
-        def __init__(self, *arguments: Any, **named: Any) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -153,10 +134,6 @@ class Setting(Named):
     name: str = field(default="", kw_only=True)
     unit: str = field(default=OF_NAME, kw_only=True)
 
-    if TYPE_CHECKING:  # both orders, see the metaclass
-
-        def __init__(self, *arguments: Any, **named: Any) -> None: ...
-
     def code(self, value: str | bool | float) -> float:
         """The number that stands for `value` inside a kernel."""
         if self.choices:
@@ -168,16 +145,16 @@ class Setting(Named):
 
 @dataclass(frozen=True)
 class Extremum:
-    """The largest or smallest value of one quantity along the flight, and its time.
+    """The largest or smallest value of one output along the flight, and its time.
 
     `evaluate` finds both under `name`: the value in `best`, the time [s] in `when`.
 
     name : str, the symbol in `best` and `when`
-    quantity : str, the name of a quantity of the model
-    kind : str, "max", "min", or "last_above": the last time at which the quantity was above `level`, of which only the
+    quantity : str, the name of an output of the model
+    kind : str, "max", "min", or "last_above": the last time at which the output was above `level`, of which only the
         time is of use
     level : float, in SI; for "last_above"
-    smooth : bool, between steps the extremum is that of a parabola; a quantity with corners is taken at the steps
+    smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
 
     >>> Extremum("peak", "altitude_km").kind
     'max'
@@ -190,17 +167,8 @@ class Extremum:
     smooth: bool = True
 
 
-class _TakesEventName(type):
-    """Accepts the name in the place of the function, too, as models did before 0.2, which had one for all events."""
-
-    def __call__(cls, *arguments: Any, **named: Any) -> Any:
-        if arguments and isinstance(arguments[0], str):
-            return super().__call__(None, *arguments[1:], name=arguments[0], **named)
-        return super().__call__(*arguments, **named)
-
-
 @dataclass(frozen=True)
-class Event(metaclass=_TakesEventName):
+class Event:
     """A zero crossing of a function along the flight: events={"apogee": Event(climb_rate, "falling", "stop")}.
 
     In a model with a stopping event, a case that reaches the integrator's `until` first has status no-stop, which
@@ -208,23 +176,29 @@ class Event(metaclass=_TakesEventName):
 
     function : physics with the arguments that it names, of t, s, m, p, o; a number that crosses zero
     direction : str, "rising", "falling" or "either"
-    action : str, "stop" ends the case, "switch" calls the model's `switch`
+    action : str, "stop" ends the case, "switch" calls the model's `switch`; by default "stop", and "switch" with `to`
+    to : str, the phase that begins, see `Phase`; `switch` may change state and discrete state there, too
+    after : float, time [s] from the crossing to the action, or str, the name without unit of a parameter that holds it,
+        of which a value below 0 counts as 0.  The action happens whatever follows the crossing; one that is waited for
+        does not begin again.
     rare : bool, it may never happen in ordinary cases, or only with some settings; `mc-engine check` does not miss it
     name : str, given by the model
 
-    >>> Event(None, name="apogee").direction, Event(None, name="apogee").action
+    >>> apogee = Event(lambda s: s.vz, name="apogee")
+    >>> apogee.direction, apogee.action
     ('falling', 'stop')
     """
 
-    function: Callable[..., Any] | None
+    function: Callable[..., Any]
     direction: str = "falling"
-    action: str = "stop"
+    action: str = ""
     rare: bool = False
+    to: str = field(default="", kw_only=True)
+    after: float | str = field(default=0.0, kw_only=True)
     name: str = field(default="", kw_only=True)
 
-    if TYPE_CHECKING:  # both orders, see the metaclass
-
-        def __init__(self, *arguments: Any, **named: Any) -> None: ...
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "action", self.action or ("switch" if self.to else "stop"))
 
 
 @dataclass(frozen=True)
@@ -271,3 +245,47 @@ class AdaptiveStep:
     method: str = "dop853"
     attempts: int = 100_000
     first_step: float = 0.0
+
+
+# ---- types of the values in a record, against those that its class declares
+
+_WORDS = {str: "a text", bool: "True or False", float: "a number", int: "a number", NoneType: "None"}
+
+
+def refuse_other_types(record: Any, what: str) -> None:
+    """ModelError if a field of `record`, a dataclass, is of another type than its class declares.
+
+    what : the beginning of the sentence, such as 'event "apogee"'.
+    """
+    for name, kind in get_type_hints(type(record)).items():
+        value = getattr(record, name)
+        if not _is_of(value, kind):
+            raise ModelError(f"{what} has {value!r} as its `{name}`; it must be {_words(kind)}")
+
+
+def _is_of(value: Any, kind: Any) -> bool:
+    """Whether a value is of a declared type; numbers are neither truth values nor NaN."""
+    parts = get_args(kind)
+    if get_origin(kind) in (Union, UnionType):
+        return any(_is_of(value, part) for part in parts)
+    if get_origin(kind) is tuple:
+        parts = parts[:1] * len(value) if isinstance(value, tuple) and parts[-1] is Ellipsis else parts
+        return isinstance(value, tuple) and len(value) == len(parts) and all(map(_is_of, value, parts))
+    if get_origin(kind) is Callable:
+        return callable(value)
+    if kind in (float, int):
+        return isinstance(value, int | float | np.number) and not isinstance(value, bool) and bool(value == value)
+    return kind is Any or isinstance(value, get_origin(kind) or kind)
+
+
+def _words(kind: Any) -> str:
+    parts = get_args(kind)
+    if get_origin(kind) in (Union, UnionType):
+        return " or ".join(dict.fromkeys(map(_words, parts)))
+    if get_origin(kind) is tuple and parts[-1] is Ellipsis:
+        return f"a tuple, each item {_words(parts[0])}; one alone needs its comma, (...,)"
+    if get_origin(kind) is tuple:
+        return f"a tuple of {' and '.join(map(_words, parts))}"
+    if get_origin(kind) is Callable:
+        return "a function"
+    return _WORDS.get(kind, str(getattr(kind, "__name__", kind)))

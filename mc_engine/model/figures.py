@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import ModelError
-from mc_engine.model.record_types import refuse_other_types
+from mc_engine.model.fields import refuse_other_types
 from mc_engine.suggestions import hint, nearest
 
 if TYPE_CHECKING:
@@ -40,9 +40,9 @@ class MapFigure:
 
 @dataclass(frozen=True)
 class HistoryFigure:
-    """Saved time histories: one panel for each quantity.
+    """Saved time histories: one panel for each output.
 
-    quantities : tuple of str
+    quantities : tuple of str, outputs
     title : str
 
     >>> HistoryFigure(("altitude_km", "speed_m_s"), "Altitude and speed").quantities
@@ -98,10 +98,10 @@ class FootprintFigure:
 
 @dataclass(frozen=True)
 class ProfileFigure:
-    """One history quantity against another, as altitude against speed, with percentile bands of x at each y.
+    """One output of histories against another, as altitude against speed, with percentile bands of x at each y.
 
-    x : str, quantity
-    y : str, quantity
+    x : str, output or "t_s"
+    y : str, output or "t_s"
     title : str
 
     >>> ProfileFigure("speed_m_s", "altitude_km", "Speed along the descent").y
@@ -187,7 +187,7 @@ def _names_in_figure(figure: Figure, model: "System") -> Iterator[tuple[str, str
     inputs = [item.name for item in (*model.parameters, *model.settings)]
     metrics = [metric.name for metric in model.metrics]
     columns = [*inputs, *metrics, *(f"end_{state.name}" for state in model.states), *_OF_EVERY_CASE]
-    quantities = [quantity.name for quantity in model.quantities]
+    outputs = [output.name for output in model.quantities]
     if isinstance(figure, MapFigure):
         yield "column", figure.metric, columns
     if isinstance(figure, CorridorFigure):
@@ -195,9 +195,9 @@ def _names_in_figure(figure: Figure, model: "System") -> Iterator[tuple[str, str
     if isinstance(figure, MapFigure | ScatterFigure | CorridorFigure) and not figure.upstream:
         yield from (("column", name, columns) for name in (figure.x, figure.y))
     if isinstance(figure, HistoryFigure):
-        yield from (("quantity", name, quantities) for name in figure.quantities)
+        yield from (("output", name, outputs) for name in figure.quantities)
     if isinstance(figure, ProfileFigure):
-        yield from (("quantity", name, ["t_s", *quantities]) for name in (figure.x, figure.y))
+        yield from (("output", name, ["t_s", *outputs]) for name in (figure.x, figure.y))
     if isinstance(figure, FootprintFigure):
         above = () if figure.ends_below is None else figure.ends_below[:1]
         yield from (("column", str(name), columns) for name in (figure.latitude, figure.longitude, *above))
@@ -214,8 +214,8 @@ def _hint(name: str, known: list[str]) -> str:
 
 def _other_table(name: str, word: str, model: "System") -> str:
     """Why a name that the model has is not for this figure: histories and the table of cases are two tables."""
-    if word == "quantity" and name in [item.name for item in (*model.parameters, *model.settings, *model.metrics)]:
+    if word == "output" and name in [item.name for item in (*model.parameters, *model.settings, *model.metrics)]:
         return " (it is a column of the table of cases, histories do not have it)"
-    if word in ("column", "metric") and name in [quantity.name for quantity in model.quantities]:
-        return " (it is a quantity of histories, the table of cases does not have it)"
+    if word in ("column", "metric") and name in [output.name for output in model.quantities]:
+        return " (it is an output of histories, the table of cases does not have it)"
     return ""

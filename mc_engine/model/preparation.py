@@ -1,7 +1,7 @@
 """Calls a model's `prepare` and explains its errors; it is plain NumPy code, with other rules than physics."""
 
 import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,8 +11,11 @@ import numpy as np
 
 from mc_engine.errors import ModelError
 from mc_engine.model.faults import place_in_model
+from mc_engine.model.fields import Parameter
 from mc_engine.model.record import Model, Refusals
 from mc_engine.suggestions import hint
+
+MISUSES = (TypeError, KeyError, AttributeError, ValueError)
 
 
 def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> Any:
@@ -35,16 +38,18 @@ def _explaining(model: Model) -> Iterator[None]:
     """ModelError with the line, the error and the rules of `prepare` for errors of a wrong use."""
     try:
         yield
-    except (TypeError, KeyError, AttributeError, ValueError) as error:
-        words = f"{type(error).__name__}: {error}"
-        if isinstance(error, AttributeError) and isinstance(error.obj, SimpleNamespace):
-            words += hint(str(error.name), vars(error.obj))
-        raise ModelError(f"{place_in_model(error) or 'the model'}: `prepare`: {words}; {_rules(model)}") from error
+    except MISUSES as error:
+        raise ModelError(f"{place_in_model(error) or 'the model'}: {misuse(error, model.parameters)}") from error
 
 
-def _rules(model: Model) -> str:
-    first = next((parameter.symbol for parameter in model.parameters), "altitude")
+def misuse(error: Exception, parameters: Sequence[Parameter]) -> str:
+    """The error of a wrong use of what `prepare` is handed, with the rules."""
+    words = f"{type(error).__name__}: {error}"
+    if isinstance(error, AttributeError) and isinstance(error.obj, SimpleNamespace):
+        words += hint(str(error.name), vars(error.obj))
+    first = next((parameter.symbol for parameter in parameters), "altitude")
     return (
+        f"`prepare`: {words}; "
         f"`inputs` and `settings` have attributes in SI, without unit, such as inputs.{first}, and vars(inputs) is a "
         "dictionary of them; each holds the numbers of many cases: use NumPy, np.where(condition, a, b), & and |; "
         'cases are refused by refusals.add(mask, "why")'

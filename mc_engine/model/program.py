@@ -1,19 +1,20 @@
-"""Programs as simulators: the table [simulator] of a campaign file, and the record that is made of it.
+"""The table [simulator] of a campaign file, and the simulator that is made of it where it names a program.
 
-The command is started without a shell, in the folder of its case.  What a program is made of beside the campaign file
-counts as its source: the executable, files that the command names, templates, and `files`.
+`mc_engine.model.fmu` reads the table of an FMU.  The command is started without a shell, in the folder of its case.
+What a program is made of beside the campaign file counts as its source: the executable, files that the command names,
+templates, and `files`.
 """
 
 import os
 import re
 import shutil
 import string
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 from pydantic import Field as Key
 
@@ -31,35 +32,51 @@ JSON_INPUT = "json"
 Problems = list[tuple[str, str]]
 
 
-class _NumberSection(Section):
+class NumberSection(Section):
+    """A number that goes in or comes out."""
+
     unit: str | None = Key(default=None, description="by default the one that the name ends in")
     description: str = ""
     low: float | None = None
     high: float | None = None
+    variable: str | None = Key(default=None, min_length=1, description="variable of the FMU; default: its name")
 
 
-class ParameterSection(_NumberSection):
+class ParameterSection(NumberSection):
     """[simulator.parameter]: an input."""
 
     default: float = Key(description="the nominal value")
 
 
-class MetricSection(_NumberSection):
-    """[simulator.metric]: a result, read by key, path or pattern."""
+class MetricSection(NumberSection):
+    """[simulator.metric]: a result, read by key, path or pattern, or taken from a variable of an FMU."""
 
     read: str | None = Key(
         default=None, min_length=1, description="key or dotted path in the result; default: its name"
     )
     pattern: str | None = Key(default=None, min_length=1, description="regular expression over stdout, with one group")
+    take: Literal["final", "max", "min", "time_of_max", "crossing"] | None = Key(
+        default=None, description="of a variable's history; default: final"
+    )
+    level: float | None = Key(default=None, description="that a crossing is the first time of")
     sometimes: bool = Key(default=False, description="it may be missing, or not a number")
 
 
-class ProgramSection(Section):
-    """[simulator]: a program that flies one case at a time."""
+class SimulatorSection(Section):
+    """[simulator]: a program, or an FMU, that flies one case at a time."""
 
     command: list[str] = Key(
         default_factory=list,
         description="the executable and its arguments, without a shell; none for `mc-engine import`",
+    )
+    fmu: str | None = Key(default=None, min_length=1, description="an FMU of FMI 2 or 3, in place of a command")
+    stop_time_s: float | None = Key(default=None, gt=0.0, le=LONGEST_S, description="end of the flight of an FMU")
+    step_s: float | None = Key(default=None, gt=0.0, description="communication step of an FMU, and of its history")
+    interface: Literal["co-simulation", "model-exchange"] | None = Key(
+        default=None, description="of an FMU that has both; default: co-simulation"
+    )
+    solver_tolerance: float | None = Key(
+        default=None, gt=0.0, lt=1.0, description="relative, of the solver; default: that of the FMU, or 1e-8"
     )
     title: str = ""
     input: dict[str, str] = Key(default_factory=lambda: {"case.json": JSON_INPUT}, description="files that it reads")
@@ -77,7 +94,7 @@ class ProgramSection(Section):
     tolerance: float = Key(default=0.0, ge=0.0, lt=1.0, description="fraction by which numbers may differ")
     parameter: dict[str, ParameterSection] = Key(default_factory=dict)
     metric: dict[str, MetricSection] = Key(min_length=1, description="its results, a table each")
-    output: dict[str, _NumberSection] = Key(default_factory=dict, description="columns of its history")
+    output: dict[str, NumberSection] = Key(default_factory=dict, description="columns of its history")
 
 
 @dataclass(frozen=True)
@@ -97,13 +114,14 @@ class Program:
     reads: Mapping[str, tuple[str | None, str | None]]
 
 
-def program_simulator(section: ProgramSection, directory: Path, problems: Problems) -> Simulator | None:
+def program_simulator(section: SimulatorSection, directory: Path, problems: Problems) -> Simulator | None:
     """The simulator that a campaign file describes, or None with the mistakes added to `problems` by key."""
     contents: dict[Path, bytes] = {}
+    refuse_keys(section, FMU_KEYS, "of an FMU; give `fmu`, its file, or leave it out", problems)
     command, outside = _command(section, directory, contents, problems)
     inputs = _inputs(section, directory, contents, problems)
     for name in section.files:
-        _add_file(name, "files", directory, contents, problems)
+        add_file(name, "files", directory, contents, problems)
     reads = {name: _reading(name, metric, section, problems) for name, metric in section.metric.items()}
     for key in ("result", "history", *section.input):
         _check_file_name(key, getattr(section, key, None) or key, problems)
@@ -116,13 +134,32 @@ def program_simulator(section: ProgramSection, directory: Path, problems: Proble
     if problems:
         return None
     files = {path.relative_to(directory.resolve()).as_posix(): content for path, content in contents.items()}
-    name = Path(section.command[0]).stem if section.command else directory.name
     program = Program(command, files, inputs, section.result, section.history, section.echo, reads)
-    module = ModuleType("program")
-    module.__doc__ = outside  # counts in the digest, as what lies beside the campaign file does
+    name = Path(section.command[0]).stem if command else directory.name
+    reference = section.command[0] if command else "[simulator]"
+    return described_simulator(
+        section, reference, name, Origin(directory, contents, outside), problems, program=program if command else None
+    )
+
+
+class Origin(NamedTuple):
+    """Where a described simulator is from: files by path, and what counts as its source beside them."""
+
+    directory: Path
+    contents: Mapping[Path, bytes]
+    outside: str = ""
+
+
+def described_simulator(
+    section: SimulatorSection, reference: str, name: str, origin: Origin, problems: Problems, **flies: Any
+) -> Simulator | None:
+    """The record of a table [simulator].  flies : the program or the FMU."""
+    module = ModuleType("described")
+    module.__doc__ = origin.outside  # counts in the digest, as what lies beside the campaign file does
+    home = origin.directory.resolve()
     try:
         return Simulator(
-            title=section.title or f"The program {name}",
+            title=section.title or f"The {'FMU' if 'fmu' in flies else 'program'} {name}",
             name=name,
             parameters=tuple(_parameter(name, one) for name, one in section.parameter.items()),
             metrics=tuple(_field(name, one, one.sometimes) for name, one in section.metric.items()),
@@ -133,17 +170,30 @@ def program_simulator(section: ProgramSection, directory: Path, problems: Proble
             keep=section.keep,
             deterministic=section.deterministic,
             tolerance=section.tolerance,
-            program=program if command else None,
-            reference=section.command[0] if command else "[simulator]",
-            sources=Sources(module, directory.resolve(), directory.resolve(), contents, {}),
+            reference=reference,
+            sources=Sources(module, home, home, origin.contents, {}),
+            **flies,
         )
     except ModelError as error:
         problems.append(("", str(error)))
         return None
 
 
+FMU_KEYS = ("fmu", "stop_time_s", "step_s", "interface", "solver_tolerance", "variable", "take", "level")
+PROGRAM_KEYS = ("command", "input", "result", "history", "echo", "files", "read", "pattern")
+
+
+def refuse_keys(section: SimulatorSection, keys: Sequence[str], why: str, problems: Problems) -> None:
+    """Note the keys of the table that are for another kind of simulator."""
+    tables = {"": section, **{f"parameter.{name}.": one for name, one in section.parameter.items()}}
+    tables |= {f"metric.{name}.": one for name, one in section.metric.items()}
+    tables |= {f"output.{name}.": one for name, one in section.output.items()}
+    for place, table in tables.items():
+        problems.extend((f"{place}{key}", f"is {why}") for key in keys if key in table.model_fields_set)
+
+
 def _command(
-    section: ProgramSection, directory: Path, contents: dict[Path, bytes], problems: Problems
+    section: SimulatorSection, directory: Path, contents: dict[Path, bytes], problems: Problems
 ) -> tuple[tuple[str, ...], str]:
     """(words of the command, SHA-256 of an executable that does not lie beside the campaign file).
 
@@ -160,7 +210,7 @@ def _command(
             problems.append(("command", f"word {place}: {{{name}}} is not known{hint(name, PLACES)}"))
         beside = not named and (directory / word).is_file() and not os.path.isabs(word)
         if beside and (place > 1 or "/" in word):
-            _add_file(word, "command", directory, contents, problems)
+            add_file(word, "command", directory, contents, problems)
             word = "{home}/" + os.path.normpath(word)
         elif place == 1:
             word, outside = _executable(word, problems)
@@ -183,7 +233,8 @@ def _executable(word: str, problems: Problems) -> tuple[str, str]:
     return word, ""
 
 
-def _add_file(name: str, key: str, directory: Path, contents: dict[Path, bytes], problems: Problems) -> None:
+def add_file(name: str, key: str, directory: Path, contents: dict[Path, bytes], problems: Problems) -> None:
+    """Read a file beside the campaign file."""
     try:
         path = resolve_beside(directory, name)
         contents[path] = path.read_bytes()
@@ -194,7 +245,7 @@ def _add_file(name: str, key: str, directory: Path, contents: dict[Path, bytes],
 
 
 def _inputs(
-    section: ProgramSection, directory: Path, contents: dict[Path, bytes], problems: Problems
+    section: SimulatorSection, directory: Path, contents: dict[Path, bytes], problems: Problems
 ) -> dict[str, str]:
     """The files that each case is given: "json", or the text of a Jinja template."""
     import jinja2  # which a campaign without templates does not wait for
@@ -207,7 +258,7 @@ def _inputs(
             inputs[name] = kind
             continue
         before, key = len(problems), f"input.{name}"
-        _add_file(kind, key, directory, contents, problems)
+        add_file(kind, key, directory, contents, problems)
         if len(problems) > before:
             continue
         try:
@@ -226,7 +277,7 @@ def _inputs(
 
 
 def _reading(
-    name: str, metric: MetricSection, section: ProgramSection, problems: Problems
+    name: str, metric: MetricSection, section: SimulatorSection, problems: Problems
 ) -> tuple[str | None, str | None]:
     """(path in the result, pattern) of a metric."""
     key = f"metric.{name}"
@@ -252,16 +303,18 @@ def _check_file_name(key: str, name: str, problems: Problems) -> None:
 def _parameter(name: str, section: ParameterSection) -> Parameter:
     low = -float("inf") if section.low is None else section.low
     high = float("inf") if section.high is None else section.high
-    return Parameter(name, _unit(name, section), section.description or name, section.default, low=low, high=high)
+    unit, meaning = _unit(name, section), section.description or name
+    return Parameter(section.default, meaning, low=low, high=high, name=name, unit=unit)
 
 
-def _field(name: str, section: _NumberSection, sometimes: bool = False) -> Field:
+def _field(name: str, section: NumberSection, sometimes: bool = False) -> Field:
     low = -float("inf") if section.low is None else section.low
     high = float("inf") if section.high is None else section.high
-    return Field(name, _unit(name, section), section.description or name, sometimes=sometimes, low=low, high=high)
+    unit, meaning = _unit(name, section), section.description or name
+    return Field(meaning, sometimes=sometimes, low=low, high=high, name=name, unit=unit)
 
 
-def _unit(name: str, section: _NumberSection) -> str:
+def _unit(name: str, section: NumberSection) -> str:
     """The unit that a number declares, or that its name ends in; "" where it ends in none."""
     if section.unit is not None:
         return section.unit

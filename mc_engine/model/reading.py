@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.lanes.composed import ComposedFunction
+from mc_engine.lanes.composed import Alternatives, ComposedFunction
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import PHYSICS, source_place
 from mc_engine.model.record import Model
@@ -31,6 +31,7 @@ ARGUMENTS = {
     "control": "t, s, m, p, o, draws",
     "events": "t, s, m, p, o",
     "switch": "t, s, m, p, o, hit",
+    "note": "t, s, m, p, o, hit",
     "observe": "t, s, m, p, o",
     "evaluate": "t, s, m, p, o, best, when",
     "prepare": "inputs, settings, refusals",
@@ -54,6 +55,11 @@ _VALUES = (bool, int, float, str, tuple, np.ndarray, np.generic, Enum, type(None
            PhysicsFunction)  # fmt: skip
 _BUILTINS = {abs, bool, divmod, enumerate, float, int, len, max, min, pow, range, round, sum, tuple, zip}
 
+# How the sentence on `print` and `breakpoint()` ends, which a flight by Python allows.
+FOR_DEBUGGING = (
+    "would run in every step of every case; `mc-engine debug` flies one case that runs it; let `observe` give what "
+    "histories are to show"
+)
 _TUPLES = "keep numbers in tuples and named tuples"
 _KEEP = "what changes is kept in the state or in the memory, and a record is made anew, State(...) with every field"
 _OWN = "a case depends on its inputs and case_id alone: noise comes from the `draws` of `control`"
@@ -73,6 +79,7 @@ _FIXES = (
 )  # fmt: skip
 
 _ENGINE = Path(__file__).resolve().parents[1]
+_PHASES = "mc_engine.model.phases"  # the module of the functions that make phases of the model's own
 _AT_DEFINITION = {"annotation", "returns", "defaults", "kw_defaults", "decorator_list"}  # run once, by Python alone
 # What the attributes of may be read: nothing of it runs code of the user's.
 _FOLLOWED = (ModuleType, SimpleNamespace, np.random.Generator, np.random.RandomState, random.Random)
@@ -81,7 +88,7 @@ _FOLLOWED = (ModuleType, SimpleNamespace, np.random.Generator, np.random.RandomS
 def source_faults(model: Model) -> list[str]:
     """Sentences on functions without decorator or with other arguments, and on what physics may not contain."""
     reader = _Reader(frozenset(setting.symbol for setting in model.settings))
-    for name, function in _functions(model):
+    for name, function in functions_of_model(model):
         if name not in INTERPRETED and isinstance(function, PhysicsFunction):
             reader.read(function, name, ())
     return [*_wrong_functions(model), *reader.breaches]
@@ -104,36 +111,36 @@ def code_of(function: Callable[..., Any]) -> CodeType | None:
     return getattr(inspect.unwrap(getattr(function, "function", function)), "__code__", None)
 
 
-def _functions(model: Model) -> Iterator[tuple[str, Callable[..., Any]]]:
-    """The functions of the model's file, each once, with what the engine calls it."""
+def functions_of_model(model: Model) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """The functions of the model's file, each once, with what the engine calls it; not those that make its phases."""
     met: list[Any] = []
     for name in ARGUMENTS:
         for function in _parts(getattr(model, name)):
-            if function is not None and not any(function is other for other in met):
+            own = getattr(function, "__module__", "") != _PHASES
+            if function is not None and own and not any(function is other for other in met):
                 met.append(function)
                 yield name, function
 
 
 def _parts(function: Any) -> Iterator[Any]:
     """A function, or those that it is composed of."""
-    if not isinstance(function, ComposedFunction):
+    if not isinstance(function, ComposedFunction | Alternatives):
         yield function
         return
-    for part, _ in function.calls:
+    for part in function.parts:
         yield from _parts(part)
 
 
 def _wrong_functions(model: Model) -> Iterator[str]:
-    for name, function in _functions(model):
+    for name, function in functions_of_model(model):
         wanted = ARGUMENTS[name]
         if not callable(function):
             yield f"`{name}` is {function!r}; it must be a function"
             continue
-        if name not in INTERPRETED and not isinstance(function, PhysicsFunction):
-            yield f"{place_of(function)}: `{name}` is not marked; write @physics on the line above it"
+        if name not in INTERPRETED:  # it is handed the arguments that it names
+            if not isinstance(function, PhysicsFunction):
+                yield f"{place_of(function)}: `{name}` is not marked; write @physics on the line above it"
             continue
-        if function is not getattr(model, name):
-            continue  # it is handed the arguments that it names
         try:
             inspect.signature(function).bind(*wanted.split(", "))
         except TypeError:
@@ -161,7 +168,7 @@ class _Reader:
         if physics in callers:
             self._add(code, code.co_firstlineno, f"`{name}` calls itself; physics has no recursion, unroll it")
             return
-        tree = None if physics in self._read else _definition(code)
+        tree = None if physics in self._read else definition_of(code)
         self._read.add(physics)
         if tree is None:
             return
@@ -228,7 +235,7 @@ def _running(node: ast.AST, line: int) -> Iterator[tuple[ast.AST, int]]:
                 yield from _running(child, own)
 
 
-def _definition(code: CodeType) -> ast.AST | None:
+def definition_of(code: CodeType) -> ast.AST | None:
     """The syntax tree of a function; None where there is no source, as in an interactive session."""
     try:
         tree = tree_of_file(code.co_filename)
@@ -305,8 +312,8 @@ def _wrong_value(value: Any) -> str:
         return ""
     if isinstance(value, np.random.Generator | np.random.RandomState | random.Random) or "random" in home:
         return f"random numbers are not for physics; {_OWN}"
-    if value is print:
-        return "`print` would run in every step of every case; let `observe` give what histories are to show"
+    if value in (print, breakpoint):
+        return f"`{value.__name__}` {FOR_DEBUGGING}"
     if isinstance(value, np.ufunc) or (callable(value) and (value in _BUILTINS or home == ["math"])):
         return ""
     if isinstance(value, FunctionType) and home[0] not in ("numpy", *sys.stdlib_module_names):

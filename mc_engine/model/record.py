@@ -1,8 +1,8 @@
-"""What a model gives the engine: its fields, its physics, its events and its clock.
+"""The record of a model, which the engine reads: its numbers, its physics, its events and its integrator.
 
-A `Model` is a record.  It names every number that goes in (parameters, settings) and comes out (states,
-quantities along the flight, metrics), with unit and one-line meaning, and points to the physics: plain
-functions on named tuples of numbers, marked with `mc_engine.lanes.physics`.
+`mc_engine.model.model` makes it from the declarations of a model's file.  It names every number that goes in
+(parameters, settings) and comes out (states, outputs along the flight, metrics), with unit and one-line meaning, and
+points to the physics: plain functions on named tuples of numbers, marked with `mc_engine.lanes.physics`.
 
 Inside physics everything is SI and radians and a parameter loses its unit suffix (`inclination_deg` is
 `inclination`, in radians); outside, every column has the unit its field declares.
@@ -47,43 +47,34 @@ NoMemory = namedtuple("NoMemory", "unused")  # of a model without `start`
 class Model:
     """A system that can be flown: its inputs and outputs with their units, its physics, its events and its integrator.
 
-    A model file ends with `MODEL = Model(...)`.  Except `prepare` and `tables`, which are NumPy, the functions are
-    marked with `mc_engine.lanes.physics`.  Their arguments are the time t [s], the state s, the discrete state m, the
-    kernel parameters p and the settings o, each a named tuple of numbers in SI and radians.
+    `model(...)` makes it, see there.  The engine calls its functions with the arguments that are given here, in this
+    order: the time t [s], the state s, the discrete state m, the kernel parameters p and the settings o, each a named
+    tuple of numbers in SI and radians.
 
-    name : str
-    title : str, one line for reports
-    source : str, the publication that the physics is from; may be empty
+    name, title, source, clock, figures, data, published : as handed to `model`
     parameters : tuple of Parameter, inputs that may differ from case to case
     settings : tuple of Setting, inputs that all cases of a batch share
     states : tuple of Field, in the order of the state's named tuple
-    quantities : tuple of Field, what histories hold besides the time
+    quantities : tuple of Field, the outputs, which histories hold besides the time
     metrics : tuple of Field, the results of a case
-    clock : FixedStep or AdaptiveStep, the integrator
-    kernel_parameters : type, the named tuple p
+    kernel_parameters : class of p
     initial(p, o) : the first state
     rhs(t, s, m, p, o) : the derivative of the state
-    observe(t, s, m, p, o) : named tuple of the quantities
+    observe(t, s, m, p, o) : named tuple of the outputs
     evaluate(t, s, m, p, o, best, when) : named tuple of the metrics; best and when hold value and time of each Extremum
-    prepare(inputs, settings, refusals) : dict, by the fields of `kernel_parameters`, of SI arrays or of numbers for all
-        cases, such as {**vars(inputs), "burn_dv": dv}.  NumPy, for many cases at once: inputs and settings have an
-        attribute for each symbol, `inputs.altitude` for altitude_km.  Cases that cannot start are added to `refusals`.
-        An array "tables" [n, k] is put after the model's tables: a parameter must say where each case's begins.  By
-        default the inputs are passed on.
+    prepare(inputs, settings, refusals) : dict of kernel parameters, see `model`
     start(p, o) : the first discrete state
     control(t, s, m, p, o, draws) : the next discrete state, at each sample, the first at t = 0
     events(t, s, m, p, o) : named tuple with one component for each Event
     switch(t, s, m, p, o, hit) : (state, discrete state) after an event with the action "switch"; hit has 1.0 where it
         fired
+    note(t, s, m, p, o, hit) : the discrete state after an event, also one that ends the case; made by the engine
     event_list : tuple of Event, in the order of the components of `events`
+    phases : tuple of str, the names of the phases, by the number that the discrete state holds
+    noting() : dict of functions of this record, with which the time of every event is noted; of a model with phases
     extrema : tuple of Extremum
-    tables(o) : float64[n], NumPy, numbers that all cases with the same settings share, such as a reference path;
-        physics reads them with look_up(o.tables, index)
-    figures : tuple of figure records, such as `MapFigure`, that every report shows
-    data : tuple of str, files that the model reads while it is imported, such as ("aero.csv", "tables/wind.csv"),
-        inside its own folder.  They count as its source, and a run directory keeps copies of them.
+    tables(o) : float64[n], see `model`
     watching : bool, set by the engine while it watches events
-    published : tuple of dict, published values to compare with
     reference : str, set by `load_model`
     sources : Sources, set by `load_model`
 
@@ -115,12 +106,15 @@ class Model:
     control: Callable[..., Any] | None = None
     events: Callable[..., Any] | None = None
     switch: Callable[..., Any] | None = None
+    note: Callable[..., Any] | None = None
     event_list: tuple[Event, ...] = ()
+    phases: tuple[str, ...] = ()
     extrema: tuple[Extremum, ...] = ()
     tables: Callable[..., np.ndarray] | None = None
     figures: tuple[Figure, ...] = ()
     data: tuple[str, ...] = ()
     watching: bool = False  # see mc_engine.flight.kernel_parts.watching_events
+    noting: Callable[[], Mapping[str, Any]] | None = field(default=None, compare=False, repr=False)
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False)
     reference: str = field(default="", compare=False)
     sources: Sources | None = field(default=None, compare=False, repr=False)  # of one that `load_model` gave
@@ -139,7 +133,7 @@ class Model:
 
 @dataclass
 class Refusals:
-    """The cases that a model cannot start from, each with one sentence: the third argument of `Model.prepare`.
+    """The cases that a model cannot start from, each with one sentence: the third argument of `prepare`.
 
     reason : object[n_cases] of str, empty for a case that can start
 
@@ -265,7 +259,7 @@ def _fault(reference: str, error: BaseException) -> str:
         return f"{place}: {error}"
     if isinstance(error, FileNotFoundError):
         name = Path(error.filename or str(error).removesuffix(" not found.")).name
-        return f'{place}: there is no file "{name}"; a model\'s data lie next to it, named in Model(data=("{name}",))'
+        return f'{place}: there is no file "{name}"; a model\'s data lie next to it, named in data=("{name}",)'
     if words := wrong_record(error) or relative_import(error):
         return f"{place}: {words}"
     text = error.msg if isinstance(error, SyntaxError) else str(error)

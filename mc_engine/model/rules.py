@@ -7,9 +7,17 @@ from math import inf
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import ModelError
-from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Event, Extremum, Field, FixedStep, Named, Setting
+from mc_engine.model.fields import (
+    DIRECTIONS,
+    AdaptiveStep,
+    Event,
+    Extremum,
+    FixedStep,
+    Named,
+    Setting,
+    refuse_other_types,
+)
 from mc_engine.model.figures import refuse_false_figures
-from mc_engine.model.record_types import refuse_other_types
 from mc_engine.suggestions import hint
 from mc_engine.units import UNITS, unit_hint, unit_suffix
 
@@ -20,7 +28,6 @@ if TYPE_CHECKING:
 _CASE_COLUMNS = ("case_id", "status", "reason", "end_time_s")  # the engine's own, of cases and of histories
 _HISTORY_COLUMNS = ("case_id", "t_s")
 _ACTIONS = ("stop", "switch")
-_EXTREMA = ("max", "min", "last_above")
 _MOST_ATTEMPTS = 1e9  # of a case, as there are steps on a fixed grid: minutes of one core
 _METHODS = {"FixedStep": ("rk4",), "AdaptiveStep": ("dop853", "dp54")}
 
@@ -32,8 +39,8 @@ def refuse_contradictions(model: "Model") -> None:
     for record in (*named, *model.event_list, *model.extrema):
         refuse_other_types(record, f'{type(record).__name__} "{record.name}"')
     refuse_other_types(model.clock, "the clock")
-    for name in ("states", "quantities", "metrics"):
-        if not getattr(model, name):
+    for name, declared in (("states", model.states), ("outputs", model.quantities), ("metrics", model.metrics)):
+        if not declared:
             raise ModelError(f"`{name}` is empty; a model has one at least")
     if not hasattr(model.kernel_parameters, "_fields"):
         raise ModelError("kernel_parameters must be a named tuple, whose fields are the parameters' names without unit")
@@ -41,23 +48,24 @@ def refuse_contradictions(model: "Model") -> None:
     inputs: tuple[Named, ...] = (*model.parameters, *model.settings)
     for item in (*inputs, *model.states, *model.quantities, *model.metrics):
         _refuse_name(item)
-    outputs: tuple[Field, ...] = (*model.metrics, *(Field(f"end_{state.name}", "", "") for state in model.states))
+    columns = [*(item.name for item in (*inputs, *model.metrics)), *(f"end_{state.name}" for state in model.states)]
     _refuse_taken("column", [item.name for item in (*inputs, *model.metrics)], _CASE_COLUMNS)
-    _refuse_taken("quantity", [item.name for item in model.quantities], _HISTORY_COLUMNS)
+    _refuse_taken("output", [item.name for item in model.quantities], _HISTORY_COLUMNS)
     _refuse_twice("input", [item.symbol for item in inputs])
-    _refuse_twice("column", [item.name for item in (*inputs, *outputs)])
-    _refuse_twice("quantity", [item.name for item in model.quantities])
+    _refuse_twice("column", columns)
+    if model.phases:
+        _refuse_taken("column", columns, ("end_phase",))
+        _refuse_taken("output", [item.name for item in model.quantities], ("phase",))
+    _refuse_twice("output", [item.name for item in model.quantities])
     _refuse_twice("extremum", [item.name for item in model.extrema])
     _refuse_twice("event", [item.name for item in model.event_list])
     for setting in model.settings:
         _refuse_choice(setting)
     for extremum in model.extrema:
-        _refuse_extremum(extremum, [quantity.name for quantity in model.quantities])
+        _refuse_extremum(extremum, [output.name for output in model.quantities])
     if model.control is not None and model.start is None:
-        raise ModelError("the model has `control`, but no function `start`; write start(p, o), which gives the first "
-                         "memory")  # fmt: skip
-    if model.event_list and model.events is None:
-        raise ModelError("event_list names events, but the model has no function `events`")
+        raise ModelError("the model has `control`, but no `memory`; give memory=Memory, a named tuple with a default "
+                         "for each field, or write start(p, o), which gives the first one")  # fmt: skip
     for event in model.event_list:
         _refuse_event(event, model.switch is not None)
     refuse_false_figures(model)
@@ -126,12 +134,11 @@ def _refuse_word(what: str, name: str) -> None:
                          "begin with a letter, and leave out words such as lambda and class")  # fmt: skip
 
 
-def _refuse_extremum(extremum: Extremum, quantities: list[str]) -> None:
+def _refuse_extremum(extremum: Extremum, outputs: list[str]) -> None:
     name = f'extremum "{extremum.name}"'
     _refuse_word("extremum", extremum.name)
-    if extremum.quantity not in quantities:
-        raise ModelError(f'{name}: there is no quantity "{extremum.quantity}"{hint(extremum.quantity, quantities)}')
-    _refuse_unknown(f"{name} has the kind", extremum.kind, _EXTREMA)
+    if extremum.quantity not in outputs:
+        raise ModelError(f'{name}: there is no output "{extremum.quantity}"{hint(extremum.quantity, outputs)}')
 
 
 def _refuse_event(event: Event, switches: bool) -> None:

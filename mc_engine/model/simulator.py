@@ -4,6 +4,7 @@ A simulator declares its numbers as models do, and offers the same attributes to
 comes out.  `mc_engine.flight.simulated` flies it, each worker in a process of its own.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -18,6 +19,7 @@ from mc_engine.model.rules import refuse_false_simulator
 from mc_engine.model.sources import Sources
 
 if TYPE_CHECKING:
+    from mc_engine.model.fmu import Fmu
     from mc_engine.model.program import Program
 
 KEPT = ("none", "failed", "all")  # of the folders of cases
@@ -37,21 +39,22 @@ class Refuse(Exception):
 
 @dataclass(frozen=True)
 class Simulator:
-    """A system that flies by its own code: a Python function, or a program that a campaign file describes.
+    """A system that flies by its own code: a Python function, or a program or FMU that a campaign file describes.
 
     A file or module ends with `SIMULATOR = Simulator(...)`, and the campaign file names it as `simulator`.
 
     title : str, one line for reports
-    parameters : tuple of Parameter, inputs that may differ from case to case
-    metrics : tuple of Field, the results of a case
+    parameters : made by `inputs`: each Parameter may differ from case to case; each Setting is shared by all, and is
+        found in `settings`
+    metrics : made by `metrics`, the results of a case, all of which `fly` gives
     fly(inputs, case) : a mapping of the metrics, or (metrics, history).  `inputs` has the value of every parameter and
         setting by name, in declared units.  `case` has `id`; `seed`, a whole number of 64 bits; `rng`, a NumPy
         generator of this case; `folder`, its own and empty; `shared`, what `start` returned.  history is a DataFrame
         with t_s and the outputs.  `raise Refuse("why")` refuses the inputs.  With `batch`, inputs and metrics are
         arrays [n], `id` and `seed` too, `rng` a list of generators, and NaN in a metric fails its case alone.
         Without `fly`, the record declares what `mc-engine import` reads.
-    outputs : tuple of Field, what histories hold besides the time t_s
-    settings : tuple of Setting, inputs that are words, switches, dates or numbers that all cases share
+    outputs : made by `outputs`, what histories hold besides the time t_s
+    settings : tuple of Setting, those among `parameters`
     start() : called once in each worker, before its first case; loads a library or opens a licence
     batch : bool, many cases at a time
     name : str, by default that of the file
@@ -62,10 +65,10 @@ class Simulator:
     keep : str, whose folders are kept in the run directory: "none", "failed", "all"
     deterministic : bool, `replay` compares bits; otherwise numbers may differ by `tolerance`, a fraction of them
     tolerance : float, the fraction
-    figures : tuple of figure records, as of a `Model`
-    data : tuple of str, files that the simulator reads from its own folder, as of a `Model`
+    figures : tuple of figure records, as of a `model`
+    data : tuple of str, files that the simulator reads from its own folder, as of a `model`
     published : tuple of dict, published values to compare with
-    program : Program, set by the engine for the table [simulator] of a campaign file
+    program, fmu : set by the engine for the table [simulator] of a campaign file; one of them at most
     reference : str, set by `load_simulator`
     sources : Sources, set by `load_simulator`
 
@@ -73,8 +76,8 @@ class Simulator:
 
     >>> fall = Simulator(
     ...     title="A stone",
-    ...     parameters=(Parameter("height_m", "m", "height of the fall", 10.0, low=0.0),),
-    ...     metrics=(Field("fall_time_s", "s", "time to the ground"),),
+    ...     parameters=inputs(height_m=Parameter(10.0, "height of the fall", low=0.0)),
+    ...     metrics=metrics(fall_time_s="time to the ground"),
     ...     fly=lambda inputs, case: {"fall_time_s": (2.0 * inputs["height_m"] / 9.81) ** 0.5},
     ... )
     >>> fall.input("height_m").default
@@ -101,10 +104,16 @@ class Simulator:
     data: tuple[str, ...] = field(default=(), kw_only=True)
     published: tuple[Mapping[str, Any], ...] = field(default=(), compare=False, kw_only=True)
     program: "Program | None" = field(default=None, kw_only=True)  # of a campaign file's [simulator]
+    fmu: "Fmu | None" = field(default=None, kw_only=True)
     reference: str = field(default="", compare=False, kw_only=True)
     sources: Sources | None = field(default=None, compare=False, repr=False, kw_only=True)
 
     def __post_init__(self) -> None:
+        for name, what in (("parameters", "inputs"), ("metrics", "metrics"), ("outputs", "outputs")):
+            object.__setattr__(self, name, _declared(name, what, getattr(self, name)))
+        shared = tuple(item for item in self.parameters if isinstance(item, Setting))
+        object.__setattr__(self, "parameters", tuple(item for item in self.parameters if item not in shared))
+        object.__setattr__(self, "settings", (*self.settings, *shared))
         refuse_false_simulator(self)
         if self.keep not in KEPT:
             raise ModelError(f'the simulator has "{self.keep}" as its `keep`; it must be one of {", ".join(KEPT)}')
@@ -121,6 +130,16 @@ class Simulator:
         return self.outputs
 
     @property
+    def is_described(self) -> bool:
+        """Whether the table [simulator] of a campaign file describes what flies."""
+        return self.program is not None or self.fmu is not None
+
+    @property
+    def may_draw(self) -> bool:
+        """Whether it is handed a seed or a generator; an FMU is not."""
+        return self.fmu is None
+
+    @property
     def states(self) -> tuple[Field, ...]:
         """None: what a simulator integrates is its own affair."""
         return ()
@@ -128,18 +147,36 @@ class Simulator:
     def digest(self) -> str:
         """SHA-256 of the sources, in a fixed order; of a program, of all that it is made of."""
         assert self.sources is not None  # a loaded simulator has them
-        digest = sha256((self.sources.module.__doc__ or "").encode() if self.program else b"")
+        digest = sha256((self.sources.module.__doc__ or "").encode() if self.is_described else b"")
         for name, content in self.sources.named():
             digest.update(f"{name}\n{len(content)}\n".encode() + content)
         return digest.hexdigest()
 
+    def lost_metric(self, values: Mapping[str, float]) -> str:
+        """The first metric that is infinite or not a number, as a sentence; empty if there is none."""
+        for metric in self.metrics:
+            value = values[metric.name]
+            if math.isinf(value) or (math.isnan(value) and not metric.sometimes):
+                return f'"{metric.name}" is {"not a number" if math.isnan(value) else "infinite"}'
+        return ""
+
     def input(self, name: str) -> Parameter | Setting:
         """The parameter or setting called `name`; KeyError if the simulator has none."""
-        items: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
-        for item in items:
+        every: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
+        for item in every:
             if item.name == name:
                 return item
         raise KeyError(name)
+
+
+def _declared(name: str, what: str, made: Any) -> Any:
+    """The numbers that `inputs`, `metrics` or `outputs` declared; ModelError for anything else."""
+    for metric in getattr(made, "computed", ()):
+        raise ModelError(f'the metric "{metric}" is computed along the flight of a model; a simulator gives all of its '
+                         f'metrics itself, {metric}="meaning"')  # fmt: skip
+    if not isinstance(made, tuple) and not hasattr(made, "declared"):
+        raise ModelError(f"`{name}` is {made!r}; declare it, {name}={what}(...)")
+    return getattr(made, "declared", made)
 
 
 System = Model | Simulator

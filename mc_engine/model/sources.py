@@ -27,7 +27,7 @@ class Sources:
     """A model's module and the files that it was made of, as they were read.
 
     home : folder that the names of the files begin in.  folder : the model's own.  data : contents of the files that
-    Model(data=...) names and of those that curves are read from, as they were before the import.
+    model(..., data=...) names and of those that curves are read from, as they were before the import.
     """
 
     module: ModuleType
@@ -57,7 +57,7 @@ class Sources:
             raise ModelError(f"data: {fault}") from None
         for path, name in paths.items():
             if path not in self.data:
-                raise ModelError(f'data: write "{name}" into the call itself, as in Model(..., data=("{name}",))')
+                raise ModelError(f'data: write "{name}" into the call itself, as in model(..., data=("{name}",))')
         for path in _curves_beside(self.files):
             paths.setdefault(path, path.name)
         for path in read:
@@ -90,7 +90,7 @@ def sources_of_file(path: Path) -> Sources:
 
 
 def _data_in(folder: Path, sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
-    """Contents of the files that calls of `Model` in these sources name as their data, and of those that their curves
+    """Contents of the files that calls of `model` in these sources name as their data, and of those that their curves
     are read from; what cannot be read is left out."""
     contents = _curves_beside(sources)
     for name in sorted({name for source in sources.values() for name in data_names(source)}):

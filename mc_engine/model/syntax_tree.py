@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from functools import lru_cache
 
 _LOCK = threading.Lock()
-_RECORDS = ("model", "Model", "Simulator")  # which name data files
+_RECORDS = ("model", "Simulator")  # which name data files
 
 
 def parse(source: bytes | str) -> ast.Module:

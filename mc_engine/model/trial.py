@@ -16,19 +16,26 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
+from mc_engine.lanes.composed import Alternatives, value_of
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.number import calling
 from mc_engine.lanes.philox import Draws, noise_key
-from mc_engine.model.faults import MORE, fault_of_trial, source_place
-from mc_engine.model.origins import sentence
+from mc_engine.model.faults import MORE, fault_of_trial, origin_sentence, source_place
+from mc_engine.model.phases import PHASE
 from mc_engine.model.reading import is_shipped, place_of, source_faults
 from mc_engine.model.record import Model, NoMemory
 from mc_engine.suggestions import listed
 
 FEW = 3  # cases on arrays
 _MOST_ROUNDS = 1_000_000  # of the loops of one call, which a flight makes in every step
-# what the fields of each function's result are declared by
-_FIELDS = {"initial": "states", "rhs": "states", "observe": "quantities", "events": "event_list", "evaluate": "metrics"}
+# what the fields of each function's result are declared by: in the record, and in the model's file
+_FIELDS = {
+    "initial": ("states", "states"),
+    "observe": ("quantities", "outputs"),
+    "events": ("event_list", "events"),
+    "evaluate": ("metrics", "metrics"),
+}
+_OF_MEMORY = ("start", "control", "switch")  # what gives the discrete state
 _MANY = 128  # values of everything that `evaluate` is handed
 _DECADES = (-9.0, 15.0)  # powers of ten that they reach over: from nanometres to light years, in SI
 _ENGINE = str(Path(__file__).parents[1])
@@ -79,28 +86,44 @@ def _run_through(model: Model, p: Any, o: Any, seed: int, finite: bool) -> None:
     t = np.zeros(FEW)
     s = _call(model, "initial", p, o)
     m = NoMemory(0.0) if model.start is None else _call(model, "start", p, o)
-    if model.control is not None:
-        sampled = _call(model, "control", t, s, m, p, o, Draws(noise_key(seed), 0.0, 0.0))
-        _same_record(model.control, "control", sampled, "start", m)
-        m = sampled
     if finite:
         _refuse_infinite("initial", model.initial, (p, o), s, "the state")
-    with suppress(_ByZero):
-        derivative = _call(model, "rhs", t, s, m, p, o)
-        _same_record(model.rhs, "rhs", derivative, "initial", s)
-        if finite:
-            _refuse_infinite("rhs", model.rhs, (t, s, m, p, o), derivative, "the derivative")
-    with suppress(_ByZero):
-        _try_events(model, t, s, m, p, o)
+    for number in range(1, len(model.phases)):
+        _try_phase(model, t, s, m._replace(**{PHASE: number + t}), p, o, seed, False)
+    m = _try_phase(model, t, s, m, p, o, seed, finite)
     seen = _call(model, "observe", t, s, m, p, o)
     best = _looks(model, seen)
     _call(model, "evaluate", t, s, m, p, o, best, type(best)(*(np.zeros(FEW) for _ in best)))
 
 
+def _try_phase(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any, seed: int, finite: bool) -> Any:
+    """The discrete state after the first sample; the functions of a model, or of the phase that it is in."""
+    if model.control is not None:
+        sampled = _call(model, "control", t, s, m, p, o, Draws(noise_key(seed), 0.0, 0.0))
+        _same_record(model.control, "control", sampled, "start", m)
+        m = sampled
+    with suppress(_ByZero):
+        derivative = _call(model, "rhs", t, s, m, p, o)
+        rhs = _of_phase(model.rhs, (t, s, m, p, o))
+        _same_record(rhs, "rhs", derivative, "initial", s)
+        if finite:
+            _refuse_infinite("rhs", rhs, (t, s, m, p, o), derivative, "the derivative")
+    with suppress(_ByZero):
+        _try_events(model, t, s, m, p, o)
+    return m
+
+
+def _of_phase(function: Any, arguments: tuple[Any, ...]) -> Any:
+    """Of the functions of phases, that of the phase which all these cases are in; any other function itself."""
+    if not isinstance(function, Alternatives):
+        return function
+    return function.parts[int(np.ravel(value_of(function.number, arguments, ()))[0])]
+
+
 def _looks(model: Model, seen: Any) -> Any:
-    """What `evaluate` is handed as `best` where the quantities stay what they are.  seen : result of `observe`."""
+    """What `evaluate` is handed as `best` where the outputs stay what they are.  seen : result of `observe`."""
     best = namedtuple("Best", [extremum.name for extremum in model.extrema] or ["unused"])  # type: ignore[misc]
-    names = [quantity.name for quantity in model.quantities]
+    names = [output.name for output in model.quantities]
     return best(*[seen[names.index(extremum.quantity)] for extremum in model.extrema] or [np.zeros(FEW)])
 
 
@@ -142,45 +165,64 @@ def _try_events(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any) -> None:
     values = _call(model, "events", t, s, m, p, o)
     if model.switch is None:
         return
-    arguments = (t, s, m, p, o, type(values)(*(np.zeros(FEW) for _ in values)))
+    arguments = (t, s, m, p, o, type(values)(*(np.ones(FEW) for _ in values)))
+    _refuse_short(model.switch, "switch", arguments)
     result = _run(model.switch, arguments)
-    if not isinstance(result, tuple) or len(result) != 2 or hasattr(result, "_fields"):
-        raise _breach(model.switch, "switch", _shape_of(result), "state and memory, (s, m)")
+    _refuse_other_pair(model.switch, "switch", result)
     for given, wanted, source in zip(result, (s, m), ("initial", "start"), strict=True):
         _same_record(model.switch, "switch", given, source, wanted)
         _refuse_other_than_numbers(model.switch, "switch", given)
 
 
+def _refuse_other_pair(function: Callable[..., Any], name: str, given: Any) -> None:
+    if not isinstance(given, tuple) or len(given) != 2 or hasattr(given, "_fields"):
+        raise _breach(function, name, _shape_of(given), "state and memory, (s, m)")
+
+
 def _same_record(function: Callable[..., Any], name: str, given: Any, source: str, wanted: Any) -> None:
-    if getattr(given, "_fields", None) != wanted._fields:
+    if getattr(given, "_fields", None) != getattr(wanted, "_fields", None):
         raise _breach(function, name, _shape_of(given), f"the named tuple of `{source}`, {_shape_of(wanted)}")
+    for field, own in zip(given, wanted, strict=True) if hasattr(wanted, "_fields") else ():
+        _same_record(function, name, field, source, own)  # a discrete state may hold records
 
 
 def _call(model: Model, name: str, *arguments: Any) -> Any:
     """The result of one function of the model, a named tuple with a field for each that the model declares."""
-    function = getattr(model, name)
+    function = _of_phase(getattr(model, name), arguments)
     _refuse_short(function, name, arguments)
     result = _run(function, arguments)
     if not hasattr(result, "_fields"):
         raise _breach(function, name, "nothing" if result is None else _shape_of(result), "a named tuple")
     if name in _FIELDS:
-        records = getattr(model, _FIELDS[name])
-        names = [(record.name, getattr(record, "symbol", record.name)) for record in records]
-        _compare(function, name, result, _FIELDS[name], names)
+        attribute, declared = _FIELDS[name]
+        known = getattr(model, attribute)
+        wanted = [item.symbol if name in ("initial", "observe") else item.name for item in known]
+        if [*result._fields] != wanted:
+            gives = f"what `{declared}` declares, in its order: {listed(wanted)}"
+            raise _breach(function, name, listed(result._fields), gives)
     _refuse_other_than_numbers(function, name, result)
     return result
 
 
 def _refuse_short(function: Any, name: str, arguments: tuple[Any, ...]) -> None:
     """Breach where a part of a composed function gives no record with the fields that are taken from it."""
+    results: list[Any] = []
     for i, (part, chosen) in enumerate(getattr(function, "calls", ())):
-        taken = [field for source, index, field in function.picks if (source, index) == ("result", i) and field]
-        if not taken:
-            continue
-        given = _run(part, tuple(arguments[index] for index in chosen))
-        if not set(taken) <= set(getattr(given, "_fields", ())):
+        handed = tuple(value_of(pick, arguments, results) for pick in chosen)
+        part = _of_phase(part, handed)
+        _refuse_short(part, name, handed)
+        given = _run(part, handed)
+        results.append(given)
+        picks = [*function.picks, *(pick for _, later in function.calls for pick in later)]
+        taken = [field for source, index, field in picks if (source, index) == ("result", i) and field != ""]
+        named = [field for field in taken if isinstance(field, str)]
+        if name == "events" and not isinstance(given, tuple):
+            continue  # a number, which several events may share
+        if not set(named) <= set(getattr(given, "_fields", ())):
             gives = "nothing" if given is None else _shape_of(given)
-            raise _breach(part, name, gives, f"a record with {listed(taken)}")
+            raise _breach(part, name, gives, f"a record with {listed(named)}")
+        if taken and not named and getattr(part, "record", None) is not tuple:  # what the model itself gives
+            _refuse_other_pair(part, name, given)
 
 
 def _run(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
@@ -254,37 +296,34 @@ def _first_case(value: Any) -> Any:
     return float(value[0]) if np.ndim(value) == 1 else value
 
 
-def _compare(function: Callable[..., Any], name: str, result: Any, declared: str, named: list[tuple[str, str]]) -> None:
-    """Breach if the result has not one field for each declared one, in their order.
-
-    named : the declared names with and without their units; fields may have names of their own, but not one another's,
-    and those of events are the declared ones.
-    """
-    fields, symbols = list(result._fields), [symbol for _, symbol in named]
-    known = {*symbols}.union(full for full, _ in named if {full for full, _ in named} == {*fields})
-    pairs = zip(fields, named, strict=False)
-    in_place = all(field in pair or (field not in known and name != "events") for field, pair in pairs)
-    if len(fields) != len(named) or not in_place:
-        raise _breach(function, name, listed(fields), f"what `{declared}` declares, in its order: {listed(symbols)}")
-
-
 def _breach(function: Callable[..., Any], name: str, gives: str, wanted: str) -> Breach:
     return Breach(f"{place_of(function)}: `{name}` gives {gives}; it must give {wanted}")
 
 
 def _refuse_other_than_numbers(function: Callable[..., Any], name: str, result: Any) -> None:
-    """Breach unless every field is one real number, or one for each case."""
+    """Breach unless every field is one real number, or one for each case; a discrete state may hold records of them."""
     for field, value in zip(result._fields, result, strict=True):
+        if hasattr(value, "_fields") and name in _OF_MEMORY:
+            _refuse_other_than_numbers(function, name, value)
+            continue
+        part = _part_giving(function, field)
         try:
             array = np.asarray(value)
         except ValueError:
             array = np.asarray(None)
         if array.dtype == bool:
             wanted = "one that crosses zero" if name == "events" else "where(condition, 1.0, 0.0)"
-            raise _breach(function, name, f'a truth value for "{field}"', f"a number, such as {wanted}")
+            raise _breach(part, name, f'a truth value for "{field}"', f"a number, such as {wanted}")
         if array.dtype.kind not in "iuf" or array.shape not in ((), (FEW,)):
             what = f"{value!r}" if array.ndim == 0 and len(repr(value)) < 40 else type(value).__name__
-            raise _breach(function, name, f'{what} for "{field}"', "one number")
+            raise _breach(part, name, f'{what} for "{field}"', "one number")
+
+
+def _part_giving(function: Any, field: str) -> Callable[..., Any]:
+    """The function that gives a field of the result of another, which may be composed of several."""
+    fields = getattr(getattr(function, "record", None), "_fields", ())
+    source, index, _ = function.picks[fields.index(field)] if field in fields else ("", 0, "")
+    return _part_giving(function.calls[index][0], field) if source == "result" else function
 
 
 def _refuse_other_tables(model: Model, o: Any) -> None:
@@ -300,6 +339,7 @@ def _refuse_infinite(
         if not np.isfinite(value).all():
             bad = np.ravel(value)[~np.isfinite(np.ravel(value))][0]
             lost = getattr(calling(name, function, *(_first_case(argument) for argument in arguments)), field)
-            first = sentence(lost.origin) if getattr(lost, "origin", None) else f"{place_of(function)}: out of range"
+            origin = getattr(lost, "origin", None)
+            first = origin_sentence(origin) if origin else f"{place_of(function)}: out of range"
             raise Breach(f'{first}; so `{name}` gives {bad:g} for {what} of "{field}" at the start of the nominal '
                          "case; keep square roots, logarithms and divisions in range")  # fmt: skip

@@ -10,7 +10,6 @@ from mc_engine.campaign.sensitivity_design import companion
 from mc_engine.campaign.upstream import COMPANION
 from mc_engine.durable_file import make_way, write_inside
 from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError
-from mc_engine.flight.case_rows import FOLDER
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.model.record import Model, load_model, sources_of
 from mc_engine.model.simulator import Simulator, load_simulator
@@ -19,11 +18,10 @@ from mc_engine.sampling.designs import EXTENSIBLE
 from mc_engine.sampling.streams import SEED_CONTRACT
 from mc_engine.store.derived_files import FIGURES, REPLAYS
 from mc_engine.store.parts import CASE_COLUMNS, PART_FOLDERS
-from mc_engine.store.run_files import SENSITIVITY
-from mc_engine.store.run_folder import readable
+from mc_engine.store.run_files import SENSITIVITY, SIMULATOR, readable
 from mc_engine.store.store import Store
 
-_OWN = (*PART_FOLDERS, SENSITIVITY, FIGURES, REPLAYS, FOLDER)  # folders of a run directory
+_OWN = (*PART_FOLDERS, SENSITIVITY, FIGURES, REPLAYS, SIMULATOR)  # folders of a run directory
 
 
 def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
@@ -87,7 +85,7 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
 def _files_of_model(campaign: Campaign) -> dict[str, bytes]:
     """Sources and data of a model that is a file, as they were read; empty for an installed model."""
     model = campaign.model
-    if not (campaign.model_reference.endswith(".py") or (isinstance(model, Simulator) and model.program is not None)):
+    if not (campaign.model_reference.endswith(".py") or (isinstance(model, Simulator) and model.is_described)):
         return {}
     sources = sources_of(model) if isinstance(model, Model) else model.sources
     assert sources is not None  # a loaded simulator has them
@@ -98,7 +96,7 @@ def _files_of_model(campaign: Campaign) -> dict[str, bytes]:
 def refuse_undeclared_data(campaign: Campaign) -> None:
     """ModelError if the model does not work with the copies of its files that a run keeps.
 
-    The cause is a data file that `Model(data=...)` does not name.  A file outside the model's folder is not detected.
+    The cause is a data file that is not named in `data`.  A file outside the model's folder is not detected.
     """
     if not (files := _files_of_model(campaign)):
         return
@@ -111,14 +109,14 @@ def refuse_undeclared_data(campaign: Campaign) -> None:
             _start_from(campaign, folder)
         except EngineError as error:
             why = str(error).replace(f"{folder}{os.sep}", "")
-            kept = "a run keeps copies only of the model's sources and of the files in Model(data=...)"
+            kept = "a run keeps copies only of the model's sources and of the files in model(..., data=...)"
             raise ModelError(f"{why}; {kept}") from None
 
 
 def _start_from(campaign: Campaign, folder: Path) -> None:
     """Load the model or simulator from `folder`; of a model, compute what its nominal case begins with."""
     if isinstance(campaign.model, Simulator):
-        if campaign.model.program is None:
+        if not campaign.model.is_described:
             load_simulator(campaign.model_reference, folder)
         return
     from mc_engine.flight.repeatability import nominal_inputs  # which loads the compiler

@@ -94,7 +94,7 @@ def _flown_history(campaign: Campaign, case_id: int, inputs: dict[str, Any], noi
 
 
 def history_frame(case_id: int, history: dict[str, np.ndarray]) -> pd.DataFrame:
-    """One history as a table: case_id, t_s and the quantities."""
+    """One history as a table: case_id, t_s and the outputs."""
     frame = pd.DataFrame(history)
     frame.insert(0, "case_id", np.full(len(frame), case_id, dtype=np.int64))
     return frame

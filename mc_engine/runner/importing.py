@@ -7,6 +7,7 @@ any `status` and `reason`.  `mc-engine sample` gives the inputs; those in the ta
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.inputs import number
@@ -16,6 +17,7 @@ from mc_engine.errors import CampaignError, Problem
 from mc_engine.flight.chunks import LARGEST_CHUNK, chunks_of
 from mc_engine.flight.flyer import Columns
 from mc_engine.model.files import FileFault
+from mc_engine.numbers_in_text import is_real
 from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.status import NO_RESULT, NOT_FINITE, OK, STATUS_NAME
@@ -75,6 +77,7 @@ def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Prob
         problems.append(Problem("case_id", f"{which}; the campaign has the cases 0 to {campaign.cases - 1}"))
         return {}, {}
     drawn = case_table(campaign, np.arange(campaign.cases))
+    _refuse_unknown_words(table, problems)
     for name in inputs:
         _compare(name, table[name][order], drawn[name], file, problems)
     rows = {name: values[name][order] for name in metrics}
@@ -83,13 +86,31 @@ def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Prob
 
 def _numbers_or_nan(file: Path, name: str, cells: np.ndarray) -> np.ndarray:
     """float64[n]; an empty cell is not a number, as a metric of a failed case.  FileFault for a word."""
-    values = np.full(len(cells), np.nan)
-    for row, cell in enumerate(cells.tolist()):
-        try:
-            values[row] = np.nan if cell in ("", None) else float(cell)
-        except (TypeError, ValueError):
-            raise FileFault(f'"{file.name}", row {row + 1}, column "{name}": {cell!r:.60} is not a number') from None
-    return values
+    if cells.dtype.kind in "fiu":
+        return cells.astype(np.float64)
+    import pyarrow as pa
+
+    empty, texts = pd.isna(cells) | (cells == ""), cells.astype(str)
+    try:
+        return np.asarray(pa.array(texts, pa.string(), mask=empty).cast(pa.float64()).to_numpy(zero_copy_only=False))
+    except pa.ArrowInvalid:
+        row = next(row for row, text in enumerate(texts) if not (empty[row] or _is_number(text)))
+    raise FileFault(f'"{file.name}", row {row + 1}, column "{name}": {str(cells[row])!r:.60} is not a number')
+
+
+def _is_number(text: str) -> bool:
+    return is_real(text) or text.lower().lstrip("+-") in ("nan", "inf", "infinity")
+
+
+def _refuse_unknown_words(table: Columns, problems: list[Problem]) -> None:
+    """Note the first status that no case can have."""
+    if "status" in table:
+        cells, known = table["status"], [*STATUS_NAME.values()]
+        unknown = np.flatnonzero(~(pd.isna(cells) | np.isin(cells.astype(str), ["", *known])))
+        if unknown.size:
+            word = str(cells[unknown[0]])
+            message = f'row {unknown[0] + 1}: "{word:.60}" is none of {", ".join(known)}{hint(word, known)}'
+            problems.append(Problem("status", message))
 
 
 def _compare(name: str, given: np.ndarray, drawn: np.ndarray, file: Path, problems: list[Problem]) -> None:
@@ -113,7 +134,9 @@ def _compare(name: str, given: np.ndarray, drawn: np.ndarray, file: Path, proble
 def _judged(campaign: Campaign, table: Columns, order: np.ndarray, rows: Columns) -> Columns:
     """Status and reason of each case, and its metrics, which a failed case has not."""
     words = {name: np.full(len(order), "", dtype=object) for name in ("status", "reason")}
-    words |= {name: table[name][order].astype(object) for name in words if name in table}
+    for name in words.keys() & table.keys():
+        cells = table[name][order]
+        words[name] = np.where(pd.isna(cells), "", cells.astype(str)).astype(object)
     status = np.where(words["status"] == "", STATUS_NAME[OK], words["status"]).astype(object)
     for metric in campaign.model.metrics:
         if not metric.sometimes:

@@ -113,7 +113,7 @@ def _description(item: Named) -> dict[str, str]:
 
 
 def _ranges(model: System) -> dict[str, list[float | None]]:
-    """Bounds of the physical range of each metric and quantity that has one; None for an open end."""
+    """Bounds of the physical range of each metric and output that has one; None for an open end."""
     fields = [*model.quantities, *model.metrics]
     ends = {field.name: [end if isfinite(end) else None for end in (field.low, field.high)] for field in fields}
     return {name: pair for name, pair in ends.items() if pair != [None, None]}

@@ -29,8 +29,7 @@ from mc_engine.runner.shards import Shard, merge_shards
 from mc_engine.sampling.designs import block_problem, extension_problem
 from mc_engine.store.opening import open_store
 from mc_engine.store.repair import mend_journal
-from mc_engine.store.run_files import JOURNAL
-from mc_engine.store.run_folder import default_folder
+from mc_engine.store.run_files import JOURNAL, default_folder
 from mc_engine.store.store import Store, create_store
 from mc_engine.store.urls import is_url
 
@@ -43,7 +42,7 @@ class Replay:
 
     equal : bool, every stored number has the same bits
     differences : tuple of str, a sentence for each number that has not
-    history : DataFrame, the flight: case_id, t_s and the model's quantities
+    history : DataFrame, the flight: case_id, t_s and the model's outputs
     row : dict, the stored line of the case table, by column name
     lost : str, file, line and values of what made the state or a metric not finite; empty where all are finite
 

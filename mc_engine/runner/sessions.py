@@ -15,7 +15,6 @@ from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
 from mc_engine.campaign.sensitivity_design import companion, sensitivity_record
 from mc_engine.durable_file import remove_file
 from mc_engine.errors import DiskError, RunInterrupted, StoreError, WorkersLost
-from mc_engine.flight.case_rows import remove_logs
 from mc_engine.flight.chunks import Task, chunk_size, fly_nominal, rerun_tasks
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import stop_signal
@@ -29,6 +28,7 @@ from mc_engine.runner.pools import pool_of
 from mc_engine.runner.progress import ProgressCall
 from mc_engine.shell_words import shell_word
 from mc_engine.status import OK, STATUS_NAME
+from mc_engine.store.case_rows import remove_logs
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import Written, problem_of
 from mc_engine.store.repair import mend_journal, withdraw_damaged

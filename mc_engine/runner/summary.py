@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import StoreError
 from mc_engine.section import ReportSection
+from mc_engine.shell_words import shell_word
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME
 from mc_engine.store.parts import CASE_COLUMNS, Column, Part, read_part
 from mc_engine.store.store import Store
@@ -33,6 +34,21 @@ def first_not_finite(store: Store) -> int | None:
             lost = table["status"].to_numpy(zero_copy_only=False) == STATUS_NAME[NOT_FINITE]
             return int(table["case_id"].to_numpy()[lost][0])
     return None
+
+
+def is_compiled(store: Store) -> bool:
+    """Whether a compiled model flew the run: its table has the state at the end, which a simulator does not tell."""
+    return any(column.role == "state" for column in store.columns) and not store.manifest.get("imported")
+
+
+def not_finite_line(store: Store) -> str:
+    """Where to look for the cause of the first case that ended not-finite; empty if there is none."""
+    case = first_not_finite(store)
+    if case is None:
+        return ""
+    if is_compiled(store):
+        return f"`mc-engine replay {shell_word(store.path)} {case}` names the line of the model"
+    return f"case {case}: {store.row(case)['reason']}"
 
 
 def case_line(store: Store) -> str:

@@ -1,4 +1,4 @@
-"""Tables of saved time histories: case_id, t_s, and the model's quantities with their units."""
+"""Tables of saved time histories: case_id, t_s, the model's outputs with units, and the phase; which rows they hold."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,13 +15,95 @@ from mc_engine.store.parts import CASE_COLUMNS, Column, Part
 if TYPE_CHECKING:
     import pandas as pd
 
+_EVEN = 0.2  # share of the rows that lie evenly in time, so that no quiet stretch is left without
+_EDGE = 1e-2  # of the range of a quantity: a smaller jump is no edge
+_MOST_EDGES = 2  # times as many as the rows that are asked for
+
+
+def rows_to_keep(table: np.ndarray, rows: int) -> np.ndarray:
+    """Indices of the rows of a recorded flight that its history holds, ascending: int64[n_kept].
+
+    table : float64[n, 1 + n_quantities], the time, not falling, and the quantities.  Rows of one time are one instant:
+        two before and after a sample of the control, three or more before and after an event.
+    rows : how many are kept.  The first and the last are, both sides of every event, and both sides of the samples at
+        which a quantity jumps by more than a hundredth of its range: up to twice `rows` of them, the largest.  The rest
+        lie where straight lines between them err most, a fifth evenly in time; they are half of `rows` at least, on top
+        of the others where events and samples are so many.
+
+    A row that repeats the one before counts as none.  All rows are kept where there are no more.
+    The density of the rest is that of C. de Boor, A Practical Guide to Splines, 1978, chapter XII: the square root of
+    the second derivative, here of the quantity that bends most in units of its range.
+    """
+    equal = (table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1]))
+    left = np.flatnonzero(np.append(True, ~equal.all(axis=1)))
+    if left.size <= rows:
+        return left
+    t, values = table[left, 0], _in_ranges(table[left, 1:])
+    always = _events_and_edges(table[:, 0], t, values, rows)
+    span = np.diff(t, prepend=t[0]) / max(t[-1] - t[0], np.finfo(float).tiny)
+    bend = np.sqrt(_chord_errors(t, values))
+    density = (1.0 - _EVEN) * bend / max(bend.cumsum()[-1], np.finfo(float).tiny) + _EVEN * span
+    density[always] = np.inf
+    shares = _shares(density, max(rows, int(always.sum()) + rows // 2))
+    places = np.floor(shares.cumsum() + 0.5)
+    return left[always | (np.diff(places, prepend=0.0) > 0.0)]
+
+
+def _in_ranges(values: np.ndarray) -> np.ndarray:
+    """Quantities in units of their ranges; 0 where one is not finite or constant."""
+    finite = np.where(np.isfinite(values), values, np.nan)
+    held = np.where(np.isnan(finite).all(axis=0), 0.0, finite)
+    low, high = np.nanmin(held, axis=0), np.nanmax(held, axis=0)
+    return np.nan_to_num((held - low) / np.where(high > low, high - low, 1.0))
+
+
+def _events_and_edges(recorded: np.ndarray, t: np.ndarray, values: np.ndarray, rows: int) -> np.ndarray:
+    """Mask of the rows that are kept in any case.  recorded : float64[n], the times with those of repeated rows."""
+    instants, counts = np.unique(recorded, return_counts=True)
+    is_event = (counts > 2)[np.searchsorted(instants, t)]
+    jumps = np.where(np.diff(t) == 0.0, np.abs(np.diff(values, axis=0)).max(axis=1, initial=0.0), 0.0)
+    edges = np.flatnonzero(jumps > _EDGE)
+    edges = edges[np.argsort(-jumps[edges], kind="stable")[: _MOST_EDGES * rows]]
+    always = is_event
+    always[edges] = always[edges + 1] = always[0] = always[-1] = True
+    return always
+
+
+def _chord_errors(t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Of each row, how far the straight line between its neighbours errs, in the quantity where it errs most."""
+    errors = np.zeros(t.size)
+    width = t[2:] - t[:-2]
+    share = ((t[1:-1] - t[:-2]) / np.where(width > 0.0, width, 1.0))[:, None]
+    chord = values[:-2] + share * (values[2:] - values[:-2])
+    errors[1:-1] = np.abs(values[1:-1] - chord).max(axis=1, initial=0.0)
+    return errors
+
+
+def _shares(density: np.ndarray, total: int) -> np.ndarray:
+    """min(1, c density), with the c that makes the sum `total`; all where there are no more."""
+    low, high = 0.0, 1.0
+    while np.minimum(1.0, high * density).cumsum()[-1] < total and high < 1e30:
+        high *= 2.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if np.minimum(1.0, middle * density).cumsum()[-1] < total:
+            low = middle
+        else:
+            high = middle
+    return np.minimum(1.0, high * density)
+
+
+PHASE_COLUMN = "phase"  # of histories of a model with phases: its name, in words
+
 
 def history_columns(names: Sequence[str], quantities: Sequence[Mapping[str, str]]) -> tuple[Column, ...]:
-    """Columns of a history table with these names: case_id and t_s first, units from the model's quantities."""
+    """Columns of a history table with these names: case_id and t_s first, units from the model's outputs."""
     known = {quantity["name"]: quantity for quantity in quantities}
     columns = [CASE_COLUMNS[0], Column("t_s", "s", "time", "time since the start of the case")]
     for name in names:
-        if name not in ("case_id", "t_s"):
+        if name == PHASE_COLUMN and name not in known:
+            columns.append(Column(PHASE_COLUMN, "", "phase", "phase of the flight", "word"))
+        elif name not in ("case_id", "t_s"):
             quantity = known.get(name, {})
             columns.append(Column(name, quantity.get("unit", ""), "quantity", quantity.get("description", "")))
     return tuple(columns)
@@ -46,8 +128,8 @@ def read_histories(run: Path, part: Part, quantities: Sequence[Mapping[str, str]
 
 
 def history_problem(table: pa.Table, quantities: Sequence[Mapping[str, str]]) -> str:
-    """What is wrong with the columns of a table of histories; empty if they are case_id, t_s and quantities."""
-    names, known = table.column_names, {"case_id", "t_s", *(quantity["name"] for quantity in quantities)}
+    """What is wrong with the columns of a table of histories; empty if they are case_id, t_s, outputs, phase."""
+    names, known = table.column_names, {"case_id", "t_s", PHASE_COLUMN, *(quantity["name"] for quantity in quantities)}
     unknown = {*names} - known if quantities else {}
     expected = parts.arrow_schema(history_columns(names, quantities))
     if unknown or not {"case_id", "t_s"} <= {*names} or not table.schema.equals(expected, check_metadata=True):

@@ -69,7 +69,7 @@ class _Shard(Record):
 
 
 class _Described(_Named):
-    """An input, parameter, setting or history quantity."""
+    """An input, parameter, setting or output along the flight."""
 
     unit: str = ""
     description: str = ""

@@ -1,5 +1,8 @@
-"""Names of the files in directories of results, and the kind of a directory by these names.  No file is read."""
+"""Directories of results: names of their files, their kind by these names, and where they lie.  No file is read."""
 
+import os
+import re
+from datetime import UTC, datetime
 from pathlib import Path
 
 from mc_engine.durable_file import temporary_name
@@ -8,8 +11,10 @@ JOURNAL, MANIFEST = "journal.jsonl", "manifest.json"
 CAMPAIGN = "campaign.toml"
 NOMINAL = "nominal.parquet"
 SENSITIVITY = "sensitivity"  # the run directory, inside a run, of the flights for contributions
+SIMULATOR = "simulator"  # the folder, inside a run, of what cases of a simulator left behind
 CUT_SHORT = {temporary_name(name) for name in (CAMPAIGN, MANIFEST, JOURNAL, NOMINAL)}  # of a creation cut short
 NO_FOLDER = "the folder is gone"
+NO_TEXT = "lies where a name is no text in UTF-8; rename the folder or file"
 RUN, TUNING, RARE_EVENT = "run", "tuning", "rare event"
 STEMS = {TUNING: "tuning", RARE_EVENT: "rare"}
 
@@ -29,3 +34,21 @@ def kind_of(path: str | Path) -> str | None:
 def is_run_directory(path: str | Path) -> bool:
     """True if `path` is or was a run directory, whole or damaged."""
     return kind_of(path) == RUN
+
+
+def readable(name: str) -> str:
+    """The name of a file or folder as valid Unicode, with a replacement character for bytes that are not UTF-8."""
+    return os.fsencode(name).decode("utf-8", "replace")
+
+
+def default_folder(campaign_name: str) -> Path:
+    """`runs/<campaign>-<UTC time>`, a folder that does not exist."""
+    stem = re.sub(r"[^\w.-]+", "-", campaign_name)
+    path = Path("runs") / f"{stem}-{datetime.now(UTC):%Y%m%dT%H%M%SZ}"
+    return path if not path.exists() else path.with_name(f"{path.name}-{datetime.now(UTC):%f}")
+
+
+def runs_in(folder: Path) -> list[Path]:
+    """The run directories in `folder`, in the order in which they were begun."""
+    manifests = folder.glob("*/manifest.json") if folder.is_dir() else ()
+    return [file.parent for file in sorted(manifests, key=lambda file: (file.stat().st_mtime_ns, file))]

@@ -239,7 +239,7 @@ class Store:
         return parts.read_part(self.path, receipt, self.columns).to_pylist()[0] if receipt else {}
 
     def histories(self) -> pd.DataFrame:
-        """The saved time histories: case_id, t_s and the quantities; no rows if none were written."""
+        """The saved time histories: case_id, t_s and the outputs; no rows if none were written."""
         quantities, receipt = self.manifest.get("quantities", []), self.history_part
         tables = [read_histories(self.path, receipt, quantities)] if receipt else []
         names = tables[0].column_names if tables else [quantity["name"] for quantity in quantities]
@@ -346,7 +346,7 @@ class Store:
             self._record("nominal", asdict(parts.write_table(self.path, NOMINAL, table, first=-1)))
 
     def write_histories(self, table: "pd.DataFrame | Mapping[str, Any]") -> None:
-        """Commit time histories (case_id, t_s and quantities, one row per sample) in place of earlier ones."""
+        """Commit time histories (case_id, t_s and outputs, one row per sample) in place of earlier ones."""
         arrow = history_table(table, self.manifest.get("quantities", []), self.path / "history")
         with self.lock():
             before = self.history_part

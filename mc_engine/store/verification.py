@@ -29,6 +29,7 @@ from mc_engine.store.run_files import (
     NOMINAL,
     RUN,
     SENSITIVITY,
+    SIMULATOR,
     kind_of,
 )
 from mc_engine.store.writer_lock import LOCK_NAME, holder, is_left_by_dead
@@ -193,10 +194,12 @@ def _is_folder(path: Path) -> bool:
 
 
 def _obstacles(run: Path) -> Iterator[Damage]:
-    """Folders beside manifest and journal that keep every writer from its work."""
+    """What lies beside manifest and journal and keeps every writer from its work."""
     for name in (LOCK_NAME, *CUT_SHORT):
         if _is_folder(run / name):
             yield Damage(f"{name}: is a folder", IN_THE_WAY)
+    if os.path.lexists(run / SIMULATOR) and not _is_folder(run / SIMULATOR):
+        yield Damage(f"{SIMULATOR}: is no folder of this run's own", IN_THE_WAY)
 
 
 def _present(run: Path) -> Iterator[str]:

@@ -19,9 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from mc_engine.errors import StoreError
+from mc_engine.errors import ModelError, StoreError
+from mc_engine.model.simulator import Simulator
 from mc_engine.runner.summary import case_line, judgement, summaries, verdict_line
 from mc_engine.shell_words import shell_word
+from mc_engine.status import REFUSED, STATUS_NAME
 from mc_engine.store.opening import open_store
 from mc_engine.store.store import Store
 from mc_engine.studies.replay_files import history_figure
@@ -178,6 +180,8 @@ class Case:
     'ok'
     >>> case.inputs.round(3).to_dict()
     {'magnitude_error_pct': -0.106, 'pitch_error_deg': 0.647}
+    >>> case.trace()[["t_s", "altitude_km", "rhs.g"]].iloc[1].round(9).to_dict()  # every number that physics names
+    {'t_s': 10.0, 'altitude_km': 300.022901603, 'rhs.g': -1.338e-06}
     """
 
     store: Store
@@ -219,7 +223,7 @@ class Case:
         return pd.Series({name: self.row[name] for name in names}, name=self.name, dtype=object).infer_objects()
 
     def history(self) -> pd.DataFrame:
-        """Its flight: case_id, t_s and the quantities.  Read if the run kept it, else flown again.
+        """Its flight: case_id, t_s and the outputs.  Read if the run kept it, else flown again.
 
         StoreError if what is flown again is not the case of the run, bit for bit.
         """
@@ -234,6 +238,48 @@ class Case:
     def _kept_history(self) -> pd.DataFrame:
         table = self.store.histories()
         return table[table["case_id"] == self.case_id].reset_index(drop=True)
+
+    def trace(self, seconds: float = 600.0) -> pd.DataFrame:
+        """Every intermediate number of its flight by name, at every step: a table for looking into a model.
+
+        The case is flown by Python, which takes some milliseconds a step; given up after so many seconds.
+
+        Returns a DataFrame with a row for the start, the end of each step, each event, and both sides of each call of
+        `control` and `switch`. Its columns:
+
+        t_s, states and outputs : in declared units, under their own names; `attrs["units"]` says which
+        m.NAME : the discrete state, in SI, as all that follows
+        d(NAME)/dt : what `rhs` gives for a state
+        event.NAME : the functions of the events
+        FUNCTION.VARIABLE : what a function of the model assigns, as `rhs.drag`; `rhs.wind.speed` where `rhs` calls
+            `wind`, `rhs.wind[2].speed` where it calls it again, `rhs.force.x` for a field of a record. Of `initial`,
+            `start`, `control` and `switch`, what they assigned last.
+
+        Raises StoreError for a case that never started, or whose end is not that of the run bit for bit; ModelError for
+        a simulator, which has no physics to look into.
+        """
+        from mc_engine.flight.interpreted import OutOfTime  # which loads the compiler
+        from mc_engine.runner.debugging import inputs_of
+        from mc_engine.runner.flown_campaign import campaign_of
+        from mc_engine.studies.trace import trace_case
+
+        campaign = campaign_of(self.store)
+        if isinstance(campaign.model, Simulator):
+            raise ModelError(f"{self.store.path}: was flown by a simulator, which has no physics to trace")
+        if self.status == STATUS_NAME[REFUSED]:
+            raise StoreError(f"{self.store.path}: {self.name} never started: {self.reason}")
+        inputs, noise = inputs_of(campaign, None if self.case_id == NOMINAL else self.case_id)
+        try:
+            trace, end = trace_case(campaign.model, inputs, noise, campaign.seed, seconds)
+        except OutOfTime as late:
+            raise StoreError(f"{self.store.path}: the trace of {self.name} was given up after {seconds:g} s, at t = "
+                             f"{late.t:.6g} s; trace(seconds=...) waits longer") from None  # fmt: skip
+        for name, value in end.items():
+            stored = self.row[name]
+            if stored != value and not (np.isnan(value) and np.isnan(stored)):
+                raise StoreError(f"{self.store.path}: {self.name} ended with {name} = {stored!r}, its trace with "
+                                 f"{value!r}; the run was changed, or flown elsewhere")  # fmt: skip
+        return trace
 
     def replay(self) -> "Replay":
         """The case flown again, alone, every stored number compared bit for bit.

@@ -23,8 +23,7 @@ from mc_engine.statistics.rare_events import RareEvent
 from mc_engine.statistics.subset_simulation import subset_simulation
 from mc_engine.store.parts import Column
 from mc_engine.store.result_folder import write_result
-from mc_engine.store.run_files import RARE_EVENT
-from mc_engine.store.run_folder import default_folder
+from mc_engine.store.run_files import RARE_EVENT, default_folder
 from mc_engine.store.store import refuse_occupied
 from mc_engine.store.writer_lock import writer_of_new
 from mc_engine.studies.limit_state import LimitState, chosen_requirement

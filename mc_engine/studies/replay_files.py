@@ -56,13 +56,14 @@ def read_replay(run: Path, case_id: int, quantities: Sequence[Mapping[str, str]]
 
 
 def history_figure(history: pd.DataFrame, quantities: Sequence[Mapping[str, str]], title: str) -> "Figure":
-    """Every quantity of one history against time, a panel each.
+    """Every output of one history against time, a panel each.
 
-    history : case_id, t_s and the quantities.  Units come from the records of the model's quantities.
+    history : case_id, t_s and the outputs.  Units come from the records of the model's outputs.
     """
     from matplotlib.figure import Figure
 
-    columns = [column for column in history_columns(list(history), quantities) if column.name not in ("case_id", "t_s")]
+    known = history_columns(list(history), quantities)
+    columns = [column for column in known if column.kind == "number" and column.name != "t_s"]
     rows = max(1, (len(columns) + 1) // 2)
     figure = Figure(figsize=(10.0, 1.0 + 1.8 * rows), layout="constrained")
     axes = figure.subplots(rows, 2, sharex=True, squeeze=False)

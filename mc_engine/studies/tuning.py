@@ -21,8 +21,7 @@ from mc_engine.runner.runner import ProgressCall
 from mc_engine.section import Section
 from mc_engine.store.parts import Column
 from mc_engine.store.result_folder import ColumnsAndArrays, write_result
-from mc_engine.store.run_files import TUNING
-from mc_engine.store.run_folder import default_folder
+from mc_engine.store.run_files import TUNING, default_folder
 from mc_engine.store.store import refuse_occupied
 from mc_engine.store.writer_lock import WriterLock, writer_of_new
 from mc_engine.studies.candidates import Scores, cases_per_candidate, fly_candidates

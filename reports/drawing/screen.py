@@ -87,7 +87,7 @@ def history_panel(time: str) -> dict[str, Any]:
 @singledispatch
 def traced(mark: object, plot: Plot) -> Iterator[dict[str, Any]]:
     """The traces of plotly.js that draw the mark."""
-    raise NotImplementedError(type(mark))
+    raise TypeError(f"{type(mark).__name__} is no mark that the screen draws")
 
 
 @traced.register

@@ -53,7 +53,7 @@ def _part(values: np.ndarray | float, ends: tuple[float, float], log: bool) -> n
 @singledispatch
 def stroked(mark: object, frame: Frame) -> Iterator[str]:
     """The mark as SVG elements."""
-    raise NotImplementedError(type(mark))
+    raise TypeError(f"{type(mark).__name__} is no mark that is drawn as SVG")
 
 
 @stroked.register

@@ -29,6 +29,19 @@ class HistoryLine:
 
 
 @dataclass(frozen=True)
+class Phases:
+    """Names and first times of the phases of one case, and all of them in words for the key; empty without phases."""
+
+    begins: tuple[tuple[str, float], ...] = ()
+    words: str = ""
+
+    def marks(self) -> Iterator[Limit]:
+        """A dotted line where each phase after the first begins."""
+        for name, time in self.begins[1:]:
+            yield Limit(time, "x", MUTED, f"{name} begins", "dot", 1.0, False, self.words)
+
+
+@dataclass(frozen=True)
 class Envelope:
     """Quantiles of a quantity over n_cases: float64[n] by probability, at the times or levels `at` float64[n].
 
@@ -56,9 +69,10 @@ def history_plot(
     lines: Sequence[HistoryLine],
     envelope: Envelope | None = None,
     limits: Sequence[tuple[float, str]] = (),
+    phases: Phases | None = None,
 ) -> Plot:
-    """A quantity against the time.  limits : required limits with their words."""
-    marks: list[Mark] = []
+    """A quantity against the time.  limits : required limits with their words.  phases : of the nominal case."""
+    marks: list[Mark] = [*(phases.marks() if phases else ())]
     if envelope is not None:
         for low, high, opacity, words in envelope.bands():
             marks.append(between(envelope.at, low, high, SKY, opacity, words, words))

@@ -6,6 +6,7 @@ import numpy as np
 
 from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
 from reports.run.flown import Flown
+from reports.run.phases import quantity_names
 
 MOST_SCATTERS = 4
 
@@ -15,7 +16,7 @@ def history_figures(flown: Flown) -> list[HistoryFigure]:
     own = [figure for figure in flown.figures if isinstance(figure, HistoryFigure)]
     if own or any(isinstance(figure, ProfileFigure) for figure in flown.figures):
         return own
-    saved = [name for name in flown.histories.columns if name not in ("case_id", "t_s")]
+    saved = quantity_names(flown.histories)
     return [HistoryFigure(tuple(saved), "Saved time histories")] if saved else []
 
 

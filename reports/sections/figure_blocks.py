@@ -15,7 +15,7 @@ from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Drawing, Plot, Points
 from reports.figures.clouds import Outline, case_scatter
 from reports.figures.distributions import histogram, histograms
-from reports.figures.histories import Envelope, HistoryLine, history_figure, history_plot
+from reports.figures.histories import Envelope, HistoryLine, Phases, history_figure, history_plot
 from reports.figures.maps import metric_map
 from reports.run.cloud_regions import cloud_regions
 from reports.run.default_figures import history_figures, scatter_figures
@@ -23,6 +23,7 @@ from reports.run.flown import Flown
 from reports.run.history_bands import FEWEST_CASES, OUTER, fair_cases, history_envelopes, outer_percentile
 from reports.run.history_limits import history_limits
 from reports.run.outcomes import case_outcomes, outcome_names
+from reports.run.phases import phase_times, phases_in_words, quantity_names
 from reports.sections.case_tables import FEW_CASES, input_words
 from reports.sections.published import published_law
 from reports.text.numbers import axis_label, count, counted, number, percent
@@ -260,7 +261,7 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     if not len(flown.histories):
         yield "No time histories were saved in this run; [retention] in the campaign file selects cases."
         return
-    saved = [name for name in flown.histories.columns if name not in ("case_id", "t_s")]
+    saved = quantity_names(flown.histories)
     asked = list(dict.fromkeys(name for figure in wanted for name in figure.quantities))
     missing = [name for name in asked if name not in saved]
     constant = [name for name in asked if name in saved and is_constant(flown.histories[name].to_numpy())]
@@ -274,7 +275,7 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     if constant:
         yield f"Not drawn, constant in every saved case: {', '.join(constant)}."
     if missing:
-        yield f"Not drawn, the histories have no such quantity: {', '.join(missing)}."
+        yield f"Not drawn, the histories have no such output: {', '.join(missing)}."
 
 
 @dataclass(frozen=True)
@@ -288,7 +289,8 @@ class SavedHistories:
     def plot(self, flown: Flown, name: str) -> Plot:
         """The panel of one quantity."""
         label, time = flown.axis(name), axis_label("time", flown.unit("t_s"))
-        return history_plot(name, label, time, self.lines, self.envelopes.get(name), self.limits.get(name, ()))
+        phases = Phases(tuple(phase_times(flown)), phases_in_words(flown))
+        return history_plot(name, label, time, self.lines, self.envelopes.get(name), self.limits.get(name, ()), phases)
 
 
 def saved_histories(
@@ -364,6 +366,6 @@ def _worst_reasons(flown: Flown) -> dict[int, tuple[int, str]]:
 
 
 def history_line(flown: Flown, case: int, label: str, rank: int | None, names: list[str]) -> HistoryLine:
-    rows = flown.histories[flown.histories["case_id"] == case].sort_values("t_s")
+    rows = flown.histories[flown.histories["case_id"] == case].sort_values("t_s", kind="stable")
     quantities = {name: rows[name].to_numpy(dtype=np.float64) for name in names}
     return HistoryLine(label, rows["t_s"].to_numpy(dtype=np.float64), quantities, rank)

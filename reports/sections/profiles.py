@@ -29,7 +29,7 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
     names = [figure.x, figure.y]
     missing = [name for name in names if name not in flown.histories.columns]
     if missing:
-        return f"{figure.title}: not drawn; the histories have no quantity {missing[0]}."
+        return f"{figure.title}: not drawn; the histories have no output {missing[0]}."
     if not np.isfinite(flown.histories[names].to_numpy(dtype=np.float64)).all(axis=1).any():
         return f"{figure.title}: not drawn; no saved case has both {figure.x} and {figure.y}."
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from mc_engine.units import UNITS, convert
 from reports.document.blocks import Cell, Column, Table
 from reports.run.flown import Flown
+from reports.run.phases import phase_times
 from reports.sections.tables import fixed_table, input_table
 from reports.text.numbers import counted, number, with_unit
 
@@ -37,15 +38,16 @@ def _vehicle(flown: Flown) -> str:
 
 
 def timeline_table(flown: Flown) -> Table | None:
-    """The events of the nominal case whose times the metrics tell, in their order; None where they tell none."""
+    """The phases of the nominal case and the events whose times the metrics tell, in their order; None without any."""
     times = {}
     for fact in flown.with_role("metric"):
         words, value = flown.words(fact.name), flown.own.nominal_value(fact.name)
         if value is not None and _is_time(flown.own.unit(fact.name)) and words.endswith(" time"):
             times[fact.name] = words.removesuffix(" time")
-    if not times:
+    phases = phase_times(flown)
+    if not times and not phases:
         return None
-    rows = []
+    rows = [_phase_row(flown, place, *begin) for place, begin in enumerate(phases)]
     for name in sorted(times, key=lambda event: _seconds(flown, event)):
         summary, event = flown.summaries[name], times[name]
         spread = "–" if summary.sd is None else number(0.0 if summary.constant else summary.sd, 3)
@@ -57,6 +59,7 @@ def timeline_table(flown: Flown) -> Table | None:
                 Cell("; ".join(_at_event(flown, name, event)) or "–"),
             )
         )
+    rows.sort(key=lambda row: row[1].value or 0.0)
     columns = (
         Column("Event", "text"),
         Column("Nominal time", "number"),
@@ -64,6 +67,13 @@ def timeline_table(flown: Flown) -> Table | None:
         Column("Nominal values at the event", "text"),
     )
     return Table("Timeline of the nominal case", columns, tuple(rows))
+
+
+def _phase_row(flown: Flown, place: int, name: str, time: float) -> tuple[Cell, ...]:
+    """Where a phase of the nominal case begins, as far as the rows of its history tell."""
+    told = Cell(with_unit(number(time, 5), flown.unit("t_s")), convert(time, flown.unit("t_s"), "s"))
+    when = "first saved row in this phase" if place else "first phase"
+    return Cell(f"Phase {name} begins", small=when), told, Cell("–"), Cell("–")
 
 
 def _is_time(unit: str) -> bool:

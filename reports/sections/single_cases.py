@@ -16,6 +16,7 @@ from reports.document.blocks import Block, CaseColumn, CaseData, FigureBlock, Se
 from reports.figures.histories import thinned
 from reports.run.flown import ColumnFacts, Flown
 from reports.run.outcomes import INSIDE, case_outcomes, outcome_names, outcome_sentence
+from reports.run.phases import quantity_names
 from reports.sections.figure_blocks import is_constant, outcome_scatter, thinned_rows
 from reports.text.numbers import axis_label
 
@@ -162,7 +163,7 @@ def case_histories(flown: Flown) -> tuple[dict[int, dict[str, tuple[Any, Any]]],
     table = _all_histories(flown)
     if not len(table):
         return {}, 0
-    names = [name for name in table.columns if name not in ("case_id", "t_s")]
+    names = quantity_names(table)
     frames = {int(case): frame for case, frame in table.groupby("case_id", sort=True)}
     ordered = [case for case in dict.fromkeys([NOMINAL, *_first_of_all(flown), *frames]) if case in frames]
     most = max(1, MOST_SAMPLES // (2 * SAMPLES * max(1, len(names))))

@@ -85,7 +85,7 @@ def _history_marks(run: int, flown: Flown, name: str) -> Iterator[Band | Line]:
         yield between(band.at, band.curves[0.0], band.curves[1.0], COLOURS[run], 0.2, key=key)
         yield _line(run, band.at, band.curves[0.5], "median")
         return
-    rows = flown.histories[flown.histories["case_id"] == -1].sort_values("t_s")
+    rows = flown.histories[flown.histories["case_id"] == -1].sort_values("t_s", kind="stable")
     if len(rows):
         yield _line(run, rows["t_s"].to_numpy(np.float64), rows[name].to_numpy(np.float64), "nominal")
 

@@ -29,7 +29,7 @@ VERBS = typer.main.get_command(app).commands
 
 def command_lines():
     """(file, words after `mc-engine`) of every call in the examples, those in comments too."""
-    for path in sorted(EXAMPLES.iterdir()):
+    for path in sorted(path for path in EXAMPLES.iterdir() if path.is_file()):
         for call in re.findall(r"mc-engine ([a-z][^`\n;)]*)", path.read_text()):
             yield path.name, call.replace('"', "").split()
 

@@ -14,6 +14,7 @@ from mc_engine.documentation.commands_page import commands as verbs
 from mc_engine.documentation.website import HOME
 from mc_engine.flight.chunks import fly_nominal
 from mc_engine.flight.contract import breaches
+from mc_engine.flight.contract_flight import faults
 from mc_engine.status import STATUS_NAME
 from mc_engine.studies.published import read_published
 
@@ -28,6 +29,7 @@ RECIPES = [
         "curves_rotations_frames_air",
     )
 ]
+PHASES = HOME / "how_to" / "phases.md"
 PUBLISHED = HOME / "how_to" / "published_results.md"
 HEAD = '[campaign]\nmodel = "{model}"\ncases = 1000\ndesign = "mc"\nseed = 1\n\n'
 
@@ -149,7 +151,7 @@ def test_the_prepared_campaign_keeps_the_contract_and_reaches_its_target(tmp_pat
     for old, new in (
         (own, f"{declared}\n"),
         ("@physics\ndef initial", f"{function}\n\n@physics\ndef initial"),
-        ("initial=initial,", "initial=initial, prepare=prepare, kernel_parameters=Parameters,"),
+        ("initial=initial,", "initial=initial, prepare=prepare, kernel_parameters=prepared(prepare, Inputs),"),
     ):
         assert old in text
         text = text.replace(old, new)
@@ -165,7 +167,7 @@ def test_the_prepared_campaign_keeps_the_contract_and_reaches_its_target(tmp_pat
     [
         page
         for page in PAGES
-        if page not in (*RECIPES, PUBLISHED) and page.parent.name != "tutorial" and blocks(page, "toml")
+        if page not in (*RECIPES, PUBLISHED, PHASES) and page.parent.name != "tutorial" and blocks(page, "toml")
     ]
 )
 def test_every_campaign_file_on_a_page_loads(page, tmp_path):
@@ -180,6 +182,20 @@ def test_the_records_of_the_page_on_published_results_are_read_and_show_each_way
     assert [next(way for way in ("column", "statistic", "compute") if way in record) for record in records] == [
         "column", "statistic", "compute",
     ]  # fmt: skip
+
+
+def test_the_rocket_of_the_page_on_phases_keeps_the_contract_and_gives_what_is_printed(tmp_path, monkeypatch):
+    (rocket, _), (results, _) = blocks(PHASES, "python")
+    (tmp_path / "rocket.py").write_text(rocket)
+    (tmp_path / "campaign.toml").write_text(blocks(PHASES, "toml")[0][0])
+    monkeypatch.chdir(tmp_path)
+    campaign = mc_engine.load_campaign("campaign.toml")
+    assert breaches(campaign) == []
+    assert faults(campaign) == []
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(results, PHASES.name, "exec"), {})  # the page is the project's own
+    assert printed.getvalue() == blocks(PHASES, "text")[0][0]
 
 
 def check_campaigns(page, folder):

@@ -70,7 +70,7 @@ def names_unsynced(patch):
 
 
 def digests_unread(patch):
-    """The bytes of a part are not held against the journal."""
+    """The bytes of a part are not compared with the checksum in the journal."""
     patch(parts, "content_problem", lambda content, part: "")
 
 

@@ -1,7 +1,12 @@
 """Files in the current folder that are named as libraries are: no process of the engine imports them."""
 
+import sys
+
 import pytest
 from falling import engine, falling
+
+from mc_engine import load_campaign, run
+from tests.mc_engine.flight.falling_ball import python_campaign
 
 NAMES = (
     "psutil json numpy random typing numba pandas pyarrow joblib distributed msgpack tomllib pickle signal"
@@ -26,6 +31,11 @@ def flown_among(names, folder, campaign, backend, again=True):
     assert not list(folder.glob("imported_*"))
 
 
+@pytest.fixture(scope="module")
+def simulator(tmp_path_factory):
+    return python_campaign(tmp_path_factory.mktemp("simulator") / "ball", cases=4)
+
+
 @pytest.mark.parametrize("backend", ["loky", "dask"])
 def test_files_named_as_libraries_in_the_current_folder_are_not_imported(backend, campaign, tmp_path):
     if backend == "dask":
@@ -38,3 +48,19 @@ def test_files_named_as_libraries_in_the_current_folder_are_not_imported(backend
 @pytest.mark.parametrize("name", NAMES)
 def test_no_such_file_is_imported_alone_either(name, backend, campaign, tmp_path):
     flown_among([name], tmp_path / "here", campaign, backend)
+
+
+@pytest.mark.parametrize("backend", ["threading", "loky", "dask"])
+def test_processes_of_a_simulator_import_no_such_file(backend, simulator, tmp_path):
+    if backend == "dask":
+        pytest.importorskip("distributed")
+    flown_among(NAMES, tmp_path / "here", simulator, backend, again=False)
+
+
+def test_processes_do_not_import_from_the_current_folder_of_an_interactive_session(simulator, tmp_path, monkeypatch):
+    for name in {*NAMES} & sys.modules.keys():  # others are imported from there by the session itself
+        (tmp_path / f"{name}.py").write_text(f"raise RuntimeError('imported {name}')\n")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", ["", *sys.path])  # as Python has it there
+    campaign = load_campaign(simulator, seed=4)
+    assert run(campaign, tmp_path / "run", workers=1).status_counts() == {"ok": 4}

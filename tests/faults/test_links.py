@@ -10,12 +10,24 @@ from counted_directories import PAGES, TEXTS, a_rare_event, a_run, a_tuning, cop
 from stones import call
 from trapped import ROOT
 
-from mc_engine import durable_file, open_store
-from mc_engine.durable_file import make_way, names_in, publish, read_inside, remove_file, temporary_name, write_inside
+from mc_engine import durable_file, load_campaign, open_store
+from mc_engine.durable_file import (
+    copy_into,
+    make_way,
+    names_in,
+    open_to_append,
+    publish,
+    read_inside,
+    remove_file,
+    remove_folder,
+    temporary_name,
+    write_inside,
+)
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.runner import runner
 from mc_engine.store.derived_files import derived_files
 from mc_engine.store.verification import damage
+from tests.mc_engine.flight.falling_ball import python_campaign
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links need rights")
 
@@ -115,6 +127,9 @@ def test_names_lead_nowhere_but_into_the_directory(tmp_path, monkeypatch, holds_
         lambda name: make_way(root, f"{name}/b"),
         lambda name: read_inside(root, name),
         lambda name: names_in(root, f"{name}/.."),
+        lambda name: open_to_append(root, name),
+        lambda name: copy_into(root, name, outside / "a"),
+        lambda name: remove_folder(root, name),
     )
     for act in acts:
         for name in ("link/a", "../outside/a", "in/../../outside/a", f"{outside}/a", "", "in//a", "in/\0"):
@@ -126,24 +141,62 @@ def test_names_lead_nowhere_but_into_the_directory(tmp_path, monkeypatch, holds_
     assert names_in(root, "in") == ["a"]
 
 
+@pytest.mark.parametrize("name", ["simulator", "simulator/case-0000003", "simulator/case-0000003/case.json"])
+def test_what_a_simulator_leaves_behind_stays_in_the_run(tmp_path, name):
+    file = python_campaign(tmp_path / "ball", cases=8, fault="if case.id == 3: raise ValueError('once more')")
+    store, outside = runner.run(load_campaign(file), tmp_path / "run", workers=1), tmp_path / "outside"
+    kept = contents(store.path / "simulator")
+    assert [*kept] == ["case-0000003/case.json"]
+    (store.path / name).rename(outside)
+    (store.path / name).symlink_to(outside)
+    theirs = contents(outside) if outside.is_dir() else outside.read_bytes()
+    if name == "simulator":
+        assert damage(store.path) == ["simulator: is no folder of this run's own"]
+        with pytest.raises(StoreError, match="simulator: is a symbolic link"):
+            runner.rerun(store.path)
+        with pytest.raises(StoreError, match="simulator: is a symbolic link"):
+            runner.extend(store.path, 16, workers=1)
+    else:
+        runner.rerun(store.path)
+        assert contents(store.path / "simulator") == kept  # in a new folder, or a new file
+    assert (contents(outside) if outside.is_dir() else outside.read_bytes()) == theirs
+
+
+def test_only_regular_files_of_a_case_are_kept(tmp_path):
+    (tmp_path / "secret").write_text("mine")
+    lines = [
+        "import os",
+        f"os.symlink({str(tmp_path / 'secret')!r}, case.folder / 'link')",
+        f"os.symlink({str(tmp_path)!r}, case.folder / 'way')",
+        "os.mkfifo(case.folder / 'pipe')",
+        "(case.folder / 'in').mkdir()",
+        "(case.folder / 'in/deck.inp').write_text('10.0')",
+        "raise ValueError('no')",
+    ]
+    file = python_campaign(tmp_path / "ball", cases=2, fault="\n".join(lines))
+    runner.run(load_campaign(file), tmp_path / "run", workers=1)
+    folder = tmp_path / "run/simulator/case-0000001"
+    kept = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*"))
+    assert kept == ["case.json", "in", "in/deck.inp"]
+
+
 # What writes, replaces, removes or makes files and folders.
 WRITES = re.compile(
     r"\.(?:write_bytes|write_text|unlink|touch|mkdir|rmdir|rename(?!\(columns)|symlink_to|hardlink_to)\("
-    r"|\bos\.(?:open|remove|replace|rename|rmdir|makedirs|truncate|link|symlink)\(|\bshutil\.|\btempfile\."
+    r"|\bos\.(?:open|remove|replace|rename|rmdir|makedirs|truncate|link|symlink)\(|\bshutil\.(?!which)|\btempfile\."
     r"|\bopen\([^)\n]*[\"'](?:[wax]b?\+?|r?b?\+b?)[\"']"
 )
 ELSEWHERE = {
     "mc_engine/durable_file.py": "the one place",
     "mc_engine/cache_folder.py": "the folder of compiled kernels and kept designs",
-    "mc_engine/flight/case_process.py": "what the process of a simulator's case printed",
-    "mc_engine/flight/case_rows.py": "what failed cases of a simulator printed",
-    "mc_engine/flight/case_worker.py": "the folder of a simulator's case",
+    "mc_engine/flight/case_process.py": "a simulator's temporary folder, outside of any run",
+    "mc_engine/flight/case_worker.py": "folders of cases in a simulator's temporary folder, outside of any run",
     "mc_engine/flight/kernel.py": "the cache of compiled kernels",
-    "mc_engine/flight/program_flight.py": "input files of a program, in the folder of its case",
+    "mc_engine/flight/program_flight.py": "input files of a program, in a simulator's temporary folder",
     "mc_engine/lanes/kernel_cache.py": "locks of kernels under compilation",
-    "mc_engine/model/program.py": "looks for the program",
     "mc_engine/store/object_store.py": "scratch folders beside a fetched copy",
     "mc_engine/text.py": "the null device",
+    "mc_engine/command_line/watching.py": "the page of --watch, which is no run",
     "mc_engine/command_line/before_flight.py": "init makes a folder that the user named",
     "mc_engine/documentation/website.py": "the site of the documentation",
     "mc_engine/unforeseen.py": "the log of an error, in the folder of temporary files",

@@ -26,37 +26,35 @@ print(json.dumps(samples))
 """
 
 MODEL = """
-from collections import namedtuple
 from mc_engine.lanes import physics
-from mc_engine.model import Field, FixedStep, Model, Parameter
+from mc_engine.model import Field, FixedStep, Parameter, inputs, metrics, model, outputs, states
 
-NAMES = [f"metric_{i}" for i in range(40)]
-State, Parameters, Quantities = (namedtuple(name, field) for name, field in (("S", "x"), ("P", "push"), ("Q", "x")))
-Metrics = namedtuple("Metrics", NAMES)
-
-@physics
-def initial(p, o):
-    return State(p.push)
+Inputs = inputs(push=Parameter(1.0, "push", unit=""))
+State = states(x=Field("place", unit=""))
+Outputs = outputs(x=Field("place", unit=""))
+Metrics = metrics(**{f"metric_{i}": Field("a number", unit="") for i in range(40)})
 
 @physics
-def rhs(t, s, m, p, o):
-    return State(-s.x)
+def initial(p):
+    return State(x=p.push)
 
 @physics
-def observe(t, s, m, p, o):
-    return Quantities(s.x)
+def rhs(s):
+    return State(x=-s.x)
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    return Metrics(*METRICS)
+def observe(s):
+    return Outputs(x=s.x)
 
-MODEL = Model(
-    name="wide", title="A row of forty metrics", source="", parameters=(Parameter("push", "", "push", 1.0),),
-    settings=(), states=(Field("x", "", "place"),), quantities=(Field("x", "", "place"),),
-    metrics=tuple(Field(name, "", "a number") for name in NAMES), clock=FixedStep(0.5, 1.0),
-    kernel_parameters=Parameters, initial=initial, rhs=rhs, observe=observe, evaluate=evaluate,
+@physics
+def evaluate(s):
+    return Metrics(METRICS)
+
+MODEL = model(
+    name="wide", title="A row of forty metrics", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
+    clock=FixedStep(0.5, 1.0), initial=initial, rhs=rhs, observe=observe, evaluate=evaluate,
 )
-""".replace("*METRICS", ", ".join(f"s.x * {i + 1}.0" for i in range(40)))
+""".replace("METRICS", ", ".join(f"metric_{i}=s.x * {i + 1}.0" for i in range(40)))
 
 CAMPAIGN = """
 [campaign]

@@ -8,12 +8,14 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mc_engine import load_campaign, resume, run
 from tests.mc_engine.flight.falling_ball import program_campaign, python_campaign
 
-AT = (3, 11, 17, 40)  # cases
+SAMPLE, WHOLE = (4, 50), (100, 250)  # cases with a fault, of so many: in the deep tests and in the slow ones
+SAMPLE_KILLS, WHOLE_KILLS = (("case", 3), ("program", 30), ("case", 90)), 50  # of the engine, after so many cases
 PYTHON_FAULTS = {
     "segfault": ("import ctypes\n    ctypes.string_at(0)", "crashed", "ended by SIGSEGV at "),
     "kill": ("import os\n    os.kill(os.getpid(), 9)", "crashed", "ended by SIGKILL"),
@@ -27,16 +29,30 @@ PYTHON_FAULTS = {
     "refused": ("raise Refuse('too heavy')", "refused", "too heavy"),
     "loud": ("print('x' * 5_000_000)\n    raise ValueError('loud')", "crashed", "ValueError: loud"),
 }
+WRITE = 'file = fopen(argv[2], "w"); fprintf(file, '
+USED = r'\"used\": {\"mass_kg\": %.17g, \"drag_area_m2\": %.17g, \"height_m\": %.17g}}", mass, area, height'
 C_FAULTS = {
     "abort": ("abort();", "crashed", "ended by SIGABRT"),
     "kill": ("kill(getpid(), SIGKILL);", "crashed", "ended by SIGKILL"),
     "endless": ("for (;;) ;", "time-limit", "took longer than 2 s"),
     "memory": ("for (;;) { char *p = malloc(1 << 20); memset(p, 1, 1 << 20); }", "memory-limit", "more than 300 MiB"),
+    "worker": ("kill(getppid(), SIGKILL); usleep(1000000);", "crashed", "ended by SIGKILL"),
+    "loud": ('for (int i = 0; i < 100000; i++) puts("' + 50 * "x" + '"); return 3;', "crashed", "exit code 3"),
+    "NaN": (f'{WRITE}"{{\\"time\\": NaN, \\"speed\\": 1, {USED}); return 0;', "not-finite", "is not a number"),
+    "wrong key": (f'{WRITE}"{{\\"t\\": 1, \\"speed\\": 1, {USED}); return 0;', "no-result", 'has no "time"'),
+    "no history": (
+        f'{WRITE}"{{\\"time\\": 1, \\"speed\\": 1, {USED}); fclose(file); return 0;',
+        "no-result",
+        "wrote no history.csv",
+    ),
     "exit": ('fprintf(stderr, "licence lost\\n"); return 3;', "crashed", "ended with exit code 3: licence lost"),
     "nothing": ("return 0;", "no-result", "wrote no result.json"),
     "half": ('file = fopen(argv[2], "w"); fprintf(file, "{\\"time\\": 1."); return 0;', "no-result", "cannot be read"),
     "previous": ("mass = 10.0;", "no-result", "the program used mass_kg = 10"),
 }
+
+
+METRICS = ["fall_time_s", "impact_speed_m_s"]
 
 
 def at(cases, fault):
@@ -47,36 +63,48 @@ def in_c(cases, fault):
     return f"if ({' || '.join(f'id == {case}' for case in cases)}) {{ {fault} }}"
 
 
-def refuse_others(table, status, reason):
+def refuse_others(table, cases, status, reason):
     failed = table[table["status"] != "ok"]
-    assert tuple(failed["case_id"]) == AT
+    assert tuple(failed["case_id"]) == cases
     assert set(failed["status"]) == {status}
     assert all(reason in one for one in failed["reason"])
 
 
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
+    """The table without faults."""
     folder = tmp_path_factory.mktemp("sound")
-    return run(load_campaign(python_campaign(folder / "ball", cases=50)), folder / "run", workers=2).cases()
+    return run(load_campaign(python_campaign(folder / "ball", cases=WHOLE[1])), folder / "run", workers=2).cases()
+
+
+@pytest.fixture(params=[SAMPLE, pytest.param(WHOLE, marks=pytest.mark.slow)], ids=["sample", "whole"])
+def faulty(request):
+    """(the cases with a fault, drawn by chance; how many there are in all)."""
+    failing, cases = request.param
+    return tuple(sorted(np.random.default_rng(21).permutation(cases)[:failing].tolist())), cases
 
 
 @pytest.mark.parametrize("name", PYTHON_FAULTS)
-def test_a_fault_of_a_function_costs_its_case(tmp_path, sound, name):
-    fault, status, reason = PYTHON_FAULTS[name]
+def test_a_fault_of_a_function_costs_its_case(tmp_path, sound, faulty, name):
+    (failing, cases), (fault, status, reason) = faulty, PYTHON_FAULTS[name]
     limits = "time_limit_s=1.0, memory_limit_mib=2000.0,"
-    file = python_campaign(tmp_path / "ball", cases=50, fault=at(AT, fault), options=limits)
+    file = python_campaign(tmp_path / "ball", cases=cases, fault=at(failing, fault), options=limits)
     table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
-    refuse_others(table, status, reason)
-    well = table["status"] == "ok"
-    assert table[well].equals(sound[well.to_numpy()])
-    assert len(list((tmp_path / "run/simulator").iterdir())) == len(AT)
+    refuse_others(table, failing, status, reason)
+    well = (table["status"] == "ok").to_numpy()
+    assert table[well].equals(sound[:cases][well])
+    assert len(list((tmp_path / "run/simulator").iterdir())) == len(failing)
 
 
 @pytest.mark.parametrize("name", C_FAULTS)
-def test_a_fault_of_a_program_costs_its_case(tmp_path, name):
-    fault, status, reason = C_FAULTS[name]
-    file = program_campaign(tmp_path / "ball", cases=50, fault=in_c(AT, fault))
-    refuse_others(run(load_campaign(file), tmp_path / "run", workers=2).cases(), status, reason)
+def test_a_fault_of_a_program_costs_its_case(tmp_path, sound, faulty, name):
+    (failing, cases), (fault, status, reason) = faulty, C_FAULTS[name]
+    file = program_campaign(tmp_path / "ball", cases=cases, fault=in_c(failing, fault))
+    table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
+    refuse_others(table, failing, status, reason)
+    well = (table["status"] == "ok").to_numpy()
+    assert np.allclose(table[METRICS][well], sound[METRICS][:cases][well], rtol=1e-12, atol=0.0)
+    assert running(str(tmp_path / "ball")) == []
 
 
 def test_the_echo_finds_an_input_that_is_rounded(tmp_path):
@@ -86,11 +114,31 @@ def test_the_echo_finds_an_input_that_is_rounded(tmp_path):
     assert table["reason"].str.contains("the program used mass_kg = ").all()
 
 
+HISTORIES = {
+    "column": ("pd.DataFrame({'t_s': [0.0], 'speed': [1.0]})", 'the history has no column "speed_m_s"'),
+    "word": ("pd.DataFrame({'t_s': [0.0], 'speed_m_s': ['fast']})", 'column "speed_m_s" of the history is no numbers'),
+    "lengths": ("{'t_s': [0.0, 1.0], 'speed_m_s': [1.0]}", "columns of the history have 2 and 1 rows"),
+    "number": ("3.0", "the history is a float; it must be a DataFrame"),
+}
+
+
+@pytest.mark.parametrize("options", ["", "batch=True,"], ids=["case", "batch"])
+@pytest.mark.parametrize("name", HISTORIES)
+def test_a_history_that_cannot_be_read_is_no_result(tmp_path, name, options):
+    table, reason = HISTORIES[name]
+    one = "np.ones_like(inputs['mass_kg'])"
+    fault = f"return {{'fall_time_s': {one}, 'impact_speed_m_s': {one}}}, {table}"
+    file = python_campaign(tmp_path / "ball", cases=3, fault=fault, options=options)
+    rows = run(load_campaign(file), tmp_path / "run", workers=1).cases()
+    assert set(rows["status"]) == {"no-result"}
+    assert all(reason in one for one in rows["reason"])
+
+
 def test_a_case_of_a_batch_that_crashes_is_found(tmp_path, sound):
-    fault = f"if np.isin(case.id, {AT}).any():\n    import os\n    os.kill(os.getpid(), 9)"
+    fault = "if np.isin(case.id, (3, 11, 40)).any():\n    import os\n    os.kill(os.getpid(), 9)"
     file = python_campaign(tmp_path / "ball", cases=50, fault=fault, options="batch=True,")
     table = run(load_campaign(file), tmp_path / "run", workers=1).cases()
-    refuse_others(table, "crashed", "ended by SIGKILL")
+    refuse_others(table, (3, 11, 40), "crashed", "ended by SIGKILL")
 
 
 def running(word):
@@ -105,20 +153,46 @@ def running(word):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-def test_children_left_behind_are_ended(tmp_path):
+def test_children_left_behind_are_ended(tmp_path, faulty):
+    failing, cases = faulty
     start = "import subprocess\n    subprocess.Popen(['sleep', '4321'], start_new_session=True)"
-    run(load_campaign(python_campaign(tmp_path / "a", cases=50, fault=at(AT, start))), tmp_path / "run-a", workers=2)
+    run(
+        load_campaign(python_campaign(tmp_path / "a", cases=cases, fault=at(failing, start))),
+        tmp_path / "run-a",
+        workers=2,
+    )
     fork = 'if (!fork()) { setsid(); if (!fork()) execlp("sleep", "sleep", "4321", NULL); _exit(0); } usleep(50000);'
-    run(load_campaign(program_campaign(tmp_path / "b", cases=50, fault=in_c(AT, fork))), tmp_path / "run-b", workers=2)
+    run(
+        load_campaign(program_campaign(tmp_path / "b", cases=cases, fault=in_c(failing, fork))),
+        tmp_path / "run-b",
+        workers=2,
+    )
     assert running("4321") == []
 
 
+def more_kills():
+    """Of a whole test, at random instants."""
+    rng = np.random.default_rng(22)
+    for kill in range(WHOLE_KILLS):
+        kind, after = ("case", "program")[kill % 2], int(rng.integers(1, 118))
+        yield pytest.param(kind, after, marks=pytest.mark.slow, id=f"{kind}-{after}-{kill}")
+
+
+def parts(folder):
+    """The bytes of the parts of a run, in order."""
+    return [path.read_bytes() for path in sorted((folder / "cases").glob("*.parquet"))]
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-@pytest.mark.parametrize("after", [3, 30, 90])  # cases
-def test_a_killed_engine_resumes_without_flying_a_finished_case_twice(tmp_path, after):
+@pytest.mark.parametrize(("kind", "after"), [*SAMPLE_KILLS, *more_kills()])
+def test_a_killed_engine_resumes_without_flying_a_finished_case_twice(tmp_path, kind, after):
     starts = tmp_path / "starts"
-    fault = f"import time\ntime.sleep(0.03)\nwith open({str(starts)!r}, 'a') as file: print(case.id, file=file)"
-    file = python_campaign(tmp_path / "ball", cases=120, fault=fault)
+    if kind == "case":
+        fault = f"import time\ntime.sleep(0.03)\nwith open({str(starts)!r}, 'a') as file: print(case.id, file=file)"
+        file = python_campaign(tmp_path / "ball", cases=120, fault=fault)
+    else:
+        count = f'file = fopen("{starts}", "a"); fprintf(file, "%ld\\n", id); fclose(file); usleep(30000);'
+        file = program_campaign(tmp_path / "ball", cases=120, fault=count)
     command = [
         sys.executable,
         "-m",
@@ -139,10 +213,10 @@ def test_a_killed_engine_resumes_without_flying_a_finished_case_twice(tmp_path, 
     engine.wait()
     time.sleep(1.0)
     assert running(f"\0{engine.pid}\0") == []  # the last argument of the processes that it started
-    table = resume(tmp_path / "run", workers=2).cases()
+    resume(tmp_path / "run", workers=2)
     flown = Counter(starts.read_text().split())
     # in flight at the kill: a case or its last lines a worker; the nominal and the first two for their histories
     twice = [case for case, times in flown.items() if times > 1 and case not in ("-1", "0", "1")]
     assert len(twice) <= 2
-    whole = run(load_campaign(file), tmp_path / "whole", workers=1)
-    assert table.equals(whole.cases())
+    run(load_campaign(file), tmp_path / "whole", workers=2)
+    assert parts(tmp_path / "run") == parts(tmp_path / "whole")

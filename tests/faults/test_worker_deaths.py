@@ -69,7 +69,7 @@ def workers_of(process, backend):
 def kill_at_random(process, run, backend, seed, kills):
     """Kill a worker of the command some time after a part has landed, so that the run goes on in between.
 
-    Returns how many kills are left when the command comes to its end.
+    Returns how many kills are left when the command ends.
     """
     rng, seen = np.random.default_rng(seed), 0
     while kills and process.poll() is None:

@@ -7,19 +7,14 @@ from mc_engine.command_line.commands import app
 from mc_engine.store.store import create_store
 
 MODEL = """
-from collections import namedtuple
-from mc_engine.model import Field, FixedStep, Model, Parameter, Setting
+from mc_engine.model import FixedStep, Parameter, Setting, inputs, metrics, model, outputs, states
 
-State = namedtuple("State", "x")
-
-MODEL = Model(
-    name="cart", title="A cart", source="", kernel_parameters=State,
-    parameters=(Parameter("push_n", "N", "push", 2.0, 0.0, 9.0),),
-    settings=(Setting("track", "", "surface", "ice", ("ice", "sand")),),
-    states=(Field("x_m", "m", "place"),), quantities=(Field("x_m", "m", "place"),),
-    metrics=(Field("range_m", "m", "how far it came"),),
+MODEL = model(
+    name="cart", title="A cart",
+    inputs=inputs(push_n=Parameter(2.0, "push", 0.0, 9.0), track=Setting("ice", "surface", choices=("ice", "sand"))),
+    states=states(x_m="place"), outputs=outputs(x_m="place"), metrics=metrics(range_m="how far it came"),
     clock=FixedStep(0.1, 1.0),
-    initial=lambda *a: a, rhs=lambda *a: a, observe=lambda *a: a, evaluate=lambda *a: a,
+    initial=lambda: None, rhs=lambda: None, observe=lambda: None, evaluate=lambda: None,
 )
 """
 CAMPAIGN = """

@@ -37,7 +37,7 @@ def run(
     }
     manifest = {
         "format": 1,
-        "engine": "0.1.0",
+        "engine": "0.2.0",
         "created_utc": "2026-04-21T10:15:00+00:00",
         "campaign": {"name": "test", "title": "A <b>test</b>", "cases": n, "design": "mc", "seed": seed},
         "model": {"name": "m", "digest": "3b1f" * 16},

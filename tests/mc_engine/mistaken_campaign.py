@@ -1,16 +1,14 @@
 """The smallest campaign with deliberate mistakes, for the tests of what the engine says about them."""
 
-from pathlib import Path
-
 from mc_engine.campaign.loading import SHIPPED, load_campaign
 
-MODEL = (Path(__file__).with_name("in_parts") / "model.py").read_text()  # its record made part by part
-DECLARED = (SHIPPED / "minimal" / "model.py").read_text()
+MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()
 
 
-def write_campaign(folder, *edits, text=MODEL):
+def write_campaign(folder, *edits):
     """The smallest campaign in `folder`, with each (text, other text) of its model exchanged."""
+    text = MODEL
     for old, new in edits:
         assert old in text, old
         text = text.replace(old, new)
@@ -25,9 +23,30 @@ def campaign_with(folder, *edits):
     return load_campaign(write_campaign(folder, *edits))
 
 
-def declared_with(folder, *edits):
-    """The smallest campaign as it is shipped, loaded."""
-    return load_campaign(write_campaign(folder, *edits, text=DECLARED))
+def given(*arguments):
+    """The edit that hands `model` these arguments, too."""
+    return ("observe=observe,", f"observe=observe, {', '.join(arguments)},")
+
+
+def in_front(text, function="observe"):
+    """The edit that puts `text` in front of one of the model's functions."""
+    return (f"@physics\ndef {function}", f"{text}\n\n\n@physics\ndef {function}")
+
+
+def with_input(declared):
+    """Edits: one input more, such as 'law=Setting("a", "law")'."""
+    return [("    altitude_km=Parameter", f"    {declared},\n    altitude_km=Parameter"),
+            ("FixedStep, Parameter,", "FixedStep, Parameter, Setting,")]  # fmt: skip
+
+
+def with_evaluate(result):
+    """Edits: `evaluate` gives `result`, which may read the largest speed in `best.speed`, and the metric
+    top_speed_m_s is left to it."""
+    return [
+        ('top_speed_m_s=maximum_of("speed_m_s", "largest speed")', 'top_speed_m_s="largest speed"'),
+        in_front(f"@physics\ndef evaluate(t, s, best):\n    return {result}"),
+        given("evaluate=evaluate", 'extrema={"speed": maximum_of("speed_m_s", "")}'),
+    ]
 
 
 def line_of(folder, text):

@@ -10,7 +10,7 @@ from mc_engine.campaign.reading import Findings
 from mc_engine.dates import date_text, modified_julian_date
 from mc_engine.model import Setting
 
-EPOCH = Setting("epoch_utc", "", "start", "2019-01-01T12:00:00", (), 33282.0, 88068.0, date=True)
+EPOCH = Setting("2019-01-01T12:00:00", "start", low=33282.0, high=88068.0, date=True, name="epoch_utc", unit="")
 
 
 def test_a_date_is_the_modified_julian_date_of_the_standard_library_of_astronomy():

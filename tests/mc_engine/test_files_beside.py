@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from small_run import ENVIRONMENT
@@ -15,7 +14,7 @@ from mc_engine.runner.flown_campaign import companions_of
 from mc_engine.runner.runner import extend, replay, run
 from mc_engine.store.verification import damage
 
-MODEL = (Path(__file__).parent / "in_parts" / "model.py").read_text()
+MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()
 PULL = "g = -MU_EARTH / (r2 * sqrt(r2))"
 DYNAMICS = """from {constants} import MU
@@ -32,7 +31,7 @@ assert PULL in MODEL
 
 def campaign_in(folder, files, imports, model="model.py"):
     """The minimal campaign, its pull taken from elsewhere.  files : name -> text."""
-    text = MODEL.replace(PULL, "g = pull(r2)").replace("from collections", f"{imports}\nfrom collections", 1)
+    text = MODEL.replace(PULL, "g = pull(r2)").replace("from mc_engine", f"{imports}\nfrom mc_engine", 1)
     reference = model if "/" not in model else model.removesuffix(".py").replace("/", ".")
     campaign = CAMPAIGN.replace('"model.py"', f'"{reference}"')
     for name, content in {**files, model: text, "campaign.toml": campaign}.items():
@@ -122,10 +121,10 @@ def tables(o):
 
 def model_with_data(declared='("factors.csv",)', first=AERO, later=""):
     """The minimal model with a number from a file; declared : the argument `data`.  later : text with `tables`."""
-    text = MODEL.replace("State = namedtuple", f"{first}{later}\nState = namedtuple", 1)
+    text = MODEL.replace("State = states", f"{first}{later}\nState = states", 1)
     text = text.replace(PULL, "g = -MU / (r2 * sqrt(r2))")
-    arguments = f"    data={declared},\n" + ("    tables=tables,\n" if later else "")
-    return text.replace("    initial=initial,\n", f"    initial=initial,\n{arguments}")
+    arguments = f"data={declared}, " + ("tables=tables, " if later else "")
+    return text.replace("initial=initial, ", f"initial=initial, {arguments}")
 
 
 def put(folder, files):
@@ -166,7 +165,7 @@ def test_an_edited_table_of_numbers_is_read_again_in_the_same_process(tmp_path):
 CHANGING = f"{AERO}\nPath(__file__).with_name('factors.csv').write_text('3.9e14,0.0')\n"
 MISTAKES = {
     "missing": ({"model.py": model_with_data().replace("factors.csv", "aero.csv")},
-                r'model.py, line \d+: there is no file "aero.csv"; .*Model\(data=\("aero.csv",\)\)'),
+                r'model.py, line \d+: there is no file "aero.csv"; .*named in data=\("aero.csv",\)'),
     "missing and not read": ({"model.py": model_with_data('("aero.csv",)')},
                              'data: there is no file "aero.csv" beside the model'),
     "outside": ({"model.py": model_with_data('("../factors.csv",)'), "../factors.csv": ""},
@@ -194,7 +193,7 @@ def test_a_file_that_is_read_and_not_declared_is_named_before_anything_flies(lat
         done = said(tmp_path, *command)
         assert done.returncode == 2
         assert ("table.csv" if later else "factors.csv") in done.stderr
-        assert "a run keeps copies only of the model's sources and of the files in Model(data=...)" in done.stderr
+        assert "a run keeps copies only of the model's sources and of the files in model(..., data=...)" in done.stderr
         assert str(tmp_path) not in done.stderr
         assert not (tmp_path / "run").exists()
 

@@ -107,7 +107,7 @@ def test_two_signals_end_a_kernel_that_python_cannot_interrupt(tmp_path):
 
 
 def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun():
-    """The first module of it that is loaded after `install_handlers` never comes to its end."""
+    """The first of its modules that is loaded after `install_handlers` never finishes loading."""
     script = (
         "import os, signal, sys, time\n"
         "class Finder:\n"

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from mistaken_campaign import campaign_with, line_of, write_campaign
+from mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate, with_input, write_campaign
 from small_run import ENVIRONMENT
 
 from mc_engine.errors import ModelError
@@ -18,9 +18,10 @@ from mc_engine.model.faults import MORE
 from mc_engine.runner.runner import run
 
 ACCELERATION = "    g = -MU_EARTH / (r2 * sqrt(r2))\n"
-DERIVATIVE = "    return State(s.vx, s.vy, g * s.x, g * s.y)"
-EVENT = "    return Events(s.x * s.vx + s.y * s.vy)"
-METRICS = "    return Metrics("
+DERIVATIVE = "    return State(x=s.vx, y=s.vy, vx=g * s.x, vy=g * s.y)"
+EVENT = "    return s.x * s.vx + s.y * s.vy"
+END = "speed=sqrt(s.vx * s.vx + s.vy * s.vy))"  # of `observe`
+SIGNATURE = ("def rhs(s)", "def rhs(t, s, m, p, o)")
 IMPORTS = "from mc_engine.lanes import"
 RHS = "@physics\ndef rhs"
 CLOCK = "FixedStep(step=10.0, until=10_000.0)"
@@ -32,10 +33,9 @@ def with_lines(lines, before="", setting=""):
     """Edits: more lines in `rhs`; imports, or definitions, before it; a setting with the choices a and b."""
     imports = "".join(f"{line}\n" for line in before.splitlines() if re.match(r"(from|import) ", line))
     rest = "".join(f"{line}\n" for line in before.splitlines() if f"{line}\n" not in imports)
-    edits = [LANES, (IMPORTS, f"{imports}{IMPORTS}"), (RHS, f"{rest}\n\n{RHS}"),
+    edits = [LANES, SIGNATURE, (IMPORTS, f"{imports}{IMPORTS}"), (RHS, f"{rest}\n\n{RHS}"),
              (ACCELERATION, ACCELERATION + "".join(f"    {line}\n" for line in lines.splitlines()))]  # fmt: skip
-    setting = f'settings=(Setting("{setting}", "", "law", "b", choices=("a", "b")),)' if setting else "settings=()"
-    return [*edits, ("settings=()", setting), ("Model, Parameter", "Model, Parameter, Setting")]
+    return [*edits, *(with_input(f'{setting}=Setting("b", "law", choices=("a", "b"))') if setting else [])]
 
 
 def refused(folder, edits):
@@ -146,7 +146,7 @@ LINES = [
     ("g = g * tan(s.x)", "name 'tan' is not defined; write it with"),
     ("n, _ = normal_pair(t, 0)", ALLOWED, "from mc_engine.lanes.noise import normal_pair"),
     (f"for k in range(0):\n    top = g\ng = g + top{HERE}", "cannot access local variable 'top'"),
-    (DERIVATIVE.strip().replace(", g * s.y", ""), "State(...) leaves out 'vy'; give every field"),
+    (DERIVATIVE.strip().replace(", vy=g * s.y", ""), "State(...) leaves out 'vy'; give every field"),
 ]  # fmt: skip
 
 
@@ -160,58 +160,72 @@ def test_a_line_that_is_not_for_physics_is_named_with_its_fix(tmp_path):
 
 
 def test_two_functions_that_call_one_another_are_recursion(tmp_path):
-    pulled = (RHS, f"@physics\ndef pulled(x):\n    return initial(x, x).x\n\n\n{RHS}")
+    pulled = (RHS, f"@physics\ndef pulled(x):\n    return initial(x).x\n\n\n{RHS}")
     sentence = refused(tmp_path, [pulled, ("    r, dv = ", "    pulled(p)\n    r, dv = ")])
     assert sentence.startswith(f"model.py, line {line_of(tmp_path, '@physics')}: ")
     assert "`initial` calls itself" in sentence
 
 
 # (edits, text on the line that is named, sentence)
+OTHER = 'Other = namedtuple("Other", "{}")'
+TUPLES = (IMPORTS, f"from collections import namedtuple\n\n{IMPORTS}")
 RECORDS = {
     "one metric more": (
-        [('top_speed")', 'top_speed more")'), ("t, best.speed)", "t, best.speed, t)")],
-        "@physics\ndef evaluate",
-        '"top_speed", "more"; it must give what `metrics` declares, in its order: "apogee_altitude", "apogee_t',
+        with_evaluate("Metrics(top_speed=best.speed, more=t)"),
+        "    return Metrics(",
+        'Metrics(...) has no field "more"; known is "top_speed"',
     ),
     "one metric fewer": (
-        [(' top_speed")', '")'), ("t, best.speed)", "t)")],
+        with_evaluate("Metrics()"),
+        "    return Metrics(",
+        "Metrics(...) leaves out 'top_speed'; give every field that has no default",
+    ),
+    "metrics of another record": (
+        [TUPLES, in_front(OTHER.format("speed"), "initial"), *with_evaluate("Other(speed=best.speed)")],
         "@physics\ndef evaluate",
-        '`evaluate` gives "apogee_altitude", "apogee_time"; it must give what `metrics` declares, in its order: "apog',
+        '`evaluate` gives Other(speed); it must give a record with "top_speed"',
     ),
-    "events that are not declared": (
-        [('"apogee")', '"apogee b c d")'), (EVENT, EVENT.replace(")", ", t, t, t)"))],
-        "@physics\ndef events",
-        '`events` gives "apogee", "b", "c", "d"; it must give what `event_list` declares, in its order: "apogee"',
+    "an event that is not declared": (
+        [in_front("@physics\ndef switch(s, m, hit):\n    return State(x=s.x * hit.moon, y=s.y, vx=s.vx, vy=s.vy), m"),
+         given("switch=switch")],
+        "    return State(x=s.x * hit.moon",
+        "'Events' object has no attribute 'moon'",
     ),
-    "quantities that are not declared": (
-        [('"altitude speed"', '"altitude speed more"'), ("s.vx * s.vx + s.vy * s.vy))", "s.vx * s.vx), t)")],
+    "an output that is not declared": (
+        [(END, END.replace("))", "), more=s.x)"))],
+        "    return Outputs(",
+        'Outputs(...) has no field "more"; known are "altitude", "speed"',
+    ),
+    "an output more": (
+        [TUPLES, in_front(OTHER.format("altitude speed more")), ("Outputs(altitude", "Other(altitude"),
+         (END, END.replace("))", "), more=s.x)"))],
         "@physics\ndef observe",
-        '`observe` gives "altitude", "speed", "more"; it must give what `quantities` declares, in its order: "alti',
+        '`observe` gives "altitude", "speed", "more"; it must give what `outputs` declares, in its order: "altitude"',
     ),
-    "no event list": (
-        [('    event_list=(Event("apogee", "falling", "stop"),),\n', "")],
-        "@physics\ndef events",
-        '`events` gives "apogee"; it must give what `event_list` declares',
-    ),
-    "an event of another name": (
-        [('Event("apogee"', 'Event("apogeee"')],
-        "@physics\ndef events",
-        '`events` gives "apogee"; it must give what `event_list` declares, in its order: "apogeee"',
+    "an output fewer": (
+        [TUPLES, in_front(OTHER.format("altitude")), ("Outputs(altitude", "Other(altitude"), (f", {END}", ")")],
+        "@physics\ndef observe",
+        '`observe` gives "altitude"; it must give what `outputs` declares, in its order: "altitude", "speed"',
     ),
     "states in another order": (
-        [('"x y vx vy"', '"x y vy vx"')],
+        [TUPLES, in_front(OTHER.format("x y vy vx"), "initial"), ("return State(x=r", "return Other(x=r")],
         "@physics\ndef initial",
         '"y", "vy", "vx"; it must give what `states` declares, in its order: "x", "y", "vx", "vy"',
     ),
-    "metrics in another order": (
-        [("apogee_altitude apogee_time top_speed", "apogee_time apogee_altitude top_speed")],
-        "@physics\ndef evaluate",
-        'it must give what `metrics` declares, in its order: "apogee_altitude", "apogee_time"',
+    "outputs in another order": (
+        [TUPLES, in_front(OTHER.format("speed altitude")), ("Outputs(altitude", "Other(altitude")],
+        "@physics\ndef observe",
+        '`observe` gives "speed", "altitude"; it must give what `outputs` declares, in its order: "altitude", "speed"',
+    ),
+    "a state more": (
+        [TUPLES, in_front(OTHER.format("x y vx vy mass"), "initial"), ("State(x=r", "Other(mass=1.0, x=r")],
+        "@physics\ndef initial",
+        '"vy", "mass"; it must give what `states` declares, in its order: "x", "y", "vx", "vy"',
     ),
     "missing state": (
-        [(', Field("vy_m_s", "m/s", "vy")', "")],
-        "@physics\ndef initial",
-        '"vy"; it must give what `states` declares, in its order: "x", "y", "vx"',
+        [(', vy_m_s="vy"', "")],
+        "    return State(x=r",
+        'State(...) has no field "vy"; did you mean "y"?',
     ),
     "a plain tuple": (
         [(DERIVATIVE, "    return s.vx, s.vy, g * s.x, g * s.y")],
@@ -219,9 +233,9 @@ RECORDS = {
         "`rhs` gives tuple; it must give a named tuple",
     ),
     "another record": (
-        [(DERIVATIVE, "    return p")],
+        [SIGNATURE, (DERIVATIVE, "    return p")],
         RHS,
-        "gives Parameters(altitude, burn_dv, magnitude_error, pitch_error); it must give the named tuple of `initial`",
+        "gives Inputs(altitude, burn_dv, magnitude_error, pitch_error); it must give the named tuple of `initial`",
     ),
     "no return": ([(DERIVATIVE, DERIVATIVE.replace("return ", ""))], RHS, "`rhs` gives nothing; it must give a named"),
     "a text in the state": (
@@ -230,34 +244,43 @@ RECORDS = {
         "`rhs` gives 'a' for \"vy\"; it must give one number",
     ),
     "a truth value as an event": (
-        [(EVENT, EVENT.replace(")", " < 0.0)"))],
-        "@physics\ndef events",
+        [(EVENT, f"{EVENT} < 0.0")],
+        "@physics\ndef climb",
         '`events` gives a truth value for "apogee"; it must give a number, such as one that crosses zero',
     ),
     "tables in two columns": (
         [
             (IMPORTS, f"import numpy as np\n\n{IMPORTS}"),
-            ("MODEL = Model(", "def tables(o):\n    return np.zeros((3, 2))\n\n\nMODEL = Model("),
-            ("    initial=initial", "    tables=tables,\n    initial=initial"),
+            in_front("def tables(o):\n    return np.zeros((3, 2))"),
+            given("tables=tables"),
         ],
         "def tables",
         "`tables` gives an array of shape (3, 2); it must give float64[n], numbers in one row",
     ),
-    "an extremum of another name": ([("best.speed", "best.sped")], METRICS, "'Best' object has no attribute 'sped'"),
+    "a truth value as one of two events": (
+        [in_front("@physics\ndef high(s):\n    return s.y > 0.0"), ('"stop")}', '"stop"), "high": Event(high)}')],
+        "@physics\ndef high",
+        '`events` gives a truth value for "high"; it must give a number, such as one that crosses zero',
+    ),
+    "an extremum of another name": (
+        with_evaluate("Metrics(top_speed=best.sped)"),
+        "    return Metrics(",
+        "'Best' object has no attribute 'sped'",
+    ),
     "missing parameter": (
-        [('"altitude burn_dv magnitude_error pitch_error"', '"altitude burn_dv magnitude_error"')],
-        "    return State(r, 0.0, dv",
+        [TUPLES, given('kernel_parameters=namedtuple("Parameters", "altitude burn_dv magnitude_error")')],
+        "    return State(x=r",
         "'Parameters' object has no attribute 'pitch_error'",
     ),
     "parameter of nobody": (
-        [("magnitude_error pitch_error", "magnitude_error pitch_errors")],
+        [TUPLES, given('kernel_parameters=namedtuple("P", "altitude burn_dv magnitude_error pitch_errors")')],
         None,
         'kernel_parameters has the field "pitch_errors", but no parameter has this name without its unit',
     ),
     "wrong arity": (
-        [("def rhs(t, s, m, p, o):", "def rhs(t, s, p, o):")],
-        RHS,
-        "`rhs` takes (t, s, p, o); the engine gives it (t, s, m, p, o)",
+        [in_front("def tables(p, o):\n    return [1.0]"), given("tables=tables")],
+        "def tables",
+        "`tables` takes (p, o); the engine gives it (o)",
     ),
     "no decorator": ([(RHS, "def rhs")], "def rhs", "`rhs` is not marked; write @physics"),
     "async def": ([(RHS, "@physics\nasync def rhs")], "@physics\nasync def rhs", "write def and `return`"),
@@ -277,7 +300,7 @@ def test_a_function_that_gives_other_numbers_than_the_model_declares_is_named(tm
         assert words in sentence, (mistake, sentence)
 
 
-RUN = ["one metric more", "states in another order", "a plain tuple", "wrong arity"]
+RUN = ["one metric more", "states in another order", "a plain tuple", "metrics of another record"]
 
 
 @pytest.mark.parametrize("edits", [*(RECORDS[name][0] for name in RUN), with_lines("print(g)"), with_lines("g = +s")])
@@ -320,7 +343,7 @@ def test_what_only_the_compiler_finds_is_one_sentence_with_the_line_too(tmp_path
 
 
 ADAPTIVE = [(CLOCK, "AdaptiveStep(until=10_000.0)"), ("FixedStep", "AdaptiveStep")]
-UNEQUAL = ["one metric more", "one metric fewer", "events that are not declared", "quantities that are not declared"]
+UNEQUAL = ["an output more", "an output fewer", "a state more"]
 
 
 @pytest.mark.parametrize("clock", [[], ADAPTIVE], ids=["fixed", "adaptive"])

@@ -1,7 +1,7 @@
 """Correct models that are written in unusual ways: neither `check` nor a flight may refuse them."""
 
 import pytest
-from mistaken_campaign import campaign_with
+from mistaken_campaign import campaign_with, given, in_front, with_input
 
 from mc_engine.flight.contract import breaches
 from mc_engine.flight.contract_flight import faults
@@ -10,7 +10,7 @@ IMPORTS = "from mc_engine.lanes import"
 RHS = "@physics\ndef rhs"
 ACCELERATION = "    g = -MU_EARTH / (r2 * sqrt(r2))\n"
 WHERE = ("sin, sqrt", "maximum, sin, sqrt, where")
-ALTITUDE = ('Extremum("speed", "speed_m_s"),', 'Extremum("speed", "speed_m_s"), Extremum("altitude", "altitude_km"),')
+SIGNATURE = ("def rhs(s)", "def rhs(t, s, m, p, o)")
 
 
 def then(line):
@@ -20,26 +20,23 @@ def then(line):
 
 def before(text):
     """An edit: more text before `rhs`."""
-    return (RHS, f"{text}\n\n\n{RHS}")
+    return in_front(text, "rhs")
 
 
 def with_metric(expression):
     """Edits: one metric more, of the time or the largest altitude."""
     return [
         WHERE,
-        ALTITUDE,
-        ('top_speed")', 'top_speed more")'),
-        ("t, best.speed)", f"t, best.speed, {expression})"),
-        ('"largest speed"),\n', '"largest speed"),\n        Field("more", "", "what it came to"),\n'),
+        ("import Event", "import Event, Field"),
+        ("Metrics = metrics(", 'Metrics = metrics(more=Field("what it came to", unit=""), '),
+        in_front(f"@physics\ndef evaluate(t, best):\n    return Metrics(more={expression})"),
+        given("evaluate=evaluate", 'extrema={"altitude": maximum_of("altitude_km", "")}'),
     ]
 
 
 def with_setting(name):
     """Edits: one setting, which is zero."""
-    return [
-        ("    settings=(),", f'    settings=(Setting("{name}", "", "a number", 0.0),),'),
-        ("Model, Parameter", "Model, Parameter, Setting"),
-    ]
+    return with_input(f'{name}=Setting(0.0, "a number", unit="")')
 
 
 COMPOSED = """def composed(f, g):
@@ -123,13 +120,15 @@ UNUSUAL = {
 
 @pytest.mark.parametrize("way", UNUSUAL)
 def test_an_unusual_way_is_no_breach(way, tmp_path):
-    assert breaches(campaign_with(tmp_path, *UNUSUAL[way])) == []
+    assert breaches(campaign_with(tmp_path, SIGNATURE, *UNUSUAL[way])) == []
 
 
 def test_the_unusual_ways_fly(tmp_path):
     edits = [edit for way, edits in UNUSUAL.items() if "excess" not in way for edit in edits]
     flag = edits.index(WHERE)
-    assert faults(campaign_with(tmp_path, *(e for i, e in enumerate(edits) if e != WHERE or i == flag))) == []
+    assert (
+        faults(campaign_with(tmp_path, SIGNATURE, *(e for i, e in enumerate(edits) if e != WHERE or i == flag))) == []
+    )
 
 
 # (lines in `rhs`, what stands before it)
@@ -167,6 +166,7 @@ LINES = [
     ("if not o.drag and o.drag < 1.0:\n        g = g * 1.0\n    for k in range(int(o.drag)):\n        g = g * 1.0", ""),
 ]  # fmt: skip
 MODULES = """import numpy as np
+from collections import namedtuple
 from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple
@@ -177,5 +177,5 @@ from numba import njit
 def test_an_unusual_line_is_no_breach(tmp_path):
     for number, (lines, text) in enumerate(LINES):
         imports = (IMPORTS, f"{MODULES}{IMPORTS}")
-        edits = [imports, before(text), *with_setting("drag"), then(lines)]
+        edits = [imports, SIGNATURE, before(text), *with_setting("drag"), then(lines)]
         assert breaches(campaign_with(tmp_path / str(number), *edits)) == [], lines

@@ -1,11 +1,10 @@
-"""A small model to hold campaign files against, and short ways to load them."""
+"""A small model for the tests of campaign files, and short ways to load them."""
 
-from collections import namedtuple
 from pathlib import Path
 
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import CampaignError
-from mc_engine.model import Field, FixedStep, Model, Parameter, Setting
+from mc_engine.model import FixedStep, Parameter, Setting, inputs, metrics, model, outputs, states
 
 HERE = Path(__file__).resolve().parent
 
@@ -22,32 +21,29 @@ def _prepare(inputs, settings, refusals):
     return vars(inputs)
 
 
-def _nothing(*_):
+def _nothing():
     raise AssertionError("no test of the inputs flies the model")
 
 
-MODEL = Model(
+MODEL = model(
     name="toy",
     title="A stone with a thruster",
     source="nobody",
-    parameters=(
-        Parameter("speed_pct", "%", "Error of the speed", 0.0, low=-100.0),
-        Parameter("angle_deg", "deg", "Angle of throw", 45.0, low=0.0, high=90.0),
-        Parameter("mass_kg", "kg", "Mass", 100.0, low=0.0),
-        Parameter("height_km", "km", "Height", 10.0),
-        Parameter("drag_area_m2", "m^2", "Drag area", 1.0, low=0.0),
-        Parameter("delay_s", "s", "Delay of the throw", 0.0, low=0.0),
+    inputs=inputs(
+        speed_pct=Parameter(0.0, "Error of the speed", low=-100.0),
+        angle_deg=Parameter(45.0, "Angle of throw", low=0.0, high=90.0),
+        mass_kg=Parameter(100.0, "Mass", low=0.0),
+        height_km=Parameter(10.0, "Height"),
+        drag_area_m2=Parameter(1.0, "Drag area", low=0.0),
+        delay_s=Parameter(0.0, "Delay of the throw", low=0.0),
+        control=Setting("continuous", "How the thruster is driven", choices=("continuous", "clipped", "off")),
+        drag=Setting(True, "Whether there is air"),
+        step_s=Setting(0.5, "Step of integration", low=0.01, high=10.0),
     ),
-    settings=(
-        Setting("control", "", "How the thruster is driven", "continuous", ("continuous", "clipped", "off")),
-        Setting("drag", "", "Whether there is air", True),
-        Setting("step_s", "s", "Step of integration", 0.5, low=0.01, high=10.0),
-    ),
-    states=(Field("x_m", "m", "Distance"),),
-    quantities=(Field("range_m", "m", "Range so far"),),
-    metrics=(Field("range_m", "m", "Range"), Field("propellant_kg", "kg", "Propellant used")),
+    states=states(x_m="Distance"),
+    outputs=outputs(range_m="Range so far"),
+    metrics=metrics(range_m="Range", propellant_kg="Propellant used"),
     clock=FixedStep("step", 100.0),
-    kernel_parameters=namedtuple("P", "speed angle mass height drag_area delay"),
     initial=_nothing,
     rhs=_nothing,
     observe=_nothing,

@@ -81,7 +81,7 @@ def manifest(**changes: Any) -> dict[str, Any]:
     """A manifest as the runner writes it."""
     return {
         "format": 1,
-        "engine": "0.1.0",
+        "engine": "0.2.0",
         "created_utc": "2026-04-21T10:15:00+00:00",
         "seed_contract": 1,
         "campaign": {

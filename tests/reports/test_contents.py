@@ -138,8 +138,8 @@ def test_a_metric_that_differs_by_rounding_is_one_short_number_that_is_the_same_
         ),
         (ScatterFigure("isp_s", "ve_pct", "T"), "T: not drawn; the run does not disperse isp_s."),
         (CorridorFigure("ve", "oe_pct", ("propellant_kg",), "T"), "T: not drawn; the run has no column ve."),
-        (HistoryFigure(("force_n", "force"), "T"), "Not drawn, the histories have no such quantity: force."),
-        (ProfileFigure("force", "force_n", "T"), "T: not drawn; the histories have no quantity force."),
+        (HistoryFigure(("force_n", "force"), "T"), "Not drawn, the histories have no such output: force."),
+        (ProfileFigure("force", "force_n", "T"), "T: not drawn; the histories have no output force."),
     ],
 )
 def test_a_figure_that_is_not_drawn_says_the_true_reason(figure, sentence):

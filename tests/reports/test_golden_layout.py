@@ -1,4 +1,4 @@
-"""The layout of two small reports, held against files; `golden_layout` says how these are written anew."""
+"""The layout of two small reports, compared with stored files; `golden_layout` says how to write these again."""
 
 import pytest
 from golden_layout import GOLDEN, SMALLER, outline, report_of

@@ -48,7 +48,7 @@ def oscillation() -> str:
 
     True is: 30 changes of sign and more, and a mean below 3 % of the largest value.
     """
-    history = chosen_history(MODEL, TABLE_8, rows=30_000)
+    history = chosen_history(MODEL, TABLE_8, rows=200_000)  # every step
     modes = [history[f"eta_{mode}"][history["t_s"] > _SETTLED_S] for mode in (1, 2, 3, 4)]
     changes = [np.count_nonzero(np.diff(np.sign(mode))) for mode in modes]
     centred = [abs(mode.mean()) < _LARGEST_MEAN * np.abs(mode).max() for mode in modes]

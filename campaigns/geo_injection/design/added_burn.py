@@ -3,9 +3,18 @@ primer vector is as long at the end of the coast after it as at its start.  Cano
 """
 
 import numpy as np
+from scipy.optimize import brentq
 
 from campaigns.geo_injection.design.coast import coast
-from campaigns.geo_injection.design.optimal import Problem, first_burn, first_states, local_axes, solve, switch_states
+from campaigns.geo_injection.design.optimal import (
+    Problem,
+    first_burn,
+    first_states,
+    local_axes,
+    solve,
+    switch_states,
+    unknowns_of,
+)
 
 _SHORT = 0.05  # first length of an added burn, and how it grows, over the burn that it relieves
 
@@ -14,16 +23,15 @@ def with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
     """Three-burn unknowns from those of two burns, canonical, or None."""
     grow = _SHORT * two[7]
     x = solve(problem, _short_burn_ahead(problem, two, grow), first_burn(problem))
-    last: tuple[float, np.ndarray] | None = None
+    last = None
     while x is not None and x[8] > _SHORT * two[7]:
-        here = _gap(problem, x), x
-        if last is not None and here[0] * last[0] < 0.0:
-            return _where_lengths_agree(problem, last, here)
+        if last is not None and _gap(problem, x) * _gap(problem, last) < 0.0:
+            return _where_lengths_agree(problem, last, x)
         longer = None
         while longer is None and grow > 1e-4 * two[7]:
             longer = _longer(problem, last, x, grow)
             grow = grow if longer is not None else 0.5 * grow
-        last, x = here, longer
+        last, x = x, longer
     return None
 
 
@@ -33,36 +41,32 @@ def _gap(problem: Problem, x: np.ndarray) -> float:
     return float(size[2] - size[1])
 
 
-def _longer(problem: Problem, before: tuple | None, x: np.ndarray, grow: float) -> np.ndarray | None:
+def _longer(problem: Problem, before: np.ndarray | None, x: np.ndarray, grow: float) -> np.ndarray | None:
     """The solution with a first burn longer by `grow`, canonical time; the guess is linear in that burn's duration."""
     guess = x.copy()
     if before is not None:
-        guess = x + (x - before[1]) * grow / (x[7] - before[1][7])
+        guess = x + (x - before) * grow / (x[7] - before[7])
     else:
         guess[8] -= grow
     guess[7] = x[7] + grow
     return solve(problem, guess, first_burn(problem))
 
 
-def _where_lengths_agree(problem: Problem, low: tuple, high: tuple) -> np.ndarray | None:
-    """Between two solutions of opposite gaps: the Illinois rule, then all conditions at once."""
-    (f0, x0), (f1, x1) = low, high
-    x = x1
-    for _ in range(20):
-        share = f0 / (f0 - f1)
-        guess = x0 + share * (x1 - x0)
-        solution = solve(problem, guess, first_burn(problem))
-        if solution is None:
-            return None
-        x, f = solution, _gap(problem, solution)
-        if abs(f) < 1e-9:
-            break
-        if f * f1 < 0.0:
-            f0, x0 = f1, x1
-        else:
-            f0 *= 0.5
-        f1, x1 = f, x
-    return solve(problem, x)
+def _where_lengths_agree(problem: Problem, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
+    """Between two solutions of opposite gaps: a root of the gap, canonical, then all conditions at once."""
+
+    def between(share: float) -> np.ndarray | None:
+        return solve(problem, low + share * (high - low), first_burn(problem))
+
+    def gap(share: float) -> float:
+        x = between(share)
+        return np.nan if x is None else _gap(problem, x)
+
+    try:
+        x = between(brentq(gap, 0.0, 1.0, xtol=1e-9))
+    except ValueError:  # a gap is not a number: there is no solution on the way
+        return None
+    return None if x is None else solve(problem, x)
 
 
 def _short_burn_ahead(problem: Problem, two: np.ndarray, length: float) -> np.ndarray:
@@ -77,9 +81,6 @@ def _short_burn_ahead(problem: Problem, two: np.ndarray, length: float) -> np.nd
     after = times[np.argmax(sizes)]
     y = coast(start, np.array([after - 0.5 * length]))[0]
     at_node = local_axes(problem.plane_change, np.zeros(1))[0]
-    place = np.arctan2(at_node[1] @ y[:3], at_node[0] @ y[:3])
-    axes = local_axes(problem.plane_change, np.array([place]))[0]
-    revolution = period - after + 1.5 * length
-    return np.array(
-        [place, *axes @ y[6:9], *axes @ y[9:12], length, two[7] - length, two[8], revolution, two[9]]
-    )  # fmt: skip
+    place = float(np.arctan2(at_node[1] @ y[:3], at_node[0] @ y[:3]))
+    burns, coasts = [length, two[7] - length, two[8]], [period - after + 1.5 * length, two[9]]
+    return unknowns_of(problem, place, y[6:9], y[9:12], burns, coasts)

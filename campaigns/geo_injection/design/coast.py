@@ -7,7 +7,7 @@ exact to rounding: J. R. R. A. Martins et al., ACM Transactions on Mathematical 
 
 import numpy as np
 
-_STEP = 1e-40  # along the imaginary axis: its square vanishes beside one
+IMAGINARY = 1e-40  # step along the imaginary axis: its square vanishes beside one
 
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -62,5 +62,7 @@ def coast(y: np.ndarray, dt: np.ndarray) -> np.ndarray:
 
     (19)-(21)
     """
-    place, velocity = kepler(y[..., 0:3] + 1j * _STEP * y[..., 6:9], y[..., 3:6] + 1j * _STEP * y[..., 9:12], dt)
-    return np.concatenate([place.real, velocity.real, place.imag / _STEP, velocity.imag / _STEP], axis=-1)
+    place, velocity = kepler(
+        y[..., 0:3] + 1j * IMAGINARY * y[..., 6:9], y[..., 3:6] + 1j * IMAGINARY * y[..., 9:12], dt
+    )
+    return np.concatenate([place.real, velocity.real, place.imag / IMAGINARY, velocity.imag / IMAGINARY], axis=-1)

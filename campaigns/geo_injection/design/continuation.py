@@ -8,6 +8,7 @@ number here depends on the orbit or on the engine.
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -18,9 +19,9 @@ from campaigns.geo_injection.design.optimal import (
     Instead,
     Problem,
     Solution,
-    local_axes,
     solve,
     switch_states,
+    unknowns_of,
 )
 from mc_engine.errors import ModelError
 
@@ -75,21 +76,17 @@ def _impulsive_guess(problem: Problem) -> np.ndarray:
     two = two_impulses(problem.plane_change, problem.ratio)
     first = propellant_share(two.first, problem.exhaust) / problem.flow
     second = propellant_share(two.first + two.second, problem.exhaust) / problem.flow - first
-    place = -0.5 * first
-    axes = local_axes(problem.plane_change, np.array([place]))[0]
-    primer = two.primer - 0.5 * first * two.rate
-    return np.array(
-        [place, *axes @ primer, *axes @ two.rate, first, second, np.pi * two.a**1.5 - 0.5 * (first + second)]
-    )
+    primer, coast = two.primer - 0.5 * first * two.rate, np.pi * two.a**1.5 - 0.5 * (first + second)
+    return unknowns_of(problem, -0.5 * first, primer, two.rate, [first, second], [coast])
 
 
 def _two_burns(problem: Problem) -> np.ndarray:
     """Two-burn unknowns, canonical: from a circle as it comes, from an ellipse the cheapest of all ways."""
-    if problem.eccentricity == 0.0:
-        return _from_circle(problem)
-    ways: list[Callable[[Problem], np.ndarray]] = [_from_perigee]
-    if problem.plane_change > 0.0:
-        ways = [_from_ascending_node, _from_descending_node, _from_perigee]
+    ways: list[Callable[[Problem], np.ndarray]] = [_from_node]
+    if problem.eccentricity > 0.0:
+        ways = [_from_perigee]
+        if problem.plane_change > 0.0:
+            ways = [_from_node, partial(_from_node, descending=True), _from_perigee]
     solved, failed = [], []
     for way in ways:
         try:
@@ -110,20 +107,22 @@ def _widened(problem: Problem) -> Problem:
     return problem if problem.plane_change == 0.0 else replace(problem, plane_change=max(problem.plane_change, WIDE))
 
 
-def _at_large_thrust(problem: Problem) -> tuple[Problem, np.ndarray]:
-    """(the problem at a large thrust, its unknowns)."""
-    top = problem.with_thrust(max(LARGE_THRUST, problem.thrust))
-    x = solve(top, _impulsive_guess(top))
+def _from_node(problem: Problem, descending: bool = False) -> np.ndarray:
+    """Impulses at a large thrust, then the eccentricity, then less thrust, then less plane change if it is small.
+
+    The first burn is about the ascending node, or about the descending one: from the mirror image about the earth's
+    centre, which a circle allows.  It changes the sign of the normal components and moves the place by pi [rad].
+    """
+    wide = _widened(problem)
+    circle = replace(wide.with_thrust(max(LARGE_THRUST, wide.thrust)), eccentricity=0.0)
+    x = solve(circle, _impulsive_guess(circle))
     if x is None:
         raise ModelError("the search for the optimal burns did not start, not even at a large thrust")
-    return top, x
-
-
-def _from_circle(problem: Problem) -> np.ndarray:
-    """Impulses, then less thrust, then less plane change if it is small."""
-    wide = _widened(problem)
-    top, x = _at_large_thrust(wide)
-    return _follow(wide, problem, _follow(top, wide, x))
+    if descending:
+        x[[3, 6]] *= -1.0
+        x[0] += np.pi
+    ellipse = replace(circle, eccentricity=problem.eccentricity)
+    return _follow(wide, problem, _follow(ellipse, wide, _follow(circle, ellipse, x)))
 
 
 def _from_perigee(problem: Problem) -> np.ndarray:
@@ -135,7 +134,7 @@ def _from_perigee(problem: Problem) -> np.ndarray:
     """
     strong = problem.with_thrust(max(problem.thrust, 2.0 * GENTLE_THRUST))
     circle = replace(strong, plane_change=0.0, eccentricity=0.0)
-    x = _from_circle(circle)
+    x = _from_node(circle)
     x[0] += problem.perigee
     planar = replace(strong, plane_change=0.0)
     x = _follow(planar, strong, _follow(circle, planar, x, FIRST_PLACE), FIRST_PLACE)
@@ -156,30 +155,6 @@ def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
     if best is None or abs(best[0] - x[0]) > 3.0 * _PLACE_STEP:
         raise ModelError("the search for the optimal burns found no best place of the first one on the parking orbit")
     return best
-
-
-def _from_ascending_node(problem: Problem) -> np.ndarray:
-    """The circle at a large thrust, then the eccentricity, then less thrust, then less plane change if it is small."""
-    wide = _widened(problem)
-    top, x = _at_large_thrust(replace(wide, eccentricity=0.0))
-    return _stretched(top, x, wide, problem)
-
-
-def _from_descending_node(problem: Problem) -> np.ndarray:
-    """The same from the mirror image about the earth's centre, which a circle allows.
-
-    The image changes the sign of the normal components and moves the place by pi [rad].
-    """
-    wide = _widened(problem)
-    top, x = _at_large_thrust(replace(wide, eccentricity=0.0))
-    mirrored = x * np.array([1.0, 1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
-    mirrored[0] += np.pi
-    return _stretched(top, mirrored, wide, problem)
-
-
-def _stretched(top: Problem, x: np.ndarray, wide: Problem, problem: Problem) -> np.ndarray:
-    ellipse = replace(top, eccentricity=problem.eccentricity)
-    return _follow(wide, problem, _follow(ellipse, wide, _follow(top, ellipse, x)))
 
 
 def _between(start: Problem, end: Problem, share: float) -> Problem:

@@ -3,26 +3,26 @@
 `python -m campaigns.geo_injection.design.kept_programs` designs them again and writes them.
 """
 
+from functools import partial
+
 import numpy as np
 
 from campaigns.geo_injection.design.program import to_text
 from campaigns.geo_injection.design.programs import KEPT, new_design
 from campaigns.geo_injection.design.sequence import Sequence, source_orbits
 
-PARKING_RADIUS, FINAL_RADIUS = 6_578_137.0, 42_164_137.0  # m: eq. (12) of the source
-# N, kg/s, kg: the mass by eq. (12); thrust and mass flow are not printed and follow from tables 2 to 8
-THRUST, MASS_FLOW, MASS = 20_000.0, 6.14, 22_170.0
+# m, kg: eq. (12) of the source;  N, kg/s: not printed, they follow from tables 2 to 8
+_SOURCE = partial(
+    Sequence, final_inclination=0.0, parking_radius=6_578_137.0, final_radius=42_164_137.0, thrust=20_000.0,
+    mass_flow=6.14, mass=22_170.0,
+)  # fmt: skip
 
 
 def _sequence(burns: int, degrees: float, method: str = "optimal") -> Sequence:
     """A sequence of the source: tables 2 to 8, with the burns, plane change [deg] and method given."""
     change = float(np.radians(degrees))
     between = source_orbits(burns, change) if method == "staged" else ()
-    return Sequence(
-        method=method, burns=burns, initial_inclination=change, final_inclination=0.0,
-        parking_radius=PARKING_RADIUS, final_radius=FINAL_RADIUS, thrust=THRUST, mass_flow=MASS_FLOW, mass=MASS,
-        between=between,
-    )  # fmt: skip
+    return _SOURCE(method=method, burns=burns, initial_inclination=change, between=between)
 
 
 SEQUENCES = {

@@ -9,6 +9,7 @@ Canonical units: perigee radius of the parking orbit, the circular speed there, 
 node of the parking orbit, z normal to the final orbit.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,6 +71,14 @@ class Solution:
         return np.concatenate([[0.0], np.cumsum(self.durations[:-1] + self.coasts)])
 
 
+def unknowns_of(
+    problem: Problem, place: float, primer: np.ndarray, rate: np.ndarray, durations: list[float], coasts: list[float]
+) -> np.ndarray:
+    """The unknowns, see `Solution`; primer vector and rate canonical, in the axes of the problem."""
+    axes = local_axes(problem.plane_change, np.array([place]))[0]
+    return np.array([place, *axes @ primer, *axes @ rate, *durations, *coasts])
+
+
 def switch_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     """States [n, 2 burns, 12] at the ignitions and cut-offs of n sets of unknowns [n, 6 + 2 burns].
 
@@ -106,8 +115,6 @@ def parking_orbit(problem: Problem, place: np.ndarray) -> tuple[np.ndarray, np.n
     Curtis, Orbital Mechanics for Engineering Students, 3rd ed., eqs (2.45), (2.48), (2.49), the perigee radius being 1.
     """
     axes = local_axes(problem.plane_change, place)
-    if problem.eccentricity == 0.0:  # no perigee, whose angle would round
-        return axes[:, 0], axes[:, 1]
     e, anomaly = problem.eccentricity, place - problem.perigee
     along, across = 1.0 + e * np.cos(anomaly), e * np.sin(anomaly)
     root = np.sqrt(1.0 + e)  # of the parameter
@@ -156,12 +163,30 @@ def residuals(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     return np.concatenate(columns, axis=1)
 
 
-def _jacobian(problem: Problem, x: np.ndarray) -> np.ndarray:
-    """Central differences of the residuals over all unknowns at once, canonical: [6 + 2 burns, 6 + 2 burns]."""
-    steps = _STEP * np.diag(np.maximum(1.0, np.abs(x)))
-    both = residuals(problem, np.concatenate([x + steps, x - steps]))
-    n = x.size
-    return (both[:n] - both[n:]).T / (2.0 * np.diag(steps))
+Conditions = Callable[[np.ndarray], np.ndarray]  # zero where they are met: [n, m] at n sets of unknowns [n, k]
+
+
+def searched(conditions: Conditions, guess: np.ndarray, most: int | None = None) -> tuple[np.ndarray, float, int]:
+    """(unknowns near a guess, largest residual, iterations); the conditions are canonical, over unknowns of about one.
+
+    Levenberg-Marquardt of at most `most` evaluations, then two Newton steps; the Jacobian by central differences over
+    all unknowns at once.  What is not finite counts as far from being met.
+    """
+
+    def value(x: np.ndarray) -> np.ndarray:
+        left = conditions(x[None])[0]
+        return np.where(np.isfinite(left), left, 1e3)
+
+    def slope(x: np.ndarray) -> np.ndarray:
+        steps = _STEP * np.diag(np.maximum(1.0, np.abs(x)))
+        both = conditions(np.concatenate([x + steps, x - steps]))
+        return np.nan_to_num((both[: x.size] - both[x.size :]).T / (2.0 * np.diag(steps)))
+
+    search = least_squares(value, guess, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=most)
+    x = search.x
+    for _ in range(2):
+        x = x - np.linalg.lstsq(slope(x), value(x), rcond=1e-9)[0]
+    return x, float(np.abs(value(x)).max()), int(search.njev)
 
 
 Instead = tuple[int, int]  # (condition that is left out, unknown that keeps its guess for it)
@@ -184,26 +209,15 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
     if problem.plane_change == 0.0:
         held[[1, 2], [3, 6]] = 1.0
         held[0, 0] = float(problem.eccentricity == 0.0)
+
+    def conditions(x: np.ndarray) -> np.ndarray:
+        left = residuals(problem, x)
+        if instead is not None:
+            left[:, instead[0]] = x[:, instead[1]] - guess[instead[1]]
+        return np.concatenate([left, (x - guess) @ held.T], axis=1)
+
     with np.errstate(all="ignore"):
-        start = residuals(problem, guess[None])[0]
-        if not np.isfinite(start).all():
+        if not np.isfinite(residuals(problem, guess[None])).all():
             return None
-
-        def value(x: np.ndarray) -> np.ndarray:
-            left = residuals(problem, x[None])[0]
-            left = np.append(np.where(np.isfinite(left), left, 1e3), held @ (x - guess))
-            if instead is not None:
-                left[instead[0]] = x[instead[1]] - guess[instead[1]]
-            return left
-
-        def slope(x: np.ndarray) -> np.ndarray:
-            jacobian = np.vstack([np.nan_to_num(_jacobian(problem, x)), held])
-            if instead is not None:
-                jacobian[instead[0]] = np.eye(1, x.size, instead[1])
-            return jacobian
-
-        x = least_squares(value, guess, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60).x
-        for _ in range(2):
-            x = x - np.linalg.lstsq(slope(x), value(x), rcond=1e-9)[0]
-        good = np.abs(value(x)).max() < SOLVED and (x[7:] > 0.0).all()
-    return x if good else None
+        x, left, _ = searched(conditions, guess, 60)
+    return x if left < SOLVED and (x[7:] > 0.0).all() else None

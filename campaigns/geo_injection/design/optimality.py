@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -48,23 +49,22 @@ def _backward(solution: Solution, n: int) -> Iterator[Arc]:
     problem = solution.problem
     masses = 1.0 - problem.flow * np.concatenate([[0.0], np.cumsum(solution.durations)])
     mass_costate, unit = 0.0, problem.thrust / masses[-1]
-    for k in reversed(range(problem.burns)):
-        start, duration = solution.states[2 * k], solution.durations[k]
-        t = np.linspace(0.0, duration, n)
-        states, mass = _flown(problem, start, masses[k], t), masses[k] - problem.flow * t
-        costate = mass_costate + np.array([_push(problem, start, masses[k], low, duration) for low in t])
+
+    def arc(burning: bool, begin: float, t: np.ndarray, states: np.ndarray, mass: np.ndarray, costate: Any) -> Arc:
         size = np.linalg.norm(states[:, 6:9], axis=1)
         switching = unit - problem.thrust * size / mass - problem.flow * costate
-        hamiltonian = switching + coast_hamiltonian(states)
-        yield Arc(True, solution.ignitions[k] + t, states, mass, switching, hamiltonian)
+        return Arc(burning, begin + t, states, mass, switching, burning * switching + coast_hamiltonian(states))
+
+    for k in reversed(range(problem.burns)):
+        start, duration, begin = solution.states[2 * k], solution.durations[k], solution.ignitions[k]
+        t = np.linspace(0.0, duration, n)
+        costate = mass_costate + np.array([_push(problem, start, masses[k], low, duration) for low in t])
+        yield arc(True, begin, t, _flown(problem, start, masses[k], t), masses[k] - problem.flow * t, costate)
         mass_costate = float(costate[0])
         if k > 0:
             t = np.linspace(0.0, solution.coasts[k - 1], n)
             states = coast(np.repeat(solution.states[2 * k - 1][None], n, axis=0), t)
-            size = np.linalg.norm(states[:, 6:9], axis=1)
-            switching = unit - problem.thrust * size / masses[k] - problem.flow * mass_costate
-            before = solution.ignitions[k] - solution.coasts[k - 1]
-            yield Arc(False, before + t, states, np.full(n, masses[k]), switching, coast_hamiltonian(states))
+            yield arc(False, begin - t[-1], t, states, np.full(n, masses[k]), mass_costate)
 
 
 def _push(problem: Problem, start: np.ndarray, mass: float, low: float, high: float) -> float:

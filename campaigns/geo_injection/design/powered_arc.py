@@ -35,34 +35,29 @@ def _rates(y, acceleration, out):
 
 
 @compile_kernel
-def _fly_one(y, mass, duration, thrust, flow, n_steps, nodes, starts, columns, weights, stages):
+def _fly_one(y, mass, duration, thrust, flow, n_steps):
     """Carry y over one burn in place, canonical.  mass : at its start;  thrust, flow : per initial mass.
 
     Weights of order 8 of DOP853: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993).
     """
     h = duration / n_steps
-    n_stages = stages.shape[0]
-    now = np.empty(y.shape[0])
+    now, stages = np.empty(y.size), np.empty((_STAGES, y.size))
     for step in range(n_steps):
-        t = step * h
-        for stage in range(n_stages + 1):
+        for stage in range(_STAGES + 1):
             now[:] = y
-            for k in range(starts[stage], starts[stage + 1]):
-                for i in range(now.shape[0]):
-                    now[i] += h * weights[k] * stages[columns[k], i]
-            if stage == n_stages:
+            for k in range(_STARTS[stage], _STARTS[stage + 1]):
+                for i in range(now.size):
+                    now[i] += h * _WEIGHTS[k] * stages[_COLUMNS[k], i]
+            if stage == _STAGES:
                 y[:] = now
             else:
-                _rates(now, thrust / (mass - flow * (t + nodes[stage] * h)), stages[stage])
+                _rates(now, thrust / (mass - flow * (step * h + _NODES[stage] * h)), stages[stage])
 
 
 @compile_kernel
-def _fly_all(y, mass, duration, thrust, flow, n_steps, nodes, starts, columns, weights, n_stages):
-    stages = np.empty((n_stages, y.shape[1]))
+def _fly_all(y, mass, duration, thrust, flow, n_steps):
     for case in range(y.shape[0]):
-        _fly_one(
-            y[case], mass[case], duration[case], thrust, flow, n_steps, nodes, starts, columns, weights, stages
-        )  # fmt: skip
+        _fly_one(y[case], mass[case], duration[case], thrust, flow, n_steps)
 
 
 def fly_burns(
@@ -75,9 +70,7 @@ def fly_burns(
     ones.  A burn may last a negative time: it is then flown backward.
     """
     out = np.array(y, dtype=np.float64)
-    n = out.shape[0]
-    mass = np.ascontiguousarray(np.broadcast_to(mass, n), dtype=np.float64)
-    duration = np.ascontiguousarray(np.broadcast_to(duration, n), dtype=np.float64)
+    mass, duration = (np.broadcast_to(column, len(out)).astype(np.float64) for column in (mass, duration))
     n_steps = max(8, int(np.ceil(np.abs(duration).max() / step)))
-    _fly_all(out, mass, duration, thrust, flow, n_steps, _NODES, _STARTS, _COLUMNS, _WEIGHTS, _STAGES)
+    _fly_all(out, mass, duration, thrust, flow, n_steps)
     return out

@@ -4,17 +4,16 @@ A burn is one or more segments, on each of which the primer vector is a polynomi
 segment's start to 1 at its end; thrust points along it.  Its length means nothing.  Text files of TOML keep a program.
 """
 
+import json
 import tomllib
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from campaigns.geo_injection.design.optimal import Solution
 from campaigns.geo_injection.design.sequence import DESIGN, Sequence
-from campaigns.geo_injection.design.staged import StagedBurn
 
 DEGREE = 11
 _LONGEST = 2.5  # canonical time of a segment: the fit is then good to 1e-7 rad
@@ -81,19 +80,12 @@ def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float)
         series = chebyshev.chebfit(nodes, primer, DEGREE)
         error = np.cross(chebyshev.chebval(nodes, series).T, primer) / (primer**2).sum(1)[:, None]
         worst = max(worst, float(np.abs(error).max()))
-        steering = np.array([_powers(column) for column in series.T])
+        powers = [chebyshev.cheb2poly(column) for column in series.T]
+        # numpy drops the zeros at their end
+        steering = np.array([np.pad(column, (0, DEGREE + 1 - column.size)) for column in powers])
         unit = sequence.time_unit
         segments.append(Segment(float(low * unit), float((high - low) * unit), steering))
     return worst, tuple(segments)
-
-
-def _powers(column: np.ndarray) -> np.ndarray:
-    """Coefficients (no unit) of powers from those of a Chebyshev series; numpy drops the zeros at their end."""
-    powers = chebyshev.cheb2poly(column)
-    return np.pad(powers, (0, DEGREE + 1 - powers.size))
-
-
-Flown = tuple[float, float, np.ndarray, np.ndarray]
 
 
 def _in_space(sequence: Sequence, state: np.ndarray) -> np.ndarray:
@@ -102,49 +94,39 @@ def _in_space(sequence: Sequence, state: np.ndarray) -> np.ndarray:
     return np.concatenate([place, sequence.inertial(state[3:6]) * sequence.speed_unit])
 
 
-def program_of(sequence: Sequence, flown: list[Flown], optimal: bool) -> Program:
+def program_of(sequence: Sequence, flown: list[tuple], optimal: bool) -> Program:
     """The program of burns given as (ignition, duration, states at ignition and cut-off) in canonical units."""
     burns, mass, unit = [], 1.0, sequence.time_unit
-    flow = sequence.problem().flow
     for ignition, duration, state, end in flown:
         error, segments = _fitted(sequence, state, mass, duration)
         times = float(ignition * unit), float(duration * unit)
         burns.append(BurnProgram(*times, error, _in_space(sequence, end), segments))
-        mass -= flow * duration
+        mass -= sequence.problem().flow * duration
     return Program(sequence, _in_space(sequence, flown[0][2]), tuple(burns), optimal)
 
 
-def of_solution(sequence: Sequence, solution: Solution, optimal: bool) -> Program:
-    """The program of the free-time optimum."""
-    rows = zip(solution.ignitions, solution.durations, solution.states[::2], solution.states[1::2], strict=True)
-    return program_of(sequence, list(rows), optimal)
-
-
-def of_stages(sequence: Sequence, stages: list[StagedBurn]) -> Program:
-    """The program of the staged procedure."""
-    rows = [(stage.ignition, stage.burn.duration, stage.burn.start, stage.burn.end) for stage in stages]
-    return program_of(sequence, rows, False)
+# the names of numbers in the text, which carry their units
+_OF_BURN = {"ignition": "ignition_s", "duration": "duration_s", "error": "direction_error_rad", "end": "end"}
+_OF_SEGMENT = {"start": "start_s", "length": "length_s"}
 
 
 def to_text(program: Program) -> str:
     """The program as TOML, SI."""
-    lines = ["# Burn program: see program.py.  Written by the design; edit its inputs instead.", f"design = {DESIGN}"]
-    lines += [f"optimal = {str(program.optimal).lower()}", f"start = {_list(program.start)}", "", "[sequence]"]
-    for name, value in program.sequence.record().items():
-        lines.append(f'{name} = "{value}"' if isinstance(value, str) else f"{name} = {value!r}")
+    whole = {"design": DESIGN, "optimal": program.optimal, "start": program.start}
+    lines = ["# Burn program: see program.py.  Written by the design; edit its inputs instead.", *_lines(whole)]
+    lines += ["", "[sequence]", *_lines(asdict(program.sequence))]
     for burn in program.burns:
-        lines += ["", "[[burn]]", f"ignition_s = {burn.ignition!r}", f"duration_s = {burn.duration!r}"]
-        lines.append(f"direction_error_rad = {burn.error!r}")
-        lines.append(f"end = {_list(burn.end)}")
+        lines += ["", "[[burn]]", *_lines({key: getattr(burn, name) for name, key in _OF_BURN.items()})]
         for segment in burn.segments:
-            lines += ["", "[[burn.segment]]", f"start_s = {segment.start!r}", f"length_s = {segment.length!r}"]
-            lines += [f"{axis} = {_list(row)}" for axis, row in zip("xyz", segment.steering, strict=True)]
+            values = {key: getattr(segment, name) for name, key in _OF_SEGMENT.items()}
+            values |= dict(zip("xyz", segment.steering, strict=True))
+            lines += ["", "[[burn.segment]]", *_lines(values)]
     return "\n".join(lines) + "\n"
 
 
-def _list(values: np.ndarray) -> str:
-    """Numbers as a TOML array with every digit of float64[n]."""
-    return "[" + ", ".join(repr(float(value)) for value in values) + "]"
+def _lines(values: dict[str, Any]) -> list[str]:
+    """Key and value of each number, array or word, with every digit: TOML's values are those of JSON."""
+    return [f"{key} = {json.dumps(np.asarray(value).tolist())}" for key, value in values.items()]
 
 
 def from_text(text: str) -> Program:
@@ -154,17 +136,14 @@ def from_text(text: str) -> Program:
         raise ValueError("a program of another design")
     inputs: dict[str, Any] = record["sequence"]
     sequence = Sequence(**{**inputs, "between": tuple(tuple(row) for row in inputs["between"])})
-    burns = tuple(
-        BurnProgram(
-            burn["ignition_s"],
-            burn["duration_s"],
-            burn["direction_error_rad"],
-            np.array(burn["end"]),
-            tuple(
-                Segment(segment["start_s"], segment["length_s"], np.array([segment[axis] for axis in "xyz"]))
-                for segment in burn["segment"]
-            ),
-        )
-        for burn in record["burn"]
-    )
+    burns = tuple(_burn_of(burn) for burn in record["burn"])
     return Program(sequence, np.array(record["start"]), burns, bool(record["optimal"]))
+
+
+def _burn_of(record: dict[str, Any]) -> BurnProgram:
+    segments = tuple(
+        Segment(**{name: one[key] for name, key in _OF_SEGMENT.items()}, steering=np.array([one[x] for x in "xyz"]))
+        for one in record["segment"]
+    )
+    values = {name: record[key] for name, key in _OF_BURN.items()}
+    return BurnProgram(**values | {"end": np.array(values["end"])}, segments=segments)

@@ -8,7 +8,7 @@ import numpy as np
 
 from campaigns.geo_injection.design.continuation import optimum
 from campaigns.geo_injection.design.optimality import is_optimal
-from campaigns.geo_injection.design.program import Program, from_text, of_solution, of_stages, to_text
+from campaigns.geo_injection.design.program import Program, from_text, program_of, to_text
 from campaigns.geo_injection.design.sequence import Sequence
 from campaigns.geo_injection.design.staged import staged
 from mc_engine.model import kept_design
@@ -20,9 +20,12 @@ def new_design(sequence: Sequence) -> Program:
     """The program, designed now; ModelError says how far the search got where it found none."""
     problem = sequence.problem()
     if sequence.method == "staged":
-        return of_stages(sequence, staged(problem, sequence.orbits_between()))
-    solution = optimum(problem)
-    return of_solution(sequence, solution, is_optimal(solution))
+        stages = staged(problem, sequence.orbits_between())
+        flown = [(stage.ignition, stage.burn.duration, stage.burn.start, stage.burn.end) for stage in stages]
+        return program_of(sequence, flown, optimal=False)
+    best = optimum(problem)
+    rows = zip(best.ignitions, best.durations, best.states[::2], best.states[1::2], strict=True)
+    return program_of(sequence, list(rows), is_optimal(best))
 
 
 @lru_cache(maxsize=256)

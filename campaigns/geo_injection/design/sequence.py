@@ -1,6 +1,6 @@
 """What a burn program is designed for: the orbits, the engine and the method, in SI; and its canonical problem."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -80,10 +80,6 @@ class Sequence:
         x, y, z = vectors[..., 0], vectors[..., 1], self.turn * vectors[..., 2]
         c, s = np.cos(self.final_inclination), np.sin(self.final_inclination)
         return np.stack([x, c * y - s * z, s * y + c * z], axis=-1)
-
-    def record(self) -> dict[str, object]:
-        """The inputs as plain data."""
-        return {**asdict(self), "between": [list(row) for row in self.between]}
 
 
 def source_orbits(burns: int, plane_change: float) -> tuple[tuple[float, float, float], ...]:

@@ -6,17 +6,15 @@ H = 1 + q.v - p.g - T |p| / m (eq. 13) and eqs (14), (15) say "thrust along p".
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from campaigns.geo_injection.design.coast import coast
-from campaigns.geo_injection.design.optimal import SOLVED, coast_hamiltonian
+from campaigns.geo_injection.design.coast import IMAGINARY, coast
+from campaigns.geo_injection.design.optimal import SOLVED, coast_hamiltonian, searched
 from mc_engine.errors import ModelError
 
 Conditions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of place and velocity [n, 3], complex too: [n, m]
-_STEP = 1e-6
-_IMAGINARY = 1e-40
 
 
 @dataclass(frozen=True)
@@ -76,22 +74,22 @@ def circle(radius: float) -> Conditions:
     return reached
 
 
-def orbit(a: float, e: float, inclination: float) -> Conditions:
-    """An ellipse of given size, shape and inclination with node and apse line on the x axis, canonical.
+def orbit(a: float, e: float, inclination: float, apse_on_node: bool = True) -> Conditions:
+    """An ellipse of given size, shape and inclination with its node on the x axis, canonical.
 
-    Conditions: the angular momentum by eq. (17), the energy -1 / (2 a), and an eccentricity vector without a component
-    across the x axis.
+    Conditions: the angular momentum by eq. (17), the energy -1 / (2 a), and, unless the apse line is free, an
+    eccentricity vector without a component across the x axis.
     """
     h_wanted = np.sqrt(a * (1.0 - e * e))
 
     def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
         h = np.cross(r, v)
-        r1 = np.sqrt((r * r).sum(-1))
-        v2 = (v * v).sum(-1)
+        r1, v2 = np.sqrt((r * r).sum(-1)), (v * v).sum(-1)
         rows = [h[..., 0], h[..., 1] + h_wanted * np.sin(inclination), h[..., 2] - h_wanted * np.cos(inclination)]
         rows.append(v2 - 2.0 / r1 + 1.0 / a)
-        apse = (v2 - 1.0 / r1)[..., None] * r - (r * v).sum(-1)[..., None] * v
-        rows.append(apse[..., 1] * np.cos(inclination) + apse[..., 2] * np.sin(inclination))
+        if apse_on_node:
+            apse = (v2 - 1.0 / r1)[..., None] * r - (r * v).sum(-1)[..., None] * v
+            rows.append(apse[..., 1] * np.cos(inclination) + apse[..., 2] * np.sin(inclination))
         return np.stack(rows, axis=-1)
 
     return reached
@@ -111,10 +109,8 @@ def _residuals(stage: Stage, x: np.ndarray) -> np.ndarray:
     """End conditions, transversality, H = 0 at the end, and the rule that places the ignition."""
     start, end = _ends(stage, x)
     r, v = end[:, :3], end[:, 3:6]
-    gradients = []
-    for k in range(6):
-        step = 1j * _IMAGINARY * np.eye(1, 6, k)[0]
-        gradients.append(stage.reached(r + step[:3], v + step[3:]).imag / _IMAGINARY)
+    steps = 1j * IMAGINARY * np.eye(6)
+    gradients = [stage.reached(r + step[:3], v + step[3:]).imag / IMAGINARY for step in steps]
     costate = np.concatenate([end[:, 9:12], -end[:, 6:9]], axis=1)
     across = costate - np.einsum("knm,nm->nk", np.array(gradients), x[:, 8:])
     unit = stage.thrust / stage.mass  # the costates are those of eq. (13), times this
@@ -142,21 +138,8 @@ def fly_shortest(stage: Stage, primer: np.ndarray, rate: np.ndarray, duration: f
         basis[:, 8:] = np.eye(m)
         columns = free[:, None] - _residuals(stage, basis)[:, m : m + 6].T
         x[8:] = np.linalg.lstsq(columns, free, rcond=None)[0]
-
-        def value(x: np.ndarray) -> np.ndarray:
-            return np.nan_to_num(_residuals(stage, x[None])[0], nan=1e3, posinf=1e3, neginf=-1e3)
-
-        def slope(x: np.ndarray) -> np.ndarray:
-            steps = _STEP * np.diag(np.maximum(1.0, np.abs(x)))
-            both = np.nan_to_num(_residuals(stage, np.concatenate([x + steps, x - steps])))
-            return (both[: x.size] - both[x.size :]).T / (2.0 * np.diag(steps))
-
-        search = least_squares(value, x, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15)
-        x = search.x
-        for _ in range(2):
-            x = x - np.linalg.lstsq(slope(x), value(x), rcond=1e-10)[0]
-        left = float(np.abs(value(x)).max())
+        x, left, iterations = searched(partial(_residuals, stage), x)
     if not left < SOLVED or x[6] <= 0.0:
         raise ModelError(f"the search for the shortest burn stopped with a residual of {left:.1e}")
     start, end = _ends(stage, x[None])
-    return Burn(float(x[7]), float(x[6]), start[0], end[0], int(search.njev))
+    return Burn(float(x[7]), float(x[6]), start[0], end[0], iterations)

@@ -24,6 +24,15 @@ class Orbit:
     e: float
     inclination: float
 
+    def apsis(self, side: float) -> np.ndarray:
+        """Place and velocity [6] at perigee (side 1.0, on the ascending node) or apogee (-1.0, on the descending one).
+
+        The vis-viva equation at r = a (1 - side e).
+        """
+        r, i = self.a * (1.0 - side * self.e), self.inclination
+        speed = np.sqrt((1.0 + side * self.e) / r)
+        return side * np.array([r, 0.0, 0.0, 0.0, speed * np.cos(i), speed * np.sin(i)])
+
 
 @dataclass(frozen=True)
 class StagedBurn:
@@ -49,8 +58,10 @@ def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
         reached = circle(problem.ratio) if last else orbit(between[k].a, between[k].e, between[k].inclination)
         placing = "free" if k == 0 and circle_first else "centred"
         stage = Stage(reference, mass, problem.thrust, problem.flow, reached, placing)
-        wanted = -np.sqrt(1.0 / problem.ratio) if last else _perigee_speed(between[k])
-        burn = _last(stage, wanted, problem) if last else _shortest(stage, wanted, between[k].inclination)
+        if last:
+            burn = _last(stage, problem)
+        else:
+            burn = shortest(stage, float(np.linalg.norm(between[k].apsis(1.0)[3:])), between[k].inclination)
         ignition = 0.0 if k == 0 else lead + burn.ignition
         burns.append(StagedBurn(ignition, burn))
         mass -= problem.flow * burn.duration
@@ -61,26 +72,25 @@ def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
     return burns
 
 
-def _perigee_speed(transfer: Orbit) -> float:
-    """Canonical speed at perigee, sqrt((1 + e) / ((1 - e) a)): the vis-viva equation at r = a (1 - e)."""
-    return float(np.sqrt((1.0 + transfer.e) / ((1.0 - transfer.e) * transfer.a)))
+def shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
+    """The burn, guessed as an impulse at the reference that gives the wanted speed; the rocket equation times it.
 
-
-def _shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
-    """The burn, guessed as an impulse at the apsis that gives the wanted speed; the rocket equation times it."""
+    Canonical; the impulse is centred in the burn, unless the burn is to be ignited at the reference.
+    """
     r, v = stage.reference[:3], stage.reference[3:]
     change = wanted * np.array([0.0, np.cos(inclination), np.sin(inclination)]) - v
     size = float(np.linalg.norm(change))
     duration = stage.mass * -np.expm1(-size * stage.flow / stage.thrust) / stage.flow
     primer = change / size
     rate = np.cross(np.cross(r, v) / (r @ r), primer)  # the thrust turns with the local horizon
-    return fly_shortest(stage, primer - 0.5 * duration * rate, rate, duration, -0.5 * duration)
+    ignition = 0.0 if stage.placing == "fixed" else -0.5 * duration
+    return fly_shortest(stage, primer - 0.5 * duration * rate, rate, duration, ignition)
 
 
-def _last(stage: Stage, wanted: float, problem: Problem) -> Burn:
+def _last(stage: Stage, problem: Problem) -> Burn:
     """The burn into the final circle: guessed as an impulse or, if nothing is found so, by eq. (23)."""
     try:
-        return _shortest(stage, wanted, 0.0)
+        return shortest(stage, -np.sqrt(1.0 / problem.ratio), 0.0)
     except ModelError:
         r, v = stage.reference[:3], stage.reference[3:]
         r0 = float(np.linalg.norm(r))

@@ -6,45 +6,39 @@ record.
 
 from functools import lru_cache
 
-import numpy as np
-
-from campaigns.geo_injection.avoidance import AVOIDANCE, analytic_guess, burn_of, converged
+from campaigns.geo_injection.avoidance import RISE, avoidance
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
 from campaigns.geo_injection.design.programs import program_for
-from campaigns.geo_injection.design.staged import Orbit, staged
+from campaigns.geo_injection.design.single_burn import rise_guess
+from campaigns.geo_injection.design.staged import staged
 from campaigns.geo_injection.model import MODEL
-from campaigns.geo_injection.published.burns import ORBITS
+from campaigns.geo_injection.published.burns import USED_KG, printed_orbits
 from mc_engine.physics.constants import STANDARD_GRAVITY
-
-_COLUMNS = ("burn_time", "radial", "transverse")  # of table 1; the last two are velocity costates
 
 
 def avoidance_analytic(column: str) -> float:
-    """Row 1 of table 1, eq. (18), canonical.  column : burn_time, radial or transverse"""
-    return analytic_guess(AVOIDANCE)[_COLUMNS.index(column)]
+    """Row 1 of table 1, eq. (18), canonical.  column : burn_time, radial or transverse; the last two are costates"""
+    burn_time, radial, transverse = rise_guess(RISE)
+    return {"burn_time": burn_time, "radial": radial, "transverse": transverse}[column]
 
 
 def avoidance_converged(column: str) -> float:
-    """Row 4 of table 1, the solution of the boundary-value problem, canonical."""
-    return converged(AVOIDANCE)[_COLUMNS.index(column)]
+    """Row 4 of table 1, the solution of the boundary-value problem, canonical, in the scale and sign of the table."""
+    burn = avoidance()
+    scale = -burn.start[9]
+    return {"burn_time": burn.duration, "radial": burn.start[6] / scale, "transverse": burn.start[7] / scale}[column]
 
 
 def avoidance_iterations() -> int:
     """Steps of our search (Levenberg–Marquardt, to 1e-9) for row 4 of table 1."""
-    return burn_of(AVOIDANCE).iterations
+    return avoidance().iterations
 
 
 @lru_cache
 def _iterations() -> list[int]:
     """Steps of our search for each burn of the staged sequences over the printed orbits."""
-    steps = []
-    for name, orbits in ORBITS.items():
-        unit = SEQUENCES[name].parking_radius
-        between = tuple(
-            Orbit(1e3 * orbit.a_km / unit, orbit.e, float(np.radians(orbit.inclination_deg))) for orbit in orbits
-        )
-        steps += [stage.burn.iterations for stage in staged(SEQUENCES[name].problem(), between)]
-    return steps
+    flown = [staged(SEQUENCES[name].problem(), printed_orbits(name)) for name in USED_KG]
+    return [stage.burn.iterations for stages in flown for stage in stages]
 
 
 def most_iterations() -> int:

@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.dynamics import R0
 from campaigns.geo_servicing.model import MODEL, nominal_start
 from campaigns.geo_servicing.phasing_plan import PUBLISHED, design
 from campaigns.geo_servicing.planned_flight import Craft
 from mc_engine.flight.chosen_cases import chosen_history
 from mc_engine.flight.kernel_parts import settings_class
-from mc_engine.physics.geopotential import harmonics_table
 from mc_engine.studies.published_values import dispersed_cases
 
 _FOLDER = Path(__file__).resolve().parents[1]
@@ -80,11 +78,8 @@ def _designed() -> tuple[np.ndarray, np.ndarray]:
     """Coasts before the burns of our own plan, and the burns [s], float64[3] each."""
     chosen: dict[str, Any] = {"navigation": "perfect", "schedule": "designed", "sunlight": False}
     codes = [setting.code(chosen.get(setting.name, setting.default)) for setting in MODEL.settings]
-    o = settings_class(MODEL)(*codes, np.empty(0))
-    first, sun_moon = nominal_start(o)
-    rows = harmonics_table(int(o.gravity_degree), int(o.gravity_order))
-    craft = Craft(o, np.concatenate([plan_table.no_plan(), rows.ravel(), sun_moon.ravel()]), first)
-    plan, _ = design(o, craft)
+    craft = Craft(*nominal_start(settings_class(MODEL)(*codes, np.empty(0))))
+    plan = design(craft)
     return plan.coasts, craft.burn_times(plan.dv)
 
 

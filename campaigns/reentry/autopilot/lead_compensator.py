@@ -6,7 +6,7 @@ K. Ogata, Modern Control Engineering, section on lead compensation by the freque
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -79,9 +79,14 @@ def design_lead(plant: Response, gain: float, margin: float) -> Lead:
 def _lead_of(plant: Response, gain: float, lead: float) -> Lead:
     """The stage that gives this phase [rad] at the new crossover."""
     alpha = (1.0 - np.sin(lead)) / (1.0 + np.sin(lead))
-    w = crossover_of(lambda x: gain * plant(x), float(np.sqrt(alpha)))
-    stage = Lead(gain / alpha, w * float(np.sqrt(alpha)), w / float(np.sqrt(alpha)), Margins(0.0, 0.0))
-    return Lead(stage.gain, stage.zero, stage.pole, margins_of(lambda x: stage.response(x) * plant(x)))
+    return stage(plant, gain, alpha, crossover_of(lambda x: gain * plant(x), float(np.sqrt(alpha))))
+
+
+def stage(plant: Response, gain: float, alpha: float, w: float) -> Lead:
+    """The compensator with the ratio alpha of zero to pole, its largest lead at w [rad/s]: zero w sqrt(alpha)."""
+    root = float(np.sqrt(alpha))
+    bare = Lead(gain / alpha, w * root, w / root, Margins(0.0, 0.0))
+    return replace(bare, margins=margins_of(lambda x: bare.response(x) * plant(x)))
 
 
 def short_period(stiffness: float, damping: float = 0.0) -> Response:

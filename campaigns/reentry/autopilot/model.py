@@ -21,6 +21,7 @@ from campaigns.reentry.autopilot.gains import (
     STEPS,
     autopilot_tables,
 )
+from campaigns.reentry.guidance.reference_table import between_rows
 from mc_engine.lanes import floor, look_up, maximum, minimum, physics, sqrt, where
 from mc_engine.model import (
     Field,
@@ -108,34 +109,22 @@ Metrics = metrics(
     limited_share=Field("share of the time with a torque at its limit", unit=""),
     final_alpha_deg=at_end("alpha_deg", "angle of attack error at the end"),
 )
-Parameters = namedtuple(
+Parameters = namedtuple(  # type: ignore[misc]
     "Parameters",
-    "alpha alpha_rate bank moment damping offset roll_moment pressure known torque_pitch torque_roll inverse_pitch "
-    "inverse_roll amplitude period bank_rate",
+    (*Inputs._fields, "moment", "damping", "roll_moment", "inverse_pitch", "inverse_roll"),
 )
 
 
 def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Kernel parameters of each case, SI: coefficients over its inertia, torques, errors."""
+    """Kernel parameters of each case, SI: the inputs, and coefficients over its inertia."""
     pitch, roll = settings.inertia_pitch * i.inertia_pitch_factor, settings.inertia_roll * i.inertia_roll_factor
     lever = settings.area * settings.diameter / pitch
-    return {
-        "alpha": i.initial_alpha,
-        "alpha_rate": i.initial_alpha_rate,
-        "bank": i.initial_bank,
+    return vars(i) | {
         "moment": lever * settings.c_m_alpha * i.c_m_alpha_factor,
         "damping": 0.5 * lever * settings.diameter * i.c_mq,
-        "offset": i.trim_offset,
         "roll_moment": settings.area * i.side_force_coefficient * i.side_offset / roll,
-        "pressure": i.pressure_factor,
-        "known": i.pressure_known_factor,
-        "torque_pitch": i.torque_pitch,
-        "torque_roll": i.torque_roll,
         "inverse_pitch": 1.0 / pitch,
         "inverse_roll": 1.0 / roll,
-        "amplitude": i.bank_amplitude,
-        "period": i.reversal_period,
-        "bank_rate": i.commanded_rate,
     }
 
 
@@ -143,20 +132,18 @@ def prepare(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -
 def initial(p):
     """At entry, compensators at rest."""
     return State(
-        alpha=p.alpha, alpha_rate=p.alpha_rate, bank=p.bank, bank_rate=0.0, lead_alpha=0.0, lead_bank=0.0,
-        alpha_square=0.0, bank_square=0.0, impulse=0.0, limited=0.0,
+        alpha=p.initial_alpha, alpha_rate=p.initial_alpha_rate, bank=p.initial_bank, bank_rate=0.0, lead_alpha=0.0,
+        lead_bank=0.0, alpha_square=0.0, bank_square=0.0, impulse=0.0, limited=0.0,
     )  # fmt: skip
 
 
 @physics
 def air_at(t, p, o):
     """(dynamic pressure [Pa], speed [m/s]) of the planned entry, the pressure of the day on it."""
-    at = minimum(maximum(t + 0.0 * p.pressure, 0.0), look_up(o.tables, LAST_SECOND) - 1e-6)
+    at = minimum(maximum(t, 0.0), look_up(o.tables, LAST_SECOND) - 1e-6)
     second = floor(at)
     x, row = at - second, PROFILE + 2.0 * second
-    q0, q1 = look_up(o.tables, row), look_up(o.tables, row + 2.0)
-    v0, v1 = look_up(o.tables, row + 1.0), look_up(o.tables, row + 3.0)
-    return p.pressure * (q0 + x * (q1 - q0)), v0 + x * (v1 - v0)
+    return p.pressure_factor * between_rows(o.tables, row, 2.0, x), between_rows(o.tables, row + 1.0, 2.0, x)
 
 
 @physics
@@ -165,25 +152,26 @@ def pitch_gains(pressure, o):
     place = minimum(maximum(pressure * ((STEPS - 1) / STEEPEST), 0.0), STEPS - 1.000001)
     step = floor(place)
     x, row = place - step, SCHEDULE + 3.0 * step
-    a0, b0 = look_up(o.tables, row), look_up(o.tables, row + 3.0)
-    a1, b1 = look_up(o.tables, row + 1.0), look_up(o.tables, row + 4.0)
-    a2, b2 = look_up(o.tables, row + 2.0), look_up(o.tables, row + 5.0)
-    return a0 + x * (b0 - a0), a1 + x * (b1 - a1), a2 + x * (b2 - a2)
+    return (
+        between_rows(o.tables, row, 3.0, x),
+        between_rows(o.tables, row + 1.0, 3.0, x),
+        between_rows(o.tables, row + 2.0, 3.0, x),
+    )
 
 
 @physics
 def bank_command(t, p):
     """Commanded bank [rad]: reversals from one side to the other, half a period after entry and every period on."""
-    number = floor(t / p.period + 0.5)
-    since = t - p.period * number
+    number = floor(t / p.reversal_period + 0.5)
+    since = t - p.reversal_period * number
     side = where(number - 2.0 * floor(0.5 * number) < 0.5, 1.0, -1.0)
-    return side * minimum(maximum(p.bank_rate * since, -p.amplitude), p.amplitude)
+    return side * minimum(maximum(p.commanded_rate * since, -p.bank_amplitude), p.bank_amplitude)
 
 
 @physics
 def torques(t, s, p, o, pressure):
     """(pitch torque, roll torque [N m] within their limits, bank error, rates of both compensators, at a limit)."""
-    gain, zero, pole = pitch_gains(p.known * pressure, o)
+    gain, zero, pole = pitch_gains(p.pressure_known_factor * pressure, o)
     error = bank_command(t, p) - s.bank
     bank_zero, bank_pole = look_up(o.tables, BANK_ZERO), look_up(o.tables, BANK_POLE)
     wanted_pitch = o.inertia_pitch * gain * (s.lead_alpha - s.alpha)
@@ -206,7 +194,7 @@ def rhs(t, s, p, o):
     """
     pressure, speed = air_at(t, p, o)
     pitch, roll, error, lead_alpha, lead_bank, limited = torques(t, s, p, o, pressure)
-    air = pressure * (p.moment * (s.alpha - p.offset) + p.damping * s.alpha_rate / speed)
+    air = pressure * (p.moment * (s.alpha - p.trim_offset) + p.damping * s.alpha_rate / speed)
     return State(
         alpha=s.alpha_rate,
         alpha_rate=air + pitch * p.inverse_pitch,

@@ -9,7 +9,7 @@ command the vertical share u = cos(bank) of the lift; roll relative to the verti
 from collections import namedtuple
 
 from campaigns.reentry.bank import followed, lateral_miss, side_of
-from campaigns.reentry.dynamics import Memory, exposure_of, place_of, speed2
+from campaigns.reentry.dynamics import Memory, Reckoning, Steering, Turn, exposure_of, place_of, speed2
 from campaigns.reentry.guidance.apollo_final_phase import OVERCONTROL, REFERENCE_LIFT_TO_DRAG
 from campaigns.reentry.guidance.reference_table import (
     FELT,
@@ -21,12 +21,11 @@ from campaigns.reentry.guidance.reference_table import (
     by_speed,
     clocked_range,
 )
-from campaigns.reentry.inputs import GUIDANCE
+from campaigns.reentry.inputs import APOLLO_LAW, LAW1, LAW2, LAW3, LAW3R, UNGUIDED
 from mc_engine.lanes import acos, any_lane, asin, atan2, log, maximum, minimum, physics, sqrt, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.aerodynamics import axial_coefficient
 
-LAW1, LAW2, LAW2R, LAW3, LAW3R, APOLLO = (float(GUIDANCE.index(law)) for law in GUIDANCE[1:])
 LEAST_SHARE = -0.9659258262890683  # cos 165 deg: never quite lift down
 SCALE_HEIGHT = 7000.0  # m, by which drag is read as altitude
 LARGEST_CLIMB, LARGEST_TILT = 6000.0, 0.03490658503988659  # 6 km and 2 deg: bounds of what drag is read as
@@ -34,9 +33,6 @@ LARGEST_CLIMB, LARGEST_TILT = 6000.0, 0.03490658503988659  # 6 km and 2 deg: bou
 # speed, altitude, flight-path angle, range, altitude rate: as navigated; drag, axial: decelerations as measured;
 # load: total over axial load of the present trim, and total load over drag
 Sensed = namedtuple("Sensed", "speed altitude path along climb drag axial load_by_axial load_by_drag")
-# what law 3 keeps: speed lost W, reckoned range, present rate of it, measured deceleration, its logarithm over the
-# stored one
-Reckoning = namedtuple("Reckoning", "lost range rate axial excess")
 
 
 @physics
@@ -53,15 +49,15 @@ def sensed(s, p, o, draws):
     up = s.x * p.ex + s.y * p.ey + s.z * p.ez
     ahead = s.x * p.fx + s.y * p.fy + s.z * p.fz
     sine = (s.vx * place.ux + s.vy * place.uy + s.vz * place.uz) / v
-    wrong, stretch = p.accelerometer_bias, 1.0 + p.accelerometer_scale
+    wrong, stretch = p.accelerometer_bias, 1.0 + p.accelerometer_scale_error
     if any_lane(p.accelerometer_noise > 0.0):
         wrong = wrong + p.accelerometer_noise * normal_pair(draws, 0)[0]
     return Sensed(
-        speed=v + p.nav_speed,
-        altitude=altitude + p.nav_altitude,
-        path=asin(bounded(sine, 1.0)) + p.nav_path,
-        along=p.radius * atan2(ahead, up) + p.nav_range,
-        climb=place.climb + p.nav_climb,
+        speed=v + p.nav_speed_error,
+        altitude=altitude + p.nav_altitude_error,
+        path=asin(bounded(sine, 1.0)) + p.nav_flight_path_angle_error,
+        along=p.radius * atan2(ahead, up) + p.nav_range_error,
+        climb=place.climb + p.nav_climb_error,
         drag=stretch * (pressure * axial_coefficient(force.drag, force.lift, p.cos_misaligned, p.sin_misaligned))
         + wrong,
         axial=stretch * (pressure * force.sensed) + wrong,
@@ -91,7 +87,7 @@ def navigated_share(x, p, o):
         high = bounded(-SCALE_HEIGHT * (x.drag / row.drag - 1.0), LARGEST_CLIMB)
         tilt = (x.climb - row.climb) / x.speed
     if o.guidance == LAW2:
-        along = 0.0 * along
+        along = 0.0
     return -(row.k_altitude * high + row.k_path * tilt + row.k_range * along)
 
 
@@ -109,27 +105,27 @@ def apollo_share(x, p, o):
 
 
 @physics
-def reckoned(t, m, x, p, o):
+def reckoned(t, kept, x, p, o):
     """The accelerometer's account after a sample: by the clock until the air is felt, then by the speed lost [m/s].
 
     W = integral of n dt and the range [m] along W by trapezoids; derived here for the source's law 3.
     """
     period = o.guidance_period
-    before = m.lost <= 0.0
+    before = kept.lost <= 0.0
     felt = x.axial > FELT
     # of the sample in which the threshold is passed, the part beyond it
-    part = (x.axial - FELT) / where(x.axial > m.axial, x.axial - m.axial, 1.0)
+    part = (x.axial - FELT) / where(x.axial > kept.axial, x.axial - kept.axial, 1.0)
     first = 0.5 * (x.axial + FELT) * bounded(part, 1.0) * period
-    lost = where(before, where(felt, first, 0.0), m.lost + 0.5 * (x.axial + m.axial) * period)
+    lost = where(before, where(felt, first, 0.0), kept.lost + 0.5 * (x.axial + kept.axial) * period)
     row = by_loss(o.tables, p.reference, lost)
     by_clock = clocked_range(o.tables, p.reference, t)
-    along = where(before, by_clock, m.reckoned + 0.5 * (row.range_rate + m.range_rate) * period)
+    along = where(before, by_clock, kept.range + 0.5 * (row.range_rate + kept.rate) * period)
     excess = log(maximum(x.axial, 1e-6)) - row.log_axial
     return Reckoning(lost, along, row.range_rate, x.axial, excess)
 
 
 @physics
-def accelerometer_share(now, m, p, o):
+def accelerometer_share(now, before, p, o):
     """Law 3: vertical share of the lift less that of the reference, without unit, and the stored speed [m/s].
 
     dh = -H_s (n - n_r) / n_r and h' = -H_s [rate of ln(n / n_r) + 2 (n - n_r) / V_r]: the logarithm of n ~ rho V^2
@@ -138,36 +134,35 @@ def accelerometer_share(now, m, p, o):
     row = by_loss(o.tables, p.reference, now.lost)
     share = now.axial / row.axial - 1.0
     high = bounded(-SCALE_HEIGHT * share, LARGEST_CLIMB)
-    growth = (now.excess - m.excess) / o.guidance_period
+    growth = (now.excess - before.excess) / o.guidance_period
     climb = -SCALE_HEIGHT * (growth + 2.0 * (now.axial - row.axial) / row.speed)
     tilt = bounded(climb / row.speed, LARGEST_TILT)
     along = now.range - row.range - target_shift(p)
     if o.guidance == LAW3:
-        along = 0.0 * along
+        along = 0.0
     return -(row.k_altitude * high + row.k_path * tilt + row.k_range * along), row.speed
 
 
 @physics
-def commanded_share(t, s, m, x, p, o):
+def commanded_share(t, kept, x, p, o):
     """(vertical share of the lift before its limits, speed [m/s] by which the law goes, what law 3 keeps)."""
-    zero = 0.0 * t
-    kept = Reckoning(m.lost, m.reckoned, m.range_rate, m.axial, m.excess)
+    now = kept
     if o.guidance == LAW3 or o.guidance == LAW3R:
-        kept = reckoned(t, m, x, p, o)
-        change, speed = accelerometer_share(kept, m, p, o)
+        now = reckoned(t, kept, x, p, o)
+        change, speed = accelerometer_share(now, kept, p, o)
         share = p.planned_share + change
-    elif o.guidance == APOLLO:
-        share, speed = apollo_share(x, p, o), x.speed + zero
+    elif o.guidance == APOLLO_LAW:
+        share, speed = apollo_share(x, p, o), x.speed
     else:
-        share, speed = p.planned_share + navigated_share(x, p, o), x.speed + zero
-    return share, speed, kept
+        share, speed = p.planned_share + navigated_share(x, p, o), x.speed
+    return share, speed, now
 
 
 @physics
 def steer(t, s, m, p, o, draws):
     """One sample: sense, ask for a share of the lift, choose its side, and send the bank [rad] after it."""
     x = sensed(s, p, o, draws)
-    share, speed, kept = commanded_share(t, s, m, x, p, o)
+    share, speed, reckoning = commanded_share(t, m.reckoning, x, p, o)
     if o.guidance == LAW3 or o.guidance == LAW3R:
         felt, load = x.axial, x.axial * x.load_by_axial
     else:
@@ -180,27 +175,22 @@ def steer(t, s, m, p, o, draws):
     inside = minimum(maximum(share, LEAST_SHARE), 1.0)
     side = where(active > 0.5, side_of(m.side, lateral_miss(s, p), sqrt(speed2(s)), p), m.side)
     command = side * acos(inside) + p.bank_error
-    bank, rate = m.next_bank, m.next_rate
+    bank, rate = m.turn.next_bank, m.turn.next_rate
     next_bank, next_rate = followed(bank, rate, command, p.bank_lag, p.bank_rate_limit, o.guidance_period)
-    bank = where(p.bank_lag > 0.0, bank, next_bank)  # at once
-    return Memory(
-        pressure=m.pressure, pressure_time=m.pressure_time, pressure_altitude=m.pressure_altitude,
-        pressure_speed=m.pressure_speed, pressure_total=m.pressure_total, pressure_axial=m.pressure_axial,
-        flux=m.flux, flux_time=m.flux_time, flux_altitude=m.flux_altitude, flux_speed=m.flux_speed,
-        low=m.low, low_time=m.low_time, cos_bank=m.cos_bank, sin_bank=m.sin_bank, rolls=m.rolls,
-        exits=m.exits, exit_time=m.exit_time, exit_speed=m.exit_speed, exit_angle=m.exit_angle,
-        exit_inertial=m.exit_inertial, exit_apoapsis=m.exit_apoapsis,
-        sampled=t, bank=bank, bank_rate=rate, next_bank=next_bank, next_rate=next_rate, side=side, active=active,
-        lost=kept.lost, reckoned=kept.range, range_rate=kept.rate, axial=kept.axial, excess=kept.excess,
+    return Steering(
+        turn=Turn(t, where(p.bank_lag > 0.0, bank, next_bank), rate, next_bank, next_rate),  # without a lag at once
+        reckoning=reckoning,
+        side=side,
+        active=active,
         samples=m.samples + where(working, 1.0, 0.0),
         saturated=m.saturated + where(working & (share != inside), 1.0, 0.0),
         reversals=m.reversals + where(side != m.side, 1.0, 0.0),
-    )  # fmt: skip
+    )
 
 
 @physics
 def control(t, s, m, p, o, draws):
     """The memory after a sample; nothing happens without a law."""
-    if o.guidance > 0.0:
-        m = steer(t, s, m, p, o, draws)
+    if o.guidance != UNGUIDED:
+        m = Memory(m.met, steer(t, s, m.steering, p, o, draws))
     return m

@@ -10,10 +10,11 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from campaigns.reentry.airframe import Airframe, airframe_of
+from campaigns.reentry.airframe import airframe_of
 from campaigns.reentry.entry_state import Entry, World, entry_of, world_of
-from campaigns.reentry.inputs import GUIDANCE, PARAMETERS, PLANS, SETTINGS
-from mc_engine.model import Refusals
+from campaigns.reentry.inputs import GUIDANCE, PLAN_IS_GIVEN, Inputs
+from campaigns.reentry.vehicles import Vehicle
+from mc_engine.model import Parameter, Refusals
 
 # laws that read the same stored gains: with range, and without
 _SAME_GAINS = {"law2r": "law1", "law3r": "law1", "law3": "law2"}
@@ -34,7 +35,7 @@ def planned_entry(settings: SimpleNamespace, world: World, entry: Entry, refusal
 
     Of the cases' own, only what _OF_ENTRY names is exchanged.
     """
-    given = settings.plan == PLANS.index("given")
+    given = settings.plan == PLAN_IS_GIVEN
     if not given.any():
         return entry
     plain = SimpleNamespace(arrival=np.zeros_like(world.mu), speed_frame=settings.speed_frame)
@@ -51,11 +52,11 @@ def _inputs_of_plan(settings: SimpleNamespace) -> SimpleNamespace:
     return SimpleNamespace(**given, **errors, excess_speed=zero, vacuum_periapsis=zero)
 
 
-def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planned: Entry, airframe: Airframe) -> Plan:
+def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planned: Entry, airframe: Vehicle) -> Plan:
     """The plan of each case: a `Plan` of float64[n]."""
-    given = settings.plan == PLANS.index("given")
+    given = settings.plan == PLAN_IS_GIVEN
     numbers = given & (settings.vehicle < 0.5)  # one of vehicles.py brings its own
-    drag = airframe.area * airframe.drag_coefficient / airframe.mass
+    drag = airframe.reference_area * airframe.drag_coefficient / airframe.mass
     return Plan(
         law=_LAW[settings.guidance.astype(int)],
         planet=settings.planet,
@@ -74,7 +75,7 @@ def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planne
         lift_to_drag=np.where(
             numbers, settings.plan_lift_to_drag, airframe.lift_coefficient / airframe.drag_coefficient
         ),
-        trim=np.where(numbers, settings.plan_trim_angle, airframe.trim),
+        trim=np.where(numbers, settings.plan_trim_angle, airframe.trim_angle),
         share=np.cos(np.where(given, settings.plan_bank, i.bank)),
         end=settings.plan_stop_altitude,
     )
@@ -82,13 +83,13 @@ def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planne
 
 def default_plan() -> Plan:
     """The plan of the model's default inputs, as plain numbers, SI."""
-    i, settings = (
-        SimpleNamespace(**{item.symbol: np.array([number(item)]) for item in items})
-        for items, number in (
-            (PARAMETERS, lambda item: item.default * item.si_factor),
-            (SETTINGS, lambda item: item.code(item.default)),
-        )
-    )
+    i = SimpleNamespace()
+    settings = SimpleNamespace()
+    for item in Inputs.declared:
+        if isinstance(item, Parameter):
+            setattr(i, item.symbol, np.array([item.default * item.si_factor]))
+        else:
+            setattr(settings, item.symbol, np.array([item.code(item.default)]))
     refusals = Refusals.none(1)
     world = world_of(i, settings)
     entry = entry_of(i, settings, world, refusals)

@@ -14,15 +14,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from campaigns.reentry.air import GAS_CONSTANT, sound_speed
-from campaigns.reentry.entry_state import ELLIPSOID
 from campaigns.reentry.guidance import reference_table as table
 from campaigns.reentry.guidance.apollo_final_phase import influence_rows
 from campaigns.reentry.guidance.plan import Plan
 from campaigns.reentry.guidance.reference_table import FELT, LAST_SPEED, STEERED
 from campaigns.reentry.guidance.vinh import gravity, rates
-from campaigns.reentry.inputs import GUIDANCE
+from campaigns.reentry.inputs import APOLLO, APOLLO_LAW, ELLIPSOID, J2, LAW2, NO_GRAVITY, US76
 from campaigns.reentry.planets import PLANETS
-from campaigns.reentry.vehicles import VEHICLES
+from campaigns.reentry.vehicles import apollo_shares
 from mc_engine.errors import ModelError
 from mc_engine.model import Refusals
 from mc_engine.physics.aerodynamics import axial_coefficient
@@ -30,7 +29,6 @@ from mc_engine.physics.atmosphere import us76_logarithm, us76_of_array
 from mc_engine.physics.constants import J2_EARTH
 from mc_engine.physics.frames import over_ellipsoid
 
-US76, J2, NO_GRAVITY = 0.0, 0.0, 2.0  # codes of settings
 MOST_PLANS = 16  # different plans among the cases prepared at once: a grid, but no random draws
 MOST_EVALUATIONS = 15_000  # of the rates of one reference path; the planned entries of the campaigns take some 3000
 _KILOMETRE, _DEGREE = 1e3, np.pi / 180.0
@@ -85,7 +83,6 @@ class Planner:
         self.rate = planet.rate if plan.rotating > 0.5 else 0.0
         self.j2 = J2_EARTH if plan.gravity == J2 else 0.0
         self.free = plan.gravity == NO_GRAVITY
-        self.over_mach = np.array([(), *(vehicle.over_mach for vehicle in VEHICLES.values())][int(plan.vehicle)]).T
         self.temperature = planet.mu / plan.ground**2 * planet.air[1] / GAS_CONSTANT
 
     def height(self, r, latitude):
@@ -99,9 +96,8 @@ class Planner:
         density = us76_of_array(h) if standard else self.air[0] * np.exp(-h / self.air[1])
         drag = 0.5 * density * v * v * self.plan.drag
         lift = drag * self.plan.lift_to_drag
-        if self.over_mach.size:
-            mach = v / sound_speed(us76_logarithm(h)[2] if standard else self.temperature)
-            of_drag, of_lift = (np.interp(mach, self.over_mach[0], c) / c[-1] for c in self.over_mach[1:])
+        if self.plan.vehicle == APOLLO:
+            of_drag, of_lift = apollo_shares(v / sound_speed(us76_logarithm(h)[2] if standard else self.temperature))
             drag, lift = of_drag * drag, of_lift * lift
         return drag, lift
 
@@ -262,18 +258,17 @@ def reference_table_of(plan: Plan) -> np.ndarray | str:
 
 def _designed(plan: Plan) -> np.ndarray:
     """The table of one plan; ModelError if its path does not come down, or never meets air enough."""
-    law = GUIDANCE[int(plan.law)]
     out = np.zeros(table.LENGTH)
     planner = Planner(plan)
     path = fly_reference(planner)
     out[table.RANGE] = path.along[-1]
     _write_clock(out, path)
-    if law == "apollo":
+    if plan.law == APOLLO_LAW:
         speed, columns = influence_rows()
         out[table.FIRST_SPEED] = speed[0]
         out[table.SPEED_DENSITY] = _write_rows(out, table.SPEED_TABLE, speed[0] - speed, columns)
     else:
-        _write_path(out, planner, path, PROFILE_SET if law == "law2" else RANGE_SET)
+        _write_path(out, planner, path, PROFILE_SET if plan.law == LAW2 else RANGE_SET)
     return out
 
 

@@ -32,23 +32,24 @@ Influence = namedtuple("Influence", "climb drag range by_drag by_climb by_lift u
 
 
 @physics
+def between_rows(tables, at, columns, f):
+    """Linear interpolation, at the fraction f, from the number at index `at` to the one below it in the next row."""
+    here = look_up(tables, at)
+    return here + f * (look_up(tables, at + columns) - here)
+
+
+@physics
 def _interpolated_row(tables, start, density, x):
     """The eight columns at a speed lost x [m/s]; the first and the last row stand for what lies beyond."""
     place = log(1.0 + maximum(x, 0.0) * (1.0 / SPREAD)) * density
     place = minimum(maximum(place, 0.0), LAST_PLACE)
     row = floor(place)
     f, at = place - row, start + COLUMNS * row
-    a0, b0 = look_up(tables, at), look_up(tables, at + 8.0)
-    a1, b1 = look_up(tables, at + 1.0), look_up(tables, at + 9.0)
-    a2, b2 = look_up(tables, at + 2.0), look_up(tables, at + 10.0)
-    a3, b3 = look_up(tables, at + 3.0), look_up(tables, at + 11.0)
-    a4, b4 = look_up(tables, at + 4.0), look_up(tables, at + 12.0)
-    a5, b5 = look_up(tables, at + 5.0), look_up(tables, at + 13.0)
-    a6, b6 = look_up(tables, at + 6.0), look_up(tables, at + 14.0)
-    a7, b7 = look_up(tables, at + 7.0), look_up(tables, at + 15.0)
     return (
-        a0 + f * (b0 - a0), a1 + f * (b1 - a1), a2 + f * (b2 - a2), a3 + f * (b3 - a3),
-        a4 + f * (b4 - a4), a5 + f * (b5 - a5), a6 + f * (b6 - a6), a7 + f * (b7 - a7),
+        between_rows(tables, at, COLUMNS, f), between_rows(tables, at + 1.0, COLUMNS, f),
+        between_rows(tables, at + 2.0, COLUMNS, f), between_rows(tables, at + 3.0, COLUMNS, f),
+        between_rows(tables, at + 4.0, COLUMNS, f), between_rows(tables, at + 5.0, COLUMNS, f),
+        between_rows(tables, at + 6.0, COLUMNS, f), between_rows(tables, at + 7.0, COLUMNS, f),
     )  # fmt: skip
 
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from campaigns.reentry.autopilot.lead_compensator import Lead, Margins, crossover_of, margins_of
-from campaigns.reentry.closed_forms import SteepEntry, critical_roll_angle, glide_angle, glide_range, shallow_peak
-from campaigns.reentry.critical_trajectories import CriticalPeriapses, critical_periapses
+from campaigns.reentry.autopilot.lead_compensator import crossover_of, margins_of, stage
+from campaigns.reentry.closed_forms import critical_roll_angle, glide_angle, glide_range, shallow_peak, steep_peak
+from campaigns.reentry.critical_trajectories import critical_periapses
 from campaigns.reentry.guidance.apollo_final_phase import FLOWN
 from campaigns.reentry.model import MODEL
 from mc_engine.campaign.loading import load_campaign
@@ -63,32 +63,20 @@ def grazing_load_g(root_beta_r: float) -> float:
     return root_beta_r * shallow_peak(0.0)
 
 
-@lru_cache
-def _loads_from_orbit() -> np.ndarray:
-    """Largest loads [g] at circular speed and −2°, 50 to 1000 kg/m^2, from where rho / B is that of 100 at 120 km.
+def load_from_orbit_g(which: str) -> float:
+    """The "min" or "max" of the largest loads [g] at circular speed and −2°, 50 to 1000 kg/m^2.
 
-    Eq. (5) of the source has then one solution for all of them.
+    Each starts where rho / B is that of 100 kg/m^2 at 120 km: eq. (5) of the source has then one solution for all.
     """
     b = np.array([50.0, 100.0, 200.0, 400.0, 1000.0])
     altitude_km = 120.0 - 1e-3 * SCALE_M * np.log(b / 100.0)
     speed = np.sqrt(MU_EARTH / (WGS84_RADIUS + 1e3 * altitude_km))
     start = {"entry_altitude_km": altitude_km, "entry_speed_m_s": speed, "stop_altitude_km": 5.0}
-    return chosen_cases(MODEL, TEXTBOOK | _ballistic(b) | start | EXACT)["peak_load_g"]
+    return float(getattr(chosen_cases(MODEL, TEXTBOOK | _ballistic(b) | start | EXACT)["peak_load_g"], which)())
 
 
-def smallest_load_from_orbit_g() -> float:
-    """Smallest of the largest loads [g] of these entries."""
-    return float(_loads_from_orbit().min())
-
-
-def largest_load_from_orbit_g() -> float:
-    """Largest of the largest loads [g] of these entries."""
-    return float(_loads_from_orbit().max())
-
-
-@lru_cache
-def _excess_of_gravity_pct() -> np.ndarray:
-    """By how much [%] largest loads of steep entries at 6.5 km/s from 150 km exceed those without gravity.
+def excess_of_gravity_pct(which: str) -> float:
+    """The "min" or "max" excess [%] of largest loads of entries at 6.5 km/s from 150 km over those without gravity.
 
     −30 to −60° and 100 to 3000 kg/m^2: H. J. Allen, A. J. Eggers, NACA Rep. 1381 (1958), eq. (15).
     """
@@ -99,17 +87,7 @@ def _excess_of_gravity_pct() -> np.ndarray:
         MODEL, {**TEXTBOOK, **_ballistic(b), **start, "entry_flight_path_angle_deg": angle_deg, **EXACT}
     )
     alone = [_steep_load_g(6500.0, angle) for angle in angle_deg]
-    return 100.0 * (flown["peak_load_g"] / np.array(alone) - 1.0)
-
-
-def least_excess_of_gravity_pct() -> float:
-    """The least of these excesses [%]."""
-    return float(_excess_of_gravity_pct().min())
-
-
-def most_excess_of_gravity_pct() -> float:
-    """The most of these excesses [%]."""
-    return float(_excess_of_gravity_pct().max())
+    return float(getattr(100.0 * (flown["peak_load_g"] / np.array(alone) - 1.0), which)())
 
 
 def _ballistic(b: np.ndarray) -> dict[str, Any]:
@@ -119,8 +97,7 @@ def _ballistic(b: np.ndarray) -> dict[str, Any]:
 
 def _steep_load_g(speed: float, angle_deg: float) -> float:
     """Largest load [g] of a straight entry: it depends on neither vehicle nor air but the scale height."""
-    entry = SteepEntry(speed, np.radians(angle_deg), 1.0, GROUND_DENSITY, SCALE_M)
-    return entry.peak_deceleration / STANDARD_GRAVITY
+    return steep_peak(speed, np.radians(angle_deg), SCALE_M) / STANDARD_GRAVITY
 
 
 # ---- Stardust
@@ -207,19 +184,9 @@ def flown_glide_km() -> float:
     return 1e-3 * float(np.trapezoid(along, history["t_s"]))
 
 
-@lru_cache
-def _periapses() -> CriticalPeriapses:
-    return critical_periapses(load_campaign("reentry/aerobraking").nominal)
-
-
-def capture_periapsis_km() -> float:
-    """Vacuum periapsis [km] below which one pass of aerobraking captures; eqs (17), (18) of the source."""
-    return _periapses().capture
-
-
-def entry_periapsis_km() -> float:
-    """Vacuum periapsis [km] below which the vehicle comes down at once; eqs (17), (18) of the source."""
-    return _periapses().entry
+def periapsis_km(trajectory: str) -> float:
+    """Vacuum periapsis [km] below which one pass of aerobraking ends in "capture" or in "entry"; eqs (17), (18)."""
+    return float(getattr(critical_periapses(load_campaign("reentry/aerobraking").nominal), trajectory))
 
 
 # ---- Apollo final phase
@@ -246,44 +213,18 @@ def _ogata_plant(w: Any) -> Any:
     return 4.0 / (1j * w * (1j * w + 2.0))
 
 
-@lru_cache
-def _ogata_lead() -> Lead:
-    """Ogata's design with his roundings: static gain 10, lead 38°, α to two digits, crossover to a whole rad/s.
+def ogata_lead(number: str) -> float:
+    """A number of Ogata's design with his roundings: static gain 10, lead 38°, α to two digits, crossover to a rad/s.
+
+    "zero", "pole" [rad/s] and "gain" of the compensator; "phase" margin [deg] and "crossover" [rad/s] with it, and the
+    "bare phase" margin [deg] without.
 
     K. Ogata, Modern Control Engineering, lead compensation: zero ω√α, pole ω/√α, gain K/α.
     """
     alpha = round(float((1.0 - np.sin(np.radians(38.0))) / (1.0 + np.sin(np.radians(38.0)))), 2)
-    root = float(np.sqrt(alpha))
-    w = float(round(crossover_of(lambda x: 10.0 * _ogata_plant(x), root)))
-    stage = Lead(10.0 / alpha, w * root, w / root, Margins(0.0, 0.0))
-    return Lead(stage.gain, stage.zero, stage.pole, margins_of(lambda x: stage.response(x) * _ogata_plant(x)))
-
-
-def bare_phase_margin_deg() -> float:
-    """Phase margin [deg] with the static gain alone."""
-    return float(np.degrees(margins_of(lambda w: 10.0 * _ogata_plant(w)).phase))
-
-
-def lead_zero_rad_s() -> float:
-    """Zero [rad/s] of Ogata's lead compensator."""
-    return _ogata_lead().zero
-
-
-def lead_pole_rad_s() -> float:
-    """Pole [rad/s] of Ogata's lead compensator."""
-    return _ogata_lead().pole
-
-
-def lead_gain() -> float:
-    """Gain of Ogata's lead compensator."""
-    return _ogata_lead().gain
-
-
-def lead_phase_margin_deg() -> float:
-    """Phase margin [deg] of the compensated loop."""
-    return float(np.degrees(_ogata_lead().margins.phase))
-
-
-def lead_crossover_rad_s() -> float:
-    """Crossover [rad/s] of the compensated loop."""
-    return _ogata_lead().margins.crossover
+    w = float(round(crossover_of(lambda x: 10.0 * _ogata_plant(x), float(np.sqrt(alpha)))))
+    lead = stage(_ogata_plant, 10.0, alpha, w)
+    phase, bare = (
+        np.degrees(margins.phase) for margins in (lead.margins, margins_of(lambda x: 10.0 * _ogata_plant(x)))
+    )
+    return float({**vars(lead), "phase": phase, "crossover": lead.margins.crossover, "bare phase": bare}[number])

@@ -7,15 +7,10 @@ lifetimes.
 from collections import namedtuple
 
 from mc_engine.lanes import fma, physics, sqrt
-from mc_engine.model import Field, Model, Parameter, Setting
+from mc_engine.model import Parameter, Setting, at_end, inputs, metrics, model, outputs, states
 from mc_engine.physics.atmosphere import exponential
 from mc_engine.physics.constants import EARTH_RATE, EQUATORIAL_RADIUS, MU_EARTH
 from mc_engine.physics.gravity import oblate, point_mass
-
-State = namedtuple("State", "x y z vx vy vz")
-Parameters = namedtuple("Parameters", "x y z vx vy vz drag")
-Quantities = namedtuple("Quantities", "radius")
-Metrics = namedtuple("Metrics", "radius")
 
 # Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., Table 8-4
 LOW_AIR = (3.725e-12, 400e3, 58_515.0)
@@ -25,6 +20,11 @@ LOW_ORBIT = (6778e3, 0.0, 0.0, 0.0, 3950.0, 6574.0)
 TRANSFER_ORBIT = (6628e3, 0.0, 0.0, 0.0, 10086.0, 1238.0)
 AXES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
 
+State = states(**{axis: f"inertial {axis[0]}" for axis in AXES})
+Outputs = outputs(radius_m="distance from the Earth's centre")
+Metrics = metrics(final_radius_m=at_end("radius_m", "distance from the Earth's centre in the end"))
+Parameters = namedtuple("Parameters", [*State._fields, "drag"])
+
 
 def prepare(inputs, settings, refusals):
     """What does not change in a flight: half the drag area over mass [m^2/kg], with its sign."""
@@ -32,9 +32,9 @@ def prepare(inputs, settings, refusals):
 
 
 @physics
-def initial(p, o):
+def initial(p):
     """The parameters are the first state."""
-    return State(p.x, p.y, p.z, p.vx, p.vy, p.vz)
+    return State(x=p.x, y=p.y, z=p.z, vx=p.vx, vy=p.vy, vz=p.vz)
 
 
 @physics
@@ -52,70 +52,59 @@ def acceleration(s, p, air):
 
 
 @physics
-def low_rhs(t, s, m, p, o):
+def low_rhs(s, p):
     """Derivative of the state in the layer from 400 km."""
     ax, ay, az = acceleration(s, p, LOW_AIR)
-    return State(s.vx, s.vy, s.vz, ax, ay, az)
+    return State(x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az)
 
 
 @physics
-def transfer_rhs(t, s, m, p, o):
+def transfer_rhs(s, p):
     """Derivative of the state in the layer from 250 km."""
     ax, ay, az = acceleration(s, p, PERIGEE_AIR)
-    return State(s.vx, s.vy, s.vz, ax, ay, az)
+    return State(x=s.vx, y=s.vy, z=s.vz, vx=ax, vy=ay, vz=az)
 
 
 @physics
-def oblate_rhs(t, s, m, p, o):
+def oblate_rhs(s):
     """Derivative of the state without air: a point mass and J2."""
-    return State(s.vx, s.vy, s.vz, *oblate(s.x, s.y, s.z, MU_EARTH))
+    gx, gy, gz = oblate(s.x, s.y, s.z, MU_EARTH)
+    return State(x=s.vx, y=s.vy, z=s.vz, vx=gx, vy=gy, vz=gz)
 
 
 @physics
-def two_body_rhs(t, s, m, p, o):
+def two_body_rhs(s):
     """Derivative of the state around a point mass, whose energy and angular momentum are kept."""
     gx, gy, gz = point_mass(s.x, s.y, s.z, MU_EARTH)
-    return State(s.vx, s.vy, s.vz, gx, gy, gz)
+    return State(x=s.vx, y=s.vy, z=s.vz, vx=gx, vy=gy, vz=gz)
 
 
 @physics
-def observe(t, s, m, p, o):
+def observe(s):
     """Distance from the Earth's centre [m]."""
-    return Quantities(sqrt(s.x * s.x + s.y * s.y + s.z * s.z))
-
-
-@physics
-def evaluate(t, s, m, p, o, best, when):
-    """Distance from the Earth's centre [m] in the end."""
-    return Metrics(sqrt(s.x * s.x + s.y * s.y + s.z * s.z))
+    return Outputs(radius=sqrt(s.x * s.x + s.y * s.y + s.z * s.z))
 
 
 def orbit_model(name, rhs, first_state, clock):
     """The model of a drag orbit with the given derivative, nominal first state and clock."""
-    return Model(
+    return model(
         name=name,
         title="Earth orbit with J2 and drag",
         source="D. A. Vallado, Fundamentals of Astrodynamics and Applications, 4th ed., sections 8.6 and 8.7",
-        parameters=(
-            *(
-                Parameter(axis, axis.partition("_")[2].replace("_", "/"), f"first {axis[0]}", value)
-                for axis, value in zip(AXES, first_state, strict=True)
-            ),
-            Parameter("ballistic_coefficient_kg_m2", "kg/m^2", "mass over drag area", 100.0),
+        inputs=inputs(
+            **{axis: Parameter(value, f"first {axis[0]}") for axis, value in zip(AXES, first_state, strict=True)},
+            ballistic_coefficient_kg_m2=Parameter(100.0, "mass over drag area", unit="kg/m^2"),
+            duration_s=Setting(86400.0, "length of the flight"),
+            step_s=Setting(10.0, "step of the fixed grid"),
+            tolerance=Setting(1e-10, "error of a step, relative", unit=""),
         ),
-        settings=(
-            Setting("duration_s", "s", "length of the flight", 86400.0),
-            Setting("step_s", "s", "step of the fixed grid", 10.0),
-            Setting("tolerance", "", "error of a step, relative", 1e-10),
-        ),
-        states=tuple(Field(axis, axis.partition("_")[2].replace("_", "/"), f"inertial {axis[0]}") for axis in AXES),
-        quantities=(Field("radius_m", "m", "distance from the Earth's centre"),),
-        metrics=(Field("final_radius_m", "m", "distance from the Earth's centre in the end"),),
+        states=State,
+        outputs=Outputs,
+        metrics=Metrics,
         clock=clock,
         kernel_parameters=Parameters,
         prepare=prepare,
         initial=initial,
         rhs=rhs,
         observe=observe,
-        evaluate=evaluate,
     )

@@ -12,7 +12,7 @@ from collections import namedtuple
 import numpy as np
 
 from mc_engine.lanes import physics, sincos, sqrt
-from mc_engine.model import Event, Field, Model, Parameter, Setting
+from mc_engine.model import Event, Parameter, Setting, at_end, inputs, metrics, model, outputs, states
 from mc_engine.physics.atmosphere import exponential
 from mc_engine.physics.constants import MU_EARTH
 
@@ -20,13 +20,25 @@ RADIUS = 6378137.0  # of the Earth [m], WGS 84
 AIR = (1.225, 0.0, 7200.0)  # density [kg/m^3], its altitude [m], scale height [m]
 STOP_ALTITUDE = 10e3
 EAST, NORTH = 0.8660254037844386, 0.5  # parts of the first level speed
-AXES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
 
-State = namedtuple("State", "x y z vx vy vz")
+Inputs = inputs(
+    altitude_m=Parameter(120e3, "first altitude"),
+    speed_m_s=Parameter(7800.0, "first speed"),
+    flight_path_rad=Parameter(-0.034906585039886594, "first flight-path angle"),
+    ballistic_coefficient_kg_m2=Parameter(364.02, "mass over drag area", unit="kg/m^2"),
+    lift_to_drag=Parameter(0.3, "lift over drag", unit=""),
+    bank_rad=Parameter(1.0471975511965976, "bank angle"),
+    density=Parameter(1.0, "factor of the density", unit=""),
+    duration_s=Setting(3000.0, "limit of the flight"),
+    step_s=Setting(0.5, "step of the fixed grid"),
+    tolerance=Setting(1e-10, "error of a step, relative", unit=""),
+)
+State = states(**{axis: f"inertial {axis[0]}" for axis in ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")})
+Outputs = outputs(altitude_m="altitude")
+Metrics = metrics(
+    time_s=at_end("t_s", "length of the flight"), final_altitude_m=at_end("altitude_m", "altitude in the end")
+)
 Parameters = namedtuple("Parameters", "altitude speed flight_path drag lift_up lift_aside")
-Events = namedtuple("Events", "altitude")
-Quantities = namedtuple("Quantities", "altitude")
-Metrics = namedtuple("Metrics", "time altitude")
 
 
 def prepare(inputs, settings, refusals):
@@ -38,15 +50,15 @@ def prepare(inputs, settings, refusals):
 
 
 @physics
-def initial(p, o):
+def initial(p):
     """Over the x axis, heading for the y axis, 30 degrees up to the z axis."""
     sin_path, cos_path = sincos(p.flight_path)
     level = p.speed * cos_path
-    return State(RADIUS + p.altitude, 0.0, 0.0, p.speed * sin_path, EAST * level, NORTH * level)
+    return State(x=RADIUS + p.altitude, y=0.0, z=0.0, vx=p.speed * sin_path, vy=EAST * level, vz=NORTH * level)
 
 
 @physics
-def rhs(t, s, m, p, o):
+def rhs(s, p):
     """Derivative of the state under point-mass gravity, drag, and lift turned to the right by the bank angle."""
     r2 = s.x * s.x + s.y * s.y + s.z * s.z
     v2 = s.vx * s.vx + s.vy * s.vy + s.vz * s.vz
@@ -63,74 +75,60 @@ def rhs(t, s, m, p, o):
     up = p.lift_up * thrust * (inverse * r2)
     aside = -p.lift_aside * thrust * speed * (inverse * r2)
     return State(
-        s.vx,
-        s.vy,
-        s.vz,
-        g * s.x + d * s.vx + up * (s.vy * hz - s.vz * hy) + aside * hx,
-        g * s.y + d * s.vy + up * (s.vz * hx - s.vx * hz) + aside * hy,
-        g * s.z + d * s.vz + up * (s.vx * hy - s.vy * hx) + aside * hz,
+        x=s.vx,
+        y=s.vy,
+        z=s.vz,
+        vx=g * s.x + d * s.vx + up * (s.vy * hz - s.vz * hy) + aside * hx,
+        vy=g * s.y + d * s.vy + up * (s.vz * hx - s.vx * hz) + aside * hy,
+        vz=g * s.z + d * s.vz + up * (s.vx * hy - s.vy * hx) + aside * hz,
     )
 
 
 @physics
-def ballistic_rhs(t, s, m, p, o):
+def ballistic_rhs(s, p):
     """Derivative of the state under point-mass gravity and drag."""
     r2 = s.x * s.x + s.y * s.y + s.z * s.z
     radius, speed = sqrt(r2), sqrt(s.vx * s.vx + s.vy * s.vy + s.vz * s.vz)
     u2 = 1.0 / r2
     g = -MU_EARTH * (u2 * u2) * radius
     d = -p.drag * exponential(radius - RADIUS, AIR[0], AIR[1], AIR[2]) * speed
-    return State(s.vx, s.vy, s.vz, g * s.x + d * s.vx, g * s.y + d * s.vy, g * s.z + d * s.vz)
+    return State(
+        x=s.vx,
+        y=s.vy,
+        z=s.vz,
+        vx=g * s.x + d * s.vx,
+        vy=g * s.y + d * s.vy,
+        vz=g * s.z + d * s.vz,
+    )
 
 
 @physics
-def events(t, s, m, p, o):
+def above_stop(s):
     """Height over the end of the flight [m]."""
-    return Events(sqrt(s.x * s.x + s.y * s.y + s.z * s.z) - (RADIUS + STOP_ALTITUDE))
+    return sqrt(s.x * s.x + s.y * s.y + s.z * s.z) - (RADIUS + STOP_ALTITUDE)
 
 
 @physics
-def observe(t, s, m, p, o):
+def observe(s):
     """Altitude [m]."""
-    return Quantities(sqrt(s.x * s.x + s.y * s.y + s.z * s.z) - RADIUS)
-
-
-@physics
-def evaluate(t, s, m, p, o, best, when):
-    """Where and when the flight ends."""
-    return Metrics(t, sqrt(s.x * s.x + s.y * s.y + s.z * s.z) - RADIUS)
+    return Outputs(altitude=sqrt(s.x * s.x + s.y * s.y + s.z * s.z) - RADIUS)
 
 
 def entry_model(clock, derivative=rhs):
     """The model of the entry with the given clock and right-hand side; the nominal flight is a lifting one."""
-    return Model(
+    return model(
         name="entry",
         title="Entry with constant lift and drag",
         source="N. X. Vinh et al., Hypersonic and Planetary Entry Flight Mechanics (1980), chapter 2",
-        parameters=(
-            Parameter("altitude_m", "m", "first altitude", 120e3),
-            Parameter("speed_m_s", "m/s", "first speed", 7800.0),
-            Parameter("flight_path_rad", "rad", "first flight-path angle", -0.034906585039886594),
-            Parameter("ballistic_coefficient_kg_m2", "kg/m^2", "mass over drag area", 364.02),
-            Parameter("lift_to_drag", "", "lift over drag", 0.3),
-            Parameter("bank_rad", "rad", "bank angle", 1.0471975511965976),
-            Parameter("density", "", "factor of the density", 1.0),
-        ),
-        settings=(
-            Setting("duration_s", "s", "limit of the flight", 3000.0),
-            Setting("step_s", "s", "step of the fixed grid", 0.5),
-            Setting("tolerance", "", "error of a step, relative", 1e-10),
-        ),
-        states=tuple(Field(axis, axis.partition("_")[2].replace("_", "/"), f"inertial {axis[0]}") for axis in AXES),
-        quantities=(Field("altitude_m", "m", "altitude"),),
-        metrics=(Field("time_s", "s", "length of the flight"), Field("final_altitude_m", "m", "altitude in the end")),
+        inputs=Inputs,
+        states=State,
+        outputs=Outputs,
+        metrics=Metrics,
         clock=clock,
         kernel_parameters=Parameters,
         prepare=prepare,
         initial=initial,
         rhs=derivative,
-        events=events,
-        event_list=(Event("altitude", "falling", "stop"),),
+        events={"altitude": Event(above_stop, "falling", "stop")},
         observe=observe,
-        evaluate=evaluate,
     )

@@ -12,7 +12,7 @@ from collections import namedtuple
 import numpy as np
 
 from mc_engine.lanes import minimum, physics, sin, sqrt, where
-from mc_engine.model import Field, FixedStep, Model, Parameter, Setting
+from mc_engine.model import Field, FixedStep, Parameter, Setting, at_end, inputs, metrics, model, outputs, states
 
 COUPLING = ((7.0, -1.2, 1.1, 1.2), (1.2, 0.9, 2.5, -2.6), (2.2, -1.7, -0.8, -1.1))  # kg^(1/2) m
 FREQUENCY = (0.7, 1.0, 1.8, 2.5)  # rad/s
@@ -24,10 +24,19 @@ DELTA_P, DELTA_I, DELTA_D = 2.0, 5.0, 10.0
 DISTURBANCE = 2.8867513459481287e-4  # N m
 FIRST_QUATERNION = (0.4, 0.2, 0.4, -0.8)  # scalar first, body from orbit
 
-State = namedtuple("State", "wx wy wz q0 q1 q2 q3 a1 a2 a3 a4 b1 b2 b3 b4 nx ny nz")
+Inputs = inputs(
+    jx_kg_m2=Parameter(100.0, "moment of inertia, x", unit="kg m^2"),
+    jy_kg_m2=Parameter(75.0, "moment of inertia, y", unit="kg m^2"),
+    jz_kg_m2=Parameter(50.0, "moment of inertia, z", unit="kg m^2"),
+    offset=Parameter(0.5, "constant part of the disturbance, of its amplitude", unit=""),
+    duration_s=Setting(200.0, "length of the flight"),
+    step_s=Setting(0.01, "step"),
+)
+NAMES = "wx wy wz q0 q1 q2 q3 a1 a2 a3 a4 b1 b2 b3 b4 nx ny nz".split()
+State = states(**{name: Field(f"state {name} in SI", unit="") for name in NAMES})
+Outputs = outputs(error=Field("vector part of the quaternion", unit=""))
+Metrics = metrics(final_error=at_end("error", "vector part of the quaternion in the end", unit=""))
 Parameters = namedtuple("Parameters", "jx jy jz ixx iyy izz ixy ixz iyz offset")
-Quantities = namedtuple("Quantities", "error")
-Metrics = namedtuple("Metrics", "error")
 
 
 def prepare(inputs, settings, refusals):
@@ -40,9 +49,13 @@ def prepare(inputs, settings, refusals):
 
 
 @physics
-def initial(p, o):
+def initial():
     """A large turn ahead, the modes at rest."""
-    return State(0.07, -0.05, -0.04, 0.4, 0.2, 0.4, -0.8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    q0, q1, q2, q3 = FIRST_QUATERNION
+    return State(
+        wx=0.07, wy=-0.05, wz=-0.04, q0=q0, q1=q1, q2=q2, q3=q3, a1=0.0, a2=0.0, a3=0.0, a4=0.0,
+        b1=0.0, b2=0.0, b3=0.0, b4=0.0, nx=0.0, ny=0.0, nz=0.0,
+    )  # fmt: skip
 
 
 @physics
@@ -60,7 +73,7 @@ def _torque(s):
 
 
 @physics
-def rhs(t, s, m, p, o):
+def rhs(t, s, p):
     """Derivative of the state: eqs (1), (2) solved for the rates, (5)-(9), and the integral in (13)."""
     ux, uy, uz = _torque(s)
     td = DISTURBANCE * (sin(t) + p.offset)
@@ -83,62 +96,45 @@ def rhs(t, s, m, p, o):
     ry = s.wy + ORBITAL_RATE * (s.q0 * s.q0 - s.q1 * s.q1 + s.q2 * s.q2 - s.q3 * s.q3)
     rz = s.wz + ORBITAL_RATE * (2.0 * (s.q2 * s.q3 - s.q0 * s.q1))
     return State(
-        dx,
-        dy,
-        dz,
-        -0.5 * (s.q1 * rx + s.q2 * ry + s.q3 * rz),
-        0.5 * (s.q0 * rx + s.q2 * rz - s.q3 * ry),
-        0.5 * (s.q0 * ry + s.q3 * rx - s.q1 * rz),
-        0.5 * (s.q0 * rz + s.q1 * ry - s.q2 * rx),
-        s.b1,
-        s.b2,
-        s.b3,
-        s.b4,
-        -e1 - (c1[0] * dx + c2[0] * dy + c3[0] * dz),
-        -e2 - (c1[1] * dx + c2[1] * dy + c3[1] * dz),
-        -e3 - (c1[2] * dx + c2[2] * dy + c3[2] * dz),
-        -e4 - (c1[3] * dx + c2[3] * dy + c3[3] * dz),
-        C1 * s.wx + C2 * s.q1,
-        C1 * s.wy + C2 * s.q2,
-        C1 * s.wz + C2 * s.q3,
+        wx=dx,
+        wy=dy,
+        wz=dz,
+        q0=-0.5 * (s.q1 * rx + s.q2 * ry + s.q3 * rz),
+        q1=0.5 * (s.q0 * rx + s.q2 * rz - s.q3 * ry),
+        q2=0.5 * (s.q0 * ry + s.q3 * rx - s.q1 * rz),
+        q3=0.5 * (s.q0 * rz + s.q1 * ry - s.q2 * rx),
+        a1=s.b1,
+        a2=s.b2,
+        a3=s.b3,
+        a4=s.b4,
+        b1=-e1 - (c1[0] * dx + c2[0] * dy + c3[0] * dz),
+        b2=-e2 - (c1[1] * dx + c2[1] * dy + c3[1] * dz),
+        b3=-e3 - (c1[2] * dx + c2[2] * dy + c3[2] * dz),
+        b4=-e4 - (c1[3] * dx + c2[3] * dy + c3[3] * dz),
+        nx=C1 * s.wx + C2 * s.q1,
+        ny=C1 * s.wy + C2 * s.q2,
+        nz=C1 * s.wz + C2 * s.q3,
     )
 
 
 @physics
-def observe(t, s, m, p, o):
+def observe(s):
     """Size of the vector part of the quaternion."""
-    return Quantities(sqrt(s.q1 * s.q1 + s.q2 * s.q2 + s.q3 * s.q3))
+    return Outputs(error=sqrt(s.q1 * s.q1 + s.q2 * s.q2 + s.q3 * s.q3))
 
 
-@physics
-def evaluate(t, s, m, p, o, best, when):
-    """Size of the vector part of the quaternion in the end."""
-    return Metrics(sqrt(s.q1 * s.q1 + s.q2 * s.q2 + s.q3 * s.q3))
-
-
-MODEL = Model(
+MODEL = model(
     name="satellite",
     title="Turn of a flexible satellite",
     source="H. Taei, S. Ayati, S. F. Mousavi, Iranian Journal of Mechanical Engineering 24 (3) (2022)",
-    parameters=(
-        *(
-            Parameter(f"j{axis}_kg_m2", "kg m^2", f"moment of inertia, {axis}", value)
-            for axis, value in zip("xyz", (100.0, 75.0, 50.0), strict=True)
-        ),
-        Parameter("offset", "", "constant part of the disturbance, of its amplitude", 0.5),
-    ),
-    settings=(
-        Setting("duration_s", "s", "length of the flight", 200.0),
-        Setting("step_s", "s", "step", 0.01),
-    ),
-    states=tuple(Field(name, "", f"state {name} in SI") for name in State._fields),
-    quantities=(Field("error", "", "vector part of the quaternion"),),
-    metrics=(Field("final_error", "", "vector part of the quaternion in the end"),),
+    inputs=Inputs,
+    states=State,
+    outputs=Outputs,
+    metrics=Metrics,
     clock=FixedStep("step", "duration"),
     kernel_parameters=Parameters,
     prepare=prepare,
     initial=initial,
     rhs=rhs,
     observe=observe,
-    evaluate=evaluate,
 )

@@ -8,8 +8,9 @@ from gauss_equations import Elements, gauss_rates
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
-from campaigns.deorbit.elements import osculating
+from campaigns.deorbit.dynamics import osculating
 from campaigns.deorbit.published import DEMONSTRATION
+from mc_engine.physics.vectors import Vector
 
 MU = 3.986004418e14
 
@@ -68,7 +69,7 @@ def random_elements(number):
 @pytest.mark.parametrize("number", range(12))
 def test_the_osculating_elements_are_those_the_place_was_made_from(number):
     elements = random_elements(number)
-    a, e, omega = osculating(*np.concatenate(place(elements)))
+    a, e, omega = osculating(*(Vector(*components) for components in place(elements)))
     assert a == pytest.approx(elements.a, rel=1e-12)
     assert e == pytest.approx(elements.e, abs=1e-13)
     assert omega == pytest.approx(elements.omega, abs=1e-11)  # 1e-13 / the smallest eccentricity
@@ -142,6 +143,6 @@ def test_the_gauss_equations_turn_the_plane_as_the_flight_did(tilted):
 
 def test_near_a_circle_the_argument_of_perigee_keeps_its_digits():
     elements = Elements(0.3, 0.9, 1.2, 7e6, 1e-6, 0.4)
-    _, e, omega = osculating(*np.concatenate(place(elements)))
+    _, e, omega = osculating(*(Vector(*components) for components in place(elements)))
     assert e == pytest.approx(1e-6, abs=1e-15)
     assert omega == pytest.approx(1.2, abs=1e-9)

@@ -46,7 +46,7 @@ def fly_one(**inputs):
     return {name: column[0] for name, column in fly_cases(**inputs).items()}
 
 
-def history(rows=30_000, **inputs):
+def history(rows=200_000, **inputs):
     """Quantities along the flight of one case."""
     return fly_history(MODEL, NOMINAL | inputs, 0, SEED, rows=rows)[1]
 

@@ -1,4 +1,4 @@
-"""Attitude kinematics of the engine, held against rotation matrices and SciPy's rotations."""
+"""Attitude kinematics of the engine, compared with rotation matrices and SciPy's rotations."""
 
 import numpy as np
 import pytest

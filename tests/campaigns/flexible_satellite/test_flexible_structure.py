@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from flexible_flights import ALONE, C0, LAMBDA, MODEL, J, fly_cases, fly_one, prepared
 
-from campaigns.flexible_satellite import dynamics
+from campaigns.flexible_satellite import control, dynamics
 from mc_engine.flight.kernel_parts import settings_class
 
 # recomputed from Tables 10 and 11: rad/s and kg m^2, to the digits written
@@ -45,16 +45,16 @@ def test_the_free_craft_rings_at_the_frequencies_of_the_digest():
 def test_the_right_hand_side_rings_at_those_frequencies_too():
     """Its derivatives by differences, about rest: the eigenvalues are zeros and +-i times the frequencies."""
     p, _ = prepared(**ALONE, initial_omega_x_rad_s=0.0, initial_omega_y_rad_s=0.0, initial_omega_z_rad_s=0.0)
-    p = dynamics.Parameters(**{name: float(row[0]) for name, row in p.items()})
+    p = MODEL.kernel_parameters(**{name: float(row[0]) for name, row in p.items()})
     settings = settings_class(MODEL)(*(0.0 for _ in MODEL.settings))
-    memory = dynamics.Memory(*(0.0 for _ in dynamics.Memory._fields))
-    rest = np.array(dynamics.initial(p, settings))
+    memory = control.start(p, settings)
+    rest = np.array(dynamics.initial(p))
     moving = slice(4, 15)  # h, psi, eta
 
     def rate(displacement):
         state = rest.copy()
         state[moving] += displacement
-        return np.array(dynamics.rhs(0.0, dynamics.State(*state), memory, p, settings))[moving]
+        return np.array(dynamics.rhs(0.0, dynamics.State(*state), memory, p))[moving]
 
     size = 1e-3
     columns = [(rate(size * unit) - rate(-size * unit)) / (2.0 * size) for unit in np.eye(11)]

@@ -14,8 +14,11 @@ MU = 3.986004418e14
 
 def sequence(burns, inclination_deg, *, thrust=THRUST, final_deg=0.0, method="optimal", between=()):
     """A sequence of the source's engine, whose exhaust speed any thrust keeps."""
-    angles = float(np.radians(inclination_deg)), float(np.radians(final_deg))
-    return Sequence(method, burns, *angles, PARKING, GEO, thrust, FLOW * thrust / THRUST, MASS, between)
+    return Sequence(
+        method=method, burns=burns, initial_inclination=float(np.radians(inclination_deg)),
+        final_inclination=float(np.radians(final_deg)), parking_radius=PARKING, final_radius=GEO, thrust=thrust,
+        mass_flow=FLOW * thrust / THRUST, mass=MASS, between=between,
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=64)

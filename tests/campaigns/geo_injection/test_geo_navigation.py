@@ -20,7 +20,7 @@ def test_navigation_errors_do_nothing_to_a_stored_program():
 
 
 def test_navigation_errors_count_along_the_true_radial_transverse_and_normal_axes():
-    names = [f"known_{one}" for one in ("r", "t", "n", "vr", "vt", "vn")]
+    names = [f"navigation_{what}_{axis}" for what in ("position", "velocity") for axis in "rtn"]
     errors = type("Errors", (), dict(zip(names, (10.0, 20.0, 30.0, 1.0, 2.0, 3.0), strict=True)))
     state = State(0.0, 7e6, 0.0, -6e3, 1e3, 0.0, 1.0)  # transverse is -x, the normal is z
     assert tuple(known(state, errors)) == pytest.approx((-20.0, 7e6 + 10.0, 30.0, -6002.0, 1001.0, 3.0), abs=1e-9)

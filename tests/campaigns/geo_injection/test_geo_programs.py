@@ -1,5 +1,7 @@
 """The burn programs as files, and the campaign files that fly them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from geo_flights import MODEL, NOMINAL
@@ -32,7 +34,8 @@ def test_a_kept_program_is_what_the_design_gives(name):
 
 def test_a_new_sequence_is_designed_once_and_then_read_from_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path))
-    wanted = SEQUENCES["two_burns_28_5"].__class__("optimal", 2, 0.3, 0.0, 6.7e6, 4.2e7, 3e4, 9.0, 2e4)
+    other = {"initial_inclination": 0.3, "parking_radius": 6.7e6, "final_radius": 4.2e7}
+    wanted = replace(SEQUENCES["two_burns_28_5"], **other, thrust=3e4, mass_flow=9.0, mass=2e4)
     first = design.program_for.__wrapped__(wanted)
     assert first.sequence.parking_radius == 6.7e6
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from geo_sequences import GEO, MASS, MU, PARKING, sequence
 
-from campaigns.geo_injection.avoidance import AVOIDANCE
+from campaigns.geo_injection.avoidance import avoidance
 from campaigns.geo_injection.design.single_burn import Stage, circle, fly_shortest, rise_guess
 from campaigns.geo_injection.design.staged import Orbit, rising, staged
 from campaigns.geo_injection.published.burns import burn_s as published_burn_s
@@ -109,7 +109,5 @@ def test_burns_in_the_source_s_conventions_last_as_long_as_an_independent_soluti
 
 def test_table_1_costates_keep_the_symmetry_of_a_free_longitude():
     """l_y = l_vx at the start, as the source takes it."""
-    from campaigns.geo_injection.avoidance import burn_of
-
-    start = burn_of(AVOIDANCE).start
+    start = avoidance().start
     assert start[10] == pytest.approx(-start[6], rel=1e-6)

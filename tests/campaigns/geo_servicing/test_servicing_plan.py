@@ -9,7 +9,6 @@ from servicing_flights import KEPLER, NOMINAL, fly_one
 from servicing_twin import MU, R0, RATE, SIDEREAL_DAY, Twin, sidereal
 
 from campaigns.geo_servicing import drift_model as drift
-from campaigns.geo_servicing import plan_table
 from campaigns.geo_servicing.bellman import best_corrections, planned_cost
 from campaigns.geo_servicing.inspection import correction
 from campaigns.geo_servicing.model import MODEL, nominal_start
@@ -17,7 +16,6 @@ from campaigns.geo_servicing.planned_flight import Craft
 from mc_engine.errors import ModelError
 from mc_engine.flight.flight import settings_of
 from mc_engine.flight.kernel_parts import settings_class
-from mc_engine.physics.geopotential import harmonics_table
 
 PERFECT = {"navigation": "perfect", "schedule": "designed"}
 DAY = 86_400.0
@@ -58,9 +56,7 @@ def craft_of(**inputs):
     """The craft that plans are made for, with the tables behind its plan."""
     codes = [one.code((NOMINAL | inputs)[one.name]) for one in MODEL.settings]
     o = settings_class(MODEL)(*codes, np.empty(0))
-    first, sun_moon = nominal_start(o)
-    rows = harmonics_table(int(o.gravity_degree), int(o.gravity_order))
-    return Craft(o, np.concatenate([plan_table.no_plan(), rows.ravel(), sun_moon.ravel()]), first)
+    return Craft(*nominal_start(o))
 
 
 def test_the_mean_pull_of_a_plan_is_that_of_the_geopotential_and_of_the_twins_sun_and_moon():

@@ -104,7 +104,7 @@ def test_the_tables_hold_the_designs_and_the_planned_entry(o):
             (lead.gain, lead.zero, lead.pole), rel=1e-4
         )
     profile = planned_profile()
-    p = SimpleNamespace(pressure=1.1)
+    p = SimpleNamespace(pressure_factor=1.1)
     for second in (0, 250, 400):
         pressure, speed = air_at(float(second), p, o)
         assert (pressure, speed) == pytest.approx((1.1 * profile[second, 0], profile[second, 1]), rel=1e-12)
@@ -112,7 +112,7 @@ def test_the_tables_hold_the_designs_and_the_planned_entry(o):
 
 
 def test_the_command_reverses_every_period_at_its_rate():
-    p = SimpleNamespace(period=60.0, bank_rate=0.2, amplitude=1.0)
+    p = SimpleNamespace(reversal_period=60.0, commanded_rate=0.2, bank_amplitude=1.0)
     t = np.linspace(0.0, 240.0, 9601)
     command = bank_command(t, p)
     assert np.abs(np.diff(command)).max() <= 0.2 * (t[1] - t[0]) * (1.0 + 1e-9)
@@ -130,7 +130,7 @@ def twin(inputs, duration):
     i = NOMINAL | inputs
     pitch, roll = 7000.0 * i["inertia_pitch_factor"], 8000.0 * i["inertia_roll_factor"]
     bank = bank_design(CODES)
-    command = SimpleNamespace(period=60.0, bank_rate=np.radians(10.0), amplitude=np.radians(60.0))
+    command = SimpleNamespace(reversal_period=60.0, commanded_rate=np.radians(10.0), bank_amplitude=np.radians(60.0))
 
     def rates(t, y):
         a, da, b, db, xa, xb = y

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from closed_form_entries import Skip, SteepEntry
 from reentry_flights import (
     EXACT,
     G0,
@@ -16,14 +17,7 @@ from reentry_flights import (
     history,
 )
 
-from campaigns.reentry.closed_forms import (
-    Skip,
-    SteepEntry,
-    critical_roll_angle,
-    glide_angle,
-    glide_range,
-    shallow_peak,
-)
+from campaigns.reentry.closed_forms import critical_roll_angle, glide_angle, glide_range, shallow_peak
 from campaigns.reentry.critical_trajectories import critical_roll
 from mc_engine.physics.heating import SUTTON_GRAVES
 

@@ -1,4 +1,4 @@
-"""Vehicles whose coefficients go by the Mach number: the table, a flight by it twice more, the loads, the reference."""
+"""Vehicles whose coefficients go by the Mach number: the curves, a flight by them twice more, loads, reference."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,8 @@ from reentry_flights import MU, PLANAR, RADIUS, assert_same_bits_alone, fly_case
 from reentry_twin import standard_density
 from scipy.integrate import solve_ivp
 
-from campaigns.reentry.airframe import COEFFICIENTS
 from campaigns.reentry.guidance.reference import Planner, fly_reference
-from mc_engine.physics.aerodynamics import over_mach
+from campaigns.reentry.vehicles import apollo_shares
 
 # C. A. Graves, J. C. Harpold, NASA TN D-6725 (1972), table I: Mach number, drag and lift coefficient at trim.
 PRINTED = [
@@ -21,8 +20,8 @@ APOLLO = {"vehicle": "apollo", **PLANAR}
 
 
 @pytest.mark.parametrize(("mach", "drag", "lift"), PRINTED)
-def test_the_flights_table_holds_the_printed_coefficients(mach, drag, lift):
-    shares = over_mach(COEFFICIENTS, 0.0, mach)
+def test_the_flights_curves_hold_the_printed_coefficients(mach, drag, lift):
+    shares = apollo_shares(mach)
     assert (1.2891 * shares[0], 0.38773 * shares[1]) == pytest.approx((drag, lift), rel=1e-12)
 
 

@@ -12,15 +12,19 @@ from collections import namedtuple
 import numpy as np
 
 from mc_engine.lanes import physics
-from mc_engine.model import Field, FixedStep, Model, Parameter
+from mc_engine.model import FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
 
 KILLS, HANGS, EATS, EXITS = 1.0, 2.0, 3.0, 4.0
 
-State = namedtuple("State", "z v")
+Inputs = inputs(
+    height_m=Parameter(100.0, "height at the start"),
+    speed_m_s=Parameter(0.0, "speed at the start, upwards"),
+    trap=Parameter(0.0, "0, or what befalls the worker", low=0.0, high=4.0, unit=""),
+)
+State = states(z_m="height", v_m_s="speed, upwards")
+Outputs = outputs(height_m="height")
+Metrics = metrics(end_height_m=at_end("height_m", "height at the end"), impact_speed_m_s="speed at the end")
 Parameters = namedtuple("Parameters", "height speed")
-Memory = namedtuple("Memory", "unused")
-Quantities = namedtuple("Quantities", "height")
-Metrics = namedtuple("Metrics", "end_height impact_speed")
 
 
 def prepare(inputs, settings, refusals):
@@ -40,42 +44,36 @@ def prepare(inputs, settings, refusals):
 
 
 @physics
-def initial(p, o):
+def initial(p):
     """At its height, with its speed."""
-    return State(p.height, p.speed)
+    return State(z=p.height, v=p.speed)
 
 
 @physics
-def rhs(t, s, m, p, o):
+def rhs(s):
     """Free fall with a little drag."""
-    return State(s.v, -9.81 - 1e-3 * s.v * s.v)
+    return State(z=s.v, v=-9.81 - 1e-3 * s.v * s.v)
 
 
 @physics
-def observe(t, s, m, p, o):
+def observe(s):
     """What histories show."""
-    return Quantities(s.z)
+    return Outputs(height=s.z)
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    """What a case comes to."""
-    return Metrics(s.z, s.v)
+def evaluate(s):
+    """What a case comes to, besides its height."""
+    return Metrics(impact_speed=s.v)
 
 
-MODEL = Model(
+MODEL = model(
     name="traps",
     title="A stone and its traps",
-    source="",
-    parameters=(
-        Parameter("height_m", "m", "height at the start", 100.0),
-        Parameter("speed_m_s", "m/s", "speed at the start, upwards", 0.0),
-        Parameter("trap", "", "0, or what befalls the worker", 0.0, low=0.0, high=4.0),
-    ),
-    settings=(),
-    states=(Field("z_m", "m", "height"), Field("v_m_s", "m/s", "speed, upwards")),
-    quantities=(Field("height_m", "m", "height"),),
-    metrics=(Field("end_height_m", "m", "height at the end"), Field("impact_speed_m_s", "m/s", "speed at the end")),
+    inputs=Inputs,
+    states=State,
+    outputs=Outputs,
+    metrics=Metrics,
     clock=FixedStep(step=0.1, until=3.0),
     kernel_parameters=Parameters,
     initial=initial,

@@ -19,53 +19,42 @@ from mc_engine.studies.opened_run import open_run
 
 MODEL = '''
 """A throw, straight up."""
-from collections import namedtuple
 from mc_engine.lanes import physics
-from mc_engine.model import Event, Field, FixedStep, Model, Parameter
+from mc_engine.model import Event, FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
 
-State = namedtuple("State", "height speed")
-Parameters = namedtuple("Parameters", "height speed gravity")
-Quantities = namedtuple("Quantities", "height")
-Events = namedtuple("Events", "top")
-Metrics = namedtuple("Metrics", "height fall")
+Inputs = inputs(
+    HEIGHT_km=Parameter(0.0, "first height"),
+    speed_m_s=Parameter(10.0, "first speed", low=0.0),
+    gravity_m_s2=Parameter(9.80665, "gravity"),
+)
+State = states(height_m="height", speed_m_s="speed")
+Outputs = outputs(height_m="height")
+Metrics = metrics(RESULT_m=at_end("height_m", "height of the top"), fall_s=at_end("t_s", "time to the top"))
 
 def prepare(inputs, settings, refusals):
     refusals.add(inputs.speed < 1.5, "too slow")
     return vars(inputs)
 
 @physics
-def initial(p, o):
-    return State(p.height, p.speed)
+def initial(p):
+    return State(height=p.HEIGHT, speed=p.speed)
 
 @physics
-def rhs(t, s, m, p, o):
-    return State(s.speed, -p.gravity)
+def rhs(s, p):
+    return State(height=s.speed, speed=-p.gravity)
 
 @physics
-def events(t, s, m, p, o):
-    return Events(s.speed)
+def climb(s):
+    return s.speed
 
 @physics
-def observe(t, s, m, p, o):
-    return Quantities(s.height)
+def observe(s):
+    return Outputs(height=s.height)
 
-@physics
-def evaluate(t, s, m, p, o, best, when):
-    return Metrics(s.height, t)
-
-MODEL = Model(
-    name="throw", title="A throw", source="Galilei",
-    parameters=(
-        Parameter("HEIGHT_km", "km", "first height", 0.0),
-        Parameter("speed_m_s", "m/s", "first speed", 10.0, low=0.0),
-        Parameter("gravity_m_s2", "m/s^2", "gravity", 9.80665),
-    ),
-    settings=(),
-    states=(Field("height_m", "m", "height"), Field("speed_m_s", "m/s", "speed")),
-    quantities=(Field("height_m", "m", "height"),),
-    metrics=(Field("RESULT_m", "m", "height of the top"), Field("fall_s", "s", "time to the top")),
-    clock=FixedStep(0.01, 5.0), kernel_parameters=Parameters, prepare=prepare, initial=initial, rhs=rhs, events=events,
-    event_list=(Event("top"),), observe=observe, evaluate=evaluate,
+MODEL = model(
+    name="throw", title="A throw", source="Galilei", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
+    clock=FixedStep(0.01, 5.0), prepare=prepare, initial=initial, rhs=rhs, events={"top": Event(climb)},
+    observe=observe,
 )
 '''
 FIRST = """

@@ -32,47 +32,34 @@ NAMES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
 IN_METRES = 1e3  # km to m, km/s to m/s
 
 MODEL = """
-from collections import namedtuple
 from mc_engine.lanes import physics
-from mc_engine.model import Field, FixedStep, Model, Parameter
+from mc_engine.model import FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
 
-UNITS = ("m", "m", "m", "m/s", "m/s", "m/s")
-NAMES = ("x", "y", "z", "vx", "vy", "vz")
-State = namedtuple("State", NAMES)
-Place = namedtuple("Place", "x")
-
-
-@physics
-def initial(p, o):
-    return State(p.dx, p.dy, p.dz, p.dvx, p.dvy, p.dvz)
+NAMES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
+Inputs = inputs(**{f"d{name}": Parameter(0.0, name) for name in NAMES})
+State = states(**{name: name for name in NAMES})
+Outputs = outputs(x_m="x")
+Metrics = metrics(x_m=at_end("x_m", "x"))
 
 
 @physics
-def rhs(t, s, m, p, o):
-    return State(s.vx, s.vy, s.vz, 0.0, 0.0, 0.0)
+def initial(p):
+    return State(x=p.dx, y=p.dy, z=p.dz, vx=p.dvx, vy=p.dvy, vz=p.dvz)
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Place(s.x)
+def rhs(s):
+    return State(x=s.vx, y=s.vy, z=s.vz, vx=0.0, vy=0.0, vz=0.0)
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    return Place(s.x)
+def observe(s):
+    return Outputs(x=s.x)
 
 
-def fields(prefix):
-    return [(f"{prefix}{n}_{u.replace('/', '_')}", u, n) for n, u in zip(NAMES, UNITS)]
-
-
-MODEL = Model(
-    name="drift", title="A drift without forces", source="",
-    kernel_parameters=namedtuple("Parameters", [f"d{n}" for n in NAMES]),
-    parameters=tuple(Parameter(*field, 0.0) for field in fields("d")), settings=(),
-    states=tuple(Field(*field) for field in fields("")), quantities=(Field("x_m", "m", "x"),),
-    metrics=(Field("x_m", "m", "x"),), clock=FixedStep(1.0, 10.0),
-    initial=initial, rhs=rhs, observe=observe, evaluate=evaluate,
+MODEL = model(
+    name="drift", title="A drift without forces", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
+    clock=FixedStep(1.0, 10.0), initial=initial, rhs=rhs, observe=observe,
 )
 """
 CAMPAIGN = """

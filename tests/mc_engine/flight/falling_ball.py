@@ -33,7 +33,8 @@ PYTHON = """
 import numpy as np
 import pandas as pd
 
-from mc_engine import Field, Parameter, Refuse, Simulator
+from mc_engine import Parameter, Refuse, Simulator
+from mc_engine.model import inputs, metrics, outputs
 
 
 def fly(inputs, case):
@@ -50,16 +51,13 @@ def fly(inputs, case):
 
 SIMULATOR = Simulator(
     title="A falling ball with drag",
-    parameters=(
-        Parameter("mass_kg", "kg", "mass", 10.0, low=0.1),
-        Parameter("drag_area_m2", "m^2", "drag area", 0.02, low=0.0),
-        Parameter("height_m", "m", "height", 500.0, low=0.0),
+    parameters=inputs(
+        mass_kg=Parameter(10.0, "mass", low=0.1),
+        drag_area_m2=Parameter(0.02, "drag area", low=0.0),
+        height_m=Parameter(500.0, "height", low=0.0),
     ),
-    metrics=(
-        Field("fall_time_s", "s", "time to the ground"),
-        Field("impact_speed_m_s", "m/s", "speed at the ground"),
-    ),
-    outputs=(Field("speed_m_s", "m/s", "speed"),),
+    metrics=metrics(fall_time_s="time to the ground", impact_speed_m_s="speed at the ground"),
+    outputs=outputs(speed_m_s="speed"),
     fly=fly,
     {options}
 )

@@ -149,8 +149,8 @@ def test_parameters_enter_and_metrics_leave_in_their_declared_units(model):
     inputs = {item.name: item.default for item in (*model.parameters, *model.settings)}
     inputs |= {"initial_mass_kg": 80.0, "thrust_bias_pct": 5.0, "target_radius_km": 6500.0, "gain_1_s": 0.02}
     rows = dict(zip(model.kernel_parameters._fields, prepare(model, inputs, 2).parameters, strict=True))
-    assert rows["mass"].tolist() == [80.0, 80.0]
-    assert rows["radius"].tolist() == [6.5e6, 6.5e6]
+    assert rows["initial_mass"].tolist() == [80.0, 80.0]
+    assert rows["target_radius"].tolist() == [6.5e6, 6.5e6]
     assert rows["thrust_factor"].tolist() == [1.05, 1.05]
     columns = fly(model, inputs, np.array([0]), SEED)
     assert columns["entry_radius_km"][0] == pytest.approx(6500.0, rel=1e-12)

@@ -22,41 +22,33 @@ from mc_engine.flight.flight import fly
 from mc_engine.model import load_model
 
 FALL = """
-from collections import namedtuple
-
 from mc_engine.lanes import physics
-from mc_engine.model import Field, FixedStep, Model, Parameter
+from mc_engine.model import FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
 
-State = namedtuple("State", "v")
-Fall = namedtuple("Fall", "v")
-
-
-@physics
-def initial(p, o):
-    return State(0.0)
+Inputs = inputs(gravity_m_s2=Parameter(9.0, "acceleration"))
+State = states(v_m_s="speed")
+Outputs = outputs(v_m_s="speed")
+Metrics = metrics(speed_m_s=at_end("v_m_s", "speed"))
 
 
 @physics
-def rhs(t, s, m, p, o):
-    return State(FACTOR * p.gravity)
+def initial():
+    return State(v=0.0)
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Fall(s.v)
+def rhs(t, s, p):
+    return State(v=FACTOR * p.gravity)
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    return Fall(s.v)
+def observe(s):
+    return Outputs(v=s.v)
 
 
-MODEL = Model(
-    name="fall", title="Fall", source="", settings=(), kernel_parameters=namedtuple("Parameters", "gravity"),
-    parameters=(Parameter("gravity_m_s2", "m/s^2", "acceleration", 9.0),),
-    states=(Field("v_m_s", "m/s", "speed"),), quantities=(Field("v_m_s", "m/s", "speed"),),
-    metrics=(Field("speed_m_s", "m/s", "speed"),), clock=FixedStep(0.5, 2.0),
-    initial=initial, rhs=rhs, observe=observe, evaluate=evaluate,
+MODEL = model(
+    name="fall", title="Fall", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
+    clock=FixedStep(0.5, 2.0), initial=initial, rhs=rhs, observe=observe,
 )
 """
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mistaken_campaign import campaign_with
+from mistaken_campaign import campaign_with, with_evaluate
 from small_run import ENVIRONMENT
 
 import mc_engine
@@ -19,6 +19,7 @@ from mc_engine.flight.chunks import NOMINAL_NOISE
 from mc_engine.flight.contract import breaches
 from mc_engine.flight.contract_flight import faults
 from mc_engine.flight.flight import fly, fly_interpreted
+from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.flight.lost_numbers import first_lost
 from mc_engine.runner import runner
 from mc_engine.status import STATUS_NAME
@@ -27,32 +28,25 @@ ROCKET = Path(mc_engine.__file__).parent / "documentation" / "tutorial" / "sound
 DRAG = "    drag = 0.5 * rho * m.drag_area * sqrt(ux * ux + uz * uz)\n"
 BY_MACH = """    speed = sqrt(ux * ux + uz * uz)
     mach = sqrt(speed - {slowest}) / 340.0
-    factor, _ = over_mach(o.tables, 0.0, mach)
-    drag = 0.5 * rho * m.drag_area * speed * factor
+    drag = 0.5 * rho * m.drag_area * speed * FACTOR(mach)
 """
-TABLES = '''def tables(o):
-    """Factor of the drag by Mach number."""
-    return mach_table([(0.0, 1.0, 0.0), (1.0, 1.6, 0.0), (5.0, 1.0, 0.0)])
-
-
-MODEL = Model(
-    tables=tables,
-'''
-BY_TABLE = (
-    ("from mc_engine.physics.atmosphere", "from mc_engine.physics.aerodynamics import mach_table, over_mach\nfrom "
-     "mc_engine.physics.atmosphere"),
-    ("MODEL = Model(\n", TABLES),
+BY_CURVE = (
+    ("import STANDARD_GRAVITY\n", "import STANDARD_GRAVITY\nfrom mc_engine.physics.curves import curve\n\n"
+     "FACTOR = curve(x=[0.0, 1.0, 5.0], y=[1.0, 1.6, 1.0])  # of the drag by Mach number\n"),
 )  # fmt: skip
 SHORT = ("until=2000.0", "until=8.0")
 ADAPTIVE = ("FixedStep(step=0.05, until=8.0)", "AdaptiveStep(until=8.0, rtol=1e-8, control_period=0.5)")
-ADAPTED = ("FixedStep, Model", "AdaptiveStep, Model")
+ADAPTED = ("    FixedStep,\n", "    AdaptiveStep,\n")
+# the functions take the time and the settings, too
+SIGNATURES = (("def rhs(s, m, p)", "def rhs(t, s, m, p, o)"), ("def control(s,", "def control(t, s,"),
+              ("def switch(s,", "def switch(t, s,"), ("def altitude(s)", "def altitude(t, s)"))  # fmt: skip
 
 
 def rocket(folder, *edits):
-    """The tutorial's campaign, flown by `rocket_model.py` with each (text, other text) of it exchanged."""
+    """The tutorial's campaign, with each (text, other text) of its model exchanged."""
     shutil.copytree(ROCKET, folder, ignore=shutil.ignore_patterns("__pycache__"), dirs_exist_ok=True)
-    text = Path(__file__).with_name("rocket_model.py").read_text()
-    for old, new in edits:
+    text = (ROCKET / "model.py").read_text()
+    for old, new in (*SIGNATURES, *edits):
         assert old in text, old
         text = text.replace(old, new)
     (folder / "model.py").write_text(text)
@@ -76,7 +70,7 @@ def only(sentences):
 
 
 def test_check_names_the_line_of_a_mach_number_that_no_slow_rocket_has(tmp_path):
-    campaign = rocket(tmp_path, *BY_TABLE, (DRAG, BY_MACH.format(slowest=200.0)))
+    campaign = rocket(tmp_path, *BY_CURVE, (DRAG, BY_MACH.format(slowest=200.0)))
     line = line_of(tmp_path, "    mach = ")
     assert only(breaches(campaign)).startswith(
         f"model.py, line {line}: `mach = sqrt(speed - 200.0) / 340.0`: the square root of -176.3"
@@ -86,7 +80,7 @@ def test_check_names_the_line_of_a_mach_number_that_no_slow_rocket_has(tmp_path)
 def test_check_and_replay_name_the_line_of_a_number_that_is_lost_in_flight(tmp_path):
     model = tmp_path / "rocket"
     slowest = "10.0 * t * t"
-    campaign = rocket(model, *BY_TABLE, (DRAG, BY_MACH.format(slowest=slowest)), SHORT)
+    campaign = rocket(model, *BY_CURVE, (DRAG, BY_MACH.format(slowest=slowest)), SHORT)
     assert breaches(campaign) == []
     sentence = (
         f"model.py, line {line_of(model, '    mach = ')}: `mach = sqrt(speed - {slowest}) / 340.0`: the square root"
@@ -113,7 +107,7 @@ def mc_engine_says(folder, *words):
 
 HEATING = "from mc_engine.physics.heating import sutton_graves\n"
 PUSH = "    force = m.burning * thrust_of(p)\n"
-HELD, SWITCHED = "    return Memory(nozzle, m.burning", "    return s, Memory(m.nozzle"
+HELD, SWITCHED = "    return Memory(nozzle=nozzle, burning=m", "    return s, Memory(nozzle=m.nozzle"
 LOST = {
     "in a helper of another file": (
         [("from figures import", "from guidance import lag\nfrom figures import"),
@@ -140,8 +134,8 @@ LOST = {
         "the arc cosine of 1.",
     ),
     "in the function of an event": (
-        [("s.altitude - MAIN_ALTITUDE, s.altitude)", "s.altitude - MAIN_ALTITUDE, sqrt(3.01 - t))")],
-        "    return Events(",
+        [("    return s.altitude\n", "    return sqrt(3.01 - t)\n")],
+        "    return sqrt(3.01",
         "the square root of -",
     ),
     "in what an event does": (
@@ -173,12 +167,12 @@ def test_a_parameter_that_prepare_loses_is_named(tmp_path):
     prepare = (
         "def prepare(inputs, settings, refusals):\n    return {**vars(inputs), 'wind': inputs.wind * float('nan')}\n"
     )
-    campaign = rocket(tmp_path, SHORT, ("MODEL = Model(\n", f"{prepare}\n\nMODEL = Model(\n    prepare=prepare,\n"))
+    campaign = rocket(tmp_path, SHORT, ("MODEL = model(\n", f"{prepare}\n\nMODEL = model(\n    prepare=prepare,\n"))
     assert lost(campaign) == '"wind" of the kernel_parameters is nan (the nominal case)'
 
 
 def test_a_metric_that_evaluate_loses_is_named_though_the_case_is_ok(tmp_path):
-    campaign = campaign_with(tmp_path / "minimal", ("t, best.speed)", "t, sqrt(-best.speed))"))
+    campaign = campaign_with(tmp_path / "minimal", *with_evaluate("Metrics(top_speed=sqrt(-best.speed))"))
     found = runner.replay(runner.run(replace(campaign, cases=3), tmp_path / "run").path, 2).lost
     line = line_of(tmp_path / "minimal", "    return Metrics(")
     assert found.startswith(f'"top_speed_m_s": model.py, line {line}: `return Metrics(')
@@ -203,7 +197,8 @@ def test_an_interpreted_flight_has_the_bits_of_the_kernel(name, tmp_path):
     campaign = rocket(tmp_path, SHORT) if name == "rocket" else load_campaign(name)
     inputs = full_inputs(campaign, {key: value[0] for key, value in case_table(campaign, np.array([3])).items()})
     flown = fly(campaign.model, inputs, np.array([3]), campaign.seed, folder=campaign.directory, width=1)
-    (time, status, states, metrics), _ = fly_interpreted(campaign.model, inputs, 3, campaign.seed, 120.0)
+    flight = InterpretedFlight(campaign.model, 120.0)
+    time, status, states, metrics = fly_interpreted(flight, inputs, 3, campaign.seed)
     assert flown["status"][0] == STATUS_NAME[int(status[0])]
     assert flown["end_time_s"][0] == time[0]
     for field, row in zip(campaign.model.states, states, strict=True):

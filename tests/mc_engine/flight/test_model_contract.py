@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 import pytest
-from mistaken_campaign import campaign_with, line_of
+from mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate
 from small_run import ENVIRONMENT
 
 from mc_engine.campaign.loading import list_campaigns, load_campaign
@@ -24,8 +24,8 @@ def only(sentences):
 
 def test_an_unknown_unit_is_named_with_the_nearest(tmp_path):
     with pytest.raises(CampaignError) as error:
-        campaign_with(tmp_path, ('Field("altitude_km", "km"', 'Field("altitude_km", "kilometres"'))
-    line = line_of(tmp_path, "MODEL = Model(")
+        campaign_with(tmp_path, ("low=150.0", 'low=150.0, unit="kilometres"'))
+    line = line_of(tmp_path, "Inputs = inputs(")
     assert f'model.py, line {line}: "altitude_km" has the unit "kilometres"; did you mean "km"?' in str(error.value)
 
 
@@ -34,15 +34,15 @@ NOISE = (
 )
 FLOWN = {
     "metric never set": (
-        [("t, best.speed)", "t, best.speed / 0.0 * 0.0)")],
+        with_evaluate("Metrics(top_speed=best.speed / 0.0 * 0.0)"),
         'the metric "top_speed_m_s" is not a number in any of the 32 cases',
     ),
     "metric that is infinite": (
-        [("t, best.speed)", "t, best.speed / 0.0)")],
+        with_evaluate("Metrics(top_speed=best.speed / 0.0)"),
         'the metric "top_speed_m_s" is infinite in all of the 32 cases that flew',
     ),
     "metric that is constant": (
-        [("t, best.speed)", "t, 7.5)")],
+        with_evaluate("Metrics(top_speed=7.5)"),
         'the metric "top_speed_m_s" is 7.5 whatever happens; let `evaluate` work it out',
     ),
     "dispersion that moves nothing": (
@@ -50,21 +50,21 @@ FLOWN = {
         'dispersion "pitch_error_deg" moves no metric',
     ),
     "event never crossing": (
-        [("Events(s.x * s.vx + s.y * s.vy)", "Events(1e12 + s.x * s.vx + s.y * s.vy)")],
+        [("return s.x * s.vx", "return 1e12 + s.x * s.vx")],
         'no stopping event crosses zero before the time limit, of "apogee"',
     ),
     "non-deterministic": (
         [
             ("from mc_engine.lanes", "import numpy as np\n\nfrom mc_engine.lanes"),
             ("@physics\ndef initial", NOISE.replace("BURN", "inputs.burn_dv + np.random.rand(inputs.burn_dv.size)")),
-            ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+            given("prepare=prepare"),
         ],
         "when the same cases fly a second time; a case must depend on its inputs and case_id alone",
     ),
     "depends on the company": (
         [
             ("@physics\ndef initial", NOISE.replace("BURN", "inputs.burn_dv - inputs.magnitude_error.mean()")),
-            ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+            given("prepare=prepare"),
         ],
         "when it flies among other cases",
     ),
@@ -81,19 +81,15 @@ def test_a_mistake_that_shows_in_flight_is_one_sentence(mistake, tmp_path):
 
 def test_a_switching_event_that_never_fires_is_missed_unless_it_is_declared_rare(tmp_path):
     edits = [
-        ('"apogee")', '"apogee moon")'),
-        ("    return Events(s.x * s.vx + s.y * s.vy)", "    return Events(s.x * s.vx + s.y * s.vy, s.x - 3.8e8)"),
-        ("    initial=initial", "    switch=switch,\n    initial=initial"),
-        (
-            "@physics\ndef observe",
-            "@physics\ndef switch(t, s, m, p, o, hit):\n    return s, m\n\n\n@physics\ndef observe",
-        ),
+        in_front("@physics\ndef moon(s):\n    return s.x - 3.8e8"),
+        in_front("@physics\ndef switch(s, m):\n    return s, m"),
+        given("switch=switch"),
     ]
-    stop = 'Event("apogee", "falling", "stop")'
-    rare = [*edits, (stop, f'{stop}, Event("moon", "rising", "switch", rare=True)')]
+    stop = '"apogee": Event(climb, "falling", "stop")'
+    rare = [*edits, (stop, f'{stop}, "moon": Event(moon, "rising", "switch", rare=True)')]
     assert faults(campaign_with(tmp_path / "rare", *rare)) == []
     missed = only(
-        faults(campaign_with(tmp_path / "missed", *edits, (stop, f'{stop}, Event("moon", "rising", "switch")')))
+        faults(campaign_with(tmp_path / "missed", *edits, (stop, f'{stop}, "moon": Event(moon, "rising", "switch")')))
     )
     assert 'the event "moon" crosses zero in none of 32 cases, its function stays below it' in missed
 
@@ -102,10 +98,7 @@ PREPARE = "def prepare(inputs, settings, refusals):\n    {}\n    return vars(inp
 
 
 def with_prepare(body):
-    return ("@physics\ndef initial", PREPARE.format(body)), (
-        "    initial=initial",
-        "    prepare=prepare,\n    initial=initial",
-    )
+    return ("@physics\ndef initial", PREPARE.format(body)), given("prepare=prepare")
 
 
 def test_a_design_that_breaks_is_a_problem_of_the_campaign_with_its_line(tmp_path):

@@ -4,8 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from mc_engine import CampaignError, StoreError, load_campaign, open_run, replay, resume, run
+from mc_engine.command_line.commands import app
 from mc_engine.runner.importing import import_results
 from mc_engine.runner.runner import Backend, extend, rerun
 from mc_engine.runner.summary import judgement
@@ -82,7 +84,7 @@ def test_failed_cases_are_flown_again(tmp_path):
     )
     campaign = load_campaign(python_campaign(tmp_path / "a", cases=8, fault=fault))
     store = run(campaign, tmp_path / "run", workers=1)
-    assert store.row(4)["reason"] == "sim.py, line 11: ValueError: a licence is missing"
+    assert store.row(4)["reason"] == "sim.py, line 12: ValueError: a licence is missing"
     inputs = json.loads((tmp_path / "run/simulator/case-0000004/case.json").read_text())
     assert inputs["mass_kg"] == store.row(4)["mass_kg"]
     mark.touch()
@@ -96,6 +98,18 @@ def test_numbers_within_the_tolerance_replay(tmp_path):
         campaign = load_campaign(python_campaign(tmp_path / name, cases=4, fault=fault, options=options))
         run(campaign, tmp_path / f"run-{name}", workers=1)
         assert replay(tmp_path / f"run-{name}", 1).equal == equal
+
+
+def test_the_command_line_says_of_simulators_what_is_true_of_them(tmp_path):
+    fault = "if case.id == 2: return {'fall_time_s': np.nan, 'impact_speed_m_s': 1.0}"
+    file = python_campaign(tmp_path / "ball", cases=4, fault=fault)
+    said = CliRunner().invoke(app, ["run", str(file), "--out", str(tmp_path / "run"), "--no-report"])
+    assert said.exit_code == 0
+    assert "compile" not in said.output
+    assert 'not finite   case 2: "fall_time_s" is not a number\n' in said.output
+    said = CliRunner().invoke(app, ["extend", str(tmp_path / "run"), "--cases", "6", "--no-report"])
+    assert said.exit_code == 0
+    assert "compile" not in said.output
 
 
 def test_a_changed_simulator_is_another_one(tmp_path):
@@ -166,3 +180,24 @@ def test_results_of_other_inputs_are_refused(tmp_path, flown):
     table.drop(columns="fall_time_s").to_csv(tmp_path / "results.csv", index=False)
     with pytest.raises(CampaignError, match="fall_time_s: is no column of the table"):
         import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
+
+
+def test_words_and_numbers_of_imported_results_are_checked(tmp_path, flown):
+    table = flown["case"].cases().astype({"fall_time_s": object})
+    campaign = load_campaign(python_campaign(tmp_path / "ball"))
+    table.loc[7, "status"] = "crashd"
+    table.to_csv(tmp_path / "results.csv", index=False)
+    with pytest.raises(CampaignError, match=r'status: row 8: "crashd" is none of ok, .*; did you mean "crashed"'):
+        import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
+    table.loc[7, "status"] = "crashed"
+    for cell in ("1_0", "\u0663", "soon"):
+        table.loc[7, "fall_time_s"] = cell
+        table.to_csv(tmp_path / "results.csv", index=False)
+        with pytest.raises(CampaignError, match=rf"row 8, column \"fall_time_s\": '{cell}' is not a number"):
+            import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
+    table.loc[7, "fall_time_s"] = ""
+    table.to_csv(tmp_path / "results.csv", index=False)
+    store = import_results(campaign, tmp_path / "results.csv", tmp_path / "run")
+    assert store.status_counts() == {"ok": 99, "crashed": 1}
+    others = table.index != 7
+    assert store.cases()["fall_time_s"][others].equals(flown["case"].cases()["fall_time_s"][others])

@@ -128,16 +128,35 @@ def test_the_control_is_sampled_at_its_times_with_its_own_draws(wave):
     assert longer["push_m_s2"][0] == longer["push_m_s2"][1] != longer["push_m_s2"][2]
 
 
-def test_a_history_disturbs_nothing_and_passes_through_the_requested_times(wave):
+@pytest.mark.parametrize("width", [1, 8])
+def test_a_history_disturbs_nothing_and_has_every_event_and_top_of_the_flight(wave, width):
     inputs = inputs_of(wave, {"omega_rad_s": 1.3, "tolerance": 1e-12})
     plain = flown(wave, omega_rad_s=1.3, tolerance=1e-12)
+    turns = np.arange(int(50.0 * 1.3 / np.pi / 2.0)) * 2.0 * np.pi
+    instants = np.concatenate([turns + angle for angle in (np.arcsin(0.5), np.pi - np.arcsin(0.5), np.pi / 2.0)]) / 1.3
     for rows in (11, 501):
-        columns, history = fly_history(wave, inputs, 0, 1, folder=FOLDER, rows=rows)
+        columns, history = fly_history(wave, inputs, 0, 1, folder=FOLDER, rows=rows, width=width)
+        t, height = history["t_s"], history["height_m"]
         assert bits(columns) == bits(plain)
-        assert len(history["t_s"]) == rows
-        assert history["t_s"] == pytest.approx(np.linspace(0.0, 50.0, rows), rel=1e-14)
-        assert history["height_m"] == pytest.approx(np.sin(1.3 * history["t_s"]), abs=1e-9)
-    assert history["height_m"][-1] == plain["end_x_m"][0]
+        assert (t[0], t[-1], height[-1]) == (0.0, plain["end_time_s"][0], plain["end_x_m"][0])
+        assert (np.diff(t) > 0.0).all()
+        assert height == pytest.approx(np.sin(1.3 * t), abs=1e-9)
+        assert np.abs(t[:, None] - instants).min(axis=0).max() < 1e-6  # a top is flat: its time has half the digits
+        assert height.max() == plain["top_m"][0]
+    assert len(t) == 501
+
+
+def test_a_history_has_both_sides_of_every_sample_at_which_the_held_push_jumps(tmp_path):
+    text = (FOLDER / "wave.py").read_text()
+    text = text.replace("def observe(s, p)", "def observe(s, m)").replace("above=s.x - p.level", "above=m.push")
+    (tmp_path / "pushed.py").write_text(text)
+    model = load_model("pushed.py", tmp_path)
+    inputs = inputs_of(model, {"omega_rad_s": 1.0, "noise_m_s2": 1.0})
+    _, history = fly_history(model, inputs, 4, 1, folder=tmp_path, rows=60)
+    t, push = history["t_s"], history["above_m"]
+    for sample in range(1, 8):
+        before, after = np.flatnonzero(t == 7.0 * sample)
+        assert push[before] == push[np.flatnonzero(t == 7.0 * (sample - 1))[-1]] != push[after]
 
 
 @pytest.mark.parametrize(("ill", "status"), [(1.0, "not-finite"), (2.0, "step-limit"), (3.0, "step-limit")])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, OSCILLATOR, flown, same_bytes
+from flown_models import FOLDER, OSCILLATOR, RAIL, flown, same_bytes
 
 from mc_engine.flight.flight import fly_history
 from mc_engine.lanes.functions import fma
@@ -140,3 +140,18 @@ def test_the_history_runs_from_the_first_state_to_the_last_one_of_the_row(width)
 
 def test_one_case_and_eight_at_a_time_give_the_same_bytes():
     same_bytes(flown(OSCILLATOR, width=1, **MIXED), flown(OSCILLATOR, width=8, **MIXED))
+
+
+@pytest.mark.parametrize("rows", [10, 1000])
+def test_the_history_has_every_bounce_at_its_time_however_few_its_rows_are(rows):
+    """A ball from 5 m at 10 m/s^2 meets the floor at 1, 3, 5, 7 and 9 s, all between two steps."""
+    inputs = {item.name: item.default for item in (*RAIL.parameters, *RAIL.settings)}
+    inputs |= {"gravity_m_s2": 10.0, "x0_m": 5.0, "wall_m": 0.0, "step_s": 0.3, "last_s": 9.9}
+    columns, history = fly_history(RAIL, inputs, 0, 1, folder=FOLDER, rows=rows)
+    t, height = history["t_s"], history["x_m"]
+    bounces = np.abs(t[:, None] - [1.0, 3.0, 5.0, 7.0, 9.0]).argmin(axis=0)
+    assert t[bounces] == pytest.approx([1.0, 3.0, 5.0, 7.0, 9.0], abs=1e-12)
+    assert height[bounces] == pytest.approx(np.zeros(5), abs=1e-12)
+    assert columns["bounced_at_s"][0] in t
+    # both ends and five bounces, and half as many rows as asked for; or those, 34 instants of the grid, and the stop
+    assert len(t) == (2 + 5 + 5 if rows == 10 else 34 + 5)

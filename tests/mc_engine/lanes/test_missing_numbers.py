@@ -15,6 +15,7 @@ from mc_engine.physics import (
     aerodynamics,
     atmosphere,
     attitude,
+    curves,
     frames,
     geopotential,
     gravity,
@@ -81,7 +82,7 @@ def test_a_limit_that_is_written_out_gives_the_bits_of_one_that_is_not(compiled)
     np.testing.assert_array_equal(bits(compiled[15]), bits(np.where(X == 0.0, X, np.maximum(0.0, X))))
 
 
-TABLE = aerodynamics.mach_table([(0.0, 1.0, 0.0), (1.0, 2.0, 4.0)])
+CURVE = curves.curve(x=[0.0, 1.0], y=[1.0, 2.0])
 NODES = np.arange(48.0)
 HARMONICS = geopotential.harmonics_table(2, 2).ravel()
 COMMAND = pulse_modulators.at_rest()
@@ -91,7 +92,7 @@ SETUP = type("Setup", (), {"gain": 4.0, "level": 1.0, "on": 0.45, "off": 0.15, "
 OF_PHYSICS = {
     "lift_direction": (aerodynamics.lift_direction, (1.0, 2.0, 3.0, 0.0, 0.6, 0.8, math.sqrt(14.0), 0.8, 0.6)),
     "axial_coefficient": (aerodynamics.axial_coefficient, (1.0, 0.2, 0.9, 0.1)),
-    "over_mach": (lambda first, mach: aerodynamics.over_mach(TABLE, first, mach), (0.0, 0.7)),
+    "curve": (CURVE, (0.7,)),
     "exponential": (atmosphere.exponential, (5e3, 1.225, 0.0, 7200.0)),
     "layered": (atmosphere.layered, (250e3,)),
     "us76": (atmosphere.us76, (30e3,)),
@@ -138,26 +139,31 @@ def test_shared_physics_hands_on_what_is_not_a_number_in_any_argument(name):
 
 
 GAP = """
-from collections import namedtuple
-
 from mc_engine.lanes import physics, sqrt, where
-from mc_engine.model import {clock}, Event, Extremum, Field, Model, Parameter
+from mc_engine.model import {clock}, Event, Field, Parameter, inputs, last_above, maximum_of, metrics, model, outputs
+from mc_engine.model import states, time_of_maximum
 
-State = namedtuple("State", "x")
-Parameters = namedtuple("Parameters", "seen_gap event_gap")
-Seen = namedtuple("Seen", "hill")
-Events = namedtuple("Events", "end")
-Metrics = namedtuple("Metrics", "top top_time late_time")
+Inputs = inputs(
+    seen_gap=Parameter(1e9, "where the output is none", unit=""),
+    event_gap=Parameter(1e9, "where the event is none", unit=""),
+)
+State = states(x=Field("place", unit=""))
+Outputs = outputs(hill=Field("height", unit=""))
+Metrics = metrics(
+    top=maximum_of("hill", "top", unit=""),
+    top_time_s=time_of_maximum("hill", "time"),
+    late_time_s=last_above("hill", 0.0, "time"),
+)
 
 
 @physics
-def initial(p, o):
-    return State(0.0 * p.seen_gap)
+def initial():
+    return State(x=0.0)
 
 
 @physics
-def rhs(t, s, m, p, o):
-    return State(1.0 + 0.0 * s.x)
+def rhs():
+    return State(x=1.0)
 
 
 @physics
@@ -166,31 +172,19 @@ def gap(x, since, until):
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Seen(2.0 + (s.x - 3.0) * (7.0 - s.x) + gap(s.x, p.seen_gap, p.seen_gap + 0.8))
+def observe(s, p):
+    return Outputs(hill=2.0 + (s.x - 3.0) * (7.0 - s.x) + gap(s.x, p.seen_gap, p.seen_gap + 0.8))
 
 
 @physics
-def events(t, s, m, p, o):
-    return Events(9.0 - s.x + gap(s.x, p.event_gap, p.event_gap + 0.8))
+def before_end(s, p):
+    return 9.0 - s.x + gap(s.x, p.event_gap, p.event_gap + 0.8)
 
 
-@physics
-def evaluate(t, s, m, p, o, best, when):
-    return Metrics(best.top, when.top, when.late)
-
-
-MODEL = Model(
-    name="gap", title="A quantity and an event with a gap", source="",
-    parameters=(
-        Parameter("seen_gap", "", "where the quantity is none", 1e9),
-        Parameter("event_gap", "", "where the event is none", 1e9),
-    ),
-    settings=(), states=(Field("x", "", "place"),), quantities=(Field("hill", "", "height"),),
-    metrics=(Field("top", "", "top"), Field("top_time_s", "s", "time"), Field("late_time_s", "s", "time")),
-    clock={made}, kernel_parameters=Parameters, initial=initial, rhs=rhs, observe=observe, evaluate=evaluate,
-    events=events, event_list=(Event("end"),),
-    extrema=(Extremum("top", "hill"), Extremum("late", "hill", "last_above")),
+MODEL = model(
+    name="gap", title="An output and an event with a gap", inputs=Inputs, states=State, outputs=Outputs,
+    metrics=Metrics, clock={made}, initial=initial, rhs=rhs, observe=observe,
+    events={{"end": Event(before_end)}},
 )
 """
 CLOCKS = {"FixedStep": "FixedStep(0.25, 20.0)", "AdaptiveStep": "AdaptiveStep(20.0, control_period=0.3)"}
@@ -203,7 +197,7 @@ def gapped(request, tmp_path_factory):
     return load_model("model.py", folder), folder
 
 
-def test_a_quantity_that_was_once_not_a_number_has_no_extreme_value(gapped):
+def test_an_output_that_was_once_not_a_number_has_no_extreme_value(gapped):
     model, folder = gapped
     inputs = {"seen_gap": np.array([1e9, 1.1, 5.1, 8.4]), "event_gap": 1e9}
     flown = fly(model, inputs, np.arange(4), 1, folder=folder, width=8)

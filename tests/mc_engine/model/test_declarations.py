@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from mistaken_campaign import declared_with as campaign_with
+from mistaken_campaign import campaign_with
 
 from mc_engine.errors import CampaignError, ModelError
 from mc_engine.flight.contract import breaches
-from mc_engine.flight.flight import fly
+from mc_engine.flight.flight import fly, fly_interpreted
+from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.model import Field, Parameter, Setting, inputs, maximum_of, metrics, outputs, states
 from mc_engine.model.declarations import unit_of
 
@@ -143,3 +144,137 @@ def test_a_memory_starts_with_its_defaults_and_is_given_by_keyword(tmp_path):
     columns = flown(tmp_path, *edits)
     steps = np.floor(columns["end_time_s"] / 10.0)
     np.testing.assert_array_equal(columns["samples"], 10.0 * (steps + 1.0) + 7.0)
+
+
+PREPARED = (
+    ("\n\n@physics\ndef initial", "\n\ndef prepare(i, settings, refusals):\n    r = EQUATORIAL_RADIUS + i.altitude\n"
+     '    return {**vars(i), "radius": r, "tables": []}\n\n\n@physics\ndef initial'),
+    ("EQUATORIAL_RADIUS + p.altitude, p", "p.radius, p"),
+    ("import Event", "import prepared, Event"),
+    ("observe=observe,", "observe=observe, prepare=prepare, kernel_parameters=prepared(prepare, Inputs),"),
+)  # fmt: skip
+
+
+def test_physics_reads_what_prepare_gives_by_its_names(tmp_path):
+    plain, own = flown(tmp_path / "plain"), flown(tmp_path / "own", *PREPARED)
+    assert all(np.array_equal(plain[name], own[name]) for name in plain)
+    kernel_parameters = campaign_with(tmp_path / "own", *PREPARED).model.kernel_parameters
+    assert kernel_parameters._fields == ("altitude", "burn_dv", "magnitude_error", "pitch_error", "radius")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "sentence"),
+    [
+        ("i.altitude", "i.altitud", 21, '`prepare`: AttributeError: \'types.SimpleNamespace\' object has no attribute '
+         '\'altitud\'; did you mean "altitude"?; `inputs` and `settings` have attributes in SI'),
+        ("return {", "more = {", 49, "`prepare` gives NoneType; it must return a dictionary of arrays"),
+    ],
+)  # fmt: skip
+def test_a_mistake_in_prepare_is_named_when_its_names_are_read(old, new, line, sentence, tmp_path):
+    with pytest.raises(CampaignError) as error:
+        campaign_with(tmp_path, *PREPARED, (old, new))
+    (problem,) = error.value.problems
+    assert problem.message.startswith(f"model.py, line {line}: {sentence}")
+
+
+NESTED = (
+    ("\n\n@physics\ndef initial", '''
+
+Top = namedtuple("Top", "speed time")
+Memory = namedtuple("Memory", "top samples")
+
+
+@physics
+def start():
+    return Memory(Top(0.0, time=-1.0), samples=0.0)
+
+
+@physics
+def control(t, s, m):
+    fast = s.vx > m.top.speed
+    return Memory(where(fast, Top(s.vx, t), m.top), m.samples + 1.0)
+
+
+@physics
+def switch(t, s, m, hit):
+    return s, Memory(where(hit.turn > 0.5, Top(m.top.speed, 0.0), m.top), m.samples)
+
+
+@physics
+def turn(s):
+    return s.x
+
+
+@physics
+def initial'''),
+    ("from mc_engine.lanes import", "from collections import namedtuple\n\nfrom mc_engine.lanes import where,"),
+    ("def observe(s)", "def observe(s, m)"),
+    ("Outputs(altitude=", "Outputs(top=m.top.speed, top_time=m.top.time, samples=m.samples, altitude="),
+    ('outputs(altitude_km="altitude"',
+     'outputs(altitude_km="altitude", top_m_s="", top_time_s="", samples=Field("", unit="")'),
+    ("    top_speed_m_s=", '    top_m_s=at_end("top_m_s", ""), top_time_s=at_end("top_time_s", ""),\n'
+     '    samples=at_end("samples", "", unit=""), top_speed_m_s='),
+    ("observe=observe,", "observe=observe, start=start, control=control, switch=switch,"),
+    ('"falling", "stop")', '"falling", "stop"), "turn": Event(turn, "falling", "switch")'),
+    ("import Event", "import Event, Field"),
+)  # fmt: skip
+FLAT = (
+    ("Memory(Top(0.0, time=-1.0), samples=0.0)", "Memory(0.0, -1.0, 0.0)"),
+    ('"top samples"', '"speed time samples"'),
+    ("fast = s.vx > m.top.speed", "fast = s.vx > m.speed"),
+    ("where(fast, Top(s.vx, t), m.top)", "where(fast, s.vx, m.speed), where(fast, t, m.time)"),
+    ("where(hit.turn > 0.5, Top(m.top.speed, 0.0), m.top)", "m.speed, where(hit.turn > 0.5, 0.0, m.time)"),
+    ("m.top.speed, top_time=m.top.time", "m.speed, top_time=m.time"),
+)
+
+
+@pytest.mark.parametrize(
+    "clock", ["FixedStep(step=10.0, until=10_000.0)", "AdaptiveStep(10_000.0, control_period=10.0)"]
+)
+def test_a_discrete_state_of_records_flies_as_one_of_numbers_at_every_width_and_interpreted(clock, tmp_path):
+    clocked = (("FixedStep(step=10.0, until=10_000.0)", clock), ("import Event", "import AdaptiveStep, Event"))
+    nested = campaign_with(tmp_path / "nested", *NESTED, *clocked)
+    assert breaches(nested) == []
+    plain = campaign_with(tmp_path / "flat", *NESTED, *FLAT, *clocked)
+    inputs = nested.nominal | {"burn_dv_m_s": np.linspace(50.0, 400.0, 11)}
+    ids = np.arange(11)
+    expected = fly(plain.model, inputs, ids, 1, folder=tmp_path / "flat", width=8)
+    assert len(set(expected["samples"])) > 5
+    assert set(expected["top_time_s"]) == {0.0}
+    for width in (1, 8):
+        found = fly(nested.model, inputs, ids, 1, folder=tmp_path / "nested", width=width)
+        assert all(np.array_equal(found[name], expected[name]) for name in expected)
+    time, _, _, metrics = fly_interpreted(InterpretedFlight(nested.model), inputs | {"burn_dv_m_s": 50.0}, 0, 1)
+    assert time[0] == expected["end_time_s"][0]
+    names = [metric.name for metric in nested.model.metrics]
+    assert metrics[names.index("samples")][0] == expected["samples"][0]
+
+
+def test_a_record_of_the_discrete_state_keeps_its_fields(tmp_path):
+    other = ("where(fast, Top(s.vx, t), m.top)", "Memory(s.vx, t)")
+    (found,) = breaches(campaign_with(tmp_path, *NESTED, other))
+    assert "`control` gives Memory(top, samples)" in found
+    assert "the named tuple of `start`, Top(speed, time)" in found
+
+
+SHARED = (
+    ("@physics\ndef climb(s)", "Crossings = namedtuple('Crossings', 'late apogee')\n\n\n@physics\ndef climb(t, s)"),
+    ("    return s.x * s.vx + s.y * s.vy", "    return Crossings(late=t - 1e9, apogee=s.x * s.vx + s.y * s.vy)"),
+    ('{"apogee": Event(climb, "falling", "stop")}',
+     '{"apogee": Event(climb, "falling", "stop"), "late": Event(climb, "rising", "stop", rare=True)}'),
+    ("from mc_engine.lanes import", "from collections import namedtuple\n\nfrom mc_engine.lanes import"),
+)  # fmt: skip
+
+
+def test_events_may_share_a_function_that_gives_a_number_for_each(tmp_path):
+    plain, shared = flown(tmp_path / "plain"), flown(tmp_path / "shared", *SHARED)
+    assert all(np.array_equal(plain[name], shared[name]) for name in plain)
+    other = ("Crossings(late=t - 1e9, apogee=", "Crossings(later=t - 1e9, apogee="), ("'late apogee'", "'later apogee'")
+    (found,) = breaches(campaign_with(tmp_path / "other", *SHARED, *other))
+    assert "`events` gives Crossings(later, apogee); it must give a record with" in found
+
+
+def test_events_may_share_a_function_that_gives_one_number(tmp_path):
+    both = ('"falling", "stop")}', '"falling", "stop"), "rise": Event(climb, "rising", "stop", rare=True)}')
+    plain, shared = flown(tmp_path / "plain"), flown(tmp_path / "both", both)
+    assert all(np.array_equal(plain[name], shared[name]) for name in plain)

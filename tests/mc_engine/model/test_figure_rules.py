@@ -1,7 +1,7 @@
 """Figures of a model: their names and the kinds of their fields are looked at where the model is made."""
 
 import pytest
-from mistaken_campaign import campaign_with, line_of
+from mistaken_campaign import campaign_with, given, line_of
 
 from mc_engine.errors import CampaignError
 
@@ -15,7 +15,7 @@ def with_figures(folder, figures):
     return campaign_with(
         folder,
         ("from mc_engine.lanes import", f"{lines}from mc_engine.lanes import"),
-        ("    settings=(),", f"    settings=(),\n    figures={figures},"),
+        given(f"figures={figures}"),
     )
 
 
@@ -48,12 +48,12 @@ MISTAKES = {
                                    "must be a tuple, each item a text; one alone needs its comma, (...,)"),
     "a list in place of a tuple": ('HistoryFigure(["altitude_km"], "t")', "it must be a tuple, each item a text; one"),
     "nothing to draw": ('HistoryFigure((), "t")', "has () as its `quantities`; it must name one at least"),
-    "a quantity": ('HistoryFigure(("altitude_km", "spedd_m_s"), "t")', 'no quantity "spedd_m_s"; did you mean "spe'),
-    "a metric in time": ('HistoryFigure(("top_speed_m_s",), "t")', 'there is no quantity "top_speed_m_s" (it is a '
+    "an output": ('HistoryFigure(("altitude_km", "spedd_m_s"), "t")', 'no output "spedd_m_s"; did you mean "spe'),
+    "a metric in time": ('HistoryFigure(("top_speed_m_s",), "t")', 'there is no output "top_speed_m_s" (it is a '
                          'column of the table of cases, histories do not have it); did you mean "speed_m_s"?'),
-    "a quantity of cases": ('ScatterFigure("speed_m_s", "apogee_time_s", "t")', 'no column "speed_m_s" (it is a '
-                            "quantity of histories, the table of cases does not have it)"),
-    "a profile": ('ProfileFigure("speed", "altitude_km", "t")', 'no quantity "speed"; did you mean "speed_m_s"?'),
+    "an output as a column": ('ScatterFigure("speed_m_s", "apogee_time_s", "t")', 'no column "speed_m_s" (it is an '
+                               "output of histories, the table of cases does not have it)"),
+    "a profile": ('ProfileFigure("speed", "altitude_km", "t")', 'no output "speed"; did you mean "speed_m_s"?'),
     "a number as a name": ('ScatterFigure(1, "apogee_time_s", "t")', "has 1 as its `x`; it must be a text"),
     "a number as a title": ('ScatterFigure("end_x_m", "end_y_m", 3)', "has 3 as its `title`; it must be a text"),
     "a word where yes or no is wanted": (MAP.replace('"t")', '"t", upstream="deorbit")'), "it must be True or False"),
@@ -71,5 +71,5 @@ def test_a_figure_of_what_the_model_does_not_have_is_refused(tmp_path):
         with pytest.raises(CampaignError) as error:
             with_figures(folder, figures if alone else f"({figures},)")
         (problem,) = error.value.problems
-        assert problem.message.startswith(f"model.py, line {line_of(folder, 'MODEL = Model(')}: "), mistake
+        assert problem.message.startswith(f"model.py, line {line_of(folder, 'MODEL = model(')}: "), mistake
         assert sentence in problem.message

@@ -19,11 +19,14 @@ WAVE = load_model("wave.py", WAVE_FOLDER)
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"parameters": (Parameter("a_m", "m", "", 0.0), Parameter("a_s", "s", "", 0.0))}, 'two inputs .* called "a"'),
-        ({"metrics": (Field("top_m", "m", ""), Field("top_m", "m", ""))}, 'two columns .* called "top_m"'),
-        ({"extrema": (Extremum("top", "depth_m"),)}, 'extremum "top": there is no quantity "depth_m"'),
-        ({"events": None}, "no function `events`"),
-        ({"event_list": (Event("rise", "rising", "switch"),), "switch": None}, "no function `switch`"),
+        (
+            {"parameters": (Parameter(0.0, "", name="a_m", unit="m"), Parameter(0.0, "", name="a_s", unit="s"))},
+            'two inputs .* called "a"',
+        ),
+        ({"metrics": (Field("", name="top_m", unit="m"),) * 2}, 'two columns .* called "top_m"'),
+        ({"extrema": (Extremum("top", "depth_m"),)}, 'extremum "top": there is no output "depth_m"'),
+        ({"event_list": (Event(abs, "rising", "switch", name="rise"),), "switch": None}, "no function `switch`"),
+        ({"event_list": (Event("rise", "rising"),)}, "has .rise. as its `function`; it must be a function"),
     ],
 )
 def test_a_model_that_contradicts_itself_is_refused(change, sentence):
@@ -33,7 +36,7 @@ def test_a_model_that_contradicts_itself_is_refused(change, sentence):
 
 def test_a_unit_that_is_not_known_is_named():
     with pytest.raises(ModelError, match=r'"depth_m" has the unit "metre"'):
-        replace(WAVE, metrics=(Field("depth_m", "metre", ""),))
+        replace(WAVE, metrics=(Field("", name="depth_m", unit="metre"),))
 
 
 def model_file(folder, helper):

@@ -1,7 +1,7 @@
 """Records of a model that contradict themselves or one another: named where the model is made."""
 
 import pytest
-from mistaken_campaign import campaign_with, line_of
+from mistaken_campaign import campaign_with, given, line_of, with_evaluate, with_input
 
 from mc_engine.errors import CampaignError
 
@@ -20,25 +20,28 @@ CONTRADICTIONS = {
     "end in the past": ((CLOCK, "FixedStep(step=1.0, until=-5)"), "the clock's `until` is -5; it must be a number"),
     "sampling": ((CLOCK, "FixedStep(step=1.0, until=5.0, control_every=0)"), "`control_every` is 0; it must be"),
     "method": ((CLOCK, 'FixedStep(step=1.0, until=5.0, method="euler")'), 'the clock has the method "euler"'),
-    "kind of extremum": (('"speed", "speed_m_s")', '"speed", "speed_m_s", "maximum")'), 'has the kind "maximum"'),
-    "unit and name": (('"altitude_km", "km", "altitude of the c', '"altitude_km", "m", "altitude of the c'),
+    "kind of extremum": (given('extrema={"top": at_end("speed_m_s", "")}'), "it must be maximum_of(...), minimum_of("),
+    "output of an extremum": (given('extrema={"top": maximum_of("sped_m_s", "")}'),
+                              'extremum "top": there is no output "sped_m_s"; did you mean "speed_m_s"?'),
+    "unit and name": (("orbit\", low=150.0", "orbit\", unit=\"m\", low=150.0"),
                       '"altitude_km" has the unit "m", so that its name must end in "_m"; change the name or the unit'),
-    "missing comma": (('(Event("apogee", "falling", "stop"),)', 'Event("apogee", "falling", "stop")'),
-                      "as its `event_list`; it must be a tuple, each item Event; one alone needs its comma, (...,)"),
-    "a metric of the engine's name": (('Field("apogee_time_s", "s"', 'Field("case_id", ""'),
-                                      'the column "case_id" has the name of a column that every table has'),
-    "a quantity of the engine's name": (('Field("speed_m_s", "m/s"', 'Field("t_s", "s"'), 'the quantity "t_s" has the'),
-    "control without a memory": (("    initial=initial", "    control=rhs,\n    initial=initial"),
-                                 "the model has `control`, but no function `start`; write start(p, o)"),
-    "default of nobody": (("Model, Parameter", "Model, Parameter, Setting"),
-                          ("    settings=(),", '    settings=(Setting("law", "", "law", "c", choices=("a", "b")),),'),
+    "no dictionary of events": (('{"apogee": Event(climb, "falling", "stop")}', 'Event(climb, "falling", "stop")'),
+                                '`events` is no dictionary; declare it so: events={"apogee": Event('),
+    "one figure alone": (given("figures=3"), "as its `figures`; it must be a tuple, each item MapFigure"),
+    "a metric of the engine's name": (("top_speed_m_s", "case_id"), ('"largest speed"', '"fastest", unit="m/s"'),
+                                      '"case_id" has the unit "m/s", so that its name must end in "_m_s"'),
+    "a column of the engine's": (*with_evaluate("State(end_time=t)"), ("top_speed_m_s", "end_time_s"),
+                                 'the column "end_time_s" has the name of a column that every table has'),
+    "an output of the engine's name": (('speed_m_s="speed")', 'speed_m_s="speed", t_s="time")'),
+                                       'the output "t_s" has the name of a column that every table has'),
+    "control without a memory": (given("control=rhs"), "the model has `control`, but no `memory`; give memory=Memory"),
+    "default of nobody": (*with_input('law=Setting("c", "law", choices=("a", "b"))'),
                           'setting "law" has the default \'c\'; known are "a", "b"'),
-    "a text as a default": (("300.0, low", '"300", low'), "\"altitude_km\" has '300' as its `default`; it must"),
+    "a text as a default": (("300.0,", '"300",'), "\"altitude_km\" has '300' as its `default`; it must"),
     "sampling between steps": ((CLOCK, "FixedStep(step=1.0, until=5.0, control_every=1.5)"), "it counts steps, in"),
-    "no unit": (('"km", "altitude of the c', 'None, "altitude of the c'), '"altitude_km" has None as its `unit`; it'),
     "number as a text": (('"largest speed"', "3"), '"top_speed_m_s" has 3 as its `description`; it must be a text'),
-    "number as the source": (('source=""', "source=3"), "the model has 3 as its `source`; it must be a text"),
-    "wrong keyword": (("metrics=(", "metrix=("),
+    "number as the source": (given("source=3"), "the model has 3 as its `source`; it must be a text"),
+    "wrong keyword": (("metrics=Metrics", "metrix=Metrics"),
                       "unexpected keyword argument 'metrix'; did you mean \"metrics\"?; it takes name, "),
 }  # fmt: skip
 
@@ -48,7 +51,7 @@ def test_a_contradiction_is_named_where_the_model_is_made(tmp_path):
         with pytest.raises(CampaignError) as error:
             campaign_with(tmp_path / mistake, *edits)
         (problem,) = error.value.problems
-        assert problem.message.startswith(f"model.py, line {line_of(tmp_path / mistake, 'MODEL = Model(')}: "), mistake
+        assert problem.message.startswith(f"model.py, line {line_of(tmp_path / mistake, 'MODEL = model(')}: "), mistake
         assert sentence in problem.message
 
 
@@ -73,6 +76,12 @@ def test_a_contradiction_is_named_where_the_model_is_made(tmp_path):
             "clock=",
             "6 were given; it takes step, until,",
         ),
+        (
+            "low=150.0",
+            "unit=None, low=150.0",
+            "Inputs = inputs(",
+            '"altitude_km" has None as its `unit`; it must be a text',
+        ),
         ("@physics\ndef initial", "@physics()\ndef initial", "@physics()", "stands alone on the line above a function"),
         ("@physics\ndef initial", "physics(3)\ndef initial", "physics(3)", "physics marks a function, not 3"),
     ],
@@ -85,12 +94,12 @@ def test_a_record_made_wrongly_is_named_at_its_line(old, new, spot, sentence, tm
     assert sentence in problem.message
 
 
-@pytest.mark.parametrize(("old", "word"), [('"x y vx vy"', "class"), ('"altitude speed"', "lambda")])
+@pytest.mark.parametrize(("old", "word"), [('vy_m_s="vy"', "class"), ('altitude_km="altitude"', "lambda")])
 def test_a_field_that_is_a_word_of_python_is_named_at_its_line(old, word, tmp_path):
-    new = f'{old[:-1]} {word}"'
+    new = f'{old}, {word}_m="more"'
     with pytest.raises(CampaignError) as error:
         campaign_with(tmp_path, (old, new))
-    assert f"model.py, line {line_of(tmp_path, new)}: ValueError: " in str(error.value)
+    assert f"model.py, line {line_of(tmp_path, new)}: " in str(error.value)
     assert f"field names cannot be a keyword: '{word}'" in str(error.value)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mistaken_campaign import campaign_with, line_of
+from mistaken_campaign import campaign_with, given, line_of, with_input
 
 from mc_engine.errors import EngineError
 from mc_engine.flight.contract import breaches
@@ -12,7 +12,6 @@ PREPARE = (
     "import numpy as np\n\n\ndef prepare(inputs, settings, refusals):\n    more = {{}}\n    {}\n"
     "    return {{**vars(inputs), **more}}\n\n\n@physics\ndef initial"
 )
-SETTING = 'Setting("limit_s", "s", "a limit", 10.0),'
 
 
 def campaign(folder, line):
@@ -20,9 +19,8 @@ def campaign(folder, line):
     return campaign_with(
         folder,
         ("@physics\ndef initial", PREPARE.format(line)),
-        ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
-        ("    settings=()", f"    settings=({SETTING})"),
-        ("Model, Parameter", "Model, Parameter, Setting"),
+        given("prepare=prepare"),
+        *with_input('limit_s=Setting(10.0, "a limit")'),
     )
 
 
@@ -85,5 +83,5 @@ def test_a_preparation_that_would_have_to_be_awaited_is_a_sentence(tmp_path):
                 "@physics\ndef initial",
                 "async def prepare(i, s, refusals):\n    return vars(i)\n\n\n@physics\ndef initial",
             ),
-            ("    initial=initial", "    prepare=prepare,\n    initial=initial"),
+            given("prepare=prepare"),
         )

@@ -7,19 +7,18 @@ import mc_engine
 from mc_engine.errors import ModelError
 from mc_engine.flight.contract import breaches
 from mc_engine.flight.flight import fly, fly_interpreted
+from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.model import load_model
 
 MODEL = """
-from collections import namedtuple
-
 from mc_engine.lanes import physics
-from mc_engine.model import Field, FixedStep, Model, Parameter
+from mc_engine.model import FixedStep, Parameter, inputs, metrics, model, outputs, states
 from mc_engine.physics.curves import curve, surface
 
-State = namedtuple("State", "x v")
-Parameters = namedtuple("Parameters", "mass")
-Quantities = namedtuple("Quantities", "x")
-Metrics = namedtuple("Metrics", "drag")
+Inputs = inputs(mass_kg=Parameter(2.0, "mass"))
+State = states(x_m="place", v_m_s="speed")
+Outputs = outputs(x_m="place")
+Metrics = metrics(drag_n="drag at the end")
 
 THRUST = curve("thrust.csv", x="time_s", y="thrust_n", kind="{kind}", outside="{outside}")
 DRAG = surface("drag.csv", "speed_m_s", "mass_kg", "drag_n")
@@ -31,35 +30,28 @@ def force(t, v, mass):
 
 
 @physics
-def initial(p, o):
-    return State(0.0, 0.0)
+def initial():
+    return State(x=0.0, v=0.0)
 
 
 @physics
-def rhs(t, s, m, p, o):
-    return State(s.v, force(t, s.v, p.mass) / p.mass)
+def rhs(t, s, p):
+    return State(x=s.v, v=force(t, s.v, p.mass) / p.mass)
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Quantities(s.x)
+def observe(s):
+    return Outputs(x=s.x)
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    return Metrics(DRAG(s.v, p.mass))
+def evaluate(s, p):
+    return Metrics(drag=DRAG(s.v, p.mass))
 
 
-MODEL = Model(
-    name="sled", title="A sled with an engine", source="",
-    parameters=(Parameter("mass_kg", "kg", "mass", 2.0),),
-    settings=(),
-    states=(Field("x_m", "m", "place"), Field("v_m_s", "m/s", "speed")),
-    quantities=(Field("x_m", "m", "place"),),
-    metrics=(Field("drag_n", "N", "drag at the end"),),
-    clock=FixedStep(step=0.25, until=4.0),
-    kernel_parameters=Parameters,
-    initial=initial, rhs=rhs, observe=observe, evaluate=evaluate,
+MODEL = model(
+    name="sled", title="A sled with an engine", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
+    clock=FixedStep(step=0.25, until=4.0), initial=initial, rhs=rhs, observe=observe, evaluate=evaluate,
 )
 """
 THRUST = "time_s,thrust_n\n0,2\n1,2\n2,6\n5,6\n"
@@ -101,7 +93,7 @@ def test_a_flight_has_the_curve_at_every_width_and_interpreted(tmp_path):
     assert columns["end_v_m_s"] == pytest.approx(wanted, rel=1e-14)
     assert columns["drag_n"] == pytest.approx(0.1 * columns["end_v_m_s"], rel=1e-14)
     assert flown(model, width=1)["end_v_m_s"].tolist() == columns["end_v_m_s"].tolist()
-    (_, _, states, _), _ = fly_interpreted(model, {"mass_kg": 2.0}, 0, 1, 60.0)
+    _, _, states, _ = fly_interpreted(InterpretedFlight(model, 60.0), {"mass_kg": 2.0}, 0, 1)
     assert states[1, 0] == columns["end_v_m_s"][1]
 
 
@@ -127,7 +119,8 @@ def test_a_case_ends_where_its_curve_does(tmp_path):
     columns = flown(model)
     assert columns["status"].tolist() == ["not-finite"] * 3
     assert (columns["end_time_s"] <= 3.1).all()
-    _, flight = fly_interpreted(model, {"mass_kg": 2.0}, 0, 1, 60.0)
+    flight = InterpretedFlight(model, 60.0)
+    fly_interpreted(flight, {"mass_kg": 2.0}, 0, 1)
     assert flight.origin.operation == "the curve thrust.csv"
     assert 3.1 < flight.origin.arguments[0] < 3.6
 
@@ -144,7 +137,7 @@ def test_a_file_that_only_a_variable_names_is_refused(tmp_path):
 def test_a_missing_file_is_said_with_the_line(tmp_path):
     sled(tmp_path)
     (tmp_path / "thrust.csv").unlink()
-    with pytest.raises(ModelError, match=r'model.py, line 13: there is no file "thrust.csv"'):
+    with pytest.raises(ModelError, match=r'model.py, line 11: there is no file "thrust.csv"'):
         load_model("model.py", tmp_path)
 
 

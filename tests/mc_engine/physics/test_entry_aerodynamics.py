@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mc_engine.physics.aerodynamics import axial_coefficient, lift_direction, mach_table, over_mach
+from mc_engine.physics.aerodynamics import axial_coefficient, lift_direction
 from mc_engine.physics.heating import (
     SUTTON_GRAVES,
     detra_kemp_riddell,
@@ -72,22 +72,3 @@ def test_heat_rates_grow_with_the_root_of_density_and_the_third_power_of_speed(s
 def test_sutton_and_graves_at_a_round_point():
     """k sqrt(rho / R) V^3 with 1e-4 kg/m^3, 1 m and 7 km/s: 1.7415e-4 * 0.01 * 3.43e11."""
     assert sutton_graves(1e-4, 7000.0, SUTTON_GRAVES["earth"]) == pytest.approx(5.973e5, rel=1e-3)
-
-
-POINTS = ((0.4, 1.0, -2.0), (0.9, 2.0, 4.0), (1.35, 1.5, 4.0), (10.0, 0.5, 3.0))
-
-
-@pytest.mark.parametrize("first", [0, 5])
-def test_a_table_over_the_mach_number_is_linear_between_its_points_and_constant_beyond(first):
-    tables = np.concatenate([np.full(first, np.nan), mach_table(POINTS), [np.nan]])
-    mach = np.concatenate([np.linspace(0.0, 12.0, 1207), [point[0] for point in POINTS], [1e9]])
-    grid, *columns = np.array(POINTS).T
-    found = over_mach(tables, float(first), mach)
-    for ours, column in zip(found, columns, strict=True):
-        assert ours == pytest.approx(np.interp(mach, grid, column), rel=1e-12, abs=1e-12)
-
-
-@pytest.mark.parametrize("mach", [(1.0, 1.0), (2.0, 1.0), (1.0, 1.02)])
-def test_a_table_that_does_not_rise_in_its_steps_is_refused(mach):
-    with pytest.raises(ValueError, match=r"multiples of 0\.05"):
-        mach_table([(each, 1.0, 1.0) for each in mach])

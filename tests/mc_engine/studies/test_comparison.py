@@ -72,7 +72,7 @@ def test_a_requirement_that_stands_worse_on_the_same_cases_is_a_change(tmp_path)
 
 def test_what_changed_in_code_and_campaign_is_told(tmp_path):
     changes = {
-        "engine": "0.2.0",
+        "engine": "0.3.0",
         "model": {"name": "m", "digest": "9c2e" * 16},
         "provenance": {
             "python": "3.11.7",

@@ -1,12 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import mc_engine
 from mc_engine import load_campaign, open_run
-from mc_engine.errors import StoreError
+from mc_engine.campaign.loading import SHIPPED
+from mc_engine.errors import ModelError, StoreError
+from mc_engine.physics.constants import MU_EARTH
 from mc_engine.runner import runner
 from reports.drawing.marks import Bar
 from reports.figures.table_figures import fuel_map, histogram, scatter
+from tests.mc_engine.flight.falling_ball import python_campaign
 
 
 @pytest.fixture(scope="module")
@@ -50,6 +55,52 @@ def test_a_replay_is_bit_exact_and_the_nominal_case_has_none(run):
     assert len(run.nominal.history())
     with pytest.raises(StoreError, match="nominal case cannot be replayed"):
         run.nominal.replay()
+
+
+def test_a_trace_has_every_number_that_the_physics_names_at_every_step(run):
+    case, trace = run.case(17), run.case(17).trace()
+    assert trace["t_s"].tolist() == [*(10.0 * np.arange(len(trace) - 1)), case.row["end_time_s"]]
+    for name in ("x_m", "y_m", "vx_m_s", "vy_m_s"):
+        assert trace[name].iloc[-1] == case.row[f"end_{name}"]
+    r2 = trace["x_m"] ** 2 + trace["y_m"] ** 2
+    np.testing.assert_allclose(trace["rhs.r2"], r2, rtol=1e-15)
+    np.testing.assert_allclose(trace["rhs.g"], -MU_EARTH / r2**1.5, rtol=1e-14)
+    np.testing.assert_allclose(trace["d(vx)/dt"], trace["rhs.g"] * trace["x_m"], rtol=1e-15)
+    climb = trace["x_m"] * trace["vx_m_s"] + trace["y_m"] * trace["vy_m_s"]
+    np.testing.assert_allclose(trace["event.apogee"], climb, rtol=1e-12)
+    assert trace["event.apogee"].iloc[-1] <= 0.0 < trace["event.apogee"].iloc[-2]
+    assert trace["altitude_km"].iloc[-1] == pytest.approx(case.metrics["apogee_altitude_km"], rel=1e-15)
+    assert (trace.attrs["units"]["altitude_km"], trace.attrs["units"]["rhs.g"]) == ("km", "")
+    assert (trace["initial.dv"] == trace["initial.dv"][0]).all()
+
+
+def test_a_trace_names_functions_inside_functions_and_fields_of_records(tmp_path):
+    text = (SHIPPED / "minimal" / "model.py").read_text()
+    (tmp_path / "campaign.toml").write_text((SHIPPED / "minimal" / "campaign.toml").read_text())
+    for old, new in (
+        ("@physics\ndef rhs", "@physics\ndef half(x):\n    part = 0.5 * x\n    return part\n\n\n@physics\ndef rhs"),
+        ("    g = -MU", "    pull = State(half(s.x), 0.0, half(half(s.y)), 0.0)\n    g = -MU"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "model.py").write_text(text)
+    runner.run(load_campaign(tmp_path, cases=2), tmp_path / "run", workers=1)
+    trace = open_run(tmp_path / "run").case(1).trace()
+    assert (trace["rhs.half.part"] == 0.5 * trace["x_m"]).all()
+    assert (trace["rhs.half[2].part"] == 0.5 * trace["y_m"]).all()
+    assert (trace["rhs.half[3].part"] == 0.25 * trace["y_m"]).all()
+    assert (trace["rhs.pull.vx"] == trace["rhs.half[3].part"]).all()
+
+
+def test_a_trace_that_is_not_the_case_of_the_run_or_has_no_physics_is_refused(run, tmp_path):
+    case = run.case(17)
+    with pytest.raises(StoreError, match=r"case 17 ended with end_x_m = 1\.0, its trace with"):
+        replace(case, row={**case.row, "end_x_m": 1.0}).trace()
+    with pytest.raises(StoreError, match=r"the trace of case 17 was given up after 0 s, at t = "):
+        case.trace(seconds=0.0)
+    runner.run(load_campaign(python_campaign(tmp_path / "ball", cases=2)), tmp_path / "run", workers=1)
+    with pytest.raises(ModelError, match="was flown by a simulator, which has no physics to trace"):
+        open_run(tmp_path / "run").case(1).trace()
 
 
 def test_a_metric_or_a_case_by_a_wrong_name_is_answered_with_the_right_one(run):

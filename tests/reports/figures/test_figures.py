@@ -10,14 +10,24 @@ from synthetic_run import synthetic_run
 from reports.contents import build
 from reports.document.blocks import FigureBlock, blocks_of
 from reports.drawing import paper, screen
-from reports.drawing.marks import Points
+from reports.drawing.marks import Axis, Plot, Points
+from reports.drawing.strokes import Frame, stroked
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
+
+PLOT = Plot((), Axis("x"), Axis("y"), "", 240.0)
 
 
 @pytest.fixture(scope="module")
 def drawings():
     return [block.drawing for block in blocks_of(build(synthetic_run(3000, failed=3), "run"), FigureBlock)]
+
+
+def test_what_is_no_mark_is_named():
+    with pytest.raises(TypeError, match="Plot is no mark that the screen draws"):
+        screen.traced(PLOT, PLOT)
+    with pytest.raises(TypeError, match="Plot is no mark that is drawn as SVG"):
+        stroked(PLOT, Frame(0.0, 0.0, 1.0, 1.0, (0.0, 1.0), (0.0, 1.0)))
 
 
 def test_every_case_falls_into_a_bin():

@@ -1,12 +1,13 @@
 """What a report says was flown; and what it draws where the model asks for no figure."""
 
+import numpy as np
 import pytest
 from figure_marks import FORMS, marks_of
 from synthetic_run import synthetic_run
 
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table
-from reports.drawing.marks import Points
+from reports.drawing.marks import Limit, Points
 
 
 def section(run, anchor):
@@ -26,6 +27,23 @@ def test_the_timeline_tells_when_and_what_else_is_known_of_the_event():
     assert [row[0].text for row in table.rows] == ["Peak load", "Settling"]  # in the order of their times
     assert table.rows[0][1].text == "100\u202fs"
     assert table.rows[0][3].text == "altitude 41.5\u202fkm"
+
+
+def test_phases_of_the_nominal_case_are_in_the_timeline_and_marked_in_the_histories():
+    run = synthetic_run(50, failed=0)
+    t = run.history["t_s"]
+    run.history = run.history.assign(phase=np.where(t < 60.0, "rail", np.where(t < 150.0, "burn", "coast")))
+    nominal = run.history[run.history["case_id"] == -1]
+    begins = {name: nominal["t_s"][nominal["phase"] == name].min() for name in ("burn", "coast")}
+    table = next(one for one in section(run, "scenario").blocks if isinstance(one, Table))
+    phases = [row for row in table.rows if row[0].text.startswith("Phase ")]
+    assert [row[0].text for row in phases] == ["Phase rail begins", "Phase burn begins", "Phase coast begins"]
+    assert [row[1].value for row in phases] == pytest.approx([0.0, *begins.values()])
+    histories = [one for one in section(run, "histories").blocks if isinstance(one, FigureBlock)]
+    lines = [mark for mark in marks_of(histories[0].drawing, Limit) if mark.axis == "x"]
+    assert {mark.name: mark.at for mark in lines} == {f"{name} begins": at for name, at in begins.items()}
+    assert {mark.key.split(",")[0] for mark in lines} == {"phases of the nominal case: rail"}
+    assert "phase" not in {plot.quantity for one in histories for plot in one.drawing.plots}
 
 
 def test_assumptions_are_what_the_campaign_file_sets_and_the_rest_is_in_the_appendix():

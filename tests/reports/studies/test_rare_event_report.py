@@ -17,7 +17,7 @@ from reports.studies.rare_events import build_rare_event
 
 MANIFEST = {
     "created_utc": "2026-01-02T03:04:05.000Z",
-    "engine": "0.1.0",
+    "engine": "0.2.0",
     "seed_contract": 1,
     "campaign": {"name": "toy", "title": "Toy <b>", "model": "toy", "digest": "d", "seed": 7, "cases": 9},
     "model": {"title": "A toy", "source": "", "digest": "m"},

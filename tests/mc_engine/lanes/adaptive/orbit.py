@@ -1,61 +1,74 @@
 """A plane Kepler orbit from (r, 0) with a speed across, with its highest and lowest point."""
 
-from collections import namedtuple
-
 from mc_engine.lanes import physics, sqrt
-from mc_engine.model import AdaptiveStep, Extremum, Field, Model, Parameter, Setting
+from mc_engine.model import (
+    AdaptiveStep,
+    Field,
+    Parameter,
+    Setting,
+    inputs,
+    maximum_of,
+    metrics,
+    minimum_of,
+    model,
+    outputs,
+    states,
+    time_of_maximum,
+    time_of_minimum,
+)
 
 MU = 398600.4418e9
-State = namedtuple("State", "x y vx vy")
-Parameters = namedtuple("Parameters", "radius speed")
-Quantities = namedtuple("Quantities", "radius speed")
-Metrics = namedtuple("Metrics", "energy angular_momentum highest highest_time lowest lowest_time")
+Inputs = inputs(
+    radius_m=Parameter(7e6, "first distance"),
+    speed_m_s=Parameter(8e3, "first speed"),
+    tolerance=Setting(1e-12, "relative", unit=""),
+    duration_s=Setting(86400.0, "of the flight"),
+)
+State = states(x_m="x", y_m="y", vx_m_s="vx", vy_m_s="vy")
+Outputs = outputs(radius_m="distance", speed_m_s="speed")
+Metrics = metrics(
+    energy=Field("specific energy, J/kg", unit=""),
+    angular_momentum=Field("specific, m2/s", unit=""),
+    highest_m=maximum_of("radius_m", "largest distance"),
+    highest_time_s=time_of_maximum("radius_m", "its time"),
+    lowest_m=minimum_of("radius_m", "smallest distance"),
+    lowest_time_s=time_of_minimum("radius_m", "its time"),
+)
 
 
 @physics
-def initial(p, o):
-    return State(p.radius, 0.0, 0.0, p.speed)
+def initial(p):
+    return State(x=p.radius, y=0.0, vx=0.0, vy=p.speed)
 
 
 @physics
-def rhs(t, s, m, p, o):
+def rhs(s):
     r2 = s.x * s.x + s.y * s.y
     g = -MU / (r2 * sqrt(r2))
-    return State(s.vx, s.vy, g * s.x, g * s.y)
+    return State(x=s.vx, y=s.vy, vx=g * s.x, vy=g * s.y)
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Quantities(sqrt(s.x * s.x + s.y * s.y), sqrt(s.vx * s.vx + s.vy * s.vy))
+def observe(s):
+    return Outputs(radius=sqrt(s.x * s.x + s.y * s.y), speed=sqrt(s.vx * s.vx + s.vy * s.vy))
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
+def evaluate(s):
     energy = 0.5 * (s.vx * s.vx + s.vy * s.vy) - MU / sqrt(s.x * s.x + s.y * s.y)
-    return Metrics(energy, s.x * s.vy - s.y * s.vx, best.high, when.high, best.low, when.low)
+    return Metrics(energy=energy, angular_momentum=s.x * s.vy - s.y * s.vx)
 
 
-MODEL = Model(
+MODEL = model(
     name="orbit",
     title="A plane orbit",
-    source="",
-    parameters=(Parameter("radius_m", "m", "first distance", 7e6), Parameter("speed_m_s", "m/s", "first speed", 8e3)),
-    settings=(Setting("tolerance", "", "relative", 1e-12), Setting("duration_s", "s", "of the flight", 86400.0)),
-    states=(Field("x_m", "m", "x"), Field("y_m", "m", "y"), Field("vx_m_s", "m/s", "vx"), Field("vy_m_s", "m/s", "vy")),
-    quantities=(Field("radius_m", "m", "distance"), Field("speed_m_s", "m/s", "speed")),
-    metrics=(
-        Field("energy", "", "specific energy, J/kg"),
-        Field("angular_momentum", "", "specific, m2/s"),
-        Field("highest_m", "m", "largest distance"),
-        Field("highest_time_s", "s", "its time"),
-        Field("lowest_m", "m", "smallest distance"),
-        Field("lowest_time_s", "s", "its time"),
-    ),
+    inputs=Inputs,
+    states=State,
+    outputs=Outputs,
+    metrics=Metrics,
     clock=AdaptiveStep("duration", "tolerance", (1e-5, 1e-5, 1e-8, 1e-8)),
-    kernel_parameters=Parameters,
     initial=initial,
     rhs=rhs,
     observe=observe,
     evaluate=evaluate,
-    extrema=(Extremum("high", "radius_m"), Extremum("low", "radius_m", "min")),
 )

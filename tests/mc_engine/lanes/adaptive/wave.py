@@ -8,96 +8,109 @@ from collections import namedtuple
 
 from mc_engine.lanes import physics, sqrt, where
 from mc_engine.lanes.noise import normal_pair
-from mc_engine.model import AdaptiveStep, Event, Extremum, Field, Model, Parameter, Setting
+from mc_engine.model import (
+    AdaptiveStep,
+    Event,
+    Field,
+    Parameter,
+    Setting,
+    inputs,
+    last_above,
+    maximum_of,
+    metrics,
+    model,
+    outputs,
+    states,
+    time_of_maximum,
+)
 
-State = namedtuple("State", "x v")
-Memory = namedtuple("Memory", "rises falls rise_time push")
-Parameters = namedtuple("Parameters", "omega level stop noise ill")
-Events = namedtuple("Events", "rise fall end")
-Quantities = namedtuple("Quantities", "height above")
-Metrics = namedtuple("Metrics", "rises falls rise_time top top_time last_above push")
+Inputs = inputs(
+    omega_rad_s=Parameter(1.0, "frequency"),
+    level_m=Parameter(0.5, "level"),
+    stop_s=Parameter(50.0, "end"),
+    noise_m_s2=Parameter(0.0, "push per sample"),
+    ill=Parameter(0.0, "how the case breaks", unit=""),
+    tolerance=Setting(1e-10, "relative", unit=""),
+)
+State = states(x_m="height", v_m_s="speed")
+Memory = namedtuple("Memory", "rises falls rise_time push", defaults=(0.0, 0.0, 0.0, 0.0))
+Outputs = outputs(height_m="height", above_m="height over the level")
+Metrics = metrics(
+    rises=Field("rising crossings", unit=""),
+    falls=Field("falling crossings", unit=""),
+    rise_time_s="the last rising crossing",
+    top_m=maximum_of("height_m", "largest height"),
+    top_time_s=time_of_maximum("height_m", "its time"),
+    last_above_s=last_above("above_m", 0.0, "last time above the level"),
+    push_m_s2="last push",
+)
 
 
 @physics
-def initial(p, o):
-    return State(0.0 * p.omega, p.omega)
+def initial(p):
+    return State(x=0.0, v=p.omega)
 
 
 @physics
-def start(p, o):
-    return Memory(0.0, 0.0, 0.0, 0.0)
-
-
-@physics
-def control(t, s, m, p, o, draws):
+def control(m, p, draws):
     n, _ = normal_pair(draws, 0)
-    return Memory(m.rises, m.falls, m.rise_time, p.noise * n)
+    return Memory(rises=m.rises, falls=m.falls, rise_time=m.rise_time, push=p.noise * n)
 
 
 @physics
-def rhs(t, s, m, p, o):
+def rhs(t, s, m, p):
     sick = where(t > 1.0, 1.0, 0.0)
     broken = where((p.ill == 1.0) & (t > 1.0), sqrt(-1.0 - 0.0 * t), 0.0)
     burst = where(p.ill == 2.0, sick * 10.0 * (1.0 + s.v**4), 0.0)
     fast = where(p.ill == 3.0, 1e7, 1.0)
     w = p.omega * fast
-    return State(s.v * fast, -w * w / fast * s.x + m.push + broken + burst)
+    return State(x=s.v * fast, v=-w * w / fast * s.x + m.push + broken + burst)
 
 
 @physics
-def events(t, s, m, p, o):
-    return Events(s.x - p.level, s.x - p.level, t - p.stop)
+def above(s, p):
+    return s.x - p.level
 
 
 @physics
-def switch(t, s, m, p, o, hit):
-    rises = m.rises + hit.rise
-    return s, Memory(rises, m.falls + hit.fall, where(hit.rise > 0.5, t, m.rise_time), m.push)
+def after_stop(t, p):
+    return t - p.stop
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Quantities(s.x, s.x - p.level)
+def switch(t, s, m, hit):
+    rise_time = where(hit.rise > 0.5, t, m.rise_time)
+    return s, Memory(rises=m.rises + hit.rise, falls=m.falls + hit.fall, rise_time=rise_time, push=m.push)
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    return Metrics(m.rises, m.falls, m.rise_time, best.top, when.top, when.above, m.push)
+def observe(s, p):
+    return Outputs(height=s.x, above=s.x - p.level)
 
 
-MODEL = Model(
+@physics
+def evaluate(m):
+    return Metrics(rises=m.rises, falls=m.falls, rise_time=m.rise_time, push=m.push)
+
+
+MODEL = model(
     name="wave",
     title="A wave and a level",
-    source="",
-    parameters=(
-        Parameter("omega_rad_s", "rad/s", "frequency", 1.0),
-        Parameter("level_m", "m", "level", 0.5),
-        Parameter("stop_s", "s", "end", 50.0),
-        Parameter("noise_m_s2", "m/s^2", "push per sample", 0.0),
-        Parameter("ill", "", "how the case breaks", 0.0),
-    ),
-    settings=(Setting("tolerance", "", "relative", 1e-10),),
-    states=(Field("x_m", "m", "height"), Field("v_m_s", "m/s", "speed")),
-    quantities=(Field("height_m", "m", "height"), Field("above_m", "m", "height over the level")),
-    metrics=(
-        Field("rises", "", "rising crossings"),
-        Field("falls", "", "falling crossings"),
-        Field("rise_time_s", "s", "the last rising crossing"),
-        Field("top_m", "m", "largest height"),
-        Field("top_time_s", "s", "its time"),
-        Field("last_above_s", "s", "last time above the level"),
-        Field("push_m_s2", "m/s^2", "last push"),
-    ),
+    inputs=Inputs,
+    states=State,
+    outputs=Outputs,
+    metrics=Metrics,
     clock=AdaptiveStep(100.0, "tolerance", 1e-10, control_period=7.0, attempts=3000),
-    kernel_parameters=Parameters,
     initial=initial,
-    start=start,
+    memory=Memory,
     control=control,
     rhs=rhs,
-    events=events,
+    events={
+        "rise": Event(above, "rising", "switch"),
+        "fall": Event(above, "falling", "switch"),
+        "end": Event(after_stop, "rising", "stop"),
+    },
     switch=switch,
-    event_list=(Event("rise", "rising", "switch"), Event("fall", "falling", "switch"), Event("end", "rising", "stop")),
     observe=observe,
     evaluate=evaluate,
-    extrema=(Extremum("top", "height_m"), Extremum("above", "above_m", "last_above")),
 )

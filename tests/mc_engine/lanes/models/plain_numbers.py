@@ -6,13 +6,15 @@
 from collections import namedtuple
 
 from mc_engine.lanes import maximum, physics, where
-from mc_engine.model import Event, Field, FixedStep, Model, Parameter, Setting
+from mc_engine.model import Event, Field, FixedStep, Parameter, Setting, inputs, metrics, model, outputs, states
 
-State = namedtuple("State", "x v")
+Inputs = inputs(
+    lift_m_s2=Parameter(0.0, "acceleration upwards"), style=Setting(0.0, "which branches are taken", unit="")
+)
+State = states(x_m="height", v_m_s="speed")
 Memory = namedtuple("Memory", "force count last")
-Events = namedtuple("Events", "ground apex")
-Quantities = namedtuple("Quantities", "height speed")
-Metrics = namedtuple("Metrics", "time height flag")
+Outputs = outputs(height_m="height", speed_m_s="speed")
+Metrics = metrics(time_s="time", height_m="height", flag=Field("kind of end", unit=""))
 Pull = namedtuple("Pull", "down side")
 
 
@@ -44,83 +46,86 @@ def summed(s):  # numbers and records that a loop begins with
 
 
 @physics
-def initial(p, o):
-    return State(10.0, 0.0)
+def initial():
+    return State(x=10.0, v=0.0)
 
 
 @physics
-def start(p, o):
-    return Memory(0.0, 0.0, 0.0)
+def start():
+    return Memory(force=0.0, count=0.0, last=0.0)
 
 
 @physics
-def control(t, s, m, p, o, draws):
+def control(t, s, m, o):
     if o.style > 1.5:
-        return Memory(0.0, m.count + 1.0, t)
+        return Memory(force=0.0, count=m.count + 1.0, last=t)
     elif o.style > 0.5:
         force = 0.0
     else:
         force = -0.1 * s.v
-    return Memory(force, m.count + 1.0, 1.0)
+    return Memory(force=force, count=m.count + 1.0, last=1.0)
 
 
 @physics
-def rhs(t, s, m, p, o):
+def rhs(s, m, p, o):
     if o.style > 2.5:
-        return State(0.0, -1.0)
+        return State(x=0.0, v=-1.0)
     side = 0.0
     if o.style > 0.5:
         side = s.v * 0.001
     first, second = pair(s, o)
     w = pull(s, o)
-    return State(s.v, w.down + p.lift + m.force + side * w.side + 1e-4 * (first + second) + 1e-6 * summed(s))
+    return State(
+        x=s.v, v=w.down + p.lift + m.force + side * w.side + 1e-4 * (first + second) + 1e-6 * summed(s)
+    )  # fmt: skip
 
 
 @physics
-def events(t, s, m, p, o):
+def height(s):
+    return s.x
+
+
+@physics
+def apex(s, o):
     if o.style > 1.5:
-        return Events(s.x, 1.0)
-    return Events(s.x, s.v + 5.0)
+        return 1.0
+    return s.v + 5.0
 
 
 @physics
-def switch(t, s, m, p, o, hit):
+def switch(s, m, o, hit):
     if o.style > 1.5:
-        return State(s.x, 0.0), Memory(0.0, 0.0, 0.0)
-    return State(s.x, where(hit.apex > 0.5, -4.0, s.v)), m
+        return State(x=s.x, v=0.0), Memory(force=0.0, count=0.0, last=0.0)
+    return State(x=s.x, v=where(hit.apex > 0.5, -4.0, s.v)), m
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Quantities(s.x, 0.0) if o.style > 1.5 else Quantities(s.x, s.v)
+def observe(s, o):
+    return Outputs(height=s.x, speed=0.0) if o.style > 1.5 else Outputs(height=s.x, speed=s.v)
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
+def evaluate(t, s, o):
     flag = where(o.style > 0.5, 1.0, 2.0)
     if o.style > 1.5:
-        return Metrics(t, 0.0, flag)
-    return Metrics(t, s.x, where(s.v > 0.0, 1.0, 0.0))
+        return Metrics(time=t, height=0.0, flag=flag)
+    return Metrics(time=t, height=s.x, flag=where(s.v > 0.0, 1.0, 0.0))
 
 
-MODEL = Model(
+MODEL = model(
     name="plain_numbers",
     title="A stone of plain numbers",
-    source="",
-    parameters=(Parameter("lift_m_s2", "m/s^2", "acceleration upwards", 0.0),),
-    settings=(Setting("style", "", "which branches are taken", 0.0),),
-    states=(Field("x_m", "m", "height"), Field("v_m_s", "m/s", "speed")),
-    quantities=(Field("height_m", "m", "height"), Field("speed_m_s", "m/s", "speed")),
-    metrics=(Field("time_s", "s", "time"), Field("height_m", "m", "height"), Field("flag", "", "kind of end")),
+    inputs=Inputs,
+    states=State,
+    outputs=Outputs,
+    metrics=Metrics,
     clock=FixedStep(0.1, 20.0, control_every=5),
-    kernel_parameters=namedtuple("Parameters", "lift"),
     initial=initial,
     rhs=rhs,
     observe=observe,
     evaluate=evaluate,
     start=start,
     control=control,
-    events=events,
+    events={"ground": Event(height), "apex": Event(apex, action="switch")},
     switch=switch,
-    event_list=(Event("ground"), Event("apex", action="switch")),
 )

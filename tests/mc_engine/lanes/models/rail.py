@@ -3,98 +3,100 @@
 from collections import namedtuple
 
 from mc_engine.lanes import minimum, physics, where
-from mc_engine.model import Event, Field, FixedStep, Model, Parameter, Setting
+from mc_engine.model import Event, Field, FixedStep, Parameter, Setting, inputs, metrics, model, outputs, states
 
-State = namedtuple("State", "x v")
-Memory = namedtuple("Memory", "bounces bounced_at gates gated_at switches")
-Parameters = namedtuple("Parameters", "rate gravity x0 v0 wall restitution gate gate_every end last")
-Quantities = namedtuple("Quantities", "x")
-Events = namedtuple("Events", "wall gate end")
-Metrics = namedtuple("Metrics", "bounces bounced_at gates gated_at switches")
-
-
-@physics
-def initial(p, o):
-    return State(p.x0, p.v0)
-
-
-@physics
-def start(p, o):
-    return Memory(0.0, -1.0, 0.0, -1.0, 0.0)
-
-
-@physics
-def rhs(t, s, m, p, o):
-    return State(s.v, -p.gravity - p.rate * p.rate * s.x)
-
-
-@physics
-def events(t, s, m, p, o):
-    return Events(s.x - p.wall, t - p.gate - m.gates * p.gate_every, minimum(s.x - p.end, p.last - t))
+Inputs = inputs(
+    rate_rad_s=Parameter(0.0, "angular frequency of the spring"),
+    gravity_m_s2=Parameter(0.0, "acceleration downwards"),
+    x0_m=Parameter(0.0, "first place"),
+    v0_m_s=Parameter(0.0, "first speed"),
+    wall_m=Parameter(-1e9, "place of the wall below"),
+    restitution=Parameter(1.0, "speed after a bounce over the one before", unit=""),
+    gate_s=Parameter(1e9, "first time of the gate"),
+    gate_every_s=Parameter(1e9, "time from one gate to the next"),
+    end_m=Parameter(-1e9, "place, from above, at which the case ends"),
+    last_s=Parameter(1e9, "time at which the case ends"),
+    step_s=Setting(0.1, "step"),
+    until_s=Setting(10.0, "time limit"),
+)
+State = states(x_m="place", v_m_s="speed")
+Memory = namedtuple("Memory", "bounces bounced_at gates gated_at switches", defaults=(0.0, -1.0, 0.0, -1.0, 0.0))
+Outputs = outputs(x_m="place")
+Metrics = metrics(
+    bounces=Field("hits of the wall", unit=""),
+    bounced_at_s="the last of them",
+    gates=Field("openings of the gate", unit=""),
+    gated_at_s="the last of them",
+    switches=Field("calls of switch", unit=""),
+)
 
 
 @physics
-def switch(t, s, m, p, o, hit):
+def initial(p):
+    return State(x=p.x0, v=p.v0)
+
+
+@physics
+def rhs(s, p):
+    return State(x=s.v, v=-p.gravity - p.rate * p.rate * s.x)
+
+
+@physics
+def above_wall(s, p):
+    return s.x - p.wall
+
+
+@physics
+def since_gate(t, m, p):
+    return t - p.gate - m.gates * p.gate_every
+
+
+@physics
+def before_end(t, s, p):
+    return minimum(s.x - p.end, p.last - t)
+
+
+@physics
+def switch(t, s, m, p, hit):
     wall, gate = hit.wall > 0.5, hit.gate > 0.5
     # `switches` does not ask what was hit: it counts the calls that concern this case
     memory = Memory(
-        m.bounces + hit.wall,
-        where(wall, t, m.bounced_at),
-        m.gates + hit.gate,
-        where(gate, t, m.gated_at),
-        m.switches + 1.0,
+        bounces=m.bounces + hit.wall,
+        bounced_at=where(wall, t, m.bounced_at),
+        gates=m.gates + hit.gate,
+        gated_at=where(gate, t, m.gated_at),
+        switches=m.switches + 1.0,
     )
-    return State(s.x, where(wall, -p.restitution * s.v, s.v)), memory
+    return State(x=s.x, v=where(wall, -p.restitution * s.v, s.v)), memory
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Quantities(s.x)
+def observe(s):
+    return Outputs(x=s.x)
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    return Metrics(m.bounces, m.bounced_at, m.gates, m.gated_at, m.switches)
+def evaluate(m):
+    return Metrics(bounces=m.bounces, bounced_at=m.bounced_at, gates=m.gates, gated_at=m.gated_at, switches=m.switches)
 
 
-MODEL = Model(
+MODEL = model(
     name="rail",
     title="A bead on a rail",
-    source="",
-    parameters=(
-        Parameter("rate_rad_s", "rad/s", "angular frequency of the spring", 0.0),
-        Parameter("gravity_m_s2", "m/s^2", "acceleration downwards", 0.0),
-        Parameter("x0_m", "m", "first place", 0.0),
-        Parameter("v0_m_s", "m/s", "first speed", 0.0),
-        Parameter("wall_m", "m", "place of the wall below", -1e9),
-        Parameter("restitution", "", "speed after a bounce over the one before", 1.0),
-        Parameter("gate_s", "s", "first time of the gate", 1e9),
-        Parameter("gate_every_s", "s", "time from one gate to the next", 1e9),
-        Parameter("end_m", "m", "place, from above, at which the case ends", -1e9),
-        Parameter("last_s", "s", "time at which the case ends", 1e9),
-    ),
-    settings=(Setting("step_s", "s", "step", 0.1), Setting("until_s", "s", "time limit", 10.0)),
-    states=(Field("x_m", "m", "place"), Field("v_m_s", "m/s", "speed")),
-    quantities=(Field("x_m", "m", "place"),),
-    metrics=(
-        Field("bounces", "", "hits of the wall"),
-        Field("bounced_at_s", "s", "the last of them"),
-        Field("gates", "", "openings of the gate"),
-        Field("gated_at_s", "s", "the last of them"),
-        Field("switches", "", "calls of switch"),
-    ),
+    inputs=Inputs,
+    states=State,
+    outputs=Outputs,
+    metrics=Metrics,
     clock=FixedStep("step", "until"),
-    kernel_parameters=Parameters,
     initial=initial,
     rhs=rhs,
-    start=start,
-    events=events,
+    memory=Memory,
+    events={
+        "wall": Event(above_wall, "falling", "switch"),
+        "gate": Event(since_gate, "either", "switch"),
+        "end": Event(before_end, "falling", "stop"),
+    },
     switch=switch,
-    event_list=(
-        Event("wall", "falling", "switch"),
-        Event("gate", "either", "switch"),
-        Event("end", "falling", "stop"),
-    ),
     observe=observe,
     evaluate=evaluate,
 )

@@ -1,16 +1,18 @@
 """A point that moves at a speed out of the model's tables: for tests of numbers that all cases share.  SI."""
 
-from collections import namedtuple
-
 import numpy as np
 
 from mc_engine.lanes import look_up, physics, sqrt
-from mc_engine.model import Field, FixedStep, Model, Parameter, Setting
+from mc_engine.model import Field, FixedStep, Parameter, Setting, inputs, metrics, model, outputs, states
 
-State = namedtuple("State", "x")
-Parameters = namedtuple("Parameters", "place")
-Quantities = namedtuple("Quantities", "x")
-Metrics = namedtuple("Metrics", "first last")
+Inputs = inputs(
+    place=Parameter(0.0, "where the speed stands in the table", unit=""),
+    scale=Setting(1.0, "of the table", unit=""),
+    step_s=Setting(0.5, "step"),
+)
+State = states(x_m="place")
+Outputs = outputs(x_m="place")
+Metrics = metrics(first=Field("first number of the table", unit=""), last=Field("last number of the table", unit=""))
 
 LENGTH = 50
 
@@ -21,36 +23,34 @@ def tables(o):
 
 
 @physics
-def initial(p, o):
-    return State(0.0 * p.place)
+def initial():
+    return State(x=0.0)
 
 
 @physics
-def rhs(t, s, m, p, o):
-    return State(look_up(o.tables, p.place + 0.0 * sqrt(p.place + 100.0)))  # below -100 the place is not a number
+def rhs(p, o):
+    # below -100 the place is not a number
+    return State(x=look_up(o.tables, p.place + 0.0 * sqrt(p.place + 100.0)))
 
 
 @physics
-def observe(t, s, m, p, o):
-    return Quantities(s.x)
+def observe(s):
+    return Outputs(x=s.x)
 
 
 @physics
-def evaluate(t, s, m, p, o, best, when):
-    return Metrics(look_up(o.tables, 1.0), look_up(o.tables, LENGTH - 1.0))
+def evaluate(o):
+    return Metrics(first=look_up(o.tables, 1.0), last=look_up(o.tables, LENGTH - 1.0))
 
 
-MODEL = Model(
+MODEL = model(
     name="shelf",
     title="A point with a speed out of a table",
-    source="",
-    parameters=(Parameter("place", "", "where the speed stands in the table", 0.0),),
-    settings=(Setting("scale", "", "of the table", 1.0), Setting("step_s", "s", "step", 0.5)),
-    states=(Field("x_m", "m", "place"),),
-    quantities=(Field("x_m", "m", "place"),),
-    metrics=(Field("first", "", "second number of the table"), Field("last", "", "last number of the table")),
+    inputs=Inputs,
+    states=State,
+    outputs=Outputs,
+    metrics=Metrics,
     clock=FixedStep("step", 1.0),
-    kernel_parameters=Parameters,
     initial=initial,
     rhs=rhs,
     tables=tables,

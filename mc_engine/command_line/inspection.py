@@ -1,0 +1,127 @@
+"""The commands that look at one case: debug and replay."""
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from mc_engine.command_line.app import (
+    DAMAGED,
+    USAGE,
+    CampaignFile,
+    RunFolder,
+    app,
+    existing_run,
+    exit_status,
+    leave,
+    ranges,
+    replay_picture,
+)
+from mc_engine.suggestions import hint, listed
+
+if TYPE_CHECKING:
+    from mc_engine.runner.debugging import Debugged, Stop
+
+
+@app.command()
+@exit_status()
+def debug(
+    file: CampaignFile,
+    case: Annotated[int | None, typer.Option(min=0, help="Its case_id; by default the nominal case.")] = None,
+    at_time: Annotated[
+        float | None,
+        typer.Option(min=0.0, metavar="S", help="Stop in the first call of rhs at this time [s] or later."),
+    ] = None,
+    at_event: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Stop when this event happens: in switch, or in observe where it ends the case."
+        ),
+    ] = None,
+    at_nan: Annotated[
+        bool,
+        typer.Option(
+            "--at-nan", help="Stop at the line that breaks the flight with a number which is infinite or NaN."
+        ),
+    ] = False,
+) -> None:
+    """Fly one case by Python and stop in a debugger, inside the model's own functions.
+
+    Without an option it stops at the first line of rhs, at the start; where the physics has a breakpoint() or a print
+    of its own, there alone. The debugger is that of Python's breakpoint(): pdb, or what PYTHONBREAKPOINT names.
+    Without a terminal it reads its commands from standard input.
+    """
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.model.simulator import Simulator
+
+    if sum([at_time is not None, at_event is not None, at_nan]) > 1:
+        leave(USAGE, "--at-time, --at-event, --at-nan: choose one of them")
+    campaign = load_campaign(file)
+    if isinstance(campaign.model, Simulator):
+        leave(USAGE, f"{file}: flies a simulator, which has no physics to stop in; debug its own program")
+    from mc_engine.runner.debugging import Stop, fly_debugged, has_own_stops, inputs_of
+
+    if at_event is not None:
+        _refuse_unknown_event(campaign.model, at_event)
+    stop: Stop | None = Stop(at_time, at_event, at_nan)
+    if stop == Stop() and has_own_stops(campaign.model):
+        stop = None
+    inputs, noise = inputs_of(campaign, case)
+    ended = _in_debugger(lambda: fly_debugged(campaign.model, inputs, noise, campaign.seed, stop, typer.echo))
+    if ended is not None:
+        _echo_end("the nominal case" if case is None else f"case {case}", ended, stop)
+
+
+def _refuse_unknown_event(model: Any, name: str) -> None:
+    known = [event.name for event in model.event_list]
+    if name not in known:
+        has = f"; it has {listed(known)}" if known else "; it has none"
+        leave(USAGE, f'--at-event "{name}": is no event of the model{hint(name, known) or has}')
+
+
+def _in_debugger(fly: Any) -> "Debugged | None":
+    """How the flight ended; None if the user left the debugger before."""
+    from bdb import BdbQuit
+
+    try:
+        ended: Debugged = fly()
+        return ended
+    except BdbQuit:
+        return None
+
+
+def _echo_end(who: str, ended: "Debugged", stop: "Stop | None") -> None:
+    if stop is not None and not ended.stopped:
+        missed = (
+            "no number broke the flight"
+            if stop.not_finite
+            else (
+                f'the event "{stop.event}" did not happen' if stop.event else f"it did not come to t = {stop.time:g} s"
+            )
+        )
+        typer.echo(f"not stopped: {missed}", err=True)
+    metrics = "".join(f", {name} = {value:.6g}" for name, value in ended.metrics.items() if ended.status == "ok")
+    typer.echo(f"{who}: {ended.status} at t = {ended.end_time:.6g} s{metrics}")
+
+
+# then the message for -1 is that it is no case, instead of no option
+@app.command(context_settings={"ignore_unknown_options": True})
+@exit_status()
+def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:
+    """Fly one case again, alone: compare every stored number bit for bit, and write and plot its history."""
+    store = existing_run(folder)
+    if store.missing(range(case, case + 1)):
+        leave(USAGE, f"{folder}: case {case} is not there; the run has {ranges(store.committed())}")
+    from mc_engine.runner import runner
+    from mc_engine.studies.replay_files import write_replay
+
+    flight = runner.replay(folder, case)
+    if store.manifest.get("quantities"):  # a simulator without outputs has no history
+        for path in write_replay(store, case, flight.history, replay_picture(store, case, flight.history)):
+            typer.echo(str(path))
+    if flight.lost:
+        typer.echo(flight.lost)
+    if not flight.equal:
+        for difference in flight.differences:
+            typer.echo(str(difference), err=True)
+        leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")
+    typer.echo(f"case {case}: every stored number has the same bits")

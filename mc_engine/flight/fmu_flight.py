@@ -1,0 +1,91 @@
+"""Flights of an FMU, through the package fmpy: one instance, which is reset between cases."""
+
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mc_engine.errors import ModelError
+from mc_engine.model.fmu import CO_SIMULATION, Fmu
+
+
+class FmuFlight:
+    """Flies the cases of one process.
+
+    home : folder in which the FMU is unpacked.  Raises ModelError where it cannot be loaded or gives no instance.
+    """
+
+    def __init__(self, fmu: Fmu, home: Path):
+        import fmpy
+
+        self._fmu, self._home = fmu, home
+        self._instance: Any = None
+        try:
+            fmpy.extract(io.BytesIO(fmu.content), home)
+            self._description = fmpy.read_model_description(str(home))
+            self._instance = self._ready()
+        except Exception as error:  # fmpy has errors of many kinds
+            raise ModelError(f"the FMU cannot be started: {error}") from None
+
+    def fly(self, inputs: Mapping[str, Any], case: object) -> tuple[dict[str, float], dict[str, np.ndarray]]:
+        """Metrics and history of one case.  Raises what fmpy does where the FMU reports an error."""
+        import fmpy
+
+        flown = self._fmu
+        metrics = [variable for variable, _, _ in flown.metrics.values()]
+        instance, self._instance = self._ready(), None  # after an error it is begun anew
+        table = fmpy.simulate_fmu(
+            str(self._home),
+            start_time=0.0,
+            stop_time=flown.stop_time_s,
+            step_size=flown.step_s,
+            output_interval=flown.step_s,
+            relative_tolerance=flown.solver_tolerance,
+            start_values={variable: inputs[name] for name, variable in flown.parameters.items()},
+            output=[*metrics, *flown.outputs.values()],
+            model_description=self._description,
+            fmu_instance=instance,
+        )
+        self._instance = instance
+        time = np.asarray(table["time"])
+        results = {
+            name: taken(time, np.asarray(table[variable], dtype=np.float64), what, level)
+            for name, (variable, what, level) in flown.metrics.items()
+        }
+        return results, {"t_s": time, **{name: np.asarray(table[one]) for name, one in flown.outputs.items()}}
+
+    def _ready(self) -> Any:
+        """The instance, as if no case had been flown."""
+        from fmpy.simulation import instantiate_fmu
+
+        if self._instance is not None:
+            self._instance.reset()
+            return self._instance
+        kind = "CoSimulation" if self._fmu.interface == CO_SIMULATION else "ModelExchange"
+        return instantiate_fmu(str(self._home), self._description, kind)
+
+
+def taken(time: np.ndarray, values: np.ndarray, what: str, level: float) -> float:
+    """What is taken of the history of a variable.
+
+    what : "final", "max", "min", "time_of_max", or "crossing": the first time at which the variable reaches the level
+    or passes it, linear between two rows; NaN if it never does.
+    """
+    if what == "final":
+        return float(values[-1])
+    if what == "time_of_max":
+        return float(time[np.argmax(values)])
+    if what != "crossing":
+        return float(values.max() if what == "max" else values.min())
+    side = np.sign(values - level)
+    away = np.flatnonzero(side)
+    if not away.size:
+        return float("nan")
+    later = np.flatnonzero(side[away[0] :] != side[away[0]])
+    if not later.size:
+        return float("nan")
+    k = away[0] + later[0]
+    part = (level - values[k - 1]) / (values[k] - values[k - 1])
+    return float(time[k - 1] + part * (time[k] - time[k - 1]))

@@ -1,0 +1,147 @@
+"""What cases of a simulator leave in a run directory: rows that no part holds yet, and folders of failed cases.
+
+A case of a simulator may take minutes, and a part holds many; with its row recorded, a killed run does not fly it
+again.  Each row is a line of a file of its part, with a check sum; the file is removed when the part is written.  A
+row is on the disk as soon as the system writes it, which a kill of the engine does not prevent; a power cut may cost
+the last rows, which are then flown again.
+"""
+
+import json
+import os
+import re
+import stat
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+
+from mc_engine.durable_file import (
+    copy_into,
+    inner_names,
+    leave,
+    make_way,
+    names_in,
+    open_to_append,
+    read_inside,
+    remove_file,
+    remove_folder,
+    write_all,
+)
+from mc_engine.errors import DiskError
+from mc_engine.store.run_files import SIMULATOR
+
+MOST_KEPT = 1000  # folders of failed cases in a run
+Row = dict[str, Any]
+_NAME = re.compile(r"\.rows-([0-9]{1,18})-([0-9]{1,18})\.tmp")
+
+
+class RowLog:
+    """The rows of the cases first .. stop - 1 of a run.
+
+    The process that flies a case records its row, before it tells anybody and before it flies the next.
+    """
+
+    def __init__(self, run: Path, first: int, stop: int, case_ids: np.ndarray | None = None):
+        self._run, self._first, self._stop, self._case_ids = run, first, stop, case_ids
+        self._name = f"{SIMULATOR}/.rows-{first}-{stop}.tmp"
+        self._descriptor: int | None = None
+
+    def rows(self) -> dict[int, Row]:
+        """The recorded rows of these cases, by case; a line that was not written whole is left out."""
+        found: dict[int, Row] = {}
+        for name in _logs(self._run, self._first, self._stop):
+            for line in read_inside(self._run, name).splitlines():
+                mark, _, text = line.partition(b" ")
+                if mark == _mark(text):
+                    row = json.loads(text)
+                    if self._first <= row["case_id"] < self._stop:
+                        found[row["case_id"]] = row
+        return found
+
+    def of(self, case_ids: np.ndarray) -> "RowLog":
+        """The same log, for cases that are named by their place in `case_ids`; it can be sent to another process."""
+        return RowLog(self._run, self._first, self._stop, case_ids)
+
+    def at(self, places: Sequence[int]) -> "RowLog":
+        """The same log for some of these cases."""
+        assert self._case_ids is not None  # of `of`
+        return self.of(self._case_ids[places])
+
+    def add(self, place: int, row: Row) -> None:
+        """Record the row of the case at a place."""
+        assert self._case_ids is not None  # of `of`
+        text = json.dumps({"case_id": int(self._case_ids[place]), **row}).encode()
+        try:
+            write_all(self._opened(), _mark(text) + b" " + text + b"\n")
+        except OSError as error:
+            raise DiskError(f"{self._run / self._name}: {error.strerror or error}") from error
+
+    def _opened(self) -> int:
+        if self._descriptor is None:
+            self._descriptor = open_to_append(self._run, self._name)
+            write_all(self._descriptor, b"\n")  # after a line that a kill cut short
+        return self._descriptor
+
+    def close(self) -> None:
+        """Close the file, to which further rows may be added."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def remove(self) -> None:
+        """Forget the rows, which a part holds now."""
+        self.close()
+        if os.path.lexists(self._run / SIMULATOR):
+            remove_file(self._run, self._name)
+
+
+def remove_logs(run: Path) -> None:
+    """Remove all logs of a run whose cases are complete, and their folder if nothing else is in it."""
+    for name in _logs(run, 0, 2**62):
+        remove_file(run, name)
+    if os.path.lexists(run / SIMULATOR) and not names_in(run, SIMULATOR):
+        remove_folder(run, SIMULATOR)
+
+
+def _logs(run: Path, first: int, stop: int) -> Iterator[str]:
+    """Names of the files with rows of any of the cases first .. stop - 1."""
+    for name in names_in(run, SIMULATOR) if os.path.lexists(run / SIMULATOR) else ():
+        match = _NAME.fullmatch(name)
+        if match is not None and int(match[1]) < stop and first < int(match[2]):
+            yield f"{SIMULATOR}/{name}"
+
+
+def _mark(text: bytes) -> bytes:
+    return f"{crc32(text):08x}".encode()
+
+
+def keep_case(run: Path, name: str, folder: Path, texts: Mapping[str, bytes], most: int | None = MOST_KEPT) -> None:
+    """Keep what a case left behind, in place of what an earlier flight of it did.
+
+    name : of its folder in the run.  folder : of its files, of which the regular ones are copied; it may be missing.
+    texts : contents of further files by name.  most : folders that a run may have, or None.
+    """
+    make_way(run, f"{SIMULATOR}/{name}")
+    if most is not None and len(names_in(run, SIMULATOR)) >= most:
+        return
+    remove_folder(run, f"{SIMULATOR}/{name}")
+    for path, kept in _regular_files(folder):
+        if kept.split("/")[0] not in texts:
+            copy_into(run, f"{SIMULATOR}/{name}/{kept}", path)
+    for file, text in texts.items():
+        make_way(run, f"{SIMULATOR}/{name}/{file}")
+        leave(run, f"{SIMULATOR}/{name}/{file}", text)
+
+
+def _regular_files(folder: Path) -> Iterator[tuple[Path, str]]:
+    """The regular files in a folder that can be read, and their names from there, if a run directory can hold them."""
+    for way, _, names in os.walk(folder):  # which enters no folder by a link
+        for name in sorted(names):
+            path = Path(way) / name
+            with suppress(ValueError, OSError):
+                inner = path.relative_to(folder).as_posix()
+                if stat.S_ISREG(path.lstat().st_mode) and os.access(path, os.R_OK) and inner_names(inner):
+                    yield path, inner

@@ -1,0 +1,173 @@
+"""All that a run can be part of, with simulators: shards, clusters, studies, ways to give results, imports."""
+
+import json
+from collections import Counter
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from mc_engine import load_campaign, open_run, open_store, run
+from mc_engine.command_line.commands import app
+from mc_engine.runner.backends import Backend
+from mc_engine.runner.runner import merge
+from mc_engine.runner.shards import Shard
+from mc_engine.runner.stopping import fly_until_decided
+from mc_engine.runner.summary import judgement
+from tests.mc_engine.flight.falling_ball import program_campaign, python_campaign
+
+FILES = {"case": python_campaign, "program": program_campaign}
+BATCH = "batch=True,"
+TUNING = """
+[tuning]
+population = 8
+generations = 3
+[tuning.parameter.drag_area_m2]
+lower = 0.01
+upper = 0.05
+[tuning.objective.speed]
+metric = "impact_speed_m_s"
+"""
+
+
+def told(*words, status=0):
+    """What a command prints; it must end with this exit status."""
+    said = CliRunner().invoke(app, [str(word) for word in words])
+    assert said.exit_code == status, said.output
+    return said.output
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    return run(load_campaign(python_campaign(folder / "ball", cases=60)), folder / "run", workers=2)
+
+
+def test_shards_make_the_same_run(tmp_path, flown):
+    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=60))
+    for k in (1, 2):
+        run(campaign, tmp_path / f"shard-{k}", workers=1, shard=Shard(k, 2))
+    whole = merge(tmp_path / "merged", [tmp_path / "shard-1", tmp_path / "shard-2"], workers=1)
+    assert whole.cases().equals(flown.cases())
+    assert whole.histories().equals(flown.histories())
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_a_cluster_makes_the_same_run(tmp_path, flown, kind):
+    pytest.importorskip("distributed")
+    campaign = load_campaign(FILES[kind](tmp_path / "ball", cases=60))
+    table = run(campaign, tmp_path / "run", workers=2, backend=Backend("dask")).cases()
+    columns = ["case_id", "status", "mass_kg", "height_m"]
+    assert table[columns].equals(flown.cases()[columns])
+    assert np.allclose(table["fall_time_s"], flown.cases()["fall_time_s"], rtol=1e-12, atol=0.0)
+
+
+def test_two_simulators_are_compared_case_by_case(tmp_path, flown):
+    other = run(load_campaign(program_campaign(tmp_path / "ball", cases=60)), tmp_path / "run", workers=2)
+    said = told("compare", flown.path, other.path)
+    assert "paired: 60 cases have the same inputs in both runs" in said
+    assert "the same in both runs: fall_time_s, impact_speed_m_s" in said
+    lighter = "inputs = {**inputs, 'mass_kg': 0.9 * inputs['mass_kg']}"
+    light = python_campaign(tmp_path / "light", cases=60, fault=lighter)
+    changed = run(load_campaign(light), tmp_path / "run-light", workers=2)
+    told("compare", flown.path, changed.path, status=1)
+
+
+@pytest.mark.parametrize("options", ["", BATCH], ids=["case", "batch"])
+def test_a_simulator_is_tuned(tmp_path, options):
+    pytest.importorskip("pymoo")
+    file = python_campaign(tmp_path / "ball", cases=4, options=options)
+    file.write_text(file.read_text() + TUNING)
+    told("tune", file, "--out", tmp_path / "tuned", "--no-report", "--workers", 2)
+    front = pd.read_parquet(tmp_path / "tuned/front.parquet")
+    assert front["drag_area_m2"].min() > 0.045  # more drag, less speed
+
+
+@pytest.mark.parametrize("kind", ["case", "batch"])
+def test_a_rare_event_of_a_simulator_is_estimated(tmp_path, kind):
+    file = python_campaign(tmp_path / "ball", options=BATCH if kind == "batch" else "")
+    file.write_text(file.read_text().replace("at_most = 90.0", "at_most = 80.0"))
+    told("rare", file, "--out", tmp_path / "rare", "--cases-per-level", 500, "--no-report", "--workers", 2)
+    found = json.loads((tmp_path / "rare/rare.json").read_text())["rare_event"]
+    rng = np.random.default_rng(1)
+    k = 0.02 * 1.225 / 2.0 / rng.normal(10.0, 0.5, 1_000_000)
+    speed = np.sqrt(9.81 / k * -np.expm1(-2.0 * k * rng.uniform(450.0, 550.0, k.size)))
+    assert found["lower"] < np.mean(speed > 80.0) < found["upper"]
+    assert found["no_number"] == 0
+
+
+def test_flying_ends_where_the_requirement_of_a_simulator_is_decided(tmp_path):
+    campaign = load_campaign(python_campaign(tmp_path / "ball", cases=500))
+    store = fly_until_decided(campaign, tmp_path / "run", workers=2)
+    assert store.n_cases < 100
+    assert judgement(store)[0][0].outcome == "pass"
+
+
+def program(folder, read, how, cases=8):
+    """A campaign of the C program with another table of how its result is read."""
+    file = program_campaign(folder, cases=cases)
+    text = file.read_text()
+    for name, key in (("fall_time_s", "time"), ("impact_speed_m_s", "speed")):
+        text = text.replace(f'read = "{key}"', read[name])
+    file.write_text(text.replace('result = "result.json"\n', "").replace('echo = "used"\n', how))
+    return file
+
+
+def test_results_are_read_from_a_csv_or_by_patterns_over_stdout(tmp_path, flown):
+    shell = {"result.csv": "printf 'time,speed\\n%s,%s\\n' $t $v > result.csv", "": "echo time = $t; echo speed: $v"}
+    reads = {
+        "result.csv": {"fall_time_s": 'read = "time"', "impact_speed_m_s": 'read = "speed"'},
+        "": {"fall_time_s": "pattern = 'time = (\\S+)'", "impact_speed_m_s": "pattern = 'speed: (\\S+)'"},
+    }
+    number = "sed 's/.*\"%s\": \\([^,]*\\),.*/\\1/' result.json"
+    for result, write in shell.items():
+        folder = tmp_path / (result or "stdout")
+        file = program(folder, reads[result], f'result = "{result}"\n' if result else "")
+        lines = ["#!/bin/sh", '"$1" "$2" "$3"', f"t=$({number % 'time'}); v=$({number % 'speed'})", write]
+        (folder / "fly.sh").write_text("\n".join(lines))
+        (folder / "fly.sh").chmod(0o755)
+        file.write_text(file.read_text().replace('["./fall", ', '["./fly.sh", "./fall", '))
+        table = run(load_campaign(file), folder / "run", workers=1).cases()
+        assert set(table["status"]) == {"ok"}, set(table["reason"])
+        assert np.allclose(table["fall_time_s"], flown.cases()["fall_time_s"][:8], rtol=1e-15, atol=0.0)
+        assert np.allclose(table["impact_speed_m_s"], flown.cases()["impact_speed_m_s"][:8], rtol=1e-12, atol=0.0)
+
+
+@pytest.mark.parametrize(("slots", "most"), [(1, 1), (2, 2)])
+def test_no_more_cases_fly_at_a_time_than_there_are_slots(tmp_path, slots, most):
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    lines = [
+        "import os, time",
+        f"mark = {str(marks)!r} + f'/{{os.getpid()}}'",
+        "open(mark, 'w').close()",
+        f"many = len(os.listdir({str(marks)!r}))",
+        "time.sleep(0.05)",
+        "os.remove(mark)",
+        "return {'fall_time_s': float(many), 'impact_speed_m_s': 1.0}",
+    ]
+    file = python_campaign(tmp_path / "ball", cases=40, fault="\n".join(lines), options=f"slots={slots},")
+    table = run(load_campaign(file), tmp_path / "run", workers=4, chunk=5).cases()
+    assert table["fall_time_s"].max() == most
+
+
+@pytest.mark.parametrize(("keep", "kept"), [("all", 12), ("failed", 1), ("none", 0)])
+def test_folders_of_cases_are_kept_as_asked(tmp_path, keep, kept):
+    fault = "(case.folder / 'deck.inp').write_text('10')\nif case.id == 7: raise ValueError('no')"
+    file = python_campaign(tmp_path / "ball", cases=12, fault=fault, options=f'keep="{keep}",')
+    run(load_campaign(file), tmp_path / "run", workers=2)
+    counts = Counter(path.name for path in (tmp_path / "run/simulator").rglob("*") if path.is_file())
+    assert counts == ({"deck.inp": kept, "case.json": kept} if kept else {})
+
+
+def test_imported_histories_are_those_of_a_run(tmp_path, flown):
+    campaign = python_campaign(tmp_path / "ball", cases=60)
+    flown.cases().to_parquet(tmp_path / "results.parquet")
+    flown.histories().to_csv(tmp_path / "history.csv", index=False)
+    words = ["import", tmp_path / "results.parquet", "--campaign", campaign, "--history", tmp_path / "history.csv"]
+    told(*words, "--out", tmp_path / "run", "--no-report")
+    assert open_store(tmp_path / "run").histories().equals(flown.histories())
+    assert "imported" in open_run(tmp_path / "run").store.manifest
+    flown.histories().drop(columns="speed_m_s").to_csv(tmp_path / "history.csv", index=False)
+    assert '"history.csv" has no column "speed_m_s"' in told(*words, "--out", tmp_path / "other", status=2)

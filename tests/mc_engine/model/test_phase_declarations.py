@@ -1,0 +1,99 @@
+"""What is said of mistakes in phases, delayed events and metrics at events, and that `check` knows all phases."""
+
+import pytest
+from mistaken_campaign import campaign_with
+
+from mc_engine.errors import CampaignError
+from mc_engine.flight.contract import breaches
+from mc_engine.flight.contract_flight import faults
+
+PHASES = (
+    ("import Event,", "import Event, Phase, time_of, value_at,"),
+    ("rhs=rhs, observe", "observe"),
+    ('events={"apogee": Event(climb, "falling", "stop")}',
+     'phases={"near": Phase(rhs, events={"far": Event(height, "rising", to="away")}),\n'
+     '                      "away": Phase(rhs, events={"apogee": Event(climb, "falling", "stop")})}'),
+    ("@physics\ndef observe", "@physics\ndef height(s):\n    return s.x * s.x + s.y * s.y - (7e6) ** 2\n\n\n"
+     "@physics\ndef observe"),
+)  # fmt: skip
+SWITCH = ("MODEL =", "@physics\ndef switch(s, m, hit):\n    return s, m\n\n\nMODEL =")
+# text of the smallest model in two phases, what stands in its place, the sentence
+MISTAKES = {
+    "unknown phase": (('to="away"', 'to="awya"'),
+                      'the event "far" begins the phase "awya", which there is not; did you mean "away"?'),
+    "phase that no event begins": (('"rising", to="away"', '"rising", "stop"'),
+                                   'no event begins the phase "away"; let one of a phase before it do so'),
+    "event without function": (("Event(height, ", "Event("), 'the event "far" has no function; declare it so'),
+    "rhs beside phases": (("observe=observe", "rhs=rhs, observe=observe"),
+                          "the model has both `rhs` and `phases`; each phase has its own: Phase(rhs=...)"),
+    "events beside phases": (("observe=observe", "events={}, observe=observe"), "both `events` and `phases`"),
+    "neither": (('phases={"near"', 'data=()) and dict(x={"near"'), "the model has no `rhs`"),
+    "no phase": (('"near": Phase(rhs, ', '"near": dict(rhs=rhs, '), 'the phase "near" is {'),
+    "stop and phase": (('"rising", to=', '"rising", "stop", to='), 'has the action "stop" and begins the phase "away"'),
+    "phase of a model without": (('phases={"near"', 'rhs=rhs, events={"far": Event(height, "rising", to="away")})\n'
+                                  'dict(x={"near"'), 'begins the phase "away", but the model has no phases'),
+    "one name, two events": (('"away": Phase(rhs, events={', '"away": Phase(rhs, events={"far": Event(climb),'),
+                             'the phase "away" has another event "far" than a phase before'),
+    "delay before": (('to="away"', 'to="away", after=-1.0'), 'the event "far" acts after -1.0 s; a delay is a number'),
+    "delay of nobody": (('to="away"', 'to="away", after="burn_vd"'),
+                        '"burn_vd", and no parameter has this name without its unit; did you mean "burn_dv"?'),
+    "value at no event": (('maximum_of("speed_m_s"', 'value_at("apogeee", "speed_m_s"'),
+                          'metric "top_speed_m_s": there is no event "apogeee"; did you mean "apogee"?'),
+    "value of no output": (('maximum_of("speed_m_s"', 'value_at("apogee", "sped_m_s"'),
+                           'metric "top_speed_m_s": there is no output "sped_m_s"; did you mean "speed_m_s"?'),
+    "time in metres": (('maximum_of("speed_m_s", ', 'time_of("apogee", '), 'is in "m/s", but it holds a value in "s"'),
+    "nearly since": (("def observe(s)", "def observe(s, sinc)"), 'takes "sinc"; did you mean "since"?'),
+    "control without memory": (("Phase(rhs, events={\"far\"", "Phase(rhs, rhs, events={\"far\""),
+                               "name its class, memory=Memory"),
+    "no function to switch": (('"falling", "stop")}', '"falling", "switch")}'), "the model has no function `switch`"),
+    "a phase of no word": (('"away": Phase', '"2nd": Phase'), "'2nd'"),
+    "a reserved column": (('altitude_km="altitude"', 'phase=Field("x", unit=""), altitude_km="altitude"'),
+                          ("import Event,", "import Event, Field,"), 'the output "phase" has the name of a column'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_phases_is_named_with_its_fix(mistake, tmp_path):
+    *edits, sentence = MISTAKES[mistake]
+    with pytest.raises(CampaignError) as error:
+        campaign_with(tmp_path, *PHASES, *edits)
+    (problem,) = error.value.problems
+    assert sentence in problem.message
+
+
+IN_PHYSICS = {
+    "rhs of the second phase": (("def height", "def lost(s):\n    return s.x\n\n\n@physics\ndef height"),
+                                ('"away": Phase(rhs', '"away": Phase(lost'), "`rhs` gives "),
+    "syntax of the second phase": (("def height", "def lost(s):\n    return [s.x]\n\n\n@physics\ndef height"),
+                                   ('"away": Phase(rhs', '"away": Phase(lost'), "a list, dictionary or set is not for"),
+    "switch without memory": (("observe=observe", "switch=switch, observe=observe"), (SWITCH[0], SWITCH[1].replace(
+        "return s, m", "return s")), "`switch` gives State(x, y, vx, vy); it must give state and memory, (s, m)"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("mistake", IN_PHYSICS)
+def test_check_finds_what_is_wrong_in_any_phase(mistake, tmp_path):
+    *edits, sentence = IN_PHYSICS[mistake]
+    found = breaches(campaign_with(tmp_path, *PHASES, *edits))
+    assert any(sentence in one for one in found), found
+
+
+NEVER = ('Phase(rhs, events={"apogee"', 'Phase(rhs, events={"never": Event(beyond, "rising", "stop"), "apogee"')
+BEYOND = ("@physics\ndef observe", "@physics\ndef beyond(s):\n    return s.x - 1e9\n\n\n@physics\ndef observe")
+
+
+def test_an_event_of_the_second_phase_that_never_comes_is_found_by_flying(tmp_path):
+    (found,) = faults(campaign_with(tmp_path / "event", *PHASES, NEVER, BEYOND))
+    assert 'the event "never" happens in none of 32 cases, in the phases that look for it' in found
+    metric = ('maximum_of("speed_m_s"', 'value_at("never", "speed_m_s"')
+    found, _ = faults(campaign_with(tmp_path / "metric", *PHASES, NEVER, BEYOND, metric))
+    assert 'the metric "top_speed_m_s" is not a number in any of the 32 cases' in found
+    sometimes = (metric[0], metric[1]), ('"largest speed")', '"speed there", sometimes=True)')
+    (found,) = faults(campaign_with(tmp_path / "sometimes", *PHASES, NEVER, BEYOND, *sometimes))
+    assert "happens in none of" in found
+
+
+def test_check_has_nothing_to_say_of_a_right_model_in_phases(tmp_path):
+    campaign = campaign_with(tmp_path, *PHASES)
+    assert breaches(campaign) == []
+    assert faults(campaign) == []
