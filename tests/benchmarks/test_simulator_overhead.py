@@ -48,8 +48,9 @@ def test_cases_of_a_millisecond_keep_the_processors_busy(tmp_path):
     cases = 5000
     wall, spent = seconds(python_campaign(tmp_path / "ball", fault=WAITING), cases, tmp_path)
     plain = without_engine(cases)
-    print(f"1 ms a case: {wall:.2f} s, two plain processes {plain:.2f} s; busy {spent / WORKERS / wall:.1%}")
-    assert plain / wall > 0.9
+    busy, plain_busy = spent / WORKERS / wall, 1e-3 * cases / WORKERS / plain
+    print(f"1 ms a case: {wall:.2f} s, two plain processes {plain:.2f} s; busy {busy:.1%}, they {plain_busy:.1%}")
+    assert busy > 0.9 * plain_busy  # other work on the machine takes from both
 
 
 def without_engine(cases):
