@@ -260,7 +260,7 @@ def observe(s):
 LANDING = {"ground": Event(height, "falling", "stop")}
 MODEL = model(
     name="calisto", title="Calisto from the rail to the ground", inputs=Inputs, states=State, outputs=Outputs,
-    metrics=Metrics, clock=AdaptiveStep(until=2000.0, rtol=1e-8, atol=1e-8), initial=initial, observe=observe,
+    metrics=Metrics, clock=AdaptiveStep(until=2000.0, rtol=1e-6, atol=1e-6), initial=initial, observe=observe,
     phases={
         "rail": Phase(slide, events={"rail_exit": Event(left_rail, "rising", to="powered")}),
         "powered": Phase(burn, events={"burn_out": Event(burnt, "rising", to="coast")}),
