@@ -1,4 +1,4 @@
-"""FMUs as simulators: what the table [simulator] of a campaign file says of one, held against the FMU itself.
+"""FMUs as simulators: what the table [simulator] of a campaign file says of one, checked against the FMU itself.
 
 FMI 2 and 3, co-simulation and model exchange, through the package fmpy.  Everything that can be wrong with the binding
 of names is found here, before anything flies; no code of the FMU runs for that.

@@ -31,9 +31,9 @@ ARGUMENTS = {
     "control": "t, s, m, p, o, draws",
     "events": "t, s, m, p, o",
     "switch": "t, s, m, p, o, hit",
-    "note": "t, s, m, p, o, hit",
     "observe": "t, s, m, p, o",
     "evaluate": "t, s, m, p, o, best, when",
+    "note": "t, s, m, p, o, hit",  # the engine's own, of `observe`, which is known by its own name
     "prepare": "inputs, settings, refusals",
     "tables": "o",
 }
