@@ -94,7 +94,7 @@ def test_a_simulator_and_two_stops_at_once_are_answered_with_a_sentence(tmp_path
 def test_it_stops_in_observe_where_an_event_ends_a_case_that_also_notes_it(tmp_path):
     noted = ('at_end("altitude_km", "altitude of the apogee")', 'value_at("apogee", "altitude_km", "altitude there")')
     folder = write_campaign(tmp_path / "noted", noted, ("import Event,", "import value_at, Event,"))
-    status, printed, complaint = debug(folder, "--at-event", "apogee", typed="q\n")
+    _status, printed, complaint = debug(folder, "--at-event", "apogee", typed="q\n")
     assert "did not happen" not in printed + complaint
     assert "stopped in `" in printed
     assert re.search(r"> model\.py\(\d+\)observe\(\)", printed)
