@@ -332,12 +332,12 @@ def names_in(root: Path, inner: str = "") -> list[str]:
         return sorted(os.listdir(folder.path if folder.descriptor is None else folder.descriptor))
 
 
-def read_file(path: Path, most: int | None = None, limit: int = MOST_OF_FILE) -> bytes:
-    """The content of the regular file `path`, as the user named it, or its first `most` bytes.
+def read_file(path: Path, limit: int = MOST_OF_FILE) -> bytes:
+    """The content of the regular file `path`, as the user named it.
 
     StoreError if more than `limit` bytes would be read, or more than the memory can hold.
     """
-    return read_inside(path.parent, path.name, most, limit)
+    return read_inside(path.parent, path.name, limit=limit)
 
 
 def read_short(path: Path) -> bytes:

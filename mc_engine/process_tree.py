@@ -30,9 +30,9 @@ def how_it_ended(code: int) -> str:
 def memory_mib(pid: int) -> float:
     """Memory of a process and its descendants; 0 where the system does not show it."""
     pages = 0
-    for one in [pid, *_descendants(pid)]:
+    for process in [pid, *_descendants(pid)]:
         try:
-            pages += int(Path(f"/proc/{one}/statm").read_text().split()[1])
+            pages += int(Path(f"/proc/{process}/statm").read_text().split()[1])
         except (OSError, IndexError):
             continue
     return pages * _PAGE / _MIB

@@ -96,18 +96,13 @@ _BY_QUANTITY: dict[str, dict[str, float]] = {
 _ALSO_WRITTEN = str.maketrans(
     {"²": "2", "³": "3", "µ": "u", "μ": "u", "°": "deg", "Ω": "ohm"} | dict.fromkeys(" ^*·()_")
 )
-_SUFFIX = {"%": "_pct", "day": "_days"}
-
-
-def other_endings() -> dict[str, str]:
-    """Units that a column's name does not end in letter by letter, with what it ends in: "_days" for day."""
-    return dict(_SUFFIX)
+OTHER_SUFFIXES = {"%": "_pct", "day": "_days"}  # of units that a column's name does not end in letter by letter
 
 
 def _suffix(unit: str) -> str:
     """W/(m^2 K) is _w_m2_k at the end of a column's name."""
-    if unit in _SUFFIX or not unit:
-        return _SUFFIX.get(unit, "")
+    if unit in OTHER_SUFFIXES or not unit:
+        return OTHER_SUFFIXES.get(unit, "")
     return "_" + "_".join(unit.lower().replace("^", "").translate(str.maketrans("/()", "   ")).split())
 
 

@@ -81,7 +81,7 @@ def element_errors(s, p):
 
 @physics
 def inverse(first, scale):
-    """1 / first, and 0 where the first error is nothing but rounding: below 1e-9 of the element's scale."""
+    """1 / first, in 1 / its unit; 0 where the first error is only rounding, below 1e-9 of the element's scale."""
     known = abs(first) > 1e-9 * scale
     return where(known, 1.0 / where(known, first, 1.0), 0.0)
 

@@ -114,10 +114,11 @@ def _dates(path: Path, item: Setting, cells: np.ndarray) -> np.ndarray:
 
 
 def table_dispersions(
-    table: Mapping[str, np.ndarray], declared: Mapping[str, Dispersion], findings: Findings
+    table: Mapping[str, np.ndarray], dispersions: tuple[Dispersion, ...], findings: Findings
 ) -> tuple[Dispersion, ...]:
-    """One dispersion per column, with the source that the campaign file gives it."""
-    for name in declared:
+    """One dispersion per column, with the source that the campaign file gives it; none where the table is wrong."""
+    declared = {dispersion.name: dispersion for dispersion in dispersions}
+    for name in declared if table else ():
         if name not in table:
             findings.under("dispersion").add(name, f"the table has no such column{hint(name, table)}")
     return tuple(declared.get(name, Dispersion(name, None, {}, "", "")) for name in table)

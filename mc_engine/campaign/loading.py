@@ -212,28 +212,21 @@ def _assemble(
     check_taken(sections, upstream, design, findings)
     dispersions = _dispersions(sections, model, nominal, design, directory, findings)
     correlations = check_correlations(sections.correlations, dispersions, model, design or "mc", findings)
-    table_path, table = (
-        (None, {}) if upstream is not None else cases_of_table(section, model, dispersions, directory, findings)
-    )
-    if design == "table" and upstream is None:
-        dispersions = (
-            table_dispersions(table, {dispersion.name: dispersion for dispersion in dispersions}, findings)
-            if table
-            else ()
-        )
+    table_path: Path | None = None
+    table: dict[str, np.ndarray] = {}
+    if upstream is None:
+        table_path, table = cases_of_table(section, model, dispersions, directory, findings)
+        if design == "table":
+            dispersions = table_dispersions(table, dispersions, findings)
     count = None
     if section is not None and (sections.inputs is None or upstream is not None):
         rows = 0 if upstream is None else (first.cases if first is not None else upstream.rows.n_cases)
         count = chained_count(section, rows, inside) if rows else _case_count(section, dispersions, table, inside)
     if count is not None:
         check_size(count, design or "", dispersions, correlations, inside)
-    retention = Retention()
-    if sections.retention is not None:
-        retention = check_retention(sections.retention, model, count, shortened, findings.under("retention"))
-    tuning = None
-    if sections.tuning is not None:
-        names = [dispersion.name for dispersion in dispersions]
-        tuning = check_tuning(sections.tuning, model, names, design, findings.under("tuning"))
+    retention = check_retention(sections.retention, model, count, shortened, findings.under("retention"))
+    names = [dispersion.name for dispersion in dispersions]
+    tuning = check_tuning(sections.tuning, model, names, design, findings.under("tuning"))
     flown_before = None if upstream is None else upstream.name
     sensitivity = check_sensitivity(
         sections.sensitivity, model, dispersions, correlations, design, flown_before, findings.under("sensitivity")

@@ -267,12 +267,14 @@ def check_limits(section: RequirementSection | ConstraintSection, findings: Find
 
 
 def check_retention(
-    section: RetentionSection, model: System, cases: int | None, shortened: bool, findings: Findings
+    section: RetentionSection | None, model: System, cases: int | None, shortened: bool, findings: Findings
 ) -> Retention:
-    """The retention, its case numbers checked against `cases` (None: unknown).
+    """The retention, its case numbers checked against `cases` (None: unknown); by default where it could not be read.
 
     shortened : the number of cases is not the file's; numbers beyond it are then dropped, not refused.
     """
+    if section is None:
+        return Retention()
     histories = section.histories
     worst = histories.worst or []
     entries = [worst] if isinstance(worst, WorstSection) else worst

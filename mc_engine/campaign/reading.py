@@ -142,7 +142,8 @@ def read_sections(document: dict[str, Any], findings: Findings) -> Sections:
     """Read every section, noting all that is wrong inside each."""
     for name in document:
         if name not in CampaignFile.model_fields:
-            findings.add(name, f"is not a section{hint(name, CampaignFile.model_fields)}")
+            near = "" if findings.full else hint(name, CampaignFile.model_fields)
+            findings.add(name, f"is not a section{near}")
     if "campaign" not in document:
         findings.add("campaign", "is missing: the table [campaign] with model, design, ...")
     inside = {name: findings.under(name) for name in CampaignFile.model_fields}

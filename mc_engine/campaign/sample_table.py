@@ -13,6 +13,7 @@ from mc_engine.durable_file import write_durably
 from mc_engine.store.parts import CASE_COLUMNS, Column, arrow_table, parquet_bytes
 
 SUFFIXES = (".parquet", ".csv")
+_ROWS = 5  # on a terminal
 _KINDS = {"O": "word", "U": "word", "b": "switch", "i": "integer", "u": "integer", "f": "number"}
 
 
@@ -35,11 +36,11 @@ def write_sample(campaign: Campaign, table: Mapping[str, np.ndarray], path: Path
     write_durably(path, parquet_bytes(arrow_table(columns, table, campaign.cases, path)))
 
 
-def sample_text(table: Mapping[str, np.ndarray], rows: int = 5) -> str:
+def sample_text(table: Mapping[str, np.ndarray]) -> str:
     """The first rows, and mean, spread and extremes of each column of numbers (the words with their counts)."""
     frame = pd.DataFrame(table)
     numbers = frame.drop(columns="case_id").select_dtypes("number")
-    blocks = [frame.head(rows).to_string(index=False)]
+    blocks = [frame.head(_ROWS).to_string(index=False)]
     if not numbers.empty:
         summary = pd.DataFrame(
             {"mean": numbers.mean(), "std": numbers.std(), "smallest": numbers.min(), "largest": numbers.max()}

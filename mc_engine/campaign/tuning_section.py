@@ -3,6 +3,8 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from mc_engine.campaign.inputs import check_value, inputs_of, number
 from mc_engine.campaign.parts import check_limits, check_metric
 from mc_engine.campaign.reading import Findings, TuningSections
@@ -63,6 +65,11 @@ class Tuning:
         return (*self.objectives, *self.constraints)
 
     @property
+    def signs(self) -> np.ndarray:
+        """float64[n_objectives]: by which the objectives are multiplied, so that all are to be small."""
+        return np.array([1.0 if objective.large_is_bad else -1.0 for objective in self.objectives])
+
+    @property
     def nominal(self) -> bool:
         """Whether the nominal case of a candidate is looked at."""
         return any(measure.quantile is None for measure in self.measures)
@@ -74,10 +81,11 @@ class Tuning:
 
 
 def check_tuning(
-    sections: TuningSections, model: System, dispersed: Iterable[str], design: str | None, findings: Findings
+    sections: TuningSections | None, model: System, dispersed: list[str], design: str | None, findings: Findings
 ) -> Tuning | None:
-    """The tuning, or None if its plain keys could not be read; problems are noted in `findings`."""
-    dispersed = list(dispersed)
+    """The tuning, None without one or if its plain keys could not be read; problems are noted in `findings`."""
+    if sections is None:
+        return None
     for kind, entries in (("parameter", sections.parameters), ("objective", sections.objectives)):
         if not entries and not any(
             problem.place.startswith(f"{findings.place}.{kind}") for problem in findings.problems

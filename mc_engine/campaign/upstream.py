@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from mc_engine.campaign.columns import input_column
 from mc_engine.campaign.inputs import inputs_of
@@ -143,7 +142,7 @@ def _copy_problem(table: pa.Table, columns: tuple[Column, ...], nominal: Mapping
         return "its columns are not those that it names, or have missing values"
     if not np.array_equal(table["case_id"].to_numpy(), np.arange(table.num_rows)):
         return "its case_id does not count from 0"
-    if not {*pc.unique(table["status"]).to_pylist()} <= {*STATUS_NAME.values()}:
+    if not {*table["status"].unique().to_pylist()} <= {*STATUS_NAME.values()}:
         return "it has a status that there is not"
     kinds = {"number": (int, float), "integer": (int,), "word": (str,), "switch": (bool,)}
     if table.num_rows and not all(type(nominal.get(column.name)) in kinds[column.kind] for column in columns):

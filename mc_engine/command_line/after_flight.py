@@ -102,6 +102,8 @@ def status(place: RunPlace) -> None:
     typer.echo(f"run       {place}")
     typer.echo(f"campaign  {store.manifest['campaign'].get('name', '')}")
     typer.echo(f"cases     {case_line(store)}")
+    if imported := store.manifest.get("imported"):
+        typer.echo(f"imported  from {imported['file']}; the engine did not fly these cases")
     writer = holder(folder)
     missing = store.missing()
     if writer is not None:

@@ -34,7 +34,9 @@ def debug(
     at_event: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="Stop when this event happens: in switch, or in observe where it ends the case."
+            metavar="NAME",
+            help="Stop when this event happens: in switch, in the next rhs where the model has no switch, or in "
+            "observe where it ends the case.",
         ),
     ] = None,
     at_nan: Annotated[
@@ -58,7 +60,8 @@ def debug(
     campaign = load_campaign(file)
     if isinstance(campaign.model, Simulator):
         leave(USAGE, f"{file}: flies a simulator, which has no physics to stop in; debug its own program")
-    from mc_engine.runner.debugging import Stop, fly_debugged, has_own_stops, inputs_of
+    from mc_engine.runner.debugging import Stop, fly_debugged, has_own_stops
+    from mc_engine.runner.histories import inputs_of
 
     if at_event is not None:
         _refuse_unknown_event(campaign.model, at_event)
@@ -107,7 +110,10 @@ def _echo_end(who: str, ended: "Debugged", stop: "Stop | None") -> None:
 @app.command(context_settings={"ignore_unknown_options": True})
 @exit_status()
 def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE", min=0, help="Its case_id.")]) -> None:
-    """Fly one case again, alone: compare every stored number bit for bit, and write and plot its history."""
+    """Fly one case again, alone: compare every stored number bit for bit, and write and plot its history.
+
+    The numbers of a simulator that is not deterministic are compared within its tolerance.
+    """
     store = existing_run(folder)
     if store.missing(range(case, case + 1)):
         leave(USAGE, f"{folder}: case {case} is not there; the run has {ranges(store.committed())}")
@@ -124,4 +130,8 @@ def replay(folder: RunFolder, case: Annotated[int, typer.Argument(metavar="CASE"
         for difference in flight.differences:
             typer.echo(str(difference), err=True)
         leave(DAMAGED, f"case {case} is not the one in {folder}: the run was changed, or flown by other sources")
-    typer.echo(f"case {case}: every stored number has the same bits")
+    if flight.tolerance is None:
+        typer.echo(f"case {case}: every stored number has the same bits")
+    else:
+        within = f"within the tolerance of its simulator, {flight.tolerance:g} of the number"
+        typer.echo(f"case {case}: every stored number is {within}; bits were not compared")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from mc_engine.interruption import NOTHING_BEGUN
 from mc_engine.shell_words import shell_word
+from mc_engine.store.run_files import JOURNAL, MANIFEST
 
-_JOURNAL, _MANIFEST = "journal.jsonl", "manifest.json"
 _UNFINISHED = ("created", "started", "rerun", "extended", "part-withdrawn")  # events that `finished` has to follow
 
 
@@ -17,11 +17,11 @@ def after_flight(run: Path | None, options: str = "", url: str | None = None, re
 
     options : those of the backend.  url : where the run is published.  rerun : the flight was of failed cases.
     """
-    if run is None or not (run / _JOURNAL).is_file():
+    if run is None or not (run / JOURNAL).is_file():
         return NOTHING_BEGUN
     import json  # not for `--help`
 
-    events, manifest = _events(run), json.loads((run / _MANIFEST).read_bytes())
+    events, manifest = _events(run), json.loads((run / MANIFEST).read_bytes())
     # a run with interim analyses is complete once it is decided, which `resume` finds out
     if manifest.get("looks") or not _is_finished(events):
         command = "rerun --failed" if rerun and "rerun" in events else "resume"
@@ -47,7 +47,7 @@ def is_complete(run: Path) -> bool:
 def _events(run: Path) -> list[str]:
     from mc_engine.store.journal import scan
 
-    return [entry.event for entry in scan((run / _JOURNAL).read_bytes()).entries]
+    return [entry.event for entry in scan((run / JOURNAL).read_bytes()).entries]
 
 
 def _is_finished(events: list[str]) -> bool:

@@ -11,6 +11,7 @@ import typer
 from mc_engine.command_line.app import (
     USAGE,
     CampaignFile,
+    Cases,
     NoReport,
     Workers,
     app,
@@ -50,6 +51,7 @@ def import_(
         Path | None,
         typer.Option(metavar="FILE", help="Table of time histories: case_id, t_s, outputs.", parser=new_file),
     ] = None,
+    cases: Cases = None,
     no_report: NoReport = False,
 ) -> None:
     """Make a run of results that were flown elsewhere: a table of case_id, inputs and metrics.
@@ -59,7 +61,7 @@ def import_(
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.runner.importing import import_results
 
-    loaded = load_campaign(campaign)
+    loaded = load_campaign(campaign, cases=cases)
     refuse_occupied_folder(out)
     finish(import_results(loaded, results, out, history), no_report)
 

@@ -94,7 +94,7 @@ def watch_campaign(reference: str, folder: Path | None, context: typer.Context) 
         while seen == (now := _stamps(file)):
             time.sleep(_LOOK_EVERY_S)
         seen = now
-        _fly(file, arguments, page, seen)
+        _fly_once(file, arguments, page, seen)
 
 
 def _options_given(context: typer.Context) -> dict[str, str]:
@@ -104,7 +104,7 @@ def _options_given(context: typer.Context) -> dict[str, str]:
     return {name: str(value) for name, (value, usual) in given.items() if value != usual and name not in own}
 
 
-def _fly(file: Path, arguments: Sequence[str], page: "_Page", seen: dict[Path, tuple[int, int]]) -> None:
+def _fly_once(file: Path, arguments: Sequence[str], page: "_Page", seen: dict[Path, tuple[int, int]]) -> None:
     """Fly once and show what came of it; given up if a file is saved before the flight has ended."""
     begun = time.monotonic()
     with TemporaryDirectory(prefix="mc-engine-watch-") as place:
@@ -156,8 +156,8 @@ def _stamps(file: Path) -> dict[Path, tuple[int, int]]:
     for folder in _folders(file):
         for path in _files_in(folder):
             with suppress(OSError):  # removed since it was listed
-                found = path.stat()
-                stamps[path] = found.st_mtime_ns, found.st_size
+                facts = path.stat()
+                stamps[path] = facts.st_mtime_ns, facts.st_size
             if len(stamps) >= _MOST_FILES:
                 return stamps
     return stamps

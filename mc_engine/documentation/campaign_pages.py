@@ -16,7 +16,7 @@ from mc_engine.studies.published_table import campaign_table
 _COLUMNS = """# Columns of a run
 
 One row a case in `cases/*.parquet` of a run directory. Units are in the columns' names, in the Parquet metadata of each
-field, and in `Store.units()`. The nominal case is kept apart, in `nominal.parquet`, and enters no statistic.
+field, and in `Store.units`. The nominal case is kept apart, in `nominal.parquet`, and enters no statistic.
 
 | Column | Meaning |
 |---|---|

@@ -222,6 +222,15 @@ def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
     return n_steps, step, int(every)
 
 
+def fixed_arguments(clock: FixedStep, settings: Any) -> tuple[Any, ...]:
+    """Grid, and tables of a multistep method, as the kernels on a fixed grid take them."""
+    if clock.method == "rk4":
+        return grid_of(clock, settings)
+    from mc_engine.lanes.multistep import multistep_tables
+
+    return *grid_of(clock, settings), *multistep_tables(clock.method)
+
+
 def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tuple[np.ndarray, ...]:
     """Tables of the pair, clock and absolute tolerances, as the adaptive kernels take them."""
     pair = PAIRS[clock.method]
@@ -292,7 +301,7 @@ def _bound_kernel(
     shared = np.ascontiguousarray(parameters), kernel_settings, data, np.uint64(noise_key(seed)), cases
     if isinstance(clock, AdaptiveStep):
         return partial(kernel, *shared, *adaptive_arguments(model, clock, chosen), *out, history, float(pace))
-    return partial(kernel, *shared, *grid_of(clock, chosen), *out, history, int(pace))
+    return partial(kernel, *shared, *fixed_arguments(clock, chosen), *out, history, int(pace))
 
 
 def bound_flight(

@@ -34,11 +34,13 @@ class Flyer(ABC):
     keeps_rows : a case may take long, so the row of each is recorded when it is complete, and a run that is stopped
         does not wait for the cases in flight.
     most_workers : that may fly cases of this campaign at a time, as licences allow; None for any number.
+    tolerance : fraction by which the numbers of a replayed case may differ from those stored; None: bits are compared.
     """
 
     batch: int
     keeps_rows: bool = False
     most_workers: int | None = None
+    tolerance: float | None = None
 
     @abstractmethod
     def fly(
@@ -90,10 +92,14 @@ class Flyer(ABC):
         """ModelError with the first fault, before anything is flown or written."""
 
     def differs(self, stored: Any, value: Any) -> bool:
-        """Whether a number of a replayed case is another one than stored: in any bit, by default."""
-        if isinstance(value, float | np.floating):
+        """Whether a number of a replayed case is another one than stored: in any bit, or by more than `tolerance`."""
+        if not isinstance(value, float | np.floating):
+            return bool(stored != value)
+        if self.tolerance is None:
             return np.float64(stored).tobytes() != np.float64(value).tobytes()
-        return bool(stored != value)
+        if not (np.isfinite(stored) and np.isfinite(value)):
+            return not np.array_equal(stored, value, equal_nan=True)
+        return bool(abs(stored - value) > self.tolerance * max(abs(stored), abs(value)))
 
     def lost_number(self, inputs: Inputs, noise: int, results: Columns, who: str) -> str:
         """Where a number of a failed flight became infinite or NaN, as a sentence; empty where that is not known."""

@@ -18,6 +18,7 @@ from numba.core.dispatcher import Dispatcher
 
 from mc_engine.lanes.block_search import has_powers
 from mc_engine.lanes.composed import Alternatives, ComposedFunction
+from mc_engine.lanes.fixed_step import Method
 from mc_engine.lanes.functions import TABLES, fma
 from mc_engine.lanes.number import Number, Origin, calling, number, numbers
 from mc_engine.model.fields import AdaptiveStep
@@ -61,12 +62,14 @@ class InterpretedFlight:
         inputs = (parameters, settings, key, cases)
         common, must_stop = (model.kernel_parameters, self._settings, 1), "stop" in actions
         if adaptive:
-            tables, (clock, atol, *out, history, pace) = rest[:4], rest[4:]
+            pair, (clock, atol, *out, history, pace) = rest[:4], rest[4:]
             order = (np.zeros(1, dtype=np.int64), *inputs, [Number(value) for value in clock], atol, must_stop)
-            return int(fly(self._functions, tables, *common, *order, out, history, pace))
-        n_steps, h, every, *out, history, stride = rest
-        kinds = bool(actions), must_stop
-        return int(fly(self._functions, *common, *inputs, (n_steps, h, every), kinds, out, history, stride))
+            return int(fly(self._functions, pair, *common, *order, out, history, pace))
+        n_steps, h, every, *tables, time, status, state, metrics, history, stride = rest
+        stepping = self._interpreted("multistep" if tables else "fixed_step")
+        method = Method(**{name: stepping[name] for name in Method._fields[:-1]}, tables=tuple(tables))
+        grid, kinds, results = (n_steps, h, every), (bool(actions), must_stop), (time, status, state, metrics)
+        return int(fly(self._functions, method, *common, *inputs, grid, kinds, results, history, stride))
 
     def _called(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         def called(*arguments: Any) -> Any:
@@ -186,6 +189,7 @@ _INTRINSICS: dict[str, Callable[..., Any]] = {
     "store": _store,
     "store_fields": _store,
     "store_lane": lambda array, column, value, lane: _store(array, column, value),
+    "unequal": lambda one, other, like: one != other,
     "lane_holds": lambda mask, lane: mask,
     "with_lane": lambda value, lane, item: number(item),
     "align_stack": lambda: None,

@@ -16,7 +16,7 @@ from mc_engine.cache_folder import cache_folder
 from mc_engine.errors import DiskError
 from mc_engine.flight.kernel_key import Recorder, kernel_key
 from mc_engine.flight.kernel_parts import Functions, parts_of
-from mc_engine.model.fields import AdaptiveStep
+from mc_engine.model.fields import AdaptiveStep, FixedStep
 from mc_engine.model.imports import new_module
 from mc_engine.model.record import Model, sources_of
 
@@ -37,8 +37,9 @@ _FIXED = '''"""A kernel for {width} cases at a time.  Written by the engine; edi
 
 from mc_engine.flight.kernel_parts import Functions
 from mc_engine.lanes.compiler import compile_kernel
-from mc_engine.lanes.fixed_step import fly
+from mc_engine.lanes.fixed_step import Method, fly
 from mc_engine.lanes.kernel_data import hand_over
+from mc_engine.lanes.{module} import advance, begin, restart, single
 
 _F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 {names} = _F
@@ -46,13 +47,19 @@ _F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 
 @compile_kernel
 def kernel(
-    parameters, settings, data, key, cases, n_steps, h, control_every, time, status, state, metrics, history, stride,
+    parameters, settings, data, key, cases, n_steps, h, control_every, {tables}time, status, state, metrics, history,
+    stride,
 ):
     hand_over(BLOCKS, data)
-    f = Functions({names})
+    f, method = Functions({names}), Method(begin, restart, advance, single, ({tables}))
     grid, kinds, out = (n_steps, h, control_every), (HAS_EVENTS, MUST_STOP), (time, status, state, metrics)
-    return fly(f, Parameters, Settings, {width}, parameters, settings, key, cases, grid, kinds, out, history, stride)
+    return fly(
+        f, method, Parameters, Settings, {width}, parameters, settings, key, cases, grid, kinds, out, history, stride
+    )
 '''
+_TABLES = "nodes, starts, columns, weights, columns_of, ahead, behind, at_end, n_differences"
+_RUNGE_KUTTA = _FIXED.replace("{module}", "fixed_step").replace("{tables}", "")
+_MULTISTEP = _FIXED.replace("{module}", "multistep").replace("{tables}", _TABLES + ", ")
 _ADAPTIVE = '''"""A kernel for {width} cases at a time.  Written by the engine; edit the model instead."""
 
 import numpy as np
@@ -117,7 +124,7 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
     folder : see `sources_of`.  The first call compiles or loads from the cache.
     """
     module = sources_of(model, folder).module
-    template = _ADAPTIVE if isinstance(model.clock, AdaptiveStep) else _FIXED
+    template = _template(model.clock)
     digest, is_complete = kernel_key(parts_of(module.MODEL, model.watching, Recorder()), template)
     if not is_complete:
         what = f"{digest} {source_digest(model, folder)} {module.__name__} {module.__file__}"
@@ -127,6 +134,13 @@ def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -
     _write_source(path, text)
     name, parts = f"mc_engine_kernel_{digest[:20]}_w{width}", parts_of(module.MODEL, model.watching)
     return new_module(name, path, text, PARTS=parts).kernel
+
+
+def _template(clock: FixedStep | AdaptiveStep) -> str:
+    """The text of a kernel's file; methods of one kind share a kernel, which is handed their tables."""
+    if isinstance(clock, AdaptiveStep):
+        return _ADAPTIVE
+    return _RUNGE_KUTTA if clock.method == "rk4" else _MULTISTEP
 
 
 def _write_source(path: Path, text: bytes) -> None:

@@ -6,17 +6,21 @@ import json
 import os
 import re
 import selectors
+import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from traceback import extract_tb
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from mc_engine.model.program import JSON_INPUT, template_environment
 from mc_engine.model.simulator import Simulator
 from mc_engine.process_tree import end_children, how_it_ended, kill_group, memory_mib
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, NOT_FINITE, OK, STATUS_NAME, TIME_LIMIT
@@ -26,6 +30,7 @@ if TYPE_CHECKING:
     from mc_engine.flight.case_worker import Case
 
 PROGRAM_ID = "program_id"  # file with the process group of the program in flight, for whoever must end it
+TEMPLATE_S, TEMPLATE_MIB = 10.0, 2048  # that a template may take for one case
 LOOK_EVERY_S = 0.02  # between two looks at the memory of a program, and whether it has ended
 MOST_STDOUT, MOST_STDERR, MOST_RESULT = 2**24, 2**16, 2**26  # bytes
 _MIB = 2**20
@@ -78,7 +83,10 @@ class ProgramFlight:
     def fly(self, inputs: Mapping[str, Any], case: "Case", history: bool) -> Flown:
         """Fly one case in its own folder."""
         folder = case.folder
-        self._write_inputs(folder, inputs, case)
+        try:
+            self._write_inputs(folder, inputs, case)
+        except TemplateFault as fault:
+            return flown(CRASHED, str(fault))
         words = {"folder": str(folder), "case_id": case.id, "seed": case.seed, "home": str(self._home)}
         command = [word.format(**words) for word in self._program.command]
         try:
@@ -101,7 +109,8 @@ class ProgramFlight:
         for name, kind in self._program.inputs.items():
             path = folder / name
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(json.dumps(known, indent=1) if kind == "json" else _rendered(kind, known), encoding="utf-8")
+            text = json.dumps(known, indent=1) if kind == JSON_INPUT else _rendered(name, kind, known)
+            path.write_text(text, encoding="utf-8")
 
     def _run(self, command: list[str], folder: Path) -> _Ended:
         """Run the command until it ends or exceeds a limit; then nothing of its process group is left."""
@@ -190,17 +199,50 @@ def last_lines(stderr: bytes, count: int = 3) -> str:
     return f": {' | '.join(lines[-count:])}" if lines else ""
 
 
-def _rendered(template: str, known: Mapping[str, Any]) -> str:
-    return str(_compiled(template).render(known))
+class TemplateFault(Exception):
+    """A template that gives no text for a case."""
+
+
+def _rendered(name: str, template: str, known: Mapping[str, Any]) -> str:
+    """The text of a template.  name : of the file that it is for.  Raises TemplateFault."""
+    try:
+        with _bounded():
+            return str(_compiled(template).render(known))
+    except MemoryError:
+        raise TemplateFault(f"the template of {name} needs more than {TEMPLATE_MIB} MiB") from None
+    except Exception as error:  # of what stands in the template
+        lines = [frame.lineno for frame in extract_tb(error.__traceback__) if frame.filename == "<template>"]
+        place = f", line {lines[-1]}" if lines else ""
+        raise TemplateFault(f"the template of {name}{place}: {error}") from None
+
+
+@contextmanager
+def _bounded() -> Iterator[None]:
+    """Within, this process has limits of time and memory, where the system has them."""
+    if not _LINUX:
+        yield
+        return
+    import resource
+
+    def end(*_: Any) -> None:
+        raise TimeoutError(f"takes longer than {TEMPLATE_S:g} s")
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    most = TEMPLATE_MIB * _MIB if hard == resource.RLIM_INFINITY else min(TEMPLATE_MIB * _MIB, hard)
+    before = signal.signal(signal.SIGALRM, end)
+    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+    signal.setitimer(signal.ITIMER_REAL, TEMPLATE_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
+        signal.signal(signal.SIGALRM, before)
 
 
 @lru_cache(maxsize=64)
 def _compiled(template: str) -> Any:
-    import jinja2
-    from jinja2.sandbox import SandboxedEnvironment
-
-    environment = SandboxedEnvironment(undefined=jinja2.StrictUndefined, keep_trailing_newline=True)
-    return environment.from_string(template)
+    return template_environment().from_string(template)
 
 
 def _read_ready(selector: selectors.BaseSelector, seconds: float) -> None:

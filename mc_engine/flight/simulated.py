@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from mc_engine.model.simulator import Simulator
 from mc_engine.status import NOT_FINITE, OK, REFUSED, STATUS_NAME
 from mc_engine.store.case_rows import Row, RowLog
 
+_FEW_MINUTES = 360.0  # s, a tenth of an hour
 _TOGETHER = 64  # cases of a batch, where one may end the worker of all
 
 
@@ -35,6 +35,7 @@ class SimulatorFlyer(Flyer):
         self.keeps_rows = not self._simulator.batch  # a batch is one piece of work, as a chunk of a model is
         self.batch = _TOGETHER if self._simulator.batch else 1
         self.most_workers = self._simulator.slots
+        self.tolerance = None if self._simulator.deterministic else self._simulator.tolerance
         self._names = [metric.name for metric in self._simulator.metrics]
         self._key = (self._simulator.reference, str(campaign.directory), self.digest(), campaign.seed)
 
@@ -132,22 +133,14 @@ class SimulatorFlyer(Flyer):
             lines.append(f"case 0 ends as {dispersed['status']}: {dispersed['reason']}")
         cores = os.cpu_count() or 1
         workers = min(cores, self.most_workers or cores)
-        hours = seconds * self._campaign.cases / workers / 3600.0
-        lines.append(
-            f"{seconds:.3g} s a case, {hours:.2g} hours for {self._campaign.cases:,} cases on {workers} workers"
-        )
+        whole = seconds * self._campaign.cases / workers
+        takes = f"{whole / 3600.0:.2g} hours" if whole > _FEW_MINUTES else f"{whole:.2g} s"
+        lines.append(f"{seconds:.3g} s a case, {takes} for {self._campaign.cases:,} cases on {workers} workers")
         return lines
 
     @staticmethod
     def _differ(a: float, b: float) -> bool:
         return np.float64(a).tobytes() != np.float64(b).tobytes()
-
-    def differs(self, stored: Any, value: Any) -> bool:
-        if self._simulator.deterministic or not isinstance(value, float | np.floating):
-            return super().differs(stored, value)
-        if np.isnan(stored) or np.isnan(value):
-            return bool(np.isnan(stored) != np.isnan(value))
-        return bool(abs(stored - value) > self._simulator.tolerance * max(abs(stored), abs(value)))
 
     def process(self) -> CaseProcess:
         """A process of this simulator, from those that wait or new."""

@@ -25,11 +25,10 @@ from mc_engine.lanes.adaptive_step import (
     leap,
     next_length,
     sense,
-    sense_shared,
     turn_length,
 )
 from mc_engine.lanes.aligned_stack import align_stack
-from mc_engine.lanes.compiler import compile_callable, compile_inline
+from mc_engine.lanes.compiler import compile_inline
 from mc_engine.lanes.events import crossed
 from mc_engine.lanes.extrema import first_time
 from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, where
@@ -145,7 +144,7 @@ def _narrow(kinds, signs, bracket, seen, rates, looking):
     return Bracket(low, high, at_low, at_high, rate_low, rate_high, side, look, looks, width), back, near
 
 
-narrow = compile_callable(_narrow)
+narrow = compile_inline(_narrow)
 
 
 def _begin(f, p, o, key, case):
@@ -155,7 +154,7 @@ def _begin(f, p, o, key, case):
     return s, spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
 
 
-begin = compile_callable(_begin)
+begin = compile_inline(_begin)
 
 
 def _first_instant(f, clock, case, s, m, p, o, atol):
@@ -165,10 +164,10 @@ def _first_instant(f, clock, case, s, m, p, o, atol):
     longest = minimum(clock.until, clock.period)
     h = first_length(f, t, s, k, m, p, o, atol, clock.rtol, clock.order, longest + t)
     h = where(clock.first + t > 0.0, clock.first + t, h)
-    return sense_shared(f, t, s, m, k, p, o, _REACH * h), h
+    return sense(f, t, s, m, k, p, o, _REACH * h), h
 
 
-first = compile_callable(_first_instant)
+first = compile_inline(_first_instant)
 
 
 def _metrics_at_end(f, here, best, when, p, o):
@@ -176,7 +175,7 @@ def _metrics_at_end(f, here, best, when, p, o):
     return f.metrics_of(spread(f.evaluate(here.t, here.s, here.m, p, o, f.best_of(best), f.when_of(when)), here.t))
 
 
-finish = compile_callable(_metrics_at_end)
+finish = compile_inline(_metrics_at_end)
 
 
 def _noted(f, here, fired, noting, p, o):
@@ -186,7 +185,7 @@ def _noted(f, here, fired, noting, p, o):
     return select(noting, spread(f.note(here.t, here.s, here.m, p, o, hit), here.t), here.m)
 
 
-noted = compile_callable(_noted)
+noted = compile_inline(_noted)
 
 
 def _changed(f, key, case, sample, here, fired, switching, sampling, p, o, reach):
@@ -199,7 +198,7 @@ def _changed(f, key, case, sample, here, fired, switching, sampling, p, o, reach
     return arrive(f, t, s, m, p, o, reach)
 
 
-changed = compile_callable(_changed)
+changed = compile_inline(_changed)
 
 
 def _fly(

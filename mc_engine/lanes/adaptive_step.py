@@ -6,7 +6,7 @@ the tables of the method (`runge_kutta_pairs`).
 
 from collections import namedtuple
 
-from mc_engine.lanes.compiler import compile_callable, compile_inline
+from mc_engine.lanes.compiler import compile_inline
 from mc_engine.lanes.elementary import exp, log
 from mc_engine.lanes.functions import exponent, fma, mantissa, maximum, minimum, rint, sqrt, two_to, where
 from mc_engine.lanes.physics_function import physics
@@ -115,7 +115,7 @@ def _first_length(f, t, s, k, m, p, o, atol, rtol, order, longest):
     return where(length == length, length, longest)  # of a derivative that is not a number no length can be told
 
 
-first_length = compile_callable(_first_length)
+first_length = compile_inline(_first_length)
 
 
 @physics
@@ -203,16 +203,14 @@ def _sense(f, t, s, m, k, p, o, reach):
 
 # inlined, what a model does not watch costs nothing
 sense = compile_inline(_sense)
-# for places off the main path: one copy in the kernel, called where needed
-sense_shared = compile_callable(_sense)
 
 
 def _arrive(f, t, s, m, p, o, reach):
     """The `Instant` at a state whose derivative is not yet known."""
-    return sense_shared(f, t, s, m, spread(f.rhs(t, s, m, p, o), t), p, o, reach)
+    return sense(f, t, s, m, spread(f.rhs(t, s, m, p, o), t), p, o, reach)
 
 
-arrive = compile_callable(_arrive)
+arrive = compile_inline(_arrive)
 
 
 def _glance(f, tables, h, here, p, o):
@@ -232,4 +230,4 @@ def _leap(f, tables, h, here, p, o, atol, rtol):
 
 
 leap = compile_inline(_leap)
-glance = compile_callable(_glance)
+glance = compile_inline(_glance)

@@ -9,6 +9,7 @@ for them, and nothing of it is global: any number of threads may fly other data 
 from typing import Any
 
 from llvmlite import ir
+from numba import types
 from numba.core import cgutils
 from numba.core.callconv import CPUCallConv, excinfo_ptr_t
 from numba.core.cpu import CPUContext
@@ -73,16 +74,36 @@ class _Context(CPUContext):
     """numba's target with calls of our own."""
 
     calls: Any
+    is_fresh: bool
 
     @property
     def call_conv(self) -> Any:
         return self.calls
 
+    def refresh(self) -> None:
+        """Called by numba, for each call that it lowers, to take over what modules have registered meanwhile.
+
+        Once is enough: lowering a function imports none.
+        """
+        if not self.is_fresh:
+            super().refresh()
+            self.is_fresh = True
+
+    def get_constant_generic(self, builder: Any, ty: Any, val: Any) -> Any:
+        """A constant, and nothing in place of the address of a function's dispatcher.
+
+        Its type alone says which function is called.  An address counts in this process only, and a kernel that hands
+        one on to a part could not be kept on disk.
+        """
+        if isinstance(ty, types.Dispatcher):
+            return ir.Constant(self.get_value_type(ty), None)
+        return super().get_constant_generic(builder, ty, val)
+
 
 def calling_by(calls: type[_SharedSlot], context: Any) -> None:
     """Let the functions that are compiled in this context, one compilation's own, call others in this way."""
     context.__class__ = _Context
-    context.calls = calls(context)
+    context.calls, context.is_fresh = calls(context), False
 
 
 def refuse_missing_blocks(module: Any) -> None:

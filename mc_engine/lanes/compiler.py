@@ -25,6 +25,8 @@ _UNWRAPPED: dict[str, Any] = {
     "pipeline_class": LinkedCompiler,
 }
 
+_KERNEL: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
+
 if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise ModelError("the environment has NUMBA_DISABLE_JIT, with which no kernel can be compiled; unset it")
 assert _kernel_data
@@ -39,10 +41,16 @@ def compile_inline(function: Callable[..., Any]) -> Any:
 
 
 def compile_callable(function: Callable[..., Any]) -> Any:
-    """Dispatcher for code that several places of a kernel share without copying it."""
-    return njit(**_UNWRAPPED, **STRICT)(function)
+    """Dispatcher for code that several places of a kernel share without copying it: histories, and events in a step.
+
+    A call keeps the compiler from computing once what both sides need.  Adaptive flights, which start a new case or
+    change one in every few rounds, take 5 to 40 % longer where these parts are shared, and 3 to 6 % longer where those
+    of their histories are, so theirs are inlined.
+    """
+    # numba takes over what is not set here from the function that calls
+    return njit(forceinline=False, **_UNWRAPPED, **STRICT)(function)
 
 
 def compile_kernel(function: Callable[..., Any]) -> Any:
     """Dispatcher for a kernel: cached beside its file, and free of the interpreter lock while it runs."""
-    return keep_on_disk(njit(nogil=True, pipeline_class=KernelCompiler, **STRICT)(function))
+    return keep_on_disk(njit(**_KERNEL, **STRICT)(function))

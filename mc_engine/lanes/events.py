@@ -14,7 +14,6 @@ from mc_engine.lanes.functions import any_lane, minimum, where
 from mc_engine.lanes.history import record_change, record_row
 from mc_engine.lanes.lane_access import lane_holds
 from mc_engine.lanes.physics_function import physics
-from mc_engine.lanes.runge_kutta import rk4_shared
 from mc_engine.lanes.tuples import any_field, least, map_fields, select, spread
 
 EVENTS_PER_STEP = 32
@@ -63,7 +62,7 @@ def _one_where(mask, unused):
     return where(mask, 1.0, 0.0)
 
 
-def _locate(f, signs, t, finish, s, m, p, o, length, end, g_start, g_end, open_lanes):
+def _locate(f, method, signs, t, finish, s, m, p, o, length, end, g_start, g_end, open_lanes):
     """(length, state, event values) just past the first event of each open lane inside a step from s to `finish`."""
     low, high, side = 0.0 * length, length, 0.0 * length
     g_low, g_high, at_end = g_start, g_end, g_end
@@ -77,7 +76,7 @@ def _locate(f, signs, t, finish, s, m, p, o, length, end, g_start, g_end, open_l
         if iteration >= _SECANT_ITERATIONS:
             chord = chord & (not chord)
         guess = where(chord, guess, middle)
-        state = rk4_shared(f.rhs, t, guess, s, m, p, o)
+        state = method.single(f, method.tables, t, guess, s, m, p, o)
         values = spread(f.events(minimum(t + guess, finish), state, m, p, o), t)
         after = any_field(map_fields(crossed, g_low, values, signs))
         ahead, back = open_lanes & (not after), open_lanes & after
@@ -93,7 +92,7 @@ def _locate(f, signs, t, finish, s, m, p, o, length, end, g_start, g_end, open_l
 locate = compile_inline(_locate)
 
 
-def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying, history, rows):
+def _follow(f, method, t, finish, h, s, end, m, p, o, g_start, g_end, flying, history, rows):
     """What becomes of a step [t, finish] of length h in which some flying lane meets events.
 
     s, end : states at both ends of the step as if there were no events; g_start, g_end : event values there.
@@ -109,7 +108,7 @@ def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying, history, r
     for _ in range(EVENTS_PER_STEP):
         if not any_lane(pending):
             break
-        length, state, values = locate(f, signs, t, finish, s, m, p, o, rest, end, g_start, g_end, pending)
+        length, state, values = locate(f, method, signs, t, finish, s, m, p, o, rest, end, g_start, g_end, pending)
         fired = map_fields(crossed, g_start, values, signs)
         now = where(length < rest, minimum(t + length, finish), finish)
         stops = pending & f.stops_of(fired)
@@ -126,7 +125,7 @@ def _follow(f, t, finish, h, s, end, m, p, o, g_start, g_end, flying, history, r
         if recorded:
             rows = record_change(f, history, rows, True, t, s, m, p, o)
         g_start = select(on, spread(f.events(t, s, m, p, o), t), g_start)
-        end = select(on, rk4_shared(f.rhs, t, rest, s, m, p, o), end)
+        end = select(on, method.single(f, method.tables, t, rest, s, m, p, o), end)
         g_end = select(on, spread(f.events(finish, end, m, p, o), t), g_end)
         pending = on & any_field(map_fields(crossed, g_start, g_end, signs))
     lost = flying & (not stopped) & any_field(map_fields(is_lost, g_start, g_end, signs))

@@ -2,18 +2,25 @@
 
 All lanes of a block share the grid; a lane that meets an event takes its own way to the end of the step and
 rejoins.  Lanes never look at each other: a lane that has ended or failed keeps its last values.
+
+The loop is handed its `Method`: the classical Runge-Kutta method of fourth order, which is here, or one that uses
+earlier steps (`multistep`).  W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
 """
+
+from collections import namedtuple
 
 from mc_engine.lanes import extrema
 from mc_engine.lanes.aligned_stack import align_stack
-from mc_engine.lanes.compiler import compile_inline
+from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import follow, may_have_crossed
-from mc_engine.lanes.functions import any_lane, where
+from mc_engine.lanes.functions import any_lane, fma, where
 from mc_engine.lanes.history import look_shared, record_row
-from mc_engine.lanes.lane_access import lane_holds
+from mc_engine.lanes.lane_access import lane_holds, unequal
 from mc_engine.lanes.philox import Draws
-from mc_engine.lanes.runge_kutta import rk4
+from mc_engine.lanes.physics_function import physics
+from mc_engine.lanes.stage_memory import stage_memory
 from mc_engine.lanes.tuples import (
+    add_scaled,
     any_field,
     load,
     load_fields,
@@ -27,7 +34,51 @@ from mc_engine.lanes.tuples import (
 )
 from mc_engine.status import EVENT_LIMIT, NO_STOP, NOT_FINITE
 
+# How a state is taken along the grid.  `past` is what a method knows of earlier steps; `tables` are its numbers.
+# begin(memory, s, t) : past of the first state; memory : room for `MOST_SLOPES` derivatives
+# restart(past, lanes) : past without the earlier steps of some lanes, whose discrete state has changed
+# advance(f, tables, past, t, finish, h, s, m, p, o, flying) : (state at the end of a grid step, past)
+# single(f, tables, t, h, s, m, p, o) : state after a step of length h [s], lanes, from a state alone
+Method = namedtuple("Method", "begin restart advance single tables")
+MOST_SLOPES = 10
+
 _OVERRUN, _BROKEN, _UNSTOPPED = float(EVENT_LIMIT), float(NOT_FINITE), float(NO_STOP)
+
+
+@physics
+def _weighted(y, sixth, k1, k2, k3, k4):
+    return fma(sixth, fma(2.0, k2 + k3, k1 + k4), y)
+
+
+def _rk4(f, tables, t, h, s, m, p, o):
+    """State after one step of length h [s] (a number or lanes) from state s at time t."""
+    half = 0.5 * h
+    k1 = spread(f.rhs(t, s, m, p, o), t)
+    k2 = spread(f.rhs(t + half, add_scaled(s, half, k1), m, p, o), t)
+    k3 = spread(f.rhs(t + half, add_scaled(s, half, k2), m, p, o), t)
+    k4 = spread(f.rhs(t + h, add_scaled(s, h, k3), m, p, o), t)
+    return map_fields(_weighted, s, h * (1.0 / 6.0), k1, k2, k3, k4)
+
+
+rk4 = compile_inline(_rk4)
+# for places off the main path: one copy in the kernel, called where needed
+single = compile_callable(_rk4)
+
+
+def _begin(memory, s, t):
+    """RK4 knows nothing of earlier steps."""
+    return 0
+
+
+def _restart(past, lanes):
+    return past
+
+
+def _advance(f, tables, past, t, finish, h, s, m, p, o, flying):
+    return rk4(f, tables, t, h, s, m, p, o), past
+
+
+begin, restart, advance = compile_inline(_begin), compile_inline(_restart), compile_inline(_advance)
 
 
 def _track(flying, smooth, seen, times, lasts, best, when, last):
@@ -48,29 +99,32 @@ def _track(flying, smooth, seen, times, lasts, best, when, last):
 track = compile_inline(_track)
 
 
-def _step(f, has_events, t, finish, h, s, m, p, o, flying, history, rows):
-    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken) of every lane, history rows.
+def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, history, rows):
+    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken, past) of every lane, history
+    rows.
 
     The event values at the start are taken anew, not handed on: they share what the first derivative computes.
     """
-    end = rk4(f.rhs, t, h, s, m, p, o)
+    end, past = method.advance(f, method.tables, past, t, finish, h, s, m, p, o, flying)
     now, stopped = finish, flying & (not flying)
     overrun = lost = stopped
     if has_events:
         g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
-        if any_lane(flying & any_field(map_fields(may_have_crossed, g, g_end, f.signs_of(g)))):
+        met = flying & any_field(map_fields(may_have_crossed, g, g_end, f.signs_of(g)))
+        if any_lane(met):
             end, m, now, stopped, overrun, lost, rows = follow(
-                f, t, finish, h, s, end, m, p, o, g, g_end, flying, history, rows
+                f, method, t, finish, h, s, end, m, p, o, g, g_end, flying, history, rows
             )
+            past = method.restart(past, met)
     size = total(end)
     broken = lost | (flying & (not (size - size == 0.0)))
-    return end, m, now, stopped, overrun & (not broken), broken, rows
+    return end, m, now, stopped, overrun & (not broken), broken, past, rows
 
 
 step = compile_inline(_step)
 
 
-def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, history, stride):
+def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events, history, stride):
     """Fly one block from its first state to the stop or the time limit.
 
     The outputs are looked at where a step begins, beside its first derivative, with which they share most of
@@ -87,12 +141,14 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
     w1 = f.lasts_of(seen)
     when, last = map_fields(extrema.first_time, v1, t), map_fields(extrema.first_time, w1, t)
     t0 = t1 = t2 = t
+    past = method.begin(stage_memory(s, MOST_SLOPES), s, t)
     for k in range(n_steps):
         recorded = history.shape[0] > 0 and lane_holds(flying, 0) and k % stride == 0
         if k > 0 and k % control_every == 0:
             if recorded:
                 rows = record_row(f, history, rows, t2, s, m, p, o)
             held = spread(f.control(t2, s, m, p, o, Draws(key, case, float(k // control_every))), t)
+            past = method.restart(past, unequal(m, held, t))
             m = select(flying, held, m)
         seen = spread(f.observe(t2, s, m, p, o), t)
         v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
@@ -101,8 +157,8 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
             rows = record_row(f, history, rows, t2, s, m, p, o)
         # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
         finish = case * 0.0 + float(k + 1) * h
-        end, memory, now, stopped, overrun, broken, rows = step(
-            f, has_events, t2, finish, h, s, m, p, o, flying, history, rows
+        end, memory, now, stopped, overrun, broken, past, rows = step(
+            f, method, past, has_events, t2, finish, h, s, m, p, o, flying, history, rows
         )
         moved = flying & (not broken)
         if any_lane(not moved):  # a branch, foretold by the processor: the next step need not wait for the check
@@ -129,8 +185,23 @@ def _fly_block(f, p, o, key, case, n_steps, h, control_every, has_events, histor
 fly_block = compile_inline(_fly_block)
 
 
-def _fly(f, parameter_class, setting_class, width, parameters, settings, key, cases, grid, kinds, out, history, stride):
-    """Fly all cases of a chunk.
+def _fly(
+    f,
+    method,
+    parameter_class,
+    setting_class,
+    width,
+    parameters,
+    settings,
+    key,
+    cases,
+    grid,
+    kinds,
+    out,
+    history,
+    stride,
+):
+    """Fly all cases of a chunk by a `Method`.
 
     parameters : float64[n_parameters, n], SI, n a multiple of the width
     settings : float64[n_settings];  key : uint64;  cases : float64[n], case numbers
@@ -148,7 +219,7 @@ def _fly(f, parameter_class, setting_class, width, parameters, settings, key, ca
         p = load_fields(parameter_class, parameters, first, width)
         case = load(cases, first, width)
         t, s, m, status, unstopped, best, when, last, rows = fly_block(
-            f, p, o, key, case, n_steps, h, control_every, has_events, history, stride
+            f, method, p, o, key, case, n_steps, h, control_every, has_events, history, stride
         )
         if must_stop:
             status = where(unstopped, _UNSTOPPED, status)

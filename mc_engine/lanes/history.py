@@ -48,4 +48,4 @@ def _record_step(f, tables, history, rows, parts, here, now, p, o):
     return record_row(f, history, rows, now.t, now.s, here.m, p, o)
 
 
-record_step = compile_callable(_record_step)
+record_step = compile_inline(_record_step)

@@ -1,12 +1,13 @@
-"""Access to a single lane: reads and writes columns of arrays, so that a finished lane can take the next case."""
+"""Access to single lanes: which of them differ, and columns of arrays, with which a lane takes the next case."""
 
+import functools
 from typing import Any
 
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from mc_engine.lanes.lane_type import I32, Lanes
+from mc_engine.lanes.lane_type import I32, Lanes, common_width, mask_type
 from mc_engine.lanes.tuples import _item, _pack, _pointer
 
 
@@ -65,3 +66,21 @@ def store_lane(typingctx, array, column, value, lane):
         return context.get_dummy_value()
 
     return types.none(array, types.intp, value, types.intp), codegen
+
+
+@intrinsic
+def unequal(typingctx, one, other, like):
+    """Mask of the lanes in which any number of two records differs; records of lanes as wide as `like`."""
+    result = mask_type(common_width(like))
+
+    def codegen(context, builder, sig, args):
+        return _unequal(builder, one, args[0], args[1])
+
+    return result(one, one, like), codegen
+
+
+def _unequal(builder, ty, one, other):
+    if not isinstance(ty, types.BaseTuple):
+        return builder.fcmp_unordered("!=", one, other)
+    masks = [_unequal(builder, ty[i], _item(builder, one, i), _item(builder, other, i)) for i in range(len(ty))]
+    return functools.reduce(builder.or_, masks)

@@ -12,9 +12,9 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from mc_engine.lanes.composed import Call, Pick
-from mc_engine.lanes.lane_type import I1, common_width, convert, number_type
+from mc_engine.lanes.lane_type import I1, common_width, convert
 from mc_engine.lanes.lowering import any_bit, constant
-from mc_engine.lanes.tuples import _item, _pack, _refuse_other_count, _select
+from mc_engine.lanes.tuples import _item, _pack, _refuse_other_count, _select, _spread_type
 
 
 def counted(what: str, count: int) -> Any:
@@ -123,7 +123,7 @@ def alternatives(number: Pick, functions: Sequence[Any]) -> Any:
         width = common_width(which)
         resolved = [typingctx.resolve_value_type(function) for function in functions]
         sigs = [function.get_call_type(typingctx, args, {}) for function in resolved]
-        result = _in_lanes(sigs[0].return_type, width)
+        result = _spread_type(sigs[0].return_type, width)
         for sig in sigs:
             _refuse_other_count("phases", sig.return_type, len(result))
 
@@ -136,7 +136,7 @@ def alternatives(number: Pick, functions: Sequence[Any]) -> Any:
                 mask = builder.fcmp_ordered("==", there, constant(width, float(k)))
                 with builder.if_then(any_bit(builder, mask, width)):
                     given = _called(context, builder, function, own_sig, own)
-                    given = _converted(context, builder, given, own_sig.return_type, result)
+                    given = convert(context, builder, given, own_sig.return_type, result)
                     before = builder.load(kept)
                     builder.store(_select(context, builder, mask, result, given, before), kept)
             return builder.load(kept)
@@ -188,24 +188,6 @@ def _class_of(record: Any) -> Any:
     return None if record is tuple else record
 
 
-def _in_lanes(ty: Any, width: int) -> Any:
-    """The type of a number, or of a tuple of numbers and tuples, with lanes in place of the numbers."""
-    fields = _fields_of(ty)
-    if fields is None:
-        return number_type(width)
-    lanes = tuple(_in_lanes(field, width) for field in fields)
-    return types.BaseTuple.from_types(lanes, getattr(ty, "instance_class", None))
-
-
 def _fields_of(ty: Any) -> Any:
     """The types of a tuple's fields; None for another type."""
     return ty if isinstance(ty, types.BaseTuple) else None
-
-
-def _converted(context: Any, builder: Any, value: Any, ty: Any, wanted: Any) -> Any:
-    """A value of the type `wanted`, which `_in_lanes` gave."""
-    fields = _fields_of(ty)
-    if fields is None:
-        return convert(context, builder, value, ty, wanted)
-    items = [_converted(context, builder, _item(builder, value, i), field, wanted[i]) for i, field in enumerate(fields)]
-    return _pack(context, builder, wanted, items)

@@ -45,6 +45,7 @@ def _refuse_other_count(what: str, fields: Any, count: int) -> None:
 
 
 def _spread_type(value, width):
+    """The type of a number, or of a record of numbers and records, with lanes in place of the numbers."""
     if isinstance(value, types.BaseTuple):
         return _tuple_type([_spread_type(field, width) for field in value], value)
     return number_type(width)

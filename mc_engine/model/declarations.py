@@ -43,13 +43,13 @@ class Metric:
         return Field(self.description, low=low, high=high, sometimes=sometimes, name=name, unit=self.unit)
 
 
-def maximum_of(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
+def maximum_of(output: str, description: str, *, smooth: bool = True, **options: Any) -> Metric:
     """The largest value of an output along the flight: metrics(top_speed_m_s=maximum_of("speed_m_s", "top speed")).
 
     output : str, the name of an output
     description : str, one line
     smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
-    more : low, high, sometimes, unit; see `Field`
+    options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
     Raises TypeError for another argument.
@@ -57,13 +57,13 @@ def maximum_of(output: str, description: str, *, smooth: bool = True, **more: An
     >>> maximum_of("speed_m_s", "largest speed").extremum.kind
     'max'
     """
-    return Metric("value", Extremum("", output, "max", smooth=smooth), "", description, **more)
+    return _extreme("max", "value", output, description, smooth, options)
 
 
-def minimum_of(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
+def minimum_of(output: str, description: str, *, smooth: bool = True, **options: Any) -> Metric:
     """The smallest value of an output along the flight.
 
-    output, description, smooth, more : as of `maximum_of`
+    output, description, smooth, options : as of `maximum_of`
 
     Returns the Metric.
     Raises TypeError for another argument.
@@ -71,13 +71,13 @@ def minimum_of(output: str, description: str, *, smooth: bool = True, **more: An
     >>> minimum_of("altitude_km", "lowest altitude").extremum.kind
     'min'
     """
-    return Metric("value", Extremum("", output, "min", smooth=smooth), "", description, **more)
+    return _extreme("min", "value", output, description, smooth, options)
 
 
-def time_of_maximum(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
+def time_of_maximum(output: str, description: str, *, smooth: bool = True, **options: Any) -> Metric:
     """The time of the largest value of an output.
 
-    output, description, smooth, more : as of `maximum_of`
+    output, description, smooth, options : as of `maximum_of`
 
     Returns the Metric.
     Raises TypeError for another argument.
@@ -85,13 +85,13 @@ def time_of_maximum(output: str, description: str, *, smooth: bool = True, **mor
     >>> time_of_maximum("altitude_km", "time of the apogee").source
     'time'
     """
-    return replace(maximum_of(output, description, smooth=smooth, **more), source="time")
+    return _extreme("max", "time", output, description, smooth, options)
 
 
-def time_of_minimum(output: str, description: str, *, smooth: bool = True, **more: Any) -> Metric:
+def time_of_minimum(output: str, description: str, *, smooth: bool = True, **options: Any) -> Metric:
     """The time of the smallest value of an output.
 
-    output, description, smooth, more : as of `maximum_of`
+    output, description, smooth, options : as of `maximum_of`
 
     Returns the Metric.
     Raises TypeError for another argument.
@@ -99,13 +99,17 @@ def time_of_minimum(output: str, description: str, *, smooth: bool = True, **mor
     >>> time_of_minimum("altitude_km", "time of the perigee").source
     'time'
     """
-    return replace(minimum_of(output, description, smooth=smooth, **more), source="time")
+    return _extreme("min", "time", output, description, smooth, options)
 
 
-def last_above(output: str, level: float, description: str, **more: Any) -> Metric:
+def _extreme(kind: str, source: str, output: str, description: str, smooth: bool, options: dict[str, Any]) -> Metric:
+    return Metric(source, Extremum("", output, kind, smooth=smooth), "", description, **options)
+
+
+def last_above(output: str, level: float, description: str, **options: Any) -> Metric:
     """The last time at which an output was above `level`.
 
-    output, description, more : as of `maximum_of`
+    output, description, options : as of `maximum_of`
     level : float, in SI
 
     Returns the Metric.
@@ -114,13 +118,13 @@ def last_above(output: str, level: float, description: str, **more: Any) -> Metr
     >>> last_above("error_deg", 0.01, "settling time").extremum.level
     0.01
     """
-    return Metric("time", Extremum("", output, "last_above", level), "", description, **more)
+    return Metric("time", Extremum("", output, "last_above", level), "", description, **options)
 
 
-def at_end(output: str, description: str, **more: Any) -> Metric:
+def at_end(output: str, description: str, **options: Any) -> Metric:
     """The value of an output, or of the time "t_s", at the end of the case.
 
-    output, description, more : as of `maximum_of`
+    output, description, options : as of `maximum_of`
 
     Returns the Metric.
     Raises TypeError for another argument.
@@ -128,10 +132,10 @@ def at_end(output: str, description: str, **more: Any) -> Metric:
     >>> at_end("altitude_km", "altitude of the apogee").output
     'altitude_km'
     """
-    return Metric("end", None, output, description, **more)
+    return Metric("end", None, output, description, **options)
 
 
-def value_at(event: str, output: str, description: str, **more: Any) -> Metric:
+def value_at(event: str, output: str, description: str, **options: Any) -> Metric:
     """The value of an output where an event first crosses zero: value_at("apogee", "altitude_km", "altitude there").
 
     Of a delayed event, where it crosses, not where it acts.  In a case without the event it is not a number, which
@@ -140,7 +144,7 @@ def value_at(event: str, output: str, description: str, **more: Any) -> Metric:
     event : str, the name of an event
     output : str, the name of an output
     description : str, one line
-    more : low, high, sometimes, unit; see `Field`
+    options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
 
@@ -149,15 +153,15 @@ def value_at(event: str, output: str, description: str, **more: Any) -> Metric:
     >>> value_at("apogee", "altitude_km", "altitude of the apogee").event
     'apogee'
     """
-    return Metric("event", None, output, description, event=event, **more)
+    return Metric("event", None, output, description, event=event, **options)
 
 
-def time_of(event: str, description: str, **more: Any) -> Metric:
+def time_of(event: str, description: str, **options: Any) -> Metric:
     """The time at which an event first crosses zero; see `value_at`.
 
     event : str, the name of an event
     description : str, one line
-    more : low, high, sometimes, unit; see `Field`
+    options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
 
@@ -166,7 +170,7 @@ def time_of(event: str, description: str, **more: Any) -> Metric:
     >>> time_of("apogee", "time of the apogee").output
     ''
     """
-    return Metric("event", None, "", description, event=event, **more)
+    return Metric("event", None, "", description, event=event, **options)
 
 
 def inputs(**declared: Parameter | Setting) -> Any:

@@ -112,10 +112,11 @@ def model(
     for what, record in (("inputs", inputs), ("states", states), ("outputs", outputs), ("metrics", metrics)):
         if not hasattr(record, "declared"):
             raise ModelError(f"`{what}` is {record!r}; declare it, {_DECLARATIONS[what]} = {what}(...)")
+    kernel_parameters = kernel_parameters or inputs
     phases = _phases(phases, rhs=rhs, control=control, events=events)
     declared = events_of(phases, checked_events(events))
     kept = _memory(memory, start, phases, declared, metrics, outputs)
-    _refuse_idle_events(declared, switch, (kernel_parameters or inputs)._fields)
+    _refuse_idle_events(declared, switch, getattr(kernel_parameters, "_fields", ()))
     tracked, places = _extrema(metrics, outputs, extrema or {})
     seen = _called("observe", observe, kept)
     if memory is not None and start is None:
@@ -148,7 +149,7 @@ def model(
         quantities=outputs.declared,
         metrics=metrics.declared,
         clock=clock,
-        kernel_parameters=kernel_parameters or inputs,
+        kernel_parameters=kernel_parameters,
         initial=_called("initial", initial, kept),
         observe=seen,
         evaluate=_metrics(metrics, outputs, seen, evaluate, places, kept),

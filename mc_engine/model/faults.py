@@ -43,9 +43,8 @@ _FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the ar
               "tan": "the tangent", "exp": "the exponential"}  # fmt: skip
 _ENGINE = Path(__file__).resolve().parents[1]
 _PYTHON = Path(sysconfig.get_path("stdlib")).resolve()
+_OF_0_1 = "a model of version 0.1 is written so; CHANGELOG.md says under 0.2.0 how to convert it"
 _LONG = 60  # characters of a source line in a sentence
-_FUNCTIONS = {"sqrt": "the square root", "log": "the logarithm", "asin": "the arc sine", "acos": "the arc cosine",
-              "tan": "the tangent", "exp": "the exponential"}  # fmt: skip
 
 
 @contextmanager
@@ -134,7 +133,9 @@ def wrong_record(error: BaseException) -> str:
         return ""
     wrong = re.search("unexpected keyword argument '(\\w+)'", call[2])
     near = nearest(wrong[1], known) if wrong else None
-    return f"{call[1]}: {call[2]}" + (f'; did you mean "{near}"?' if near else "") + f"; it takes {', '.join(known)}"
+    meant = f'; did you mean "{near}"?' if near else ""
+    old = f"; {_OF_0_1}" if call[1] == "Field" and "positional" in call[2] else ""
+    return f"{call[1]}: {call[2]}{meant}; it takes {', '.join(known)}{old}"
 
 
 def _arguments(made: Any) -> list[str]:

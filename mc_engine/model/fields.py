@@ -203,12 +203,14 @@ class Event:
 
 @dataclass(frozen=True)
 class FixedStep:
-    """The classical Runge-Kutta integrator of fourth order on a time grid that all cases share.
+    """An integrator on a time grid that all cases share: the classical Runge-Kutta method, or a multistep method.
 
     step : float, length of a step [s], or str, the symbol of a setting that holds it
     until : float or str, end of the flight [s]; at most 1e9 steps.  In a model with a stopping event, see `Event`.
     control_every : int or str, steps from one call of `control` to the next
-    method : str, "rk4"
+    method : str, "rk4" (order 4), or "abm8" to "abm12": Adams-Bashforth-Moulton of order 8 to 12, for long smooth arcs.
+        It is stable for steps below 0.37, 0.26, 0.18, 0.12, 0.08 over the fastest angular frequency [rad/s].  It starts
+        by DOP853, and again after each event and each sample of the control that changes the discrete state.
 
     >>> FixedStep(step=10.0, until=6000.0).control_every
     1

@@ -248,8 +248,7 @@ def _inputs(
     section: SimulatorSection, directory: Path, contents: dict[Path, bytes], problems: Problems
 ) -> dict[str, str]:
     """The files that each case is given: "json", or the text of a Jinja template."""
-    import jinja2  # which a campaign without templates does not wait for
-    from jinja2 import meta, sandbox
+    from jinja2 import TemplateSyntaxError, meta  # which a campaign without templates does not wait for
 
     inputs = {}
     known = [*section.parameter, "case_id", "seed"]
@@ -263,17 +262,31 @@ def _inputs(
             continue
         try:
             text = contents[resolve_beside(directory, kind)].decode()
-            tree = sandbox.SandboxedEnvironment().parse(text)
+            tree = template_environment().parse(text)
         except UnicodeDecodeError:
             problems.append((key, f'"{kind}" is not text in UTF-8'))
             continue
-        except jinja2.TemplateSyntaxError as error:
+        except TemplateSyntaxError as error:
             problems.append((key, f"{kind}, line {error.lineno}: {error.message}"))
             continue
         for missing in sorted(meta.find_undeclared_variables(tree) - {*known}):
             problems.append((key, f'{kind}: "{missing}" is no input{hint(missing, known)}'))
         inputs[name] = text
     return inputs
+
+
+def template_environment() -> Any:
+    """For templates of input files: sandboxed, and nothing in them is computed before a case is written."""
+    from jinja2 import StrictUndefined, pass_context
+    from jinja2.sandbox import SandboxedEnvironment
+
+    @pass_context  # then jinja computes no constants while it reads a template: they may take any memory
+    def unchanged(context: Any, value: Any) -> Any:
+        return value
+
+    return SandboxedEnvironment(
+        undefined=StrictUndefined, keep_trailing_newline=True, optimized=False, finalize=unchanged
+    )
 
 
 def _reading(

@@ -80,6 +80,9 @@ _FIXES = (
 
 _ENGINE = Path(__file__).resolve().parents[1]
 _PHASES = "mc_engine.model.phases"  # the module of the functions that make phases of the model's own
+# Arguments of a call, a keyword counted twice.  Of more Python makes a tuple and a dictionary, which numba does not
+# follow through a branch.
+_MANY = 30
 _AT_DEFINITION = {"annotation", "returns", "defaults", "kw_defaults", "decorator_list"}  # run once, by Python alone
 # What the attributes of may be read: nothing of it runs code of the user's.
 _FOLLOWED = (ModuleType, SimpleNamespace, np.random.Generator, np.random.RandomState, random.Random)
@@ -291,6 +294,10 @@ def _wrong_comparison(node: ast.Compare, scope: _Scope) -> str:
 def _wrong_call(node: ast.Call, scope: _Scope) -> str:
     """On a call of what is neither physics nor a named tuple, and on arguments that kernels do not take."""
     called, arguments = scope.value(node.func), [*node.args, *(named.value for named in node.keywords)]
+    choices = [part for argument in arguments for part in ast.walk(argument) if _branches(part)]
+    if choices and len(node.args) + 2 * len(node.keywords) > _MANY:
+        chosen = ast.unparse(choices[0])
+        return f"`{chosen}` decides within a call of too many arguments; give it a name on a line above the call"
     if called is None and isinstance(node.func, ast.Attribute) and not scope.is_constant(node.func):
         known = node.func.attr.startswith("_") or hasattr(np.ndarray, node.func.attr)
         return f"methods are not for physics: functions are those of mc_engine.lanes; {_KEEP}" if known else ""
@@ -301,6 +308,11 @@ def _wrong_call(node: ast.Call, scope: _Scope) -> str:
     if hasattr(called, "_fields"):
         return ""
     return f"physics makes no objects of the class `{called.__name__}`; make it a namedtuple, and {_TUPLES}"
+
+
+def _branches(node: ast.AST) -> bool:
+    """Whether Python decides at this node what it computes next: `a if b else c`, `and`, `or`, `a < b < c`."""
+    return isinstance(node, ast.IfExp | ast.BoolOp) or (isinstance(node, ast.Compare) and len(node.ops) > 1)
 
 
 def _wrong_value(value: Any) -> str:

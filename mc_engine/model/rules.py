@@ -29,7 +29,7 @@ _CASE_COLUMNS = ("case_id", "status", "reason", "end_time_s")  # the engine's ow
 _HISTORY_COLUMNS = ("case_id", "t_s")
 _ACTIONS = ("stop", "switch")
 _MOST_ATTEMPTS = 1e9  # of a case, as there are steps on a fixed grid: minutes of one core
-_METHODS = {"FixedStep": ("rk4",), "AdaptiveStep": ("dop853", "dp54")}
+_METHODS = {"FixedStep": ("rk4", "abm8", "abm9", "abm10", "abm11", "abm12"), "AdaptiveStep": ("dop853", "dp54")}
 
 
 def refuse_contradictions(model: "Model") -> None:

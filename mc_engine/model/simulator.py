@@ -123,6 +123,10 @@ class Simulator:
                 raise ModelError(f"the simulator has {value!r} as its `{name}`; it must be above 0, at most {most:g}")
         if not 0.0 <= self.tolerance < 1.0:
             raise ModelError(f"the simulator has {self.tolerance!r} as its `tolerance`; it must be from 0 to below 1")
+        if self.deterministic and self.tolerance:
+            raise ModelError(
+                "the simulator has a `tolerance`, and `replay` compares bits; set `deterministic` to false"
+            )
 
     @property
     def quantities(self) -> tuple[Field, ...]:

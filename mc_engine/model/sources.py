@@ -92,25 +92,27 @@ def sources_of_file(path: Path) -> Sources:
 def _data_in(folder: Path, sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
     """Contents of the files that calls of `model` in these sources name as their data, and of those that their curves
     are read from; what cannot be read is left out."""
-    contents = _curves_beside(sources)
-    for name in sorted({name for source in sources.values() for name in data_names(source)}):
+    names = sorted({name for source in sources.values() for name in data_names(source)})
+    return {**_curves_beside(sources), **_files_named(names, folder)}
+
+
+def _curves_beside(sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
+    """Contents of the files, named from the folder of each source, that its curves and surfaces are read from."""
+    contents: dict[Path, bytes] = {}
+    for file, source in sources.items():
+        contents |= _files_named(curve_files(source), file.parent)
+    return dict(sorted(contents.items()))
+
+
+def _files_named(names: Iterable[str], folder: Path) -> dict[Path, bytes]:
+    """Contents of the files of these names, from a folder; what cannot be read is left out."""
+    contents = {}
+    for name in names:
         with suppress(FileFault):
             path = resolve_beside(folder, name)
             if (content := _content(path)) is not None:
                 contents[path] = content
     return contents
-
-
-def _curves_beside(sources: Mapping[Path, bytes]) -> dict[Path, bytes]:
-    """Contents of the files, named from the folder of each source, that its curves and surfaces are read from."""
-    contents = {}
-    for file, source in sources.items():
-        for name in curve_files(source):
-            with suppress(FileFault):
-                path = resolve_beside(file.parent, name)
-                if (content := _content(path)) is not None:
-                    contents[path] = content
-    return dict(sorted(contents.items()))
 
 
 def sources_beside(file: Path) -> dict[Path, bytes]:

@@ -36,11 +36,7 @@ def imported_names(source: bytes, package: str = "") -> frozenset[str]:
 
     package : that the source belongs to, for relative imports.
     """
-    try:
-        tree = parse(source)
-    except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: nested too deep
-        return frozenset()
-    return frozenset(name for node in ast.walk(tree) for name in _names_imported_by(node, package))
+    return frozenset(name for node in _nodes(source) for name in _names_imported_by(node, package))
 
 
 @lru_cache(maxsize=512)
@@ -62,12 +58,17 @@ def _arguments(calls: list[ast.Call], name: str) -> list[ast.expr]:
 
 def _calls(source: bytes, names: tuple[str, ...]) -> list[ast.Call]:
     """Calls of functions of these names, whatever they are attributes of."""
-    try:
-        tree = parse(source)
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
-        return []
-    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+    calls = (node for node in _nodes(source) if isinstance(node, ast.Call))
     return [call for call in calls if getattr(call.func, "attr", getattr(call.func, "id", None)) in names]
+
+
+@lru_cache(maxsize=64)
+def _nodes(source: bytes) -> tuple[ast.AST, ...]:
+    """All nodes of the tree of a source; none of a broken one."""
+    try:
+        return tuple(ast.walk(parse(source)))
+    except (SyntaxError, ValueError, MemoryError, RecursionError):  # the last two: nested too deep
+        return ()
 
 
 def _texts(values: Iterable[ast.AST]) -> frozenset[str]:

@@ -214,14 +214,14 @@ def _refuse_short(function: Any, name: str, arguments: tuple[Any, ...]) -> None:
         given = _run(part, handed)
         results.append(given)
         picks = [*function.picks, *(pick for _, later in function.calls for pick in later)]
-        taken = [field for source, index, field in picks if (source, index) == ("result", i) and field != ""]
-        named = [field for field in taken if isinstance(field, str)]
+        fields = [field for source, index, field in picks if (source, index) == ("result", i) and field != ""]
+        named = [field for field in fields if isinstance(field, str)]
         if name == "events" and not isinstance(given, tuple):
             continue  # a number, which several events may share
         if not set(named) <= set(getattr(given, "_fields", ())):
             gives = "nothing" if given is None else _shape_of(given)
             raise _breach(part, name, gives, f"a record with {listed(named)}")
-        if taken and not named and getattr(part, "record", None) is not tuple:  # what the model itself gives
+        if fields and not named and getattr(part, "record", None) is not tuple:  # what the model itself gives
             _refuse_other_pair(part, name, given)
 
 

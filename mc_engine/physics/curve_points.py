@@ -20,11 +20,11 @@ def columns_of(path: Path, wanted: Mapping[str, str | None]) -> dict[str, np.nda
         name without a unit is a plain number.
     Raises ModelError where the file, a column, a unit or a number is missing; FileNotFoundError as `open` does.
     """
-    found = _parquet(path) if path.suffix == ".parquet" else _csv(path)
+    columns = _parquet(path) if path.suffix == ".parquet" else _csv(path)
     for name in wanted:
-        if name not in found:
-            raise ModelError(f'{path.name} has no column "{name}"{hint(name, found)}; it has {listed([*found])}')
-    return {name: found[name] * si_factor(name, unit) for name, unit in wanted.items()}
+        if name not in columns:
+            raise ModelError(f'{path.name} has no column "{name}"{hint(name, columns)}; it has {listed([*columns])}')
+    return {name: columns[name] * si_factor(name, unit) for name, unit in wanted.items()}
 
 
 def si_factor(name: str, unit: str | None = None) -> float:
@@ -33,9 +33,9 @@ def si_factor(name: str, unit: str | None = None) -> float:
         if unit not in UNITS:
             raise ModelError(f'"{unit}" is not a unit{unit_hint(unit)}')
         return UNITS[unit].factor
-    fitting = [one for one in UNITS.values() if one.suffix and name.endswith(one.suffix)]
-    longest = max((len(one.suffix) for one in fitting), default=0)
-    factors = {one.factor for one in fitting if len(one.suffix) == longest}
+    fitting = [known for known in UNITS.values() if known.suffix and name.endswith(known.suffix)]
+    longest = max((len(known.suffix) for known in fitting), default=0)
+    factors = {known.factor for known in fitting if len(known.suffix) == longest}
     if len(factors) > 1:
         raise ModelError(f'the end of "{name}" could be more than one unit; say which')
     return factors.pop() if factors else 1.0

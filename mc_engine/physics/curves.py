@@ -59,7 +59,7 @@ class Curve(PhysicsFunction):
         """The value at the argument(s), interpreted: floats or arrays, SI."""
         if Number not in map(type, args):
             return self.function(*args)
-        plain = [float(one) if type(one) is Number else one for one in args]
+        plain = [float(argument) if type(argument) is Number else argument for argument in args]
         return result_of(self.words, args, self.function(*plain))
 
     def __repr__(self) -> str:
@@ -126,11 +126,11 @@ def wind_profile(
         raise ModelError("a wind has the columns north and east, or speed and coming_from")
     h, *pair = (columns_of(path, dict.fromkeys(wanted))[name] for name in wanted)
     components = pair if north else [-pair[0] * np.cos(pair[1]), -pair[0] * np.sin(pair[1])]
-    to_north, to_east = (_through(h, one, kind, outside, path) for one in components)
+    to_north, to_east = (_through(h, component, kind, outside, path) for component in components)
 
     @physics
     def wind(h):
-        return Vector(to_north(h), to_east(h), 0.0 * h)
+        return Vector(to_north(h), to_east(h), 0.0)
 
     return wind
 
@@ -166,7 +166,7 @@ def surface(
         xs, ys, zs = array_of(x, "x"), array_of(y, "y"), np.asarray(z, dtype=np.float64)
     refuse_points(words, xs, zs, xs.size)
     refuse_points(words, ys, zs.T, ys.size)
-    first, second = (_axis(turnovers(one) if kind == "nearest" else one) for one in (xs, ys))
+    first, second = (_axis(turnovers(points) if kind == "nearest" else points) for points in (xs, ys))
     first[_HEADER - 1] = first.size
     second[_HEADER - 1] = first.size + second.size
     second[5:7] += first.size

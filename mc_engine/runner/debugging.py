@@ -17,8 +17,6 @@ from inspect import unwrap
 from types import CodeType, FunctionType
 from typing import Any
 
-import numpy as np
-
 from mc_engine.errors import ModelError
 from mc_engine.flight.flight import fly_interpreted, prepare
 from mc_engine.flight.interpreted import InterpretedFlight
@@ -198,16 +196,16 @@ def _written(model: Model, names: Iterable[str] = ()) -> list[PhysicsFunction]:
 
 def _reachable(functions: Iterable[PhysicsFunction]) -> list[PhysicsFunction]:
     """These and all physics that they name."""
-    found, waiting = [], list(functions)
+    reached, waiting = [], list(functions)
     while waiting:
         physics = waiting.pop()
-        if physics not in found:
-            found.append(physics)
+        if physics not in reached:
+            reached.append(physics)
             function = unwrap(physics.function)
             cells = [cell.cell_contents for cell in function.__closure__ or ()]
             named = [function.__globals__.get(name) for name in function.__code__.co_names]
             waiting += [value for value in (*cells, *named) if isinstance(value, PhysicsFunction)]
-    return found
+    return reached
 
 
 @contextlib.contextmanager
@@ -225,10 +223,10 @@ def _stopping(functions: Iterable[tuple[PhysicsFunction, int]], is_due: Callable
 
 def _with_stop(function: Any, line: int, is_due: Callable[[], bool]) -> Any:
     """The function with `if is_due(): breakpoint()` before the statement of a line, or as its first statement."""
-    found = definition_of(function.__code__)
-    if not isinstance(found, ast.FunctionDef):
+    definition = definition_of(function.__code__)
+    if not isinstance(definition, ast.FunctionDef):
         return function
-    own = deepcopy(found)
+    own = deepcopy(definition)
     own.decorator_list = []
     body, index = _position(own.body, line) if line else (own.body, 0)
     stop = ast.parse("if __is_due__(): __breakpoint__()").body[0]
@@ -267,16 +265,3 @@ def _code_in(code: CodeType, name: str) -> CodeType:
 
 def _cell(value: Any) -> Any:
     return (lambda: value).__closure__[0]  # type: ignore[index]
-
-
-def inputs_of(campaign: Any, case_id: int | None) -> tuple[dict[str, Any], int]:
-    """(inputs, what addresses the noise) of a case of a campaign, or of its nominal case."""
-    from mc_engine.campaign.cases import case_table, full_inputs
-    from mc_engine.campaign.sensitivity_design import noise_ids
-    from mc_engine.flight.flyer import NOMINAL_NOISE
-
-    if case_id is None:
-        return campaign.nominal, NOMINAL_NOISE
-    table = case_table(campaign, np.array([case_id]))
-    inputs = full_inputs(campaign, {name: column[0] for name, column in table.items()})
-    return inputs, int(noise_ids(campaign, np.array([case_id]))[0])

@@ -8,6 +8,7 @@ import pandas as pd
 
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
+from mc_engine.campaign.sensitivity_design import noise_ids
 from mc_engine.flight.chunks import NOMINAL_NOISE
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.statistics.worst import limits_on, worst_cases
@@ -16,6 +17,15 @@ from mc_engine.store.parts import problem_of
 from mc_engine.store.store import Store
 
 _DANGEROUS = tuple(STATUS_NAME[code] for code in (WORKER_DIED, TIME_LIMIT, CRASHED, MEMORY_LIMIT, NO_RESULT))
+
+
+def inputs_of(campaign: Campaign, case_id: int | None) -> tuple[dict[str, Any], int]:
+    """(inputs, what addresses the noise) of a case of a campaign, or of its nominal case."""
+    if case_id is None:
+        return dict(campaign.nominal), NOMINAL_NOISE
+    table = case_table(campaign, np.array([case_id]))
+    inputs = full_inputs(campaign, {name: column[0] for name, column in table.items()})
+    return inputs, int(noise_ids(campaign, np.array([case_id]))[0])
 
 
 def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Callable[[], bool]) -> bool:
@@ -31,10 +41,8 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     retained = retained_cases(store, campaign)
     if _are_kept(store, campaign, retained):
         return True
-    flights = [(-1, campaign.nominal, NOMINAL_NOISE)] if campaign.retention.nominal else []
-    for case_id in retained:
-        inputs = {name: column[0] for name, column in case_table(campaign, np.array([case_id])).items()}
-        flights.append((case_id, full_inputs(campaign, inputs), case_id))
+    flights = [(-1, *inputs_of(campaign, None))] if campaign.retention.nominal else []
+    flights += [(case_id, *inputs_of(campaign, case_id)) for case_id in retained]
 
     def history(*flight: Any) -> pd.DataFrame | None:
         return None if stopped() else _flown_history(campaign, *flight)

@@ -45,7 +45,8 @@ def import_results(campaign: Campaign, file: Path, out: Path, history: Path | No
         raise CampaignError(file.name, problems[:_MOST])
     imported = {"file": file.name, "history": None if history is None else history.name}
     manifest = {**manifest_of(campaign), "imported": imported}
-    store = create_store(out, manifest, campaign.text, columns_of(campaign), companions_of(campaign))
+    columns = [column for column in columns_of(campaign) if column.name in rows]  # states of a model are not in tables
+    store = create_store(out, manifest, campaign.text, columns, companions_of(campaign))
     with store.lock():
         for first, stop in chunks_of([(0, campaign.cases)], LARGEST_CHUNK):
             store.append(first, stop - first, {name: column[first:stop] for name, column in rows.items()})
@@ -74,7 +75,8 @@ def _results(campaign: Campaign, file: Path, table: Columns, problems: list[Prob
     if not np.array_equal(ids[order], np.arange(campaign.cases)):
         missing = sorted({*range(campaign.cases)} - {*ids.tolist()})
         which = f"case {missing[0]} is missing" if missing else "a case is there twice, or is none of the campaign's"
-        problems.append(Problem("case_id", f"{which}; the campaign has the cases 0 to {campaign.cases - 1}"))
+        has = f"the campaign has the cases 0 to {campaign.cases - 1}; --cases takes another number of them"
+        problems.append(Problem("case_id", f"{which}; {has}"))
         return {}, {}
     drawn = case_table(campaign, np.arange(campaign.cases))
     _refuse_unknown_words(table, problems)
@@ -122,10 +124,10 @@ def _compare(name: str, given: np.ndarray, drawn: np.ndarray, file: Path, proble
             problems.append(Problem("", str(fault)))
             return
         wrong = np.flatnonzero(~(np.abs(cells - drawn) <= _SAME * np.maximum(np.abs(drawn), 1e-300)))
-        texts = [number(float(one[wrong[0]])) for one in (cells, drawn)] if wrong.size else []
+        texts = [number(float(column[wrong[0]])) for column in (cells, drawn)] if wrong.size else []
     else:
         wrong = np.flatnonzero(np.char.lower(given.astype(str)) != np.char.lower(drawn.astype(str)))
-        texts = [str(one[wrong[0]]) for one in (given, drawn)] if wrong.size else []
+        texts = [str(column[wrong[0]]) for column in (given, drawn)] if wrong.size else []
     if wrong.size:
         message = f"case {wrong[0]} has {texts[0]}, and the campaign draws {texts[1]}; {wrong.size:,} cases differ"
         problems.append(Problem(name, f"{message}; `mc-engine sample` gives the inputs"))

@@ -13,15 +13,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from mc_engine.campaign.cases import case_table, full_inputs
+from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import Campaign, Retention, load_campaign
-from mc_engine.campaign.sensitivity_design import noise_ids
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.runner.backends import Backend
 from mc_engine.runner.flown_campaign import campaign_of, companions_of, refuse_undeclared_data
-from mc_engine.runner.histories import history_frame
+from mc_engine.runner.histories import history_frame, inputs_of
 from mc_engine.runner.manifest import columns_of, manifest_of
 from mc_engine.runner.progress import ProgressCall
 from mc_engine.runner.sessions import Session, complete, fly_failed, session_of
@@ -40,11 +39,13 @@ THREADS = Backend()
 class Replay:
     """One case flown again, and whether every number of it came out as stored.
 
-    equal : bool, every stored number has the same bits
-    differences : tuple of str, a sentence for each number that has not
+    equal : bool, every stored number has the same bits, or lies within `tolerance`
+    differences : tuple of str, a sentence for each number that does not
     history : DataFrame, the flight: case_id, t_s and the model's outputs
     row : dict, the stored line of the case table, by column name
     lost : str, file, line and values of what made the state or a metric not finite; empty where all are finite
+    tolerance : float, fraction by which numbers were allowed to differ, that of a simulator which is not
+        deterministic; None where bits were compared
 
     >>> again = replay("runs/small", 3)
     >>> again.equal, list(again.history)
@@ -56,6 +57,7 @@ class Replay:
     history: pd.DataFrame
     row: dict[str, Any]
     lost: str = ""
+    tolerance: float | None = None
 
 
 def run(
@@ -234,6 +236,8 @@ def merge(
 def replay(path: str | Path, case_id: int) -> Replay:
     """Fly one case of a run again, alone, and compare every stored number bit for bit.
 
+    The numbers of a simulator that is not deterministic are compared within its `tolerance`.
+
     path : str or Path, the run directory
     case_id : int, number of the case, from 0
 
@@ -246,9 +250,8 @@ def replay(path: str | Path, case_id: int) -> Replay:
     """
     store = open_store(path)
     campaign = campaign_of(store)
-    table = case_table(campaign, np.array([case_id]))
-    inputs = full_inputs(campaign, {name: column[0] for name, column in table.items()})
-    flyer, noise = flyer_of(campaign), int(noise_ids(campaign, np.array([case_id]))[0])
+    table, flyer = case_table(campaign, np.array([case_id])), flyer_of(campaign)
+    inputs, noise = inputs_of(campaign, case_id)
     flight, history = flyer.history(inputs, noise, Retention().rows, alone=True)
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
@@ -259,4 +262,5 @@ def replay(path: str | Path, case_id: int) -> Replay:
         if flyer.differs(stored[name], value)
     ]
     lost = flyer.lost_number(inputs, noise, flight, f"case {case_id}")
-    return Replay(not differences, tuple(differences), history_frame(case_id, history), stored, lost)
+    frame = history_frame(case_id, history)
+    return Replay(not differences, tuple(differences), frame, stored, lost, flyer.tolerance)

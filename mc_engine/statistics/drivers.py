@@ -78,9 +78,7 @@ class SuccessCurve:
     levels: tuple[str, ...]
 
 
-def failure_drivers(
-    inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray], rate: float = FALSE_DISCOVERIES
-) -> Drivers:
+def failure_drivers(inputs: Mapping[str, Any], failed: Mapping[str, np.ndarray]) -> Drivers:
     """Drivers of each requirement.  failed : bool[n] by requirement, True also for a case without a number.
 
     Benjamini & Hochberg, J. R. Stat. Soc. B 57 (1995), 289-300, over all tests of singles, and over all of pairs.
@@ -102,23 +100,23 @@ def failure_drivers(
     by_name = {column.name: column for column in columns}
     located = tuple(
         _located(pair, by_name[pair.inputs[0]], by_name[pair.inputs[1]], rich[pair.requirement])
-        for pair in _discovered(pairs, rate)
+        for pair in _discovered(pairs)
     )
-    return Drivers(_discovered(singles, rate), located, len(singles), len(pairs), undecided)
+    return Drivers(_discovered(singles), located, len(singles), len(pairs), undecided)
 
 
 def _fewer_group(failed: np.ndarray) -> int:
     return int(min(failed.sum(), (~failed).sum()))
 
 
-def success_along(values: Any, passed: np.ndarray, confidence: float = 0.95, bins: int = BINS) -> SuccessCurve | None:
+def success_along(values: Any, passed: np.ndarray, confidence: float = 0.95) -> SuccessCurve | None:
     """Success probability along one input; None without a case.  passed : bool[n]."""
     (column,) = input_columns({"": values})
     rows = np.flatnonzero(np.isfinite(column.values))
     if not rows.size:
         return None
     column, passed = column.at(rows), np.asarray(passed, dtype=bool)[rows]
-    index, count = equal_bins(column, bins)
+    index, count = equal_bins(column, BINS)
     order = np.argsort(index, kind="stable")
     starts = np.searchsorted(index[order], np.arange(count))
     tried = np.bincount(index, minlength=count)
@@ -153,12 +151,14 @@ def _evenly(rows: np.ndarray, most: int) -> np.ndarray:
     return rows if rows.size <= most else rows[np.linspace(0, rows.size - 1, most).astype(np.int64)]
 
 
-def _discovered(tested: list[Driver], rate: float) -> tuple[Driver, ...]:
+def _discovered(tested: list[Driver]) -> tuple[Driver, ...]:
     if not tested:
         return ()
     adjusted = _adjusted(np.array([driver.p_value for driver in tested]))
     discovered = [
-        replace(driver, adjusted=float(value)) for driver, value in zip(tested, adjusted, strict=True) if value <= rate
+        replace(driver, adjusted=float(value))
+        for driver, value in zip(tested, adjusted, strict=True)
+        if value <= FALSE_DISCOVERIES
     ]
     return tuple(sorted(discovered, key=lambda driver: (driver.p_value, -driver.effect)))
 

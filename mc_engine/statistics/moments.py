@@ -1,11 +1,7 @@
 """Moments of a metric in two passes, the same to the last bit in any order of the cases and any grouping of parts.
 
 First pass (`Tally`): number, smallest, largest and exact sum.  Second pass (`Spread`): exact sums of the powers of
-the distances from the mean; each power is rounded on its own, which depends on the case alone.  Both merge.
-
-An exact sum (`ExactSum`) is one whole number of units of 2**-1074, the smallest float64.  Blocks of values are cut into
-slices of a few leading bits, so short that adding up a slice of a whole block rounds nothing: the error-free vector
-transformation of S. M. Rump, T. Ogita & S. Oishi, SIAM J. Sci. Comput. 31 (2008), 189-224, section 3.
+the distances from the mean; each power is rounded on its own, which depends on the case alone.
 """
 
 from math import frexp, ldexp, sqrt
@@ -14,11 +10,9 @@ import numpy as np
 
 from mc_engine.statistics.normality import Normality, normality_of
 
-UNIT_BITS = 1074
-BLOCK = 1 << 16
-HEADROOM = 17  # bits above the largest value of a block: those of its length, and one for the rounding of a slice
-HUGE = 2.0**960  # from here on a slice's own headroom would overflow
-HUGE_SHIFT = 64
+MANTISSA_BITS, HALF_BITS = 53, 27  # of a float64; of the lower half of its mantissa
+UNIT_BITS = 1073 + MANTISSA_BITS  # a float64 of the least exponent, -1073, is whole in units of 2**-UNIT_BITS
+BLOCK = 1 << 16  # values at a time: sums of as many half mantissas are exact
 
 
 def finite_values(values: np.ndarray) -> np.ndarray:
@@ -43,42 +37,26 @@ def in_units(values: np.ndarray | float, exponent: np.ndarray) -> np.ndarray:
 
 
 class ExactSum:
-    """The sum of all finite values put in; `units` is its exact value times 2**1074."""
+    """The sum of all finite values put in, without rounding; `units` is its exact value times 2**UNIT_BITS."""
 
-    def __init__(self, units: int = 0):
-        self.units = units
+    def __init__(self) -> None:
+        self.units = 0
 
     def add(self, values: np.ndarray) -> None:
-        """Put in float64[n], all finite."""
+        """Put in float64[n], all finite.  Values of one exponent are added up as whole numbers, their mantissas."""
         for first in range(0, values.size, BLOCK):
-            block = values[first : first + BLOCK]
-            huge = np.abs(block) >= HUGE
-            if huge.any():
-                self.units += _block_units(block[huge] * 2.0**-HUGE_SHIFT) << HUGE_SHIFT
-                block = block[~huge]
-            self.units += _block_units(block)
-
-    def merge(self, other: "ExactSum") -> None:
-        """Put in all that another sum holds."""
-        self.units += other.units
+            mantissa, exponent = np.frexp(values[first : first + BLOCK])
+            whole = np.ldexp(mantissa, MANTISSA_BITS).astype(np.int64)
+            least = int(exponent.min())
+            high = np.bincount(exponent - least, whole >> HALF_BITS)
+            low = np.bincount(exponent - least, whole & ((1 << HALF_BITS) - 1))
+            for k in np.flatnonzero((high != 0.0) | (low != 0.0)).tolist():
+                total = (int(high[k]) << HALF_BITS) + int(low[k])
+                self.units += total << (least + k + UNIT_BITS - MANTISSA_BITS)
 
     def over(self, count: int) -> float:
         """The sum divided by a whole number, rounded once; OverflowError beyond float64."""
         return self.units / (count << UNIT_BITS)  # Python divides whole numbers with one rounding
-
-
-def _block_units(values: np.ndarray) -> int:
-    rest, units = values.copy(), 0
-    while rest.size:
-        largest = float(np.abs(rest).max())
-        if largest == 0.0:
-            break
-        anchor = ldexp(1.0, frexp(largest)[1] + HEADROOM)
-        leading = (anchor + rest) - anchor  # the bits of each value that the anchor's last place reaches
-        rest -= leading
-        numerator, denominator = float(leading.sum()).as_integer_ratio()
-        units += numerator << (UNIT_BITS + 1 - denominator.bit_length())
-    return units
 
 
 class Tally:
@@ -101,12 +79,6 @@ class Tally:
             )
             self.total.add(finite)
         return finite
-
-    def merge(self, other: "Tally") -> None:
-        """Count all that another tally has counted."""
-        self.n_used, self.n_tried = self.n_used + other.n_used, self.n_tried + other.n_tried
-        self.minimum, self.maximum = min(self.minimum, other.minimum), max(self.maximum, other.maximum)
-        self.total.merge(other.total)
 
     @property
     def mean(self) -> float:
@@ -132,11 +104,6 @@ class Spread:
         square = distance * distance
         for power, values in zip(self.powers, (distance, square, square * distance, square * square), strict=True):
             power.add(values)
-
-    def merge(self, other: "Spread") -> None:
-        """Put in all that another spread about the same tally holds."""
-        for mine, theirs in zip(self.powers, other.powers, strict=True):
-            mine.merge(theirs)
 
     @property
     def sd(self) -> float | None:

@@ -15,9 +15,10 @@ from mc_engine.statistics.order_statistics import quantile_ranks
 
 CONTENTS = (0.5, 0.9, 0.99)
 FEWEST = 3  # points of an ellipse
-THINNEST = 1e-9  # of the length of a cloud; what is thinner is a line
+THINNEST = 1e-9  # of the length of the scatter; what is thinner is a line
 CELLS = 256  # of the density's grid, each way
 FEWEST_SMOOTHED = 20  # points that a density is made of
+_CORNERS = 180  # of the outline of an ellipse
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,9 @@ class Ellipse:
     inside: int
     n: int
 
-    def outline(self, corners: int = 180) -> np.ndarray:
-        """float64[corners + 1, 2]: once around, anticlockwise, the last point the first one."""
-        angle = np.linspace(0.0, 2.0 * np.pi, corners + 1)
+    def outline(self) -> np.ndarray:
+        """float64[n, 2]: once around, anticlockwise, the last point the first one."""
+        angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS + 1)
         along, across = self.semi_axes[0] * np.cos(angle), self.semi_axes[1] * np.sin(angle)
         c, s = np.cos(self.direction), np.sin(self.direction)
         points = np.column_stack([self.centre[0] + c * along - s * across, self.centre[1] + s * along + c * across])
@@ -48,7 +49,7 @@ class Ellipse:
 def chi_square_scale(content: float) -> float:
     """k with P(chi^2 with 2 degrees of freedom <= k^2) = content: the square root of -2 ln(1 - content).
 
-    k = 3 holds 98.89 % of a normal cloud in two dimensions, not 99.73 %; that takes k = 3.439.
+    k = 3 holds 98.89 % of a normal distribution in two dimensions, not 99.73 %; that takes k = 3.439.
     """
     return float(np.sqrt(-2.0 * np.log1p(-content)))
 
@@ -98,7 +99,7 @@ def _principal_axes(points: np.ndarray, thinnest: float = 0.0) -> tuple[np.ndarr
     if len(points) < FEWEST:
         return None
     centre = points.mean(axis=0)
-    # Singular values of the offsets, not eigenvalues of their squares: those lose half the digits of a thin cloud.
+    # Singular values of the offsets, not eigenvalues of their squares: those lose half the digits of a thin scatter.
     _, singular, directions = np.linalg.svd(points - centre, full_matrices=False)
     spread = singular / np.sqrt(len(points) - 1.0)
     if not spread[1] > max(thinnest, THINNEST * float(spread[0])):
@@ -109,7 +110,7 @@ def _principal_axes(points: np.ndarray, thinnest: float = 0.0) -> tuple[np.ndarr
 
 @dataclass(frozen=True)
 class Density:
-    """A density on a grid in the frame of the cloud's principal axes, in which its standard deviations are 1."""
+    """A density on a grid in the frame of the points' principal axes, in which its standard deviations are 1."""
 
     centre: np.ndarray
     spread: np.ndarray

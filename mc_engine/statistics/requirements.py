@@ -360,7 +360,7 @@ def _limit(requirement: Mapping[str, Any], key: str) -> float | None:
 def inside_all(
     requirements: Iterable[Mapping[str, Any]], column: Callable[[str], np.ndarray], ok: np.ndarray
 ) -> np.ndarray:
-    """bool[n]: completed, and inside the limits of all these requirement records; whoever counts cases asks here.
+    """bool[n]: completed, and inside the limits of all these requirement records.
 
     column : metric to float64[n].  ok : bool[n].  Without a requirement every completed case is inside.
     """

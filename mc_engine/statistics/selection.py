@@ -3,7 +3,7 @@
 The bits of a float64, read as a 64-bit integer, can be made to sort as the values do.  Each pass counts 16 of these
 bits, beginning with the leading ones, among the values that agree with a wanted one so far (radix selection: D. E.
 Knuth, The Art of Computer Programming, vol. 3, 2nd ed., 5.2.5 and 5.3.3); once few values are left, the next pass keeps
-and sorts them, and is the last.  Counts of parts are added.
+and sorts them, and is the last.
 
 Memory: 65 536 counts per wanted rank, or FEW values, whatever the number of values.
 """
@@ -70,11 +70,6 @@ class Selection:
         below = np.uint64(64 - DIGIT_BITS * (self.digit + 1))
         digit = ((keys[fits] >> below) & np.uint64(DIGITS - 1)).astype(np.int64)
         np.add.at(self.counts, (row[fits], digit), 1)
-
-    def merge(self, other: "Selection") -> None:
-        """Count all that the same pass over other values has counted."""
-        self.counts += other.counts
-        self.kept += other.kept
 
     def next(self, ranks: Iterable[int] | None = None) -> "Selection":
         """The pass that follows when this one has seen all values.  ranks : those wanted, told after the first."""

@@ -10,8 +10,8 @@ total        E[Var(metric | all other inputs)] / Var(metric): what the input doe
              a surrogate (`total_order`); NaN where inputs are correlated, for which it has no such meaning
 
 For inputs that are correlated with each other src and prcc tell them apart as far as the cases do, while spearman and
-first_order also hold what an input owes to its partners.  Errors are standard errors for independent cases (`mc`);
-`lhs` and `sobol` scatter less.  NaN: not defined, or too few cases.
+first_order also hold what an input owes to its partners.  first_order and total have standard errors, for independent
+cases (`mc`); `lhs` and `sobol` scatter less.  NaN: not defined, or too few cases.
 
 Saltelli et al., Global Sensitivity Analysis: The Primer (2008), ch. 1 (SRC, first-order index); Marino et al.,
 J. Theor. Biol. 254 (2008), 178-196 (PRCC).
@@ -29,12 +29,12 @@ from mc_engine.statistics.moments import near_one
 from mc_engine.statistics.total_order import total_order
 
 FEWEST_CASES = 20
-_INDICES = ("spearman", "src", "prcc", "first_order", "total")
+_INDICES = ("spearman", "src", "prcc", "first_order", "first_order_error", "total", "total_error")
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Indices and their standard errors, float64[n_inputs, n_metrics]; n_used int64[n_metrics] of n_tried cases.
+    """Indices and standard errors, float64[n_inputs, n_metrics]; n_used int64[n_metrics] of n_tried cases.
 
     r_squared : float64[n_metrics], the share of variance that the linear regression behind `src` explains.
     unexplained : float64[n_metrics], the share that the surrogate behind `total` leaves; total may be larger by it.
@@ -46,11 +46,8 @@ class Sensitivity:
     n_used: np.ndarray
     n_tried: int
     spearman: np.ndarray
-    spearman_error: np.ndarray
     src: np.ndarray
-    src_error: np.ndarray
     prcc: np.ndarray
-    prcc_error: np.ndarray
     first_order: np.ndarray
     first_order_error: np.ndarray
     total: np.ndarray
@@ -61,16 +58,14 @@ class Sensitivity:
 
 
 class _Fit(NamedTuple):
-    """A regression of standardised metrics y on standardised columns x; coefficients [column, metric]."""
+    """A regression of standardised metrics on standardised columns.
 
-    x: np.ndarray
-    y: np.ndarray
-    alone: np.ndarray  # what the other columns leave of each column, divided by its variance
-    left: np.ndarray  # what all columns leave of y
+    coefficient : float64[n_columns, n_metrics];  partial : partial correlations, likewise;  r_squared : [n_metrics]
+    """
+
     coefficient: np.ndarray
-    partial: np.ndarray  # partial correlation
+    partial: np.ndarray
     r_squared: np.ndarray
-    freedom: int
 
 
 def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) -> Sensitivity:
@@ -84,9 +79,7 @@ def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) ->
     table = np.column_stack([np.asarray(metrics[name], dtype=np.float64) for name in names]) if names else None
     tried = len(next(iter([*metrics.values(), *inputs.values()]), ()))
     shape = (len(columns), len(names))
-    indices: dict[str, np.ndarray] = {
-        f"{index}{end}": np.full(shape, np.nan) for index in _INDICES for end in ("", "_error")
-    }
+    indices: dict[str, np.ndarray] = {index: np.full(shape, np.nan) for index in _INDICES}
     indices |= {share: np.full(len(names), np.nan) for share in ("r_squared", "unexplained")}
     n_used = np.zeros(len(names), dtype=np.int64)
     strongest = _strongest_correlation(columns, tried)
@@ -138,19 +131,14 @@ def _fill(
     place = np.ix_(np.array(ordered), where)
     plain = np.column_stack([columns[k].values for k in ordered])
     ranks, metric_ranks = average_ranks(plain), average_ranks(varying)
-    rho = standardised(ranks).T @ standardised(metric_ranks) / n
-    indices["spearman"][place] = rho
-    # Bonett & Wright, Psychometrika 65 (2000), 23-28, carried from Fisher's z to the correlation.
-    indices["spearman_error"][place] = (1.0 - rho**2) * np.sqrt((1.0 + 0.5 * rho**2) / (n - 3))
+    indices["spearman"][place] = standardised(ranks).T @ standardised(metric_ranks) / n
     fit = _regression(np.column_stack([plain, *groups]), varying)
     if fit is not None:
         indices["src"][place] = fit.coefficient[: len(ordered)]
-        indices["src_error"][place] = _coefficient_error(fit, len(ordered))
         indices["r_squared"][where] = fit.r_squared
     fit = _regression(np.column_stack([ranks, *groups]), metric_ranks)
     if fit is not None:
         indices["prcc"][place] = fit.partial[: len(ordered)]
-        indices["prcc_error"][place] = _partial_error(fit, len(ordered))
 
 
 def _regression(columns: np.ndarray, table: np.ndarray) -> _Fit | None:
@@ -162,8 +150,7 @@ def _regression(columns: np.ndarray, table: np.ndarray) -> _Fit | None:
     x, y = standardised(columns), standardised(table)
     value, vector = np.linalg.eigh(x.T @ x / n)
     null = value < 1e-10 * value[-1]
-    freedom = n - 1 - int(np.count_nonzero(~null))
-    if freedom < 2:
+    if n - 1 - np.count_nonzero(~null) < 2:
         return None
     tied = (np.abs(vector[:, null]) > 1e-6).any(axis=1)
     inverse = (vector[:, ~null] / value[~null]) @ vector[:, ~null].T
@@ -173,31 +160,8 @@ def _regression(columns: np.ndarray, table: np.ndarray) -> _Fit | None:
     # Above 0: else rounding would be the whole trend of an input that an exact model does not hold.
     spread = np.maximum(1.0 - r_squared, 1e-12) * np.diag(inverse)[:, None]
     partial = coefficient / np.sqrt(coefficient**2 + spread)
-    alone, left = x @ inverse, y - x @ coefficient
     coefficient[tied] = partial[tied] = np.nan
-    return _Fit(x, y, alone, left, coefficient, partial, r_squared, freedom)
-
-
-def _coefficient_error(fit: _Fit, count: int) -> np.ndarray:
-    """Standard errors of the first `count` coefficients, by their influence function: of the regression, whatever the
-    spread of its residuals, and of the two standard deviations that a coefficient is scaled with.
-    """
-    error = np.empty((count, fit.y.shape[1]))
-    for k in range(count):
-        scales = 0.5 * fit.coefficient[k] * (fit.x[:, k : k + 1] ** 2 - fit.y**2)
-        error[k] = (fit.alone[:, k : k + 1] * fit.left + scales).std(axis=0)
-    return error / np.sqrt(fit.freedom)
-
-
-def _partial_error(fit: _Fit, count: int) -> np.ndarray:
-    """Standard errors of the first `count` partial correlations: those of a correlation of two sets of residuals."""
-    error = np.full((count, fit.y.shape[1]), np.nan)
-    for k in np.flatnonzero(np.isfinite(fit.partial[:count]).all(axis=1)):
-        x = fit.alone[:, k : k + 1]
-        y = fit.left + fit.coefficient[k] * x / np.mean(x**2)
-        x, y = x / x.std(), y / np.maximum(y.std(axis=0), 1e-12)
-        error[k] = (x * y - 0.5 * fit.partial[k] * (x**2 + y**2)).std(axis=0)
-    return error / np.sqrt(fit.freedom)
+    return _Fit(coefficient, partial, r_squared)
 
 
 def _strongest_correlation(columns: Sequence[InputColumn], n: int) -> tuple[str, str, float] | None:

@@ -58,7 +58,7 @@ class Members(NamedTuple):
 class Climb(NamedTuple):
     """The last level reached.
 
-    reached : float64[runs], each run's probability of the last level, which `members` represent.  weight : float64, of
+    reached : float64[RUNS], each run's probability of the last level, which `members` represent.  weight : float64, of
         every case flown.  flat : whether equal margins ended the levels.
     """
 
@@ -74,7 +74,6 @@ def subset_simulation(
     n_inputs: int,
     *,
     cases_per_level: int = 10_000,
-    runs: int = RUNS,
     seed: int = 0,
     confidence: float = 0.95,
     noise: bool = False,
@@ -82,36 +81,37 @@ def subset_simulation(
     """Probability that margin(u) <= 0 for u of `n_inputs` independent standard normal numbers.
 
     margin : float64[n, n_inputs] -> float64[n];  not a number counts as failed.
-    cases_per_level : of all runs together, at least 50 for each of at least 3 runs.
+    cases_per_level : of all runs together, at least 50 for each.
     noise : call margin(u, addresses), int64[n]; see `rare_events`.
     """
-    per_run = cases_per_level // runs
-    if runs < 3 or per_run * SHARE < FEWEST_SEEDS:
-        raise ValueError(f"{cases_per_level} cases per level are too few for {runs} runs; 3 runs of 50 are the least")
+    per_run = cases_per_level // RUNS
+    if per_run * SHARE < FEWEST_SEEDS:
+        least = round(RUNS * FEWEST_SEEDS / SHARE)
+        raise ValueError(f"{cases_per_level} cases per level are too few; {least} are the least")
     flights, rng = Flights(margin, noise), stream(seed, "subset simulation", 0)
-    climb = _run_levels(flights, rng, n_inputs, runs, per_run)
+    climb = _run_levels(flights, rng, n_inputs, per_run)
     if len(climb.levels) == 1:
         return plain_count(flights, climb.levels, confidence)
-    estimates = climb.reached * _shares(climb.members.run[climb.members.margin <= 0.0], runs, per_run)
+    estimates = climb.reached * _shares(climb.members.run[climb.members.margin <= 0.0], per_run)
     lower, upper = interval_of_mean(estimates, confidence)
     if not estimates.any():  # failure is rarer than the last level
         upper = interval_of_mean(climb.reached, confidence)[1]
     mean = float(estimates.mean())
-    error = float(estimates.std(ddof=1)) / (mean * math.sqrt(runs)) if mean > 0.0 else math.inf
+    error = float(estimates.std(ddof=1)) / (mean * math.sqrt(RUNS)) if mean > 0.0 else math.inf
     remarks = tuple(_remarks(climb, estimates, upper))
     cases = flights.evaluated(climb.weight)
     return RareEvent("subset", mean, lower, upper, confidence, error, climb.levels, cases, remarks)
 
 
-def _run_levels(flights: Flights, rng: np.random.Generator, n_inputs: int, runs: int, per_run: int) -> Climb:
+def _run_levels(flights: Flights, rng: np.random.Generator, n_inputs: int, per_run: int) -> Climb:
     """Level by level to the failures, or until there is no further level."""
-    n = per_run * runs
-    fresh, run = np.full(n, FRESH), np.repeat(np.arange(runs), per_run)
+    n = per_run * RUNS
+    fresh, run = np.full(n, FRESH), np.repeat(np.arange(RUNS), per_run)
     members = _flown(flights, rng.standard_normal((n, n_inputs)), fresh, run, 0)
-    reached, scale = np.ones(runs), _FIRST_SCALE
-    levels, weights = [Level(math.inf, 1.0, runs, n, 1.0)], list[tuple[np.ndarray, np.ndarray]]()
+    reached, scale = np.ones(RUNS), _FIRST_SCALE
+    levels, weights = [Level(math.inf, 1.0, RUNS, n, 1.0)], list[tuple[np.ndarray, np.ndarray]]()
     while True:
-        threshold = _threshold(members.margin, FEWEST_SEEDS * runs)
+        threshold = _threshold(members.margin)
         weight = reached[members.run] / n
         if threshold is None or threshold <= 0.0 or len(levels) == MOST_LEVELS:
             total = np.zeros(flights.n)
@@ -120,23 +120,23 @@ def _run_levels(flights: Flights, rng: np.random.Generator, n_inputs: int, runs:
             return Climb(members, reached, tuple(levels), total, threshold is None)
         near = members.margin <= threshold
         weights.append((members.case[~near], weight[~near]))
-        reached = reached * _shares(members.run[near], runs, per_run)
+        reached = reached * _shares(members.run[near], per_run)
         before = flights.n
         members, accepted, scale = _chains(flights, rng, members.take(near), per_run, threshold, scale, len(levels))
         alive = int(np.count_nonzero(reached))
         levels.append(Level(threshold, float(reached.mean()), alive, flights.n - before, accepted))
 
 
-def _shares(run: np.ndarray, runs: int, per_run: int) -> np.ndarray:
-    """float64[runs]: how much of each run's members these are."""
-    return np.bincount(run, minlength=runs) / per_run
+def _shares(run: np.ndarray, per_run: int) -> np.ndarray:
+    """float64[RUNS]: how much of each run's members these are."""
+    return np.bincount(run, minlength=RUNS) / per_run
 
 
 def _flown(flights: Flights, u: np.ndarray, noise: np.ndarray, run: np.ndarray, level: int) -> Members:
     return Members(u, *flights.fly(u, noise, level), run)
 
 
-def _threshold(margin: np.ndarray, fewest: int) -> float | None:
+def _threshold(margin: np.ndarray) -> float | None:
     """Margin of the next level: the nearest tenth is at or below it.  Zero at the last, None if ties forbid one."""
     seeds = round(SHARE * margin.size)
     value = float(np.partition(margin, seeds - 1)[seeds - 1])
@@ -145,7 +145,7 @@ def _threshold(margin: np.ndarray, fewest: int) -> float | None:
     if np.count_nonzero(margin <= value) <= margin.size // 2:
         return value
     below = margin[margin < value]  # most cases share one margin: the level goes below that plateau
-    if below.size >= fewest and below.max() > 0.0:
+    if below.size >= FEWEST_SEEDS * RUNS and below.max() > 0.0:
         return float(below.max())
     return None
 

@@ -74,8 +74,5 @@ def _evidence(failures: int, tried: int, rate: float, below: bool) -> float:
     a, b = failures + _POWER, tried - failures + 1.0
     mass = log(_POWER) - (_POWER * log(rate) if below else np.log1p(-(rate**_POWER)))
     share = betainc(a, b, rate) if below else betaincc(a, b, rate)
-    return float(mass + betaln(a, b) + np.log(share) - _log_likelihood(failures, tried, rate))
-
-
-def _log_likelihood(failures: int, tried: int, rate: float) -> float:
-    return float(failures * log(rate) + (tried - failures) * np.log1p(-rate))
+    log_likelihood = failures * log(rate) + (tried - failures) * np.log1p(-rate)
+    return float(mass + betaln(a, b) + np.log(share) - log_likelihood)

@@ -51,15 +51,15 @@ class RowLog:
 
     def rows(self) -> dict[int, Row]:
         """The recorded rows of these cases, by case; a line that was not written whole is left out."""
-        found: dict[int, Row] = {}
+        recorded: dict[int, Row] = {}
         for name in _logs(self._run, self._first, self._stop):
             for line in read_inside(self._run, name).splitlines():
                 mark, _, text = line.partition(b" ")
                 if mark == _mark(text):
                     row = json.loads(text)
                     if self._first <= row["case_id"] < self._stop:
-                        found[row["case_id"]] = row
-        return found
+                        recorded[row["case_id"]] = row
+        return recorded
 
     def of(self, case_ids: np.ndarray) -> "RowLog":
         """The same log, for cases that are named by their place in `case_ids`; it can be sent to another process."""

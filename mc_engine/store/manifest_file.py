@@ -144,6 +144,26 @@ class _Upstream(_Campaign):
     links: dict[str, str] = {}
 
 
+class _Imported(Record):
+    """Tables that the cases were read from, where the engine did not fly them."""
+
+    file: str
+    history: str | None = None
+
+
+class _Group(_Named):
+    members: list[str]
+
+
+class _Sensitivity(Record):
+    """Design of the flights for contributions."""
+
+    design: str
+    cases: CaseNumber
+    groups: list[_Group]
+    repeated: list[str]
+
+
 class _Git(Record):
     commit: str = ""
     dirty: bool = False
@@ -186,6 +206,9 @@ class Head(Record):
 
 class _Manifest(Head):
     shard: _Shard | None = None
+    imported: _Imported | None = None
+    sensitivity: _Sensitivity | None = None
+    ranges: dict[str, Annotated[list[float | None], Field(min_length=2, max_length=2)]] = {}
     columns: Annotated[list[_Column], AfterValidator(_each_once)]
 
     @model_validator(mode="after")

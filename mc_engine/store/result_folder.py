@@ -10,10 +10,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mc_engine.durable_file import make_folder
 from mc_engine.errors import StoreError
@@ -24,6 +23,9 @@ from mc_engine.store.parts import Column, arrow_schema, arrow_table, attributes,
 from mc_engine.store.result_records import FORMAT, TABLES, parse_result
 from mc_engine.store.run_files import JOURNAL, RARE_EVENT, STEMS, TUNING, kind_of
 from mc_engine.store.writer_lock import WriterLock
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 ColumnsAndArrays = tuple[Sequence[Column], Mapping[str, np.ndarray]]
 
@@ -56,7 +58,7 @@ def write_result(
     result_files(path, kind).write({**files, f"{STEMS[kind]}.json": content.encode()}, lock=lock)
 
 
-def read_result(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, pd.DataFrame]]:
+def read_result(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, "pd.DataFrame"]]:
     """Record and tables of the result in `path`; StoreError if there is none, or a byte has changed."""
     again = f"`mc-engine {COMMANDS[kind]}` makes one"
     if kind_of(path) != kind:
@@ -74,7 +76,7 @@ def read_result(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, pd.Dat
     return record, {name: _result_table(path, name, contents, record) for name in TABLES[kind]}
 
 
-def _result_table(path: Path, name: str, contents: Mapping[str, bytes], record: Mapping[str, Any]) -> pd.DataFrame:
+def _result_table(path: Path, name: str, contents: Mapping[str, bytes], record: Mapping[str, Any]) -> "pd.DataFrame":
     columns = columns_in(record["tables"][name])
     try:
         table = parquet_table(contents[f"{name}.parquet"])

@@ -24,9 +24,6 @@ Kind = Literal["number", "integer", "word", "switch"]
 _NAMED: Shape = {"name": str, "unit": (str, ""), "description": (str, "")}
 _COLUMN = {**_NAMED, "role": str, "kind": (Kind, "number")}
 _TABLE = {"rows": Count, "columns": [_COLUMN]}
-_HEAD: Shape = {
-    "format": Literal[2],
-}
 _LIMITS: Shape = {"metric": str, "at_most": Limit, "at_least": Limit, "source": (str, "")}
 _SEARCH: Shape = {
     **dict.fromkeys(("population", "generations", "flown", "cases"), Some),
@@ -76,7 +73,9 @@ _SHAPES: dict[str, Shape] = {TUNING: {"tuning": _SEARCH}, RARE_EVENT: {"rare_eve
 def parse_result(content: bytes, kind: str) -> dict[str, Any]:
     """The record in these bytes, with defaults filled in; ValueError with a sentence if it is not valid."""
     tables = {"tables": dict.fromkeys(TABLES[kind], _TABLE)}
-    record = checked_record(content, _model({**_HEAD, **_SHAPES[kind], **tables}, Head), FORMAT)[1].model_dump()
+    record = checked_record(content, _model({"format": Literal[2], **_SHAPES[kind], **tables}, Head), FORMAT)[
+        1
+    ].model_dump()
     if kind == TUNING:
         _refuse_other_columns(record)
     elif len({item[key] is None for item in record["rare_event"]["inputs"] for key in ("across", "across_sigma")}) > 1:

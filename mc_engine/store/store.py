@@ -13,10 +13,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
 
 from mc_engine import durable_file as disk
@@ -31,6 +30,9 @@ from mc_engine.store.parts import CASE_COLUMNS, PART_FOLDERS, Column, Part, Writ
 from mc_engine.store.receipts import Range, Receipts, receipts_of
 from mc_engine.store.run_files import CAMPAIGN, CUT_SHORT, JOURNAL, MANIFEST, NO_FOLDER, NOMINAL, is_run_directory
 from mc_engine.store.writer_lock import LOCK_FILES, LOCK_NAME, WriterLock, writer_of_new
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _EDITED = "damaged or edited, it is not the one this run began with; put the original back"
 _OURS_BEFORE_THE_JOURNAL = {*LOCK_FILES, CAMPAIGN, MANIFEST, *PART_FOLDERS}
@@ -212,7 +214,7 @@ class Store:
 
     # ---- reading
 
-    def cases(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
+    def cases(self, columns: Sequence[str] | None = None) -> "pd.DataFrame":
         """The case table: one row per committed case, by case_id, with all columns or the named ones.
 
         `attrs["units"]`, `["descriptions"]` and `["roles"]` describe the columns.  StoreError if a part is damaged.
@@ -238,7 +240,7 @@ class Store:
         receipt = self.nominal_part
         return parts.read_part(self.path, receipt, self.columns).to_pylist()[0] if receipt else {}
 
-    def histories(self) -> pd.DataFrame:
+    def histories(self) -> "pd.DataFrame":
         """The saved time histories: case_id, t_s and the outputs; no rows if none were written."""
         quantities, receipt = self.manifest.get("quantities", []), self.history_part
         tables = [read_histories(self.path, receipt, quantities)] if receipt else []
@@ -356,7 +358,7 @@ class Store:
                 self._remove(before)
 
 
-def _data_frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> pd.DataFrame:
+def _data_frame(tables: Sequence[pa.Table], columns: Sequence[Column]) -> "pd.DataFrame":
     table = pa.concat_tables(tables) if tables else parts.arrow_schema(columns).empty_table()
     frame = table.to_pandas(use_threads=False)
     frame.attrs.update(parts.attributes(columns))

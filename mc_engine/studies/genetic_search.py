@@ -4,6 +4,7 @@ K. Deb, A. Pratap, S. Agarwal, T. Meyarivan, IEEE Transactions on Evolutionary C
 constraint handling: a feasible candidate beats any other, of two infeasible ones the one with the smaller violation.
 """
 
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -23,22 +24,28 @@ class GeneticSearch:
 
     def __init__(self, tuning: Tuning, population: int, seed: int):
         """EngineError in a sentence if pymoo is not installed."""
-        pymoo = _pymoo()
+        if find_spec("pymoo") is None:
+            raise EngineError(f"tuning needs pymoo, which is not installed; {how_to_install('tune')}")
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.problem import Problem
+        from pymoo.operators.crossover.sbx import SBX
+        from pymoo.operators.mutation.pm import PM
+        from pymoo.operators.sampling.lhs import LHS
+
         n_tuned = len(tuning.parameters)
-        self._signs = np.array([1.0 if objective.large_is_bad else -1.0 for objective in tuning.objectives])
-        self._problem = pymoo["Problem"](
+        self._signs = tuning.signs
+        self._problem = Problem(
             n_var=n_tuned,
             n_obj=len(tuning.objectives),
             n_ieq_constr=len(tuning.constraints) + 1,
             xl=np.array([parameter.lower for parameter in tuning.parameters]),
             xu=np.array([parameter.upper for parameter in tuning.parameters]),
         )
-        self._evaluate, self._static = pymoo["Evaluator"]().eval, pymoo["StaticProblem"]
-        self._algorithm = pymoo["NSGA2"](
+        self._algorithm = NSGA2(
             pop_size=population,
-            sampling=pymoo["LHS"](),
-            crossover=pymoo["SBX"](prob=tuning.crossover, eta=_CROSSOVER_INDEX),
-            mutation=pymoo["PM"](prob=1.0, prob_var=tuning.mutation or 1.0 / n_tuned, eta=_MUTATION_INDEX),
+            sampling=LHS(),
+            crossover=SBX(prob=tuning.crossover, eta=_CROSSOVER_INDEX),
+            mutation=PM(prob=1.0, prob_var=tuning.mutation or 1.0 / n_tuned, eta=_MUTATION_INDEX),
         )
         self._algorithm.setup(self._problem, seed=seed, termination=("n_gen", 10**9), verbose=False)
         self._asked: Any = None
@@ -52,29 +59,14 @@ class GeneticSearch:
 
     def tell(self, scores: Scores) -> None:
         """Report the scores of the candidates of the last `ask`."""
+        from pymoo.core.evaluator import Evaluator
+        from pymoo.problems.static import StaticProblem
+
         dead = ~np.isfinite(scores.violation)
         objectives = np.where(np.isfinite(scores.objectives), scores.objectives * self._signs, _WORST)
         excess = np.column_stack([np.nan_to_num(scores.excess, nan=0.0), np.where(dead, _DEAD, 0.0)])
-        self._evaluate(self._static(self._problem, F=objectives, G=excess), self._asked)
+        Evaluator().eval(StaticProblem(self._problem, F=objectives, G=excess), self._asked)
         self._algorithm.tell(infills=self._asked)
-
-
-def _pymoo() -> dict[str, Any]:
-    """The names of pymoo that the search uses; imported here, so that only a search needs the package."""
-    try:
-        from pymoo.algorithms.moo.nsga2 import NSGA2
-        from pymoo.core.evaluator import Evaluator
-        from pymoo.core.problem import Problem
-        from pymoo.operators.crossover.sbx import SBX
-        from pymoo.operators.mutation.pm import PM
-        from pymoo.operators.sampling.lhs import LHS
-        from pymoo.problems.static import StaticProblem
-    except ModuleNotFoundError as error:
-        if (error.name or "").split(".")[0] != "pymoo":
-            raise
-        raise EngineError(f"tuning needs pymoo, which is not installed; {how_to_install('tune')}") from None
-    names = (NSGA2, Evaluator, Problem, SBX, PM, LHS, StaticProblem)
-    return {cls.__name__: cls for cls in names} | {"PM": PM, "SBX": SBX, "LHS": LHS}
 
 
 def non_dominated(values: np.ndarray) -> np.ndarray:

@@ -63,13 +63,10 @@ class LimitState:
             flown = fly_in_threads(self.campaign, self.inputs(u), ids, ["status", requirement.metric], self._workers)
         status, metric = flown["status"], flown[requirement.metric]
         able = (status == STATUS_NAME[OK]) & np.isfinite(metric)
+        upper = np.inf if requirement.at_most is None else requirement.at_most
+        lower = -np.inf if requirement.at_least is None else requirement.at_least
         with np.errstate(invalid="ignore"):
-            sides = [
-                limit
-                for limit in (_below(requirement.at_most, metric), _below(metric, requirement.at_least))
-                if limit is not None
-            ]
-            margin = np.where(able, np.min(sides, axis=0), -np.inf)
+            margin = np.where(able, np.minimum(upper - metric, metric - lower), -np.inf)
         # a case right at its limit is inside: the engine's word for it, safe from rounding of the difference
         inside = able & inside_limits(metric, requirement.at_most, requirement.at_least)
         margin = np.where(inside, np.maximum(margin, _LEAST), np.minimum(margin, 0.0))
@@ -98,10 +95,6 @@ class LimitState:
                 dispersion.distribution, shares.get(dispersion.name, np.full(len(u), 0.5))
             )
         return table
-
-
-def _below(upper: np.ndarray | float | None, lower: np.ndarray | float | None) -> np.ndarray | None:
-    return None if upper is None or lower is None else np.asarray(upper - lower)
 
 
 def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:

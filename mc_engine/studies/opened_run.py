@@ -259,8 +259,8 @@ class Case:
         a simulator, which has no physics to look into.
         """
         from mc_engine.flight.interpreted import OutOfTime  # which loads the compiler
-        from mc_engine.runner.debugging import inputs_of
         from mc_engine.runner.flown_campaign import campaign_of
+        from mc_engine.runner.histories import inputs_of
         from mc_engine.studies.trace import trace_case
 
         campaign = campaign_of(self.store)

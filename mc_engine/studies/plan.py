@@ -18,6 +18,7 @@ from mc_engine.statistics.requirements import JOINT, SAMPLING_DESIGNS, joint_sha
 from mc_engine.statistics.time_uniform import smallest_sample as smallest_at_any_time
 
 ROWS = 6  # failures 0 to 5
+_RANKS = 3  # of two-sided intervals
 
 
 class PlanRow(NamedTuple):
@@ -40,11 +41,6 @@ def plan_row(share: float, confidence: float, failures: int) -> PlanRow:
     return PlanRow(failures, cases, lower_bound(cases - failures, cases, confidence), passes)
 
 
-def plan_table(share: float, confidence: float, rows: int = ROWS) -> list[PlanRow]:
-    """The smallest samples for 0, 1, ..., rows - 1 failures."""
-    return [plan_row(share, confidence, failures) for failures in range(rows)]
-
-
 def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Iterator[str]:
     """A line per row, under a heading; with the cases that `run --until verdict` takes for as many failures."""
     heading = f"{'failures':>8}  {'cases':>9}  {'until verdict':>13}  {'demonstrated share':>18}"
@@ -54,10 +50,10 @@ def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Ite
         yield f"{row.failures:>8}  {row.cases:>9}  {anytime:>13}  {row.shown:>18.6f}  {100.0 * row.half_rate:.1f} %"
 
 
-def interval_lines(share: float, confidence: float, rows: int = 3) -> Iterator[str]:
+def interval_lines(share: float, confidence: float) -> Iterator[str]:
     """Cases for an interval between order statistics that holds the share (two-sided, Wilks)."""
     yield f"{'between the':>28}  {'cases':>9}"
-    for rank in range(1, rows + 1):
+    for rank in range(1, _RANKS + 1):
         words = "smallest and the largest" if rank == 1 else f"{_ordinal(rank)} smallest and largest"
         yield f"{words:>28}  {smallest_interval_sample(share, confidence, rank):>9}"
 

@@ -61,15 +61,15 @@ class _TracedFlight(InterpretedFlight):
             self._observed = arguments
         if name in _AT_ROWS:
             return super().call(name, function, arguments)
-        with _named_numbers() as found:
+        with _named_numbers() as named:
             result = super().call(name, function, arguments)
-        self._held.update(found)
+        self._held.update(named)
         return result
 
     def record(self, array: Any, row: int, t: Any, fields: Any) -> None:
         model, functions, arguments = self.model, self._functions, self._observed
         _, s, m, *_ = arguments
-        with _named_numbers() as found:
+        with _named_numbers() as named:
             rates = functions.rhs(*arguments)
             events = functions.events(*arguments) if model.events is not None else ()
             functions.observe(*arguments)
@@ -83,7 +83,7 @@ class _TracedFlight(InterpretedFlight):
             columns |= {f"m.{name}": float(value) for name, value in kept if name not in (PHASE, BEGAN)}
         columns |= {f"d({field.symbol})/dt": float(v) for field, v in zip(model.states, rates, strict=True)}
         columns |= {f"event.{event.name}": float(v) for event, v in zip(model.event_list, events, strict=True)}
-        self.rows.append(columns | found | self._held)
+        self.rows.append(columns | named | self._held)
 
 
 @contextmanager
@@ -93,7 +93,7 @@ def _named_numbers() -> Iterator[dict[str, float]]:
     By the functions that were called, one inside another, and the variable; a function that one function calls again
     is numbered.
     """
-    found: dict[str, float] = {}
+    named: dict[str, float] = {}
     path: list[tuple[str, dict[str, int]]] = []  # of each function under way: its name, and how often it called others
 
     def on_call(frame: FrameType, event: str, _: Any) -> None:
@@ -111,12 +111,12 @@ def _named_numbers() -> Iterator[dict[str, float]]:
             prefix, _ = path.pop()
             for variable in code.co_varnames[code.co_argcount :] + code.co_cellvars:
                 if variable in frame.f_locals and variable not in code.co_varnames[: code.co_argcount]:
-                    found.update(_numbers(prefix + variable, frame.f_locals[variable]))
+                    named.update(_numbers(prefix + variable, frame.f_locals[variable]))
 
     before = sys.getprofile()
     sys.setprofile(on_call)
     try:
-        yield found
+        yield named
     finally:
         sys.setprofile(before)
 

@@ -121,7 +121,6 @@ def _search(
 ) -> tuple[list[Generation], str]:
     """All generations, and why there are no more of them; `keep` stores what there is after each."""
     per, flown = cases_per_candidate(campaign, tuning), list[Generation]()
-    signs = _signs(tuning)
     with stop_signal() as stop:
         for number in range(plan["generations"]):
             candidates = search.ask()
@@ -130,7 +129,7 @@ def _search(
             scores = fly_candidates(campaign, tuning, candidates, workers)
             search.tell(scores)
             before = flown[-1] if flown else None
-            flown.append(_generation(candidates, scores, before, signs))
+            flown.append(_generation(candidates, scores, before, tuning.signs))
             keep(flown, UNFINISHED)
             if progress is not None:
                 failed = sum(int(generation.scores.failed.sum()) for generation in flown)
@@ -144,10 +143,6 @@ def _search(
             if plan["patience"] is not None and is_stalled(flown, plan["patience"]):
                 return flown, f"no progress in {plan['patience']} generations"
     return flown, "all generations"
-
-
-def _signs(tuning: Tuning) -> np.ndarray:
-    return np.array([1.0 if objective.large_is_bad else -1.0 for objective in tuning.objectives])
 
 
 def _generation(candidates: np.ndarray, scores: Scores, before: Generation | None, signs: np.ndarray) -> Generation:
@@ -194,7 +189,7 @@ def _write_tables(
     lock: WriterLock,
 ) -> None:
     columns, arrays = _evaluations(campaign, tuning, flown)
-    small = _signs(tuning) * np.column_stack([arrays[objective.name] for objective in tuning.objectives])
+    small = tuning.signs * np.column_stack([arrays[objective.name] for objective in tuning.objectives])
     front = np.flatnonzero(non_dominated(np.where(arrays["feasible"][:, None], small, np.nan)))
     front = front[np.argsort(small[front, 0], kind="stable")]
     ended = manifest["tuning"]["end"] != UNFINISHED

@@ -111,7 +111,9 @@ def _note(flown: Flown, contributions: Contributions) -> str:
     if contributions.trends is None:
         return (
             f"From {count(contributions.flights)} cases in {count(contributions.n_tried)} blocks, flown for this "
-            f"purpose and in no other statistic. {each} Pick-freeze estimates (Janon 2014, Jansen 1999)."
+            f"purpose and in no other statistic. {each} Pick-freeze estimates (Janon 2014, Jansen 1999). A total "
+            "effect is the variance that remains, on average, when all other inputs are known; where inputs interact, "
+            "the variance falls by another amount if the input is held at its nominal value."
         )
     note = (
         "Estimated from the table of cases. Unexplained: fraction that the surrogate model behind the total effects "

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.drawing.palette import KEY_MARK, field_colour
+from reports.drawing.palette import KEY_MARK, PAPER, field_colour
 from reports.text.numbers import number
 
 MARGIN = 0.04  # of an axis, beyond the marks on it
@@ -188,8 +188,8 @@ def finite(values: Iterable[Any]) -> np.ndarray:
 class Axis:
     """label : beside it; name : what it measures, where there is no label.  reach : its ends, in their order.
 
-    ticks : places and words of its own ticks; most : of other ones; whole : at whole numbers only; zero : reaches 0;
-    top : ticks stand above.  Without a margin it ends at the outermost mark.
+    ticks : places and words of its own ticks; most : of other ones; whole : at whole numbers only; zero : reaches 0.
+    Without a margin it ends at the outermost mark.
     """
 
     label: str = ""
@@ -201,7 +201,6 @@ class Axis:
     whole: bool = False
     zero: bool = False
     grid: bool = True
-    top: bool = False
     margin: float = MARGIN
 
     def ends(self, values: Iterable[np.ndarray]) -> tuple[float, float]:
@@ -342,7 +341,7 @@ def joined(outlines: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate(parts[:-1])
 
 
-def nominal_ring(place: tuple[float, float], colour: str, name: str = "nominal", edge: str = "") -> Points:
-    """A ring around one point; with `edge`, its inside is filled with that colour."""
+def nominal_ring(place: tuple[float, float], colour: str, name: str = "nominal") -> Points:
+    """A ring around one point, its inside filled with the colour of the page."""
     x, y = (np.array([value], dtype=np.float64) for value in place)
-    return Points(x, y, colour, name, "ring", 12.0, edge=edge, key=name)
+    return Points(x, y, colour, name, "ring", 12.0, edge=PAPER, key=name)

@@ -169,15 +169,11 @@ class _Box:
 
     @property
     def head(self) -> float:
-        power = LINE if self.y_ticks.power else 0.0
-        return 3.0 + LINE * len(self.title) + power + (self.tick_room if self.plot.x.top else 0.0)
+        return 3.0 + LINE * (len(self.title) + bool(self.y_ticks.power))
 
     @property
     def foot(self) -> float:
-        below = 0.0 if self.plot.x.top else self.tick_room
-        return below + LINE * len(
-            self.x_label if self.plot.x.label else [self.x_ticks.power] * bool(self.x_ticks.power)
-        )
+        return self.tick_room + LINE * (len(self.x_label) if self.plot.x.label else bool(self.x_ticks.power))
 
     def drawn(self, head: float, height: float, clip: int) -> Iterator[str]:
         top = self.top + head
@@ -210,9 +206,8 @@ class _Box:
         yield f'<path d="{"".join(lines)}" stroke="{on_paper(GRID)}" stroke-width=".5"/>' if lines else ""
 
     def _axes(self, frame: Frame) -> Iterator[str]:
-        if not self.plot.x.top:
-            corner = f"M{frame.left:.2f} {frame.top:.2f}V{frame.bottom:.2f}H{frame.right:.2f}"
-            yield f'<path d="{corner}" stroke="{AXIS}" stroke-width=".6"/>'
+        corner = f"M{frame.left:.2f} {frame.top:.2f}V{frame.bottom:.2f}H{frame.right:.2f}"
+        yield f'<path d="{corner}" stroke="{AXIS}" stroke-width=".6"/>'
         for place, lines in zip(frame.y(np.array(self.y_ticks.places)), self.y_ticks.texts, strict=True):
             for k, line in enumerate(lines):
                 y = place + 2.7 + LINE * (k - 0.5 * (len(lines) - 1))
@@ -223,7 +218,7 @@ class _Box:
         middle = 0.5 * (frame.top + frame.bottom)
         for k, line in enumerate(self.y_label):
             yield lettering.text(self.left + 7.0 + LINE * k, middle, line, anchor="middle", turned=True)
-        below = frame.bottom + (0.0 if self.plot.x.top else self.tick_room)
+        below = frame.bottom + self.tick_room
         power_width = lettering.width(self.x_ticks.power, TYPE) + 3.0 if self.x_ticks.power else 0.0
         for k, line in enumerate(self.x_label):
             farthest = frame.right - power_width - 0.5 * lettering.width(line, TYPE)
@@ -238,12 +233,11 @@ class _Box:
             for k, line in enumerate(lines):
                 if ticks.turned:
                     x = place + 2.7 + LINE * (k - 0.5 * (len(lines) - 1))
-                    y = frame.top - 4.0 if self.plot.x.top else frame.bottom + 4.0
-                    yield lettering.text(x, y, line, anchor="start" if self.plot.x.top else "end", turned=True)
+                    yield lettering.text(x, frame.bottom + 4.0, line, anchor="end", turned=True)
                     continue
-                y = frame.top - 4.0 - LINE * (len(lines) - 1 - k) if self.plot.x.top else frame.bottom + LINE * (k + 1)
                 half = 0.5 * lettering.width(line, TYPE)
-                yield lettering.text(min(max(place, self.left + half), self.right - half), y, line, anchor="middle")
+                x, y = min(max(place, self.left + half), self.right - half), frame.bottom + LINE * (k + 1)
+                yield lettering.text(x, y, line, anchor="middle")
 
 
 class _Scale:

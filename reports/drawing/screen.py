@@ -208,12 +208,11 @@ def _axis(axis: Axis, ends: tuple[float, float], **own_keys: Any) -> dict[str, A
     return {
         "title": {"text": plain(axis.label), "standoff": 8, "font": {"size": 13}},
         "automargin": True, "gridcolor": GRID, "linecolor": MUTED, "tickcolor": MUTED, "zeroline": False,
-        "ticks": "outside", "ticklen": 4, "showline": not axis.top, "exponentformat": "power", "minexponent": 5,
+        "ticks": "outside", "ticklen": 4, "showline": True, "exponentformat": "power", "minexponent": 5,
         "nticks": axis.most + 1,
         "range": [float(np.log10(end)) for end in ends] if axis.log else list(ends),
         **({"type": "log"} if axis.log else {"type": "linear"}),
         **({"showgrid": False} if not axis.grid else {}),
-        **({"side": "top"} if axis.top else {}),
         **({} if own is None else {"tickvals": [at for at, _ in own], "ticktext": [plain(text) for _, text in own]}),
         **({"tickformat": ",d"} if axis.whole and own is None else {}),
         **own_keys,

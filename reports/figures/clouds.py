@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, joined, nominal_ring
-from reports.drawing.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PAPER, PURPLE, SKY, VERMILION
+from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, joined
+from reports.drawing.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILION
 from reports.text.numbers import count
 
 # Colour and shape by class: apart in grey and for the colour-blind, too.
@@ -55,7 +55,7 @@ def case_scatter(
     n_tried: int,
     *,
     styles: Sequence[tuple[str, str]] = OUTCOMES,
-    nominal: tuple[float, float] | None = None,
+    rings: Sequence[Points] = (),
     outlines: Sequence[Outline] = (),
     form: str = "Scatter of cases",
 ) -> Drawing:
@@ -63,6 +63,7 @@ def case_scatter(
 
     cloud : all of them, with their numbers and columns.
     classes : words of each, and how many cases belong to it, those not shown among them.
+    rings : around single points, as the nominal case.
     """
     clouds: list[Mark] = []
     for k in sorted((k for k, (_, cases) in enumerate(classes) if cases), key=lambda k: -classes[k][1]):
@@ -75,6 +76,5 @@ def case_scatter(
             replace(cloud, x=cloud.x[rows], y=cloud.y[rows], cases=numbers, name=words, colour=colour, sign=sign,
                     size=size, opacity=opacity, key=f"{words}: {count(cases)} of {count(n_tried)} cases{thinned}")
         )  # fmt: skip
-    rings = [nominal_ring(nominal, VERMILION, edge=PAPER)] if nominal else []
     marks = (*clouds, *outline_lines(outlines), *rings)
     return Drawing(form, (Plot(marks, Axis(axes[0]), Axis(axes[1]), height=420.0),))

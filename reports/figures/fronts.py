@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 
 from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, nominal_ring
-from reports.drawing.palette import BLUE, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
+from reports.drawing.palette import BLUE, INK, MUTED, ORANGE, SKY, VERMILION
 from reports.text.numbers import count
 
 MOST_PANELS = 6
@@ -55,7 +55,7 @@ def front_figure(
             marks.append(Line(x, y, colour, "front", width=1.6, step="hv" if first_small else "vh"))
         marks.append(Points(x, y, colour, name, size=6.0, key=f"{name}: {count(len(x))} candidates" if len(x) else ""))
         for place, (point, values) in enumerate(published):
-            marks.append(nominal_ring((values[i], values[k]), (VERMILION, INK)[place % 2], point, PAPER))
+            marks.append(nominal_ring((values[i], values[k]), (VERMILION, INK)[place % 2], point))
         axes = Axis(labels[i], reach=reaches[i]), Axis(labels[k], reach=reaches[k])
         plots.append(Plot(tuple(marks), *axes, height=440.0 if len(pairs) == 1 else 340.0))
     return Drawing("Candidates and the front of the objectives", tuple(plots))

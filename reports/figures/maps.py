@@ -1,10 +1,11 @@
 """A metric over two inputs: filled contours with the flown cases and the nominal on them."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mc_engine.statistics import SurfaceMap
-from reports.drawing.marks import Axis, Drawing, Field, Plot, Points, nominal_ring
-from reports.drawing.palette import VERMILION
+from reports.drawing.marks import Axis, Drawing, Field, Mark, Plot, Points
 from reports.drawing.ticks import covering
 from reports.text.numbers import count, number, with_unit
 
@@ -21,26 +22,26 @@ def metric_map(
     unit: str,
     *,
     n_points: int,
-    nominal: tuple[float, float] | None = None,
+    rings: Sequence[Points] = (),
     columns: tuple[str, str, str] | None = None,
 ) -> Drawing:
     """points : float64[k, 2], the cases shown of n_points, with their metric float64[k] and numbers int64[k].
 
     labels : of both axes and of the metric;  unit : of the metric;  columns : their names in the table of cases.
+    rings : around single points, as the nominal case.
     """
     key = f"surface: {surface_method(surface, unit)}"
     x, y = points.T
     shown = "all" if len(x) == n_points else f"{count(len(x))} of {count(n_points)}"
     texts = [f"{labels[2]}: {number(float(value))}" for value in values]
-    marks: list[Field | Points] = [
+    marks: tuple[Mark, ...] = (
         Field(surface.x, surface.y, surface.value, contour_levels(surface.value), labels[2], key),
         Points(x, y, DOT, size=3.5, edge="#ffffff", texts=texts, cases=case_ids, columns=columns,
                key=f"cases, {shown} shown"),
-    ]  # fmt: skip
-    if nominal:
-        marks.append(nominal_ring(nominal, VERMILION, edge="#ffffff"))
+        *rings,
+    )  # fmt: skip
     across, up = (Axis(label, grid=False, margin=0.0) for label in labels[:2])
-    return Drawing("Filled contour map", (Plot(tuple(marks), across, up, height=500.0),))
+    return Drawing("Filled contour map", (Plot(marks, across, up, height=500.0),))
 
 
 def surface_method(surface: SurfaceMap, unit: str) -> str:

@@ -15,6 +15,7 @@ from reports.drawing import screen
 from reports.drawing.marks import Axis, Band, Limit, Line, Plot
 from reports.figures.clouds import outcome_cloud
 from reports.figures.histories import MEDIAN
+from reports.text.numbers import count
 
 SCRIPTS = ("tables.js", "figures.js", "cases.js", "histories.js")
 
@@ -36,6 +37,7 @@ def _environment() -> Environment:
     )
     environment.filters["page_colour"] = page_colour
     environment.filters["breakable"] = breakable
+    environment.filters["grouped"] = count
     return environment
 
 
@@ -58,9 +60,11 @@ def render_html(document: Document) -> bytes:
     """The page, UTF-8."""
     cases = document.cases
     figures = [
-        {"id": f"figure-{block.number}-{index}", "number": block.number, **_by_row(panel, cases)}
+        {"id": f"figure-{block.number}-{index}", "number": block.number, **_background(plot), **_by_row(panel, cases)}
         for block in blocks_of(document, FigureBlock)
-        for index, panel in enumerate(screen.specifications(block.drawing))
+        for index, (plot, panel) in enumerate(
+            zip(block.drawing.plots, screen.specifications(block.drawing), strict=True)
+        )
     ]
     page = _environment().get_template("report.html.j2")
     text = page.render(
@@ -121,7 +125,6 @@ def case_record(document: Document) -> dict[str, Any] | None:
             str(case): {name: [screen.packed(t), screen.packed(y)] for name, (t, y) in curves.items()}
             for case, curves in cases.histories.items()
         },
-        "behind": _history_backgrounds(document),
         "panel": screen.history_panel(cases.time),
     }  # fmt: skip
 
@@ -130,13 +133,11 @@ def _column_values(values: np.ndarray | tuple[str, ...]) -> Any:
     return screen.column(values) if isinstance(values, np.ndarray) else values
 
 
-def _history_backgrounds(document: Document) -> dict[str, list[dict[str, Any]]]:
-    """Envelopes, medians and limits of history quantities, which a single case's curve is drawn over."""
-    backgrounds: dict[str, list[dict[str, Any]]] = {}
-    for block in blocks_of(document, FigureBlock):
-        for plot in block.drawing.plots:
-            marks = [mark for mark in plot.marks if isinstance(mark, Band | Limit)
-                     or (isinstance(mark, Line) and mark.name.startswith(MEDIAN))]  # fmt: skip
-            if plot.quantity:
-                backgrounds.setdefault(plot.quantity, [trace for mark in marks for trace in screen.traced(mark, plot)])
-    return backgrounds
+def _background(plot: Plot) -> dict[str, Any]:
+    """Of a panel of a history quantity, the traces that the curve of any case is drawn over: all but those of cases."""
+    behind = [
+        place
+        for place, mark in enumerate(plot.marks)
+        if isinstance(mark, Band | Limit) or (isinstance(mark, Line) and mark.name.startswith(MEDIAN))
+    ]
+    return {"quantity": plot.quantity, "behind": behind} if plot.quantity else {}

@@ -8,7 +8,7 @@ import pandas as pd
 from reports.figures.histories import Envelope
 
 FEWEST_CASES = 20  # of a band
-INSTANTS = 300
+INSTANTS = 150
 OUTER = (0.00135, 0.005, 0.01, 0.025, 0.05)  # percentiles, the first of which a number of cases supports is drawn
 
 

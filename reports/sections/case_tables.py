@@ -106,8 +106,9 @@ def _case_table(flown: Flown, caption: str, metric: str | None, cases: pd.DataFr
     for fact in shown:
         columns.append(Column(axis_label(flown.words(fact.name), fact.unit), "number"))
         cells.append(_input_cells(cases[fact.name]))
-    columns.append(Column("Command to replay", "code"))
-    cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in cases["case_id"]])
+    if not flown.manifest.get("imported"):  # such cases cannot be flown again
+        columns.append(Column("Command to replay", "code"))
+        cells.append([Cell(f"mc-engine replay {shell_word(flown.name)} {case}") for case in cases["case_id"]])
     return Table(caption, tuple(columns), tuple(zip(*cells, strict=True)), _inputs_said(flown, ranked, len(shown)))
 
 

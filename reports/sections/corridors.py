@@ -13,7 +13,7 @@ from reports.drawing.marks import Points
 from reports.figures.clouds import LIMIT_SETS, Outline, case_scatter
 from reports.run.flown import Flown
 from reports.run.outcomes import inside, inside_words
-from reports.sections.figure_blocks import nominal_point, thinned_rows
+from reports.sections.figure_blocks import nominal_rings, thinned_rows
 from reports.sections.tables import limit_text
 from reports.text.numbers import count
 
@@ -52,7 +52,7 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
         (flown.axis(figure.x), flown.axis(figure.y)),
         flown.n_held,
         styles=LIMIT_SETS,
-        nominal=nominal_point(flown, figure.x, figure.y),
+        rings=nominal_rings(flown, figure.x, figure.y),
         outlines=limits,
         form="Cases by the limits that they violate",
     )

@@ -12,7 +12,8 @@ from mc_engine.statistics import map_metric
 from mc_engine.statistics.maps import FEWEST, LEAST_EXPLAINED, explained_share
 from mc_engine.statistics.summary import nearly_equal
 from reports.document.blocks import FigureBlock
-from reports.drawing.marks import Drawing, Plot, Points
+from reports.drawing.marks import Drawing, Plot, Points, nominal_ring
+from reports.drawing.palette import VERMILION
 from reports.figures.clouds import Outline, case_scatter
 from reports.figures.distributions import histogram, histograms
 from reports.figures.histories import Envelope, HistoryLine, Phases, history_figure, history_plot
@@ -99,7 +100,7 @@ def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
         labels,
         flown.unit(figure.metric),
         n_points=int(used.size),
-        nominal=nominal_point(flown, figure.x, figure.y),
+        rings=nominal_rings(flown, figure.x, figure.y),
         columns=(figure.x, figure.y, figure.metric),
     )
     return FigureBlock(f"{figure.title}.", drawing, "wide")
@@ -137,9 +138,10 @@ def _no_map(figure: MapFigure, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> s
     return f"{flat[0]} is the same in all cases" if z.size > 1 and flat else ""
 
 
-def nominal_point(flown: Flown, x: str, y: str) -> tuple[float, float] | None:
+def nominal_rings(flown: Flown, x: str, y: str) -> tuple[Points, ...]:
+    """A ring around the nominal case, if it has both numbers."""
     place = flown.nominal_value(x), flown.nominal_value(y)
-    return None if place[0] is None or place[1] is None else (place[0], place[1])
+    return () if place[0] is None or place[1] is None else (nominal_ring((place[0], place[1]), VERMILION),)
 
 
 def scatter_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
@@ -175,7 +177,7 @@ def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Ou
         tuple(zip(outcome_names(flown), counts, strict=True)),
         (flown.axis(x_name), flown.axis(y_name)),
         flown.n_held,
-        nominal=nominal_point(flown, x_name, y_name),
+        rings=nominal_rings(flown, x_name, y_name),
         outlines=regions,
     )
 

@@ -32,6 +32,7 @@ def origin_table(
         ("started (UTC)", manifest.get("created_utc", "")),
         ("engine", manifest.get("engine", "")),
         ("campaign", campaign.get("name", "")),
+        ("imported from", (manifest.get("imported") or {}).get("file", "")),
         ("campaign digest", campaign.get("digest", "")),
         ("model", campaign.get("model", "") or model.get("name", "")),
         ("model source digest", model.get("digest", "")),

@@ -24,11 +24,12 @@ ANCHOR = "cases"
 NOMINAL = -1
 BINS = 10
 MOST_CASES = 6000  # drawn, and held where a page cannot hold all
-MOST_NUMBERS = 160_000  # of the cases, 4 bytes each
+MOST_NUMBERS = 400_000  # of the cases, 4 bytes each
+ROOM = 160_000  # numbers that further metrics may fill up
 MOST_METRICS = 24
 WORST_RANKS = 10
-SAMPLES = 160  # of a curve
-MOST_SAMPLES = 300_000  # of all histories; about 3 MB
+SAMPLES = 120  # of a curve
+MOST_SAMPLES = 120_000  # of all histories, 5 bytes each
 
 
 def case_blocks(flown: Flown) -> Iterator[Block | str]:
@@ -82,9 +83,9 @@ def case_data(flown: Flown, sections: Iterable[Section]) -> CaseData | None:
     if not flown.n_tried:
         return None
     key = [*flown.with_role("dispersion"), *(flown.columns[name] for name in flown.key_metrics[:MOST_METRICS])]
-    most = MOST_NUMBERS // flown.n_tried
-    everything = most >= len(key)
-    facts = _shown_columns(flown, min(most, len(key) + MOST_METRICS) if everything else len(key))
+    everything = flown.n_tried * len(key) <= MOST_NUMBERS
+    further = min(max(ROOM // flown.n_tried - len(key), 0), MOST_METRICS) if everything else 0
+    facts = _shown_columns(flown, len(key) + further)
     histories, left_out = case_histories(flown)
     rows = np.arange(flown.n_held) if everything else _held_rows(flown, sections, histories, max(1, len(facts)))
     return CaseData(

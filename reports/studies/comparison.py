@@ -190,10 +190,14 @@ def _metric_blocks(comparison: Comparison) -> Iterator[FigureBlock | Table | str
 
 
 def _ranked(comparison: Comparison) -> list[MetricChange]:
-    """The metrics that differ, the largest effect first."""
+    """The metrics that differ: those that changed beyond chance first, of them the largest effect first."""
+
+    def significant(change: MetricChange) -> bool:
+        return change.shift_adjusted <= comparison.alpha or change.spread_adjusted <= comparison.alpha
+
     return sorted(
         (metric for metric in comparison.metrics if not metric.same and finite(metric.shift)),
-        key=lambda change: -change.effect,
+        key=lambda change: (not significant(change), -change.effect),
     )
 
 
@@ -246,7 +250,8 @@ def _metric_table(comparison: Comparison, moved: list[MetricChange]) -> Table:
         Column("Adjusted p", "number"),
     )
     note = (
-        f"The largest change first. Small: the {percent(comparison.confidence)} interval of the quantity that the test "
+        "Significant changes first, each kind by its size. "
+        f"Small: the {percent(comparison.confidence)} interval of the quantity that the test "
         "is of; cases used of cases flown. σ: standard deviation of run A."
     )
     return Table("Metrics of both runs", columns, tuple(_metric_row(comparison, change) for change in moved), note)

@@ -29,7 +29,7 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
     """Figures of what both runs have; metrics : those whose distributions are drawn, in this order."""
     panels = tuple(panel for name in metrics[:MOST_PANELS] if (panel := _distribution(runs, name)) is not None)
     if panels:
-        caption = "Distributions of the metrics that changed, the largest change first."
+        caption = "Distributions of the metrics that differ, significant changes first."
         yield FigureBlock(caption, Drawing(FORM, panels, 3), "small")
     drawn = dict(_histories(runs))
     panels = tuple(item for item in drawn.values() if item is not None)[:MOST_PANELS]

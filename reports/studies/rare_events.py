@@ -20,13 +20,16 @@ from reports.document.blocks import (
     as_blocks,
     numbered,
 )
-from reports.drawing.marks import Axis, Drawing, Limit, Line, Mark, Plot, Points, nominal_ring
-from reports.drawing.palette import BLUE, INK, PAPER, SKY, VERMILION
+from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points, nominal_ring
+from reports.drawing.palette import BLUE, INK, PURPLE, VERMILION
+from reports.figures.clouds import case_scatter
+from reports.sections.figure_blocks import thinned_by_outcome
 from reports.sections.provenance import origin_table
 from reports.sections.tables import dispersed_table
 from reports.text.numbers import SPACE, axis_label, count, exact, named, number, percent, with_unit, words
 
-MOST_POINTS = 2000  # of a kind
+CLASSES = ("drawn from the dispersions, not failed", "failed")
+DESIGN_POINTS = (("likeliest", "likeliest failed case", INK), ("across", "the likeliest across", PURPLE))
 METHODS = {
     "subset": "subset simulation",
     "cross-entropy": "importance sampling by cross entropy",
@@ -189,32 +192,31 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
     cases, shown = record.cases, [entry for entry in _main_inputs(record.result) if entry["name"] in record.cases][:2]
     if len(shown) < 2 or not record.result["failed"] or "failed" not in cases:
         return None
-    failed = cases["failed"].to_numpy(dtype=bool)
-    drawn = ~failed & (cases["level"].to_numpy() == 0)
+    member = cases["failed"].to_numpy(dtype=np.int8)
+    counted = (member == 1) | (cases["level"].to_numpy() == 0)
+    rows = thinned_by_outcome(np.flatnonzero(counted), member)
     x, y = (cases[item["name"]].to_numpy(dtype=np.float64) for item in shown)
-    marks: list[Mark] = []
-    for rows, colour, sign, what in (
-        (np.flatnonzero(drawn), SKY, "circle", "cases drawn from the dispersions, not failed"),
-        (np.flatnonzero(failed), VERMILION, "diamond", "failed cases"),
-    ):
-        some = rows[np.unique(np.linspace(0, rows.size - 1, min(rows.size, MOST_POINTS)).astype(np.int64))]
-        thinned = f", {count(some.size)} shown" if some.size < rows.size else ""
-        key = f"{count(rows.size)} {what}{thinned}" if rows.size else ""
-        marks.append(Points(x[some], y[some], colour, what, sign, 4.0, 0.6, cases=some, key=key))
-    for what, colour in (("likeliest", INK), ("across", BLUE)):
-        if shown[0].get(what) is not None:
-            name = "likeliest failed case" if what == "likeliest" else "the likeliest across"
-            marks.append(nominal_ring((shown[0][what], shown[1][what]), colour, name, PAPER))
-    axes = (
-        Axis(axis_label(named(words(item["name"], item["unit"]), item["description"]), item["unit"])) for item in shown
+    x_label, y_label = (
+        axis_label(named(words(item["name"], item["unit"]), item["description"]), item["unit"]) for item in shown
     )
-    x_axis, y_axis = axes
+    drawing = case_scatter(
+        Points(x[rows], y[rows], "", cases=rows),
+        member[rows],
+        [(what, int(np.count_nonzero(counted & (member == kind)))) for kind, what in enumerate(CLASSES)],
+        (x_label, y_label),
+        len(cases),
+        rings=[
+            nominal_ring((shown[0][key], shown[1][key]), colour, name)
+            for key, name, colour in DESIGN_POINTS
+            if shown[0].get(key) is not None
+        ],
+        form="Failed cases over two inputs",
+    )
     caption = (
         "Failed cases over the two inputs in which they lie farthest from the median. They are denser than the "
         "dispersions draw them; their weights give their probabilities."
     )
-    plot = Plot(tuple(marks), x_axis, y_axis, height=420.0)
-    return FigureBlock(caption, Drawing("Failed cases over two inputs", (plot,)), "wide")
+    return FigureBlock(caption, drawing, "wide")
 
 
 def _input_table(result: dict[str, Any]) -> Table:

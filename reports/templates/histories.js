@@ -23,7 +23,9 @@
     layout.title.text = reportFigures.plain(quantity.label);
     const cases = open === -1 ? [-1] : [-1, open];
     const found = cases.flatMap((id) => curve(id, quantity));
-    return { id: "history-" + index, data: [...(data.behind[quantity.name] || []), ...found], layout };
+    const drawn = reportFigures.figures.find((figure) => figure.quantity === quantity.name);
+    const behind = drawn ? drawn.behind.map((place) => drawn.data[place]) : [];
+    return { id: "history-" + index, data: [...behind, ...found], layout };
   }
 
   function inputs(id) {

@@ -29,7 +29,7 @@ from tests.benchmarks.peer_codes.problems import Problem  # noqa: E402
 TABLE = Path(__file__).with_suffix(".parquet")
 CODES = {"heyoka": "taylor", "nyx": "nyx", "Basilisk": "basilisk"}  # peer -> file in peer_codes
 TARGETS = (1.0, 1e-3, 1e-5)  # m
-METHODS = ("RK4", "DOP853", "DP54")
+METHODS = ("RK4", "ABM8", "ABM10", "ABM12", "DOP853", "DP54")
 
 
 def peer(name: str):
@@ -75,7 +75,7 @@ def _basilisk() -> Contest:
 def _nyx(target: float | None) -> Contest:
     """With the same step, or at equal error."""
     problem, step = problems.two_body(), 10.0
-    methods, code = ("RK4",) if target is None else ("RK4", "DOP853"), peer("nyx")
+    methods, code = ("RK4",) if target is None else ("RK4", "ABM10", "ABM12", "DOP853"), peer("nyx")
     entrants: list[Entrant] = []
     for method in methods:
         entrants.append(engine.entrant(problem, method, 0, (step,) if target is None else ()))

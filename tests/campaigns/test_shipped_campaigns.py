@@ -2,6 +2,14 @@
 
 from mc_engine import load_campaign
 from mc_engine.campaign.search import list_campaigns
+from reports.run.history_bands import OUTER, outer_percentile
+
+MAIN = ("deorbit", "flexible_satellite", "geo_injection", "geo_servicing", "reentry")
+
+
+def test_the_main_campaigns_save_enough_histories_for_the_outermost_percentiles():
+    first = [load_campaign(name).retention.first for name in MAIN]
+    assert {outer_percentile(n) for n in first} == {OUTER[0]}
 
 
 def test_every_dispersion_and_requirement_of_a_shipped_campaign_has_its_source():

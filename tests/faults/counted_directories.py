@@ -1,6 +1,5 @@
 """Small directories of every kind that `verify` knows, with reports and replays in them, and ways to damage them."""
 
-import json
 import shutil
 
 import numpy as np
@@ -126,33 +125,6 @@ def verified(kind, folder):
 def vouched(folder, kind, name, content):
     """Put another file into a tuning or a rare event, for which the journal vouches, as a forger can."""
     result_files(folder, kind).write({name: content})
-
-
-def mutated(record, rng):
-    """The record with one value in it changed for one of another kind, or taken away, and what was done."""
-    record = json.loads(json.dumps(record))
-    places = list(_places(record, ()))
-    *way, last = places[rng.integers(len(places))]
-    holder = record
-    for key in way:
-        holder = holder[key]
-    value = OTHERS[rng.integers(len(OTHERS))]
-    if value is ...:
-        del holder[last]
-    else:
-        holder[last] = value
-    return record, f"{'.'.join(map(str, [*way, last]))} = {value!r}"
-
-
-OTHERS = (..., None, True, -1, 10**30, 1e300, float("nan"), float("inf"), "", "/etc/hostname", "../../victim", [], {},
-          [[]], {"a": 1}, [{}], "another")  # fmt: skip
-
-
-def _places(value, way):
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, inner in items:
-        yield (*way, key)
-        yield from _places(inner, (*way, key))
 
 
 def copied(folder, place):

@@ -7,26 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from stones import call, copy_of, flown_stones, results
+from stones import call, results
 
 from mc_engine import open_store
 from mc_engine.errors import StoreError
 from mc_engine.runner import runner
 from mc_engine.store.verification import damage
 
-CASES, CHUNK = 200, 40
 RECOMPUTED = ("cases/", "history/", "nominal.parquet")  # what repair can fly again; the rest is told and refused
-
-
-@pytest.fixture(scope="module")
-def flown(tmp_path_factory):
-    return flown_stones(tmp_path_factory.mktemp("stones"), CASES, CHUNK)
-
-
-@pytest.fixture
-def run(flown, tmp_path):
-    """A copy of the run, to be damaged."""
-    return copy_of(flown, tmp_path)
 
 
 def files_of(run):
@@ -130,7 +118,7 @@ def test_no_lost_line_makes_a_case_count_twice(run, flown, event):
     lines[number] = b"?\n"
     journal.write_bytes(b"".join(lines))
     repaired(run, flown)
-    assert len(open_store(run).cases()) == CASES
+    assert len(open_store(run).cases()) == 200
 
 
 @pytest.mark.parametrize("folder", ["cases", "history"])

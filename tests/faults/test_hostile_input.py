@@ -18,7 +18,7 @@ from mc_engine.errors import CampaignError
 
 HEAD = '[campaign]\nmodel = "campaigns.deorbit"\ncases = 10\ndesign = "mc"\nseed = 1\n'
 SIZE = 249_000  # bytes, just within what is read at all
-SENTENCE_S = 2.0  # of processor time; a quiet core takes a third of it
+SENTENCE_S = 1.0  # of processor time; a busy machine takes up to 0.4 s
 
 
 def refused(text, directory=None):
@@ -64,7 +64,7 @@ def filled(unit):
         pytest.param("[parameters]\n[parameters]", id="section twice"),
     ],
 )
-def test_what_is_made_to_overwhelm_is_refused_within_two_seconds(body):
+def test_what_is_made_to_overwhelm_is_refused_within_a_second(body):
     assert refused(HEAD + body).startswith("x.toml: ")
 
 
@@ -126,7 +126,7 @@ def test_letters_that_deceive_the_eye_or_steer_a_terminal_do_neither(name):
 
 
 @pytest.mark.parametrize("size", [250_001, 100_000_000])
-def test_a_file_of_any_size_is_refused_within_two_seconds(tmp_path, size, record_property):
+def test_a_file_of_any_size_is_refused_within_a_second(tmp_path, size, record_property):
     path = tmp_path / "campaign.toml"
     with open(path, "wb") as file:
         file.write(HEAD.encode())

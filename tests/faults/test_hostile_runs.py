@@ -7,26 +7,13 @@ import shutil
 import sys
 
 import pytest
-from stones import call, copy_of, flown_stones, results, stones
+from stones import call, results, stones
 
 from mc_engine import open_store
 from mc_engine.runner import runner
 from mc_engine.runner.shards import Shard
 from mc_engine.store.journal import encode, scan
 from mc_engine.store.verification import damage, damages
-
-CASES, CHUNK = 200, 40
-
-
-@pytest.fixture(scope="module")
-def flown(tmp_path_factory):
-    return flown_stones(tmp_path_factory.mktemp("stones"), CASES, CHUNK)
-
-
-@pytest.fixture
-def run(flown, tmp_path):
-    """A copy of the run, to be tampered with."""
-    return copy_of(flown, tmp_path)
 
 
 @pytest.fixture
@@ -159,7 +146,7 @@ def assert_repaired_in_place(run, lost):
 
 
 def test_repair_of_a_merged_run_gives_the_parts_back_and_flies_nothing_else(tmp_path):
-    campaign = stones(tmp_path / "campaign", CASES)
+    campaign = stones(tmp_path / "campaign", 200)
     for number in (1, 2):
         runner.run(campaign, tmp_path / f"s{number}", workers=1, shard=Shard(number, 2))
     merged = runner.merge(tmp_path / "merged", [tmp_path / "s1", tmp_path / "s2"], chunk=70)

@@ -80,6 +80,11 @@ DIRTY = {
         {"quantity": "q", "published": "x", "statistic": "mean", "of": "height_m", "over": []}
     ),
     "upstream as words": lambda m: m.update(upstream="elsewhere"),
+    "imported as a word": lambda m: m.update(imported="results.parquet"),
+    "imported from no file": lambda m: m.update(imported={"history": None}),
+    "flights for contributions as a number": lambda m: m.update(sensitivity=5),
+    "a range of one number": lambda m: m.update(ranges={"height_m": [1.0]}),
+    "a range of words": lambda m: m.update(ranges={"height_m": ["low", "high"]}),
     "a number that is none": lambda m: m["parameters"].append({"name": "p", "value": float("nan")}),
     "a requirement on no column": lambda m: m["requirements"][0].update(metric="9" * 400),
     "an impossible confidence": lambda m: m["requirements"][0].update(confidence=1e-17),

@@ -107,6 +107,29 @@ def test_a_fault_of_a_program_costs_its_case(tmp_path, sound, faulty, name):
     assert running(str(tmp_path / "ball")) == []
 
 
+TEMPLATES = {
+    "unsafe": ("{{ ''.__class__.__mro__ }}", "access to attribute '__class__' of 'str' object is unsafe"),
+    "by zero": ("{{ 1.0 / (mass_kg - mass_kg) }}", "float division by zero"),
+    "no member": ("{{ mass_kg.metres }}", "'float object' has no attribute 'metres'"),
+    "another file": ("{% include '/etc/hostname' %}", "no loader"),
+    "memory": ("{{ 'a' * (3 * 10**9) }}", "needs more than 2048 MiB"),
+    "time": (2 * "{% for i in range(90000) %}" + "{{ '' }}" + 2 * "{% endfor %}", "takes longer than 10 s"),
+}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs limits of memory")
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_a_template_that_gives_no_text_costs_its_case_and_is_named(tmp_path, name):
+    template, reason = TEMPLATES[name]
+    file = program_campaign(tmp_path / "ball", cases=4)
+    lines = f"{{% if case_id == 2 %}}{template}{{% endif %}}\n"
+    deck = tmp_path / "ball/case.txt.j2"
+    deck.write_text(deck.read_text() + lines)
+    table = run(load_campaign(file), tmp_path / "run", workers=2).cases()
+    refuse_others(table, (2,), "crashed", reason)
+    assert table["reason"][2].startswith("the template of case.txt")
+
+
 def test_the_echo_finds_an_input_that_is_rounded(tmp_path):
     file = program_campaign(tmp_path / "ball", cases=4, mass="(double)(float)mass")
     table = run(load_campaign(file), tmp_path / "run", workers=1).cases()
@@ -211,7 +234,9 @@ def test_a_killed_engine_resumes_without_flying_a_finished_case_twice(tmp_path, 
         time.sleep(0.01)
     os.kill(engine.pid, signal.SIGKILL)
     engine.wait()
-    time.sleep(1.0)
+    end = time.monotonic() + 20.0  # a process that is still starting learns of it when it has started
+    while time.monotonic() < end and running(f"\0{engine.pid}\0"):
+        time.sleep(0.1)
     assert running(f"\0{engine.pid}\0") == []  # the last argument of the processes that it started
     resume(tmp_path / "run", workers=2)
     flown = Counter(starts.read_text().split())

@@ -100,6 +100,7 @@ def check_kills(folder, backend, seed, kills, cases, broken=""):
 @pytest.mark.parametrize(
     ("backend", "kills", "cases"),
     [
+        ("loky", 1, 400),
         ("loky", 5, 1500),
         pytest.param("loky", 100, 30_000, marks=pytest.mark.slow),
         pytest.param("dask", 30, 9_000, marks=pytest.mark.slow),

@@ -120,6 +120,3 @@ def test_a_signal_while_the_command_line_is_loaded_says_that_nothing_was_begun()
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=ENVIRONMENT, timeout=60)
     assert (done.returncode, done.stderr) == (4, f"{NOTHING_BEGUN}\n")
-
-
-# ---- what the journal says

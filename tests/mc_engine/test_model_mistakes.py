@@ -60,6 +60,8 @@ EACH_CASE = "differs from case to case; use where(condition, a, b), minimum, max
 ALLOWED = "write it with + - * / and comparisons, where(condition, a, b), named tuples, `for k in range(n)`"
 CHANGES = "what changes is kept in the state or in the memory"
 UNMARKED = "is not marked; write @physics on the line above it"
+FIELDS = [f"f{number}" for number in range(16)]
+MANY = f"from collections import namedtuple\nMany = namedtuple('Many', {FIELDS})"
 ARRAY, TABLE = "import numpy as np\nK = np.ones(2)", "T = (1.0, 2.0)"
 # (lines in `rhs`, words of the sentence, what stands before `rhs`)
 LINES = [
@@ -113,6 +115,10 @@ LINES = [
     ('g = 2.0 * g if o.law == "b" else g', "a setting is a number, not a text: the index in its `choices`"),
     ('g = 2.0 * g if o.law in ("a", "b") else g', "a setting is a number, not a text"),
     # numbers that differ from case to case
+    (f"a = Many(f0=g if o.law > 0.5 else t, {', '.join(f'{name}=g' for name in FIELDS[1:])})",
+     "`g if o.law > 0.5 else t` decides within a call of too many arguments; give it a name on a line above", MANY),
+    (f"a = Many(f0=g * float(0.0 < t < 5.0), {', '.join(f'{name}=g' for name in FIELDS[1:])})",
+     "`0.0 < t < 5.0` decides within a call of too many arguments", MANY),
     ("g = g if r2 > 1e10 and s.x > 0.0 else 2.0 * g", EACH_CASE),
     ("g = g if t > 1.0 else 0.0", EACH_CASE),
     ("if r2 > 1.0:\n    g = 2.0 * g", EACH_CASE),

@@ -1,5 +1,7 @@
 """The engine itself: its compiled kernels, called as a run calls them, eight cases at a time or one."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from mc_engine.flight import flight
@@ -13,6 +15,9 @@ from tests.benchmarks.peer_codes.problems import Problem
 FOLDER = "tests.benchmarks.models."
 # of RK4 [s]: parts of the day; entries end where they like
 ORBIT_STEPS = (60.0, 40.0, 30.0, 20.0, 15.0, 10.0, 7.5, 5.0, 4.0, 3.0, 2.0, 1.5, 1.0, 0.75, 0.5, 0.4, 0.3)
+# of the multistep methods [s]: parts of the day, dense because the error falls with the tenth power and more
+ARC_STEPS = (90.0, 80.0, 75.0, 72.0, 67.5, 64.0, 60.0, 57.6, 54.0, 50.0, 48.0, 45.0, 43.2, 40.0, 37.5, 36.0, 32.0, 30.0,
+             27.0, 25.0, 24.0, 22.5, 20.0, 18.0, 16.0, 15.0, 13.5, 12.0, 10.0, 8.0, 6.0, 5.0)  # fmt: skip
 ENTRY_STEPS = (
     16.0,
     12.0,
@@ -41,7 +46,8 @@ ENTRY_STEPS = (
 
 def load(problem: Problem, method: str) -> Model:
     """The model of a problem with one of its methods."""
-    return load_model(FOLDER + problem.models[method])
+    model = load_model(FOLDER + problem.models[method])
+    return replace(model, clock=replace(model.clock, method=method.lower()))
 
 
 def kernel_flight(problem: Problem, method: str, value: float | None, width: int) -> Flight:
@@ -57,7 +63,11 @@ def kernel_flight(problem: Problem, method: str, value: float | None, width: int
     ready = flight.prepare(model, inputs, n)
     settings = np.ascontiguousarray(ready.settings[0])
     chosen = settings_class(model)(*settings)
-    clock = flight.adaptive_arguments(model, model.clock, chosen) if adaptive else flight.grid_of(model.clock, chosen)
+    clock = (
+        flight.adaptive_arguments(model, model.clock, chosen)
+        if adaptive
+        else flight.fixed_arguments(model.clock, chosen)
+    )
     time, status, states = np.empty(n), np.empty(n), np.empty((len(model.states), n))
     out = (time, status, states, np.empty((len(model.metrics), n)))
     kernel, key, cases = build_kernel(model, None, width), np.uint64(1), np.arange(float(n))
@@ -79,6 +89,7 @@ def entrant(problem: Problem, method: str, width: int = 0, ladder: tuple[float, 
         return shared([kernel_flight(part, method, value, width) for part in parts])
 
     form = f"{method}, {f'{width} cases at a time' if width > 1 else 'one case at a time'}"
-    if method != "RK4":
+    if method in ("DOP853", "DP54"):
         return Entrant("engine", form, problem, "tolerance", ladder or TOLERANCES, build)
-    return Entrant("engine", form, problem, "step", ladder or (ENTRY_STEPS if problem.height else ORBIT_STEPS), build)
+    steps = ENTRY_STEPS if problem.height else ORBIT_STEPS if method == "RK4" else ARC_STEPS
+    return Entrant("engine", form, problem, "step", ladder or steps, build)

@@ -106,11 +106,23 @@ def _methods(name: str) -> dict[str, str]:
     return {"RK4": f"{name}_rk4", "DOP853": f"{name}_adaptive", "DP54": f"{name}_dp54"}
 
 
+def _with_multistep(models: dict[str, str]) -> dict[str, str]:
+    """Models by method, with those of smooth arcs, which differ from RK4 by their clock alone."""
+    return models | {f"ABM{order}": models["RK4"] for order in range(8, 13)}
+
+
 @cache
 def orbit() -> Problem:
     """A day in low orbit with J2 and drag."""
     return _orbits(
-        "orbit", "low orbit, J2 + drag, one day", _methods("orbit"), LOW_ORBIT, (100, 0.1), LOW_AIR, 1, 240.0
+        "orbit",
+        "low orbit, J2 + drag, one day",
+        _with_multistep(_methods("orbit")),
+        LOW_ORBIT,
+        (100, 0.1),
+        LOW_AIR,
+        1,
+        240.0,
     )
 
 
@@ -118,7 +130,9 @@ def orbit() -> Problem:
 def transfer() -> Problem:
     """A day in a dispersed transfer orbit with J2 and drag."""
     title = "dispersed transfer orbit, J2 + drag, one day"
-    return _orbits("transfer", title, _methods("transfer"), TRANSFER_ORBIT, (1000, 2.0), PERIGEE_AIR, 2, 60.0)
+    return _orbits(
+        "transfer", title, _with_multistep(_methods("transfer")), TRANSFER_ORBIT, (1000, 2.0), PERIGEE_AIR, 2, 60.0
+    )
 
 
 @cache
@@ -130,7 +144,7 @@ def oblate() -> Problem:
 @cache
 def two_body() -> Problem:
     """A day around a point mass."""
-    models = {"RK4": "two_body_rk4", "DOP853": "two_body_adaptive"}
+    models = _with_multistep({"RK4": "two_body_rk4", "DOP853": "two_body_adaptive"})
     problem = _orbits("two_body", "two-body orbit, one day", models, LOW_ORBIT, (100, 0.1), None, 4, 240.0)
     return replace(problem, rate=rates.two_body)
 

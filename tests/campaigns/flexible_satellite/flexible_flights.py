@@ -8,13 +8,14 @@ import numpy as np
 import campaigns.flexible_satellite
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import load_campaign
-from mc_engine.flight.flight import fly, fly_history, prepare
-from mc_engine.model import load_model
+from mc_engine.flight.flight import fly, prepare
+from tests.campaigns.model_flights import ModelFlights
 
-MODEL = load_model("campaigns.flexible_satellite")
-NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settings)}
-FOLDER = Path(campaigns.flexible_satellite.__file__).parent
 SEED = 20221012
+FLIGHTS = ModelFlights("campaigns.flexible_satellite", SEED, rows=200_000)
+MODEL, NOMINAL = FLIGHTS.model, FLIGHTS.nominal
+fly_cases, fly_one, history = FLIGHTS.cases, FLIGHTS.one, FLIGHTS.history
+FOLDER = Path(campaigns.flexible_satellite.__file__).parent
 AXES = "xyz"
 END = ["q0", "q1", "q2", "q3", *(f"omega_{axis}_rad_s" for axis in AXES), *(f"eta_{i}" for i in (1, 2, 3, 4))]
 
@@ -33,22 +34,6 @@ ALONE |= {"modal_damping_factor": 0.0}
 C0 = np.array([[7.0, -1.2, 1.1, 1.2], [1.2, 0.9, 2.5, -2.6], [2.2, -1.7, -0.8, -1.1]])
 J = np.diag([100.0, 75.0, 50.0])
 LAMBDA = np.array([0.7, 1.0, 1.8, 2.5])
-
-
-def fly_cases(**inputs):
-    """Columns of as many cases as the longest input has values, eight cases at a time."""
-    n_cases = max((np.size(value) for value in inputs.values()), default=1)
-    return fly(MODEL, NOMINAL | inputs, np.arange(n_cases), SEED, width=8)
-
-
-def fly_one(**inputs):
-    """The row of one case: a number or a word by column name."""
-    return {name: column[0] for name, column in fly_cases(**inputs).items()}
-
-
-def history(rows=200_000, **inputs):
-    """Quantities along the flight of one case."""
-    return fly_history(MODEL, NOMINAL | inputs, 0, SEED, rows=rows)[1]
 
 
 def prepared(**inputs):

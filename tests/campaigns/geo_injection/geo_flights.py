@@ -1,25 +1,7 @@
 """Short ways to fly the injection model: inputs and results by column name, in declared units."""
 
-import numpy as np
+from tests.campaigns.model_flights import ModelFlights
 
-from mc_engine.flight.flight import fly, fly_history
-from mc_engine.model import load_model
-
-MODEL = load_model("campaigns.geo_injection")
-NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settings)}
-
-
-def fly_cases(width=None, ids=None, **inputs):
-    """Columns of as many cases as the longest input has values."""
-    n_cases = max((np.size(value) for value in inputs.values()), default=1)
-    return fly(MODEL, NOMINAL | inputs, np.arange(n_cases) if ids is None else ids, 1, width=width)
-
-
-def fly_one(**inputs):
-    """The row of one case: a number or a word by column name."""
-    return {name: column[0] for name, column in fly_cases(**inputs).items()}
-
-
-def history(rows=2001, **inputs):
-    """Quantities along the flight of one case."""
-    return fly_history(MODEL, NOMINAL | inputs, 0, 1, rows=rows)[1]
+FLIGHTS = ModelFlights("campaigns.geo_injection", width=None)
+MODEL, NOMINAL = FLIGHTS.model, FLIGHTS.nominal
+fly_cases, fly_one, history = FLIGHTS.cases, FLIGHTS.one, FLIGHTS.history

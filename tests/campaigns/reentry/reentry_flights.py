@@ -7,11 +7,12 @@ import numpy as np
 from campaigns.reentry.airframe import airframe_of
 from campaigns.reentry.entry_state import entry_of, world_of
 from campaigns.reentry.guidance.plan import Plan, planned_entry, plans_of
-from mc_engine.flight.flight import fly, fly_history
-from mc_engine.model import Refusals, load_model
+from mc_engine.model import Refusals
+from tests.campaigns.model_flights import ModelFlights
 
-MODEL = load_model("campaigns.reentry")
-NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settings)}
+FLIGHTS = ModelFlights("campaigns.reentry")
+MODEL, NOMINAL = FLIGHTS.model, FLIGHTS.nominal
+fly_cases, fly_one, history = FLIGHTS.cases, FLIGHTS.one, FLIGHTS.history
 MU, RADIUS = 3.986004418e14, 6_378_137.0
 G0 = 9.80665
 EXACT = 1e-12  # tolerance of an integration step where the flight must be as good as its closed form
@@ -39,12 +40,6 @@ def gliding(lift_area, lift_to_drag):
     }
 
 
-def fly_cases(width=8, ids=None, **inputs):
-    """Columns of as many cases as the longest input has values."""
-    n_cases = max((np.size(value) for value in inputs.values()), default=1)
-    return fly(MODEL, NOMINAL | inputs, np.arange(n_cases) if ids is None else ids, 1, width=width)
-
-
 def assert_same_bits_alone(together, picked, width=8, each=(), **inputs):
     """The picked cases have the bits of their rows among the others where each flies alone.
 
@@ -55,11 +50,6 @@ def assert_same_bits_alone(together, picked, width=8, each=(), **inputs):
         alone = fly_cases(width=width, ids=np.array([case]), **inputs, **own)
         for name, column in together.items():
             assert column[case : case + 1].tolist() == alone[name].tolist() or np.isnan(column[case]), (case, name)
-
-
-def fly_one(**inputs):
-    """The row of one case: a number or a word by column name."""
-    return {name: column[0] for name, column in fly_cases(**inputs).items()}
 
 
 def plan_of(**inputs):
@@ -75,11 +65,6 @@ def plan_of(**inputs):
     world = world_of(i, o)
     planned = planned_entry(o, world, entry_of(i, o, world, refusals), refusals)
     return Plan(*(float(row[0]) for row in plans_of(i, o, world, planned, airframe_of(i, o, refusals))))
-
-
-def history(rows=2001, **inputs):
-    """Quantities along the flight of one case."""
-    return fly_history(MODEL, NOMINAL | inputs, 0, 1, rows=rows)[1]
 
 
 def circular_speed(altitude_km):

@@ -40,7 +40,12 @@ def calls(monkeypatch):
     def replay(path, case_id):
         history = pd.DataFrame({"case_id": [case_id] * 2, "t_s": [0.0, 1.0], "force_n": [1.0, 2.0]})
         return SimpleNamespace(
-            equal=seen.equal, differences=["propellant_kg: 1 is not 2"], history=history, row={}, lost=""
+            equal=seen.equal,
+            differences=["propellant_kg: 1 is not 2"],
+            history=history,
+            row={},
+            lost="",
+            tolerance=None,
         )
 
     def write_reports(path, formats=("html", "pdf")):

@@ -1,7 +1,9 @@
-"""A falling ball with drag as each kind of simulator, under the same campaign file."""
+"""A falling ball with drag as each kind of simulator, under the same campaign file, and a comparison of its reports."""
 
 import shutil
 import subprocess
+
+import pytest
 
 CAMPAIGN = """
 [campaign]
@@ -130,3 +132,19 @@ def program_campaign(folder, cases=100, fault="", mass="mass"):
     (folder / "case.txt.j2").write_text(names + "\n")
     (folder / "campaign.toml").write_text(CAMPAIGN.format(flies="", cases=cases) + PROGRAM)
     return folder / "campaign.toml"
+
+
+def assert_alike(ours, theirs, rel):
+    """Two trees of a report: equal words, and numbers equal to `rel`."""
+    assert type(ours) is type(theirs)
+    if isinstance(ours, dict):
+        assert ours.keys() == theirs.keys()
+        ours, theirs = [*ours.values()], [*theirs.values()]
+    if isinstance(ours, list):
+        assert len(ours) == len(theirs)
+        for one, other in zip(ours, theirs, strict=True):
+            assert_alike(one, other, rel)
+    elif isinstance(ours, float):
+        assert ours == pytest.approx(theirs, rel=rel, abs=rel)
+    else:
+        assert ours == theirs

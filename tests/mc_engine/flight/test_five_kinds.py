@@ -9,7 +9,7 @@ import pytest
 from mc_engine import load_campaign, run
 from reports import write_reports
 from tests.mc_engine.flight.ball_fmu import fmu_campaign
-from tests.mc_engine.flight.falling_ball import CAMPAIGN, program_campaign, python_campaign
+from tests.mc_engine.flight.falling_ball import CAMPAIGN, assert_alike, program_campaign, python_campaign
 
 pytest.importorskip("fmpy", reason='the extra "fmu" is missing')
 CASES = 500
@@ -86,22 +86,6 @@ def flown(tmp_path_factory):
         write_reports(store.path, ("json",))
         runs[kind] = store.cases(), json.loads((store.path / "report.json").read_text())
     return runs
-
-
-def assert_alike(ours, theirs, rel):
-    """Two trees of a report: equal words, and numbers equal to `rel`."""
-    assert type(ours) is type(theirs)
-    if isinstance(ours, dict):
-        assert ours.keys() == theirs.keys()
-        ours, theirs = [*ours.values()], [*theirs.values()]
-    if isinstance(ours, list):
-        assert len(ours) == len(theirs)
-        for one, other in zip(ours, theirs, strict=True):
-            assert_alike(one, other, rel)
-    elif isinstance(ours, float):
-        assert ours == pytest.approx(theirs, rel=rel, abs=rel)
-    else:
-        assert ours == theirs
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "case"])

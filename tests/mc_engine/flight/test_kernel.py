@@ -171,7 +171,7 @@ def test_widths_have_kernel_files_of_their_own_and_copies_of_a_model_share_them(
     assert len(set(paths)) == 3
     assert paths[:3] == paths[3:]
     assert all(path.is_relative_to(tmp_path / "cache") for path in paths)
-    assert "fly(f, Parameters, Settings, 16," in paths[-1].read_text()
+    assert "f, method, Parameters, Settings, 16," in paths[-1].read_text()
 
 
 def test_the_cache_lies_where_the_user_says_or_where_the_system_keeps_such_things(tmp_path, monkeypatch):

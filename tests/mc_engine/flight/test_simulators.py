@@ -91,13 +91,17 @@ def test_failed_cases_are_flown_again(tmp_path):
     assert rerun(tmp_path / "run").status_counts() == {"ok": 8}
 
 
-def test_numbers_within_the_tolerance_replay(tmp_path):
+def test_numbers_within_the_tolerance_replay_and_replay_says_so(tmp_path):
     fault = "import time\ninputs = {**inputs, 'mass_kg': inputs['mass_kg'] * (1.0 + 1e-12 * (time.time_ns() % 1000))}"
     for options, equal in (("", False), ("deterministic=False, tolerance=1e-6,", True)):
         name = "tolerant" if options else "strict"
         campaign = load_campaign(python_campaign(tmp_path / name, cases=4, fault=fault, options=options))
         run(campaign, tmp_path / f"run-{name}", workers=1)
-        assert replay(tmp_path / f"run-{name}", 1).equal == equal
+        again = replay(tmp_path / f"run-{name}", 1)
+        assert (again.equal, again.tolerance) == (equal, 1e-6 if options else None)
+    said = CliRunner().invoke(app, ["replay", str(tmp_path / "run-tolerant"), "1"]).stdout
+    assert "every stored number is within the tolerance of its simulator, 1e-06 of the number" in said
+    assert "same bits" not in said
 
 
 def test_the_command_line_says_of_simulators_what_is_true_of_them(tmp_path):
@@ -130,6 +134,7 @@ MISTAKES = {
     "two things": ("[campaign]", '[campaign]\nsimulator = "sim.py"', "beside the table [simulator]"),
     "template": ("case.txt.j2", "other.j2", 'other.j2: "mas_kg" is no input; did you mean "mass_kg"?'),
     "default": ("low = 0.1", "low = 20.0", "mass_kg: the model's own value 10 is not within"),
+    "tolerance": ("time_limit_s", "tolerance = 1e-9\ntime_limit_s", "has a `tolerance`, and `replay` compares bits"),
     "outside": ('"case.txt" =', '"../case.txt" =', "lies outside the folder of the case"),
 }
 
@@ -165,6 +170,17 @@ def test_results_from_elsewhere_make_the_same_run(tmp_path, flown):
     assert store.manifest["imported"]["file"] == "results.parquet"
     with pytest.raises(StoreError, match=r"imported from results\.parquet; the engine did not fly them"):
         replay(tmp_path / "run", 3)
+
+
+def test_fewer_results_than_the_campaign_has_cases_are_imported_by_number(tmp_path, flown):
+    flown["case"].cases()[:30].to_csv(tmp_path / "results.csv", index=False)
+    file, out = python_campaign(tmp_path / "ball"), tmp_path / "run"
+    command = ["import", str(tmp_path / "results.csv"), "--campaign", str(file), "--out", str(out), "--no-report"]
+    assert CliRunner().invoke(app, command).exit_code == 2
+    assert CliRunner().invoke(app, [*command, "--cases", "30"]).exit_code == 0
+    said = CliRunner().invoke(app, ["status", str(out)]).stdout
+    assert "imported  from results.csv; the engine did not fly these cases" in said
+    assert "30 of 30 cases: 30 ok" in said
 
 
 def test_results_of_other_inputs_are_refused(tmp_path, flown):

@@ -121,7 +121,7 @@ def test_the_history_of_a_broken_case_ends_with_its_last_finite_look():
     inputs = {item.name: item.default for item in (*OSCILLATOR.parameters, *OSCILLATOR.settings)} | {
         "breaks_at_s": 2.05
     }
-    columns, history = fly_history(OSCILLATOR, inputs, 0, 1, folder=FOLDER)
+    columns, history = fly_history(OSCILLATOR, inputs, 0, 1, folder=FOLDER, width=8)
     assert columns["status"][0] == "not-finite"
     assert np.isfinite(history["x_km"]).all()
     assert history["t_s"][-1] <= 2.05
@@ -147,7 +147,7 @@ def test_the_history_has_every_bounce_at_its_time_however_few_its_rows_are(rows)
     """A ball from 5 m at 10 m/s^2 meets the floor at 1, 3, 5, 7 and 9 s, all between two steps."""
     inputs = {item.name: item.default for item in (*RAIL.parameters, *RAIL.settings)}
     inputs |= {"gravity_m_s2": 10.0, "x0_m": 5.0, "wall_m": 0.0, "step_s": 0.3, "last_s": 9.9}
-    columns, history = fly_history(RAIL, inputs, 0, 1, folder=FOLDER, rows=rows)
+    columns, history = fly_history(RAIL, inputs, 0, 1, folder=FOLDER, rows=rows, width=8)
     t, height = history["t_s"], history["x_m"]
     bounces = np.abs(t[:, None] - [1.0, 3.0, 5.0, 7.0, 9.0]).argmin(axis=0)
     assert t[bounces] == pytest.approx([1.0, 3.0, 5.0, 7.0, 9.0], abs=1e-12)

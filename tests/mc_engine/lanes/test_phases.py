@@ -35,7 +35,7 @@ def inputs():
 
 @pytest.fixture(scope="module")
 def whole(model, inputs):
-    columns = flown(model, width=16, **inputs)
+    columns = flown(model, **inputs)
     assert set(columns["status"]) == {"ok"}
     assert set(columns["end_phase"]) == {"descent"}
     return columns
@@ -86,7 +86,7 @@ def test_control_is_sampled_in_its_own_phase_alone(inputs, whole):
     np.testing.assert_array_equal(whole["samples"], samples)
 
 
-@pytest.mark.parametrize(("width", "chunk", "threads"), [(1, 5, 1), (4, 1, 2), (16, 7, 2)])
+@pytest.mark.parametrize(("width", "chunk", "threads"), [(1, 5, 1), (8, 1, 2), (16, 7, 2)])
 def test_bytes_depend_on_no_width_chunk_thread_or_order(model, inputs, whole, width, chunk, threads):
     cases = np.random.default_rng(width).permutation(N_CASES)
     parts = [cases[first : first + chunk] for first in range(0, N_CASES, chunk)]
@@ -102,7 +102,7 @@ def test_bytes_depend_on_no_width_chunk_thread_or_order(model, inputs, whole, wi
 
 def test_a_replay_has_the_bytes_of_the_batch_and_names_the_phases(model, inputs, whole):
     one = {name: column[3] for name, column in inputs.items()}
-    columns, history = fly_history(model, one, 3, 1, folder=FOLDER, rows=500)
+    columns, history = fly_history(model, one, 3, 1, folder=FOLDER, rows=500, width=8)
     same_bytes(columns, {name: column[3:4] for name, column in whole.items()})
     assert list(dict.fromkeys(history["phase"])) == ["rail", "powered", "coast", "descent"]
     np.testing.assert_array_equal(history["on_rail"] == 1.0, history["phase"] == "rail")

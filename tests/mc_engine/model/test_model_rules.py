@@ -34,6 +34,7 @@ CONTRADICTIONS = {
                                  'the column "end_time_s" has the name of a column that every table has'),
     "an output of the engine's name": (('speed_m_s="speed")', 'speed_m_s="speed", t_s="time")'),
                                        'the output "t_s" has the name of a column that every table has'),
+    "parameters of no record": (given("kernel_parameters=dict"), "kernel_parameters must be a named tuple, whose"),
     "control without a memory": (given("control=rhs"), "the model has `control`, but no `memory`; give memory=Memory"),
     "default of nobody": (*with_input('law=Setting("c", "law", choices=("a", "b"))'),
                           'setting "law" has the default \'c\'; known are "a", "b"'),
@@ -108,3 +109,15 @@ def test_an_import_from_a_dot_is_named_at_its_line(tmp_path):
         campaign_with(tmp_path, (IMPORTS, f"from .guidance import k\n{IMPORTS}"))
     (problem,) = error.value.problems
     assert problem.message.startswith(f"model.py, line {line_of(tmp_path, 'from .guidance')}: an import from a dot")
+
+
+def test_a_model_in_the_form_of_version_0_1_is_pointed_to_the_change_log(tmp_path):
+    with pytest.raises(CampaignError) as error:
+        campaign_with(
+            tmp_path,
+            ("import Event,", "import Event, Field,"),
+            ('altitude_km="altitude"', 'altitude_km=Field("altitude_km", "km", "altitude")'),
+        )
+    (problem,) = error.value.problems
+    assert problem.message.startswith(f"model.py, line {line_of(tmp_path, 'Outputs = outputs(')}: Field: takes ")
+    assert problem.message.endswith("of version 0.1 is written so; CHANGELOG.md says under 0.2.0 how to convert it")

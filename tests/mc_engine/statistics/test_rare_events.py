@@ -66,12 +66,12 @@ def test_known_probabilities_are_met_without_bias_and_inside_the_interval(method
     assert np.median([event.plain_cases / event.n_cases for event in events]) > 5.0
 
 
-def noisy(share):
-    """A plane, a share of whose variance is noise of the flight."""
+def noisy(share, distance=4.0):
+    """A plane, `distance` standard deviations off, a share of whose variance is noise of the flight."""
 
     def margin(u, addresses):
         z = ndtri(np.clip(uniforms(7, "noise", addresses), 1e-16, 1.0 - 1e-16))
-        return 4.0 - math.sqrt(1.0 - share) * u[:, 0] - math.sqrt(share) * z
+        return distance - math.sqrt(1.0 - share) * u[:, 0] - math.sqrt(share) * z
 
     return margin
 
@@ -83,6 +83,15 @@ def test_noise_of_the_flight_belongs_to_the_probability(method, share):
     p = stats.norm.sf(4.0)
     assert abs(np.mean([math.log10(event.probability / p) for event in events])) <= 0.05
     assert sum(event.lower <= p <= event.upper for event in events) >= 18
+
+
+def test_importance_sampling_names_subset_simulation_where_noise_decides_the_failures():
+    event = cross_entropy(noisy(0.7, distance=2.5), 1, cases_per_level=1_000, seed=2, noise=True)
+    halted, few = event.remarks
+    assert halted.startswith("Levels came to a halt before the failures, as where the noise of the flight decides them")
+    assert halted.endswith("the interval may be too narrow. Use subset simulation.")
+    assert few.startswith("The estimate rests on as much as ")
+    assert event.lower <= stats.norm.sf(2.5) <= event.upper
 
 
 @pytest.mark.parametrize("method", METHODS)

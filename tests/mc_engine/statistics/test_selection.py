@@ -13,14 +13,12 @@ FINITE = st.floats(allow_nan=False, allow_infinity=False).map(lambda value: valu
 
 
 def selected(parts, ranks):
-    """All passes, the parts counted apart and merged backwards."""
+    """All passes, in each the parts in another order."""
     passed, step = Selection(), 0
     while not passed.done:
-        counts = [Selection(dict(passed.wanted), passed.digit, passed.few) for _ in parts]
-        for count, part in zip(counts, parts, strict=True):
-            count.add(part)
-        for count in reversed(counts):
-            passed.merge(count)
+        parts = parts[::-1]
+        for part in parts:
+            passed.add(part)
         passed = passed.next(ranks if step == 0 else None)
         step += 1
     return passed.values

@@ -7,7 +7,7 @@ import time
 
 import pytest
 from apogee_tuning import apogee_campaign
-from small_run import ENVIRONMENT, block
+from small_run import block
 
 from mc_engine import load_campaign
 from mc_engine.errors import StoreError
@@ -161,42 +161,6 @@ def test_a_new_directory_has_one_writer_and_is_gone_if_nothing_was_put_there(tmp
     with pytest.raises(KeyError):
         write(second)
     assert not (tmp_path / "new").exists()
-
-
-RACE = """
-import os
-from small_run import ENVIRONMENT, block, created
-from mc_engine import load_campaign
-from mc_engine.errors import StoreError
-from mc_engine.studies.rare_event import estimate_rare_event
-print("ready", flush=True)
-while not os.path.exists({go!r}):
-    pass
-try:
-    store = created({run!r})
-    with store.lock():
-        for first in range(0, 40, 10):
-            store.append(first, 10, block(first, 10))
-except StoreError as error:
-    print(error)
-"""
-
-
-def test_two_runs_that_start_in_one_directory_at_one_moment_do_not_mix(tmp_path):
-    for race in range(3):
-        run = tmp_path / f"run-{race}"
-        go = tmp_path / f"go-{race}"
-        script = RACE.format(run=str(run), go=str(go))
-        options = {"stdout": subprocess.PIPE, "text": True, "env": ENVIRONMENT}
-        racers = [subprocess.Popen([sys.executable, "-c", script], **options) for _ in "ab"]
-        assert [racer.stdout.readline() for racer in racers] == ["ready\n"] * 2
-        go.touch()
-        messages = [racer.communicate()[0] for racer in racers]
-        assert [racer.returncode for racer in racers] == [0, 0]
-        assert sum(bool(message) for message in messages) == 1, messages
-        assert str(run) in "".join(messages)
-        assert damage(run) == []
-        assert len(open_store(run).cases()) == 40
 
 
 def test_a_record_of_somebody_elses_making_cannot_steer_the_terminal():

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from mc_engine.statistics.binomial import acceptance_number, lower_bound, smallest_sample
-from mc_engine.studies.plan import plan_table
+from mc_engine.studies.plan import plan_row
 
 # share, confidence: smallest samples for 0, 1, 2, ... failures.
 # 59, 93, 124 and 299, 473: Wilks, Ann. Math. Stat. 12 (1941), one-sided tolerance limits; the others by scipy.
@@ -15,14 +15,15 @@ SAMPLES = [
     (0.95, 0.95, [59, 93, 124]),
     (0.99, 0.95, [299, 473]),
 ]
+ROWS = [plan_row(0.9973, 0.90, failures) for failures in range(4)]
 
 
 @pytest.mark.parametrize(("share", "confidence", "cases"), SAMPLES)
 def test_the_smallest_samples_are_those_of_the_tables(share, confidence, cases):
-    assert [row.cases for row in plan_table(share, confidence, len(cases))] == cases
+    assert [plan_row(share, confidence, failures).cases for failures in range(len(cases))] == cases
 
 
-@pytest.mark.parametrize("row", plan_table(0.9973, 0.90, 4))
+@pytest.mark.parametrize("row", ROWS)
 def test_a_row_says_what_share_it_demonstrates(row):
     assert row.shown >= 0.9973 > lower_bound(row.cases - 1 - row.failures, row.cases - 1, 0.90)
 
@@ -36,6 +37,6 @@ def test_the_acceptance_number_is_the_last_that_demonstrates(share, confidence, 
         assert smallest_sample(share, confidence, accepted) <= cases < smallest_sample(share, confidence, accepted + 1)
 
 
-@pytest.mark.parametrize("row", plan_table(0.9973, 0.90, 4))
+@pytest.mark.parametrize("row", ROWS)
 def test_a_row_says_how_likely_a_system_passes_that_fails_half_as_often(row):
     assert row.half_rate == pytest.approx(binom.cdf(row.failures, row.cases, 0.00135), rel=1e-9)

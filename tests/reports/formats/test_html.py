@@ -1,5 +1,6 @@
 """The HTML page: complete in one file, and safe from what users write."""
 
+import base64
 import json
 import re
 from html.parser import HTMLParser
@@ -9,6 +10,7 @@ from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_html
+from reports.text.numbers import count
 
 MEGABYTE = 1_000_000
 
@@ -36,6 +38,34 @@ def figures(page):
 
 def test_the_page_of_ten_thousand_cases_is_below_three_and_a_half_megabytes(page):
     assert len(page.encode()) < 3.5 * MEGABYTE
+
+
+def case_record(page):
+    return json.loads(re.search(r'id="case-data">(.*?)</script>', page, re.DOTALL)[1])
+
+
+def test_a_page_holds_all_cases_while_their_inputs_and_key_metrics_are_four_hundred_thousand_numbers():
+    record = case_record(render_html(build(synthetic_run(30_000), "run")).decode())
+    assert record["ids"] == [0, 30_000]
+    assert 160_000 < 30_000 * len(record["columns"]) <= 400_000
+
+
+def test_a_page_that_cannot_hold_all_cases_says_how_many_it_counts():
+    page = render_html(build(synthetic_run(90_000), "run")).decode()
+    held = len(base64.b64decode(case_record(page)["outcome"]["bdata"]))
+    assert 0 < held < 90_000
+    assert f"This page holds {count(held)} of {count(90_000)} cases, and counts no others." in page
+
+
+def test_what_the_curve_of_a_case_is_drawn_over_is_sent_once(page):
+    assert "behind" not in case_record(page)
+    panels = [figure for figure in figures(page) if figure.get("quantity")]
+    assert panels
+    for panel in panels:
+        drawn = [trace["name"] for trace in panel["data"]]
+        others = [drawn[place] for place in range(len(drawn)) if place not in panel["behind"]]
+        assert any(name == "nominal" for name in others)
+        assert all(name.startswith(("nominal", "case ")) for name in others)
 
 
 def test_nothing_is_loaded_from_anywhere(page):

@@ -1,6 +1,7 @@
 """The comparison of two runs as a page and as a PDF."""
 
 import warnings
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -41,6 +42,19 @@ def test_the_headline_says_what_changed_and_the_table_by_how_much():
     assert row[3].value == pytest.approx(change.shift.value / change.deviation[0])
     (figure,) = blocks_of(document, FigureBlock)
     assert "peak force" in figure.drawing.alternative
+
+
+def test_a_large_change_within_chance_stands_below_a_small_one_beyond_it():
+    found = compared(shift=8.0, seed=2)
+    scattered, moved = (
+        next(one for one in found.metrics if one.metric == name) for name in ("settling_time_s", "peak_force_n")
+    )
+    chance = replace(scattered, ratio=replace(scattered.ratio, value=50.0), shift_adjusted=1.0, spread_adjusted=1.0)
+    assert chance.effect > moved.effect
+    metrics = [chance if one is scattered else one for one in found.metrics]
+    rows = tables(build_comparison(replace(found, metrics=metrics)))["Metrics of both runs"].rows
+    place = {name: k for k, row in enumerate(rows) for name in ("peak force", "settling time") if name in row[0].text}
+    assert place["peak force"] < place["settling time"]
 
 
 def two_runs(tmp_shift):

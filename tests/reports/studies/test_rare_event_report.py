@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from figure_marks import classes
 
 import reports
 from mc_engine.store.parts import Column
@@ -129,3 +130,4 @@ def test_failed_cases_are_a_scatter_of_the_two_inputs_they_lie_farthest_in(tmp_p
     np.testing.assert_array_equal(failed.x, cases["b"][700:])
     np.testing.assert_array_equal(failed.y, cases["c"][700:])
     assert (ordinary.x.size, likeliest.x[0], likeliest.y[0]) == (500, -5.0, 3.0)
+    assert classes(figure.drawing) == {"drawn from the dispersions, not failed": 500, "failed": 300}
