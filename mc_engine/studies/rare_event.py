@@ -31,7 +31,7 @@ from mc_engine.studies.rare_event_folder import RareEventRecord, open_rare_event
 
 METHODS: dict[str, Callable[..., RareEvent]] = {"subset": subset_simulation, "cross-entropy": cross_entropy}
 CASES_PER_LEVEL = 10_000
-_SEVERAL = "Failures lie in several places: their mean is between them, and describes none."
+_SEVERAL = "Failures lie in separate regions; the mean of their inputs lies between them and stands for no failed case."
 _APART = 0.7  # distance of the mean of the failed cases over that of the nearest: below this, they lie apart
 
 
