@@ -21,6 +21,14 @@ PLACE = """(() => {
   return [box.x, box.y, box.width, box.height];
 })()"""
 
+DRAWN = "[...document.querySelectorAll('.panels > .panel')].map((p) => p.querySelectorAll('.main-svg').length)"
+SCROLLED = """(async () => {
+  for (const panel of document.querySelectorAll('.panels > .panel')) {
+    panel.scrollIntoView({block: 'center', behavior: 'instant'});
+    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+  }
+})()"""
+
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory):
@@ -37,7 +45,10 @@ def file(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def opened(browser, file):
+    """The page with every figure drawn, whichever test of it comes first."""
     browser.open(file)
+    browser.run(SCROLLED)
+    browser.until(f"{DRAWN}.every(Boolean)")
     return browser
 
 
@@ -50,18 +61,7 @@ def page(opened):
     assert opened.requests == []
 
 
-DRAWN = "[...document.querySelectorAll('.panels > .panel')].map((p) => p.querySelectorAll('.main-svg').length)"
-SCROLLED = """(async () => {
-  for (const panel of document.querySelectorAll('.panels > .panel')) {
-    panel.scrollIntoView({block: 'center', behavior: 'instant'});
-    await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-  }
-})()"""
-
-
 def test_every_panel_of_every_figure_is_drawn(page):
-    page.run(SCROLLED)
-    page.until(f"{DRAWN}.every(Boolean)")
     drawn = page.run(DRAWN)
     assert len(drawn) == page.run("JSON.parse(document.getElementById('figures').textContent).length")
     assert len(drawn) > 10
@@ -87,9 +87,6 @@ def test_failed_cases_are_chosen_without_a_mouse_and_listed_with_their_inputs(pa
 
 
 def test_a_box_drawn_over_a_cloud_lists_its_cases_and_lifts_them_out_in_every_figure(page):
-    figure = "document.getElementById(document.getElementById('explorer').dataset.figure)"
-    page.run(f"{figure}.scrollIntoView({{behavior: 'instant'}})")  # figures are drawn when they come in sight
-    page.until(f"{figure}.querySelector('.nsewdrag') !== null")
     x, y, width, height = page.settled(PLACE)
     page.drag([(x + 3, y + 3), (x + width / 3, y + height / 4), (x + width - 3, y + height / 3)])
     page.until("!document.getElementById('selection').hidden")
@@ -107,8 +104,6 @@ def test_a_box_drawn_over_a_cloud_lists_its_cases_and_lifts_them_out_in_every_fi
 
 
 def test_a_range_of_a_histogram_chooses_all_its_cases_and_shows_them_in_every_other(page):
-    page.run(SCROLLED)
-    page.until(f"{DRAWN}.every(Boolean)")
     bars = "document.querySelectorAll('.panel')].filter((p) => (p.data || []).some((t) => t.meta === 'bins'))"
     first = f"[...{bars}[0]"
     box = page.settled(
@@ -193,8 +188,6 @@ def test_the_history_of_a_worst_case_opens_over_the_nominal_one_and_closes_with_
 
 def test_figures_follow_the_dark_mode(page):
     ink = "document.querySelector('.panel').layout.font.color"
-    page.run("document.querySelector('.panel').scrollIntoView({behavior: 'instant'})")
-    page.until("document.querySelector('.panel').layout !== undefined")
     light = page.run(ink)
     page.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": "dark"}])
     page.until(f"{ink} !== '{light}'")
