@@ -47,6 +47,7 @@ DEEP = (
     "mc_engine/flight/test_simulators.py::test_backends",
     "mc_engine/flight/test_simulators.py::test_numbers_within",
     "mc_engine/lanes/test_adaptive_flight.py::test_a_history",
+    "mc_engine/lanes/test_adaptive_flight.py::test_every_crossing",
     "mc_engine/lanes/test_adaptive_flight.py::test_every_width",
     "mc_engine/lanes/test_adaptive_flight.py::test_neither_order",
     "mc_engine/lanes/test_events.py::test_cases_with_events",
@@ -60,6 +61,7 @@ DEEP = (
     "mc_engine/lanes/test_plain_numbers.py",
     "mc_engine/lanes/test_records.py::test_a_discrete",
     "mc_engine/lanes/test_record_tables.py::test_a_case_has",
+    "mc_engine/lanes/test_tables.py::test_every_lane",
     "mc_engine/model/test_declarations.py::test_a_discrete_state",
     "mc_engine/model/test_declarations.py::test_arguments",
     "mc_engine/model/test_declarations.py::test_events_may_share",
@@ -104,6 +106,7 @@ DEEP = (
     "reports/footprint/test_footprints.py::test_what_cannot_be_drawn",
     "reports/formats/test_html.py::test_a_page_that_cannot",
     "reports/formats/test_html.py::test_what_users_write",
+    "reports/formats/test_markdown.py::test_what_users_write",
     "reports/formats/test_pdf.py::test_payloads",
     "reports/formats/test_pdf.py::test_two_readers",
     "reports/run/test_streamed_cases.py",
@@ -114,6 +117,7 @@ DEEP = (
     "reports/test_counts_agree.py::test_the_data_validate_against_their_schema_and_have_the_numbers_of_the_table[reentry",
     "reports/test_counts_agree.py::test_page_markdown_pdf_and_data_have_the_same_tables_and_cards[reentry",
     "reports/user_sections/test_template_bounds.py",
+    "reports/user_sections/test_user_sections.py::test_values_of_a_run",
 )
 # Models that fly with either integrator are flown on the fixed grid; with these parameters their tests are deep, too.
 DEEP_PARAMETERS = ("[AdaptiveStep", "[phased_rocket_adaptive")
@@ -154,8 +158,18 @@ NOT_DEEP = (
     "mc_engine/test_interruption.py::test_a_signal_before_anything_is_there_says_so[in a call",
     "mc_engine/test_interruption.py::test_two_signals",
     "reports/formats/test_html.py::test_what_users_write_stays_text[<script>window.struck=1<",
+    "reports/formats/test_markdown.py::test_what_users_write_stays_text[<script>window.struck=1<",
     "reports/user_sections/test_template_bounds.py::test_a_template_without_measure_gets_a_sentence[a macro",
+    "reports/user_sections/test_user_sections.py::test_values_of_a_run_are_neither_markdown_nor_templates[{{ 7",
 )
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Files with no test but deep ones are not even read where those are left out."""
+    name = collection_path.as_posix().rpartition(f"/{TESTS}")[2]
+    left_out = config.option.markexpr == "not slow and not deep"  # as pyproject.toml says where nothing else is asked
+    deep = name.startswith(DEEP) and not any(kept.startswith(name) for kept in NOT_DEEP)
+    return True if left_out and deep and collection_path.is_file() else None
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest chooses among the tests by their markers

@@ -1,6 +1,7 @@
 """Imports point one way: campaigns -> mc_engine <- reports."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -10,10 +11,19 @@ import mc_engine
 ROOT = Path(__file__).resolve().parents[1]
 
 
+@cache
+def imports(path):
+    """(import, is it needed by annotations only) of a file."""
+    nodes = list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    guarded = [node for node in nodes if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test)]
+    annotations = {id(inner) for node in guarded for inner in ast.walk(node)}
+    return [(node, id(node) in annotations) for node in nodes if isinstance(node, ast.Import | ast.ImportFrom)]
+
+
 def imported(package):
     """(file, module) of every import in a package."""
     for path in sorted((ROOT / package).rglob("*.py")):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node, _ in imports(path):
             names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             yield from ((path.relative_to(ROOT).as_posix(), name) for name in names)
@@ -87,15 +97,12 @@ def modules(package):
 
 def taken(path, known):
     """Modules among `known` that a file takes names from, but for annotations."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    guarded = (node for node in ast.walk(tree) if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test))
-    typing = {id(inner) for node in guarded for inner in ast.walk(node)}
-    for node in ast.walk(tree):
-        if id(node) in typing:
+    for node, annotations in imports(path):
+        if annotations:
             continue
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in known)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             inner = [f"{node.module}.{alias.name}" for alias in node.names]
             yield from (name if name in known else node.module for name in inner if {name, node.module} & known.keys())
 
