@@ -4,6 +4,7 @@
 EXTRAS = {
     "cluster": ("distributed", "dask-jobqueue"),
     "cloud": ("fsspec", "s3fs"),
+    "cuda": ("cuda-bindings",),
     "fmu": ("fmpy",),
     "tune": ("pymoo",),
     "docs": ("sphinx", "myst-parser", "furo"),

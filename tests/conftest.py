@@ -36,6 +36,11 @@ DEEP = (
     "mc_engine/campaign/test_covariances.py::test_a_run_keeps",
     "mc_engine/command_line/test_debug.py",
     "mc_engine/command_line/test_watching.py::test_every",
+    "mc_engine/flight/cards/test_card_flights.py::test_a_run_on_cards",
+    "mc_engine/flight/cards/test_card_flights.py::test_the_stand_in",
+    "mc_engine/flight/cards/test_card_code.py::test_cards_round",
+    "mc_engine/flight/cards/test_card_code.py::test_on_the_processor",
+    "mc_engine/flight/cards/test_card_code.py::test_the_code_assembles",
     "mc_engine/flight/test_five_kinds.py",
     "mc_engine/flight/test_fmus.py",
     "mc_engine/flight/test_kernel.py",
@@ -51,6 +56,7 @@ DEEP = (
     "mc_engine/lanes/test_adaptive_flight.py::test_every_width",
     "mc_engine/lanes/test_adaptive_flight.py::test_neither_order",
     "mc_engine/lanes/test_events.py::test_cases_with_events",
+    "mc_engine/lanes/test_gauss_jackson.py",
     "mc_engine/lanes/test_missing_numbers.py::test_a_case_is_not_finite",
     "mc_engine/lanes/test_multistep.py",
     "mc_engine/lanes/test_phases.py::test_a_delay",
@@ -92,6 +98,7 @@ DEEP = (
     "mc_engine/studies/test_opened_run.py::test_a_trace_names",
     "mc_engine/studies/test_rare_event.py",
     "mc_engine/studies/test_tuning.py::test_a_killed",
+    "mc_engine/test_bench.py::test_methods_are",
     "mc_engine/test_bench.py::test_the_timed",
     "mc_engine/test_contributions.py",
     "mc_engine/test_files_beside.py",
@@ -135,10 +142,17 @@ NOT_DEEP = (
     "faults/test_worker_deaths.py::test_workers_killed_at_random_instants_lose_nothing_and_repeat_nothing[loky-1-",
     "mc_engine/command_line/test_debug.py::test_it_stops_at_the_line",
     "mc_engine/command_line/test_debug.py::test_the_page",
+    "mc_engine/flight/cards/test_card_flights.py::test_a_run_on_cards_has_the_bytes_of_one_on_the_processor[minimal",
+    "mc_engine/flight/cards/test_card_code.py::test_cards_round_where_the_processor_rounds[minimal",
+    "mc_engine/flight/cards/test_card_code.py::test_on_the_processor_the_code_gives_the_bits_of_the_kernel[minimal",
     "mc_engine/flight/test_fmus.py::test_an_fmu_of_another",
     "mc_engine/flight/test_fmus.py::test_every_kind_of_fmu_flies_the_ball[2-co",
     "mc_engine/flight/test_fmus.py::test_what_is_taken",
     "mc_engine/flight/test_model_contract.py::test_shipped_campaigns_keep_the_contract[minimal",
+    "mc_engine/lanes/test_gauss_jackson.py::test_a_step_integrates",
+    "mc_engine/lanes/test_gauss_jackson.py::test_states_that",
+    "mc_engine/lanes/test_gauss_jackson.py::test_the_error_falls",
+    "mc_engine/lanes/test_gauss_jackson.py::test_the_weights",
     "mc_engine/lanes/test_multistep.py::test_the_error_falls_with_the_order_of_the_method[8",
     "mc_engine/lanes/test_phases.py::test_bytes_depend_on_no_width_chunk_thread_or_order[phased_rocket-1-",
     "mc_engine/physics/test_curves.py::test_a_surface_is_scipys_and_meets_its_points[sizes0-linear",
@@ -174,8 +188,10 @@ def pytest_ignore_collect(collection_path, config):
 
 @pytest.hookimpl(tryfirst=True)  # before pytest chooses among the tests by their markers
 def pytest_collection_modifyitems(items):
-    """Mark the deep tests."""
+    """Mark the deep tests, of which the slow ones are none."""
     for item in items:
+        if item.get_closest_marker("slow"):
+            continue
         name = item.nodeid.removeprefix(TESTS)
         long = name.startswith(DEEP) or any(parameter in name for parameter in DEEP_PARAMETERS)
         if item.get_closest_marker("benchmark") or (long and not name.startswith(NOT_DEEP)):

@@ -9,7 +9,7 @@ difference of large numbers, and within a Runge-Kutta step two places taken apar
 
 from collections import namedtuple
 
-from mc_engine.lanes import any_lane, atan2, exp, physics, sincos, sqrt, where
+from mc_engine.lanes import any_lane, atan2, exp, physics, replace, sincos, sqrt, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.model import Setting, states
 from mc_engine.physics.atmosphere import layered
@@ -110,7 +110,7 @@ def fix_position(m, p, draws):
         n5, n6 = normal_pair(draws, 2)
         position = added_scaled(position, k, Vector(n1, n2, n3))
         velocity = added_scaled(velocity, w, Vector(n4, n5, n6))
-    return Memory(position_error=position, velocity_error=velocity, scale=m.scale, on=m.on, pulses=m.pulses)
+    return replace(m, position_error=position, velocity_error=velocity)
 
 
 @physics
@@ -269,5 +269,4 @@ def pulse_off(s, m, p):
 def switch(s, m, hit):
     """The trigger turns: on counts a pulse."""
     on = where(hit.pulse_on > 0.5, 1.0, where(hit.pulse_off > 0.5, 0.0, m.on))
-    errors = m.position_error, m.velocity_error
-    return s, Memory(*errors, scale=m.scale, on=on, pulses=m.pulses + hit.pulse_on)
+    return s, replace(m, on=on, pulses=m.pulses + hit.pulse_on)

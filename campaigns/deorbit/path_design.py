@@ -11,8 +11,9 @@ import numpy as np
 
 from mc_engine.model import Refusals
 from mc_engine.physics.constants import MU_EARTH
+from mc_engine.physics.frames import TURN, turned
+from mc_engine.physics.orbital_elements import mean_anomaly, true_anomaly
 
-TAU = 2.0 * np.pi
 # The desired ellipse and its burn; float64[n], SI.
 # a, e, p, omega: semi-major axis, eccentricity, semi-latus rectum, argument of perigee; f_burn, theta_burn: true
 # anomaly on the ellipse and argument of latitude of the burn; dv, alpha: burn magnitude, and its angle from the
@@ -21,33 +22,14 @@ TAU = 2.0 * np.pi
 DeorbitPath = namedtuple("DeorbitPath", "a e p omega f_burn theta_burn dv alpha tilt duration")
 
 
-def mean_anomaly(f, e):
-    """Mean anomaly [rad] of true anomaly f on an ellipse of eccentricity e."""
-    eccentric = 2.0 * np.arctan2(np.sqrt(1.0 - e) * np.sin(0.5 * f), np.sqrt(1.0 + e) * np.cos(0.5 * f))
-    return eccentric - e * np.sin(eccentric)
-
-
-def true_anomaly(mean, e):
-    """True anomaly [rad] of a mean anomaly; Kepler's equation by Newton's method, 12 steps."""
-    mean = np.mod(np.asarray(mean) + np.pi, TAU) - np.pi
-    eccentric = mean + e * np.sin(mean)
-    for _ in range(12):
-        eccentric = eccentric - (eccentric - e * np.sin(eccentric) - mean) / (1.0 - e * np.cos(eccentric))
-    return 2.0 * np.arctan2(np.sqrt(1.0 + e) * np.sin(0.5 * eccentric), np.sqrt(1.0 - e) * np.cos(0.5 * eccentric))
-
-
 def design_path(i: SimpleNamespace, ascending: np.ndarray, refusals: Refusals) -> DeorbitPath:
     """Ellipse to the entry state and the burn that reaches it from a circular orbit.
 
     i : inputs of the model, SI;  ascending : where true, burn at the ascending crossing D2.
     Cases whose entry state lies on no ellipse, or whose ellipse misses the orbit, join `refusals`.
     """
-    a_initial, radius, speed, angle = (
-        i.initial_semi_major_axis,
-        i.target_radius,
-        i.target_speed,
-        i.target_flight_path_angle,
-    )
+    a_initial, radius = i.initial_semi_major_axis, i.target_radius
+    speed, angle = i.target_speed, i.target_flight_path_angle
     a = MU_EARTH / (2.0 * (MU_EARTH / radius - speed**2 / 2.0))  # eq. (11)
     refusals.add(~((a > 0.0) & np.isfinite(a)), "no ellipse reaches the entry state: its speed is at or above escape")
     e = np.sqrt(1.0 - (radius * speed * np.cos(angle)) ** 2 / (MU_EARTH * a))  # eq. (12)
@@ -57,12 +39,12 @@ def design_path(i: SimpleNamespace, ascending: np.ndarray, refusals: Refusals) -
     )
     cos_psi = (a - radius) / (a * e)  # eq. (15)
     sin_psi = -radius * speed * np.sin(angle) / (e * np.sqrt(MU_EARTH * a))  # eq. (16)
-    f_entry = np.mod(np.arctan2(np.sqrt(1.0 - e**2) * sin_psi, cos_psi - e), TAU)  # eq. (14)
-    omega = np.mod(i.target_latitude_argument - f_entry, TAU)  # eq. (13)
+    f_entry = np.mod(np.arctan2(np.sqrt(1.0 - e**2) * sin_psi, cos_psi - e), TURN)  # eq. (14)
+    omega = np.mod(i.target_latitude_argument - f_entry, TURN)  # eq. (13)
     p = a * (1.0 - e**2)  # eq. (7)
     cos_f = (p / a_initial - 1.0) / e  # eq. (17) with e_i = 0
     refusals.add(~(np.abs(cos_f) <= 1.0), "the initial orbit and the path to the entry state do not intersect")
-    f_burn = np.where(ascending, np.arccos(cos_f), TAU - np.arccos(cos_f))
+    f_burn = np.where(ascending, np.arccos(cos_f), TURN - np.arccos(cos_f))
     v_initial = np.sqrt(MU_EARTH / a_initial)  # eq. (19)
     v_radial = np.sqrt(MU_EARTH / p) * e * np.sin(f_burn)
     v_transverse = np.sqrt(MU_EARTH * p) / a_initial
@@ -73,12 +55,12 @@ def design_path(i: SimpleNamespace, ascending: np.ndarray, refusals: Refusals) -
         p=p,
         omega=omega,
         f_burn=f_burn,
-        theta_burn=np.mod(f_burn + omega, TAU),
+        theta_burn=np.mod(f_burn + omega, TURN),
         # the velocity triangle of eqs (18) and (23), by components: no asin, no lost quadrant
         dv=np.hypot(v_radial, v_transverse - v_initial),
         alpha=np.arctan2(-tilt * v_radial, v_initial - v_transverse),
         tilt=tilt,
-        duration=np.mod(mean_anomaly(f_entry, e) - mean_anomaly(f_burn, e), TAU) / np.sqrt(MU_EARTH / a**3),
+        duration=np.mod(mean_anomaly(f_entry, e) - mean_anomaly(f_burn, e), TURN) / np.sqrt(MU_EARTH / a**3),
     )
 
 
@@ -96,16 +78,10 @@ def burnt_velocity(path: DeorbitPath, i: SimpleNamespace):
 
 def path_axes(omega, inclination):
     """Unit vectors [3, n] to the perigee and 90 degrees ahead of it: eq. (30) with the node on x."""
-    s, c, zero = np.sin(omega), np.cos(omega), np.zeros_like(omega)
+    zero = np.zeros_like(omega)
     node = np.array([np.ones_like(omega), zero, zero])
     across = np.array([zero, np.cos(inclination), np.sin(inclination)])
-    return c * node + s * across, c * across - s * node
-
-
-def _turned(to_perigee, ahead, angle):
-    """Radial and transverse unit vectors [3, n] at a true anomaly."""
-    s, c = np.sin(angle), np.cos(angle)
-    return c * to_perigee + s * ahead, c * ahead - s * to_perigee
+    return turned(node, across, np.cos(omega), np.sin(omega))
 
 
 def first_deviation(path: DeorbitPath, i: SimpleNamespace, to_perigee, ahead):
@@ -114,12 +90,12 @@ def first_deviation(path: DeorbitPath, i: SimpleNamespace, to_perigee, ahead):
     The burn happens `burn_delay` after its time: the craft has gone on along the circle, its target along the path.
     """
     angle = path.f_burn + np.sqrt(MU_EARTH / i.initial_semi_major_axis**3) * i.burn_delay
-    radial, transverse = _turned(to_perigee, ahead, angle)
+    radial, transverse = turned(to_perigee, ahead, np.cos(angle), np.sin(angle))
     v = burnt_velocity(path, i)
     velocity = v[0] * radial + v[1] * transverse + v[2] * np.cross(to_perigee, ahead, axis=0)
     mean = mean_anomaly(path.f_burn, path.e) + np.sqrt(MU_EARTH / path.a**3) * i.burn_delay
     f = np.where(i.burn_delay == 0.0, path.f_burn, true_anomaly(mean, path.e))
-    wanted_radial, wanted_transverse = _turned(to_perigee, ahead, f)
+    wanted_radial, wanted_transverse = turned(to_perigee, ahead, np.cos(f), np.sin(f))
     root, rise = np.sqrt(MU_EARTH / path.p), 1.0 + path.e * np.cos(f)
     wanted = root * path.e * np.sin(f) * wanted_radial + root * rise * wanted_transverse  # (34), (37)
     return f, (i.initial_semi_major_axis * radial - path.p / rise * wanted_radial, velocity - wanted)  # (31)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from campaigns.deorbit.model import MODEL
-from mc_engine.flight.chosen_cases import chosen_case, chosen_history
+from mc_engine.flight.flight import chosen_case, chosen_history
 from mc_engine.physics.constants import MU_EARTH
 
 DEMONSTRATION: dict[str, Any] = {"ve_pct": -20.0, "oe_pct": 10.0}  # Table 3, solved for the errors of the burn

@@ -33,7 +33,7 @@ PLANAR = 1e-3  # sine of a tilt to the final plane below which the orbit before 
 
 @physics
 def _over(a, size):
-    """The vector a divided by a number."""
+    """The vector a divided by a number, in the unit of the quotient."""
     return Vector(a.x / size, a.y / size, a.z / size)
 
 
@@ -145,24 +145,11 @@ def stored(burn, p, o):
 
 
 @physics
-def chosen(new, aim, other):
-    """The `aim` where `new` holds, the other elsewhere, SI."""
-    return Aim(
-        x=where(new, aim.x, other.x),
-        y=where(new, aim.y, other.y),
-        z=where(new, aim.z, other.z),
-        stretch=where(new, aim.stretch, other.stretch),
-        sensed=where(new, aim.sensed, other.sensed),
-        ignition=where(new, aim.ignition, other.ignition),
-    )
-
-
-@physics
 def next_aim(t, s, burn, p, o):
     """The aim [1, m/s, s] of the next burn, as a coast begins: as stored, or of the last burn, if guided, aimed now."""
     aim = stored(burn, p, o)
     if o.guidance > OPEN_LOOP:
-        aim = chosen(burn + 1.0 >= nominal(o.tables).burns, _aimed(t, known(s, p), burn, p, o), aim)
+        aim = where(burn + 1.0 >= nominal(o.tables).burns, _aimed(t, known(s, p), burn, p, o), aim)
     return aim
 
 
@@ -205,7 +192,7 @@ def turned(steering, aim, o):
 
 @physics
 def _combined(c, a, b, d):
-    """a x + b y + d z of every power of the steering, dimensionless."""
+    """a x + b y + d z of every power of the steering, without unit."""
     return Polynomial(
         c0=a * c.x.c0 + b * c.y.c0 + d * c.z.c0,
         c1=a * c.x.c1 + b * c.y.c1 + d * c.z.c1,

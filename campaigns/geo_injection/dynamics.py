@@ -7,7 +7,7 @@ errors; the program runs from the actual ignition of each burn.
 
 from collections import namedtuple
 
-from campaigns.geo_injection.aiming import OPEN_LOOP, chosen, next_aim, of_burn, stored, turned
+from campaigns.geo_injection.aiming import OPEN_LOOP, next_aim, of_burn, stored, turned
 from campaigns.geo_injection.program_table import burn_row, nominal, segment_row, steering_row
 from mc_engine.lanes import any_lane, fma, log, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Event, states
@@ -191,7 +191,7 @@ def switch(t, s, m, p, o, hit):
     to_coast = (hit.burn_out > 0.5) | (shut & (p.tail <= 0.0))
     following = minimum(m.burn + 1.0, nominal(o.tables).burns - 1.0)
     row, new = burn_row(o.tables, following), next_aim(t, s, following, p, o)
-    aim = chosen(to_coast, new, m.aim)  # that of the next burn is kept from the start of the coast on
+    aim = where(to_coast, new, m.aim)  # that of the next burn is kept from the start of the coast on
     burn = where(ignite, following, m.burn)
     segment = where(ignite, row.first, where(hit.next_segment > 0.5, m.segment + 1.0, m.segment))
     ignited = where(ignite, t, m.ignited)

@@ -1,5 +1,6 @@
 """Inputs of an injection campaign: parameters, which may differ from case to case, and settings."""
 
+from collections.abc import Mapping
 from typing import Any
 
 from mc_engine.model import Parameter, Setting, inputs
@@ -8,6 +9,7 @@ METHODS = ("optimal", "staged")
 SHUTDOWNS = ("time", "sensed_velocity")
 GUIDANCE = ("open_loop", "re_aimed")
 AXES = {"r": "radial", "t": "transverse", "n": "normal"}
+BURNS = {k: k for k in (1, 2, 3)}
 
 
 def _factor(description: str, low: float = 0.1, high: float = 10.0) -> Parameter:
@@ -18,43 +20,38 @@ def _error(description: str, most: float, **unit: Any) -> Parameter:
     return Parameter(0.0, description, -most, most, **unit)
 
 
+def _each(name: str, description: str, most: float, keys: Mapping[Any, Any], **unit: Any) -> dict[str, Parameter]:
+    """Errors of one kind by column; {} in name and description is the key, a burn or an axis, and its word."""
+    return {name.format(key): _error(description.format(word), most, **unit) for key, word in keys.items()}
+
+
+def _transfer(k: int) -> dict[str, Setting]:
+    after = f"staged: orbit after burn {k}"
+    change = f"staged: plane change by the end of burn {k}; below 0: the source's"
+    return {
+        f"transfer_{k}_semi_major_axis_km": Setting(0.0, f"{after}; 0: the source's for this number of burns", low=0.0),
+        f"transfer_{k}_eccentricity": Setting(-1.0, f"{after}; below 0: the source's", low=-1.0, high=0.99, unit=""),
+        f"transfer_{k}_plane_change_deg": Setting(-1.0, change, low=-1.0, high=90.0),
+    }
+
+
 Inputs = inputs(
     thrust_factor=_factor("thrust over its nominal value; the mass flow follows"),
     isp_factor=_factor("specific impulse over its nominal value"),
     initial_mass_factor=_factor("mass at the first ignition over its nominal value"),
-    **{
-        f"ignition_delay_{k}_s": _error(f"delay of ignition {k} against its nominal time", 1e4, unit="s")
-        for k in (1, 2, 3)
-    },
+    **_each("ignition_delay_{}_s", "delay of ignition {} against its nominal time", 1e4, BURNS, unit="s"),
     pitch_error_deg=_error("pointing error towards Z x d, all burns", 80.0),
     yaw_error_deg=_error("pointing error towards the pole, across the thrust, all burns", 80.0),
-    **{
-        f"{name}_error_{k}_deg": _error(f"{name} error of burn {k}, added to that of all", 80.0)
-        for name in ("pitch", "yaw")
-        for k in (1, 2, 3)
-    },
-    **{
-        f"initial_position_{axis}_m": _error(f"{word} error of the first place", 1e6, unit="m")
-        for axis, word in AXES.items()
-    },
-    **{
-        f"initial_velocity_{axis}_m_s": _error(f"{word} error of the first velocity", 1e3, unit="m/s")
-        for axis, word in AXES.items()
-    },
+    **_each("pitch_error_{}_deg", "pitch error of burn {}, added to that of all", 80.0, BURNS),
+    **_each("yaw_error_{}_deg", "yaw error of burn {}, added to that of all", 80.0, BURNS),
+    **_each("initial_position_{}_m", "{} error of the first place", 1e6, AXES, unit="m"),
+    **_each("initial_velocity_{}_m_s", "{} error of the first velocity", 1e3, AXES, unit="m/s"),
     tail_off_factor=_factor("duration of the tail-off over its nominal value", 0.0, 100.0),
     accelerometer_scale_error=_error("relative error of the sensed velocity", 0.5, unit=""),
-    **{
-        f"navigation_position_{axis}_m": _error(
-            f"{word} error of the place that the last burn is aimed from", 1e6, unit="m"
-        )
-        for axis, word in AXES.items()
-    },
-    **{
-        f"navigation_velocity_{axis}_m_s": _error(
-            f"{word} error of the velocity that the last burn is aimed from", 1e3, unit="m/s"
-        )
-        for axis, word in AXES.items()
-    },
+    **_each("navigation_position_{}_m", "{} error of the place that the last burn is aimed from", 1e6, AXES, unit="m"),
+    **_each(
+        "navigation_velocity_{}_m_s", "{} error of the velocity that the last burn is aimed from", 1e3, AXES, unit="m/s"
+    ),
     burns=Setting(2.0, "number of burns", low=2.0, high=3.0, whole=True, unit=""),
     initial_inclination_deg=Setting(28.5, "inclination of the parking orbit", low=0.0, high=90.0),
     final_inclination_deg=Setting(
@@ -73,21 +70,8 @@ Inputs = inputs(
     mass_flow_kg_s=Setting(6.14, "nominal mass flow", low=1e-6, dispersed_by="isp_factor"),
     initial_mass_kg=Setting(22170.0, "nominal mass at the first ignition", low=1.0, dispersed_by="initial_mass_factor"),
     method=Setting("optimal", "how the burn program is designed", choices=METHODS),
-    **{
-        name: setting
-        for k in (1, 2)
-        for name, setting in {
-            f"transfer_{k}_semi_major_axis_km": Setting(
-                0.0, f"staged: orbit after burn {k}; 0: the source's for this number of burns", low=0.0
-            ),
-            f"transfer_{k}_eccentricity": Setting(
-                -1.0, f"staged: orbit after burn {k}; below 0: the source's", low=-1.0, high=0.99, unit=""
-            ),
-            f"transfer_{k}_plane_change_deg": Setting(
-                -1.0, f"staged: plane change by the end of burn {k}; below 0: the source's", low=-1.0, high=90.0
-            ),
-        }.items()
-    },
+    **_transfer(1),
+    **_transfer(2),
     shutdown=Setting("time", "what ends a burn", choices=SHUTDOWNS),
     tail_off_s=Setting(
         0.0, "time in which the thrust falls to zero after the command, along a line", low=0.0, high=60.0

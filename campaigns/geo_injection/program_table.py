@@ -60,7 +60,7 @@ def steering_row(tables, segment):
 
 
 def table_of(program: Program, impulse: Nominal) -> np.ndarray:
-    """The program as one array."""
+    """The program as one array, SI; sensed speed changes by the rocket equation."""
     sequence, mass = program.sequence, program.sequence.mass
     burns = np.zeros((BURNS, _BURN_ROW))
     segments: list[list[float]] = []

@@ -4,7 +4,6 @@ Cartesian, SI, mean equator and equinox of the epoch, which are taken as inertia
 mean sidereal rate.  The servicing module flies in all phases, the target module only in the inspection.
 """
 
-from collections import namedtuple
 from typing import Any
 
 from campaigns.geo_servicing import plan_table
@@ -33,17 +32,6 @@ State = states(
     longitude_sum_s="integral of the longitude deviation, in radians",
 )
 BURN_NUMBERS = range(1, plan_table.BURNS + 1)
-Parameters = namedtuple(  # type: ignore[misc]
-    "Parameters",
-    [
-        *State._fields[:-1],  # first state
-        *"thrust exhaust light target_light".split(),  # N, m/s; C_R A [m^2], of the target over its mass [m^2/kg]
-        *"sidereal aim sun_moon sun_moon_time".split(),  # angles [rad] of longitude 0 and the required one; ephemeris
-        *(f"{error}_{k}" for error in ("thrust", "radial", "normal") for k in BURN_NUMBERS),  # of the phasing
-        *"thrust_noise pointing_noise nav_position nav_velocity".split(),  # 1-sigma, at inspection burns and at fixes
-        *"chi1 chi2 control_weight nominal around coast_revolutions".split(),  # the inspection law
-    ],
-)
 
 
 def tolerances(place: float, velocity: float) -> Any:

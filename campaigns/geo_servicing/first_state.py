@@ -7,21 +7,7 @@ import numpy as np
 from campaigns.geo_servicing.dynamics import MU, State
 from mc_engine.model import Refusals
 from mc_engine.physics.frames import TURN
-
-
-def state_of(a, e, inclination, node, pericentre, anomaly) -> np.ndarray:
-    """Place [m] and velocity [m/s], float64[6, n], of an orbit of semi-major axis a [m].
-
-    Montenbruck, Gill, Satellite Orbits, eqs (2.43)-(2.51).
-    """
-    parameter = a * (1.0 - e * e)
-    r, speed = parameter / (1.0 + e * np.cos(anomaly)), np.sqrt(MU / parameter)
-    ci, si, cn, sn = np.cos(inclination), np.sin(inclination), np.cos(node), np.sin(node)
-    cp, sp = np.cos(pericentre), np.sin(pericentre)
-    p = np.array([cp * cn - sp * ci * sn, cp * sn + sp * ci * cn, sp * si])
-    q = np.array([-sp * cn - cp * ci * sn, -sp * sn + cp * ci * cn, cp * si])
-    place = r * (np.cos(anomaly) * p + np.sin(anomaly) * q)
-    return np.concatenate([place, speed * (-np.sin(anomaly) * p + (e + np.cos(anomaly)) * q)])
+from mc_engine.physics.orbital_elements import state_of_elements
 
 
 def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals) -> np.ndarray:
@@ -36,19 +22,20 @@ def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Re
     a = np.cbrt(MU * (period / TURN) ** 2)
     ahead = sidereal + o.initial_longitude + i.initial_longitude_error - o.initial_node
     latitude = np.arctan2(np.sin(ahead) / np.cos(inclination), np.cos(ahead))  # argument of, above the longitude
-    return state_of(a, e, inclination, o.initial_node, latitude - anomaly, anomaly)
+    return state_of_elements(a, e, inclination, o.initial_node, latitude - anomaly, anomaly, MU)
 
 
 def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
     """State float64[6, n] of the craft whose parameters begin with `name`."""
     own = SimpleNamespace(**{key.removeprefix(f"{name}_"): value for key, value in vars(i).items()})
-    return state_of(
+    return state_of_elements(
         own.pericentre_radius / (1.0 - own.eccentricity),
         own.eccentricity,
         own.inclination,
         own.node,
         own.argument_of_pericentre,
         own.argument_of_latitude - own.argument_of_pericentre,
+        MU,
     )
 
 

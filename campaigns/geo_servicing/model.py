@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from campaigns.geo_servicing import corrections, dynamics, figures, navigation, outcome, plan_table
+from campaigns.geo_servicing import corrections, dynamics, navigation, outcome, plan_table
 from campaigns.geo_servicing.dynamics import R0
 from campaigns.geo_servicing.first_state import first_states
 from campaigns.geo_servicing.inputs import GEOMETRIES, NAVIGATION, PHASES, Inputs
 from campaigns.geo_servicing.phasing_plan import plan_of
 from mc_engine.errors import ModelError
-from mc_engine.model import AdaptiveStep, Parameter, Refusals, kept_design, model
+from mc_engine.model import AdaptiveStep, Parameter, Refusals, kept_design, model, prepared
+from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
 from mc_engine.physics.constants import STANDARD_GRAVITY
 from mc_engine.physics.geopotential import COLUMNS, harmonics_rows, harmonics_table
 from mc_engine.physics.sun_moon import COLUMNS as SUN_MOON
@@ -48,8 +49,8 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
         "mass_left": mass,
         "thrust": o.thrust,
         "exhaust": o.isp * STANDARD_GRAVITY,
-        "light": light,
-        "target_light": light / mass * i.target_area_to_mass_factor,
+        "light": light,  # C_R A [m^2]
+        "target_light": light / mass * i.target_area_to_mass_factor,  # over its mass [m^2/kg]
         "sidereal": sidereal,
         "aim": sidereal + o.target_longitude,
         **{f"thrust_{k}": i.thrust_error + getattr(i, f"burn_{k}_thrust_error") for k in dynamics.BURN_NUMBERS},
@@ -121,6 +122,18 @@ def sample_period(o: Any) -> float:
     return np.inf if o.navigation == NAVIGATION.perfect and o.phase != PHASES.inspection else float(o.fix_period)
 
 
+FIGURES = (
+    ProfileFigure("mean_longitude_deviation_deg", "drift_rate_deg_rev", "Phase portrait: longitude and drift"),
+    HistoryFigure(("longitude_deviation_deg", "drift_rate_deg_rev", "eccentricity"), "Longitude, drift, eccentricity"),
+    ProfileFigure("along_track_m", "radial_m", "Relative motion in the orbital plane, as the target sees it"),
+    ProfileFigure("settled_along_track_m", "settled_radial_m", "The same after settling"),
+    HistoryFigure(("range_m", "relative_drift_m", "relative_eccentricity"), "Range, relative drift, relative ellipse"),
+    HistoryFigure(("along_track_m", "radial_m", "delta_v_m_s"), "Ahead of and above the target, velocity spent"),
+    ScatterFigure("settled_min_range_m", "settled_max_range_m", "Smallest and largest range after settling"),
+    ScatterFigure("daily_mean_longitude_deviation_deg", "actual_drift_rate_deg_rev", "Where the transfer ends"),
+    ScatterFigure("drift_rate_deg_rev", "eccentricity", "Drift and eccentricity at the end of the transfer"),
+)
+
 MODEL = model(
     name="geo_servicing",
     title="Servicing a geostationary satellite",
@@ -130,7 +143,7 @@ MODEL = model(
     outputs=outcome.Outputs,
     metrics=outcome.Metrics,
     clock=AdaptiveStep("duration", "tolerance", dynamics.tolerances(1e-4, 1e-8), control_period=sample_period),
-    kernel_parameters=dynamics.Parameters,
+    kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,
     initial=dynamics.initial,
     start=corrections.start,
@@ -142,6 +155,6 @@ MODEL = model(
     observe=outcome.observe,
     evaluate=outcome.evaluate,
     extrema=outcome.EXTREMA,
-    figures=figures.FIGURES,
+    figures=FIGURES,
     published=read_published(Path(__file__).with_name("published.toml")),
 )

@@ -43,7 +43,7 @@ def plan_of(o: Any, first: Any) -> np.ndarray:
 
 
 def published_plan(craft: Craft) -> Plan:
-    """The source's corrections as velocity changes of this craft."""
+    """The source's corrections as velocity changes [m/s] of this craft."""
     coasts, burns, signs = (np.array(column) for column in zip(*PUBLISHED, strict=True))
     return Plan(coasts, signs * craft.velocity_changes(burns))
 
@@ -109,7 +109,7 @@ def design(craft: Craft) -> Plan:
 
 
 def first_approximations(craft: Craft, limits: Limits) -> list[Plan]:
-    """Plans to start the search from: the source's profiles at several lengths of the coasts."""
+    """Plans to start the search from: the source's profiles at several lengths of the coasts; [s, m/s]."""
     n = int(craft.o.planned_corrections)
     profile = braking if craft.o.aim == AIMS.fuel else fastest
     plans = []

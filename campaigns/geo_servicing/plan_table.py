@@ -7,7 +7,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from mc_engine.lanes import look_up, physics
+from mc_engine.lanes import look_up, look_up_record, physics
 
 BURNS = 5  # corrections that a plan may have
 # ignition [s], velocity change [m/s]; mean longitude deviation [rad] and drift [rad/rev] that the plan has at ignition;
@@ -26,15 +26,7 @@ def corrections(tables):
 @physics
 def planned(tables, burn):
     """The row of one correction, counted from 0."""
-    at = 1.0 + _WIDTH * burn
-    return Row(
-        ignition=look_up(tables, at),
-        dv=look_up(tables, at + 1.0),
-        longitude=look_up(tables, at + 2.0),
-        drift=look_up(tables, at + 3.0),
-        gain_y=look_up(tables, at + 4.0),
-        gain_v=look_up(tables, at + 5.0),
-    )
+    return look_up_record(tables, 1.0 + _WIDTH * burn, Row)
 
 
 def plan_rows(rows: Row) -> np.ndarray:

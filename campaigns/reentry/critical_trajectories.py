@@ -6,9 +6,10 @@ prints those of the campaign files aerobraking.toml and skip.toml.  Every round 
 between two limits and keeps the pair of neighbours between which the outcome changes.
 """
 
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -23,11 +24,8 @@ Inputs = Mapping[str, Any]
 Columns = dict[str, np.ndarray]
 
 
-class CriticalPeriapses(NamedTuple):
-    """Altitudes [km] of the vacuum periapsis between which one pass captures."""
-
-    capture: float
-    entry: float
+# altitudes [km] of the vacuum periapsis between which one pass captures
+CriticalPeriapses = namedtuple("CriticalPeriapses", "capture entry")
 
 
 def fly_inputs(inputs: Inputs) -> Columns:
@@ -55,7 +53,7 @@ def boundary(inputs: Inputs, name: str, low: float, high: float, holds: Callable
 
 
 def interface_km(planet: str) -> float:
-    """Altitude at which the planet's exponential atmosphere is as thin as that of the Earth at 120 km."""
+    """Altitude [km] at which the planet's exponential atmosphere is as thin as that of the Earth at 120 km."""
     thin = PLANETS["earth"].air[0] * np.exp(-120e3 / PLANETS["earth"].air[1])
     density, scale = PLANETS[planet].air
     return float(1e-3 * scale * np.log(density / thin))

@@ -1,6 +1,6 @@
 """From the inputs of a case to its first state, over ground and in planet-fixed axes.  NumPy, SI, whole chunks."""
 
-from dataclasses import dataclass
+from collections import namedtuple
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,51 +8,18 @@ import numpy as np
 from campaigns.reentry.inputs import ELLIPSOID, FLAT, HYPERBOLA, INERTIAL
 from campaigns.reentry.planets import of_planets
 from mc_engine.model import Refusals
-from mc_engine.physics.frames import (
-    carried_along,
-    local_axes,
-    over_ellipsoid,
-    radius_at_altitude,
-    velocity_components,
+from mc_engine.physics.frames import carried_along, local_axes, over_ellipsoid, radius_at_altitude, velocity_components
+
+# The planet of each case; float64[n], SI.  flat: bool[n].
+World = namedtuple("World", "mu radius polar_radius e2 rate flat")
+# The entry of each case; float64[n], SI.
+# position, velocity: [3, n], planet-fixed, over ground (flat: ahead, left, up);  speed, path: over ground
+# The others are those of the planned entry, without errors.  place, ahead, right: unit vectors [3, n], to it, along its
+# great circle, to its right;  altitude, radius, latitude: where;  heading, planned_speed, planned_path: over ground
+Entry = namedtuple(
+    "Entry",
+    "position velocity speed path place ahead right altitude radius latitude heading planned_speed planned_path",
 )
-
-
-@dataclass
-class World:
-    """The planet of each case; float64[n], SI.  flat, turning: bool[n]."""
-
-    mu: np.ndarray
-    radius: np.ndarray
-    polar_radius: np.ndarray
-    e2: np.ndarray
-    rate: np.ndarray
-    flat: np.ndarray
-
-
-@dataclass
-class Entry:
-    """The entry of each case; float64[n], SI.
-
-    position, velocity : [3, n], planet-fixed, over ground (flat: ahead, left, up)
-    speed, path : over ground
-    all others are those of the planned entry, without errors:
-    place, ahead, right : unit vectors [3, n], to it, along its great circle, to its right
-    altitude, radius, latitude : where;  heading, planned_speed, planned_path : over ground
-    """
-
-    position: np.ndarray
-    velocity: np.ndarray
-    place: np.ndarray
-    ahead: np.ndarray
-    right: np.ndarray
-    altitude: np.ndarray
-    speed: np.ndarray
-    path: np.ndarray
-    heading: np.ndarray
-    radius: np.ndarray
-    latitude: np.ndarray
-    planned_speed: np.ndarray
-    planned_path: np.ndarray
 
 
 def world_of(i: SimpleNamespace, settings: SimpleNamespace) -> World:
@@ -61,7 +28,7 @@ def world_of(i: SimpleNamespace, settings: SimpleNamespace) -> World:
     e2 = np.where(settings.shape == ELLIPSOID, of_planets(settings.planet, "e2"), 0.0)
     rate = np.where(settings.rotating > 0.5, of_planets(settings.planet, "rate"), 0.0)
     mu = of_planets(settings.planet, "mu")
-    return World(mu, radius, radius * np.sqrt(1.0 - e2), e2, rate, settings.shape == FLAT)
+    return World(mu, radius, polar_radius=radius * np.sqrt(1.0 - e2), e2=e2, rate=rate, flat=settings.shape == FLAT)
 
 
 def hyperbolic_arrival(excess_speed, periapsis, radius, mu, refusals: Refusals, asked):
@@ -107,9 +74,7 @@ def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusa
     north, east, place = local_axes(latitude, longitude)
     ahead = np.cos(heading) * north + np.sin(heading) * east
     components = velocity_components(
-        speed + i.entry_speed_error,
-        path + i.entry_flight_path_angle_error,
-        i.entry_heading + i.entry_heading_error,
+        speed + i.entry_speed_error, path + i.entry_flight_path_angle_error, i.entry_heading + i.entry_heading_error
     )
     latitude, longitude = latitude + i.entry_latitude_error, longitude + i.entry_longitude_error
     radius = radius + i.entry_altitude_error

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from campaigns.reentry import dynamics, figures, outcome, weather
+from campaigns.reentry import dynamics, outcome, weather
 from campaigns.reentry.air import GAS_CONSTANT
 from campaigns.reentry.airframe import airframe_of, airframe_rows
 from campaigns.reentry.entry_state import Entry, World, entry_of, world_of
@@ -16,6 +16,14 @@ from campaigns.reentry.guidance.reference import stored_references
 from campaigns.reentry.inputs import DETRA_KEMP_RIDDELL, EARTH, FLAT, J2, US76, Inputs
 from campaigns.reentry.planets import of_planets
 from mc_engine.model import AdaptiveStep, Event, Refusals, model
+from mc_engine.model.figures import (
+    CorridorFigure,
+    FootprintFigure,
+    HistoryFigure,
+    MapFigure,
+    ProfileFigure,
+    ScatterFigure,
+)
 from mc_engine.studies.published import read_published
 
 SOURCE = (
@@ -133,6 +141,49 @@ def _crossing(direction: str, action: str, rare: bool = False) -> Event:
     return Event(dynamics.crossings, direction, action, rare=rare)
 
 
+HIGHEST_LANDING_KM = 35.0  # a flight that ends higher has left the atmosphere again, or ran out of time
+
+# a map is drawn where the run disperses its two inputs
+FIGURES = (
+    CorridorFigure(
+        "relative_speed_m_s",
+        "relative_flight_path_angle_deg",
+        (
+            "peak_load_g",
+            "peak_axial_load_g",
+            "peak_dynamic_pressure_pa",
+            "peak_heat_rate_w_m2",
+            "heat_load_j_m2",
+            "exits",
+            "min_altitude_km",
+        ),
+        "Entry corridor: speed and flight-path angle at entry, over ground",
+    ),
+    FootprintFigure(
+        "final_latitude_deg",
+        "final_longitude_deg",
+        "Where the flights end",
+        ends_below=("final_altitude_km", HIGHEST_LANDING_KM),
+        planet="planet",
+        target=("target_latitude_deg", "target_longitude_deg"),
+    ),
+    ProfileFigure("speed_m_s", "altitude_km", "Altitude against speed"),
+    MapFigure("exit_speed_m_s", "vacuum_periapsis_km", "density_factor", "Speed that a pass leaves"),
+    MapFigure(
+        "peak_load_g",
+        "entry_flight_path_angle_error_deg",
+        "entry_speed_error_m_s",
+        "Largest load over the entry errors",
+    ),
+    MapFigure("miss_km", "ve_pct", "oe_pct", "Landing miss over the errors of the de-orbit burn", upstream=True),
+    HistoryFigure(("altitude_km", "speed_m_s", "flight_path_angle_deg"), "Altitude, speed and flight-path angle"),
+    HistoryFigure(("load_g", "heat_rate_w_m2", "dynamic_pressure_pa"), "Load, heat rate and dynamic pressure"),
+    HistoryFigure(("downrange_km", "crossrange_km", "bank_deg"), "Distances over ground and bank"),
+    ScatterFigure("downrange_km", "crossrange_km", "Where the flight ends"),
+    ScatterFigure("peak_load_altitude_km", "peak_load_g", "Largest load and its altitude"),
+    ScatterFigure("heat_load_j_m2", "peak_heat_rate_w_m2", "Largest heat rate and heat load"),
+)
+
 MODEL = model(
     name="reentry",
     title="Atmospheric entry",
@@ -169,6 +220,6 @@ MODEL = model(
     switch=dynamics.switch,
     observe=outcome.observe,
     evaluate=outcome.evaluate,
-    figures=figures.FIGURES,
+    figures=FIGURES,
     published=read_published(Path(__file__).with_name("published.toml")),
 )

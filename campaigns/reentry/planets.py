@@ -1,6 +1,6 @@
 """Planets of the entries: gravity, shape, rotation, textbook atmosphere, heating constant.  SI."""
 
-from dataclasses import dataclass
+from collections import namedtuple
 
 import numpy as np
 
@@ -9,22 +9,9 @@ from mc_engine.physics.constants import EARTH_RATE, MU_EARTH
 from mc_engine.physics.frames import WGS84_ECCENTRICITY2, WGS84_RADIUS
 from mc_engine.physics.heating import SUTTON_GRAVES
 
-
-@dataclass(frozen=True)
-class Planet:
-    """mu [m^3/s^2], equatorial radius [m], squared eccentricity, rate [rad/s]; air: density [kg/m^3], scale height [m].
-
-    Only the Earth has an ellipsoid, J2 and a standard atmosphere here.
-    """
-
-    mu: float
-    radius: float
-    e2: float
-    rate: float
-    air: tuple[float, float]
-    heating: float
-
-
+# mu [m^3/s^2], equatorial radius [m], squared eccentricity, rate [rad/s]; air: density [kg/m^3], scale height [m].
+# Only the Earth has an ellipsoid, J2 and a standard atmosphere here.
+Planet = namedtuple("Planet", "mu radius e2 rate air heating")
 # Mars and Venus: radii and gravitational parameters of D. R. Williams, NASA planetary fact sheets; rotation of
 # B. A. Archinal et al., Celestial Mechanics and Dynamical Astronomy 130 (2018) 22.
 PLANETS = {

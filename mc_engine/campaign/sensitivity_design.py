@@ -19,7 +19,7 @@ from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import MOST_CASES, SensitivitySection
 from mc_engine.model.fields import Parameter
 from mc_engine.model.simulator import Simulator, System
-from mc_engine.sampling.block_layout import RANDOM_DRAWS, BlockLayout
+from mc_engine.sampling.block_layout import NOMINAL, RANDOM_DRAWS, A, BlockLayout
 from mc_engine.sampling.correlation import correlated, gaussian_copula
 from mc_engine.sampling.designs import BY_LEVELS, IN_BLOCKS, sobol_key
 from mc_engine.sampling.distributions import quantiles
@@ -46,7 +46,8 @@ class SensitivityDesign:
     def layout(self) -> BlockLayout:
         """How the rows of a block lie."""
         repeated = (RANDOM_DRAWS,) if RANDOM_DRAWS in self.groups else ()
-        return BlockLayout(tuple(self.groups), repeated)
+        held = repeated if self.groups.get(RANDOM_DRAWS) else ()  # noise made in flight has no nominal value
+        return BlockLayout(tuple(self.groups), repeated, held)
 
     @property
     def flights(self) -> int:
@@ -122,7 +123,8 @@ def _names_a_draw(model: System, name: str) -> bool:
 def companion(campaign: "Campaign") -> "Campaign":
     """The campaign of the flights beside `campaign`, which has a [sensitivity]."""
     assert campaign.sensitivity is not None  # the caller looked
-    digest = sha256(f"{campaign.digest}/{DESIGN}".encode()).hexdigest()
+    asked = "/".join((campaign.digest, DESIGN, *campaign.sensitivity.layout.held))
+    digest = sha256(asked.encode()).hexdigest()
     retention = Retention(nominal=campaign.retention.nominal, rows=campaign.retention.rows)
     cases = campaign.sensitivity.flights
     return replace(campaign, design=DESIGN, cases=cases, digest=digest, retention=retention, looks=(), tuning=None)
@@ -133,7 +135,8 @@ def sensitivity_record(campaign: "Campaign") -> dict[str, Any]:
     assert campaign.sensitivity is not None  # the caller looked
     chosen = campaign.sensitivity
     groups = [{"name": name, "members": list(members)} for name, members in chosen.groups.items()]
-    record = {"base_cases": chosen.cases, "groups": groups, "repeated": list(chosen.layout.repeated)}
+    layout = chosen.layout
+    record = {"base_cases": chosen.cases, "groups": groups, "repeated": layout.repeated, "held": layout.held}
     return {**record, "design": campaign.design, "cases": campaign.cases}
 
 
@@ -154,9 +157,11 @@ def companion_table(campaign: "Campaign", case_ids: np.ndarray) -> dict[str, np.
     table = {}
     for place, dispersion in enumerate(campaign.dispersions):
         group = next(name for name, members in campaign.sensitivity.groups.items() if dispersion.name in members)
-        u = np.choose(layout.points(group)[row], [columns[place] for columns in points])
+        taken = layout.points(group)[row]
+        u = np.choose(taken, [columns[place] for columns in points], mode="clip")
         assert dispersion.distribution is not None  # of a random design
-        table[dispersion.name] = quantiles(dispersion.distribution, u)
+        drawn, nominal = quantiles(dispersion.distribution, u), campaign.nominal[dispersion.name]
+        table[dispersion.name] = np.where(taken == NOMINAL, nominal, drawn) if group in layout.held else drawn
     return table
 
 
@@ -183,7 +188,7 @@ def noise_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:
         return case_ids
     layout, block, row = _blocks(campaign, case_ids)
     point = layout.points(RANDOM_DRAWS)[row] if RANDOM_DRAWS in layout.groups else np.zeros_like(row)
-    return _NOISE + len(_POINTS) * block + point
+    return _NOISE + len(_POINTS) * block + np.where(point == NOMINAL, A, point)
 
 
 def upstream_ids(campaign: "Campaign", case_ids: np.ndarray) -> np.ndarray:

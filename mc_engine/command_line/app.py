@@ -128,8 +128,8 @@ BackendName = Annotated[
     typer.Option(
         "--backend",
         metavar="NAME",
-        help="Who flies: threading, loky (processes), dask (a cluster).",
-        autocompletion=beginning(("threading", "loky", "dask")),
+        help="Who flies: threading, loky (processes), dask (a cluster), cuda (NVIDIA cards), auto.",
+        autocompletion=beginning(("threading", "loky", "dask", "cuda", "auto")),
     ),
 ]
 Scheduler = Annotated[

@@ -2,9 +2,10 @@
 
 import json
 import shutil
+from contextlib import nullcontext
 from itertools import groupby
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -20,6 +21,10 @@ from mc_engine.command_line.app import (
 )
 from mc_engine.numbers_in_text import LEAST_SHARE
 from mc_engine.shell_words import shell_word
+
+if TYPE_CHECKING:
+    from mc_engine.campaign.loading import Campaign
+    from mc_engine.flight.flyer import Flyer, Process
 
 
 @app.command()
@@ -58,16 +63,10 @@ def check(
     A few cases are flown in a process of their own: results must be there and be independent of the other cases in the
     batch, and every declared dispersion, metric and event must matter.
     """
-    from mc_engine.campaign.loading import load_campaign
-    from mc_engine.flight.flyers import flyer_of
-    from mc_engine.runner.flown_campaign import refuse_undeclared_data
+    from mc_engine.flight.contract import flights_beside
 
-    campaign = load_campaign(file)
-    flyer = flyer_of(campaign)
-    problems = flyer.faults() if model else []
-    if model and not problems:
-        refuse_undeclared_data(campaign)
-        problems = flyer.faults_in_flight(file)
+    with flights_beside(file) if model else nullcontext() as process:
+        campaign, flyer, problems = _checked(file, process)
     if problems:
         heading = f"{campaign.model_reference}: {counted(problems, 'problem')}"
         leave(USAGE, "\n".join([heading, *(f"  {problem}" for problem in problems)]))
@@ -78,6 +77,21 @@ def check(
     )
     for line in flyer.remarks() if model else []:
         typer.echo(line)
+
+
+def _checked(file: str, process: "Process | None") -> "tuple[Campaign, Flyer, list[str]]":
+    """The campaign, what flies it, and sentences on its model; none without the process that flies a few cases."""
+    from mc_engine.campaign.loading import load_campaign
+    from mc_engine.flight.flyers import flyer_of
+    from mc_engine.runner.flown_campaign import refuse_undeclared_data
+
+    campaign = load_campaign(file)
+    flyer = flyer_of(campaign)
+    problems = [] if process is None else flyer.faults()
+    if process is not None and not problems:
+        refuse_undeclared_data(campaign)
+        problems = flyer.faults_in_flight(process)
+    return campaign, flyer, problems
 
 
 @app.command()

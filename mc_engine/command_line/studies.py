@@ -31,6 +31,7 @@ from mc_engine.command_line.next_step import after_search
 from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 
 if TYPE_CHECKING:
+    from mc_engine.campaign.loading import Campaign
     from mc_engine.campaign.parts import Requirement
     from mc_engine.studies.lane_speed import Timing
 
@@ -319,23 +320,61 @@ def bench(
     repeats: Annotated[
         int, typer.Option(min=1, max=10_000, help="Flights of each build; the fastest counts.")
     ] = _REPEATS,
+    methods: Annotated[
+        bool, typer.Option("--methods", help="Which integration method is fastest at the error of the model's own.")
+    ] = False,
+    card: Annotated[
+        bool, typer.Option("--card", help="On the cards and all cores of this machine; --backend auto goes by it.")
+    ] = False,
 ) -> None:
     """How fast a campaign flies on one thread, and how much faster its cases fly side by side than one at a time.
 
-    Only the flights are timed: compiling, sampling and storing are not. Nothing is stored.
+    With --methods: every method with the longest step, or roughest tolerance, whose error is that of the model's own
+    method and step, for models with FixedStep. Only the flights are timed: compiling, sampling and storing are not.
+    Nothing is stored.
     """
     from mc_engine.campaign.loading import load_campaign
     from mc_engine.flight.kernel import usual_width
     from mc_engine.model.faults import naming_faults
     from mc_engine.studies.lane_speed import campaign_flight, measure
 
+    if methods and card:
+        raise typer.BadParameter("--methods and --card are two measurements; ask for one of them")
     campaign = load_campaign(file)
+    if methods:
+        _echo_methods(campaign, cases, repeats)
+        return
+    if card:
+        _bench_card(campaign, cases)
+        return
     with naming_faults(campaign.model_reference, "the model"):
         flight = campaign_flight(campaign, cases)
         timing = measure(flight, sorted({1, 8, usual_width(flight.model)}), repeats)
     typer.echo(f"{campaign.name}: {flight.n_cases} cases a flight, the fastest of {repeats}, one thread")
     for line in _timing_lines(timing, usual_width(flight.model)):
         typer.echo(line)
+
+
+def _echo_methods(campaign: "Campaign", cases: int | None, repeats: int) -> None:
+    from mc_engine.model.faults import naming_faults
+    from mc_engine.studies.lane_speed import compare_methods
+
+    with naming_faults(campaign.model_reference, "the model"):
+        own, *others = compare_methods(campaign, cases, repeats)
+    typer.echo(f"{campaign.name}: methods at the error of the model's own, one thread")
+    for timing in (own, *others):
+        mark = f", {own.case_s / timing.case_s:5.2f} times as fast" if timing is not own else "  (the model's own)"
+        method, case_us = timing.clock.method, timing.case_s * 1e6
+        typer.echo(f"  {method:<7} {timing.setting:<26} error {timing.error:.1e} {case_us:10,.2f} µs a case{mark}")
+
+
+def _bench_card(campaign: "Campaign", cases: int | None) -> None:
+    from mc_engine.model.faults import naming_faults
+    from mc_engine.runner.backends import measure_card
+
+    with naming_faults(campaign.model_reference, "the model"):
+        processor, card = measure_card(campaign, cases)
+    typer.echo(f"{campaign.name}: all cores {processor:,.0f} cases/s, a card {card:,.0f} cases/s")
 
 
 def _timing_lines(timing: "Timing", usual: int) -> Iterator[str]:

@@ -15,7 +15,7 @@ import numpy as np
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import noise_ids, upstream_ids
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, never
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, never
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.model.faults import naming_faults
 from mc_engine.sampling.distributions import column
@@ -90,20 +90,22 @@ def run_task(
     task: Task,
     guard: Guard | None = None,
     stopped: Callable[[], bool] = never,
+    flyer: Flyer | None = None,
 ) -> Written:
     """Fly the cases of a task and write their part under a temporary name in `run`.
 
+    flyer : if another one than the campaign's own.
     guard : entered with the cases of each batch; batches are then no larger than the cases that fly together.
     Raises RunStopped once `stopped()` is true, if a case may take long.
     """
-    flown, flyer = task.flown(), flyer_of(campaign)
+    flown, flyer = task.flown(), flyer or flyer_of(campaign)
     batch = None if guard is None else flyer.batch
     log = RowLog(run, task.first, task.stop) if flyer.keeps_rows and task.base is None else None
     known = log.rows() if log is not None else {}
     fresh = flown[~np.isin(flown, [*known])]
     flights = []
     if fresh.size:
-        flight = fly_cases(campaign, fresh, batch, guard or _unguarded, len(task.alone), run, log, stopped)
+        flight = fly_cases(campaign, fresh, batch, guard or _unguarded, len(task.alone), run, log, stopped, flyer)
         flights.append({**flight, "case_id": fresh})
     names = [column.name for column in columns]
     if known:
@@ -131,6 +133,7 @@ def fly_cases(
     keep: Path | None = None,
     log: RowLog | None = None,
     stopped: Callable[[], bool] = never,
+    flyer: Flyer | None = None,
 ) -> Columns:
     """All columns but case_id of some cases.  case_ids : int64[n], n > 0.
 
@@ -139,7 +142,7 @@ def fly_cases(
     """
     table = case_table(campaign, case_ids)
     edges = [*range(alone), *range(alone, case_ids.size, batch or case_ids.size), case_ids.size]
-    flights, flyer = [], flyer_of(campaign)
+    flights, flyer = [], flyer or flyer_of(campaign)
     with naming_faults(campaign.model_reference, f"cases {case_ids.min()} to {case_ids.max()}"):
         for piece in (slice(*edge) for edge in pairwise(edges)):
             inputs = full_inputs(campaign, {name: column[piece] for name, column in table.items()})
@@ -157,15 +160,21 @@ def _stacked(tables: Sequence[Mapping[str, np.ndarray]]) -> Columns:
 
 
 def fly_in_threads(
-    campaign: Campaign, inputs: Columns, noise: np.ndarray, wanted: Sequence[str], workers: int
+    campaign: Campaign,
+    inputs: Columns,
+    noise: np.ndarray,
+    wanted: Sequence[str],
+    workers: int,
+    flyer: Flyer | None = None,
 ) -> Columns:
     """The wanted columns of cases that are not the campaign's own, flown by some threads in pieces of whole blocks.
 
     inputs : the dispersed columns.  noise : int64[n], what addresses the noise of each case.
+    flyer : if another one than the campaign's own.
     """
     from joblib import Parallel, delayed
 
-    flyer = flyer_of(campaign)
+    flyer = flyer or flyer_of(campaign)
 
     def fly_rows(rows: slice) -> Columns:
         piece = full_inputs(campaign, {name: values[rows] for name, values in inputs.items()})

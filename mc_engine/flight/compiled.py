@@ -8,7 +8,7 @@ import numpy as np
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight import flight
 from mc_engine.flight.contract import breaches, flight_faults, refuse_breaches
-from mc_engine.flight.flyer import Columns, Flyer, Inputs, never
+from mc_engine.flight.flyer import Columns, Flyer, Inputs, Process, never
 from mc_engine.flight.kernel import source_digest, usual_width
 from mc_engine.flight.lost_numbers import first_lost, may_be_lost
 from mc_engine.model.record import compiled_model
@@ -49,8 +49,8 @@ class CompiledFlyer(Flyer):
     def faults(self) -> list[str]:
         return breaches(self._campaign)
 
-    def faults_in_flight(self, file: str) -> list[str]:
-        return flight_faults(self._campaign, file)
+    def faults_in_flight(self, process: Process) -> list[str]:
+        return flight_faults(self._campaign, process)
 
     def refuse_faults(self) -> None:
         refuse_breaches(self._campaign)

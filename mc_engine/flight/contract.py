@@ -9,34 +9,40 @@ import os
 import subprocess
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import EngineError, ModelError
-from mc_engine.flight.repeatability import model_digests, nominal_inputs
 from mc_engine.model.faults import MORE
 from mc_engine.model.reading import is_shipped, source_faults
 from mc_engine.model.record import compiled_model
 from mc_engine.model.trial import run_through
 from mc_engine.safe_path import safe_environment
 
+if TYPE_CHECKING:
+    from mc_engine.campaign.loading import Campaign
+
 _PATIENCE = 600.0  # s, for all flights and compilation; one case has a limit of its own
 
 
-def breaches(campaign: Campaign) -> list[str]:
+def breaches(campaign: "Campaign") -> list[str]:
     """Sentences on what is wrong with the campaign's model, as far as it shows without compiling; empty if nothing."""
     return source_faults(compiled_model(campaign.model)) or _trial_faults(campaign)
 
 
-def refuse_breaches(campaign: Campaign) -> None:
+def refuse_breaches(campaign: "Campaign") -> None:
     """ModelError with the first breach, before anything of a campaign is flown or written."""
     sentences = _trial_faults(campaign) if is_shipped(compiled_model(campaign.model)) else breaches(campaign)
     if sentences:
         raise ModelError(f"{sentences[0]}{MORE}")
 
 
-def _trial_faults(campaign: Campaign) -> list[str]:
+def _trial_faults(campaign: "Campaign") -> list[str]:
+    from mc_engine.flight.repeatability import nominal_inputs  # later than the process of `flights_beside`
+
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
@@ -47,17 +53,32 @@ def _trial_faults(campaign: Campaign) -> list[str]:
     return []
 
 
-def flight_faults(campaign: Campaign, file: str) -> list[str]:
-    """What `mc_engine.flight.contract_flight` finds in a process of its own, which the model may kill or hang."""
-    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, json.dumps(model_digests(campaign))]
+@contextmanager
+def flights_beside(file: str) -> Iterator["subprocess.Popen[str]"]:
+    """A process of its own, which the model may kill or hang: it loads a campaign and waits to fly a few cases.
+
+    file : as the user named it.  The process loads what `check` loads meanwhile, and is killed at the end.
+    """
+    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, "--wait"]
     other = {"PYTHONHASHSEED": "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0", "TZ": "UTC-14"}
-    environment = {**safe_environment(), **other}
+    pipe, environment = subprocess.PIPE, {**safe_environment(), **other}
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=environment) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def flight_faults(campaign: "Campaign", process: "subprocess.Popen[str]") -> list[str]:
+    """What `mc_engine.flight.contract_flight` finds in the process of `flights_beside`."""
+    from mc_engine.flight.repeatability import model_digests
+
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=_PATIENCE, env=environment)
+        out, errors = process.communicate(json.dumps(model_digests(campaign)), timeout=_PATIENCE)
     except subprocess.TimeoutExpired:
         return [f"flights of a few cases have not ended after {_PATIENCE:.0f} s; shorten the clock's `until`, look for "
                 "a loop without end, or leave them out with `mc-engine check --no-model`"]  # fmt: skip
-    if done.returncode or not done.stdout:
-        last = (done.stderr.strip().splitlines() or [f"exit status {done.returncode}"])[-1]
+    if process.returncode or not out:
+        last = (errors.strip().splitlines() or [f"exit status {process.returncode}"])[-1]
         return [f"a flight of a few cases killed its process: {last}"]
-    return [str(sentence) for sentence in json.loads(done.stdout.splitlines()[-1])]
+    return [str(sentence) for sentence in json.loads(out.splitlines()[-1])]

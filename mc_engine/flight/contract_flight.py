@@ -275,12 +275,18 @@ def _never_firing(model: Model, reached: Columns, ok: np.ndarray) -> Iterator[st
 def main() -> None:
     """Print the sentences on the campaign named on the command line as a JSON list.
 
-    Behind the name may stand the digests of another process, as JSON.
+    With `--wait` behind the name nothing is flown before the digests of another process come on standard input, as
+    JSON; without them this process ends.
     """
     note_environment()
     campaign = load_campaign(sys.argv[1])
+    waits = sys.argv[2:] == ["--wait"]
+    if waits and not isinstance(campaign.model, Model):
+        return
     there = model_digests(campaign)
-    _print_sentences(influences(json.loads(sys.argv[2]) if sys.argv[2:] else there, there) or faults(campaign))
+    here = sys.stdin.read() if waits else json.dumps(there)
+    if here:
+        _print_sentences(influences(json.loads(here), there) or faults(campaign))
 
 
 def _print_sentences(sentences: list[str]) -> None:

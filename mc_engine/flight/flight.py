@@ -11,14 +11,13 @@ import numpy as np
 
 from mc_engine.campaign.columns import END_PHASE, END_TIME
 from mc_engine.errors import ModelError
-from mc_engine.flight.kernel import build_kernel, usual_width
+from mc_engine.flight.kernel import Builder, adaptive_arguments, build_kernel, fixed_arguments, grid_of, usual_width
 from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.interruption import in_another_thread
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
-from mc_engine.lanes.runge_kutta_pairs import PAIRS
-from mc_engine.model.fields import AdaptiveStep, FixedStep
+from mc_engine.model.fields import AdaptiveStep, FixedStep, Parameter, Setting
 from mc_engine.model.preparation import call_prepare
 from mc_engine.model.reading import place_of
 from mc_engine.model.record import Model, Refusals
@@ -31,10 +30,10 @@ if TYPE_CHECKING:
     from mc_engine.flight.interpreted import InterpretedFlight
 
 Inputs = Mapping[str, Any]
-_NO_TABLES = np.empty(0)
+_NO_TABLES, _NO_HISTORY = np.empty(0), np.empty((0, 0))
 _MOST_RECORDED = 200_000  # rows of a flight, of which its history keeps some
+_USUAL_ROOM = 50_000  # rows that are recorded without counting them first
 _OVERSAMPLED = 4  # times as many rows as are kept, where steps are so long that they are divided
-_MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
 
@@ -125,12 +124,13 @@ def fly(
     folder: Path | None = None,
     width: int | None = None,
     clock: FixedStep | AdaptiveStep | None = None,
+    build: Builder | None = None,
 ) -> dict[str, np.ndarray]:
     """Results of some cases as columns: status, reason, `end_...` states and metrics in declared units.
 
     case_ids : int64[n], the addresses of the noise.  Cases of different settings may be mixed.
     width : cases at a time, 1, 8 or 16; by default what is fastest for the model.
-    clock : another one of the kind of the model's own; the kernel is the same.
+    clock : another one of the kind of the model's own; the kernel is the same.  build : see `Builder`.
     """
     n, width = len(case_ids), width or usual_width(model)
     ready = prepare(model, inputs, n)
@@ -139,19 +139,23 @@ def fly(
     states = np.full((len(model.states), n), np.nan)
     metrics = np.full((_n_results(model), n), np.nan)
     for chosen in _groups_by_settings(ready):
-        flight = _fly_group(model, clock or model.clock, ready, chosen, case_ids, seed, folder, width)
+        flight = _fly_group(model, clock or model.clock, ready, chosen, case_ids, seed, folder, width, build)
         time[chosen], status[chosen], states[:, chosen], metrics[:, chosen] = flight
+    return _columns(model, ready.refusals, (time, status, states, metrics))
+
+
+def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
+    """Results as columns.  out : time, status, states and metrics as kernels give them; not a number where refused."""
+    for numbers in out:
+        numbers[np.isnan(numbers)] = np.nan  # processors and cards give it different signs
+    time, status, states, metrics = out
     last_phase = phase_words(model, metrics[-1])
     metrics = metrics[: len(model.metrics)]
     metrics[:, status != OK] = np.nan
-    reason = ready.refusals.reason.astype(object)
+    reason = refusals.reason.astype(object)
     failed = (status != OK) & (last_phase != "")
     reason[failed] = [f'in the phase "{word}"' for word in last_phase[failed]]
-    columns: dict[str, np.ndarray] = {
-        "status": _STATUS_WORDS[status.astype(int)],
-        "reason": reason,
-        END_TIME: time,
-    }
+    columns = {"status": _STATUS_WORDS[status.astype(int)], "reason": reason, END_TIME: time}
     if model.phases:
         columns[END_PHASE] = last_phase
     columns |= {f"end_{field.name}": row / field.si_factor for field, row in zip(model.states, states, strict=True)}
@@ -180,12 +184,6 @@ def _groups_by_settings(ready: Prepared) -> list[np.ndarray]:
     return [able[group == i] for i in range(int(group.max()) + 1)]
 
 
-def _clock_number(item: float | str | Callable[[Any], float], settings: Any) -> float:
-    if callable(item):
-        return float(item(settings))
-    return float(getattr(settings, item) if isinstance(item, str) else item)
-
-
 def settings_of(model: Model, codes: np.ndarray, tables: np.ndarray = _NO_TABLES) -> Any:
     """The settings of one kernel call by symbol, codes and SI numbers, with the model's tables if it has any.
 
@@ -211,37 +209,6 @@ def _kernel_settings(model: Model, codes: np.ndarray, chosen: Any) -> np.ndarray
     return np.concatenate([codes, [np.nan, chosen.tables.size - 1.0], chosen.tables])
 
 
-def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
-    """(n_steps, step [s], control_every) of one flight; the last step is the one that reaches `until`."""
-    step, until, every = (_clock_number(item, settings) for item in (clock.step, clock.until, clock.control_every))
-    if not (step > 0.0 and 0.0 < until <= _MOST_STEPS * step and every >= 1.0):
-        raise ModelError(f"the clock has steps of {step:g} s until {until:g} s, control every {every:g} steps; all "
-                         f"must be above 0, with no more than {_MOST_STEPS:,} steps")  # fmt: skip
-    # a hair under the quotient, so that 300 s in steps of 0.01 s are 30 000 steps, not 30 001
-    n_steps = max(1, int(np.ceil(until / step - 1e-9)))
-    return n_steps, step, int(every)
-
-
-def fixed_arguments(clock: FixedStep, settings: Any) -> tuple[Any, ...]:
-    """Grid, and tables of a multistep method, as the kernels on a fixed grid take them."""
-    if clock.method == "rk4":
-        return grid_of(clock, settings)
-    from mc_engine.lanes.multistep import multistep_tables
-
-    return *grid_of(clock, settings), *multistep_tables(clock.method)
-
-
-def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tuple[np.ndarray, ...]:
-    """Tables of the pair, clock and absolute tolerances, as the adaptive kernels take them."""
-    pair = PAIRS[clock.method]
-    numbers = [_clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period)]
-    if not all(number > 0.0 for number in numbers):
-        raise ModelError("the clock has until = {:g} s, rtol = {:g}, control_period = {:g} s; all must be above 0"
-                         .format(*numbers))  # fmt: skip
-    numbers += [float(clock.attempts), clock.first_step, float(pair.order)]
-    return *pair.tables(), np.array(numbers), np.array(np.broadcast_to(clock.atol, len(model.states)), dtype=np.float64)
-
-
 def _fly_group(
     model: Model,
     clock: FixedStep | AdaptiveStep,
@@ -251,7 +218,8 @@ def _fly_group(
     seed: int,
     folder: Path | None,
     width: int,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    build: Builder | None,
+) -> tuple[np.ndarray, ...]:
     n = chosen.size
     # blocks on a fixed grid are filled up; adaptive lanes take the cases in turn, and want one each to begin with
     padded = max(n, width) if isinstance(clock, AdaptiveStep) else -(-n // width) * width
@@ -259,12 +227,9 @@ def _fly_group(
     out = _outputs(model, padded)
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
     cases = ready.parameters[:, index], settings, ready.tables
-    in_another_thread(_bound_kernel(model, clock, folder, width, cases, seed, case_ids[index], out, _NO_HISTORY, 1.0))
-    time, status, states, metrics = out
-    return time[:n], status[:n], states[:, :n], metrics[:, :n]
-
-
-_NO_HISTORY = np.empty((0, 0))
+    ids = case_ids[index]
+    in_another_thread(_bound_kernel(model, clock, folder, width, cases, seed, ids, out, _NO_HISTORY, 1.0, build=build))
+    return tuple(numbers[..., :n] for numbers in out)
 
 
 def _outputs(model: Model, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -283,6 +248,7 @@ def _bound_kernel(
     history: np.ndarray,
     pace: float,
     kernel: Callable[..., int] | None = None,
+    build: Builder | None = None,
 ) -> Callable[[], int]:
     """The kernel with all its arguments.
 
@@ -294,11 +260,10 @@ def _bound_kernel(
     chosen = settings_of(model, settings, tables)
     if kernel is None:
         refuse_unfit(model, parameters, chosen)
-        kernel = build_kernel(model, folder, width)
+        kernel = (build or build_kernel)(model, folder, width)
     cases = np.ascontiguousarray(case_ids, dtype=np.float64)
-    kernel_settings = _kernel_settings(model, settings, chosen)
-    data = gathered(blocks_of(model))
-    shared = np.ascontiguousarray(parameters), kernel_settings, data, np.uint64(noise_key(seed)), cases
+    numbers, data = _kernel_settings(model, settings, chosen), gathered(blocks_of(model))
+    shared = np.ascontiguousarray(parameters), numbers, data, np.uint64(noise_key(seed)), cases
     if isinstance(clock, AdaptiveStep):
         return partial(kernel, *shared, *adaptive_arguments(model, clock, chosen), *out, history, float(pace))
     return partial(kernel, *shared, *fixed_arguments(clock, chosen), *out, history, int(pace))
@@ -358,22 +323,24 @@ def fly_history(
     """
     width = width or usual_width(model)
     ready = prepare(model, inputs, 1)
-    columns = fly(model, inputs, np.array([case_id]), seed, folder=folder, width=width)
     names = ["t_s", *(quantity.name for quantity in model.quantities), *([PHASE_COLUMN] if model.phases else [])]
     if ready.refusals.mask[0]:
+        columns = fly(model, inputs, np.array([case_id]), seed, folder=folder, width=width)
         return columns, {name: np.empty(0) for name in names}
     settings = np.ascontiguousarray(ready.settings[0])
     ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
-    cases = parameters, settings, ready.tables
+    cases, out = (parameters, settings, ready.tables), _outputs(model, width)
 
     def recorded(room: int, pace: float) -> tuple[int, np.ndarray]:
         """(rows that the flight has, as many of them as there is room for)."""
-        history, out = np.empty((room, len(names))), _outputs(model, width)
+        history = np.empty((room, len(names)))
         bound = _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, history, pace)
         return in_another_thread(bound), history
 
     pace = _history_pace(model, settings, rows, lambda: recorded(1, 1.0)[0])
-    _, table = recorded(recorded(1, pace)[0], pace)
+    n_rows, table = recorded(_USUAL_ROOM, pace)
+    table = table[:n_rows] if n_rows <= _USUAL_ROOM else recorded(n_rows, pace)[1]
+    columns = _columns(model, ready.refusals, tuple(numbers[..., :1] for numbers in out))
     table[:, 1 : 1 + len(model.quantities)] /= [quantity.si_factor for quantity in model.quantities]
     kept = table[rows_to_keep(table, rows)]
     history = {name: kept[:, i] for i, name in enumerate(names)}
@@ -394,3 +361,33 @@ def _history_pace(model: Model, settings: np.ndarray, rows: int, at_steps: Calla
         return float(-(-2 * n_steps // most))
     n = at_steps()
     return most / n if n > most else float(max(1, -(-_OVERSAMPLED * rows // n)))
+
+
+# ---- chosen inputs, all others at the model's own values: for studies that no campaign file describes
+
+
+def chosen_cases(model: Model, inputs: Inputs, *, seed: int = 0) -> dict[str, np.ndarray]:
+    """Columns of as many cases as the longest input has values, in declared units.
+
+    ValueError names the inputs that the model does not have.
+    """
+    n_cases = max((np.size(value) for value in inputs.values()), default=1)
+    return fly(model, _complete(model, inputs), np.arange(n_cases), seed)
+
+
+def chosen_case(model: Model, inputs: Inputs, *, seed: int = 0) -> dict[str, Any]:
+    """The row of one case: a number or a word by column name."""
+    return {name: column[0] for name, column in chosen_cases(model, inputs, seed=seed).items()}
+
+
+def chosen_history(model: Model, inputs: Inputs, *, rows: int = 2001, seed: int = 0) -> dict[str, np.ndarray]:
+    """`t_s` and the model's outputs along the flight of one case; rows as in `fly_history`."""
+    return fly_history(model, _complete(model, inputs), 0, seed, rows=rows)[1]
+
+
+def _complete(model: Model, inputs: Inputs) -> dict[str, Any]:
+    items: tuple[Parameter | Setting, ...] = (*model.parameters, *model.settings)
+    nominal = {item.name: item.default for item in items}
+    if unknown := sorted(inputs.keys() - nominal.keys()):
+        raise ValueError(f"{', '.join(unknown)}: no input of the model")
+    return {**nominal, **inputs}

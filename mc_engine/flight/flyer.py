@@ -7,6 +7,7 @@ the time history of one case.  The runner, the store and all studies know nothin
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from subprocess import Popen
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from mc_engine.store.case_rows import RowLog
 NOMINAL_NOISE = 2**52  # the nominal draws its noise where no case does
 Columns = dict[str, np.ndarray]
 Inputs = Mapping[str, Any]
+Process = Popen[str]
 
 
 class RunStopped(EngineError):
@@ -80,8 +82,11 @@ class Flyer(ABC):
         """Sentences on what is wrong with it, as far as it shows at once; empty if nothing."""
 
     @abstractmethod
-    def faults_in_flight(self, file: str) -> list[str]:
-        """Sentences on what flights of a few cases show.  file : the campaign file, as the user named it."""
+    def faults_in_flight(self, process: Process) -> list[str]:
+        """Sentences on what flights of a few cases show.
+
+        process : has loaded the campaign and waits to fly, see `mc_engine.flight.contract.flights_beside`.
+        """
 
     def remarks(self) -> list[str]:
         """Lines for `check` on a simulator that is sound: is it deterministic, how long does a case take."""

@@ -16,12 +16,11 @@ from typing import Any
 import numpy as np
 from numba.core.dispatcher import Dispatcher
 
-from mc_engine.lanes.block_search import has_powers
-from mc_engine.lanes.composed import Alternatives, ComposedFunction
+from mc_engine.lanes.composed import Alternatives, ComposedFunction, has_powers
 from mc_engine.lanes.fixed_step import Method
 from mc_engine.lanes.functions import TABLES, fma
 from mc_engine.lanes.number import Number, Origin, calling, number, numbers
-from mc_engine.model.fields import AdaptiveStep
+from mc_engine.model.fields import AdaptiveStep, uses_rates
 from mc_engine.model.record import Model
 
 
@@ -40,7 +39,7 @@ class InterpretedFlight:
     """
 
     def __init__(self, model: Model, seconds: float = math.inf):
-        from mc_engine.flight.kernel_parts import PHYSICS, functions_of, settings_class
+        from mc_engine.flight.kernel_parts import PHYSICS, functions_of, second_order_of, settings_class
 
         self.origin: Origin | None = None
         self.metrics: tuple[Any, ...] = ()
@@ -51,6 +50,7 @@ class InterpretedFlight:
         functions = functions_of(model, self)
         self._functions = functions._replace(**{name: self._called(name, getattr(functions, name)) for name in PHYSICS})
         self.model, self._settings = model, settings_class(model)
+        self._picks = second_order_of(model, self) if uses_rates(model.clock) else ()
 
     def kernel(
         self, parameters: np.ndarray, settings: np.ndarray, data: Any, key: Any, cases: np.ndarray, *rest: Any
@@ -66,8 +66,9 @@ class InterpretedFlight:
             order = (np.zeros(1, dtype=np.int64), *inputs, [Number(value) for value in clock], atol, must_stop)
             return int(fly(self._functions, pair, *common, *order, out, history, pace))
         n_steps, h, every, *tables, time, status, state, metrics, history, stride = rest
-        stepping = self._interpreted("multistep" if tables else "fixed_step")
-        method = Method(**{name: stepping[name] for name in Method._fields[:-1]}, tables=tuple(tables))
+        stepping = self._interpreted("gauss_jackson" if self._picks else "multistep" if tables else "fixed_step")
+        own = (*tables, *self._picks)
+        method = Method(**{name: stepping[name] for name in Method._fields[:-1]}, tables=own)
         grid, kinds, results = (n_steps, h, every), (bool(actions), must_stop), (time, status, state, metrics)
         return int(fly(self._functions, method, *common, *inputs, grid, kinds, results, history, stride))
 
@@ -174,6 +175,10 @@ def _stage_sum(memory: list[Any], like: Any, first: int, last: int, columns: np.
     return _record(type(like), sums)
 
 
+def _stage_sums(memory: list[Any], like: Any, first: int, last: int, columns: np.ndarray, weights: np.ndarray) -> Any:
+    return tuple(_stage_sum(memory, like, first, last, columns, row) for row in weights)
+
+
 _INTRINSICS: dict[str, Callable[..., Any]] = {
     "spread": _spread,
     "least": functools.partial(functools.reduce, lambda x, y: x if x < y else y),
@@ -190,6 +195,7 @@ _INTRINSICS: dict[str, Callable[..., Any]] = {
     "store_fields": _store,
     "store_lane": lambda array, column, value, lane: _store(array, column, value),
     "unequal": lambda one, other, like: one != other,
+    "differ": lambda one, other, like: one != other,
     "lane_holds": lambda mask, lane: mask,
     "with_lane": lambda value, lane, item: number(item),
     "align_stack": lambda: None,
@@ -197,6 +203,7 @@ _INTRINSICS: dict[str, Callable[..., Any]] = {
     "put_stage": lambda memory, stage, derivative: memory.__setitem__(stage, derivative),
     "take_stage": lambda memory, stage, like: memory[stage],
     "stage_sum": _stage_sum,
+    "stage_sums": _stage_sums,
 }
 
 

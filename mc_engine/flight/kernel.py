@@ -1,26 +1,34 @@
 """The compiled kernel of a model: assembled from its physics and the engine's loop, cached on disk.
 
-numba caches a function beside the file that defines it and watches that file alone.  So every kernel gets a small
-file of its own, in a folder named by the digest of what the kernel is compiled from (`mc_engine.flight.kernel_key`).
-Models that compile to the same code share a kernel, wherever they lie.
+Every kernel has a small source file of its own, in a folder named by the digest of what the kernel is compiled from
+(`mc_engine.flight.kernel_key`), and beside it its machine code.  Models that compile to the same code share a kernel,
+wherever they lie.
 """
 
 import os
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from mc_engine.cache_folder import cache_folder
-from mc_engine.errors import DiskError
+from mc_engine.errors import DiskError, ModelError
 from mc_engine.flight.kernel_key import Recorder, kernel_key
-from mc_engine.flight.kernel_parts import Functions, parts_of
-from mc_engine.model.fields import AdaptiveStep, FixedStep
+from mc_engine.flight.kernel_parts import Functions, parts_of, second_order_of
+from mc_engine.lanes.kernel_cache import Form, Kernel
+from mc_engine.lanes.runge_kutta_pairs import PAIRS
+from mc_engine.model.fields import AdaptiveStep, FixedStep, uses_rates
 from mc_engine.model.imports import new_module
 from mc_engine.model.record import Model, sources_of
 
+Builder = Callable[[Model, Path | None, int], Callable[..., int]]  # gives, as `build_kernel`, what is called
 WIDTH = 8  # one register of eight doubles
+_MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
 _FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
 _ENGINE = (
     "flight/kernel.py",
@@ -60,14 +68,20 @@ def kernel(
 _TABLES = "nodes, starts, columns, weights, columns_of, ahead, behind, at_end, n_differences"
 _RUNGE_KUTTA = _FIXED.replace("{module}", "fixed_step").replace("{tables}", "")
 _MULTISTEP = _FIXED.replace("{module}", "multistep").replace("{tables}", _TABLES + ", ")
+_SUMS = "nodes, starts, columns, weights, columns_of, ahead, present, n_accelerations"
+_GAUSS_JACKSON = (
+    _FIXED.replace("{module}", "gauss_jackson")
+    .replace("({tables})", f"({_SUMS}, positions_of, rates_of, in_order)")
+    .replace("{tables}", _SUMS + ", ")
+    .replace("= _F\n", "= _F\npositions_of, rates_of, in_order = SECOND_ORDER\n")
+)
 _ADAPTIVE = '''"""A kernel for {width} cases at a time.  Written by the engine; edit the model instead."""
-
-import numpy as np
 
 from mc_engine.flight.kernel_parts import Functions
 from mc_engine.lanes.adaptive_flight import fly
 from mc_engine.lanes.compiler import compile_kernel
 from mc_engine.lanes.kernel_data import hand_over
+from mc_engine.lanes.lane_access import lane_numbers
 
 _F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 {names} = _F
@@ -82,7 +96,7 @@ def kernel(
     f = Functions({names})
     tables, out = (nodes, starts, columns, weights), (time, status, state, metrics)
     return fly(
-        f, tables, Parameters, Settings, {width}, np.arange({width}), parameters, settings, key, cases, clock, atol,
+        f, tables, Parameters, Settings, {width}, lane_numbers({width}), parameters, settings, key, cases, clock, atol,
         MUST_STOP, out, history, pace,
     )
 '''
@@ -118,35 +132,67 @@ def usual_width(model: Model) -> int:
 
 
 @lru_cache(maxsize=64)
-def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -> Callable[..., int]:
+def build_kernel(model: Model, folder: Path | None = None, width: int = WIDTH) -> Kernel:
     """The kernel of `model` for `width` cases at a time: 1 (plain float64), 8 or 16.
 
-    folder : see `sources_of`.  The first call compiles or loads from the cache.
+    folder : see `sources_of`.  The kernel's first call compiles it or loads it from the cache.
     """
     module = sources_of(model, folder).module
     template = _template(model.clock)
-    digest, is_complete = kernel_key(parts_of(module.MODEL, model.watching, Recorder()), template)
+    digest, is_complete = kernel_key(_handed(module.MODEL, model, Recorder()), template)
     if not is_complete:
         what = f"{digest} {source_digest(model, folder)} {module.__name__} {module.__file__}"
         digest = sha256(what.encode()).hexdigest()
     path = cache_folder() / "kernels" / digest[:20] / f"kernel_w{width}.py"
     text = template.format(width=width, names=", ".join(Functions._fields)).encode()
     _write_source(path, text)
-    name, parts = f"mc_engine_kernel_{digest[:20]}_w{width}", parts_of(module.MODEL, model.watching)
-    return new_module(name, path, text, PARTS=parts).kernel
+
+    def compiled(form: Form) -> tuple[str, Any]:
+        handed = _handed(module.MODEL, model)
+        made = new_module(f"mc_engine_kernel_{digest[:20]}_w{width}", path, text, **handed)
+        name_and_library: tuple[str, Any] = made.kernel.library(form)
+        return name_and_library
+
+    return Kernel(path, compiled)
+
+
+def _handed(written: Model, model: Model, makers: Any = None) -> dict[str, Any]:
+    """The names that a kernel's file does not define itself.
+
+    written : the model as its file has it; model : the same, perhaps with another clock or while it is watched.
+    makers : see `functions_of`
+    """
+    parts = {"PARTS": parts_of(replace(written, clock=model.clock), model.watching, makers)}
+    return parts | ({"SECOND_ORDER": second_order_of(model, makers)} if uses_rates(model.clock) else {})
+
+
+def kernel_of(function: Callable[..., Any]) -> Kernel:
+    """A kernel of one function of numbers and arrays, kept as the kernels of models are.
+
+    function : gives nothing, or a whole number; what it calls is physics, or compiled by `compile_inline`.
+    """
+    from mc_engine.lanes.compiler import compile_kernel
+
+    made = compile_kernel(function)
+    digest, is_complete = kernel_key(made.dispatcher, "")
+    if not is_complete:
+        raise ModelError(f"{function.__qualname__} calls what is neither physics nor compiled by `compile_inline`")
+    return Kernel(cache_folder() / "kernels" / digest[:20] / function.__name__, made.library)
 
 
 def _template(clock: FixedStep | AdaptiveStep) -> str:
     """The text of a kernel's file; methods of one kind share a kernel, which is handed their tables."""
     if isinstance(clock, AdaptiveStep):
         return _ADAPTIVE
+    if uses_rates(clock):
+        return _GAUSS_JACKSON
     return _RUNGE_KUTTA if clock.method == "rk4" else _MULTISTEP
 
 
 def _write_source(path: Path, text: bytes) -> None:
     """Write the source of a kernel, unless it is there; DiskError with the folder's variable where the disk refuses.
 
-    It is for numba, which keeps its files beside one, and for people: what runs is `text`.
+    It is for people, and for messages of the compiler: what runs is `text`.
     """
     try:
         if path.exists() and path.read_bytes() == text:
@@ -158,3 +204,47 @@ def _write_source(path: Path, text: bytes) -> None:
     except OSError as error:
         raise DiskError(f"{path.parent}: {error.strerror or error}; compiled kernels are kept there, name another "
                         "folder in MC_ENGINE_CACHE") from error  # fmt: skip
+
+
+# ---- what a kernel takes beside the cases
+
+
+def _clock_number(item: float | str | Callable[[Any], float], settings: Any) -> float:
+    if callable(item):
+        return float(item(settings))
+    return float(getattr(settings, item) if isinstance(item, str) else item)
+
+
+def grid_of(clock: FixedStep, settings: Any) -> tuple[int, float, int]:
+    """(n_steps, step [s], control_every) of one flight; the last step is the one that reaches `until`."""
+    step, until, every = (_clock_number(item, settings) for item in (clock.step, clock.until, clock.control_every))
+    if not (step > 0.0 and 0.0 < until <= _MOST_STEPS * step and every >= 1.0):
+        raise ModelError(f"the clock has steps of {step:g} s until {until:g} s, control every {every:g} steps; all "
+                         f"must be above 0, with no more than {_MOST_STEPS:,} steps")  # fmt: skip
+    # a hair under the quotient, so that 300 s in steps of 0.01 s are 30 000 steps, not 30 001
+    n_steps = max(1, int(np.ceil(until / step - 1e-9)))
+    return n_steps, step, int(every)
+
+
+def fixed_arguments(clock: FixedStep, settings: Any) -> tuple[Any, ...]:
+    """Grid, and tables of a multistep method, as the kernels on a fixed grid take them."""
+    if clock.method == "rk4":
+        return grid_of(clock, settings)
+    if uses_rates(clock):
+        from mc_engine.lanes.gauss_jackson import gauss_jackson_tables
+
+        return *grid_of(clock, settings), *gauss_jackson_tables(clock.method)
+    from mc_engine.lanes.multistep import multistep_tables
+
+    return *grid_of(clock, settings), *multistep_tables(clock.method)
+
+
+def adaptive_arguments(model: Model, clock: AdaptiveStep, settings: Any) -> tuple[np.ndarray, ...]:
+    """Tables of the pair, clock and absolute tolerances, as the adaptive kernels take them."""
+    pair = PAIRS[clock.method]
+    numbers = [_clock_number(item, settings) for item in (clock.until, clock.rtol, clock.control_period)]
+    if not all(number > 0.0 for number in numbers):
+        raise ModelError("the clock has until = {:g} s, rtol = {:g}, control_period = {:g} s; all must be above 0"
+                         .format(*numbers))  # fmt: skip
+    numbers += [float(clock.attempts), clock.first_step, float(pair.order)]
+    return *pair.tables(), np.array(numbers), np.array(np.broadcast_to(clock.atol, len(model.states)), dtype=np.float64)

@@ -18,12 +18,15 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from hashlib import sha256
+from importlib import metadata
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
+import llvmlite
 import numpy as np
+from llvmlite import binding
 
 from mc_engine.lanes.kernel_data import Blocks, DataBlock
 from mc_engine.lanes.physics_function import PhysicsFunction
@@ -98,11 +101,9 @@ class _Walk:
 
     def _object(self, value: Any) -> Any:
         """A function, a class or a namespace."""
-        from numba.core.dispatcher import Dispatcher
-
         if isinstance(value, PhysicsFunction) and isinstance(value.function, FunctionType):
             return "physics", self._function(value.function)
-        if isinstance(value, Dispatcher):
+        if _is_dispatcher(value):
             options = sorted((name, repr(option)) for name, option in value.targetoptions.items())
             return "compiled", options, repr(value.locals), self._function(value.py_func)
         if isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
@@ -147,6 +148,12 @@ class _Walk:
         arguments = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags & _PASSED_BY_CALLER
         names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
         return code.co_code, code.co_exceptiontable, described, arguments, names
+
+
+def _is_dispatcher(value: Any) -> bool:
+    """Whether numba compiles this object; a model that has one has imported numba."""
+    numba: Any = sys.modules.get("numba.core.dispatcher")
+    return numba is not None and isinstance(value, numba.Dispatcher)
 
 
 def kind_name(value: Any) -> str:
@@ -218,9 +225,5 @@ def _engine_digest() -> str:
 @cache
 def _versions() -> str:
     """Versions of what compiles, and the processor that it compiles for."""
-    import llvmlite
-    import numba
-    from llvmlite import binding
-
-    versions = numba.__version__, llvmlite.__version__, np.__version__, sys.version_info[:2]
+    versions = metadata.version("numba"), llvmlite.__version__, np.__version__, sys.version_info[:2]
     return f"{versions} {platform.machine()} {binding.get_host_cpu_name()}"

@@ -4,14 +4,15 @@ from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from importlib import import_module
 from typing import Any, NamedTuple
 
 from mc_engine.lanes import physics
-from mc_engine.lanes.block_search import blocks_in
-from mc_engine.lanes.composed import ComposedFunction, Pick, made_by, whole
+from mc_engine.lanes.composed import ComposedFunction, Pick, blocks_in, made_by, whole
+from mc_engine.lanes.extrema import CORNER, EVENT, LAST, PEAK
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.kernel_data import Blocks, DataBlock
-from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum, Field
+from mc_engine.model.fields import DIRECTIONS, AdaptiveStep, Extremum, Field, FixedStep
 from mc_engine.model.phases import PHASE, noted_field
 from mc_engine.model.reading import ARGUMENTS
 from mc_engine.model.record import Model, NoMemory
@@ -92,9 +93,7 @@ def blocks_of(model: Model) -> tuple[DataBlock, ...]:
 
 def functions_of(model: Model, makers: Any = None) -> Functions:
     """The physics of a model, and picks of its fields as `makers` makes them: intrinsics by default."""
-    from mc_engine.lanes import model_intrinsics
-
-    makers = makers or model_intrinsics
+    makers = makers or import_module("mc_engine.lanes.model_intrinsics")  # which loads the compiler
     physics_of_model = (
         model.initial,
         model.start or _no_start,
@@ -121,8 +120,6 @@ def _with_phase(model: Model, name: str) -> Any:
 
 
 def _picks(model: Model, makers: Any) -> list[Any]:
-    from mc_engine.lanes.adaptive_step import CORNER, EVENT, LAST, PEAK
-
     names = [quantity.name for quantity in model.quantities]
     peaks = [e for e in model.extrema if e.kind in ("max", "min")]
     lasts = [e for e in model.extrema if e.kind == "last_above"]
@@ -153,6 +150,27 @@ def _picks(model: Model, makers: Any) -> list[Any]:
         makers.counted("initial", len(model.states)),
         makers.counted("evaluate", len(model.metrics) + bool(model.phases)),
     ]
+
+
+def second_order_of(model: Model, makers: Any = None) -> tuple[Any, ...]:
+    """Picks for a method of states of second order, by the `rates` of the model's clock, as `makers` makes them.
+
+    Of a state or derivative the positions; in the same order their rates; of positions and rates in a row, a state.
+    """
+    assert isinstance(model.clock, FixedStep)
+    makers = makers or import_module("mc_engine.lanes.model_intrinsics")  # which loads the compiler
+    names = [state.symbol for state in model.states]
+    pairs = [(names.index(position), names.index(rate)) for position, rate in model.clock.rates]
+    order = [position for position, _ in pairs] + [rate for _, rate in pairs]
+
+    def picker(fields: Sequence[int]) -> Any:
+        return makers.picker(None, [(i, 1.0, 0.0) for i in fields], len(names))
+
+    return (
+        picker(order[: len(pairs)]),
+        picker(order[len(pairs) :]),
+        picker([order.index(i) for i in range(len(names))]),
+    )
 
 
 def _sign(extremum: Extremum) -> float:

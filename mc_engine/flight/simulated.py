@@ -14,7 +14,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.errors import ModelError
 from mc_engine.flight.case_process import CaseEnded, CaseProcess, give_back, take
 from mc_engine.flight.case_worker import Order, Setup, folder_name, settle
-from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, RunStopped, never
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, Inputs, Process, RunStopped, never
 from mc_engine.flight.program_flight import Flown
 from mc_engine.model.fields import Parameter, Setting
 from mc_engine.model.record import Refusals
@@ -95,7 +95,7 @@ class SimulatorFlyer(Flyer):
         for sentence in self.faults():
             raise ModelError(sentence)
 
-    def faults_in_flight(self, file: str) -> list[str]:
+    def faults_in_flight(self, process: Process) -> list[str]:
         row = self._flown(np.array([NOMINAL_NOISE]), {})[0]
         if row["status"] == STATUS_NAME[OK]:
             return []

@@ -13,7 +13,6 @@ An event is a zero of a sense (see `adaptive_step`); peaks are zeros of rates, s
 from collections import namedtuple
 
 from mc_engine.lanes.adaptive_step import (
-    PEAK,
     Instant,
     arm,
     arrive,
@@ -30,7 +29,7 @@ from mc_engine.lanes.adaptive_step import (
 from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_inline
 from mc_engine.lanes.events import crossed
-from mc_engine.lanes.extrema import first_time
+from mc_engine.lanes.extrema import PEAK, first_time
 from mc_engine.lanes.functions import any_lane, floor, maximum, minimum, where
 from mc_engine.lanes.history import record_change, record_row, record_step
 from mc_engine.lanes.lane_access import lane_holds, store_lane, with_column, with_lane

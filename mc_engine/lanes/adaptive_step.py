@@ -8,6 +8,7 @@ from collections import namedtuple
 
 from mc_engine.lanes.compiler import compile_inline
 from mc_engine.lanes.elementary import exp, log
+from mc_engine.lanes.extrema import CORNER, EVENT, LAST, PEAK
 from mc_engine.lanes.functions import exponent, fma, mantissa, maximum, minimum, rint, sqrt, two_to, where
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.runge_kutta_pairs import LARGEST_STAGES
@@ -18,7 +19,6 @@ from mc_engine.lanes.tuples import add_scaled, joined, map_fields, spread, total
 # and last time that is looked for, its sense (the function of which a zero is sought), its value and its rate.
 # The sense of an event or of a last time is its value, the sense of a peak is its rate.
 Instant = namedtuple("Instant", "t s m k senses rates values")
-EVENT, PEAK, CORNER, LAST = 0.0, 1.0, 2.0, 3.0  # a corner is a peak that is taken at the steps
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
 DAMPING = 0.01  # weight of the second error estimate, Hairer's DOP853

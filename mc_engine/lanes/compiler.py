@@ -3,14 +3,15 @@
 from collections.abc import Callable
 from typing import Any
 
-from numba import config, njit
+from numba import config, njit, types
+from numba.core.compiler_lock import global_compiler_lock
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes import kernel_data_lowering as _kernel_data  # registers what reads the data of a kernel
 from mc_engine.lanes import lowering as _lowering  # registers the lane type and its functions
 from mc_engine.lanes import namespaces as _namespaces  # registers classes that hold constants
 from mc_engine.lanes import records as _records  # registers records of plain numbers and lanes
-from mc_engine.lanes.kernel_cache import keep_on_disk
+from mc_engine.lanes.kernel_cache import Form
 from mc_engine.lanes.linked import KernelCompiler, LinkedCompiler
 
 # numpy's error model: 1/0 is infinite, as in the vector instructions.  No fastmath and no contraction:
@@ -25,7 +26,7 @@ _UNWRAPPED: dict[str, Any] = {
     "pipeline_class": LinkedCompiler,
 }
 
-_KERNEL: dict[str, Any] = {"nogil": True, "no_cfunc_wrapper": True, "pipeline_class": KernelCompiler}
+_KERNEL: dict[str, Any] = {**_UNWRAPPED, "pipeline_class": KernelCompiler}
 
 if config.DISABLE_JIT:  # type: ignore[attr-defined]
     raise ModelError("the environment has NUMBA_DISABLE_JIT, with which no kernel can be compiled; unset it")
@@ -51,6 +52,27 @@ def compile_callable(function: Callable[..., Any]) -> Any:
     return njit(forceinline=False, **_UNWRAPPED, **STRICT)(function)
 
 
-def compile_kernel(function: Callable[..., Any]) -> Any:
-    """Dispatcher for a kernel: cached beside its file, and free of the interpreter lock while it runs."""
-    return keep_on_disk(njit(**_KERNEL, **STRICT)(function))
+class KernelCompilation:
+    """A function that becomes a kernel, which `mc_engine.lanes.kernel_cache.Kernel` loads and calls without numba."""
+
+    def __init__(self, function: Callable[..., Any]):
+        self.dispatcher: Any = njit(**_KERNEL, **STRICT)(function)
+
+    def library(self, form: Form) -> tuple[str, Any]:
+        """(name of the kernel in its library, library) for arguments of a form."""
+        self.dispatcher._compilation_chain_init_hook()
+        with global_compiler_lock:
+            compiled = self.dispatcher._compiler.compile(tuple(_type(word) for word in form), None)
+        return compiled.fndesc.llvm_func_name, compiled.library
+
+
+def compile_kernel(function: Callable[..., Any]) -> KernelCompilation:
+    """Mark a function as a kernel."""
+    return KernelCompilation(function)
+
+
+def _type(word: str) -> Any:
+    """numba's type of an argument."""
+    number, bracket, _ = word.partition("[")
+    kind = getattr(types, number)
+    return types.Array(kind, 1 + ("," in word), "C") if bracket else kind

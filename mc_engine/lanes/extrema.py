@@ -6,6 +6,9 @@ An output that is NaN once has no extreme value; it has a last time above a leve
 from mc_engine.lanes.functions import where
 from mc_engine.lanes.physics_function import physics
 
+# what flights with adaptive steps track as one; a corner is a peak that is taken at the steps
+EVENT, PEAK, CORNER, LAST = 0.0, 1.0, 2.0, 3.0
+
 
 @physics
 def first_time(value, t):

@@ -4,7 +4,7 @@ All lanes of a block share the grid; a lane that meets an event takes its own wa
 rejoins.  Lanes never look at each other: a lane that has ended or failed keeps its last values.
 
 The loop is handed its `Method`: the classical Runge-Kutta method of fourth order, which is here, or one that uses
-earlier steps (`multistep`).  W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
+earlier steps (`multistep`, `gauss_jackson`).  W. Kutta, Zeitschrift für Mathematik und Physik 46 (1901) 435-453.
 """
 
 from collections import namedtuple
@@ -35,12 +35,12 @@ from mc_engine.lanes.tuples import (
 from mc_engine.status import EVENT_LIMIT, NO_STOP, NOT_FINITE
 
 # How a state is taken along the grid.  `past` is what a method knows of earlier steps; `tables` are its numbers.
-# begin(memory, s, t) : past of the first state; memory : room for `MOST_SLOPES` derivatives
+# begin(tables, memory, s, t) : past of the first state; memory : room for `MOST_SLOPES` derivatives
 # restart(past, lanes) : past without the earlier steps of some lanes, whose discrete state has changed
 # advance(f, tables, past, t, finish, h, s, m, p, o, flying) : (state at the end of a grid step, past)
 # single(f, tables, t, h, s, m, p, o) : state after a step of length h [s], lanes, from a state alone
 Method = namedtuple("Method", "begin restart advance single tables")
-MOST_SLOPES = 10
+MOST_SLOPES = 11
 
 _OVERRUN, _BROKEN, _UNSTOPPED = float(EVENT_LIMIT), float(NOT_FINITE), float(NO_STOP)
 
@@ -65,7 +65,7 @@ rk4 = compile_inline(_rk4)
 single = compile_callable(_rk4)
 
 
-def _begin(memory, s, t):
+def _begin(tables, memory, s, t):
     """RK4 knows nothing of earlier steps."""
     return 0
 
@@ -141,7 +141,7 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
     w1 = f.lasts_of(seen)
     when, last = map_fields(extrema.first_time, v1, t), map_fields(extrema.first_time, w1, t)
     t0 = t1 = t2 = t
-    past = method.begin(stage_memory(s, MOST_SLOPES), s, t)
+    past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), s, t)
     for k in range(n_steps):
         recorded = history.shape[0] > 0 and lane_holds(flying, 0) and k % stride == 0
         if k > 0 and k % control_every == 0:

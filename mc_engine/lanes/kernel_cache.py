@@ -1,75 +1,233 @@
-"""Compiled kernels on disk.  A file that cannot be read or written costs a compilation and ends no flight.
+"""Kernels as machine code: kept on disk, loaded by LLVM, called through their address.
 
-Each file holds one compiled kernel and its digest, which is checked before loading: damaged machine code may crash or
-give wrong numbers.  The file's name contains all that the kernel was compiled for.  Files are replaced as a whole.
-A lock per file keeps two processes from compiling the same kernel.
+Nothing of numba is needed to load and to call a kernel: importing it takes longer than many a flight.  It is imported
+where a kernel has to be compiled (`mc_engine.lanes.compiler`).
+
+Each file holds the machine code of one kernel and a digest, which is checked before loading: damaged machine code may
+crash or give wrong numbers.  The file's name contains all that the kernel was compiled for.  Files are replaced as a
+whole.  A file that cannot be read or written costs a compilation and ends no flight.  A lock per file keeps two
+processes from compiling the same kernel.
 """
 
+import ctypes
+import json
 import logging
-from collections.abc import Iterator
+import os
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from hashlib import blake2b
+from functools import cache
+from hashlib import blake2b, sha256
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
-from numba.core.serialize import dumps, loads
+import numpy as np
+from llvmlite import binding
+
+from mc_engine.errors import ModelError
 
 try:
     import fcntl
 except ImportError:  # Windows: processes that start together may compile the same kernel, each for itself
     fcntl = None  # type: ignore[assignment]
 
+Form = tuple[str, ...]  # "float64", "int64" or "uint64" for each argument, with "[]" or "[,]" for an array
+_NUMBERS: dict[str, Any] = {"float64": ctypes.c_double, "int64": ctypes.c_int64, "uint64": ctypes.c_uint64}
+_OF_PYTHON = {float: "float64", int: "int64"}
+_ARRAYS = {1: "[]", 2: "[,]"}
 _DIGEST_BYTES = 32
+ENDED_WITH_ERROR = (
+    "the compiled physics ended with an error, such as 0.0 to the power of a negative whole number in one case alone; "
+    "`mc-engine debug FILE --case N` flies a case line by line"
+)
 
 
-class _KernelData(CompileResultCacheImpl):
-    """What is kept of a compiled kernel."""
+class Kernel:
+    """A function in machine code.  It is loaded from the disk, or compiled, when it is called with a form of arguments.
 
-    def reduce(self, result: Any) -> Any:
-        """Without the empty environments of the physics inside it.
+    path : beside which its files are kept.  compiled(form) : (name of the function, its library), from the compiler.
+    compilations, loads : how often this object has had it compiled, and has found it on the disk.
+    Calls run without the interpreter lock.  Arguments are numbers, and arrays of one or two dimensions, contiguous.
+    """
 
-        No compiled code reads them, and each would import the model's module under the name that it had then.
-        """
-        *data, environments = super().reduce(result)
-        return (*data, tuple(environment for environment in environments if environment.consts))
+    def __init__(self, path: Path, compiled: Callable[[Form], tuple[str, Any]]):
+        self.compiled = compiled
+        self.compilations = self.loads = 0
+        self._path, self._codes, self._lock = path, dict[Form, _MachineCode](), threading.Lock()
+
+    def __call__(self, *arguments: Any) -> int:
+        form = form_of(arguments)
+        code = self._codes.get(form)
+        if code is None:
+            with self._lock:
+                code = self._codes.get(form) or self._codes.setdefault(form, self._loaded(form))
+        return code(arguments)
+
+    def file(self, form: Form) -> Path:
+        """Where the machine code for such arguments is kept on this processor."""
+        what = sha256(repr((form, _target())).encode()).hexdigest()
+        return self._path.with_name(f"{self._path.stem}.{what[:16]}.kernel")
+
+    def _loaded(self, form: Form) -> "_MachineCode":
+        content, is_new = _kept_or_made(self.file(form), lambda: self._content(form))
+        self.compilations, self.loads = self.compilations + is_new, self.loads + (not is_new)
+        names, _, code = content.partition(b"\n")
+        return _MachineCode(json.loads(names), code, form)
+
+    def _content(self, form: Form) -> bytes:
+        name, library = self.compiled(form)
+        code: bytes = library.object_file()
+        return json.dumps([name, *library.outside_names]).encode() + b"\n" + code
 
 
-class KernelCache(FunctionCache):
-    """numba's cache of one function, whose failures end no flight."""
+class _MachineCode:
+    """One object file in memory, with a linker of its own: names in it may be those of another kernel.
 
-    _impl_class = _KernelData
+    names : of the kernel, and of the functions outside of the file that it calls.
+    """
 
-    def __init__(self, function: Any):
-        super().__init__(function)
-        self._cache_file = _Files(self._cache_path, self._impl.filename_base, None)
+    def __init__(self, names: Sequence[str], code: bytes, form: Form):
+        name, *outside = names
+        _find(outside)
+        self._engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
+        self._engine.add_object_file(binding.ObjectFileRef.from_data(code))
+        self._engine.finalize_object()
+        kinds = [kind for word in form for kind in _kinds(word)]
+        prototype = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, *kinds)
+        self._function = prototype(self._engine.get_function_address(name))
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The compiled function; None, to be compiled, where there is none or its file is damaged."""
-        try:
-            return super().load_overload(sig, target_context)
-        except _Damaged:
-            _warn(self.cache_path, "a compiled kernel is damaged there", "the model is compiled again")
-        except Exception as error:  # the disk's, or of what another machine compiled
-            _warn(self.cache_path, _reason(error), "a compiled kernel cannot be read there, and is compiled again")
+    def __call__(self, arguments: Sequence[Any]) -> int:
+        result, error = ctypes.c_int64(0), ctypes.c_void_p(None)
+        values = [value for argument in arguments for value in _values(argument)]
+        if self._function(ctypes.addressof(result), ctypes.addressof(error), *values):
+            raise ModelError(ENDED_WITH_ERROR)
+        return result.value
+
+
+def _find(names: Sequence[str]) -> None:
+    """Let the linker find these functions; ModelError for one that is nowhere."""
+    if all(binding.address_of_symbol(name) for name in names):
+        return
+    from numba.core.registry import cpu_target
+
+    assert cpu_target.target_context  # which tells LLVM where numba's own functions are, such as that of math.gamma
+    for name in names:
+        if not binding.address_of_symbol(name):
+            raise ModelError(f"the compiled physics calls {name}, which is not there")
+
+
+def form_of(arguments: Sequence[Any]) -> Form:
+    """The form of a call's arguments; TypeError for what no kernel takes."""
+    return tuple(_word(argument) for argument in arguments)
+
+
+def _word(argument: Any) -> str:
+    kind = argument.dtype.name if isinstance(argument, np.ndarray | np.generic) else _OF_PYTHON.get(type(argument), "")
+    if kind not in _NUMBERS:
+        what = kind or type(argument).__name__
+        raise TypeError(f"a kernel takes {', '.join(_NUMBERS)} and arrays of them, not {what}")
+    if not isinstance(argument, np.ndarray):
+        return kind
+    if argument.ndim not in _ARRAYS or not argument.flags.carray:
+        what = f"one of {argument.ndim} dimensions" if argument.ndim not in _ARRAYS else "one with gaps or read-only"
+        raise TypeError(f"a kernel takes contiguous arrays of one or two dimensions that can be written to, not {what}")
+    return f"{kind}{_ARRAYS[argument.ndim]}"
+
+
+def _kinds(word: str) -> list[Any]:
+    """C types of an argument, as numba hands arrays to a function: two addresses that only Python's own memory needs,
+    the number of items, the size of an item, the data, the lengths and the strides."""
+    number, bracket, _ = word.partition("[")
+    if not bracket:
+        return [_NUMBERS[number]]
+    n_dimensions = 1 + ("," in word)
+    pair, lengths = [ctypes.c_void_p, ctypes.c_void_p], [ctypes.c_int64] * (2 * n_dimensions)
+    return [*pair, ctypes.c_int64, ctypes.c_int64, ctypes.c_void_p, *lengths]
+
+
+def _values(argument: Any) -> tuple[Any, ...]:
+    if not isinstance(argument, np.ndarray):
+        return (argument.item() if isinstance(argument, np.generic) else argument,)
+    place, shape, strides = argument.ctypes.data, argument.shape, argument.strides
+    return None, None, argument.size, argument.itemsize, place, *shape, *strides
+
+
+def _machine() -> Any:
+    """LLVM's description of this processor, of which loading needs the kind alone; for one linker, which ends it."""
+    binding.initialize_native_target()
+    binding.initialize_native_asmprinter()
+    return binding.Target.from_triple(binding.get_process_triple()).create_target_machine(jit=True)
+
+
+@cache
+def _target() -> tuple[Any, ...]:
+    """What machine code is made for, besides the versions in the kernel's own name: the processor and its
+    instructions, and what the environment asks of numba."""
+    features = sorted(name for name, has in binding.get_host_cpu_features().items() if has)
+    asked = sorted((name, value) for name, value in os.environ.items() if name.startswith("NUMBA_"))
+    return binding.get_process_triple(), binding.get_host_cpu_name(), features, asked
+
+
+# ---- on disk
+
+
+def _kept_or_made(path: Path, make: Callable[[], bytes]) -> tuple[bytes, bool]:
+    """(content of a kernel's file, whether `make` had to give it).
+
+    Of processes that ask together one compiles, the others load.  Where there is no sound file, or the disk refuses,
+    `make` is called, with a warning that names the folder.
+    """
+    if (kept := _read(path)) is not None:
+        return kept, False
+    with _locked(path.with_suffix(".lock")):
+        if (kept := _read(path, warn=False)) is not None:
+            return kept, False
+        content = make()
+        save(path, content)
+        return content, True
+
+
+def _read(path: Path, warn: bool = True) -> bytes | None:
+    """The content of a kernel's file; None where there is none, or it cannot be read or is damaged."""
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
         return None
+    except OSError as error:
+        if warn:
+            _warn(path.parent, _reason(error), "a compiled kernel cannot be read there, and is compiled again")
+        return None
+    digest, code = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+    if digest == _digest(path, code):
+        return code
+    if warn:
+        _warn(path.parent, "a compiled kernel is damaged there", "the model is compiled again")
+    return None
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled function; a warning with the folder where the disk refuses."""
-        try:
-            super().save_overload(sig, data)
-        except OSError as error:
-            _refused(self.cache_path, error)
 
-    @contextmanager
-    def compiling(self, sig: Any, target_context: Any) -> Iterator[None]:
-        """Hold a kernel's lock unless it is on disk: of processes that ask together one compiles, the others load."""
-        path = self._cache_file.path(self._index_key(sig, target_context.codegen()))
-        if path.exists():
-            yield
-        else:
-            with _locked(path.with_suffix(".lock")):
-                yield
+def save(path: Path, content: bytes) -> None:
+    """Keep a compiled kernel; a warning with the folder where the disk refuses."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _replace(path, _digest(path, content) + content)
+    except OSError as error:
+        what = "compiled kernels cannot be kept there, and will be compiled again; make room, or name another folder in"
+        _warn(path.parent, _reason(error), f"{what} MC_ENGINE_CACHE")
+
+
+def _replace(path: Path, content: bytes) -> None:
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}")
+    try:
+        temporary.write_bytes(content)
+        os.replace(temporary, path)
+    except OSError:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
+
+
+def _digest(path: Path, content: bytes) -> bytes:
+    return blake2b(path.name.encode() + content, digest_size=_DIGEST_BYTES).digest()
 
 
 @contextmanager
@@ -96,66 +254,9 @@ def _locked(path: Path) -> Iterator[None]:
                 fcntl.flock(file, fcntl.LOCK_UN)
 
 
-class _Damaged(Exception):
-    """A file is not what was written."""
-
-
-class _Files(IndexDataCacheFile):
-    """A file for each key, without an index, which processes that write at once would take from each other."""
-
-    def load(self, key: Any) -> Any:
-        try:
-            content = self.path(key).read_bytes()
-        except FileNotFoundError:
-            return None
-        digest, data = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
-        if digest != _digest(key, data):
-            raise _Damaged
-        return loads(data)
-
-    def save(self, key: Any, data: Any) -> None:
-        content = dumps(data)
-        with self._open_for_write(str(self.path(key))) as file:
-            file.write(_digest(key, content) + content)
-
-    def path(self, key: Any) -> Path:
-        """The file of a key."""
-        name = self._data_name(0).removesuffix(".0.nbc")
-        return Path(self._cache_path) / f"{name}.{_digest(key, b'').hex()[:16]}.nbc"
-
-
-def _digest(key: Any, content: bytes) -> bytes:
-    return blake2b(repr(key).encode() + content, digest_size=_DIGEST_BYTES).digest()
-
-
-def keep_on_disk(dispatcher: Any) -> Any:
-    """The dispatcher, which from now on keeps what it compiles next to its file.
-
-    As numba's `cache=True`, but a disk that fails ends no flight, and two processes never compile the same kernel.
-    """
-    try:
-        dispatcher._cache = kept = KernelCache(dispatcher.py_func)
-    except RuntimeError as error:  # numba finds no folder that it may write to
-        _refused("kernels", error)
-        return dispatcher
-    compile_alone = dispatcher.compile
-
-    def compile_once(sig: Any) -> Any:
-        with kept.compiling(sig, dispatcher.targetctx):
-            return compile_alone(sig)
-
-    dispatcher.compile = compile_once
-    return dispatcher
-
-
-def _refused(folder: str, error: Exception) -> None:
-    what = "compiled kernels cannot be kept there, and will be compiled again; make room, or name another folder in "
-    _warn(folder, _reason(error), f"{what}MC_ENGINE_CACHE")
-
-
 def _reason(error: Exception) -> str:
     return str(getattr(error, "strerror", None) or error)
 
 
-def _warn(folder: str, reason: str, what: str) -> None:
+def _warn(folder: Path, reason: str, what: str) -> None:
     logging.getLogger("mc_engine").warning("%s: %s; %s", folder, reason, what)

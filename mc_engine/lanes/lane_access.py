@@ -7,7 +7,8 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from mc_engine.lanes.lane_type import I32, Lanes, common_width, mask_type
+from mc_engine.lanes.lane_type import I32, I64, Lanes, common_width, mask_type
+from mc_engine.lanes.lowering import llvm_type
 from mc_engine.lanes.tuples import _item, _pack, _pointer
 
 
@@ -17,6 +18,25 @@ def _get(builder: Any, value: Any, ty: Any, lane: Any) -> Any:
 
 def _put(builder: Any, value: Any, ty: Any, lane: Any, number: Any) -> Any:
     return builder.insert_element(value, number, builder.trunc(lane, I32)) if isinstance(ty, Lanes) else number
+
+
+@intrinsic(prefer_literal=True)
+def lane_numbers(typingctx, width):
+    """Room for one whole number a lane, at first 0, 1, 2, ..., in the frame of the function that asks for it.
+
+    width : a literal.  An array in its place would be allocated, which can fail, and a kernel on a card cannot fail.
+    """
+    count = width.literal_value
+
+    def codegen(context, builder, sig, args):
+        with builder.goto_entry_block():
+            numbers = builder.alloca(I64, size=ir.Constant(I64, count))
+        for lane in range(count):
+            place = ir.Constant(I64, lane)
+            builder.store(place, builder.gep(numbers, [place]))
+        return numbers
+
+    return types.CPointer(types.int64)(width), codegen
 
 
 @intrinsic
@@ -77,6 +97,25 @@ def unequal(typingctx, one, other, like):
         return _unequal(builder, one, args[0], args[1])
 
     return result(one, one, like), codegen
+
+
+@intrinsic
+def differ(typingctx, one, other, like):
+    """Mask of the lanes in which any number of two records has other bits; records of lanes as wide as `like`.
+
+    A number and itself never differ, which the compiler knows: unlike `unequal` this costs nothing there.
+    """
+    width = common_width(like)
+
+    def codegen(context, builder, sig, args):
+        whole = llvm_type(width, I64)
+        masks = []
+        for i in range(len(one)):
+            bits = [builder.bitcast(_item(builder, record, i), whole) for record in args[:2]]
+            masks.append(builder.icmp_unsigned("!=", *bits))
+        return functools.reduce(builder.or_, masks)
+
+    return mask_type(width)(one, other, like), codegen
 
 
 def _unequal(builder, ty, one, other):

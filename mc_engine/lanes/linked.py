@@ -66,6 +66,27 @@ class KernelLibrary(JITCodeLibrary):
         refuse_missing_blocks(self._final_module)
         super()._optimize_final_module()
 
+    def _finalize_final_module(self) -> None:
+        """Without numba's own linker: the kernel is loaded from its object file, here and in other processes."""
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    @property
+    def whole(self) -> Any:
+        """The module with all that the kernel needs, as it came out of numba's passes for this processor."""
+        return self._final_module
+
+    @property
+    def outside_names(self) -> list[str]:
+        """Names of the functions that the kernel calls and does not hold, such as that of math.gamma."""
+        declared = (function.name for function in self._final_module.functions if function.is_declaration)
+        return sorted(name for name in declared if not name.startswith("llvm."))
+
+    def object_file(self) -> bytes:
+        """The machine code."""
+        return bytes(self._codegen._tm.emit_object(self._final_module))
+
 
 def _callers_first(libraries: Iterable[Any]) -> list[Any]:
     """The libraries and all that they need, each once: LLVM takes over a function that something before it calls."""
@@ -134,8 +155,10 @@ class KernelLowering(NativeLowering):
     def run_pass(self, state: Any) -> bool:
         """Called by numba with the state of the compilation."""
         state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
-        return super().run_pass(state)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        state.library.finalize()
+        return True
 
 
 class KernelCompiler(CompilerBase):

@@ -64,11 +64,15 @@ def multistep_tables(method: str) -> tuple[Any, ...]:
     """
     order = int(method.removeprefix("abm"))
     n = order - 2
-    columns = [(newest + i) % n for newest in range(n) for i in range(n)]
     ahead = _of_differences(adams_weights(order - 1, implicit=False))
     at_end, at_start, *older = adams_weights(order, implicit=True)
     behind = _of_differences([at_end + at_start, *older])
-    return *DOP853.tables(), np.array(columns, dtype=np.int64), np.tile(ahead, n), np.tile(behind, n), float(at_end), n
+    return *DOP853.tables(), ring_columns(n), np.tile(ahead, n), np.tile(behind, n), float(at_end), n
+
+
+def ring_columns(n: int) -> np.ndarray:
+    """int64[n * n], for each index of the newest of n things in a ring the indices of all, newest first."""
+    return np.array([(newest + i) % n for newest in range(n) for i in range(n)], dtype=np.int64)
 
 
 def _of_differences(weights: list[Fraction]) -> list[float]:
@@ -104,7 +108,7 @@ def _lost(y, end, change):
     return (end - y) - change
 
 
-def _begin(memory, s, t):
+def _begin(tables, memory, s, t):
     none = map_fields(_none, s)
     return Past(memory, 0, none, 0.0 * t, none)
 

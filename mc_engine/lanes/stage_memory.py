@@ -106,6 +106,36 @@ def stage_sum(typingctx, memory, like, first, last, columns, weights):
     return like(memory, like, types.intp, types.intp, columns, weights), codegen
 
 
+@intrinsic
+def stage_sums(typingctx, memory, like, first, last, columns, weights):
+    """Two sums of one pass, as `stage_sum`, which have the weights[0] and the weights[1]: tuples like `like`.
+
+    Stages may have more fields than `like`: the first are summed.  weights : float64[2, n]
+    """
+    result = types.UniTuple(like, 2)
+
+    def codegen(context, builder, sig, args):
+        width = common_width(*like)
+        sums = [[cgutils.alloca_once_value(builder, constant(width, 0.0)) for _ in range(len(like))] for _ in range(2)]
+        column_data = context.make_array(columns)(context, builder, args[4]).data
+        table = context.make_array(weights)(context, builder, args[5])
+        second = builder.gep(table.data, [builder.extract_value(table.shape, 1)])
+        with cgutils.for_range_slice(builder, args[2], args[3], ir.Constant(I64, 1), I64) as (entry, _):
+            stage = builder.load(builder.gep(column_data, [entry]))
+            values = [builder.load(_place(builder, memory, args[0], stage, i)) for i in range(len(like))]
+            for row, totals in zip((table.data, second), sums, strict=True):
+                weight = _splat(builder, builder.load(builder.gep(row, [entry])), width)
+                for value, total in zip(values, totals, strict=True):
+                    builder.store(fused(builder, width, [weight, value, builder.load(total)]), total)
+        packed = [ir.Constant(context.get_value_type(like), ir.Undefined)] * 2
+        for row, totals in enumerate(sums):
+            for i, total in enumerate(totals):
+                packed[row] = builder.insert_value(packed[row], builder.load(total), i)
+        return context.make_tuple(builder, result, packed)
+
+    return result(memory, like, types.intp, types.intp, columns, weights), codegen
+
+
 def _splat(builder: Any, value: Any, width: int) -> Any:
     from mc_engine.lanes.lane_type import splat
 

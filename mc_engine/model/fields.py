@@ -208,9 +208,13 @@ class FixedStep:
     step : float, length of a step [s], or str, the symbol of a setting that holds it
     until : float or str, end of the flight [s]; at most 1e9 steps.  In a model with a stopping event, see `Event`.
     control_every : int or str, steps from one call of `control` to the next
-    method : str, "rk4" (order 4), or "abm8" to "abm12": Adams-Bashforth-Moulton of order 8 to 12, for long smooth arcs.
-        It is stable for steps below 0.37, 0.26, 0.18, 0.12, 0.08 over the fastest angular frequency [rad/s].  It starts
-        by DOP853, and again after each event and each sample of the control that changes the discrete state.
+    method : str, "rk4" (order 4), or for long smooth arcs "abm8" to "abm12", Adams-Bashforth-Moulton of order 8 to 12,
+        or "gj6" to "gj10", Gauss-Jackson with differences of order 6 to 10, where every state is the rate of another or
+        has one.  ABM is stable for steps below 0.37, 0.26, 0.18, 0.12, 0.08 over the fastest angular frequency [rad/s],
+        GJ for 0.33, 0.24, 0.17, 0.12, 0.09, and with weak damping only, see `mc_engine.lanes.gauss_jackson`.  Both
+        start by DOP853, and again after each event and each sample of the control that changes the discrete state.
+    rates : tuple of pairs (state, its rate) by their names without units, for GJ: the derivative of the first state of
+        a pair is the second
 
     >>> FixedStep(step=10.0, until=6000.0).control_every
     1
@@ -220,6 +224,7 @@ class FixedStep:
     until: float | str
     control_every: int | str = 1
     method: str = "rk4"
+    rates: tuple[tuple[str, str], ...] = field(default=(), kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -247,6 +252,11 @@ class AdaptiveStep:
     method: str = "dop853"
     attempts: int = 100_000
     first_step: float = 0.0
+
+
+def uses_rates(clock: FixedStep | AdaptiveStep) -> bool:
+    """Whether a clock's method is one for states of second order, which needs its `rates`."""
+    return clock.method.startswith("gj")
 
 
 # ---- types of the values in a record, against those that its class declares

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
-from mc_engine.lanes.block_search import blocks_in
+from mc_engine.lanes.composed import blocks_in
 from mc_engine.lanes.physics_function import PhysicsFunction
 from mc_engine.model.faults import place_in_model, relative_import, wrong_record
 from mc_engine.model.fields import (

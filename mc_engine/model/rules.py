@@ -16,9 +16,10 @@ from mc_engine.model.fields import (
     Named,
     Setting,
     refuse_other_types,
+    uses_rates,
 )
 from mc_engine.model.figures import refuse_false_figures
-from mc_engine.suggestions import hint
+from mc_engine.suggestions import hint, listed
 from mc_engine.units import UNITS, unit_hint, unit_suffix
 
 if TYPE_CHECKING:
@@ -29,7 +30,8 @@ _CASE_COLUMNS = ("case_id", "status", "reason", "end_time_s")  # the engine's ow
 _HISTORY_COLUMNS = ("case_id", "t_s")
 _ACTIONS = ("stop", "switch")
 _MOST_ATTEMPTS = 1e9  # of a case, as there are steps on a fixed grid: minutes of one core
-_METHODS = {"FixedStep": ("rk4", "abm8", "abm9", "abm10", "abm11", "abm12"), "AdaptiveStep": ("dop853", "dp54")}
+_MULTISTEP = tuple(f"abm{order}" for order in range(8, 13)) + tuple(f"gj{order}" for order in range(6, 11))
+METHODS = {"FixedStep": ("rk4", *_MULTISTEP), "AdaptiveStep": ("dop853", "dp54")}
 
 
 def refuse_contradictions(model: "Model") -> None:
@@ -69,7 +71,8 @@ def refuse_contradictions(model: "Model") -> None:
     for event in model.event_list:
         _refuse_event(event, model.switch is not None)
     refuse_false_figures(model)
-    _refuse_clock(model.clock, [setting.symbol for setting in model.settings], len(model.states))
+    settings, states = ([item.symbol for item in items] for items in (model.settings, model.states))
+    _refuse_clock(model.clock, settings, states)
 
 
 def refuse_false_simulator(simulator: "Simulator") -> None:
@@ -155,27 +158,42 @@ def _refuse_unknown(what: str, word: Any, known: Iterable[str]) -> None:
         raise ModelError(f'{what} "{word}"{hint(str(word), known)}')
 
 
-def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], n_states: int) -> None:
-    """ModelError for numbers by which nothing can fly.  settings : symbols that a clock may name."""
+def _refuse_clock(clock: FixedStep | AdaptiveStep, settings: list[str], states: list[str]) -> None:
+    """ModelError for numbers by which nothing can fly.  settings, states : symbols that a clock may name."""
     kind = type(clock).__name__
-    _refuse_unknown("the clock has the method", clock.method, _METHODS[kind])
+    _refuse_unknown("the clock has the method", clock.method, METHODS[kind])
     _refuse_time("until", clock.until, settings)
     if isinstance(clock, FixedStep):
         _refuse_time("step", clock.step, settings)
         _refuse_time("control_every", clock.control_every, settings, least=1.0)
         if not isinstance(clock.control_every, str) and clock.control_every % 1 != 0:
             raise ModelError(f"the clock's `control_every` is {clock.control_every}; it counts steps, in whole numbers")
+        if clock.rates or uses_rates(clock):
+            _refuse_rates(clock, states)
         return
     _refuse_time("rtol", clock.rtol, settings)
     if not callable(clock.control_period):
         _refuse_time("control_period", clock.control_period, settings, most=inf)
     _refuse_time("attempts", clock.attempts, [], least=1.0, most=_MOST_ATTEMPTS)
     _refuse_time("first_step", clock.first_step, [], least=0.0)
-    tolerances = clock.atol if isinstance(clock.atol, tuple) else (clock.atol,) * n_states
-    if len(tolerances) != n_states:
-        raise ModelError(f"the clock's `atol` has {len(tolerances)} numbers, the model {n_states} states")
+    tolerances = clock.atol if isinstance(clock.atol, tuple) else (clock.atol,) * len(states)
+    if len(tolerances) != len(states):
+        raise ModelError(f"the clock's `atol` has {len(tolerances)} numbers, the model {len(states)} states")
     for tolerance in tolerances:
         _refuse_time("atol", tolerance, [], least=0.0)
+
+
+def _refuse_rates(clock: FixedStep, states: list[str]) -> None:
+    """ModelError unless each state is in one pair of `rates`."""
+    named = [name for pair in clock.rates for name in pair]
+    for name in named:
+        _refuse_unknown("the clock's `rates` have the state", name, states)
+    if sorted(named) != sorted(states):
+        raise ModelError(
+            f'the clock\'s `rates` name {listed(named) or "no state"}; the method "{clock.method}" needs each of the '
+            f'states {listed(states)} in one pair, such as ("x", "vx") where vx is the derivative of x; '
+            '"abm11" is for any states'
+        )
 
 
 def _refuse_time(name: str, value: Any, settings: list[str], least: float | None = None, most: float = 1e300) -> None:

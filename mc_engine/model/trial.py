@@ -106,11 +106,21 @@ def _try_phase(model: Model, t: Any, s: Any, m: Any, p: Any, o: Any, seed: int, 
         derivative = _call(model, "rhs", t, s, m, p, o)
         rhs = _of_phase(model.rhs, (t, s, m, p, o))
         _same_record(rhs, "rhs", derivative, "initial", s)
+        _refuse_false_rates(model, rhs, s, derivative)
         if finite:
             _refuse_infinite("rhs", rhs, (t, s, m, p, o), derivative, "the derivative")
     with suppress(_ByZero):
         _try_events(model, t, s, m, p, o)
     return m
+
+
+def _refuse_false_rates(model: Model, rhs: Callable[..., Any], s: Any, derivative: Any) -> None:
+    """Breach unless the derivative of a state is the state that the clock names as its rate."""
+    for state, rate in getattr(model.clock, "rates", ()):
+        given, wanted = np.asarray(getattr(derivative, state)), np.asarray(getattr(s, rate))
+        if ((given != wanted) & (given == given)).any():
+            gives = f'{np.ravel(given)[0]:g} for "{state}"'
+            raise _breach(rhs, "rhs", gives, f"s.{rate}, here {np.ravel(wanted)[0]:g}: so say the `rates` of the clock")
 
 
 def _of_phase(function: Any, arguments: tuple[Any, ...]) -> Any:

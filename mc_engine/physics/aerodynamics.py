@@ -1,9 +1,12 @@
-"""Lift and axial force of a vehicle at its trim angle of attack.
+"""Lift and axial force of a vehicle at its trim angle of attack, lift of the parts of a slender rocket, parachutes.
 
 Coefficients that go by the Mach number are curves, see `mc_engine.physics.curves`.
 """
 
-from mc_engine.lanes import maximum, physics, sqrt, where
+from math import pi
+
+from mc_engine.lanes import atan2, maximum, physics, sqrt, where
+from mc_engine.physics.vectors import Vector, norm, scaled
 
 FADING = 0.01  # rad from the vertical
 
@@ -32,3 +35,46 @@ def lift_direction(vx, vy, vz, ux, uy, uz, speed, cos_bank, sin_bank):
 def axial_coefficient(drag_coefficient, lift_coefficient, cos_trim, sin_trim):
     """Force coefficient along the body axis at the trim angle of attack: C_D cos + C_L sin."""
     return drag_coefficient * cos_trim + lift_coefficient * sin_trim
+
+
+@physics
+def lift_of_part(density, stream, rate, place, area):
+    """(force [N], moment [N m] about the centre of mass) of the lift of a part of a rocket with z to the nose.
+
+    stream : velocity [m/s] of the air against the centre of mass, in body axes;  rate : of the body [rad/s]
+    place : of the part's centre of pressure before the centre of mass [m]
+    area : of reference times the slope of the lift coefficient by the angle of attack [m^2/rad]
+    J. S. Barrowman, The practical calculation of the aerodynamic characteristics of slender finned vehicles (1967).
+    """
+    own = Vector(stream.x - rate.y * place, stream.y + rate.x * place, stream.z)
+    speed, across = norm(own), sqrt(own.x * own.x + own.y * own.y)
+    k = 0.5 * density * speed * speed * area * atan2(across, -own.z) / where(across > 0.0, across, 1.0)
+    return Vector(k * own.x, k * own.y, 0.0), Vector(-place * k * own.y, place * k * own.x, 0.0)
+
+
+@physics
+def fins_lift_area(mach, number, span, root, tip, radius):
+    """Area times the slope of the lift coefficient [m^2/rad] of equal trapezoidal fins on a round body.
+
+    number : of the fins, three or four;  span : of one, from the body to its tip;  root, tip : chords, of fins whose
+    trailing edge is square to the body;  radius : of the body [m]
+
+    One fin: F. W. Diederich, NACA TN 2335 (1951), with Prandtl and Glauert's factor, between Mach 0.8 and 1.1 that of
+    Mach 0.8; all of them on a body: Barrowman, as above.
+    """
+    sweep = 0.5 * (root - tip) / span  # tangent, of the line at half chord
+    beta = sqrt(where(mach < 0.8, 1.0 - mach * mach, where(mach < 1.1, 0.36, mach * mach - 1.0)))
+    f = 4.0 * span / (root + tip) * sqrt(1.0 + sweep * sweep) * beta
+    return 0.5 * number * (1.0 + radius / (span + radius)) * 4.0 * pi * span * span / (2.0 + sqrt(f * f + 4.0))
+
+
+@physics
+def parachute_acceleration(density, stream, mass, area, gravity):
+    """Acceleration [m/s^2] of a mass [kg] under an open parachute, which takes half a sphere of air along.
+
+    stream : velocity of the air against it [m/s], z up;  area : drag area [m^2], of a drag coefficient of 1.4;
+    gravity : down.  G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021.
+    """
+    moving = mass + 2.0 / 3.0 * pi * density * sqrt(area / (1.4 * pi)) ** 3
+    pull = scaled(0.5 * density * area * norm(stream) / moving, stream)
+    return Vector(pull.x, pull.y, pull.z - mass / moving * gravity)

@@ -1,4 +1,4 @@
-"""Gravitational acceleration of an oblate Earth, in inertial axes with z along the rotation axis.
+"""Gravitational acceleration of an oblate Earth, in inertial axes with z along the rotation axis; weight over ground.
 
 Powers of the distance are made of 1/r**2 and r: a division takes as long as twenty products, and the compiler
 then divides once for all functions that are called with the same place.
@@ -44,3 +44,14 @@ def oblate(x, y, z, mu):
     k = 5.0 * z * z * u2
     across, along = fma(q, k - 1.0, g), fma(q, k - 3.0, g)
     return across * x, across * y, along * z
+
+
+@physics
+def normal_gravity(sine2, h):
+    """Gravity [m/s^2] at rest on the turning Earth, h [m] above the ellipsoid of WGS 84.  sine2 : sin^2 of latitude.
+
+    NIMA TR8350.2, 3rd ed. (2000), eqs (4-1) and (4-3): good to 20 km.
+    """
+    ground = 9.7803253359 * (1.0 + 1.931852652458e-3 * sine2) / sqrt(1.0 - 6.694379990141e-3 * sine2)
+    fall = 2.0 / 6378137.0 * (1.0 + 3.352810665e-3 + 3.449786506841e-3 - 2.0 * 3.352810665e-3 * sine2)
+    return ground * (1.0 - fall * h + 3.0 / 6378137.0**2 * h * h)

@@ -1,9 +1,12 @@
-"""Equinoctial elements: those of an orbit that may be circular and may lie in the equator.  SI, radians.
+"""Elements of closed orbits.  SI, radians.
 
-Not for orbits near 180 degrees of inclination, and not for open ones.
+Equinoctial elements, for orbits that may be circular and may lie in the equator but not near 180 degrees of
+inclination; and, in NumPy for whole chunks of cases, states from classical elements and Kepler's equation.
 """
 
 from collections import namedtuple
+
+import numpy as np
 
 from mc_engine.lanes import atan2, physics, sqrt
 
@@ -41,3 +44,33 @@ def equinoctial(x, y, z, vx, vy, vz, mu):
     sine = h + ((1.0 - h * h * b) * across - h * k * b * along) / (a * root)
     mean = atan2(sine, cosine) + h * cosine - k * sine
     return Equinoctial(a, k, h, q, p, mean, atan2(across, along))
+
+
+def state_of_elements(a, e, inclination, node, pericentre, anomaly, mu: float) -> np.ndarray:
+    """Place [m] and velocity [m/s], float64[6, n], of orbits of semi-major axis a [m] at a true anomaly.
+
+    Montenbruck, Gill, Satellite Orbits, eqs (2.43)-(2.51).
+    """
+    parameter = a * (1.0 - e * e)
+    r, speed = parameter / (1.0 + e * np.cos(anomaly)), np.sqrt(mu / parameter)
+    ci, si, cn, sn = np.cos(inclination), np.sin(inclination), np.cos(node), np.sin(node)
+    cp, sp = np.cos(pericentre), np.sin(pericentre)
+    p = np.array([cp * cn - sp * ci * sn, cp * sn + sp * ci * cn, sp * si])
+    q = np.array([-sp * cn - cp * ci * sn, -sp * sn + cp * ci * cn, cp * si])
+    place = r * (np.cos(anomaly) * p + np.sin(anomaly) * q)
+    return np.concatenate([place, speed * (-np.sin(anomaly) * p + (e + np.cos(anomaly)) * q)])
+
+
+def mean_anomaly(anomaly, e):
+    """Mean anomaly of a true one on ellipses of eccentricity e: Kepler's equation, M = E - e sin E."""
+    eccentric = 2.0 * np.arctan2(np.sqrt(1.0 - e) * np.sin(0.5 * anomaly), np.sqrt(1.0 + e) * np.cos(0.5 * anomaly))
+    return eccentric - e * np.sin(eccentric)
+
+
+def true_anomaly(mean, e):
+    """True anomaly, within half a turn, of a mean one; Kepler's equation by 12 of Newton's steps.  For e up to 0.95."""
+    mean = np.mod(np.asarray(mean) + np.pi, 2.0 * np.pi) - np.pi
+    eccentric = mean + e * np.sin(mean)
+    for _ in range(12):
+        eccentric = eccentric - (eccentric - e * np.sin(eccentric) - mean) / (1.0 - e * np.cos(eccentric))
+    return 2.0 * np.arctan2(np.sqrt(1.0 + e) * np.sin(0.5 * eccentric), np.sqrt(1.0 - e) * np.cos(0.5 * eccentric))

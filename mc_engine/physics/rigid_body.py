@@ -1,4 +1,4 @@
-"""A rigid body with six degrees of freedom, over flat ground or about the turning, oblate Earth.
+"""A rigid body with six degrees of freedom, over flat ground or about the turning, oblate Earth; rockets.
 
 A `Motion` is position, velocity, attitude and angular rate, and so is its derivative; the fields of a model's state are
 these numbers one by one.  Forces and moments are given in body axes, moments about the centre of mass.  The attitude is
@@ -10,9 +10,14 @@ W. T. Thomson, Introduction to Space Dynamics (1961), chapters 5 and 8 (variable
 """
 
 from collections import namedtuple
+from collections.abc import Callable
+from math import pi
+
+import numpy as np
 
 from mc_engine.lanes import cos, physics, sin, sqrt
 from mc_engine.physics.constants import EARTH_RATE, MU_EARTH
+from mc_engine.physics.curves import Curve, curve
 from mc_engine.physics.earth_frames import wind_from_body
 from mc_engine.physics.gravity import oblate
 from mc_engine.physics.rotations import derivative, transformed, transformed_back
@@ -200,3 +205,81 @@ def point_of_body(motion, arm):
         added(motion.position, transformed_back(motion.attitude, arm)),
         added(motion.velocity, transformed_back(motion.attitude, cross(motion.rate, arm))),
     )
+
+
+# ---- a rocket that burns solid propellant
+
+# A body that is the same all around its axis z, without propellant: mass [kg], inertia across and along [kg m^2] about
+# its centre of mass.  From there to the tail [m]: centre of the propellant, nozzle.  jet: radius of gyration about
+# the axis of the gas that leaves the nozzle, squared [m^2].
+Rocket = namedtuple("Rocket", "mass across axial propellant nozzle jet")
+# mass [kg] and inertia [kg m^2] about its own centre, their rates, and the rate of the mass's rate [kg/s^2]
+Propellant = namedtuple("Propellant", "mass across axial rate across_rate axial_rate change")
+
+
+def solid_propellant(
+    thrust: Curve, burn: float, *, number: int, density: float, outer: float, inner: float, length: float, gap: float
+) -> Callable[..., Propellant]:
+    """propellant(t) -> `Propellant` of a motor with hollow cylinders in a row, which burn inside and at both ends.
+
+    thrust : of the time [N];  burn : time at which nothing is left [s];  number, density [kg/m^3] of the cylinders
+    outer, inner, length, gap : radii and length of a cylinder at first, and what is between two of them [m]
+
+    The flow goes by the thrust, at a constant exhaust speed; the motor is computed every millisecond.  Derived here
+    from m = n rho pi (R^2 - r^2) L with L' = -2 r'.
+    """
+    solid, spacing = number * density * pi, length + gap
+    t = np.linspace(0.0, burn, round(1e3 * burn) + 1)
+    force, radii = thrust(t), np.linspace(inner, outer, 100_001)
+    left = solid * (outer**2 - radii**2) * (length - 2.0 * (radii - inner))
+    impulse = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(t))])
+    flow = left[0] / impulse[-1]  # over the thrust
+    radius_of = curve(x=t, y=np.interp(flow * impulse, left[0] - left, radii), kind="cubic")
+    change_of = curve(x=0.5 * (t[1:] + t[:-1]), y=-flow * np.diff(force) / np.diff(t), kind="nearest", outside="zero")
+    apart = spacing * spacing * (number * number - 1.0) / 12.0
+
+    @physics
+    def propellant(t):
+        r, rate = radius_of(t), -flow * thrust(t)
+        long, ring, round2 = length - 2.0 * (r - inner), outer * outer - r * r, outer * outer + r * r
+        mass, growth = solid * ring * long, -0.5 * rate / (solid * (r * long + ring))
+        across = 0.25 * round2 + long * long / 12.0 + apart
+        return Propellant(
+            mass=mass,
+            across=mass * across,
+            axial=0.5 * mass * round2,
+            rate=rate,
+            across_rate=rate * across + mass * growth * (0.5 * r - long / 3.0),
+            axial_rate=0.5 * rate * round2 + mass * growth * r,
+            change=change_of(t),
+        )
+
+    return propellant
+
+
+@physics
+def rocket_accelerations(rocket, fuel, rate, force, moment, weight):
+    """(acceleration [m/s^2], angular acceleration [rad/s^2]) of the point of the dry centre of mass, in body axes.
+
+    fuel : `Propellant`;  rate : of the body [rad/s];  force [N] : thrust and air, with its moment [N m] about the dry
+    centre of mass;  weight : gravity [m/s^2]
+
+    G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021, with propellant on the axis and all places counted along z.  The
+    second derivative of the place of the centre of mass is left out.
+    """
+    w, m = rate, rocket.mass + fuel.mass
+    down, arm = -rocket.nozzle, -rocket.propellant
+    r = arm * fuel.mass / m  # to the centre of mass
+    dr = arm * fuel.rate * rocket.mass / (m * m)
+    i, axial = rocket.across + fuel.across + fuel.mass * arm * arm, rocket.axial + fuel.axial
+    jet = fuel.rate * (0.5 * rocket.jet + down * down) - fuel.across_rate - fuel.rate * arm * arm
+    sway = 2.0 * fuel.rate * (down - r) - 2.0 * m * dr
+    fx = force.x + w.y * sway - m * r * w.x * w.z
+    fy = force.y - w.x * sway - m * r * w.y * w.z
+    fz = force.z - 2.0 * fuel.rate * dr + fuel.change * (down - r) + m * r * (w.x * w.x + w.y * w.y)
+    turn = Vector(
+        ((i - axial) * w.y * w.z + jet * w.x + moment.x + r * fy) / (i - m * r * r),
+        ((axial - i) * w.x * w.z + jet * w.y + moment.y - r * fx) / (i - m * r * r),
+        ((fuel.rate * rocket.jet - fuel.axial_rate) * w.z + moment.z) / axial,
+    )
+    return Vector(weight.x + fx / m - r * turn.y, weight.y + fy / m + r * turn.x, weight.z + fz / m), turn

@@ -1,21 +1,38 @@
 """The choice of a backend, with its limits.  `mc_engine.runner.pools` makes the worker pool for it."""
 
 import importlib.util
+import json
+import os
 import sys
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
 
+import numpy as np
+
+from mc_engine.cache_folder import cache_folder
+from mc_engine.campaign.cases import case_table
+from mc_engine.campaign.loading import Campaign
+from mc_engine.durable_file import disk_errors
 from mc_engine.errors import EngineError
 from mc_engine.extras import how_to_install
+from mc_engine.flight.chunks import LARGEST_CHUNK, fly_in_threads
+from mc_engine.flight.flyer import Flyer
+from mc_engine.flight.flyers import flyer_of
+from mc_engine.model.simulator import Simulator
 from mc_engine.shell_words import shell_word
 
-BACKENDS = ("threading", "loky", "dask")
+BACKENDS = ("threading", "loky", "dask", "cuda", "auto")
 
 
 @dataclass(frozen=True)
 class Backend:
     """The kind of workers that fly the cases, and their limits.
 
-    name : "threading", "loky" or "dask".  scheduler : address of a `distributed` scheduler; without one, "dask"
+    name : "threading", "loky", "dask", "cuda" (NVIDIA cards) or "auto", which takes a card where
+    `bench` found it faster.  scheduler : address of a `distributed` scheduler; without one, "dask"
     starts a cluster on this machine for the run.
     case_seconds : a case that takes longer ends with the status time-limit.  memory_mib : memory limit of a worker.
     patience_s : longest time without workers, for example while jobs wait in a queue; by default 300.
@@ -32,7 +49,8 @@ class Backend:
             raise EngineError(f'backend "{self.name}" is not known; there are {", ".join(BACKENDS)}')
         if self.scheduler is not None and self.name != "dask":
             raise EngineError(f'a scheduler is for the backend "dask", not for "{self.name}"')
-        if self.name == "threading" and (self.case_seconds is not None or self.memory_mib is not None):
+        limited = self.case_seconds is not None or self.memory_mib is not None
+        if self.name in ("threading", "cuda", "auto") and limited:
             raise EngineError('a thread cannot be limited in time or memory; fly with the backend "loky"')
         if self.scheduler is not None and self.memory_mib is not None:
             raise EngineError("the workers of a scheduler have limits of their own: `dask worker --memory-limit`")
@@ -40,6 +58,10 @@ class Backend:
             raise EngineError(f'patience is for the backend "dask", whose workers come and go, not for "{self.name}"')
         if self.memory_mib is not None and not memory_can_be_limited():
             raise EngineError("this system keeps no limit on memory; install psutil, with which the workers look")
+        if self.name == "cuda":
+            from mc_engine.runner.cards import cards
+
+            cards()
         if self.name == "dask" and importlib.util.find_spec("distributed") is None:
             raise EngineError(f'the backend "dask" needs the package distributed; {how_to_install("cluster")}')
 
@@ -58,6 +80,76 @@ class Backend:
         return "".join(f" --{key} {shell_word(str(value))}" for key, value in values.items() if value is not None)
 
 
+def flyer_on(backend: str, campaign: Campaign) -> Flyer:
+    """What flies the cases of a campaign on a backend: the processor, but for "cuda" a card.
+
+    "auto" takes a card only for a model that `bench --card` found to be faster on the cards of this machine.
+    Raises EngineError, one sentence, where a card is asked for and cannot fly them.
+    """
+    compiled = not isinstance(campaign.model, Simulator)
+    if backend == "cuda" and not compiled:
+        raise EngineError('a simulator flies on the processor; leave "--backend cuda" away')
+    if backend == "cuda" or (backend == "auto" and compiled and _is_faster_on_a_card(campaign)):
+        from mc_engine.runner.cards import CardFlyer
+
+        return CardFlyer(campaign)
+    return flyer_of(campaign)
+
+
 def memory_can_be_limited() -> bool:
     """True if the system can limit the memory of a process, or psutil is installed to watch it."""
     return sys.platform.startswith("linux") or importlib.util.find_spec("psutil") is not None
+
+
+# ---- whether a card is faster than the processor
+
+
+def measure_card(campaign: Campaign, n_cases: int | None = None, repeats: int = 3) -> tuple[float, float]:
+    """Cases per second on all cores of the processor and on a card, which the backend "auto" goes by from now on.
+
+    n_cases : of a flight; by default those of the largest part of a run.  The fastest of `repeats` flights counts.
+    Raises EngineError, one sentence, where there is no card.
+    """
+    from mc_engine.runner.cards import CardFlyer
+
+    file = _measurement_of(campaign)
+    ids = np.arange(min(n_cases or LARGEST_CHUNK, campaign.cases), dtype=np.int64)
+    table, workers = case_table(campaign, ids), os.cpu_count() or 1
+
+    def flight(flyer: Flyer) -> Callable[[], object]:
+        return lambda: fly_in_threads(campaign, table, ids, ["status"], workers, flyer)
+
+    flyers = flyer_of(campaign), CardFlyer(campaign)
+    processor, card = (ids.size / _shortest(flight(flyer), repeats) for flyer in flyers)
+    with disk_errors(file):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps({"processor_cases_s": processor, "card_cases_s": card}), encoding="utf-8")
+    return processor, card
+
+
+def _is_faster_on_a_card(campaign: Campaign) -> bool:
+    """True where the cards were measured to be faster for this model; False where nothing was measured."""
+    try:
+        kept = json.loads(_measurement_of(campaign).read_text(encoding="utf-8"))
+        return float(kept["card_cases_s"]) > float(kept["processor_cases_s"])
+    except (EngineError, OSError, ValueError, KeyError, TypeError):
+        return False  # no card, no measurement or one that was damaged
+
+
+def _shortest(flight: Callable[[], object], repeats: int) -> float:
+    """Time of the fastest flight [s], after one that compiles."""
+    flight()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        flight()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+def _measurement_of(campaign: Campaign) -> Path:
+    """What is kept for a model with its sources on the cards and cores of this machine."""
+    from mc_engine.runner.cards import cards
+
+    about = [flyer_of(campaign).digest(), str(os.cpu_count()), *(card.name for card in cards())]
+    return cache_folder() / "cards" / f"{sha256(' '.join(about).encode()).hexdigest()[:20]}.json"

@@ -10,6 +10,7 @@ from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import noise_ids
 from mc_engine.flight.chunks import NOMINAL_NOISE
+from mc_engine.flight.flyer import Columns
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.statistics.worst import limits_on, worst_cases
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, OK, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
@@ -23,9 +24,15 @@ def inputs_of(campaign: Campaign, case_id: int | None) -> tuple[dict[str, Any], 
     """(inputs, what addresses the noise) of a case of a campaign, or of its nominal case."""
     if case_id is None:
         return dict(campaign.nominal), NOMINAL_NOISE
-    table = case_table(campaign, np.array([case_id]))
-    inputs = full_inputs(campaign, {name: column[0] for name, column in table.items()})
-    return inputs, int(noise_ids(campaign, np.array([case_id]))[0])
+    return _inputs_of_all(campaign, [case_id])[0]
+
+
+def _inputs_of_all(campaign: Campaign, case_ids: list[int]) -> list[tuple[dict[str, Any], int]]:
+    """As `inputs_of`, of several cases, which are drawn together."""
+    ids = np.array(case_ids, dtype=np.int64)
+    table, noise = case_table(campaign, ids), noise_ids(campaign, ids)
+    rows = ({name: column[row] for name, column in table.items()} for row in range(ids.size))
+    return [(full_inputs(campaign, inputs), int(number)) for inputs, number in zip(rows, noise, strict=True)]
 
 
 def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Callable[[], bool]) -> bool:
@@ -42,20 +49,20 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     if _are_kept(store, campaign, retained):
         return True
     flights = [(-1, *inputs_of(campaign, None))] if campaign.retention.nominal else []
-    flights += [(case_id, *inputs_of(campaign, case_id)) for case_id in retained]
+    flights += [(case, *flight) for case, flight in zip(retained, _inputs_of_all(campaign, retained), strict=True)]
 
-    def history(*flight: Any) -> pd.DataFrame | None:
+    def history(*flight: Any) -> Columns | None:
         return None if stopped() else _flown_history(campaign, *flight)
 
     pool = Parallel(
         n_jobs=min(workers, max(len(flights), 1), flyer_of(campaign).most_workers or workers), backend="threading"
     )
-    frames = list(pool(delayed(history)(*flight) for flight in flights))
-    if any(frame is None for frame in frames):
+    histories = list(pool(delayed(history)(*flight) for flight in flights))
+    if any(columns is None for columns in histories):
         return False
-    filled = [frame for frame in frames if len(frame)]
+    filled = [columns for columns in histories if columns["case_id"].size]
     if filled:
-        store.write_histories(pd.concat(filled, ignore_index=True))
+        store.write_histories({name: np.concatenate([columns[name] for columns in filled]) for name in filled[0]})
     return True
 
 
@@ -96,13 +103,16 @@ def _dangerous_cases(store: Store) -> set[int]:
     return set(table.loc[table["status"].isin(_DANGEROUS), "case_id"])
 
 
-def _flown_history(campaign: Campaign, case_id: int, inputs: dict[str, Any], noise: int) -> pd.DataFrame:
+def _flown_history(campaign: Campaign, case_id: int, inputs: dict[str, Any], noise: int) -> Columns:
     _, history = flyer_of(campaign).history(inputs, noise, campaign.retention.rows)
-    return history_frame(case_id, history)
+    return _with_case(case_id, history)
 
 
-def history_frame(case_id: int, history: dict[str, np.ndarray]) -> pd.DataFrame:
+def _with_case(case_id: int, history: Columns) -> Columns:
+    """One history as columns: case_id, t_s and the outputs."""
+    return {"case_id": np.full(len(history["t_s"]), case_id, dtype=np.int64), **history}
+
+
+def history_frame(case_id: int, history: Columns) -> pd.DataFrame:
     """One history as a table: case_id, t_s and the outputs."""
-    frame = pd.DataFrame(history)
-    frame.insert(0, "case_id", np.full(len(frame), case_id, dtype=np.int64))
-    return frame
+    return pd.DataFrame(_with_case(case_id, history))

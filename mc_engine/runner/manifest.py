@@ -145,14 +145,13 @@ def engine_version() -> str:
 def environment() -> dict[str, Any]:
     """Interpreter, platform, processor, packages, and the git state of the engine's own sources."""
     import llvmlite.binding as llvm
-    import numba
 
     return {
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
         "cpu": str(llvm.get_host_cpu_name()),
         "packages": {name: metadata.version(name) for name in PACKAGES},
-        "numba": numba.__version__,
+        "numba": metadata.version("numba"),
         "llvm": ".".join(map(str, llvm.llvm_version_info)),
         "git": git_state(Path(__file__).parent),
         "seed_contract": SEED_CONTRACT,

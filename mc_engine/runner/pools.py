@@ -4,6 +4,8 @@ Workers write the parts themselves; only tasks and results travel between proces
 
     threading   threads: no start-up time and no copies; a crash in model code ends the run
     loky        processes: a crash ends one worker only; limits on time and memory can be set
+    cuda        threads that have the cases of a compiled model flown by NVIDIA cards
+    auto        as cuda where that was measured to be faster, otherwise as threading
     dask        processes of a `distributed` scheduler, which dask-jobqueue starts on SLURM, PBS or LSF
 """
 
@@ -17,7 +19,7 @@ from typing import Any
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.chunks import Task, run_task
 from mc_engine.interruption import unsignalled_children
-from mc_engine.runner.backends import Backend
+from mc_engine.runner.backends import Backend, flyer_on
 from mc_engine.runner.cluster_pool import ClusterWorkerPool
 from mc_engine.runner.worker_process import WorkerSetup, begin_process, run_in_worker
 from mc_engine.runner.workers import Result, WorkerPool, result_of
@@ -33,8 +35,10 @@ def pool_of(
     backend: Backend, store: Store, campaign: Campaign, workers: int, stopped: Callable[[], bool]
 ) -> WorkerPool:
     """The worker pool that `backend` asks for, ready to take tasks.  stopped : whether the run is to end."""
-    if backend.name == "threading":
-        return ThreadWorkerPool(partial(run_task, campaign, store.columns, store.path, stopped=stopped), workers)
+    if backend.name in ("threading", "cuda", "auto"):
+        flyer = flyer_on(backend.name, campaign)
+        run = partial(run_task, campaign, store.columns, store.path, stopped=stopped, flyer=flyer)
+        return ThreadWorkerPool(run, workers)
     setup = WorkerSetup(
         str(store.path.resolve()),
         str(Path(campaign.directory).resolve()),

@@ -18,7 +18,7 @@ from mc_engine.campaign.loading import Campaign, Retention, load_campaign
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
-from mc_engine.runner.backends import Backend
+from mc_engine.runner.backends import Backend, flyer_on
 from mc_engine.runner.flown_campaign import campaign_of, companions_of, refuse_undeclared_data
 from mc_engine.runner.histories import history_frame, inputs_of
 from mc_engine.runner.manifest import columns_of, manifest_of
@@ -77,7 +77,8 @@ def run(
     progress : function of (cases done, cases wanted, cases failed), called after each chunk
     workers : int, threads or processes; all cores by default
     chunk : int, cases that a worker flies at a time
-    backend : Backend, or its name: "threading", "loky" (processes: a crash in model code is isolated), or "dask"
+    backend : Backend, or its name: "threading", "loky" (processes: a crash in model code is isolated), "dask",
+        "cuda" (NVIDIA cards), or "auto"
     shard : Shard, fly only these cases; `mc_engine.runner.runner.merge` joins the shards
 
     Returns the Store, complete.  Its rows do not depend on workers, chunk and backend.  Where the campaign takes inputs
@@ -94,7 +95,7 @@ def run(
         raise StoreError(f"{out}: is a URL; fly into a folder, and give that and the URL to object_store.publish")
     path = Path(out) if out is not None else default_folder(campaign.name)
     session = session_of(progress, workers, chunk, backend)
-    flyer_of(campaign).refuse_faults()
+    flyer_on(session.backend.name, campaign).refuse_faults()
     refuse_undeclared_data(campaign)
     campaign = _after_first(campaign, path, session)
     manifest = manifest_of(campaign)

@@ -7,11 +7,13 @@ import numpy as np
 
 RANDOM_DRAWS = "random draws"  # the group of the noise made in flight and of the parameters that name a draw
 A, B, C = 0, 1, 2  # the independent points of a block
+NOMINAL = 3  # in place of a point: nominal values
 
 
 @dataclass(frozen=True)
 class BlockLayout:
-    """The rows of a block: A; A_B(g) for each group; B; and A_C(g) for the groups in `repeated`.
+    """The rows of a block: A; A_B(g) for each group; B; A_C(g) for the groups in `repeated`; and for those in `held`
+    A with the group at its nominal values.
 
     C is a third point.  A, A_B(g) and A_C(g) are three pairs in place of one for the total index of a repeated group:
     worth it for the random draws, which a whole metric may depend on, so that nothing else steadies its indices.
@@ -19,22 +21,29 @@ class BlockLayout:
 
     groups: tuple[str, ...]
     repeated: tuple[str, ...] = ()
+    held: tuple[str, ...] = ()
 
     @property
     def size(self) -> int:
         """Rows of a block."""
-        return len(self.groups) + 2 + len(self.repeated)
+        return len(self.groups) + 2 + len(self.repeated) + len(self.held)
 
     def points(self, group: str) -> np.ndarray:
-        """int64[size]: the point, A, B or C, that each row takes the group from."""
+        """int64[size]: the point, A, B or C, that each row takes the group from, or NOMINAL."""
         points = np.full(self.size, A)
         points[[self.groups.index(group) + 1, len(self.groups) + 1]] = B
         if group in self.repeated:
             points[self._repetition(group)] = C
+        if group in self.held:
+            points[self.without(group)[1]] = NOMINAL
         return points
 
     def _repetition(self, group: str) -> int:
         return len(self.groups) + 2 + self.repeated.index(group)
+
+    def without(self, group: str) -> tuple[int, int]:
+        """Rows with the group as drawn, and at its nominal values."""
+        return 0, self.size - len(self.held) + self.held.index(group)
 
     def in_common(self, group: str) -> list[tuple[int, int]]:
         """Pairs of rows that have the group alone in common."""

@@ -15,7 +15,7 @@ Clopper & Pearson, Biometrika 26 (1934), 404-413.
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import bdtr, betainc, betaincinv, gammaln
+import scipy  # loads its packages when they are used
 
 
 def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
@@ -33,7 +33,7 @@ def lower_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
     0.999
     """
     check_counts(passed, tried, confidence)
-    return float(betaincinv(passed, tried - passed + 1, 1.0 - confidence)) if passed else 0.0
+    return float(scipy.special.betaincinv(passed, tried - passed + 1, 1.0 - confidence)) if passed else 0.0
 
 
 def upper_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
@@ -51,7 +51,7 @@ def upper_bound(passed: int, tried: int, confidence: float = 0.90) -> float:
     0.937
     """
     check_counts(passed, tried, confidence)
-    return float(betaincinv(passed + 1, tried - passed, confidence)) if passed < tried else 1.0
+    return float(scipy.special.betaincinv(passed + 1, tried - passed, confidence)) if passed < tried else 1.0
 
 
 def clopper_pearson(count: int, tried: int, confidence: float = 0.95) -> tuple[float, float]:
@@ -103,7 +103,7 @@ def pass_chance(tried: int, accepted: int | None, true_share: float) -> float:
     At the wanted share it is the consumer's risk, above it one less the producer's.  accepted None: 0.
     Hanson & Beard, NASA/TP-2010-216447, section 4.
     """
-    return 0.0 if accepted is None else float(bdtr(accepted, tried, 1.0 - true_share))
+    return 0.0 if accepted is None else float(scipy.special.bdtr(accepted, tried, 1.0 - true_share))
 
 
 def smallest_sample(share: float, confidence: float, failures: int = 0) -> int:
@@ -158,7 +158,7 @@ def most_failures(demonstrates: Callable[[int], bool], tried: int) -> int | None
 def _demonstrates(cases: int, share: float, confidence: float, failures: int) -> bool:
     """True if so few failures would be too lucky, had the share of success been just below `share`."""
     # betainc(n - k, k + 1, p) is the binomial chance of at most k failures when each case succeeds with p.
-    return bool(betainc(cases - failures, failures + 1, share) <= 1.0 - confidence)
+    return bool(scipy.special.betainc(cases - failures, failures + 1, share) <= 1.0 - confidence)
 
 
 def half_rate_share(share: float) -> float:
@@ -169,8 +169,8 @@ def half_rate_share(share: float) -> float:
 def hypergeometric_tails(total: int, marked: int, drawn: int, count: int) -> tuple[float, float]:
     """Probabilities of at most, and of at least, `count` marked ones among `drawn` of `total`, of which some are."""
     k = np.arange(max(0, drawn - (total - marked)), min(marked, drawn) + 1)
-    chance = -gammaln(k + 1.0) - gammaln(marked - k + 1.0)
-    chance -= gammaln(drawn - k + 1.0) + gammaln(total - marked - drawn + k + 1.0)
+    chance = -scipy.special.gammaln(k + 1.0) - scipy.special.gammaln(marked - k + 1.0)
+    chance -= scipy.special.gammaln(drawn - k + 1.0) + scipy.special.gammaln(total - marked - drawn + k + 1.0)
     chance = np.exp(chance - chance.max())
     return float(chance[k <= count].sum() / chance.sum()), float(chance[k >= count].sum() / chance.sum())
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtr
+import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.binomial import clopper_pearson, hypergeometric_tails
 from mc_engine.statistics.input_columns import InputColumn, average_ranks, equal_bins, finite_rows, input_columns
@@ -198,7 +198,7 @@ def _separation(ranks: np.ndarray, failed: np.ndarray) -> tuple[float, float]:
     variance = n_failed * n_passed / (n * (n - 1.0)) * float(((ranks - 0.5 * (n + 1)) ** 2).sum())
     if variance == 0.0:
         return 0.0, 1.0
-    return 2.0 * excess / (n_failed * n_passed), float(2.0 * ndtr(-abs(excess) / np.sqrt(variance)))
+    return 2.0 * excess / (n_failed * n_passed), float(2.0 * scipy.special.ndtr(-abs(excess) / np.sqrt(variance)))
 
 
 def _level_test(requirement: str, column: InputColumn, failed: np.ndarray) -> Driver:
@@ -265,7 +265,7 @@ def _pair_tests(columns: Sequence[InputColumn], failed: Mapping[str, np.ndarray]
             z.setdefault((name, scored[m][0]), []).append(np.abs(row))
     for pair, rows in z.items():
         for requirement, largest in zip(failed, np.max(rows, axis=0), strict=True):
-            p_value = float(min(1.0, 2.0 * ndtr(-largest) * len(rows)))
+            p_value = float(min(1.0, 2.0 * scipy.special.ndtr(-largest) * len(rows)))
             yield Driver(requirement, pair, ("", ""), 0.0, p_value, p_value)
 
 

@@ -16,7 +16,7 @@ inputs explain less than `LEAST_EXPLAINED` of the metric's variance in cross-val
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import ConvexHull, cKDTree
+import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.moments import in_units, near_one
 
@@ -174,7 +174,7 @@ def _smoothed(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int, tried: i
     hull = _hull(cloud)
     if hull is None:
         return None
-    tree = cKDTree(cloud)
+    tree = scipy.spatial.cKDTree(cloud)
     neighbours, explained = _chosen_neighbours(tree, cloud, z)
     if explained < LEAST_EXPLAINED:
         x_axis, y_axis = (np.array(ends) for ends in zip(low, high, strict=True))
@@ -198,10 +198,10 @@ def _hull(cloud: np.ndarray) -> np.ndarray | None:
     """Half planes (a, b, c), a x + b y + c <= 0 inside; None for cases on a line."""
     centred = cloud - cloud.mean(axis=0)
     widths = np.sqrt(np.linalg.eigvalsh(centred.T @ centred))
-    return ConvexHull(cloud).equations if widths[0] > 1e-6 * widths[1] else None
+    return scipy.spatial.ConvexHull(cloud).equations if widths[0] > 1e-6 * widths[1] else None
 
 
-def _chosen_neighbours(tree: cKDTree, cloud: np.ndarray, z: np.ndarray) -> tuple[int, float]:
+def _chosen_neighbours(tree: "scipy.spatial.cKDTree", cloud: np.ndarray, z: np.ndarray) -> tuple[int, float]:
     """(number of neighbours, fraction of the variance of z that it predicts), by leaving cases out one at a time.
 
     A smaller number is chosen where it predicts as well.
@@ -224,7 +224,7 @@ def _chosen_neighbours(tree: cKDTree, cloud: np.ndarray, z: np.ndarray) -> tuple
 
 
 def _surface(
-    tree: cKDTree, cloud: np.ndarray, z: np.ndarray, at: np.ndarray, neighbours: int
+    tree: "scipy.spatial.cKDTree", cloud: np.ndarray, z: np.ndarray, at: np.ndarray, neighbours: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Fitted value and its error at each point of `at`; NaN where the neighbours do not support a surface."""
     value, error = np.full(len(at), np.nan), np.full(len(at), np.nan)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from math import ceil, floor
 
 import numpy as np
-from scipy.special import bdtr
+import scipy  # loads its packages when they are used
 
 # Normal 3, 2 and 0 sigma, one-sided: the levels that dispersion analyses are quoted at.
 QUANTILES = (0.00135, 0.02275, 0.5, 0.97725, 0.99865)
@@ -64,7 +64,7 @@ def _first_rank(n: int, probability: float, level: float, strictly: bool) -> int
     low, high = 0, n + 1
     while high - low > 1:
         middle = (low + high) // 2
-        reached = bdtr(middle - 1, n, probability)
+        reached = scipy.special.bdtr(middle - 1, n, probability)
         low, high = (low, middle) if (reached > level if strictly else reached >= level) else (middle, high)
     return high
 

@@ -5,6 +5,9 @@ from B.  A_B(g) and B have group g alone in common, so that their correlation is
 A differ in group g alone, and 1 minus their correlation is its total index.  Random draws made in flight are one group.
 Inputs that are correlated with one another have to be in one group.
 
+A with a group at its nominal values shows by how much the variance falls without the dispersion of that group.  With
+interactions this is not the total index, which is the mean over all values that the group may be held at.
+
 Janon, Klein, Lagnoux, Nodet & Prieur, ESAIM: Probab. Stat. 18 (2014), 342-364, eq. (6) (first order, pooled mean and
 variance) and section 2.3 (its asymptotic variance, by the delta method); Jansen, Comput. Phys. Commun. 117 (1999),
 35-43 (total: half the mean square of the difference, over the variance).
@@ -19,17 +22,20 @@ import numpy as np
 from mc_engine.sampling.block_layout import BlockLayout
 
 FEWEST_BLOCKS = 20
+_ROUNDING = 1e-20  # variance of scaled values that are all the same
 
 
 def layout_of(record: Mapping[str, Any]) -> BlockLayout:
     """The block layout that a companion's manifest records under "sensitivity"."""
-    return BlockLayout(tuple(group["name"] for group in record["groups"]), tuple(record["repeated"]))
+    groups = tuple(group["name"] for group in record["groups"])
+    return BlockLayout(groups, tuple(record["repeated"]), tuple(record.get("held", ())))
 
 
 @dataclass(frozen=True)
 class PickFreeze:
     """Indices float64[n_groups, n_metrics] with their standard errors; NaN for a metric that does not vary.
 
+    fall : the fraction by which the variance falls with the group at its nominal values; NaN unless that was flown.
     n_used : int64[n_metrics], blocks in which every case has a number, of n_tried.
     """
 
@@ -39,6 +45,8 @@ class PickFreeze:
     first_error: np.ndarray
     total: np.ndarray
     total_error: np.ndarray
+    fall: np.ndarray
+    fall_error: np.ndarray
     n_used: np.ndarray
     n_tried: int
 
@@ -51,20 +59,23 @@ def pick_freeze(layout: BlockLayout, case_ids: np.ndarray, metrics: Mapping[str,
     """
     rows = whole_blocks(np.asarray(case_ids, dtype=np.int64), layout.size)
     shape = (len(layout.groups), len(metrics))
-    first, first_error, total, total_error = (np.full(shape, np.nan) for _ in range(4))
+    first, first_error, total, total_error, fall, fall_error = (np.full(shape, np.nan) for _ in range(6))
     n_used = np.zeros(len(metrics), dtype=np.int64)
     for k, values in enumerate(metrics.values()):
         y = np.asarray(values, dtype=np.float64)[rows]
         y = y[np.isfinite(y).all(axis=1)]
         n_used[k] = len(y)
-        scaled = _scaled(y)
+        scaled = _scaled(y, y[:, : layout.size - len(layout.held)])
         if len(y) < FEWEST_BLOCKS or scaled is None:
             continue
         for g, group in enumerate(layout.groups):
             first[g, k], first_error[g, k] = _correlation(scaled, layout.in_common(group))
             left, total_error[g, k] = _correlation(scaled, layout.differing(group))
             total[g, k] = 1.0 - left
-    return PickFreeze(layout.groups, tuple(metrics), first, first_error, total, total_error, n_used, len(rows))
+            if group in layout.held:
+                fall[g, k], fall_error[g, k] = _fall(*scaled[:, layout.without(group)].T)
+    shares = first, first_error, total, total_error, fall, fall_error
+    return PickFreeze(layout.groups, tuple(metrics), *shares, n_used, len(rows))
 
 
 def whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
@@ -75,17 +86,16 @@ def whole_blocks(case_ids: np.ndarray, size: int) -> np.ndarray:
     return order[whole].reshape(-1, size)
 
 
-def _scaled(y: np.ndarray) -> np.ndarray | None:
-    """About zero and of order one, so that squares neither overflow nor lose digits; None without a spread."""
-    if not y.size:
-        return None
-    largest = float(np.abs(y).max())
+def _scaled(y: np.ndarray, drawn: np.ndarray) -> np.ndarray | None:
+    """About zero and of order one, so that squares neither overflow nor lose digits; None without a spread.
+
+    drawn : the rows of which no group is held at its nominal values; their spread counts.
+    """
+    largest = float(np.abs(y).max(initial=0.0))
     if largest == 0.0:
         return None
-    y = y / largest
-    y = y - y.mean()
-    spread = float(y.std())
-    return None if spread < 1e-13 else y / spread
+    mean, spread = float((drawn / largest).mean()), float((drawn / largest).std())
+    return None if spread < 1e-13 else (y / largest - mean) / spread
 
 
 def _correlation(y: np.ndarray, pairs: Sequence[tuple[int, int]]) -> tuple[float, float]:
@@ -99,3 +109,13 @@ def _correlation(y: np.ndarray, pairs: Sequence[tuple[int, int]]) -> tuple[float
     value = (product.mean() - mean * mean) / variance
     influence = product - 2.0 * mean * middle - value * (square - 2.0 * mean * middle)
     return float(value), float(influence.std() / (variance * np.sqrt(len(y))))
+
+
+def _fall(drawn: np.ndarray, held: np.ndarray) -> tuple[float, float]:
+    """1 - var(held) / var(drawn) of values paired by block, float64[n_blocks] each, and its standard error."""
+    squares, left = (drawn - drawn.mean()) ** 2, (held - held.mean()) ** 2
+    if squares.mean() < _ROUNDING:
+        return np.nan, np.nan
+    ratio = left.mean() / squares.mean()
+    influence = (left - ratio * squares) / squares.mean()
+    return float(1.0 - ratio), float(influence.std() / np.sqrt(drawn.size))

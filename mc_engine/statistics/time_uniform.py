@@ -20,7 +20,7 @@ from collections.abc import Callable
 from math import log
 
 import numpy as np
-from scipy.special import betainc, betaincc, betaln
+import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.binomial import check_counts, fewest_cases, most_failures
 
@@ -73,6 +73,6 @@ def _evidence(failures: int, tried: int, rate: float, below: bool) -> float:
     """log e(rate), the weights on failure rates below `rate`, or above it."""
     a, b = failures + _POWER, tried - failures + 1.0
     mass = log(_POWER) - (_POWER * log(rate) if below else np.log1p(-(rate**_POWER)))
-    share = betainc(a, b, rate) if below else betaincc(a, b, rate)
+    share = scipy.special.betainc(a, b, rate) if below else scipy.special.betaincc(a, b, rate)
     log_likelihood = failures * log(rate) + (tried - failures) * np.log1p(-rate)
-    return float(mass + betaln(a, b) + np.log(share) - log_likelihood)
+    return float(mass + scipy.special.betaln(a, b) + np.log(share) - log_likelihood)

@@ -147,8 +147,12 @@ class Receipts:
         """Add a part, in place of parts with any of its cases: one is being replaced, or its withdrawal was lost."""
         if cases_in_name(part.file) != (part.first, part.stop):
             raise ValueError("its file has the name of other cases")
-        before = bisect_right(self.parts, part.first, key=lambda other: other.stop)
-        self.parts[before : bisect_left(self.parts, part.stop, key=lambda other: other.first)] = [part]
+        self.parts[self._with_cases(part.first, part.stop)] = [part]
+
+    def _with_cases(self, first: int, stop: int) -> slice:
+        """Where the parts lie that hold any of the cases first .. stop - 1."""
+        before = bisect_right(self.parts, first, key=lambda part: part.stop)
+        return slice(before, max(before, bisect_left(self.parts, stop, key=lambda part: part.first)))
 
     def committed(self) -> list[Range]:
         """The committed cases, as merged ranges in order."""
@@ -162,7 +166,9 @@ class Receipts:
 
     def missing(self, expected: range) -> list[Range]:
         """The ranges among the expected cases that are not committed."""
-        return gaps(self.committed(), expected)
+        # not all parts: this is asked as each of many parts is committed
+        parts = self.parts[self._with_cases(expected.start, expected.stop)]
+        return gaps(((part.first, part.stop) for part in parts), expected)
 
     def all_parts(self) -> list[Part]:
         """Receipts of all committed files: parts of cases, nominal case, histories."""

@@ -2,26 +2,41 @@
 
 Compiling, or loading the compiled kernel, is timed separately.  The builds take turns at short flights and the shortest
 time of each counts, so that other work on the machine has little influence.
+
+`compare_methods` seeks the integration method that is fastest at the error of the model's own method and step.  Every
+other method is tried, on a fixed grid from long steps to short ones, or from rough tolerances to fine ones, until its
+error is no larger than the model's own.  The error is the largest difference of a metric from a reference flight, in
+any case, as a fraction of that metric's largest magnitude.  The reference is flown by DOP853 to a tolerance of 1e-13.
+Samples of the control stay where they are: a model with `control` is tried with whole numbers of steps between them.
 """
 
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
+from mc_engine.errors import ModelError
 from mc_engine.flight import flight
 from mc_engine.flight.kernel import usual_width
-from mc_engine.model.fields import AdaptiveStep
+from mc_engine.model.fields import AdaptiveStep, FixedStep, uses_rates
 from mc_engine.model.record import Model, compiled_model
+from mc_engine.model.rules import METHODS
 
 _MOST_CASES = 256
 _SHORT = 0.15  # s, about, of a flight one case at a time; a longer one is only disturbed more often
 _TRIAL = 16  # cases
 _SLOWEST = 12  # times that a case takes longer alone, at most: to guess from a flight in lanes
+
+_TIGHT = 1e-13
+_TOLERANCES = tuple(10.0 ** (-k / 4) for k in range(16, 53))
+_LONGER, _SHORTER = 28, 8  # steps are tried up to 2**7 times longer and 2**2 times shorter, in quarters of an octave
+_ROUNDING = 1e-14  # no error of a metric is told apart from zero below
+
+Clock = FixedStep | AdaptiveStep
 
 
 @dataclass(frozen=True)
@@ -109,3 +124,131 @@ def measure(cases: Flight, widths: Iterable[int], repeats: int = 60) -> Timing:
             if np.isfinite(ns):
                 timing.ns[width] = min(timing.ns.get(width, np.inf), ns)
     return timing
+
+
+@dataclass(frozen=True)
+class MethodTiming:
+    """A method at the error of the model's own.  case_s : shortest time of a case [s]"""
+
+    clock: Clock
+    error: float
+    case_s: float
+
+    @property
+    def setting(self) -> str:
+        """Its step or tolerance."""
+        if isinstance(self.clock, FixedStep):
+            steps = round(float(self.clock.until) / float(self.clock.step))
+            return f"{steps:,} steps of {self.clock.step:.4g} s"
+        return f"tolerance {self.clock.rtol:.1e}"
+
+
+def compare_methods(campaign: Campaign, n_cases: int | None, repeats: int) -> list[MethodTiming]:
+    """The methods that reach the error of the model's own, which is the first; the others from fast to slow.
+
+    n_cases, repeats : of the flights that are timed, see `campaign_flight` and `measure`.
+    Raises ModelError if the model chooses its steps itself.
+    """
+    few = campaign_flight(campaign, _TRIAL)
+    if not isinstance(few.model.clock, FixedStep):
+        raise ModelError("methods are compared for models on a fixed grid, FixedStep; this one chooses its steps")
+    trials = _Trials(few)
+    known: list[tuple[Clock, float]] = [(trials.own, trials.error(trials.own))]
+    if not np.isfinite(known[0][1]):
+        raise ModelError("methods are not compared: by the model's own, cases end otherwise than by small steps")
+    for clocks in trials.ladders():
+        found = _first_within(trials, clocks, max(known[0][1], _ROUNDING))
+        known += [found] if found else []
+    timed = campaign_flight(campaign, n_cases)
+    times = _shortest(timed, [clock for clock, _ in known], repeats)
+    own, *others = [MethodTiming(clock, error, seconds) for (clock, error), seconds in zip(known, times, strict=True)]
+    return [own, *sorted(others, key=lambda timing: timing.case_s)]
+
+
+def _first_within(trials: "_Trials", clocks: Iterator[Clock], most: float) -> tuple[Clock, float] | None:
+    """The roughest clock whose error is within `most`, and so is that of the next finer one: not by chance."""
+    before = None
+    for clock in clocks:
+        error = trials.error(clock)
+        if error > most:
+            before = None
+        elif before is not None:
+            return before
+        else:
+            before = clock, error
+    return before
+
+
+def _shortest(timed: Flight, clocks: list[Clock], repeats: int) -> list[float]:
+    width = usual_width(timed.model)
+    callers = [caller(replace(timed, model=replace(timed.model, clock=clock)), width) for clock in clocks]
+    best = [np.inf] * len(callers)
+    for _ in range(repeats + 1):
+        best = [min(shortest, call()[0]) for shortest, call in zip(best, callers, strict=True)]
+    return best
+
+
+class _Trials:
+    """Flights of a few cases by other clocks, and their errors."""
+
+    def __init__(self, cases: Flight):
+        self.cases, clock = cases, cases.model.clock
+        assert isinstance(clock, FixedStep)
+        flown = cases.model, cases.inputs, self._ids, cases.seed
+        codes = flight.bound_flight(*flown, folder=cases.folder, width=usual_width(cases.model))[2]
+        self.n_steps, step, every = flight.grid_of(clock, flight.settings_of(cases.model, codes))
+        self.until = self.n_steps * step
+        self.every = every if cases.model.control is not None else 0  # steps from sample to sample; 0: no samples
+        self.own = replace(clock, step=step, until=self.until, control_every=every)
+        self._models = {self.own.method: cases.model}
+        own = self._flown(self.own)
+        sizes = [np.nanmax(abs(own[f"end_{state.name}"] * state.si_factor)) for state in cases.model.states]
+        self._scales = np.array([size if np.isfinite(size) and size > 0.0 else 1.0 for size in sizes])
+        self._true = self._flown(self._adaptive("dop853", _TIGHT))
+
+    @property
+    def _ids(self) -> np.ndarray:
+        return np.arange(self.cases.n_cases)
+
+    def ladders(self) -> Iterator[Iterator[Clock]]:
+        """Of every other method its clocks, from rough to fine."""
+        for method in METHODS["FixedStep"]:
+            own = replace(self.own, method=method)
+            if method != self.own.method and (self.own.rates or not uses_rates(own)):
+                yield (replace(own, step=step, control_every=every) for step, every in self._grids())
+        for method in METHODS["AdaptiveStep"]:
+            yield (self._adaptive(method, tolerance) for tolerance in _TOLERANCES)
+
+    def _grids(self) -> Iterator[tuple[float, int]]:
+        """(step [s], steps from sample to sample) from long steps to short ones, which divide the flight or period."""
+        parts = self.every or self.n_steps
+        whole = self.until * parts / self.n_steps
+        quarters = range(-_LONGER, _SHORTER + 1)
+        for n in sorted({max(1, round(parts * 2.0 ** (quarter / 4))) for quarter in quarters}):
+            yield whole / n, n if self.every else 1
+
+    def _adaptive(self, method: str, tolerance: float) -> AdaptiveStep:
+        """A clock that samples where the model's own does; absolute tolerances by the size of the states in the end."""
+        period = self.until * self.every / self.n_steps if self.every else np.inf
+        scales = tuple(float(tolerance * scale) for scale in self._scales)
+        return AdaptiveStep(self.until, tolerance, scales, period, method)
+
+    def _flown(self, clock: Clock) -> dict[str, np.ndarray]:
+        kind = clock.method if isinstance(clock, FixedStep) else "adaptive"
+        model = self._models.setdefault(kind, replace(self.cases.model, clock=clock))
+        cases = self.cases
+        return flight.fly(model, cases.inputs, self._ids, cases.seed, folder=cases.folder, clock=clock)
+
+    def error(self, clock: Clock) -> float:
+        """Largest relative difference of a metric from the reference; infinite where another case fails."""
+        flown = self._flown(clock)
+        if list(flown["status"]) != list(self._true["status"]):
+            return np.inf
+        worst = 0.0
+        for metric in self.cases.model.metrics:
+            value, true = flown[metric.name], self._true[metric.name]
+            if (np.isnan(value) != np.isnan(true)).any():
+                return np.inf
+            size = np.nanmax(abs(true), initial=0.0) or 1.0
+            worst = max(worst, float(np.nanmax(abs(value - true), initial=0.0) / size))
+        return worst

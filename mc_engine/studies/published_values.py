@@ -15,8 +15,8 @@ import numpy as np
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.durable_file import write_durably
 from mc_engine.errors import ModelError
-from mc_engine.flight.chosen_cases import chosen_cases
 from mc_engine.flight.chunks import fly_cases
+from mc_engine.flight.flight import chosen_cases
 from mc_engine.model.record import Model
 from mc_engine.studies.published import Record, Value, lock_file, read_published
 

@@ -43,11 +43,13 @@ def _effect_figure(flown: Flown, contributions: Contributions, shown: list[str])
 
 
 def _effect_table(flown: Flown, contributions: Contributions, shown: list[str]) -> Table:
+    held = contributions.held
     columns = (
         Column("Metric", "text", grouped=True),
         Column("Contributor", "text"),
         Column("First-order effect", "number"),
         Column("Total effect", "number"),
+        *((Column("Variance reduction at nominal", "number"),) if held else ()),
         Column("1σ contribution", "number"),
         *(Column(title, "number") for title in (_TRENDS.values() if contributions.trends else ())),
     )
@@ -58,6 +60,7 @@ def _effect_table(flown: Flown, contributions: Contributions, shown: list[str]) 
             cells = [
                 _cell(contributor.first, contributor.first_interval),
                 _cell(contributor.total, contributor.total_interval),
+                *([_cell(contributor.fall, contributor.fall_interval)] if held else []),
             ]
             cells.append(_sigma_cell(flown, metric, contributor))
             cells += _trends(contributions.trends, contributor.input, k) if contributions.trends else []
@@ -109,12 +112,15 @@ def _finite(value: float) -> float | None:
 def _note(flown: Flown, contributions: Contributions) -> str:
     each = f"In brackets: {percent(flown.stated.confidence)} confidence interval."
     if contributions.trends is None:
+        reduction = (
+            " This reduction is flown for parameters that name a random draw; noise made in flight stays as drawn."
+        )
         return (
             f"From {count(contributions.flights)} cases in {count(contributions.n_tried)} blocks, flown for this "
             f"purpose and in no other statistic. {each} Pick-freeze estimates (Janon 2014, Jansen 1999). A total "
             "effect is the variance that remains, on average, when all other inputs are known; where inputs interact, "
             "the variance falls by another amount if the input is held at its nominal value."
-        )
+        ) + (reduction if contributions.held else "")
     note = (
         "Estimated from the table of cases. Unexplained: fraction that the surrogate model behind the total effects "
         "attributes to no input (random draws in flight, discontinuities); a total effect may be larger by up to it. "

@@ -6,8 +6,8 @@ import numpy as np
 
 from reports.document.blocks import Cell, Column, Table
 from reports.drawing import lettering
+from reports.drawing.lettering import TYPE
 
-TYPE = 7.5
 ROOM = 490.0  # points that a table has
 INSET = 7.0  # of a column, both sides together
 JUMPS = (4.0, 8.0, 16.0, 32.0, 64.0, 128.0)  # points that a column may get at a time

@@ -94,6 +94,12 @@ GLOSSARY = Terms(
             "interactions with others, which remains when everything else is known.",
         ),
         (
+            "variance reduction at nominal",
+            "Fraction by which a metric’s variance falls if the contributor has its nominal value in all cases; noise "
+            "made in flight stays as drawn. Where "
+            "inputs interact, it is not the total effect, which is an average over all values of the contributor.",
+        ),
+        (
             "random draws",
             "Noise made in flight, and inputs that only name a draw, such as the number of a day’s weather.",
         ),

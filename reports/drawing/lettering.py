@@ -1,8 +1,12 @@
-"""Widths and line breaks of text in DejaVu Sans, estimated before the typesetter sets it."""
+"""Widths and line breaks of text in DejaVu Sans, estimated before the typesetter sets it.  All lengths are points."""
 
 import re
+from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import escape
 
+from reports.drawing.palette import INK
+
+TYPE, LINE = 7.5, 9.4  # size, and distance of lines
 # Advance widths of DejaVu Sans 2.37 in hundredths of the type size, from the space to the tilde.
 _WIDTHS = dict(zip(map(chr, range(32, 127)), (
     32, 40, 46, 84, 64, 95, 78, 27, 39, 39, 50, 84, 32, 36, 32, 34, 64, 64, 64, 64, 64, 64, 64, 64, 64, 64, 34, 34, 84,
@@ -10,25 +14,32 @@ _WIDTHS = dict(zip(map(chr, range(32, 127)), (
     69, 39, 34, 39, 84, 50, 50, 61, 63, 55, 63, 62, 35, 63, 63, 28, 28, 58, 28, 97, 63, 61, 63, 63, 41, 52, 39, 63, 59,
     82, 59, 59, 52, 64, 34, 64, 84,
 ), strict=True)) | dict.fromkeys("−×≤≥ω", 84) | dict.fromkeys("⁰¹²³⁴⁵⁶⁷⁸⁹⁻·’", 40) | {"\u202f": 20}  # fmt: skip
-INK = "#1b1f23"
 _OTHER = 66
 _BOLD = 1.1
+_QUOTE = {'"': "&quot;"}  # so that no text looks like a colour in an attribute
 _NO_XML = re.compile(r"[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def width(text: str, size: float, bold: bool = False) -> float:
-    """Width of one line in points."""
+def width(text: str, size: float = TYPE, bold: bool = False) -> float:
+    """Width of one line."""
     return sum(_WIDTHS.get(sign, _OTHER) for sign in text) * size / 100.0 * (_BOLD if bold else 1.0)
 
 
-def wrapped(text: str, room: float, size: float, most: int = 9) -> list[str]:
-    """Lines not wider than `room` points, but for single words; what goes beyond `most` lines is left on the last."""
+def widest(lines: Sequence[str]) -> float:
+    """Width of the widest of these lines."""
+    return max(map(width, lines), default=0.0)
+
+
+def wrapped(text: str, room: float, most: int = 9) -> list[str]:
+    """Lines not wider than `room`, but for single words; what goes beyond `most` lines is left on the last."""
+    if not text:
+        return []
     lines: list[str] = []
     for paragraph in text.split("\n"):
         line = ""
         for word in paragraph.split(" "):
             longer = f"{line} {word}" if line else word
-            if line and width(longer, size) > room and len(lines) < most - 1:
+            if line and width(longer) > room and len(lines) < most - 1:
                 lines.append(line)
                 line = word
             else:
@@ -44,4 +55,10 @@ def text(
     place = f'transform="translate({x:.1f} {y:.1f}) rotate(-90)"' if turned else f'x="{x:.1f}" y="{y:.1f}"'
     style = f' text-anchor="{anchor}"' * (anchor != "start")
     style += ' font-weight="bold"' * bold
-    return f'<text {place} fill="{fill}"{style}>{escape(_NO_XML.sub(" ", words))}</text>'
+    return f'<text {place} fill="{fill}"{style}>{escape(_NO_XML.sub(" ", words), _QUOTE)}</text>'
+
+
+def lines(x: float, y: float, texts: Sequence[str], *, anchor: str = "start", turned: bool = False) -> Iterator[str]:
+    """Lines below one another, the baseline of the first at y; turned ones to the right of one another, from x."""
+    for k, words in enumerate(texts):
+        yield text(x + LINE * k * turned, y + LINE * k * (not turned), words, anchor=anchor, turned=turned)

@@ -4,7 +4,7 @@ A drawing says once what is to be seen, in the units of its axes; sizes and widt
 scales them.  Colours with an @ are the page's own.  A mark's `key` is its text in the figure's key, said once.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -12,24 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from reports.drawing.palette import KEY_MARK, PAPER, field_colour
+from reports.drawing.palette import PAPER, field_colour
 from reports.text.numbers import number
 
 MARGIN = 0.04  # of an axis, beyond the marks on it
+FIELD_EDGE = "rgba(255,255,255,0.55)"  # between the regions of a field
 MOST_TOLD = 8  # texts of a mark that are told to those who do not see it
-
-
-@dataclass(frozen=True)
-class Key:
-    """One entry of a figure's key.  mark: "line", "dash", "dot", "band", "bar", "field", "point" or "ring".
-
-    sign : the shape of a point, as of `Points`.
-    """
-
-    mark: str
-    colour: str
-    text: str
-    sign: str = "circle"
 
 
 @dataclass(frozen=True)
@@ -132,20 +120,25 @@ class Field:
     key: str = ""
 
     @property
-    def layers(self) -> list[tuple[float, float, np.ndarray]]:
-        """(lower level, upper level, outlines float64[n, 2] separated by NaN) of the region between each two levels."""
+    def colours(self) -> list[str]:
+        """The colour between each two levels."""
+        n = self.levels.size - 1
+        return [field_colour((k + 0.5) / n) for k in range(n)]
+
+    @property
+    def bands(self) -> Iterator[Band]:
+        """The region between each two levels, its range as its name."""
         import contourpy
 
         generator: Any = contourpy.contour_generator(
             self.x, self.y, np.ma.masked_invalid(self.z), fill_type=contourpy.FillType.OuterOffset
         )
-        layers = []
-        for low, high in pairwise(self.levels.tolist()):
+        for (low, high), colour in zip(pairwise(self.levels.tolist()), self.colours, strict=True):
             points, offsets = generator.filled(low, high)
             rings = [p[a:b] for p, o in zip(points, offsets, strict=True) for a, b in pairwise(o)]
             if rings:
-                layers.append((low, high, joined(rings)))
-        return layers
+                x, y = joined(rings).T
+                yield Band(x, y, colour, 1.0, f"{self.label}: {number(low)} to {number(high)}", FIELD_EDGE)
 
 
 @dataclass(frozen=True)
@@ -292,16 +285,15 @@ class Drawing:
     places: Mapping[str, tuple[str, np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     @cached_property
-    def key(self) -> tuple[Key, ...]:
-        """What the marks mean, each said once, in the order of the panels."""
-        entries = {mark.key: mark for plot in self.plots for mark in plot.marks if mark.key}
-        return tuple(_entry(mark) for mark in entries.values())
+    def key(self) -> tuple[Mark, ...]:
+        """A mark of each meaning, in the order of the panels."""
+        return tuple({mark.key: mark for plot in self.plots for mark in plot.marks if mark.key}.values())
 
     @property
     def alternative(self) -> str:
         """The figure in words, for those who do not see it."""
         panels = "; ".join(plot.words for plot in self.plots)
-        key = "".join(f"; {entry.text}" for entry in self.key if entry.text not in panels)
+        key = "".join(f"; {mark.key}" for mark in self.key if mark.key not in panels)
         return f"{self.form}. {self.words or panels + key}."
 
     @property
@@ -309,17 +301,6 @@ class Drawing:
         """Numbers of the cases that are drawn as points."""
         marks = [mark for plot in self.plots for mark in plot.marks]
         return [mark.cases for mark in marks if isinstance(mark, Points) and mark.cases is not None]
-
-
-def _entry(mark: Mark) -> Key:
-    """A mark's entry in the key."""
-    if isinstance(mark, Points):
-        return Key("ring" if mark.sign == "ring" else "point", mark.colour, mark.key, mark.sign)
-    if isinstance(mark, Line | Limit):
-        return Key(KEY_MARK[mark.dash] if mark.width < 5.0 else "bar", mark.colour, mark.key)
-    if isinstance(mark, Field) or not isinstance(mark.colour, str):
-        return Key("field", field_colour(0.5), mark.key)
-    return Key("bar" if mark.opacity > 0.4 else "band", mark.colour, mark.key)
 
 
 def between(

@@ -12,14 +12,22 @@ ON_PAPER = {INK: "#1b1f23", MUTED: "#6c757d", GRID: "#dfe3e6", PAPER: "#ffffff"}
 
 LINES = (ORANGE, PURPLE, GREEN, SKY, BLUE, VERMILION)  # of cases; the last ones also stand for medians and limits
 DASHES = ("solid", "dash", "dot")
-KEY_MARK = {"solid": "line", "dash": "dash", "dot": "dot"}  # of a line in a figure's key, by its dash
 CIVIDIS = ("#00224e", "#003170", "#2a3f6d", "#434e6c", "#575d6d", "#6a6c71", "#7d7c78", "#918b78", "#a59c74",
            "#bcae6c", "#d2c060", "#e9d34e", "#fee838")  # fmt: skip
 
 
-def on_paper(colour: str) -> str:
-    """The colour as printed."""
-    return ON_PAPER.get(colour, colour)
+def on_paper(svg: str) -> str:
+    """The page colours in the attributes of an SVG as printed; no text has a quotation mark of its own."""
+    for colour, printed in ON_PAPER.items():
+        svg = svg.replace(f'"{colour}"', f'"{printed}"')
+    return svg
+
+
+def on_screen(svg: str) -> str:
+    """The same as variables of a page's style sheet."""
+    for colour in ON_PAPER:
+        svg = svg.replace(f'"{colour}"', f'"var(--{colour[1:]})"')
+    return svg
 
 
 def field_colour(part: float) -> str:

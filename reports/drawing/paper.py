@@ -10,19 +10,18 @@ from itertools import pairwise
 import numpy as np
 
 from reports.drawing import lettering
-from reports.drawing.marks import Axis, Drawing, Field, Key, Plot
-from reports.drawing.palette import GRID, field_colour, on_paper
-from reports.drawing.strokes import DASHES, Frame, signs, stroked
+from reports.drawing.lettering import LINE, TYPE
+from reports.drawing.marks import Axis, Drawing, Field, Mark, Plot
+from reports.drawing.palette import GRID, MUTED, on_paper, on_screen
+from reports.drawing.strokes import SWATCH, Frame, part_of_axis, stroked, swatch
 from reports.drawing.ticks import log_numerals, log_ticks, nice_ticks, numerals
 
 WIDTH = 493.2  # 174 mm, the text width of the page
-TYPE, LINE = 7.5, 9.4  # size and distance of lines
 SHORT = 0.46  # points of height on paper for a pixel on the screen
 GAP = 14.0  # between panels
-SWATCH = 17.0
+UPRIGHT, BETWEEN = 1.8 * TYPE, 5.0  # distance of tick labels of an upright axis; gap between those of another
+KEY_GAP = 12.0  # between entries of a key
 BAR = 9.0  # width of a colour scale
-FILLED = {"bar": 0.6, "field": 0.6, "band": 0.3}
-AXIS = "#555b61"
 Ends = tuple[float, float]
 
 
@@ -42,7 +41,7 @@ def strips(drawing: Drawing, width: float = WIDTH) -> list[str]:
 
 
 def _picture(body: list[str], top: float, bottom: float, width: float) -> str:
-    return (
+    return on_paper(
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 {top:.1f} {width:.1f} {bottom - top:.1f}" '
         f'width="{width:.1f}pt" height="{bottom - top:.1f}pt" font-family="DejaVu Sans, sans-serif" font-size="{TYPE}" '
         f'fill="none">{"".join(body)}</svg>'
@@ -73,33 +72,26 @@ def rows_of(plots: tuple[Plot, ...], across: int) -> list[tuple[Plot, ...]]:
     return [plots[a:b] for a, b in pairwise(bounds)]
 
 
-def _key(key: tuple[Key, ...], whole: float) -> tuple[list[str], float]:
+def _key(key: tuple[Mark, ...], whole: float) -> tuple[list[str], float]:
     """SVG elements of the key, and the y of its lower edge."""
-    elements, x, y = [], 0.0, LINE
-    for entry in key:
-        lines = lettering.wrapped(entry.text, whole - SWATCH - 4.0, TYPE)
-        long = max(lettering.width(line, TYPE) for line in lines)
-        if x and x + SWATCH + long > whole:
+    elements: list[str] = []
+    x, y, inset = 0.0, LINE, SWATCH[0] + 4.0
+    for mark in key:
+        lines = lettering.wrapped(mark.key, whole - inset - 4.0)
+        long = lettering.widest(lines)
+        if x and x + inset + long > whole:
             x, y = 0.0, y + LINE + 1.0
-        elements += [
-            *_swatch(entry, x, y - 2.6),
-            *(lettering.text(x + SWATCH, y + LINE * k, line) for k, line in enumerate(lines)),
-        ]
+        elements += [*swatch(mark, x, y - 2.6), *lettering.lines(x + inset, y, lines)]
         y += LINE * (len(lines) - 1)
-        x += SWATCH + long + 12.0
+        x += inset + long + KEY_GAP
     return elements, y + 7.0 if key else 0.0
 
 
-def _swatch(entry: Key, x: float, y: float) -> Iterator[str]:
-    colour = on_paper(entry.colour)
-    if entry.mark in FILLED:
-        yield f'<path d="M{x:.1f} {y - 3:.1f}h13v6h-13z" fill="{colour}" fill-opacity="{FILLED[entry.mark]}"/>'
-    elif entry.mark in ("point", "ring"):
-        sign = "ring" if entry.mark == "ring" else entry.sign
-        yield from signs([(round(x + 6.5, 1), round(y, 1))], sign, 2.6 if sign == "circle" else 5.0, colour)
-    else:
-        dash = DASHES[{"line": "solid"}.get(entry.mark, entry.mark)]
-        yield f'<path d="M{x:.1f} {y:.1f}h13" stroke="{colour}" stroke-width="1.2"{dash}/>'
+def page_swatch(mark: Mark) -> str:
+    """The mark's sample in the key of a figure on the screen, as SVG in colours of the page."""
+    width, height = SWATCH
+    sample = on_screen("".join(swatch(mark, 0.0, 0.5 * height)))
+    return f'<svg viewBox="0 0 {width:g} {height:g}" fill="none">{sample}</svg>'
 
 
 @dataclass(frozen=True)
@@ -111,7 +103,7 @@ class _Ticks:
 
     @property
     def widest(self) -> float:
-        return max((lettering.width(line, TYPE) for text in self.texts for line in text), default=0.0)
+        return max(map(lettering.widest, self.texts), default=0.0)
 
     @property
     def lines(self) -> int:
@@ -125,18 +117,28 @@ def _ticks(axis: Axis, ends: tuple[float, float], room: float, upright: bool) ->
         own = [(place, text) for place, text in axis.ticks if low <= place <= high]
         slot = room / max(len(own), 1) - 4.0
         wrap = 0.34 * WIDTH if upright else slot
-        texts = [lettering.wrapped(text, wrap, TYPE, 4) for _, text in own]
+        texts = [lettering.wrapped(text, wrap, 4) for _, text in own]
         wrapped = _Ticks([place for place, _ in own], texts)
         if upright or wrapped.widest <= slot:
             return wrapped
-        return _Ticks(wrapped.places, [lettering.wrapped(text, 90.0, TYPE, 2) for _, text in own], turned=True)
-    for most in range(axis.most, 0, -1):
-        places = log_ticks(*ends, most) if axis.log else nice_ticks(*ends, most, axis.whole)
-        words, power = (log_numerals(places), "") if axis.log else numerals(places)
-        needed = sum(2.2 * TYPE if upright else lettering.width(text, TYPE) + 9.0 for text in words)
-        if needed <= room or most == 1:
+        return _Ticks(wrapped.places, [lettering.wrapped(text, 90.0, 2) for _, text in own], turned=True)
+    for places in _choices(axis, ends):
+        decades = axis.log and places[-1] >= 10.0 * places[0]
+        words, power = (log_numerals(places), "") if decades else numerals(places)
+        apart = np.abs(np.diff(part_of_axis(np.array(places), ends, axis.log))) * room
+        sizes = [UPRIGHT if upright else lettering.width(text) + BETWEEN for text in words]
+        if all(distance >= 0.5 * (a + b) for distance, (a, b) in zip(apart, pairwise(sizes), strict=True)):
             break
     return _Ticks(places, [[text] for text in words], power)
+
+
+def _choices(axis: Axis, ends: Ends) -> Iterator[list[float]]:
+    """Tick values from many to few: one alone says nothing of a scale, so the last choice is the outermost two."""
+    log = axis.log and len(log_ticks(*ends, axis.most)) > 1  # a narrow range may hold no 1, 2 or 5 of a decade
+    many = [log_ticks(*ends, most) if log else nice_ticks(*ends, most, axis.whole)
+            for most in range(axis.most, 1, -1)]  # fmt: skip
+    yield from (places for places in many if len(places) > 1)
+    yield many[0][:: max(len(many[0]) - 1, 1)]
 
 
 class _Box:
@@ -147,21 +149,18 @@ class _Box:
         height = SHORT * plot.height
         x_ends, y_ends = plot.ends
         self.y_ticks = _ticks(plot.y, y_ends, height, True)
-        self.y_label = lettering.wrapped(plot.y.label, height + 12.0, TYPE, 2) if plot.y.label else []
-        scale = _Scale(plot.field, height) if plot.field else None
-        self.scale = scale
+        self.y_label = lettering.wrapped(plot.y.label, height + 12.0, 2)
+        self.scale = _Scale(plot.field, height) if plot.field else None
         self.frame_left = left + self.y_ticks.widest + 5.0 + LINE * len(self.y_label)
-        self.frame_right = self.right - (scale.width if scale else 5.0)
+        self.frame_right = self.right - (self.scale.width if self.scale else 5.0)
         room = self.frame_right - self.frame_left
-        self.x_ticks = _ticks(plot.x, x_ends, room, False)
-        self.title = lettering.wrapped(plot.title, width - 4.0, TYPE, 3) if plot.title else []
-        self.x_label = lettering.wrapped(plot.x.label, room - 2.0 * lettering.width(self.x_ticks.power, TYPE), TYPE, 2)
-        self.ends = _equal(x_ends, y_ends, room, height) if plot.equal else (x_ends, y_ends)
+        self.ends = x_ends, y_ends
         if plot.equal:
-            self.x_ticks, self.y_ticks = (
-                _ticks(plot.x, self.ends[0], room, False),
-                _ticks(plot.y, self.ends[1], height, True),
-            )
+            self.ends = _equal(x_ends, y_ends, room, height)
+            self.y_ticks = _ticks(plot.y, self.ends[1], height, True)
+        self.x_ticks = _ticks(plot.x, self.ends[0], room, False)
+        self.title = lettering.wrapped(plot.title, width - 4.0, 3)
+        self.x_label = lettering.wrapped(plot.x.label, room - 2.0 * lettering.width(self.x_ticks.power), 2)
 
     @property
     def tick_room(self) -> float:
@@ -203,41 +202,37 @@ class _Box:
             for y in frame.y(np.array(self.y_ticks.places))
             if self.plot.y.grid
         ]
-        yield f'<path d="{"".join(lines)}" stroke="{on_paper(GRID)}" stroke-width=".5"/>' if lines else ""
+        yield f'<path d="{"".join(lines)}" stroke="{GRID}" stroke-width=".5"/>' if lines else ""
 
     def _axes(self, frame: Frame) -> Iterator[str]:
         corner = f"M{frame.left:.2f} {frame.top:.2f}V{frame.bottom:.2f}H{frame.right:.2f}"
-        yield f'<path d="{corner}" stroke="{AXIS}" stroke-width=".6"/>'
+        yield f'<path d="{corner}" stroke="{MUTED}" stroke-width=".6"/>'
         for place, lines in zip(frame.y(np.array(self.y_ticks.places)), self.y_ticks.texts, strict=True):
-            for k, line in enumerate(lines):
-                y = place + 2.7 + LINE * (k - 0.5 * (len(lines) - 1))
-                yield lettering.text(frame.left - 3.0, y, line, anchor="end")
+            y = place + 2.7 - 0.5 * LINE * (len(lines) - 1)
+            yield from lettering.lines(frame.left - 3.0, y, lines, anchor="end")
         yield from self._x_ticks(frame)
         if self.y_ticks.power:
             yield lettering.text(frame.left + 1.0, frame.top - 2.0, self.y_ticks.power)
         middle = 0.5 * (frame.top + frame.bottom)
-        for k, line in enumerate(self.y_label):
-            yield lettering.text(self.left + 7.0 + LINE * k, middle, line, anchor="middle", turned=True)
+        yield from lettering.lines(self.left + 7.0, middle, self.y_label, anchor="middle", turned=True)
         below = frame.bottom + self.tick_room
-        power_width = lettering.width(self.x_ticks.power, TYPE) + 3.0 if self.x_ticks.power else 0.0
-        for k, line in enumerate(self.x_label):
-            farthest = frame.right - power_width - 0.5 * lettering.width(line, TYPE)
-            x = min(0.5 * (frame.left + frame.right), farthest)
-            yield lettering.text(x, below + LINE * (k + 1) - 2.4, line, anchor="middle")
+        power_width = lettering.width(self.x_ticks.power) + 3.0 if self.x_ticks.power else 0.0
+        farthest = frame.right - power_width - 0.5 * lettering.widest(self.x_label)
+        x = min(0.5 * (frame.left + frame.right), farthest)
+        yield from lettering.lines(x, below + LINE - 2.4, self.x_label, anchor="middle")
         if self.x_ticks.power:
             yield lettering.text(frame.right, below + LINE - 2.4, self.x_ticks.power, anchor="end")
 
     def _x_ticks(self, frame: Frame) -> Iterator[str]:
         ticks = self.x_ticks
         for place, lines in zip(frame.x(np.array(ticks.places)), ticks.texts, strict=True):
-            for k, line in enumerate(lines):
-                if ticks.turned:
-                    x = place + 2.7 + LINE * (k - 0.5 * (len(lines) - 1))
-                    yield lettering.text(x, frame.bottom + 4.0, line, anchor="end", turned=True)
-                    continue
-                half = 0.5 * lettering.width(line, TYPE)
-                x, y = min(max(place, self.left + half), self.right - half), frame.bottom + LINE * (k + 1)
-                yield lettering.text(x, y, line, anchor="middle")
+            if ticks.turned:
+                x = place + 2.7 - 0.5 * LINE * (len(lines) - 1)
+                yield from lettering.lines(x, frame.bottom + 4.0, lines, anchor="end", turned=True)
+            else:
+                half = 0.5 * lettering.widest(lines)
+                x = min(max(place, self.left + half), self.right - half)
+                yield from lettering.lines(x, frame.bottom + LINE, lines, anchor="middle")
 
 
 class _Scale:
@@ -247,23 +242,20 @@ class _Scale:
         self.field = field
         ends = float(field.levels[0]), float(field.levels[-1])
         self.ticks = _ticks(Axis(most=8), ends, height, True)
-        self.label = lettering.wrapped(field.label, height, TYPE, 2)
+        self.label = lettering.wrapped(field.label, height, 2)
         self.width = 10.0 + BAR + 4.0 + self.ticks.widest + LINE * len(self.label) + 3.0
 
     def drawn(self, frame: Frame) -> Iterator[str]:
         left, levels = frame.right + 10.0, self.field.levels
         own = Frame(left, frame.top, left + BAR, frame.bottom, (0.0, 1.0), (float(levels[0]), float(levels[-1])))
-        edges = own.y(levels).tolist()
-        for k, (low, high) in enumerate(pairwise(edges)):
-            colour = field_colour((k + 0.5) / (len(edges) - 1))
+        for (low, high), colour in zip(pairwise(own.y(levels).tolist()), self.field.colours, strict=True):
             yield f'<path d="M{left:.1f} {low:.2f}h{BAR}V{high:.2f}h-{BAR}z" fill="{colour}"/>'
         for place, (text,) in zip(own.y(np.array(self.ticks.places)).tolist(), self.ticks.texts, strict=True):
             yield lettering.text(left + BAR + 3.0, place + 2.7, text)
         if self.ticks.power:
             yield lettering.text(left, frame.top - 3.0, self.ticks.power)
-        for k, line in enumerate(self.label):
-            x = left + BAR + 3.0 + self.ticks.widest + LINE * (k + 1)
-            yield lettering.text(x, 0.5 * (frame.top + frame.bottom), line, anchor="middle", turned=True)
+        x, y = left + BAR + 3.0 + self.ticks.widest + LINE, 0.5 * (frame.top + frame.bottom)
+        yield from lettering.lines(x, y, self.label, anchor="middle", turned=True)
 
 
 def _equal(x: Ends, y: Ends, width: float, height: float) -> tuple[Ends, Ends]:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from reports.drawing.marks import Axis, Band, Bar, Drawing, Field, Limit, Line, Plot, Points
-from reports.drawing.palette import GRID, INK, MUTED, PAPER, field_colour
+from reports.drawing.palette import GRID, INK, MUTED, PAPER
 from reports.drawing.ticks import log_ticks
 from reports.text.numbers import number
 
@@ -41,8 +41,13 @@ def rounded(values: Any, digits: int = DIGITS) -> list[Any]:
 
 
 def packed(values: Any) -> Any:
-    """Many numbers as base64 of their bytes, which plotly.js reads; few of them as `rounded` does."""
+    """Many numbers as base64 of their bytes, which plotly.js reads; few of them as `rounded` does.
+
+    A single number, such as that of a limit, keeps all digits: other marks may differ from it by little.
+    """
     array = np.asarray(values, dtype=np.float64)
+    if 0 < array.size <= FEW and np.isfinite(array[0]) and (array == array[0]).all():
+        return array.tolist()
     if array.size <= FEW:
         return rounded(array)
     finite = array[np.isfinite(array)]
@@ -177,14 +182,10 @@ def _bar(mark: Bar, plot: Plot) -> Iterator[dict[str, Any]]:
 
 @traced.register
 def _field(mark: Field, plot: Plot) -> Iterator[dict[str, Any]]:
-    levels = mark.levels.tolist()
-    span = levels[-1] - levels[0]
-    for low, high, line in mark.layers:
-        colour = field_colour((0.5 * (low + high) - levels[0]) / span)
-        name = f"{mark.label}: {number(low)} to {number(high)}"
-        yield from _band(Band(line[:, 0], line[:, 1], colour, 1.0, name, "rgba(255,255,255,0.55)"), plot)
-    scale = [[end, field_colour((k + 0.5) / (len(levels) - 1))] for k in range(len(levels) - 1)
-             for end in (k / (len(levels) - 1), (k + 1) / (len(levels) - 1))]  # fmt: skip
+    for band in mark.bands:
+        yield from _band(band, plot)
+    levels, n = mark.levels.tolist(), len(mark.colours)
+    scale = [[end / n, colour] for k, colour in enumerate(mark.colours) for end in (k, k + 1)]
     yield {
         "type": "scatter", "mode": "markers", "x": [None], "y": [None], "hoverinfo": "skip",
         "marker": {"color": [levels[0]], "cmin": levels[0], "cmax": levels[-1], "colorscale": scale, "showscale": True,
@@ -204,7 +205,8 @@ def _axis(axis: Axis, ends: tuple[float, float], **own_keys: Any) -> dict[str, A
     """The layout of one axis, in the colours of the page."""
     own = axis.ticks
     if own is None and axis.log:
-        own = tuple((tick, number(tick, 3)) for tick in log_ticks(min(ends), max(ends)))
+        found = log_ticks(min(ends), max(ends))
+        own = tuple((tick, number(tick, 3)) for tick in found) if len(found) > 1 else None
     return {
         "title": {"text": plain(axis.label), "standoff": 8, "font": {"size": 13}},
         "automargin": True, "gridcolor": GRID, "linecolor": MUTED, "tickcolor": MUTED, "zeroline": False,

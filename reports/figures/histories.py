@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reports.drawing.marks import Axis, Band, Drawing, Limit, Line, Mark, Plot, between
-from reports.drawing.palette import BLUE, DASHES, INK, LINES, MUTED, SKY, VERMILION
+from reports.drawing.palette import DASHES, INK, LINES, MUTED, SKY, VERMILION
 from reports.text.numbers import count, number, percent
 
 SAMPLES = 400  # on the screen and on paper; extremes between them are kept
@@ -77,7 +77,7 @@ def history_plot(
         for low, high, opacity, words in envelope.bands():
             marks.append(between(envelope.at, low, high, SKY, opacity, words, words))
         words = f"{MEDIAN} of them"
-        marks.append(Line(envelope.at, envelope.curves[0.5], BLUE, words, "dash", 1.6, key=words))
+        marks.append(Line(envelope.at, envelope.curves[0.5], INK, words, "dash", 1.6, key=words))
     marks += case_lines(lines, lambda line: thinned(line.t, line.quantities[name]))
     bottom, top = Plot(tuple(marks), Axis(), Axis()).ends[1]
     far = []

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import betaincinv, ndtri
+import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.drivers import SuccessCurve
 from reports.drawing.marks import Axis, Bar, Limit, Line, Mark, Plot, Points, between, joined
@@ -45,7 +45,8 @@ def correlation_matrix(names: Sequence[str], rho: np.ndarray) -> Plot:
     """rho : float64[n, n], symmetric, NaN where there is none; blue cells are positive, red ones negative."""
     rows, columns = np.tril_indices(len(names), -1)
     known = np.isfinite(rho[rows, columns])
-    rows, columns = rows[known], columns[known]
+    order = np.argsort(rho[rows, columns][known])  # so that the sample in the key runs from negative to positive
+    rows, columns = rows[known][order], columns[known][order]
     values = rho[rows, columns]
     labels = [f"{value:.2f}".replace("-0.00", "0.00").replace("-", "−") for value in values]
     cells = Bar(
@@ -75,7 +76,8 @@ def probability_plot(
     n, z = values.size, plotting_positions(values.size)
     mean, deviation = float(values.mean()), float(values.std(ddof=1))
     ranks = shown_ranks(n)
-    low, high = (ndtri(betaincinv(ranks + 1, n - ranks, p)) for p in (0.5 - 0.5 * CONTENT, 0.5 + 0.5 * CONTENT))
+    tails = (0.5 - 0.5 * CONTENT, 0.5 + 0.5 * CONTENT)
+    low, high = (scipy.special.ndtri(scipy.special.betaincinv(ranks + 1, n - ranks, p)) for p in tails)
     normal = f"normal distribution with the same mean and σ, with {percent(CONTENT)} band of every rank"
     ends = z[[0, -1]]
     marks: list[Mark] = [
@@ -87,21 +89,21 @@ def probability_plot(
     near = [at for at in limits if reach[0] <= at <= reach[1]]
     marks += [Limit(at, "x", VERMILION, f"required limit {number(at)}", key="required limit") for at in near]
     most = 1.04 * max(abs(float(ends[0])), 2.2)
-    ticks = tuple((float(ndtri(p)), percent(p, 4)) for p in TICKS if abs(ndtri(p)) <= most)
+    ticks = tuple((float(scipy.special.ndtri(p)), percent(p, 4)) for p in TICKS if abs(scipy.special.ndtri(p)) <= most)
     y = Axis(name="cumulative probability", reach=(-most, most), ticks=ticks)
     return Plot(tuple(marks), Axis(label, most=4), y, title, 250.0)
 
 
 def plotting_positions(n: int) -> np.ndarray:
     """Normal quantiles of the ranks 1 ... n, by Blom's positions (i - 3/8) / (n + 1/4)."""
-    return np.asarray(ndtri((np.arange(1, n + 1) - 0.375) / (n + 0.25)))
+    return np.asarray(scipy.special.ndtri((np.arange(1, n + 1) - 0.375) / (n + 0.25)))
 
 
 def shown_ranks(n: int) -> np.ndarray:
     """The ranks, from 0, of the points that are drawn."""
     if n <= MOST_POINTS:
         return np.arange(n)
-    end = -float(ndtri(OUTERMOST / n))
+    end = -float(scipy.special.ndtri(OUTERMOST / n))
     z = np.linspace(-end, end, MOST_POINTS - 2 * OUTERMOST)
     middle = np.searchsorted(plotting_positions(n), z).clip(0, n - 1)
     return np.unique(np.r_[np.arange(OUTERMOST), middle, np.arange(n - OUTERMOST, n)])

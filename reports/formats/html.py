@@ -11,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from reports.document.blocks import CaseData, Document, FigureBlock, blocks_of
-from reports.drawing import screen
+from reports.drawing import paper, screen
 from reports.drawing.marks import Axis, Band, Limit, Line, Plot
 from reports.figures.clouds import outcome_cloud
 from reports.figures.histories import MEDIAN
@@ -35,7 +35,7 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["page_colour"] = page_colour
+    environment.filters["swatch"] = lambda mark: Markup(paper.page_swatch(mark))
     environment.filters["breakable"] = breakable
     environment.filters["grouped"] = count
     return environment
@@ -44,11 +44,6 @@ def _environment() -> Environment:
 def breakable(name: str) -> Markup:
     """A name that may break behind its underscores."""
     return Markup("<wbr>").join(re.split(r"(?<=_)", name))
-
-
-def page_colour(colour: str) -> str:
-    """A drawing's colour as CSS: "@ink" is the page's own ink."""
-    return f"var(--{colour[1:]})" if colour.startswith("@") else colour
 
 
 def _own_file(name: str) -> Markup:

@@ -85,7 +85,11 @@ class MetricRecord(_Record):
 
 
 class ContributorRecord(_Record):
-    """Shares of a metric's variance.  input : a parameter, a group, "random draws" or "unexplained"."""
+    """Shares of a metric's variance.  input : a parameter, a group, "random draws" or "unexplained".
+
+    fall : the share by which the variance falls with the input at its nominal value, where that was flown; of "random
+    draws" the parameters that name a draw have theirs, and noise made in flight stays.
+    """
 
     metric: str
     input: str
@@ -93,6 +97,8 @@ class ContributorRecord(_Record):
     total: float | None
     first_interval: tuple[float, float] | None
     total_interval: tuple[float, float] | None
+    fall: float | None = None
+    fall_interval: tuple[float, float] | None = None
 
 
 class WorstRecord(_Record):
@@ -238,6 +244,8 @@ def _contributor_record(contributor: Any) -> ContributorRecord:
         total=contributor.total,
         first_interval=contributor.first_interval,
         total_interval=contributor.total_interval,
+        fall=contributor.fall,
+        fall_interval=contributor.fall_interval,
     )
 
 

@@ -71,12 +71,17 @@ def chosen_unit(unit: str, numbers: Iterable[float | None]) -> str:
 
 
 class ShownRun(Flown):
-    """A run as its report tells it.  own : the same run, each column in its own unit."""
+    """A run as its report tells it.  own : the same run, each column in its own unit.
 
-    def __init__(self, own: Flown):
+    like : a run that chooses the unit of each column that has the same own unit in both.
+    """
+
+    def __init__(self, own: Flown, like: "ShownRun | None" = None):
         self.__dict__.update(vars(own))
         self._own = own
         self._units: dict[str, str] = {}
+        if like is not None:
+            self._units = {name: like.unit(name) for name in own.columns if like.own.unit(name) == own.unit(name)}
         self.histories = self.told_table(own.histories)
 
     @property

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ndtri
+import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, sensitivity
@@ -32,6 +32,7 @@ class Contributor:
     """What one input, group of inputs, or the random draws contribute to one metric, as shares of its variance.
 
     first : the share that goes when it alone becomes known.  total : the share that stays when all others are known.
+    fall : the share by which the variance falls if it is held at its nominal value.
     None where that is not known.  Intervals hold with the report's confidence.
     """
 
@@ -41,6 +42,8 @@ class Contributor:
     total: float | None
     first_interval: Interval | None
     total_interval: Interval | None
+    fall: float | None = None
+    fall_interval: Interval | None = None
 
     @property
     def size(self) -> float:
@@ -63,6 +66,11 @@ class Contributions:
     n_tried: int
     members: dict[str, list[str]]
     trends: Sensitivity | None = None
+
+    @property
+    def held(self) -> bool:
+        """Whether flights with a contributor at its nominal value are among them."""
+        return any(row.fall is not None for row in self.rows())
 
     def rows(self) -> Iterator[Contributor]:
         """All contributors, metric by metric."""
@@ -93,9 +101,10 @@ def _of_companion(flown: "Flown", store: Store, metrics: list[str]) -> Contribut
     cases = store.cases(["case_id", *metrics])
     values = {name: cases[name].to_numpy(dtype=np.float64) for name in metrics}
     indices = pick_freeze(layout, cases["case_id"].to_numpy(), values)
-    shares = (indices.first, indices.first_error, indices.total, indices.total_error)
+    shares = ((indices.first, indices.first_error), (indices.total, indices.total_error),
+              (indices.fall, indices.fall_error))  # fmt: skip
     by_metric = {
-        metric: _ranked(flown, metric, layout.groups, *(share[:, k] for share in shares))
+        metric: _ranked(flown, metric, layout.groups, *((share[:, k], error[:, k]) for share, error in shares))
         for k, metric in enumerate(metrics)
     }
     used = {metric: int(n) for metric, n in zip(metrics, indices.n_used, strict=True)}
@@ -111,10 +120,10 @@ def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
         {name: values[rows] for name, values in flown.inputs.items()},
         {name: flown.values(name)[rows] for name in metrics},
     )
-    shares = (indices.first_order, indices.first_order_error, indices.total, indices.total_error)
+    shares = ((indices.first_order, indices.first_order_error), (indices.total, indices.total_error))
     by_metric = {}
     for k, metric in enumerate(metrics):
-        ranked = _ranked(flown, metric, indices.inputs, *(share[:, k] for share in shares))
+        ranked = _ranked(flown, metric, indices.inputs, *((share[:, k], error[:, k]) for share, error in shares))
         left = _number(indices.unexplained[k]) if ranked else None
         rest = [] if left is None else [Contributor(metric, UNEXPLAINED, left, left, None, None)]
         by_metric[metric] = (*ranked, *rest)
@@ -123,27 +132,27 @@ def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
 
 
 def _ranked(
-    flown: "Flown",
-    metric: str,
-    names: Sequence[str],
-    first: np.ndarray,
-    first_error: np.ndarray,
-    total: np.ndarray,
-    total_error: np.ndarray,
+    flown: "Flown", metric: str, names: Sequence[str], *shares: tuple[np.ndarray, np.ndarray]
 ) -> tuple[Contributor, ...]:
-    """The contributors of one metric that have an effect, float64[n_names] each, the strongest first."""
-    errors = float(ndtri(0.5 * (1.0 + flown.stated.confidence)))  # standard errors on each side of an interval
+    """The contributors of one metric that have an effect, the strongest first.
+
+    shares : values and standard errors float64[n_names] of the first-order and total effects, and of the fall.
+    """
+    # standard errors on each side of an interval
+    errors = float(scipy.special.ndtri(0.5 * (1.0 + flown.stated.confidence)))
 
     def interval(value: float, error: float) -> Interval | None:
         if not (np.isfinite(value) and np.isfinite(error)):
             return None
         return float(value - errors * error), float(value + errors * error)
 
-    rows = [
-        Contributor(metric, name, _number(a), _number(b), interval(a, da), interval(b, db))
-        for name, a, da, b, db in zip(names, first, first_error, total, total_error, strict=True)
-        if np.isfinite(a) or np.isfinite(b)
-    ]
+    rows = []
+    for row, name in enumerate(names):
+        known = [(float(value[row]), float(error[row])) for value, error in shares]
+        if any(np.isfinite(value) for value, _ in known):
+            (first, first_ends), (total, total_ends), *rest = ((_number(one[0]), interval(*one)) for one in known)
+            fall, fall_ends = rest[0] if rest else (None, None)
+            rows.append(Contributor(metric, name, first, total, first_ends, total_ends, fall, fall_ends))
     return tuple(sorted(rows, key=lambda contributor: -contributor.size))
 
 

@@ -1,6 +1,6 @@
 """What `mc-engine compare A B --report FILE` writes: the comparison of two runs as a page or as a PDF."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from mc_engine.durable_file import write_durably
 from mc_engine.statistics.change_tests import UNKNOWN, Estimate, MetricChange, ShareChange, finite
 from mc_engine.studies.comparison import Comparison, VerdictChange
 from mc_engine.studies.run_changes import Difference
+from mc_engine.units import convert
 from reports.document.blocks import (
     Block,
     Card,
@@ -26,6 +27,7 @@ from reports.drawing.marks import Drawing
 from reports.figures.rows import change_panel
 from reports.formats.html import render_html
 from reports.formats.pdf import render_pdf
+from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown, Run
 from reports.studies.comparison_overlays import overlay_blocks
 from reports.text.numbers import count, number, percent, with_unit, words
@@ -80,12 +82,16 @@ def write_comparison(comparison: Comparison, path: Path, runs: tuple[Run, Run] |
 def build_comparison(comparison: Comparison, runs: tuple[Run, Run] | None = None) -> Document:
     """The comparison as a document: requirements first, then metrics, then what was edited in code and campaign."""
     overlays: tuple[Block, ...] = ()
+    units = {change.metric: chosen_unit(comparison.units[change.metric], change.mean) for change in comparison.metrics}
     if runs is not None:
-        pair = Flown(runs[0], comparison.names[0]), Flown(runs[1], comparison.names[1])
+        own = Flown(runs[0], comparison.names[0]), Flown(runs[1], comparison.names[1])
+        first = ShownRun(own[0])
+        units = {metric: first.unit(metric) for metric in units}
+        pair = first, ShownRun(own[1], like=first)
         overlays = as_blocks(overlay_blocks(pair, [change.metric for change in _ranked(comparison)]))
     sections = (
         Section("requirements", "Requirements", as_blocks([_verdict_table(comparison), _share_table(comparison)])),
-        Section("metrics", "Metrics", as_blocks(_metric_blocks(comparison))),
+        Section("metrics", "Metrics", as_blocks(_metric_blocks(comparison, units))),
         Section("overlays", "Both runs over one another", overlays),
         Section("code", "Changes in the code", as_blocks([_difference_block("Code", comparison.code)])),
         Section("campaign", "Changes in the campaign", as_blocks(_campaign_blocks(comparison))),
@@ -171,7 +177,8 @@ def _comparison_warnings(comparison: Comparison) -> tuple[str, ...]:
 # ---- metrics
 
 
-def _metric_blocks(comparison: Comparison) -> Iterator[FigureBlock | Table | str]:
+def _metric_blocks(comparison: Comparison, units: Mapping[str, str]) -> Iterator[FigureBlock | Table | str]:
+    """units : in which the metrics are told."""
     if not comparison.metrics:
         yield "The runs have no metric in common."
         return
@@ -180,7 +187,7 @@ def _metric_blocks(comparison: Comparison) -> Iterator[FigureBlock | Table | str
     if drawn:
         yield _change_figure(comparison, drawn)
     if moved:
-        yield _metric_table(comparison, moved)
+        yield _metric_table(comparison, units, moved)
     same = [metric.metric for metric in comparison.metrics if metric.same]
     if same:
         yield f"The same in both runs: {', '.join(same)}."
@@ -239,7 +246,7 @@ def _ends(estimates: list[Estimate]) -> np.ndarray:
     ).reshape(-1, 3)
 
 
-def _metric_table(comparison: Comparison, moved: list[MetricChange]) -> Table:
+def _metric_table(comparison: Comparison, units: Mapping[str, str], moved: list[MetricChange]) -> Table:
     columns = (
         Column("Metric", "text"),
         Column("Mean A", "number"),
@@ -254,19 +261,22 @@ def _metric_table(comparison: Comparison, moved: list[MetricChange]) -> Table:
         f"Small: the {percent(comparison.confidence)} interval of the quantity that the test "
         "is of; cases used of cases flown. σ: standard deviation of run A."
     )
-    return Table("Metrics of both runs", columns, tuple(_metric_row(comparison, change) for change in moved), note)
+    rows = tuple(_metric_row(comparison, change, units[change.metric]) for change in moved)
+    return Table("Metrics of both runs", columns, rows, note)
 
 
-def _metric_row(comparison: Comparison, change: MetricChange) -> tuple[Cell, ...]:
-    unit = comparison.units[change.metric]
+def _metric_row(comparison: Comparison, change: MetricChange, unit: str) -> tuple[Cell, ...]:
+    own = comparison.units[change.metric]
+    scale = convert(change.deviation[0], own, unit) if unit != own else change.deviation[0]
+    means = [convert(mean, own, unit) if unit != own else mean for mean in change.mean]
     used = " and ".join(f"{count(k)} / {count(n)}" for k, n in zip(change.n_used, change.n_tried, strict=True))
     if change.differing is not None:
         used = f"{count(change.differing)} of {count(change.n_used[0])} pairs differ"
         lost = change.n_tried[0] - change.n_used[0]
         used += f", {count(lost)} without a number" if lost else ""
     return (
-        Cell(with_unit(words(change.metric, unit), f"[{unit}]" if unit else ""), small=used),
-        *(_number_cell(value, change.deviation[0]) for value in change.mean),
+        Cell(with_unit(words(change.metric, own), f"[{unit}]" if unit else ""), small=used),
+        *(_number_cell(value, scale) for value in means),
         _estimate_cell(change.shift_in_sigma),
         _p_value_cell(change.shift_adjusted, comparison.alpha),
         _estimate_cell(change.ratio),

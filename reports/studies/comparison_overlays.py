@@ -12,7 +12,7 @@ from reports.drawing.palette import BLUE, VERMILION
 from reports.footprint.landings import landed, planet_of
 from reports.run.flown import Flown
 from reports.run.history_bands import fair_cases, history_envelopes
-from reports.text.numbers import count
+from reports.text.numbers import axis_label, count
 
 MOST_PANELS = 9
 MOST_POINTS = 2000  # of each run
@@ -39,7 +39,7 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
     if noise := [name for name, one in drawn.items() if one is None]:
         yield f"Not drawn, rounding errors only in both nominal cases: {', '.join(noise)}."
     for figure in (drawn for drawn in runs[1].figures if isinstance(drawn, FootprintFigure)):
-        footprint = _footprint(runs, figure)
+        footprint = _footprint((runs[0].own, runs[1].own), figure)
         if footprint is not None:
             caption = f"{figure.title}, both runs. {_thinned_words(runs)}"
             yield FigureBlock(caption, Drawing(FORM, (footprint,)), "wide")
@@ -70,7 +70,9 @@ def _histories(runs: tuple[Flown, Flown]) -> Iterator[tuple[str, Plot | None]]:
         if all(len(run.histories) and name in run.histories.columns for run in runs):
             marks = [mark for run, flown in enumerate(runs) for mark in _history_marks(run, flown, name)]
             if marks:
-                plot = Plot(tuple(marks), Axis("time [s]"), Axis(runs[1].axis(name)), height=HEIGHT)
+                plot = Plot(
+                    tuple(marks), Axis(axis_label("time", runs[1].unit("t_s"))), Axis(runs[1].axis(name)), height=HEIGHT
+                )
                 low, high = Plot(tuple(marks), Axis(), Axis(margin=0.0)).ends[1]
                 saved = np.concatenate([run.histories[name].to_numpy(dtype=np.float64) for run in runs])
                 yield name, None if high - low < NOISE * np.ptp(saved[np.isfinite(saved)]) else plot

@@ -29,7 +29,10 @@ from reports.sections.tables import dispersed_table
 from reports.text.numbers import SPACE, axis_label, count, exact, named, number, percent, with_unit, words
 
 CLASSES = ("drawn from the dispersions, not failed", "failed")
-DESIGN_POINTS = (("likeliest", "likeliest failed case", INK), ("across", "the likeliest across", PURPLE))
+DESIGN_POINTS = (
+    ("likeliest", "likeliest failed case", INK),
+    ("across", "likeliest failed case on the other side", PURPLE),
+)
 METHODS = {
     "subset": "subset simulation",
     "cross-entropy": "importance sampling by cross entropy",

@@ -13,7 +13,7 @@
     const nominal = id === -1;
     return [{
       type: "scatter", mode: "lines", x: found[0], y: found[1], name: nominal ? "nominal" : "case " + id,
-      line: { color: nominal ? "@ink" : "#D55E00", dash: nominal ? "dot" : "solid", width: nominal ? 1.4 : 2 },
+      line: { color: nominal ? "@ink" : "#E69F00", dash: nominal ? "dot" : "solid", width: nominal ? 1.4 : 2 },
       hovertemplate: `${data.panel.xaxis.title.text}: %{x:.5g}<br>${reportFigures.plain(quantity.label)}: %{y:.5g}<extra>%{fullData.name}</extra>`,
     }];
   }

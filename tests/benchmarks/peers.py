@@ -2,6 +2,7 @@
 
     python tests/benchmarks/peers.py            # the table of the README, and peers.parquet
     python tests/benchmarks/peers.py --short    # one error, few turns: whether everybody flies to the same place
+    python tests/benchmarks/peers.py --only orbit
 
 Needs the extra `bench`; a peer that is not installed is named as such.  The error is the largest distance of the end
 positions from a reference flight in 80-bit numbers.  Only flights are timed: neither compiling nor preparing inputs.
@@ -29,7 +30,7 @@ from tests.benchmarks.peer_codes.problems import Problem  # noqa: E402
 TABLE = Path(__file__).with_suffix(".parquet")
 CODES = {"heyoka": "taylor", "nyx": "nyx", "Basilisk": "basilisk"}  # peer -> file in peer_codes
 TARGETS = (1.0, 1e-3, 1e-5)  # m
-METHODS = ("RK4", "ABM8", "ABM10", "ABM12", "DOP853", "DP54")
+METHODS = ("RK4", "ABM10", "ABM12", "GJ8", "GJ9", "GJ10", "DOP853", "DP54")
 
 
 def peer(name: str):
@@ -75,7 +76,7 @@ def _basilisk() -> Contest:
 def _nyx(target: float | None) -> Contest:
     """With the same step, or at equal error."""
     problem, step = problems.two_body(), 10.0
-    methods, code = ("RK4",) if target is None else ("RK4", "ABM10", "ABM12", "DOP853"), peer("nyx")
+    methods, code = ("RK4",) if target is None else ("RK4", "ABM12", "GJ8", "GJ9", "GJ10", "DOP853"), peer("nyx")
     entrants: list[Entrant] = []
     for method in methods:
         entrants.append(engine.entrant(problem, method, 0, (step,) if target is None else ()))
@@ -95,7 +96,7 @@ def contests(short: bool) -> list[Contest]:
     held = [_fixed_step(problems.orbit(), 10.0), _fixed_step(problems.satellite(), 0.01)]
     flights = ["orbit", "transfer", "ballistic", "lifting"]
     held += [_equal_error(problems.BY_KEY[key](), target) for key in flights for target in TARGETS[short : 3 - short]]
-    return [*held, _basilisk(), _nyx(None), _nyx(1e-3)]
+    return [*held, _basilisk(), _nyx(None), _nyx(1e-3), *([] if short else [_nyx(1e-5)])]
 
 
 def _number(value: float | None, form: str = ".2f") -> str:
@@ -133,15 +134,19 @@ def machine() -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--short", action="store_true", help="one error, few turns, no file")
+    parser.add_argument("--only", metavar="WORD", help="problems with this word in their title, one thread, no file")
     parser.add_argument("--turns", type=int, default=40, help="of each entrant in each contest")
     arguments = parser.parse_args()
+    part = arguments.short or arguments.only
     print(machine(), flush=True)
     results: list[Result] = []
     for contest in contests(arguments.short):
-        held = hold(contest, 2 if arguments.short else arguments.turns, all_cores=not arguments.short)
+        if arguments.only and arguments.only not in contest.title:
+            continue
+        held = hold(contest, 2 if arguments.short else arguments.turns, all_cores=not part)
         print("\n".join(lines(held)[2 if results else 0 :]), flush=True)
         results += held
-    if not arguments.short:
+    if not part:
         write(results, TABLE)
 
 

@@ -33,12 +33,12 @@ def flies_the_same_after(flown, name, flips):
         path.write_bytes(damaged)
         done = fly(folder, f"{name}_{number}")
         assert table(folder / f"{name}_{number}") == cases
-        assert ("a compiled kernel is damaged there" in done.stderr) == (path.suffix == ".nbc")
-        assert path.read_bytes() == cache[path] or path.suffix == ".nbc"
+        assert ("a compiled kernel is damaged there" in done.stderr) == (path.suffix == ".kernel")
+        assert path.read_bytes() == cache[path] or path.suffix == ".kernel"
 
 
 def test_a_flipped_bit_in_a_compiled_kernel_or_in_its_source_changes_no_number(flown):
-    (kernel,) = [path for path in flown[2] if path.suffix == ".nbc"]
+    (kernel,) = [path for path in flown[2] if path.suffix == ".kernel"]
     (source,) = [path for path in flown[2] if path.suffix == ".py"]
     flies_the_same_after(flown, "few", [(kernel, len(flown[2][kernel]) // 2, 3), (source, 700, 7)])
 

@@ -194,6 +194,7 @@ ELSEWHERE = {
     "mc_engine/flight/kernel.py": "the cache of compiled kernels",
     "mc_engine/flight/program_flight.py": "input files of a program, in a simulator's temporary folder",
     "mc_engine/lanes/kernel_cache.py": "locks of kernels under compilation",
+    "mc_engine/runner/backends.py": "what bench measured of cards, in the folder of compiled kernels",
     "mc_engine/store/object_store.py": "scratch folders beside a fetched copy",
     "mc_engine/text.py": "the null device",
     "mc_engine/command_line/watching.py": "the page of --watch, which is no run",

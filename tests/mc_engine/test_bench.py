@@ -1,6 +1,7 @@
 """What `bench` times is the flight of `run`, and it says how fast in words that compare."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from mc_engine.campaign.columns import END_TIME
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.command_line.commands import app
 from mc_engine.flight.flight import bound_flight, fly
+from mc_engine.model import AdaptiveStep, FixedStep
+from mc_engine.studies.lane_speed import MethodTiming, _first_within, _Trials, compare_methods
 
 
 @pytest.fixture(scope="module")
@@ -41,3 +44,76 @@ def test_bench_prints_cases_a_second_nanoseconds_a_step_and_the_ratio():
     # the same flights: a case is as many steps in each build
     assert np.multiply(rates, steps) == pytest.approx(rates[0] * steps[0], rel=0.05)
     assert sixteen.endswith(" times as fast (as `run`)")
+
+
+def test_methods_are_compared_at_the_error_of_the_models_own(minimal):
+    own, *others = compare_methods(minimal, 16, 1)
+    assert own.clock.method == "rk4"
+    assert [one.case_s for one in others] == sorted(one.case_s for one in others)
+    assert {"abm8", "abm12", "dop853", "dp54"} <= {one.clock.method for one in others}
+    # rates of states are not declared
+    assert not [one for one in others if one.clock.method.startswith("gj")]
+    ids = np.arange(16)
+    inputs = full_inputs(minimal, case_table(minimal, ids))
+
+    def metrics(clock):
+        model = replace(minimal.model, clock=clock)
+        columns = fly(model, inputs, ids, minimal.seed, folder=minimal.directory)
+        return np.array([columns[metric.name] for metric in model.metrics])
+
+    true = metrics(replace(own.clock, step=own.clock.step / 50.0))
+    for one in (own, *others):
+        error = (abs(metrics(one.clock) - true).max(axis=1) / abs(true).max(axis=1)).max()
+        assert error == pytest.approx(one.error, rel=0.05)
+        assert error <= 1.05 * own.error
+
+
+def test_bench_prints_a_line_for_each_method(monkeypatch):
+    timings = [
+        MethodTiming(FixedStep(20.0, 86400.0), 2.5e-8, 60e-6),
+        MethodTiming(FixedStep(86400.0 / 642, 86400.0, method="gj8"), 2.9e-9, 5e-6),
+        MethodTiming(AdaptiveStep(86400.0, 1.8e-8), 2.2e-8, 12e-6),
+    ]
+    monkeypatch.setattr("mc_engine.studies.lane_speed.compare_methods", lambda *arguments: timings)
+    done = CliRunner().invoke(app, ["bench", "minimal", "--methods"])
+    assert done.output.splitlines() == [
+        "minimal: methods at the error of the model's own, one thread",
+        "  rk4     4,320 steps of 20 s        error 2.5e-08      60.00 µs a case  (the model's own)",
+        "  gj8     642 steps of 134.6 s       error 2.9e-09       5.00 µs a case, 12.00 times as fast",
+        "  dop853  tolerance 1.8e-08          error 2.2e-08      12.00 µs a case,  5.00 times as fast",
+    ]
+
+
+class Errors:
+    """In place of flights: errors by clock."""
+
+    def __init__(self, errors):
+        self.errors = errors
+
+    def error(self, clock):
+        return self.errors[clock]
+
+
+@pytest.mark.parametrize(
+    ("errors", "found"),
+    [([5.0, 2.0, 0.9, 0.8, 0.1], 2), ([5.0, 0.5, 3.0, 0.9, 0.8], 3), ([5.0, 4.0, 3.0, 0.7], 3), ([5.0, 4.0], None)],
+)
+def test_a_step_that_is_exact_by_chance_is_not_taken(errors, found):
+    first = _first_within(Errors(errors), iter(range(len(errors))), 1.0)
+    assert first == (None if found is None else (found, errors[found]))
+
+
+def test_samples_of_the_control_stay_where_they_are():
+    trials = object.__new__(_Trials)
+    trials.every, trials.n_steps, trials.until = 5, 300, 30.0
+    grids = list(trials._grids())
+    assert [every for _, every in grids] == [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 17, 20]
+    assert [step * every for step, every in grids] == pytest.approx([0.5] * len(grids))
+    trials._scales = np.array([2.0])
+    assert trials._adaptive("dop853", 1e-3) == AdaptiveStep(30.0, 1e-3, (2e-3,), 0.5, "dop853")
+
+
+def test_methods_of_a_model_that_chooses_its_steps_are_not_compared():
+    done = CliRunner().invoke(app, ["bench", "geo_injection", "--methods"])
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "methods are compared for models on a fixed grid, FixedStep; this one chooses its steps" in done.stderr

@@ -30,7 +30,11 @@ def indices(run):
     layout = layout_of(store.manifest["sensitivity"])
     cases = store.cases()
     metrics = {column.name: cases[column.name].to_numpy() for column in store.columns if column.role == "metric"}
-    found = pick_freeze(layout, cases["case_id"].to_numpy(), metrics)
+    return pick_freeze(layout, cases["case_id"].to_numpy(), metrics)
+
+
+def effects(run):
+    found = indices(run)
     return {
         metric: {group: (found.first[g, k], found.total[g, k]) for g, group in enumerate(found.groups)}
         for k, metric in enumerate(found.metrics)
@@ -45,7 +49,7 @@ def flown(tmp_path_factory):
 
 
 def test_indices_of_ishigami_and_of_sobols_g_lie_within_a_hundredth(flown):
-    found = indices(flown)
+    found = effects(flown)
     # Ishigami & Homma (1990), a = 7, b = 0.1: Saltelli et al., Global Sensitivity Analysis: The Primer, p. 196
     for name, first, total in (("x1", 0.3139, 0.5576), ("x2", 0.4424, 0.4424), ("x3", 0.0, 0.2437), ("x4", 0.0, 0.0)):
         assert found["ishigami"][name] == pytest.approx((first, total), abs=0.01), name
@@ -58,7 +62,7 @@ def test_indices_of_ishigami_and_of_sobols_g_lie_within_a_hundredth(flown):
 
 
 def test_noise_in_flight_and_parameters_that_name_a_draw_are_one_group_of_their_own(flown):
-    found = indices(flown)
+    found = effects(flown)
     assert list(found["noise"]) == ["x1", "x2", "x3", "x4", "random draws"]
     for metric in ("noise", "raffle"):
         assert found[metric]["random draws"][1] == pytest.approx(1.0, abs=0.02)
@@ -66,6 +70,18 @@ def test_noise_in_flight_and_parameters_that_name_a_draw_are_one_group_of_their_
     # variances 1/12, 1/12, 4/12 and 1
     exact = {"x1": 1.0 / 18.0, "x2": 1.0 / 18.0, "x3": 4.0 / 18.0, "x4": 0.0, "random draws": 12.0 / 18.0}
     assert {name: total for name, (_, total) in found["line"].items()} == pytest.approx(exact, abs=0.02)
+
+
+def test_the_variance_falls_as_much_as_closed_forms_say_where_a_draw_is_held_at_its_nominal_value(flown):
+    found = indices(flown)
+    draws = found.groups.index("random draws")
+    fall, error = (dict(zip(found.metrics, row[draws], strict=True)) for row in (found.fall, found.fall_error))
+    # x (1 + t) with x, t uniform on [0, 1]: variance 31/144, with t = 0 it is 1/12; the total index of t is 4/31
+    assert fall["scaled"] == pytest.approx(19.0 / 31.0, abs=min(3.0 * error["scaled"], 0.02))
+    assert found.total[draws, found.metrics.index("scaled")] == pytest.approx(4.0 / 31.0, abs=0.01)
+    assert fall["raffle"] == pytest.approx(1.0, abs=1e-12)  # t alone
+    assert (fall["noise"], fall["line"]) == (0.0, 0.0)  # noise made in flight stays as drawn
+    assert np.isnan(np.delete(found.fall, draws, axis=0)).all()
 
 
 def test_the_cases_are_the_same_with_and_without_them(flown, tmp_path):
@@ -90,7 +106,7 @@ def test_flights_broken_off_are_resumed_to_the_same_bytes(tmp_path):
     assert open_store(tmp_path / "run" / "sensitivity").missing()
     runner.resume(tmp_path / "run")
     ours, theirs = (open_store(tmp_path / name / "sensitivity").cases() for name in ("run", "whole"))
-    assert len(ours) == 512 * (4 + 3)  # groups: odd, x2, x4 and the random draws, which have a row more
+    assert len(ours) == 512 * (4 + 4)  # groups: odd, x2, x4 and the random draws, which have two rows more
     assert ours.equals(theirs)
     assert runner.replay(tmp_path / "run" / "sensitivity", 1001).equal
 
@@ -107,7 +123,7 @@ def test_flights_broken_off_are_resumed_to_the_same_bytes(tmp_path):
 )
 def test_what_cannot_be_computed_is_told_with_its_place(tmp_path, more, sentence):
     if sentence is None:
-        assert campaign(tmp_path, more).sensitivity.flights == 80_000_000
+        assert campaign(tmp_path, more).sensitivity.flights == 90_000_000
         return
     with pytest.raises(CampaignError, match="sensitivity") as error:
         campaign(tmp_path, more)

@@ -29,5 +29,5 @@ def marks_of(drawing, kind, words=""):
 
 def classes(drawing):
     """Words and number of cases of each class of a scatter plot, from its key."""
-    found = [re.match(r"(.*): ([\d\u202f]+) of [\d\u202f]+ cases", entry.text) for entry in drawing.key]
+    found = [re.match(r"(.*): ([\d\u202f]+) of [\d\u202f]+ cases", mark.key) for mark in drawing.key]
     return {one[1]: int(one[2].replace("\u202f", "")) for one in found if one}

@@ -95,7 +95,7 @@ def test_the_worst_case_comes_with_the_command_that_repeats_it(document):
 
 def test_the_map_says_that_it_is_smoothed_and_from_how_many_cases(document):
     drawing = drawings(document, "map")[0]
-    key = " ".join(entry.text for entry in drawing.key)
+    key = " ".join(mark.key for mark in drawing.key)
     assert "local quadratic regression on the 24 nearest of 9\u202f988 of 10\u202f000 cases" in key
     assert "; error 3.98·10⁻⁵ (median) to 0.013\u202fkg (largest)" in key
     assert "of 9\u202f988 shown" in key
@@ -240,7 +240,7 @@ def test_a_handful_of_cases_is_shown_case_by_case_and_named_by_what_sets_them_ap
     rows = cells(tables(document)["Case by case"])
     assert [row[1] for row in rows] == ["continuous", "clipped", "pulsed", "off"]
     assert [row[-1] for row in rows] == ["ok", "ok", "ok", "not-finite"]
-    keys = [entry.text for block in blocks_of(document, FigureBlock) for entry in block.drawing.key]
+    keys = [mark.key for block in blocks_of(document, FigureBlock) for mark in block.drawing.key]
     assert "case 1: control clipped" in keys
 
 

@@ -157,6 +157,7 @@ STRUCK = (
     "went astray", "go astray", "any shape", "driver", "unless said", "held against", "in any company",
     "in other company", "refused with a sentence", "no problems", "Whoever flies", "verbs?", "VERB",
 )  # fmt: skip
+OF_CARDS = ("cards.py", "cards.md", "card_code.py")  # NVIDIA's driver
 
 
 def test_the_struck_words_are_in_no_text_that_a_person_reads():
@@ -171,4 +172,6 @@ def test_the_struck_words_are_in_no_text_that_a_person_reads():
         found = re.findall(r'"((?:[^"\\\n]|\\.)*)"', text) if path.suffix == ".py" else [text]
         texts = [re.sub(r"\{[^{}]*\}", "", one) for one in found]
         for words in STRUCK:
+            if words == "driver" and path.name in OF_CARDS:
+                continue
             assert not [one for one in texts if re.search(rf"\b{words}\b", one)], (path.name, words)

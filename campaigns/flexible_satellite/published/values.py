@@ -14,7 +14,7 @@ import pandas as pd
 
 from campaigns.flexible_satellite.model import MODEL
 from mc_engine.campaign.loading import load_campaign
-from mc_engine.flight.chosen_cases import chosen_case, chosen_history
+from mc_engine.flight.flight import chosen_case, chosen_history
 from mc_engine.studies.tuning import tune
 
 _FOLDER = Path(__file__).resolve().parents[1]

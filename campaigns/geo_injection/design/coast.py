@@ -42,7 +42,7 @@ def kepler(r: np.ndarray, v: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np
 
 
 def _anomaly_difference(m: np.ndarray, cosine: np.ndarray, sine: np.ndarray) -> np.ndarray:
-    """Real x of x - cosine sin x + sine (1 - cos x) = m: Newton's steps inside a bracket, which always closes."""
+    """Real x of x - cosine sin x + sine (1 - cos x) = m: Newton's steps inside a bracket, which closes; eq. (21)."""
     e = np.hypot(cosine, sine)
     low, high = m - 2.0 * e, m + 2.0 * e
     x = m + 0.0 * e

@@ -61,7 +61,7 @@ def _refuse_descents(problem: Problem) -> None:
 def _refuse_waiting(solution: Solution) -> None:
     """Each coast ends at the first apsis that serves: one that lasts longer belongs to another sequence.
 
-    The period of a coast's orbit is 2 pi a^1.5, canonical (Kepler's third law).
+    The period of a coast's orbit is 2 pi a^1.5 in canonical units (Kepler's third law).
     """
     ends = solution.states[1:-1:2]
     a = 1.0 / (2.0 / np.linalg.norm(ends[:, :3], axis=1) - (ends[:, 3:6] ** 2).sum(1))
@@ -72,7 +72,7 @@ def _refuse_waiting(solution: Solution) -> None:
 
 
 def _impulsive_guess(problem: Problem) -> np.ndarray:
-    """Unknowns from two impulses: burns as long as the rocket equation says, centred on the apses."""
+    """Unknowns from two impulses: burns by the rocket equation, eq. (1), centred on the apses; canonical units."""
     two = two_impulses(problem.plane_change, problem.ratio)
     first = propellant_share(two.first, problem.exhaust) / problem.flow
     second = propellant_share(two.first + two.second, problem.exhaust) / problem.flow - first
@@ -209,7 +209,7 @@ def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
 def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
     """The same sequence with burns longer by what the thrust is smaller, about the same middles.
 
-    The burn times scale with 1 / thrust, canonical; sqrt(1 + e) is the rate of the place at perigee.
+    The burn times scale with 1 / thrust, in canonical units; sqrt(1 + e) is the rate of the place at perigee.
     """
     n, guess = here.burns, x.copy()
     longer = here.thrust / there.thrust

@@ -57,5 +57,5 @@ def _primer_rate(start: np.ndarray, first: np.ndarray, second: np.ndarray, dt: f
 
 
 def propellant_share(speed_change: float, exhaust: float) -> float:
-    """Propellant over initial mass of impulses of a total speed change, by the rocket equation."""
+    """Fraction of the initial mass that impulses of a total speed change need: eq. (1), integrated; canonical."""
     return float(-np.expm1(-speed_change / exhaust))

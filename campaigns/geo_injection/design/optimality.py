@@ -1,7 +1,7 @@
 """Check that a sequence is an optimum: Hamiltonian and switching function along the flight, canonical units."""
 
+from collections import namedtuple
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,19 +12,9 @@ from campaigns.geo_injection.design.optimal import Problem, Solution, coast_hami
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 
 
-@dataclass(frozen=True)
-class Arc:
-    """A burn or a coast.  t : canonical, after the first ignition;  states : [n, 12];  mass : of the initial one.
-
-    switching : negative where thrust pays, positive where it does not;  hamiltonian : zero on an optimum.
-    """
-
-    burning: bool
-    t: np.ndarray
-    states: np.ndarray
-    mass: np.ndarray
-    switching: np.ndarray
-    hamiltonian: np.ndarray
+# A burn or a coast.  t: canonical, after the first ignition, [n];  states: [n, 12];  mass: over the initial one
+# switching: negative where thrust pays, positive where it does not;  hamiltonian: zero on an optimum
+Arc = namedtuple("Arc", "burning t states mass switching hamiltonian")
 
 
 def _flown(problem: Problem, start: np.ndarray, mass: float, times: np.ndarray) -> np.ndarray:
@@ -45,7 +35,7 @@ def arcs(solution: Solution, n: int = 200) -> list[Arc]:
 
 
 def _backward(solution: Solution, n: int) -> Iterator[Arc]:
-    """The arcs from the last to the first, canonical: the mass costate is known at the end, where it is 0."""
+    """The arcs from the last to the first, canonical units: the mass costate is known at the end, where it is 0."""
     problem = solution.problem
     masses = 1.0 - problem.flow * np.concatenate([[0.0], np.cumsum(solution.durations)])
     mass_costate, unit = 0.0, problem.thrust / masses[-1]
@@ -68,7 +58,7 @@ def _backward(solution: Solution, n: int) -> Iterator[Arc]:
 
 
 def _push(problem: Problem, start: np.ndarray, mass: float, low: float, high: float) -> float:
-    """Integral of T |p| / m^2 over a part of a burn, by Gauss's rule."""
+    """Integral of T |p| / m^2, the mass costate's rate, over a part of a burn, by Gauss's rule; canonical units."""
     times = 0.5 * (high - low) * _POINTS + 0.5 * (high + low)
     size = np.linalg.norm(_flown(problem, start, mass, times)[:, 6:9], axis=1)
     return float(0.5 * (high - low) * (_WEIGHTS * problem.thrust * size / (mass - problem.flow * times) ** 2).sum())

@@ -9,7 +9,8 @@ finite differences over it are as good as their rounding.
 
 import numpy as np
 
-from mc_engine.lanes.compiler import compile_kernel
+from mc_engine.flight.kernel import kernel_of
+from mc_engine.lanes.compiler import compile_inline
 from mc_engine.lanes.runge_kutta_pairs import DOP853
 
 _NODES, _STARTS, _COLUMNS, _WEIGHTS = DOP853.tables()
@@ -17,7 +18,7 @@ _STAGES = len(DOP853.nodes) + 1
 STEP = 0.1  # canonical time: a sixtieth of the parking orbit's revolution
 
 
-@compile_kernel
+@compile_inline
 def _rates(y, acceleration, out):
     """Time derivative of y under a thrust acceleration along p: eqs (1) and (16) of the source, in vectors.
 
@@ -34,30 +35,35 @@ def _rates(y, acceleration, out):
         out[9 + k] = -u3 * y[6 + k] + tide * y[k]
 
 
-@compile_kernel
-def _fly_one(y, mass, duration, thrust, flow, n_steps):
+@compile_inline
+def _fly_one(y, mass, duration, thrust, flow, n_steps, now, stages):
     """Carry y over one burn in place, canonical.  mass : at its start;  thrust, flow : per initial mass.
+
+    now, stages : float64[12] and float64[_STAGES, 12], room for a state and its derivatives.
 
     Weights of order 8 of DOP853: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993).
     """
     h = duration / n_steps
-    now, stages = np.empty(y.size), np.empty((_STAGES, y.size))
     for step in range(n_steps):
         for stage in range(_STAGES + 1):
-            now[:] = y
+            for i in range(y.size):
+                now[i] = y[i]
             for k in range(_STARTS[stage], _STARTS[stage + 1]):
                 for i in range(now.size):
                     now[i] += h * _WEIGHTS[k] * stages[_COLUMNS[k], i]
             if stage == _STAGES:
-                y[:] = now
+                for i in range(y.size):
+                    y[i] = now[i]
             else:
                 _rates(now, thrust / (mass - flow * (step * h + _NODES[stage] * h)), stages[stage])
 
 
-@compile_kernel
-def _fly_all(y, mass, duration, thrust, flow, n_steps):
+def _fly_all(y, mass, duration, thrust, flow, n_steps, now, stages):
     for case in range(y.shape[0]):
-        _fly_one(y[case], mass[case], duration[case], thrust, flow, n_steps)
+        _fly_one(y[case], mass[case], duration[case], thrust, flow, n_steps, now, stages)
+
+
+_KERNEL = kernel_of(_fly_all)
 
 
 def fly_burns(
@@ -72,5 +78,6 @@ def fly_burns(
     out = np.array(y, dtype=np.float64)
     mass, duration = (np.broadcast_to(column, len(out)).astype(np.float64) for column in (mass, duration))
     n_steps = max(8, int(np.ceil(np.abs(duration).max() / step)))
-    _fly_all(out, mass, duration, thrust, flow, n_steps)
+    room = np.empty(out.shape[1]), np.empty((_STAGES, out.shape[1]))
+    _KERNEL(out, mass, duration, float(thrust), float(flow), n_steps, *room)
     return out

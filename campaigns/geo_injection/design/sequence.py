@@ -55,7 +55,7 @@ class Sequence:
         return -1.0 if self.final_inclination > self.initial_inclination else 1.0
 
     def problem(self) -> Problem:
-        """The canonical problem."""
+        """The same in canonical units: parking radius, circular speed there, initial mass."""
         acceleration = self.speed_unit / self.time_unit
         return Problem(
             self.burns,

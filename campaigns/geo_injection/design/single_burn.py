@@ -4,6 +4,7 @@ Canonical units: mu = 1.  The costates are kept as the primer vector p = -lambda
 H = 1 + q.v - p.g - T |p| / m (eq. 13) and eqs (14), (15) say "thrust along p".
 """
 
+from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -17,15 +18,8 @@ from mc_engine.errors import ModelError
 Conditions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of place and velocity [n, 3], complex too: [n, m]
 
 
-@dataclass(frozen=True)
-class Burn:
-    """ignition : time after the reference point of the old orbit;  start, end : states [12];  iterations : of scipy."""
-
-    ignition: float
-    duration: float
-    start: np.ndarray
-    end: np.ndarray
-    iterations: int
+# ignition: time after the reference point of the old orbit;  start, end: states [12];  iterations: of scipy
+Burn = namedtuple("Burn", "ignition duration start end iterations")
 
 
 @dataclass(frozen=True)
@@ -106,7 +100,7 @@ def _ends(stage: Stage, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _residuals(stage: Stage, x: np.ndarray) -> np.ndarray:
-    """End conditions, transversality, H = 0 at the end, and the rule that places the ignition."""
+    """End conditions, transversality, H = 0 at the end, and the rule that places the ignition: eqs (9)-(17)."""
     start, end = _ends(stage, x)
     r, v = end[:, :3], end[:, 3:6]
     steps = 1j * IMAGINARY * np.eye(6)

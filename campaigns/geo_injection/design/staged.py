@@ -6,6 +6,7 @@ shortest if the parking orbit is a circle, which has no apsis.  The others are c
 reach and leave the perigee on the node again.  Canonical units, axes as in `optimal.py`.
 """
 
+from collections import namedtuple
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,12 +35,8 @@ class Orbit:
         return side * np.array([r, 0.0, 0.0, 0.0, speed * np.cos(i), speed * np.sin(i)])
 
 
-@dataclass(frozen=True)
-class StagedBurn:
-    """A burn of the flight.  ignition : canonical time after the first;  burn : as `single_burn` found it."""
-
-    ignition: float
-    burn: Burn
+# ignition: canonical time after the first;  burn: as `single_burn` found it
+StagedBurn = namedtuple("StagedBurn", "ignition burn")
 
 
 def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
@@ -75,7 +72,7 @@ def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
 def shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
     """The burn, guessed as an impulse at the reference that gives the wanted speed; the rocket equation times it.
 
-    Canonical; the impulse is centred in the burn, unless the burn is to be ignited at the reference.
+    Canonical units; the impulse is centred in the burn, unless the burn is to be ignited at the reference.
     """
     r, v = stage.reference[:3], stage.reference[3:]
     change = wanted * np.array([0.0, np.cos(inclination), np.sin(inclination)]) - v

@@ -13,7 +13,7 @@ from campaigns.geo_servicing.dynamics import R0
 from campaigns.geo_servicing.model import MODEL, nominal_start
 from campaigns.geo_servicing.phasing_plan import PUBLISHED, design
 from campaigns.geo_servicing.planned_flight import Craft
-from mc_engine.flight.chosen_cases import chosen_history
+from mc_engine.flight.flight import chosen_history
 from mc_engine.flight.kernel_parts import settings_class
 from mc_engine.studies.published_values import dispersed_cases
 

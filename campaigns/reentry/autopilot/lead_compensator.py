@@ -5,6 +5,7 @@ NumPy, SI; frequencies in rad/s.  `bode_figure` draws the loops of the autopilot
 K. Ogata, Modern Control Engineering, section on lead compensation by the frequency-response approach.
 """
 
+from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,12 +18,8 @@ FREQUENCIES = np.geomspace(1e-3, 1e4, 4001)
 LARGEST_LEAD = np.radians(75.0)  # of one stage
 
 
-@dataclass(frozen=True)
-class Margins:
-    """Phase margin [rad] at the highest crossover [rad/s], where the loop's gain falls through 1."""
-
-    phase: float
-    crossover: float
+# phase margin [rad] at the highest crossover [rad/s], where the loop's gain falls through 1
+Margins = namedtuple("Margins", "phase crossover")
 
 
 @dataclass(frozen=True)

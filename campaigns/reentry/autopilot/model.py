@@ -5,7 +5,6 @@ short period about trim, I a'' = q S d [C_ma (a - offset) + C_mq d a' / (2 V)] +
 Both torques are limited.  The pitch gains follow the dynamic pressure.
 """
 
-from collections import namedtuple
 from types import SimpleNamespace
 
 import numpy as np
@@ -36,6 +35,7 @@ from mc_engine.model import (
     metrics,
     model,
     outputs,
+    prepared,
     states,
     time_of_maximum,
 )
@@ -108,10 +108,6 @@ Metrics = metrics(
     impulse_n_m_s="integral of the size of both torques",
     limited_share=Field("share of the time with a torque at its limit", unit=""),
     final_alpha_deg=at_end("alpha_deg", "angle of attack error at the end"),
-)
-Parameters = namedtuple(  # type: ignore[misc]
-    "Parameters",
-    (*Inputs._fields, "moment", "damping", "roll_moment", "inverse_pitch", "inverse_roll"),
 )
 
 
@@ -246,7 +242,7 @@ MODEL = model(
     outputs=Outputs,
     metrics=Metrics,
     clock=FixedStep("step", "duration"),
-    kernel_parameters=Parameters,
+    kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,
     initial=initial,
     rhs=rhs,

@@ -5,7 +5,6 @@ differ in their errors alone have one plan; with plan = "given" it is that of th
 """
 
 from collections import namedtuple
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -40,7 +39,7 @@ def planned_entry(settings: SimpleNamespace, world: World, entry: Entry, refusal
         return entry
     plain = SimpleNamespace(arrival=np.zeros_like(world.mu), speed_frame=settings.speed_frame)
     plan = entry_of(_inputs_of_plan(settings), plain, world, refusals)
-    return replace(entry, **{name: np.where(given, getattr(plan, name), getattr(entry, name)) for name in _OF_ENTRY})
+    return entry._replace(**{name: np.where(given, getattr(plan, name), getattr(entry, name)) for name in _OF_ENTRY})
 
 
 def _inputs_of_plan(settings: SimpleNamespace) -> SimpleNamespace:

@@ -5,10 +5,9 @@ by reversals.  Along it the differences (altitude, flight-path angle, range) at 
 the speed lost, and a backward Riccati equation gives the gains of the vertical share of the lift.
 """
 
-from dataclasses import dataclass
+from collections import namedtuple
 from functools import lru_cache
 from itertools import count
-from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -35,39 +34,16 @@ _KILOMETRE, _DEGREE = 1e3, np.pi / 180.0
 _SCALES = np.array([_KILOMETRE, _DEGREE, _KILOMETRE])
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Riccati weights in km, degrees, km: final S, running Q on the altitude, R on the vertical share of the lift."""
-
-    final: tuple[float, float, float]
-    altitude: float
-    control: float
-
-
+# Riccati weights in km, degrees, km: final S, running Q on the altitude, R on the vertical share of the lift
+Weights = namedtuple("Weights", "final altitude control")
 # with and without a term in the range
 RANGE_SET = Weights((1.0 / 5.0**2, 1.0 / 3.0**2, 1.0 / 2.0**2), 0.0, 4e-4)
 PROFILE_SET = Weights((1.0 / 5.0**2, 1.0 / 3.0**2, 0.0), 1e-11 * _KILOMETRE**2, 2e-3)
 
 
-@dataclass(frozen=True)
-class Reference:
-    """The path at the times t [s]; float64[n], SI.  speed, path over ground; axial: deceleration along the body axis.
-
-    drag : acceleration;  climb : rate of the altitude;  along : range;  lost : speed lost since FELT, 0 before
-    """
-
-    t: np.ndarray
-    r: np.ndarray
-    latitude: np.ndarray
-    speed: np.ndarray
-    path: np.ndarray
-    heading: np.ndarray
-    along: np.ndarray
-    lost: np.ndarray
-    altitude: np.ndarray
-    climb: np.ndarray
-    drag: np.ndarray
-    axial: np.ndarray
+# The path at the times t [s]; float64[n], SI.  speed, path: over ground; along: range; lost: speed lost since FELT, 0
+# before; climb: rate of the altitude; drag: acceleration; axial: deceleration along the body axis
+Reference = namedtuple("Reference", "t r latitude speed path heading along lost altitude climb drag axial")
 
 
 class Planner:
@@ -106,7 +82,7 @@ class Planner:
         return axial_coefficient(*self.forces(r, latitude, v), np.cos(self.plan.trim), np.sin(self.plan.trim))
 
     def motion(self, r, latitude, v, path, heading, share):
-        """Vinh's rates with a share of the lift in the vertical plane, the rate of the range, and the drag."""
+        """Vinh's rates with a share of the lift in the vertical plane, the rate of the range, and the drag; SI."""
         drag, lift = self.forces(r, latitude, v)
         g_in, g_north = (0.0 * r, 0.0 * r) if self.free else gravity(r, latitude, self.mu, self.j2)
         six = rates(r, latitude, v, path, heading, drag, lift * share, 0.0, g_in, g_north, self.rate)
@@ -210,12 +186,8 @@ def riccati_gains(lost: np.ndarray, a: np.ndarray, b: np.ndarray, weights: Weigh
     return np.einsum("ni,nij->nj", b, p) / weights.control / _SCALES
 
 
-class StoredReferences(NamedTuple):
-    """Index at which each case's reference path begins in the tables, and its range [m]; both 0 without one."""
-
-    start: np.ndarray
-    range: np.ndarray
-    tables: np.ndarray
+# index at which each case's reference path begins in the tables, and its range [m]; both 0 without one
+StoredReferences = namedtuple("StoredReferences", "start range tables")
 
 
 def stored_references(plans: Plan, asked: np.ndarray, first: int, refusals: Refusals) -> StoredReferences:
@@ -275,7 +247,7 @@ def _designed(plan: Plan) -> np.ndarray:
 def _write_path(out: np.ndarray, planner: Planner, path: Reference, weights: Weights) -> None:
     """Path and gains over the speed [m/s], and over the speed lost [m/s], SI."""
     part = steered_part(path)
-    steered = Reference(**{name: value[part] for name, value in vars(path).items()})
+    steered = Reference(*(column[part] for column in path))
     lost = steered.speed[0] - steered.speed
     gains = riccati_gains(lost, *linear_system(planner, steered), weights)
     columns = [steered.altitude, steered.path, steered.along, steered.drag, steered.climb, *gains.T]

@@ -4,20 +4,13 @@
 """
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from campaigns.reentry.model import MODEL
-from mc_engine.flight.chosen_cases import chosen_case, chosen_cases
+from campaigns.reentry.published.values import PLANAR
+from mc_engine.flight.flight import chosen_case, chosen_cases
 
-PLANAR: dict[str, Any] = {
-    "shape": "sphere",
-    "gravity": "point",
-    "rotating": False,
-    "speed_frame": "relative",
-    "planar": True,
-}
 SIGMA = {
     "entry_speed_error_m_s": 5.0,
     "entry_flight_path_angle_error_deg": 0.05,

@@ -14,7 +14,7 @@ from campaigns.reentry.critical_trajectories import critical_periapses
 from campaigns.reentry.guidance.apollo_final_phase import FLOWN
 from campaigns.reentry.model import MODEL
 from mc_engine.campaign.loading import load_campaign
-from mc_engine.flight.chosen_cases import chosen_case, chosen_cases, chosen_history
+from mc_engine.flight.flight import chosen_case, chosen_cases, chosen_history
 from mc_engine.physics.atmosphere import EXPONENTIALS, us76
 from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY
 from mc_engine.physics.frames import WGS84_RADIUS
@@ -23,8 +23,9 @@ from mc_engine.statistics.binomial import lower_bound, smallest_sample
 GROUND_DENSITY, SCALE_M = EXPONENTIALS["earth"]  # of the textbook atmosphere: kg/m^3, m
 EXACT: dict[str, Any] = {"tolerance": 1e-12}  # of an integration step, where a flight is compared with a closed form
 AT_REST: dict[str, Any] = {"shape": "sphere", "gravity": "point", "rotating": False}
-# a spherical Earth that does not turn, motion in the plane of the equator, textbook atmosphere
-TEXTBOOK: dict[str, Any] = AT_REST | {"speed_frame": "relative", "planar": True, "atmosphere": "exponential"}
+# a spherical Earth that does not turn, motion in the plane of the equator; with the textbook atmosphere
+PLANAR: dict[str, Any] = AT_REST | {"speed_frame": "relative", "planar": True}
+TEXTBOOK: dict[str, Any] = PLANAR | {"atmosphere": "exponential"}
 # P. N. Desai, G. D. Qualls, AIAA 2008-1198; the latitude, so that it comes down in Utah, is ours
 STARDUST: dict[str, Any] = {
     "vehicle": "sample_return",

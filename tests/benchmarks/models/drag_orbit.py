@@ -18,6 +18,7 @@ PERIGEE_AIR = (7.248e-11, 250e3, 45_546.0)
 # first states: a circular orbit of 59 degrees at 400 km; perigee of a transfer orbit of 7 degrees, 250 to 35786 km
 LOW_ORBIT = (6778e3, 0.0, 0.0, 0.0, 3950.0, 6574.0)
 TRANSFER_ORBIT = (6628e3, 0.0, 0.0, 0.0, 10086.0, 1238.0)
+RATES = (("x", "vx"), ("y", "vy"), ("z", "vz"))
 AXES = ("x_m", "y_m", "z_m", "vx_m_s", "vy_m_s", "vz_m_s")
 
 State = states(**{axis: f"inertial {axis[0]}" for axis in AXES})

@@ -1,6 +1,6 @@
 """A day in low orbit with J2 and drag, classical Runge-Kutta."""
 
 from mc_engine.model import FixedStep
-from tests.benchmarks.models.drag_orbit import LOW_ORBIT, low_rhs, orbit_model
+from tests.benchmarks.models.drag_orbit import LOW_ORBIT, RATES, low_rhs, orbit_model
 
-MODEL = orbit_model("low orbit", low_rhs, LOW_ORBIT, FixedStep("step", "duration"))
+MODEL = orbit_model("low orbit", low_rhs, LOW_ORBIT, FixedStep("step", "duration", rates=RATES))

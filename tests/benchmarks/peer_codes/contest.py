@@ -1,6 +1,7 @@
 """A contest: entrants on one problem, at equal error or at an equal step, flying in short turns one after the other.
 
-The shortest turn of each counts, so that other work on the machine disturbs little.
+The shortest turn of each counts, and in one thread its processor time, so that other work on the machine disturbs
+little.
 """
 
 import os
@@ -17,7 +18,8 @@ LONG = 0.4  # s: an entrant whose turn is longer has few of them
 class Result:
     """One line of the table.
 
-    time_us : of a case in one thread;  all_cores_us : of a case with a thread a core, None where threads do not help
+    time_us : of a case in one thread, processor time
+    all_cores_us : of a case with a thread a core, wall time, None where threads do not help
     times_engine : time over that of the engine's fastest form in this contest;  note : why there is no time
     """
 
@@ -65,9 +67,10 @@ class _Turns:
         """One more turn."""
         if self.entrant.once:
             self.flight = _build(self.entrant, self.value, self.threads, self.n)
-        begin = time.perf_counter()
+        clock = time.process_time if self.threads == 1 else time.perf_counter
+        begin = clock()
         self.flight()
-        self.last = time.perf_counter() - begin
+        self.last = clock() - begin
         self.best = min(self.best, self.last / self.n)
 
 

@@ -108,7 +108,8 @@ def _methods(name: str) -> dict[str, str]:
 
 def _with_multistep(models: dict[str, str]) -> dict[str, str]:
     """Models by method, with those of smooth arcs, which differ from RK4 by their clock alone."""
-    return models | {f"ABM{order}": models["RK4"] for order in range(8, 13)}
+    methods = [f"ABM{order}" for order in range(8, 13)] + [f"GJ{order}" for order in range(6, 11)]
+    return models | dict.fromkeys(methods, models["RK4"])
 
 
 @cache

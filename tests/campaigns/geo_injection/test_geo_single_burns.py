@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from geo_sequences import GEO, MASS, MU, PARKING, sequence
 
-from campaigns.geo_injection.avoidance import avoidance
 from campaigns.geo_injection.design.single_burn import Stage, circle, fly_shortest, rise_guess
 from campaigns.geo_injection.design.staged import Orbit, rising, staged
 from campaigns.geo_injection.published.burns import burn_s as published_burn_s
+from campaigns.geo_injection.published.values import avoidance
 
 SOURCE = {
     "planar, 2 burns": (2, 0.0, [(24_588, 0.7142, 0.0)]),

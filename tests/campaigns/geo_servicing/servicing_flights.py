@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from campaigns.geo_servicing.dynamics import State
+from mc_engine.flight.flight import prepare
 from tests.campaigns.model_flights import ModelFlights
 
 FLIGHTS = ModelFlights("campaigns.geo_servicing")
@@ -14,6 +16,14 @@ INSPECTION = {
     "phase": "inspection", "epoch_utc": "2019-12-11T00:00:00", "duration_days": 30.0, "sunlight": False,
     "navigation": "perfect", "assumed_pointing_deg": 1.0 / 6.0,
 }  # fmt: skip
+
+
+def first_states(**inputs):
+    """(state with mass of the servicing module, state of the target) as the kernel gets them, SI."""
+    numbers = prepare(MODEL, NOMINAL | inputs, 1).parameters[:, 0]
+    named = dict(zip(MODEL.kernel_parameters._fields, numbers, strict=True))
+    first = [named[name] for name in State._fields[:13]]
+    return np.array(first[:7]), np.array(first[7:])
 
 
 def normal(name, n, sigma, seed=2021):

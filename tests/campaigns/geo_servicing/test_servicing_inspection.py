@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from first_order import coast_time
 from procedure_twin import settled_ranges
-from servicing_flights import INSPECTION, MODEL, NOMINAL, fly_cases, fly_one, history
+from servicing_flights import INSPECTION, first_states, fly_cases, fly_one, history
 from servicing_twin import R0, RATE, SIDEREAL_DAY, Twin, elements
 
 from campaigns.geo_servicing.inspection import Relative, correction, wait_until
-from mc_engine.flight.flight import prepare
 
 EPOCH, DAY = 58828.0, 86_400.0
 FIVE_DAYS = {"duration_days": 5.0, "settle_time_days": 4.0}
@@ -54,14 +53,15 @@ def test_the_start_is_the_digests():
     assert seen["range_m"] == pytest.approx(7374.3, rel=1e-3)
     assert seen["relative_drift_m"] == pytest.approx(2369.7, rel=1e-3)
     assert seen["relative_eccentricity"] == pytest.approx(1e-5, rel=1e-3)
-    module, target = pair(prepare(MODEL, NOMINAL | INSPECTION, 1).parameters[:, 0])
+    module, target = pair(**INSPECTION)
     ahead = R0 * np.angle(np.exp(1j * (elements(module)[2] - elements(target)[2])))
     assert ahead == pytest.approx(-8046.9, rel=1e-3)
 
 
-def pair(parameters):
-    """State with mass of both craft from the kernel's parameters."""
-    return parameters[:7], np.append(parameters[7:13], 2500.0)
+def pair(**inputs):
+    """State with mass of both craft as the kernel gets them."""
+    module, target = first_states(**inputs)
+    return module, np.append(target, 2500.0)
 
 
 def relative(module, target):
@@ -80,7 +80,7 @@ def law(y, v, chi1=0.85, sigma=0.005):
 def twin_burns(count):
     """[(time [day], velocity change [m/s])] by the digest's procedure 6.3, flown by the twin."""
     twin, t, out = Twin(EPOCH), 0.0, []
-    module, target = pair(prepare(MODEL, NOMINAL | INSPECTION, 1).parameters[:, 0])
+    module, target = pair(**INSPECTION)
     while len(out) < count:
         y, v, _, alpha = relative(module, target)
         waits = []

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from servicing_flights import KEPLER, MODEL, NOMINAL, PUBLISHED, fly_cases, fly_one, history
+from servicing_flights import KEPLER, MODEL, PUBLISHED, first_states, fly_cases, fly_one, history
 from servicing_twin import RATE, SIDEREAL_DAY, Twin, elements, sidereal
 
-from mc_engine.flight.flight import prepare
 from mc_engine.model import load_model
 
 FREE = {"phase": "free", "navigation": "perfect"}
@@ -15,7 +14,7 @@ EPOCH, EQUINOX = 58484.5, 58560.5
 
 
 def first_state(**inputs):
-    return prepare(MODEL, NOMINAL | inputs, 1).parameters[:7, 0]
+    return first_states(**inputs)[0]
 
 
 def place(row):

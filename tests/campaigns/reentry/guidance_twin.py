@@ -25,7 +25,7 @@ class Stored:
         planner = Planner(plan)
         self.whole = whole = fly_reference(planner)
         part = steered_part(whole)
-        self.path = type(whole)(**{name: value[part] for name, value in vars(whole).items()})
+        self.path = type(whole)(*(column[part] for column in whole))
         lost = self.path.speed[0] - self.path.speed
         self.gains = riccati_gains(lost, *linear_system(planner, self.path), RANGE_SET)
 

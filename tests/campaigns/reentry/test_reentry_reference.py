@@ -49,7 +49,7 @@ def path(plan):
 
 def part_of(path):
     part = steered_part(path)
-    return type(path)(**{name: value[part] for name, value in vars(path).items()})
+    return type(path)(*(column[part] for column in path))
 
 
 SCENARIOS = {

@@ -13,7 +13,8 @@ Inputs = inputs(
 State = states(x=Field("x", unit=""))
 Memory = namedtuple("Memory", "z", defaults=(0.0,))
 Outputs = outputs(x=Field("x", unit=""))
-Metrics = metrics(**{name: Field(name, unit="") for name in ("ishigami", "sobol_g", "noise", "line", "raffle")})
+METRICS = ("ishigami", "sobol_g", "noise", "line", "raffle", "scaled")
+Metrics = metrics(**{name: Field(name, unit="") for name in METRICS})
 PI = 3.141592653589793
 
 
@@ -52,6 +53,7 @@ def evaluate(m, p):
         noise=m.z,
         line=p.x1 + p.x2 + 2.0 * p.x3 + m.z,
         raffle=sin(1e6 * p.ticket),
+        scaled=p.x1 * (1.0 + p.ticket),
     )
 
 

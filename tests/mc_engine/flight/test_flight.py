@@ -187,3 +187,21 @@ def test_another_clock_of_the_same_kind_flies_with_the_same_kernel(model):
     nominal = {item.name: item.default for item in (*model.parameters, *model.settings)}
     short = fly(model, nominal, np.array([0]), SEED, clock=replace(model.clock, until=model.clock.step))
     assert (short["status"][0], short["end_time_s"][0]) == ("no-stop", nominal["step_s"])
+
+
+def test_what_is_not_a_number_has_the_same_bits_whoever_computed_it(model, inputs, monkeypatch):
+    """0.0 / 0.0 has a sign on some processors and none on others."""
+
+    def kernel(*arguments):
+        time, status, state, metrics = arguments[-6:-2]
+        time[...], state[...], metrics[...], status[...] = -np.nan, -np.nan, -np.nan, 0.0
+        arguments[-2][:1] = 0.0
+        return 1  # row of a history
+
+    monkeypatch.setattr("mc_engine.flight.flight.build_kernel", lambda model, folder, width: kernel)
+    among = fly(model, chosen(inputs, np.arange(8)), np.arange(8), SEED)
+    alone, _ = fly_history(model, chosen(inputs, 0), 0, SEED)
+    for columns, n in ((among, 8), (alone, 1)):
+        numbers = [column for column in columns.values() if column.dtype == np.float64]
+        assert len(numbers) > 10
+        assert {column.tobytes() for column in numbers} == {np.full(n, np.nan).tobytes()}

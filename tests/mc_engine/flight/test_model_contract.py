@@ -145,3 +145,16 @@ def test_the_process_of_its_own_prints_the_sentences_last():
         capture_output=True, text=True, env=ENVIRONMENT, check=True,
     )  # fmt: skip
     assert json.loads(done.stdout.splitlines()[-1]) == []
+
+
+@pytest.mark.parametrize(("digests", "printed"), [("", False), ('{"`mu`": "another"}', True)])
+def test_the_process_that_waits_flies_nothing_before_it_gets_the_digests_of_the_other_one(digests, printed):
+    done = subprocess.run(
+        [sys.executable, "-m", "mc_engine.flight.contract_flight", "minimal", "--wait"],
+        input=digests, capture_output=True, text=True, env=ENVIRONMENT, check=True,
+    )  # fmt: skip
+    sentences = [json.loads(line) for line in done.stdout.splitlines()]
+    if printed:
+        assert "`mu` differs between two processes" in sentences[0][0]
+    else:
+        assert sentences == []

@@ -11,8 +11,9 @@ import pytest
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes import kernel_data, physics
-from mc_engine.lanes.block_search import blocks_in
 from mc_engine.lanes.compiler import compile_callable
+from mc_engine.lanes.composed import blocks_in
+from mc_engine.lanes.kernel_cache import Kernel
 from mc_engine.lanes.kernel_data import (
     Blocks,
     DataBlock,
@@ -62,10 +63,10 @@ def kernel_of(folder, one, other):
     """A kernel of the same source, name and cache whatever the numbers; what it is handed; and what it must give."""
     function, blocks = reading(one, other), Blocks(blocks_in([reading(one, other)]))
     names = {"BLOCKS": blocks, "inlined": function, "shared": compile_callable(function.function)}
-    module = new_module("mc_engine_test_kernel", folder / "kernel.py", KERNEL, **names)
+    made = new_module("mc_engine_test_kernel", folder / "kernel.py", KERNEL, **names).kernel
     at = PLACES.astype(int)
     wanted = 2.0 * (one.numbers[2 * at + 1] + 10.0 * one.numbers[2 * at + 2] + 100.0 * other.numbers[at])
-    return module.kernel, gathered(blocks.blocks), wanted
+    return Kernel(folder / "kernel.py", made.library), gathered(blocks.blocks), wanted
 
 
 @pytest.fixture
@@ -86,8 +87,9 @@ def test_the_same_machine_code_flies_other_data_in_turn_and_at_once(folder):
     for kernel, data, wanted in (first, second, first, second):
         kernel(PLACES, out, data)
         assert out.tolist() == wanted.tolist()
-    assert first[0].stats.cache_misses
-    assert second[0].stats.cache_hits  # so the second flew machine code that the first compiled
+    assert (first[0].compilations, first[0].loads) == (1, 0)
+    # the second flew machine code that the first compiled
+    assert (second[0].compilations, second[0].loads) == (0, 1)
 
     def fly(flight):
         kernel, data, wanted = flight
@@ -125,7 +127,7 @@ def test_another_process_takes_the_kernel_from_the_disk_with_data_of_its_own(fol
     kernel, data, wanted = kernel_of(Path({folder!r}), random_block(61), random_block(9))
     out = np.empty(N)
     kernel(PLACES, out, data)
-    assert kernel.stats.cache_hits and not kernel.stats.cache_misses
+    assert (kernel.compilations, kernel.loads) == (0, 1)
     assert out.tolist() == wanted.tolist()
     """
     text = textwrap.dedent(script).format(tests=str(__file__).rpartition("/")[0], folder=str(folder))
@@ -136,9 +138,9 @@ def test_another_process_takes_the_kernel_from_the_disk_with_data_of_its_own(fol
 def test_a_block_that_a_kernel_is_not_handed_is_refused_when_it_is_compiled(folder):
     names = {"BLOCKS": Blocks(()), "inlined": reading(random_block(16), random_block(7))}
     names["shared"] = names["inlined"]
-    kernel = new_module("mc_engine_test_kernel", folder / "kernel.py", KERNEL, **names).kernel
+    made = new_module("mc_engine_test_kernel", folder / "kernel.py", KERNEL, **names).kernel
     with pytest.raises(Exception, match="were not found by the names"):
-        kernel(PLACES, np.empty(N), gathered([]))
+        Kernel(folder / "kernel.py", made.library)(PLACES, np.empty(N), gathered([]))
 
 
 def test_blocks_are_found_wherever_physics_names_them_once_and_in_order():

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mc_engine.physics.frames import orbital_axes, turned
-from mc_engine.physics.orbital_elements import equinoctial
+from mc_engine.physics.orbital_elements import equinoctial, mean_anomaly, state_of_elements, true_anomaly
 
 MU = 3.986004415e14
 
@@ -70,3 +70,29 @@ def test_axes_turned_by_a_quarter_see_x_as_minus_y():
     assert turned(1.0, 0.0, 0.0, 1.0) == (0.0, -1.0)
     c, s = np.cos(0.3), np.sin(0.3)
     assert turned(np.cos(1.0), np.sin(1.0), c, s) == pytest.approx((np.cos(0.7), np.sin(0.7)))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(7e6, 1e8), st.floats(0.0, 0.8), st.floats(0.0, 3.1), angles, angles, angles)
+def test_the_state_of_elements_is_that_of_three_rotations(a, e, inclination, node, pericentre, eccentric):
+    place, velocity = classical_state(a, e, inclination, node, pericentre, eccentric)
+    anomaly = 2.0 * np.arctan2(np.sqrt(1 + e) * np.sin(0.5 * eccentric), np.sqrt(1 - e) * np.cos(0.5 * eccentric))
+    state = state_of_elements(a, e, inclination, node, pericentre, anomaly, MU)
+    assert state[:3] == pytest.approx(place, abs=1e-13 * a / (1.0 - e))
+    assert state[3:] == pytest.approx(velocity, abs=1e-13 * np.linalg.norm(velocity) / (1.0 - e))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.floats(0.0, 0.5), angles)
+def test_kepler_s_equation_goes_both_ways(e, eccentric):
+    mean = eccentric - e * np.sin(eccentric)
+    anomaly = 2.0 * np.arctan2(np.sqrt(1 + e) * np.sin(0.5 * eccentric), np.sqrt(1 - e) * np.cos(0.5 * eccentric))
+    assert mean_anomaly(anomaly, e) == pytest.approx(mean, abs=1e-14)
+    assert true_anomaly(mean, e) == pytest.approx(anomaly, abs=1e-13)
+    assert true_anomaly(mean + 4.0 * np.pi, e) == pytest.approx(anomaly, abs=1e-13)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 0.8, 0.95])
+def test_kepler_s_equation_is_solved_on_long_ellipses_too(e):
+    mean = np.concatenate([np.linspace(-np.pi, np.pi, 20_001)[1:-1], np.logspace(-12.0, 0.0, 1000)])
+    assert mean_anomaly(true_anomaly(mean, e), e) == pytest.approx(mean, abs=2e-14)

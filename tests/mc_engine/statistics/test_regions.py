@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 from scipy.stats import f
 
 from mc_engine.statistics.regions import (
@@ -78,3 +79,14 @@ def test_a_region_of_any_shape_is_smaller_than_the_ellipse_of_a_bent_cloud():
     ellipse = covariance_ellipses(points, (0.9,))[0]
     assert region.holds(corners).mean() < 0.8 * np.pi * np.prod(ellipse.semi_axes) / 26.0**2
     assert region.outlines[0][0] == pytest.approx(region.outlines[0][-1])
+
+
+def test_the_outline_of_a_thin_cloud_is_one_smooth_curve_at_its_sparse_end_too():
+    draw = np.random.Generator(np.random.Philox(key=3))
+    along = draw.exponential(1.0, 10_000)
+    points = np.column_stack([along, along + draw.normal(0.0, 0.02 + 0.05 * along)])
+    (region,) = density_regions(points, (0.9973,))
+    (outline,) = region.outlines
+    length = np.hypot(*np.diff(outline, axis=0).T).sum()
+    hull = ConvexHull(outline)
+    assert length < 1.1 * hull.area  # of a plane hull, the "area" is its circumference

@@ -40,13 +40,13 @@ def test_a_nominal_or_limit_far_from_all_cases_is_told_and_does_not_squeeze_them
     assert high - low < 1.1 * (bins(found)[0][-1] - bins(found)[0][0])
     assert "beyond" in panel["layout"]["title"]["text"]
     assert max(map(len, panel["layout"]["title"]["text"].split("<br>"))) <= 28  # else it is clipped
-    assert not {"nominal", "required limit"} & {key.text for key in drawing.key}
+    assert not {"nominal", "required limit"} & {mark.key for mark in drawing.key}
 
 
 def test_a_nominal_and_a_limit_near_the_cases_are_drawn():
     found, drawing = near_seven(7.0, (7.001,))
     assert told(found) == ""
-    assert {"nominal", "required limit"} <= {key.text for key in drawing.key}
+    assert {"nominal", "required limit"} <= {mark.key for mark in drawing.key}
     assert screen.specifications(drawing)[0]["layout"]["xaxis"]["range"][1] > 7.001
 
 

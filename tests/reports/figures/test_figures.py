@@ -1,6 +1,7 @@
 """The figures' data and their two drawings."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from synthetic_run import synthetic_run
 from reports.contents import build
 from reports.document.blocks import FigureBlock, blocks_of
 from reports.drawing import paper, screen
-from reports.drawing.marks import Axis, Plot, Points
+from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points
+from reports.drawing.palette import INK
 from reports.drawing.strokes import Frame, stroked
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
@@ -102,3 +104,26 @@ def _with_name(name):
         if one["name"] == "ve_pct":
             one["description"] = name
     return run
+
+
+@pytest.mark.parametrize("ends", [(0.413, 0.527), (1500.0, 5900.0), (7510.0, 7558.0), (54.0527245, 54.0527355)])
+@pytest.mark.parametrize("log", [False, True])
+def test_a_narrow_panel_has_at_least_two_ticks_on_its_axis(ends, log):
+    ends = (ends[0], ends[0] + 100.0 * (ends[1] - ends[0])) if log else ends
+    plot = Plot((), Axis("x", reach=ends, log=log, most=5), Axis("y"))
+    drawn = paper.svg(Drawing("f", (plot,), 1)), paper.svg(Drawing("f", (plot,) * 4, 4))
+    for svg, panels in zip(drawn, (1, 4), strict=True):
+        assert len(re.findall(r'text-anchor="middle">[−\d.·\u202f⁰¹²³⁴⁵⁶⁷⁸⁹]+</text>', svg)) >= 2 * panels
+
+
+def test_a_limit_among_numbers_that_differ_by_little_is_drawn_where_it_is():
+    plot = Plot((Limit(54.0527303, "x", INK, "limit"),), Axis(), Axis())
+    assert screen.specifications(Drawing("f", (plot,)))[0]["data"][0]["x"] == [54.0527303] * 9
+
+
+def test_a_key_shows_its_marks_in_the_colours_of_the_page_and_of_paper():
+    line = Line(np.arange(2.0), np.arange(2.0), INK, "a line", key='a "@ink" line')
+    drawing = Drawing("f", (Plot((line,), Axis(), Axis()),))
+    assert 'stroke="var(--ink)"' in paper.page_swatch(drawing.key[0])
+    assert '"@ink' not in paper.svg(drawing)
+    assert "&quot;@ink&quot;" in paper.svg(drawing)

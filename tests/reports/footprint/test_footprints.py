@@ -38,7 +38,7 @@ def sentences(document):
 
 def impact_points(document):
     """Cases that came down, as the figure's key counts them."""
-    return int(blocks(document, FigureBlock)[0].drawing.key[0].text.split(" of ")[0].replace("\u202f", ""))
+    return int(blocks(document, FigureBlock)[0].drawing.key[0].key.split(" of ")[0].replace("\u202f", ""))
 
 
 def file(document, name):
@@ -49,7 +49,7 @@ def test_the_drawing_counts_the_cases_that_came_down(document):
     drawing = blocks(document, FigureBlock)[0].drawing
     table = landing_run().table
     down = int((table["end_altitude_km"] < 30.0).sum())
-    assert drawing.key[0].text.startswith(f"{down} of 1\u202f000 cases")
+    assert drawing.key[0].key.startswith(f"{down} of 1\u202f000 cases")
     above = int((table["end_altitude_km"] > 30.0).sum())
     assert f"{above} cases ended above 30\u202fkm" in blocks(document, FigureBlock)[0].caption
 

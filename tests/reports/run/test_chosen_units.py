@@ -94,3 +94,12 @@ def test_a_single_case_is_drawn_over_time_in_the_unit_of_its_label(slow):
     times = record["histories"]["-1"]["force_n"][0]
     own = slow.history.loc[slow.history["case_id"] == -1, "t_s"].max()
     assert max(np.frombuffer(b64decode(times["bdata"]), times["dtype"])) == pytest.approx(own / 86400.0, rel=1e-6)
+
+
+def test_two_runs_over_one_another_have_the_units_of_the_first():
+    first, second = (Flown(synthetic_run(50), name) for name in "ab")
+    metric = next(fact.name for fact in first.with_role("metric") if fact.unit == "m")
+    second.every.table[metric] *= 1e6
+    assert ShownRun(second).unit(metric) == "km"
+    shown = ShownRun(first)
+    assert ShownRun(second, like=shown).unit(metric) == shown.unit(metric) != "km"

@@ -83,7 +83,7 @@ def test_a_report_draws_bands_with_the_nominal_and_the_two_worst(drawing):
     assert [plot.quantity for plot in plots] == ["semi_major_axis_error_km", "eccentricity_error", "force_n"]
     lines = [mark.name for mark in histories_drawing.plots[0].marks if isinstance(mark, Line)]
     assert (len(lines), lines[0], lines[-1]) == (4, "median of them", "nominal")
-    texts = [entry.text for entry in histories_drawing.key]
+    texts = [mark.key for mark in histories_drawing.key]
     assert "2.5\u202f% to 97.5\u202f% of 60 saved cases" in texts  # 60 cases support no percentile farther out
     assert "smallest to largest of 60 saved cases" in texts
     filled = [trace for trace in screen.specifications(histories_drawing)[0]["data"] if trace.get("fill") == "toself"]

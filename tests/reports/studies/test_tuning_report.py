@@ -45,10 +45,10 @@ def test_the_front_is_drawn_with_every_candidate_and_the_published_points(record
     drawing = front_of(document)
     (front,) = marks_of(drawing, Points, "front")
     np.testing.assert_array_equal(np.column_stack([front.x, front.y]), record.front[["cost", "error"]])
-    keys = [entry.text for entry in drawing.key]
+    keys = [mark.key for mark in drawing.key]
     assert sum(int(text.split()[0]) for text in keys if "candidates" in text and text[0].isdigit()) == 300
     assert {"Table 8", "Table 9"} <= set(keys)
-    assert any("front: " in entry.text for entry in drawing.key)
+    assert any("front: " in mark.key for mark in drawing.key)
     low, high = drawing.plots[0].x.reach
     assert low < -0.9 < 0.9 < high
 
@@ -76,8 +76,8 @@ def test_infeasibility_is_stated_with_the_least_violation_and_never_hidden(infea
     assert infeasible.verdicts[0].answer == "out of reach"
     assert infeasible.verdicts[0].tone == "bad"
     drawing = front_of(infeasible)
-    assert not any("feasible candidates" in entry.text for entry in drawing.key)
-    assert any("constraints are left out" in entry.text for entry in drawing.key)
+    assert not any("feasible candidates" in mark.key for mark in drawing.key)
+    assert any("constraints are left out" in mark.key for mark in drawing.key)
     assert len(table(infeasible, "The least violation found").rows) == 1
     assert table(infeasible, "Published points").rows[0][-2].small == "outside a constraint"
 

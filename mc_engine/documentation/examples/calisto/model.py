@@ -2,16 +2,13 @@
 
 Vehicle, motor, curves and equations of motion are those of RocketPy 1.13 (G. H. Ceotto et al., J. Aerosp. Eng. 34(6),
 2021, doi 10.1061/(ASCE)AS.1943-5525.0001331; thrust.csv and drag.csv are from its repository, MIT licence), so that
-flights can be compared.  As there, places of nozzle and centre of mass on the axis count from the centre of dry mass to
-the tail, those of nose, fins and tail cone to the nose.  Axes: x east, y north, z up from sea level; z of the body to
-the nose.
+flights can be compared.  As there, places of nozzle and propellant count to the nose where they are towards the tail,
+and `free` changes two terms.  Axes: x east, y north, z up from sea level; z of the body to the nose.
 """
 
-from math import atan, cos, pi, radians, sin
+from math import cos, pi, radians, sin
 
-import numpy as np
-
-from mc_engine.lanes import acos, maximum, minimum, physics, sqrt, where
+from mc_engine.lanes import maximum, physics, replace, where
 from mc_engine.model import (
     AdaptiveStep,
     Event,
@@ -28,49 +25,32 @@ from mc_engine.model import (
     time_of,
     value_at,
 )  # fmt: skip
+from mc_engine.physics.aerodynamics import fins_lift_area, lift_of_part, parachute_acceleration
 from mc_engine.physics.air import us76_air
+from mc_engine.physics.constants import EARTH_RATE
 from mc_engine.physics.curves import curve, wind_profile
+from mc_engine.physics.gravity import normal_gravity
+from mc_engine.physics.rigid_body import Propellant, Rocket, rocket_accelerations, solid_propellant
 from mc_engine.physics.rotations import Quaternion, derivative, euler_sequence, transformed, transformed_back
 from mc_engine.physics.vectors import Vector, added, cross, norm, scaled, subtracted
 
 # ---- the vehicle, SI: masses, places on the axis from the tail, radii
 LATITUDE, ELEVATION, RAIL = radians(32.990254), 1400.0, 3.8632  # length of the rail above the upper button
+OMEGA = Vector(0.0, EARTH_RATE * cos(LATITUDE), EARTH_RATE * sin(LATITUDE))
 RADIUS, BODY_MASS, MOTOR_DRY_MASS, NOZZLE = 0.0635, 14.426, 1.815, -1.255
-AREA = pi * RADIUS**2
-BURN, GRAINS, DENSITY, OUTER, INNER, HEIGHT, GAP = 3.9, 5, 1815.0, 0.033, 0.015, 0.12, 0.005
 PROPELLANT, DRY_MOTOR = NOZZLE + 0.397, NOZZLE + 0.317  # centres of mass
 I_BODY, I_MOTOR, I_AXIAL = 6.321, 0.125, 0.034 + 0.002
 NOSE, FINS, TAIL = 1.278 - 0.279145, -1.04956 - 0.055, -1.194656 - 0.028130841121495328  # centres of pressure
-NOSE_LIFT, TAIL_LIFT = 2.0, 2.0 * ((0.0435 / RADIUS) ** 2 - 1.0)  # slopes of the lift coefficients
-SPAN, ROOT, TIP = 0.1, 0.12, 0.04
-SLENDER = 4.0 * SPAN / (ROOT + TIP) / cos(atan(0.5 * (ROOT - TIP) / SPAN))  # aspect ratio over cosine of the sweep
-BY_BODY = 2.0 * (1.0 + RADIUS / (SPAN + RADIUS))  # lift of the four fins over that of one alone
-JET = 0.5 * 0.033**2  # gyration of the nozzle's jet [m^2]
-S2, EARTH_RATE = sin(LATITUDE) ** 2, 7.292115e-5
-GROUND = 9.7803253359 * (1.0 + 1.931852652458e-3 * S2) / (1.0 - 6.694379990141e-3 * S2) ** 0.5  # eq. 4-1
-FALL = 2.0 / 6378137.0 * (1.0 + 3.352810665e-3 + 3.449786506841e-3 - 2.0 * 3.352810665e-3 * S2)
-OMEGA = Vector(0.0, EARTH_RATE * cos(LATITUDE), EARTH_RATE * sin(LATITUDE))
+AREA, SPAN, ROOT, TIP = pi * RADIUS**2, 0.1, 0.12, 0.04  # of reference; of the fins
+NOSE_LIFT, TAIL_LIFT = 2.0 * AREA, 2.0 * ((0.0435 / RADIUS) ** 2 - 1.0) * AREA  # by the angle of attack
 
-
-# ---- the motor: hollow cylinders that burn inside and at both ends; what the thrust needs of them is burnt
 THRUST = curve("thrust.csv", x="time_s", y="thrust_n")
 DRAG = curve("drag.csv", x="mach", y="cd")
-T = np.linspace(0.0, BURN, 3901)  # holds all points of the thrust curve
-FULL = GRAINS * DENSITY * pi * (OUTER**2 - INNER**2) * HEIGHT
-IMPULSE = np.concatenate([[0.0], np.cumsum(0.5 * (THRUST(T)[1:] + THRUST(T)[:-1]) * np.diff(T))])
-EXHAUST = IMPULSE[-1] / FULL  # speed [m/s], constant
-LEFT = FULL - IMPULSE / EXHAUST
-_BURNT = np.linspace(0.0, OUTER - INNER, 100_001)  # depth
-_RADIUS = INNER + np.interp(FULL - LEFT, FULL - GRAINS * DENSITY * pi * (OUTER**2 - (INNER + _BURNT) ** 2)
-                            * (HEIGHT - 2.0 * _BURNT), _BURNT)  # fmt: skip
-_LENGTH = HEIGHT - 2.0 * (_RADIUS - INNER)
-_ACROSS = LEFT * (0.25 * (OUTER**2 + _RADIUS**2) + _LENGTH**2 / 12.0 + 10.0 * (HEIGHT + GAP) ** 2 / GRAINS)
-_AXIAL = LEFT * 0.5 * (OUTER**2 + _RADIUS**2)
-MASS, ACROSS, AXIAL = (curve(x=T, y=values, kind="cubic") for values in (LEFT, _ACROSS, _AXIAL))
-ACROSS_RATE, AXIAL_RATE = (curve(x=T, y=np.gradient(values, T)) for values in (_ACROSS, _AXIAL))
-FLOW_RATE = curve(x=T[:-1] + 0.0005, y=-np.diff(THRUST(T)) / np.diff(T) / EXHAUST, kind="nearest")  # kg/s^2
+BURN, EMPTY = 3.9, Propellant(*7 * (0.0,))
+propellant = solid_propellant(THRUST, BURN, number=5, density=1815.0, outer=0.033, inner=0.015, length=0.12, gap=0.005)
+wind = wind_profile("wind.csv", "altitude_m", "north_m_s", "east_m_s")
+rail_attitude, _ = euler_sequence("313")
 
-# ---- what is uncertain, what is flown, what is looked at
 Inputs = inputs(
     body_mass_kg=Parameter(BODY_MASS, "mass without motor", low=5.0, high=50.0),
     thrust_factor=Parameter(1.0, "thrust over that of the curve", low=0.5, high=1.5, unit=""),
@@ -101,20 +81,18 @@ Metrics = metrics(
     landing_north_m=at_end("north_m", "landing place, north"),
     landing_speed_m_s=at_end("sink_m_s", "sink speed at the ground"),
 )
-rail_attitude, _ = euler_sequence("313")
-wind = wind_profile("wind.csv", "altitude_m", "north_m_s", "east_m_s")
+STILL = State(*13 * (0.0,))
 
 
 @physics
 def initial(p):
     q = rail_attitude(-p.heading, p.inclination - 0.5 * pi, 0.0)
-    return State(east=0.0, north=0.0, altitude=ELEVATION, ve=0.0, vn=0.0, vu=0.0, q0=q.q0, q1=q.q1, q2=q.q2, q3=q.q3,
-                 wx=0.0, wy=0.0, wz=0.0)  # fmt: skip
+    return replace(STILL, altitude=ELEVATION, q0=q.q0, q1=q.q1, q2=q.q2, q3=q.q3)
 
 
 @physics
-def gravity(h):  # WGS 84 normal gravity [m/s^2] above the ellipsoid (NIMA TR8350.2, eq. 4-3)
-    return GROUND * (1.0 - FALL * h + 3.0 / 6378137.0**2 * h * h)
+def weight(s):  # [m/s^2]
+    return Vector(0.0, 0.0, -normal_gravity(sin(LATITUDE) ** 2, s.altitude))
 
 
 @physics
@@ -124,16 +102,16 @@ def flow(s, p):  # (air, velocity of the air against the rocket [m/s])
 
 
 @physics
-def dry(p):  # (mass [kg], centre [m], inertia across about it) without propellant
+def dry(p):  # the rocket without propellant, and its centre of mass behind that of the body
     m = p.body_mass + MOTOR_DRY_MASS
     centre = MOTOR_DRY_MASS * DRY_MOTOR / m
-    return m, centre, I_BODY + p.body_mass * centre * centre + I_MOTOR + MOTOR_DRY_MASS * (DRY_MOTOR - centre) ** 2
+    across = I_BODY + p.body_mass * centre * centre + I_MOTOR + MOTOR_DRY_MASS * (DRY_MOTOR - centre) ** 2
+    return Rocket(m, across, I_AXIAL, PROPELLANT - centre, NOZZLE - centre, jet=0.5 * 0.033**2), centre
 
 
 @physics
 def point(s, a):  # derivative of the state without rotation; a : acceleration [m/s^2]
-    return State(east=s.ve, north=s.vn, altitude=s.vu, ve=a.x, vn=a.y, vu=a.z, q0=0.0, q1=0.0, q2=0.0, q3=0.0,
-                 wx=0.0, wy=0.0, wz=0.0)  # fmt: skip
+    return replace(STILL, east=s.ve, north=s.vn, altitude=s.vu, ve=a.x, vn=a.y, vu=a.z)
 
 
 @physics
@@ -142,109 +120,58 @@ def slide(t, s, p):  # along the rail; held until the thrust lifts
     q, v = Quaternion(s.q0, s.q1, s.q2, s.q3), norm(stream)
     drag = 0.5 * air.density * v * v * AREA * p.drag_factor * DRAG(v / air.speed_of_sound)
     nose = transformed_back(q, Vector(0.0, 0.0, 1.0))
-    a = (p.thrust_factor * THRUST(t) - drag) / (dry(p)[0] + MASS(t)) - nose.z * gravity(s.altitude)
+    a = (p.thrust_factor * THRUST(t) - drag) / (dry(p)[0].mass + propellant(t).mass) + nose.z * weight(s).z
     return point(s, scaled(maximum(a, 0.0), nose))
 
 
 @physics
-def lift(air, stream, w, place, slope):  # (force, moment about the centre of dry mass) of one surface
-    own = Vector(stream.x - w.y * place, stream.y + w.x * place, stream.z)
-    speed, across = norm(own), sqrt(own.x * own.x + own.y * own.y)
-    alpha = where(across > 0.0, acos(minimum(-own.z / speed, 1.0)), 0.0)
-    k = 0.5 * air.density * speed * speed * AREA * slope * alpha / where(across > 0.0, across, 1.0)
-    return Vector(k * own.x, k * own.y, 0.0), Vector(-place * k * own.y, place * k * own.x, 0.0)
+def loads(p, air, stream, w, centre, thrust):  # (force, moment) in body axes: axial force, lift of three parts
+    mach, speed = norm(stream) / air.speed_of_sound, norm(stream)
+    fins = fins_lift_area(mach, 4, SPAN, ROOT, TIP, RADIUS)
+    f1, m1 = lift_of_part(air.density, stream, w, NOSE - centre, NOSE_LIFT)
+    f2, m2 = lift_of_part(air.density, stream, w, FINS - centre, fins)
+    f3, m3 = lift_of_part(air.density, stream, w, TAIL - centre, TAIL_LIFT)
+    drag = 0.5 * air.density * speed * speed * AREA * p.drag_factor * DRAG(mach)
+    return added(added(f1, f2), Vector(f3.x, f3.y, thrust - drag)), added(added(m1, m2), m3)
 
 
 @physics
-def fin_slope(mach):  # of one fin: F. W. Diederich, NACA TN 2335, with Prandtl and Glauert's factor
-    beta = sqrt(where(mach < 0.8, 1.0 - mach * mach, where(mach < 1.1, 0.36, mach * mach - 1.0)))
-    f = SLENDER * beta
-    return 4.0 * pi * SPAN * SPAN / AREA / (2.0 + sqrt(f * f + 4.0))
-
-
-@physics
-def loads(s, p, air, stream, w):  # (force, moment) of the air in body axes: drag along the axis, lift of three surfaces
-    centre, speed = dry(p)[1], norm(stream)
-    drag = 0.5 * air.density * speed * speed * AREA * p.drag_factor * DRAG(speed / air.speed_of_sound)
-    f1, m1 = lift(air, stream, w, NOSE - centre, NOSE_LIFT)
-    f2, m2 = lift(air, stream, w, FINS - centre, BY_BODY * fin_slope(speed / air.speed_of_sound))
-    f3, m3 = lift(air, stream, w, TAIL - centre, TAIL_LIFT)
-    force = added(added(f1, f2), f3)
-    return Vector(force.x, force.y, -drag), added(added(m1, m2), m3)
-
-
-@physics
-def moved(s, q, w, push, turn):  # derivative of the state from the acceleration [m/s^2, body] and the angular one
-    v = Vector(s.ve, s.vn, s.vu)
+def free(s, p, fuel, thrust):  # six degrees of freedom
+    air, stream = flow(s, p)
+    q, v, w = Quaternion(s.q0, s.q1, s.q2, s.q3), Vector(s.ve, s.vn, s.vu), Vector(s.wx, s.wy, s.wz)
+    rocket, centre = dry(p)
+    force, moment = loads(p, air, transformed(q, stream), w, centre, thrust)
+    undamped = 0.75 * fuel.rate * rocket.nozzle**2  # RocketPy's jet takes a quarter of this away with the rotation
+    moment = Vector(moment.x - undamped * w.x, moment.y - undamped * w.y, moment.z)
+    push, turn = rocket_accelerations(rocket, fuel, w, force, moment, transformed(q, weight(s)))
+    lever = -2.0 * rocket.propellant * fuel.mass / (rocket.mass + fuel.mass)  # not mirrored in RocketPy
+    push = Vector(push.x + lever * turn.y, push.y - lever * turn.x, push.z)
     a, d = subtracted(transformed_back(q, push), scaled(2.0, cross(OMEGA, v))), derivative(q, w)
     return State(east=v.x, north=v.y, altitude=v.z, ve=a.x, vn=a.y, vu=a.z, q0=d.q0, q1=d.q1, q2=d.q2, q3=d.q3,
                  wx=turn.x, wy=turn.y, wz=turn.z)  # fmt: skip
 
 
 @physics
-def burn(t, s, p):  # six degrees of freedom with a motor that loses mass
-    air, stream = flow(s, p)
-    q, w = Quaternion(s.q0, s.q1, s.q2, s.q3), Vector(s.wx, s.wy, s.wz)
-    body, centre, across = dry(p)
-    fuel, rate, nozzle, arm = MASS(t), -THRUST(t) / EXHAUST, centre - NOZZLE, centre - PROPELLANT
-    m = body + fuel
-    r = arm * fuel / m  # of the centre of mass; its second derivative is left out, as in RocketPy: 0.4 m of the apogee
-    dr = arm * rate * body / (m * m)
-    i, axial = across + ACROSS(t) + fuel * arm * arm, I_AXIAL + AXIAL(t)
-    jet = rate * (0.5 * JET + 0.25 * nozzle * nozzle) - ACROSS_RATE(t) - rate * arm * arm
-    thrust = p.thrust_factor * THRUST(t) - 2.0 * rate * dr + FLOW_RATE(t) * (nozzle - r)
-    sway = 2.0 * rate * (nozzle - r) - 2.0 * m * dr
-    weight = transformed(q, Vector(0.0, 0.0, -m * gravity(s.altitude)))
-    force, moment = loads(s, p, air, transformed(q, stream), w)
-    fx = force.x + weight.x + w.y * sway - m * r * w.x * w.z
-    fy = force.y + weight.y - w.x * sway - m * r * w.y * w.z
-    fz = force.z + weight.z + thrust + m * r * (w.x * w.x + w.y * w.y)
-    turn = Vector(((i - axial) * w.y * w.z + jet * w.x + moment.x + r * (fy - weight.y)) / (i - m * r * r),
-                  ((axial - i) * w.x * w.z + jet * w.y + moment.y - r * (fx - weight.x)) / (i - m * r * r),
-                  (rate * JET * w.z - AXIAL_RATE(t) * w.z + moment.z) / axial)  # fmt: skip
-    return moved(s, q, w, Vector(fx / m + r * turn.y, fy / m - r * turn.x, fz / m), turn)
+def burn(t, s, p):
+    return free(s, p, propellant(t), p.thrust_factor * THRUST(t))
 
 
 @physics
-def coast(s, p):  # six degrees of freedom of the empty rocket
-    air, stream = flow(s, p)
-    q, w = Quaternion(s.q0, s.q1, s.q2, s.q3), Vector(s.wx, s.wy, s.wz)
-    m, _, i = dry(p)
-    force, moment = loads(s, p, air, transformed(q, stream), w)
-    pull = transformed(q, Vector(0.0, 0.0, -gravity(s.altitude)))
-    gyro = (i - I_AXIAL) * w.z
-    turn = Vector((gyro * w.y + moment.x) / i, (moment.y - gyro * w.x) / i, moment.z / I_AXIAL)
-    return moved(s, q, w, added(scaled(1.0 / m, force), pull), turn)
+def coast(s, p):
+    return free(s, p, EMPTY, 0.0)
 
 
 @physics
-def hang(s, p, phase):  # a point under a parachute, which takes half a sphere of air along
-    (air, stream), m = flow(s, p), dry(p)[0]
+def hang(s, p, phase):  # a point under a parachute
+    air, stream = flow(s, p)
     area = where(phase.main > 0.5, p.main_area, p.drogue_area)
-    moving = m + 2.0 / 3.0 * pi * air.density * sqrt(area / (1.4 * pi)) ** 3
-    pull = scaled(0.5 * air.density * area * norm(stream) / moving, stream)
-    a = subtracted(pull, scaled(2.0, cross(OMEGA, Vector(s.ve, s.vn, s.vu))))
-    return point(s, Vector(a.x, a.y, a.z - m / moving * gravity(s.altitude)))
+    a = parachute_acceleration(air.density, stream, dry(p)[0].mass, area, -weight(s).z)
+    return point(s, subtracted(a, scaled(2.0, cross(OMEGA, Vector(s.ve, s.vn, s.vu)))))
 
 
 @physics
 def left_rail(s):  # beyond the end of the rail [m^2]
     return s.east * s.east + s.north * s.north + (s.altitude - ELEVATION) ** 2 - RAIL * RAIL
-
-
-@physics
-def burnt(t):
-    return t - BURN
-
-
-@physics
-def climb(s):
-    return s.vu
-
-
-@physics
-def above_main(s):
-    return height(s) - 800.0
 
 
 @physics
@@ -258,14 +185,16 @@ def observe(s):
 
 
 LANDING = {"ground": Event(height, "falling", "stop")}
+APOGEE = Event(physics(lambda s: s.vu), "falling", to="drogue", after="drogue_lag")
+MAIN = Event(physics(lambda s: height(s) - 800.0), "falling", to="main", after="main_lag")
 MODEL = model(
     name="calisto", title="Calisto from the rail to the ground", inputs=Inputs, states=State, outputs=Outputs,
     metrics=Metrics, clock=AdaptiveStep(until=2000.0, rtol=1e-6, atol=1e-6), initial=initial, observe=observe,
     phases={
         "rail": Phase(slide, events={"rail_exit": Event(left_rail, "rising", to="powered")}),
-        "powered": Phase(burn, events={"burn_out": Event(burnt, "rising", to="coast")}),
-        "coast": Phase(coast, events={"apogee": Event(climb, "falling", to="drogue", after="drogue_lag"), **LANDING}),
-        "drogue": Phase(hang, events={"main": Event(above_main, "falling", to="main", after="main_lag"), **LANDING}),
+        "powered": Phase(burn, events={"burn_out": Event(physics(lambda t: t - BURN), "rising", to="coast")}),
+        "coast": Phase(coast, events={"apogee": APOGEE, **LANDING}),
+        "drogue": Phase(hang, events={"main": MAIN, **LANDING}),
         "main": Phase(hang, events=LANDING),
     },
 )  # fmt: skip

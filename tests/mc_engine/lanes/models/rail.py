@@ -7,6 +7,7 @@ from mc_engine.model import Event, Field, FixedStep, Parameter, Setting, inputs,
 
 Inputs = inputs(
     rate_rad_s=Parameter(0.0, "angular frequency of the spring"),
+    damping_1_s=Parameter(0.0, "friction over mass and speed", unit="1/s"),
     gravity_m_s2=Parameter(0.0, "acceleration downwards"),
     x0_m=Parameter(0.0, "first place"),
     v0_m_s=Parameter(0.0, "first speed"),
@@ -38,7 +39,7 @@ def initial(p):
 
 @physics
 def rhs(s, p):
-    return State(x=s.v, v=-p.gravity - p.rate * p.rate * s.x)
+    return State(x=s.v, v=-p.gravity - p.rate * p.rate * s.x - p.damping * s.v)
 
 
 @physics

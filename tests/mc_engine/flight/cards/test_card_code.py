@@ -1,0 +1,102 @@
+"""The code of a card's threads: the processor's operations, no more and no fewer roundings, and the same bits.
+
+None of this was run on a card.  Held here: the code assembles for each kind of card, holds no contracted operation, and
+compiled for the processor gives the bits of the engine's own kernel.
+"""
+
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+from assembler import assembled, ptxas
+from processor_twin import ProcessorTwin
+from shipped_kernels import NAMES, OFTEN, kernel_call
+
+from mc_engine.errors import EngineError
+from mc_engine.flight.card_code import CAPABILITIES, PER_CASE, TRIPLE, choices_of_bits, ptx_of, thread_code
+
+CASES = 8
+CAMPAIGNS = [name if name in OFTEN else pytest.param(name, marks=pytest.mark.slow) for name in NAMES]
+_LANES = re.compile(r"call (?:<(\d+) x )?double>? @llvm\.fma\.")
+_EXTREMES = re.compile(r"^\s*(?:min|max)\.f64\s+(%\w+),", re.MULTILINE)
+
+
+@cache
+def code_of(name):
+    """(call of the campaign's kernel, code of its threads)."""
+    call = kernel_call(name, CASES)
+    return call, thread_code(call.func, call.args)
+
+
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_on_the_processor_the_code_gives_the_bits_of_the_kernel(name):
+    call, code = code_of(name)
+    call()
+    twin = list(call.args)
+    for index in PER_CASE[2:]:
+        twin[index] = np.full_like(call.args[index], -7.0)
+    ProcessorTwin(code).fly_call(twin)
+    for index in PER_CASE[2:]:
+        assert twin[index].tobytes() == call.args[index].tobytes()
+
+
+@pytest.mark.parametrize("capability", CAPABILITIES)
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_cards_round_where_the_processor_rounds(name, capability):
+    """Every fma is the source's own; a minimum, which orders zeros, is used only where their sign does not count."""
+    _, code = code_of(name)
+    ptx = ptx_of(code, capability)
+    assert len(re.findall(r"\bfma\.rn\.f64", ptx)) == sum(int(lanes or 1) for lanes in _LANES.findall(code))
+    assert not re.search(r"\b(?:mad|fma)\.(?!rn\.f64|lo\.)|\.approx|\.ftz", ptx)
+    for register in _EXTREMES.findall(ptx):
+        used = [line for line in ptx.splitlines() if re.search(rf"{register}\b", line)]
+        assert [line.split()[0].split(".")[0] for line in used] in (["max", "setp"], ["min", "setp"])
+
+
+@pytest.mark.skipif(ptxas() is None, reason="ptxas is not installed: pip install nvidia-cuda-nvcc-cu12")
+@pytest.mark.parametrize("capability", CAPABILITIES)
+@pytest.mark.parametrize("name", CAMPAIGNS)
+def test_the_code_assembles(name, capability):
+    _, code = code_of(name)
+    assert 0 < assembled(ptx_of(code, capability), capability).registers <= 255
+
+
+def test_the_code_is_the_same_in_every_process():
+    """The driver keeps what it has compiled by its text, so the text holds no address."""
+    _, code = code_of("minimal")
+    ptx = ptx_of(code, CAPABILITIES[0])
+    assert "part_" in code
+    assert not re.search(r"_ZN|x7f[0-9a-f]{10}", ptx)
+
+
+@pytest.mark.parametrize("operation", ["fdiv afn float %x, %y", "call afn float @llvm.sqrt.f32(float %x)"])
+def test_an_operation_without_a_rounding_is_an_error(operation):
+    loose = f"""
+target triple = "{TRIPLE}"
+declare float @llvm.sqrt.f32(float)
+define float @loose(float %x, float %y) {{
+  %z = {operation}
+  ret float %z
+}}
+"""
+    with pytest.raises(EngineError, match=r"wrote (?:div|sqrt)\.approx\S* without a rounding, which"):
+        ptx_of(loose, CAPABILITIES[0])
+
+
+ZEROS = f"""
+target triple = "{TRIPLE}"
+define ptx_kernel void @zeros(ptr %x, ptr %z) {{
+  %v = load double, ptr %x
+  %below = fcmp olt double %v, 0.0
+  %least = select i1 %below, double %v, double 0.0
+  store double %least, ptr %z
+  ret void
+}}
+"""
+
+
+def test_the_back_end_takes_a_choice_for_a_minimum():
+    """Why choices are made between bits: a card's minimum of -0.0 and 0.0 is -0.0, and the source's choice is 0.0."""
+    assert "min.f64" in ptx_of(ZEROS, CAPABILITIES[0])
+    assert "min.f64" not in ptx_of(choices_of_bits(ZEROS), CAPABILITIES[0])
