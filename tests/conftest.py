@@ -59,6 +59,7 @@ DEEP = (
     "mc_engine/lanes/test_gauss_jackson.py",
     "mc_engine/lanes/test_missing_numbers.py::test_a_case_is_not_finite",
     "mc_engine/lanes/test_multistep.py",
+    "mc_engine/lanes/test_multistep_flights.py",
     "mc_engine/lanes/test_phases.py::test_a_delay",
     "mc_engine/lanes/test_phases.py::test_an_action",
     "mc_engine/lanes/test_phases.py::test_bytes_depend_on_no_width_chunk_thread_or_order[",

@@ -21,6 +21,9 @@ class CompiledFlyer(Flyer):
     It needs neither `log` nor `keep`: a chunk takes seconds at most, and leaves no files.
     """
 
+    _width: int | None = None  # what is fastest for the model
+    _build: flight.Builder | None = None  # the processor's kernel
+
     def __init__(self, campaign: Campaign):
         self._campaign = campaign
         self._model, self._folder, self._seed = compiled_model(campaign.model), campaign.directory, campaign.seed
@@ -34,7 +37,9 @@ class CompiledFlyer(Flyer):
         keep: Path | None = None,
         stopped: Callable[[], bool] = never,
     ) -> Columns:
-        return flight.fly(self._model, inputs, noise, self._seed, folder=self._folder)
+        return flight.fly(
+            self._model, inputs, noise, self._seed, folder=self._folder, width=self._width, build=self._build
+        )
 
     def history(self, inputs: Inputs, noise: int, rows: int, alone: bool = False) -> tuple[Columns, Columns]:
         width = 1 if alone else None

@@ -5,9 +5,8 @@ Every kernel has a small source file of its own, in a folder named by the digest
 wherever they lie.
 """
 
-import os
-import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from hashlib import sha256
@@ -20,7 +19,7 @@ from mc_engine.cache_folder import cache_folder
 from mc_engine.errors import DiskError, ModelError
 from mc_engine.flight.kernel_key import Recorder, kernel_key
 from mc_engine.flight.kernel_parts import Functions, parts_of, second_order_of
-from mc_engine.lanes.kernel_cache import Form, Kernel
+from mc_engine.lanes.kernel_cache import Form, Kernel, replace_file
 from mc_engine.lanes.runge_kutta_pairs import PAIRS
 from mc_engine.model.fields import AdaptiveStep, FixedStep, uses_rates
 from mc_engine.model.imports import new_module
@@ -190,20 +189,18 @@ def _template(clock: FixedStep | AdaptiveStep) -> str:
 
 
 def _write_source(path: Path, text: bytes) -> None:
-    """Write the source of a kernel, unless it is there; DiskError with the folder's variable where the disk refuses.
+    """Write the source of a kernel, unless it is there; DiskError with the folder's variable where no folder can be.
 
-    It is for people, and for messages of the compiler: what runs is `text`.
+    It is for people, and for messages of the compiler: what runs is `text`, also where the disk refuses the file.
     """
     try:
-        if path.exists() and path.read_bytes() == text:
-            return
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}")
-        temporary.write_bytes(text)
-        os.replace(temporary, path)
     except OSError as error:
         raise DiskError(f"{path.parent}: {error.strerror or error}; compiled kernels are kept there, name another "
                         "folder in MC_ENGINE_CACHE") from error  # fmt: skip
+    with suppress(OSError):
+        if not path.exists() or path.read_bytes() != text:
+            replace_file(path, text)
 
 
 # ---- what a kernel takes beside the cases

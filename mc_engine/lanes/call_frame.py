@@ -12,6 +12,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.callconv import CPUCallConv, excinfo_ptr_t
+from numba.core.compiler import Flags
 from numba.core.cpu import CPUContext
 
 from mc_engine.errors import ModelError
@@ -98,6 +99,18 @@ class _Context(CPUContext):
         if isinstance(ty, types.Dispatcher):
             return ir.Constant(self.get_value_type(ty), None)
         return super().get_constant_generic(builder, ty, val)
+
+    def _compile_subroutine_no_cache(
+        self, builder: Any, impl: Any, sig: Any, locals: Any = None, flags: Any = None
+    ) -> Any:
+        """Called by numba for functions of its own inside of ours, such as 1 / x of a negative power.
+
+        numba would let them raise where x is zero, which lanes cannot: a case is to be the same alone and among others.
+        """
+        if flags is None:
+            flags = Flags()
+            flags.error_model = "numpy"
+        return super()._compile_subroutine_no_cache(builder, impl, sig, locals, flags)
 
 
 def calling_by(calls: type[_SharedSlot], context: Any) -> None:

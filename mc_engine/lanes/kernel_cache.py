@@ -37,7 +37,7 @@ _OF_PYTHON = {float: "float64", int: "int64"}
 _ARRAYS = {1: "[]", 2: "[,]"}
 _DIGEST_BYTES = 32
 ENDED_WITH_ERROR = (
-    "the compiled physics ended with an error, such as 0.0 to the power of a negative whole number in one case alone; "
+    "the compiled physics ended with an error; physics computes numbers and raises nothing. "
     "`mc-engine debug FILE --case N` flies a case line by line"
 )
 
@@ -209,13 +209,14 @@ def save(path: Path, content: bytes) -> None:
     """Keep a compiled kernel; a warning with the folder where the disk refuses."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        _replace(path, _digest(path, content) + content)
+        replace_file(path, _digest(path, content) + content)
     except OSError as error:
         what = "compiled kernels cannot be kept there, and will be compiled again; make room, or name another folder in"
         _warn(path.parent, _reason(error), f"{what} MC_ENGINE_CACHE")
 
 
-def _replace(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file of the cache, as a whole or not at all; OSError where the disk refuses."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}")
     try:
         temporary.write_bytes(content)

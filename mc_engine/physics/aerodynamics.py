@@ -73,7 +73,7 @@ def parachute_acceleration(density, stream, mass, area, gravity):
     """Acceleration [m/s^2] of a mass [kg] under an open parachute, which takes half a sphere of air along.
 
     stream : velocity of the air against it [m/s], z up;  area : drag area [m^2], of a drag coefficient of 1.4;
-    gravity : down.  G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021.
+    gravity : down [m/s^2].  As RocketPy 1.13 has it (G. H. Ceotto et al., J. Aerosp. Eng. 34(6), 2021).
     """
     moving = mass + 2.0 / 3.0 * pi * density * sqrt(area / (1.4 * pi)) ** 3
     pull = scaled(0.5 * density * area * norm(stream) / moving, stream)

@@ -19,7 +19,6 @@ import numpy as np
 
 from mc_engine.errors import EngineError, ModelError
 from mc_engine.extras import how_to_install
-from mc_engine.flight import flight
 from mc_engine.flight.card_code import (
     CAPABILITIES,
     ENTRY,
@@ -32,11 +31,9 @@ from mc_engine.flight.card_code import (
     words_of,
 )
 from mc_engine.flight.compiled import CompiledFlyer
-from mc_engine.flight.flyer import Columns, Inputs, never
 from mc_engine.flight.kernel import build_kernel
 from mc_engine.lanes.kernel_cache import ENDED_WITH_ERROR
 from mc_engine.model.record import Model
-from mc_engine.store.case_rows import RowLog
 
 # ---- the driver
 
@@ -213,23 +210,16 @@ def _at(address: int, like: np.ndarray) -> np.ndarray:
 # ---- flights
 
 
-class CardFlyer(CompiledFlyer):
-    """A compiled model, one case a thread.  Time histories and the nominal fly on the processor."""
-
-    def fly(
-        self,
-        inputs: Inputs,
-        noise: np.ndarray,
-        log: RowLog | None = None,
-        keep: Path | None = None,
-        stopped: Callable[[], bool] = never,
-    ) -> Columns:
-        return flight.fly(self._model, inputs, noise, self._seed, folder=self._folder, width=1, build=_card_kernel)
-
-
 def _card_kernel(model: Model, folder: Path | None, width: int) -> Callable[..., int]:
     """What is called in place of the model's kernel, with its arguments; it fills the same arrays."""
     return partial(_fly_on_card, build_kernel(model, folder, width))
+
+
+class CardFlyer(CompiledFlyer):
+    """A compiled model, one case a thread.  Time histories and the nominal fly on the processor."""
+
+    _width = 1
+    _build = staticmethod(_card_kernel)
 
 
 def _fly_on_card(kernel: Any, *arguments: Any) -> int:

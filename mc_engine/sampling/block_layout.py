@@ -28,6 +28,11 @@ class BlockLayout:
         """Rows of a block."""
         return len(self.groups) + 2 + len(self.repeated) + len(self.held)
 
+    @property
+    def n_drawn(self) -> int:
+        """Rows, the first ones, in which no group is at its nominal values."""
+        return self.size - len(self.held)
+
     def points(self, group: str) -> np.ndarray:
         """int64[size]: the point, A, B or C, that each row takes the group from, or NOMINAL."""
         points = np.full(self.size, A)
@@ -43,7 +48,7 @@ class BlockLayout:
 
     def without(self, group: str) -> tuple[int, int]:
         """Rows with the group as drawn, and at its nominal values."""
-        return 0, self.size - len(self.held) + self.held.index(group)
+        return 0, self.n_drawn + self.held.index(group)
 
     def in_common(self, group: str) -> list[tuple[int, int]]:
         """Pairs of rows that have the group alone in common."""

@@ -65,7 +65,7 @@ def pick_freeze(layout: BlockLayout, case_ids: np.ndarray, metrics: Mapping[str,
         y = np.asarray(values, dtype=np.float64)[rows]
         y = y[np.isfinite(y).all(axis=1)]
         n_used[k] = len(y)
-        scaled = _scaled(y, y[:, : layout.size - len(layout.held)])
+        scaled = _scaled(y, y[:, : layout.n_drawn])
         if len(y) < FEWEST_BLOCKS or scaled is None:
             continue
         for g, group in enumerate(layout.groups):

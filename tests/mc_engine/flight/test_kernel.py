@@ -18,7 +18,6 @@ from mc_engine.campaign.loading import SHIPPED
 from mc_engine.errors import DiskError
 from mc_engine.flight import kernel
 from mc_engine.flight.flight import fly
-from mc_engine.lanes import kernel_cache
 from mc_engine.model import load_model
 
 FALL = """
@@ -215,7 +214,7 @@ def test_a_full_disk_of_the_cache_is_told_and_the_cases_fly(tmp_path, monkeypatc
 
     (tmp_path / "model.py").write_text(fall(4.0))
     monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(kernel_cache, "_replace", full)
+    monkeypatch.setattr(Path, "write_bytes", full)
     assert speed(tmp_path, "model.py") == 72.0
     (told,) = [record.getMessage() for record in caplog.records if record.name == "mc_engine"]
     assert told.startswith(str(tmp_path / "cache"))

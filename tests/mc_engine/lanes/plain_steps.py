@@ -1,8 +1,12 @@
 """Steps over Python floats, for the twins of multistep methods, and the cases that they fly."""
 
+from dataclasses import replace
+
 import numpy as np
+from flown_models import OSCILLATOR
 
 from mc_engine.lanes.functions import fma
+from mc_engine.lanes.philox import Draws, noise_key
 from mc_engine.lanes.runge_kutta_pairs import DOP853
 
 RANDOM = np.random.default_rng(4)
@@ -41,3 +45,31 @@ def dop853(rhs, t, h, s):
         end = ahead(s, h, weighted(row.values(), [slopes[stage] for stage in row], nothing))
         slopes.append(rhs(t + node * h, end))
     return ahead(s, h, weighted(DOP853.weights.values(), [slopes[stage] for stage in DOP853.weights], nothing))
+
+
+def by(model, method):
+    """The model with a multistep method in place of its own."""
+    rates = (model.clock.rates or (("x", "v"),)) if method.startswith("gj") else ()
+    return replace(model, clock=replace(model.clock, method=method, rates=rates))
+
+
+def twin(steps, case, seed, h, inputs):
+    """End state [m, m/s] of one case of the oscillator by a plain loop of steps h over Python floats.
+
+    steps : of a method: steps.restart(), and steps.advance(rhs, step, h, s), the state at the end of one
+    """
+    row = {parameter.name: parameter.default for parameter in OSCILLATOR.parameters}
+    row |= {name: float(value[case]) for name, value in inputs.items() if np.ndim(value)}
+    p = OSCILLATOR.kernel_parameters(*(row[item.name] * item.si_factor for item in OSCILLATOR.parameters))
+    s, m = OSCILLATOR.initial(p, None), OSCILLATOR.start(p, None)
+    for step in range(int(np.ceil(inputs["until_s"] / h))):
+        t, sample = step * h, step / inputs["every"]
+        if sample.is_integer():
+            m = OSCILLATOR.control(t, s, m, p, None, Draws(noise_key(seed), float(case), sample))
+            steps.restart()
+
+        def rhs(t, s, m=m):
+            return OSCILLATOR.rhs(t, s, m, p, None)
+
+        s = steps.advance(rhs, step, h, s)
+    return s

@@ -6,6 +6,7 @@ Not run on a card.  The stand-in keeps the driver's rules, and flies the very co
 import inspect
 import re
 import sys
+from contextlib import nullcontext
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
@@ -19,6 +20,8 @@ from mc_engine.campaign.loading import load_campaign
 from mc_engine.command_line.commands import app
 from mc_engine.errors import CampaignError, EngineError, ModelError
 from mc_engine.flight.flight import fly
+from mc_engine.lanes.compiler import compile_kernel
+from mc_engine.lanes.kernel_cache import Kernel
 from mc_engine.model import load_model
 from mc_engine.runner import backends, cards, runner
 from mc_engine.runner.backends import Backend
@@ -171,7 +174,7 @@ def rhs(p):
 
 @physics
 def observe(s, o):
-    return Outputs(q=QUANTITY)
+    return Outputs(q=s.v * 2.5 ** o.k)
 
 
 MODEL = model(
@@ -181,25 +184,31 @@ MODEL = model(
 """
 
 
-def falling(folder, quantity):
-    """(model that computes this quantity, its inputs for three cases, the second of which begins at rest)."""
-    (folder / "model.py").write_text(FALL.replace("QUANTITY", quantity))
-    gravity = np.array([9.5, 9.0, 9.25])
-    return load_model("model.py", folder), {"gravity_m_s2": gravity, "k": 1.37}
+def erring(parameters, settings, data, key, cases, time, status, state, metrics, history, stride):
+    """A kernel that cannot fly case 7: no physics that is compiled raises, so it is written by hand."""
+    if cases[0] == 7.0:
+        raise ValueError
+    time[0], status[0], state[0, 0], metrics[0, 0] = cases[0], 0.0, 0.0, 0.0
+    return 0
 
 
-def test_a_flight_that_ends_with_an_error_ends_the_run_as_on_the_processor(tmp_path, monkeypatch):
+def test_a_flight_that_ends_with_an_error_is_told_as_on_the_processor(tmp_path, monkeypatch):
     install(monkeypatch, FakeDriver())
-    model, inputs = falling(tmp_path, "s.v ** -2")
-    for build in (cards._card_kernel, None):
-        with pytest.raises(ModelError, match="the compiled physics ended with an error"):
-            fly(model, inputs, np.arange(3), 1, folder=tmp_path, width=1, build=build)
+    kernel = Kernel(tmp_path / "kernel.py", compile_kernel(erring).library)
+    for cases in (np.array([3.0, 4.0]), np.array([3.0, 7.0])):
+        time, results = np.zeros(2), [np.zeros(2), np.zeros((1, 2)), np.zeros((1, 2))]
+        data = np.zeros((1, 2)), np.zeros(1), np.zeros(1, dtype=np.uint64), np.uint64(1)
+        with pytest.raises(ModelError, match="physics ended with an error") if 7.0 in cases else nullcontext():
+            cards._fly_on_card(kernel, *data, cases, time, *results, np.zeros((0, 0)), 1)
+        assert time[0] == 3.0
+        assert (time[1] == cases[1]) == (7.0 not in cases)
 
 
 def test_what_a_card_cannot_compute_is_named(tmp_path, monkeypatch):
     """Asked to write it, LLVM would end the process."""
     install(monkeypatch, FakeDriver())
-    model, inputs = falling(tmp_path, "s.v * 2.5 ** o.k")
+    (tmp_path / "model.py").write_text(FALL)
+    model, inputs = load_model("model.py", tmp_path), {"gravity_m_s2": np.array([9.5, 9.0, 9.25]), "k": 1.37}
     with pytest.raises(EngineError, match="physics calls pow on plain numbers, which a card has not"):
         fly(model, inputs, np.arange(3), 1, folder=tmp_path, width=1, build=cards._card_kernel)
 

@@ -1,0 +1,79 @@
+"""Flights by multistep methods: bytes at every width and in any company, histories, stops and events."""
+
+import math
+
+import numpy as np
+import pytest
+from flown_models import FOLDER, OSCILLATOR, RAIL, flown, same_bytes
+from plain_steps import MIXED, by
+
+from mc_engine.flight.flight import fly_history, fly_interpreted
+from mc_engine.flight.interpreted import InterpretedFlight
+
+
+@pytest.mark.parametrize("method", ["abm11", "gj8"])
+def test_a_case_keeps_its_bytes_at_every_width_in_any_order_and_company(method):
+    model = by(OSCILLATOR, method)
+    whole = flown(model, **MIXED)
+    for width in (1, 16):
+        same_bytes(whole, flown(model, width=width, **MIXED))
+    order = np.random.default_rng(1).permutation(21)
+    shuffled = {name: value[order] if np.ndim(value) else value for name, value in MIXED.items()}
+    back = np.argsort(order)
+    same_bytes(whole, {name: row[back] for name, row in flown(model, case_ids=order, **shuffled).items()})
+    few = {name: value[10:13] if np.ndim(value) else value for name, value in MIXED.items()}
+    same_bytes({name: row[10:13] for name, row in whole.items()}, flown(model, case_ids=[10, 11, 12], **few))
+
+
+@pytest.mark.parametrize("method", ["abm10", "gj7"])
+def test_a_flight_by_python_and_a_history_give_the_bits_of_the_kernel(method):
+    model = by(OSCILLATOR, method)
+    inputs = {item.name: item.default for item in (*OSCILLATOR.parameters, *OSCILLATOR.settings)}
+    inputs |= {name: value[4] if np.ndim(value) else value for name, value in MIXED.items()}
+    columns, history = fly_history(model, inputs, 4, 1, folder=FOLDER)
+    same_bytes(columns, {name: row[4:5] for name, row in flown(model, **MIXED).items()})
+    assert history["t_s"][-1] == columns["end_time_s"][0]
+    assert history["x_km"][-1] == columns["end_x_km"][0]
+    time, _, states, _ = fly_interpreted(InterpretedFlight(model), inputs, 4, 1)
+    assert (time[0], states[0, 0] / 1e3, states[1, 0]) == tuple(
+        columns[name][0] for name in ("end_time_s", "end_x_km", "end_v_m_s")
+    )
+
+
+@pytest.mark.parametrize("method", ["abm11", "gj8"])
+def test_a_stop_is_found_to_the_last_digits(method):
+    columns = flown(by(RAIL, method), rate_rad_s=1.0, x0_m=1.0, end_m=-0.3, step_s=0.05)
+    assert columns["end_time_s"][0] == pytest.approx(math.acos(-0.3), abs=1e-13)
+    assert columns["end_x_m"][0] == pytest.approx(-0.3, abs=1e-13)
+
+
+@pytest.mark.parametrize("method", ["abm11", "gj8"])
+def test_each_bounce_of_a_bead_comes_at_its_time_and_with_its_height(method):
+    # half periods of a spring between bounces at the middle, each with 0.8 of the speed; a gate between changes nothing
+    bead = {"rate_rad_s": 1.0, "x0_m": 1.0, "wall_m": 0.0, "restitution": 0.8, "last_s": 9.0}
+    columns = flown(by(RAIL, method), **bead, gate_s=[2.0, 1e9], step_s=0.05)
+    assert columns["bounces"].tolist() == [3.0, 3.0]
+    assert columns["bounced_at_s"] == pytest.approx(2.5 * math.pi, abs=1e-12)
+    assert columns["end_x_m"] == pytest.approx(0.8**3 * math.sin(9.0 - 2.5 * math.pi), abs=1e-12)
+    assert columns["gates"].tolist() == [1.0, 0.0]
+
+
+@pytest.mark.parametrize("method", ["abm11", "gj8"])
+def test_cases_with_events_keep_their_bytes_at_every_width(method):
+    n = 30
+    random = np.random.default_rng(11)
+    mixed = {
+        "rate_rad_s": random.uniform(0.0, 1.0, n),
+        "gravity_m_s2": random.uniform(0.0, 3.0, n),
+        "x0_m": random.uniform(0.0, 5.0, n),
+        "wall_m": np.where(np.arange(n) % 3 == 0, -1e9, -1.0),
+        "restitution": random.uniform(0.2, 1.0, n),
+        "gate_s": random.uniform(0.0, 12.0, n),
+        "end_m": np.where(np.arange(n) % 3 == 0, -0.5, -1e9),
+        "last_s": np.where(np.arange(n) % 7 == 0, 1e9, random.uniform(0.5, 9.5, n)),
+    }
+    eight = flown(by(RAIL, method), **mixed)
+    assert {"ok", "no-stop"} <= set(eight["status"])
+    same_bytes(eight, flown(by(RAIL, method), width=1, **mixed))
+    alone = flown(by(RAIL, method), case_ids=[7], **{name: value[7] for name, value in mixed.items()})
+    same_bytes(alone, {name: row[7:8] for name, row in eight.items()})
