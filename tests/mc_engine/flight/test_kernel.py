@@ -7,6 +7,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +21,7 @@ from mc_engine.campaign.loading import SHIPPED
 from mc_engine.errors import DiskError
 from mc_engine.flight import kernel
 from mc_engine.flight.flight import fly
+from mc_engine.lanes import kernel_cache
 from mc_engine.model import load_model
 
 FALL = """
@@ -206,6 +210,20 @@ def test_a_file_of_the_cache_that_was_cut_costs_a_compilation_and_no_flight(fold
         path.write_bytes(path.read_bytes()[:100])
     assert in_another_process(folder)["speed"] == 18.0
     assert in_another_process(folder)["hits"] == 1
+
+
+def test_threads_may_write_the_same_file_of_the_cache_at_once(tmp_path, monkeypatch):
+    replace, both = os.replace, threading.Barrier(2)
+
+    def together(source, target):
+        both.wait(10.0)
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", together)
+    with ThreadPoolExecutor(2) as threads:
+        list(threads.map(partial(kernel_cache.replace_file, tmp_path / "a.kernel"), [b"first", b"other"]))
+    assert (tmp_path / "a.kernel").read_bytes() in (b"first", b"other")
+    assert [path.name for path in tmp_path.iterdir()] == ["a.kernel"]
 
 
 def test_a_full_disk_of_the_cache_is_told_and_the_cases_fly(tmp_path, monkeypatch, caplog):

@@ -1,15 +1,11 @@
 """Candidates flown side by side: the same as each alone, nominal or over the same dispersed cases."""
 
-import os
-import time
-
 import numpy as np
 import pytest
 from apogee_tuning import apogee_and_speed, apogee_campaign
 
 from mc_engine.campaign.cases import case_table
 from mc_engine.flight.chunks import fly_cases
-from mc_engine.flight.kernel import build_kernel
 from mc_engine.studies.candidates import cases_per_candidate, fly_candidates
 
 CHOICES = np.array([[300.0, 100.0], [250.0, 60.0], [600.0, 200.0], [400.0, 150.0], [200.0, 50.0]])
@@ -35,20 +31,6 @@ def test_candidates_fly_alike_alone_together_and_by_two_threads():
         rows = [row for row in together.limited.tolist() if row in scores.limited.tolist()]
         assert rows == scores.limited.tolist()
     assert cases_per_candidate(campaign, campaign.tuning) == 11
-
-
-def test_threads_that_find_no_kernel_yet_do_not_write_it_together(tmp_path, monkeypatch):
-    replace = os.replace
-
-    def slowly(source, target):
-        time.sleep(0.3)
-        replace(source, target)
-
-    monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path))
-    monkeypatch.setattr("mc_engine.flight.kernel.os.replace", slowly)
-    build_kernel.cache_clear()
-    choices = np.tile(CHOICES, (8, 1))
-    assert scores_of(apogee_campaign(), choices, workers=2).failed.tolist() == [0] * 40
 
 
 @pytest.mark.parametrize(("limit", "rank"), [("at_least", 2), ("at_most", 1)])
