@@ -17,6 +17,7 @@ from mc_engine.interruption import in_another_thread
 from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
+from mc_engine.model.designs import designing
 from mc_engine.model.fields import AdaptiveStep, FixedStep, Parameter, Setting
 from mc_engine.model.preparation import call_prepare
 from mc_engine.model.reading import place_of
@@ -199,7 +200,9 @@ def _settings_of(model: Model, codes: tuple[float, ...]) -> Any:
     chosen = settings_class(model)
     if model.tables is None:
         return chosen(*codes)
-    return chosen(*codes, np.ascontiguousarray(model.tables(chosen(*codes, np.empty(0))), dtype=np.float64))
+    with designing():
+        tables = model.tables(chosen(*codes, np.empty(0)))
+    return chosen(*codes, np.ascontiguousarray(tables, dtype=np.float64))
 
 
 def _kernel_settings(model: Model, codes: np.ndarray, chosen: Any) -> np.ndarray:

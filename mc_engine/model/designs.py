@@ -7,8 +7,9 @@ import dataclasses
 import io
 import platform
 import sys
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -25,6 +26,7 @@ from mc_engine.model.sources import sources_beside, sources_of_module
 
 _ENGINE = Path(__file__).parents[1]
 _DIGEST_BYTES = 32
+_one_at_a_time = threading.RLock()  # a design may ask for another
 
 
 def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
@@ -52,7 +54,8 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
         kept = read_file(path)
         if kept[:_DIGEST_BYTES] == sha256(kept[_DIGEST_BYTES:]).digest():
             return np.asarray(np.load(io.BytesIO(kept[_DIGEST_BYTES:]), allow_pickle=False))
-    designed = design(*inputs)
+    with designing():
+        designed = design(*inputs)
     with io.BytesIO() as file:
         np.save(file, designed, allow_pickle=False)
         content = file.getvalue()
@@ -60,6 +63,19 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
         make_folder(path.parent)
         write_durably(path, sha256(content).digest() + content)
     return designed
+
+
+@contextmanager
+def designing() -> Iterator[None]:
+    """Let designs be computed one at a time, with one thread for linear algebra.
+
+    OpenBLAS shares its sums among threads.  That changes the last digits, an optimizer enlarges them, and machines that
+    differ in their cores or their environment would fly different bits.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with _one_at_a_time, threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def _sources(module: str) -> str:

@@ -1,12 +1,18 @@
 """A design is computed once for the same inputs and sources, and again after a change or where its file is damaged."""
 
 import doctest
+import subprocess
+import sys
+import time
 from collections import namedtuple
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from small_run import ENVIRONMENT
 
 from mc_engine.campaign.loading import SHIPPED
 from mc_engine.model import designs, kept_design, load_model
@@ -43,6 +49,45 @@ def test_the_second_time_it_is_read_with_the_same_bits(folder):
     first = kept_design(doubled, INPUTS)
     assert kept_design(doubled, INPUTS).tobytes() == first.tobytes() == (2.0 * INPUTS).tobytes()
     assert len(calls) == 1
+
+
+THREADS = """
+import numpy as np
+from concurrent.futures import ThreadPoolExecutor
+from threadpoolctl import threadpool_info
+from mc_engine.model import kept_design
+
+def threads_of_blas(number):
+    if number > 0.0:
+        kept_design(threads_of_blas, -number)
+    return np.array([library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"])
+
+with ThreadPoolExecutor(2) as pool:
+    designed = list(pool.map(lambda number: kept_design(threads_of_blas, number), (1.0, 2.0, 3.0)))
+print(*np.concatenate(designed), "then", *threads_of_blas(0.0))
+"""
+
+
+def test_designs_have_one_thread_of_blas_each_and_give_back_what_was_there(tmp_path):
+    (tmp_path / "threads.py").write_text(THREADS)
+    chosen = ENVIRONMENT | {"OPENBLAS_NUM_THREADS": "2", "MKL_NUM_THREADS": "2", "MC_ENGINE_CACHE": str(tmp_path)}
+    command = [sys.executable, tmp_path / "threads.py"]
+    told = subprocess.run(command, env=chosen, capture_output=True, text=True, check=True).stdout
+    inside, after = told.split(" then ")
+    assert {*inside.split()} == {"1"}
+    assert {*after.split()} == {"2"}
+
+
+def test_threads_design_one_after_the_other(folder):
+    def alone(number):
+        calls.append(number)
+        time.sleep(0.1)
+        assert calls[-1] == number
+        return np.zeros(1)
+
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(partial(kept_design, alone), (1.0, 2.0)))
+    assert len(calls) == 2
 
 
 def test_inputs_that_differ_are_designed_apart(folder):
