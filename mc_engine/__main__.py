@@ -24,6 +24,8 @@ def main() -> None:
     install_handlers()  # before the rest is loaded, which takes longest
     for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(library, "1")  # for small matrices its threads cost more than they gain
+    # or pydantic reads the metadata of all installed packages; also in processes that the engine starts
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     catch_all()
     refuse_small_memory()
     with clean_streams():

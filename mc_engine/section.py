@@ -20,7 +20,7 @@ Share = Annotated[float, Field(gt=0.0, lt=1.0), AfterValidator(_not_an_end)]
 class Section(BaseModel):
     """A table of the campaign file: unknown keys, values of another type and infinite numbers are errors."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False, frozen=True, defer_build=True)
 
 
 class ReportSection(Section):

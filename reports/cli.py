@@ -1,6 +1,7 @@
 """What `mc-engine report RUN...` does: read the runs or tunings, build the contents, write the files."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from mc_engine.store.derived_files import FIGURES, derived_files
@@ -61,10 +62,11 @@ def write_reports(
     path = Path(run_path)
     document = _document(path, Path(template) if template else None, [Path(other) for other in beside])
     written, kept = [], derived_files(path)
-    for name in dict.fromkeys(formats):
-        files = FORMATS[name](document)
-        kept.write({file.name: file.content for file in files}, alone_in=FIGURES if files[1:] else None)
-        written.append(path / files[0].name)
+    wanted = [FORMATS[name] for name in dict.fromkeys(formats)]
+    with ThreadPoolExecutor() as pool:  # typst, which makes the PDF, leaves the interpreter to the others
+        for files in pool.map(lambda render: render(document), wanted):
+            kept.write({file.name: file.content for file in files}, alone_in=FIGURES if files[1:] else None)
+            written.append(path / files[0].name)
     if "json" not in formats:
         kept.write({JSON: render_json(document)})
     if document.files:

@@ -69,7 +69,8 @@ def _chapters(flown: Flown, landing: FootprintContents) -> Iterator[Section]:
     yield _section("maps", "Maps", map_blocks(flown), "part")
     yield _section("levels", "Comparison of options", level_blocks(flown), "part")
     yield _section("histories", "Time histories", [*profile_blocks(flown), *history_blocks(flown)])
-    yield _section("scatter", "Scatter and footprint", scatter_blocks(flown))
+    scatters = "Scatter and footprint" if landing.blocks else "Scatter plots"
+    yield _section("scatter", scatters, scatter_blocks(flown))
     yield _section("footprint", "Footprint", landing.blocks, "part")
     yield _section("corridor", "Corridor", corridor_blocks(flown), "part")
     yield _section(CASES, "Cases by outcome", case_blocks(flown), "part")

@@ -14,10 +14,10 @@ Outputs = outputs(
     a_error_km="semi-major axis, flown less desired",
     e_error=Field("eccentricity, flown less desired", unit=""),
     omega_error_deg="argument of perigee, flown less desired",
-    a_remaining_pct="error of the semi-major axis in its first value",
-    e_remaining_pct="error of the eccentricity in its first value",
-    omega_remaining_pct="error of the argument of perigee in its first value",
-    unsettled_pct="largest of the three remaining errors, without sign",
+    a_remaining_pct="error of the semi-major axis relative to its first value",
+    e_remaining_pct="error of the eccentricity relative to its first value",
+    omega_remaining_pct="error of the argument of perigee relative to its first value",
+    unsettled_pct="largest magnitude of the three remaining errors",
     force_n="size of the thrust",
     force_radial_n="thrust along the desired radius",
     force_transverse_n="thrust along the desired transverse direction",
@@ -35,17 +35,17 @@ Metrics = metrics(
     propellant_kg=Field("propellant of the correction, from S", low=0.0),
     peak_force_n=maximum_of("force_n", "largest thrust", smooth=False, low=0.0),  # clipped and pulsed, it has corners
     settling_time_s=Field(
-        "last time with the error of a, e or omega above 1 % of its first value; none if so at entry",
+        "last time with the error of a, e or omega above 1 % of its first value; no number if one is above it at entry",
         sometimes=True,
         low=0.0,
     ),
-    **{f"overshoot_{of}_pct": Field(f"largest error of {of} beyond zero, in its first value", low=0.0)
+    **{f"overshoot_{of}_pct": Field(f"largest error of {of} beyond zero, relative to its first value", low=0.0)
        for of in ("a", "e", "omega")},
     max_position_error_m=maximum_of("position_error_m", "largest distance from the desired place", low=0.0),
-    max_position_error_time_s=Field("when that was, after the nominal burn", low=0.0),
+    max_position_error_time_s=Field("time of the largest position error, after the nominal burn", low=0.0),
     final_position_error_m=at_end("position_error_m", "distance from the desired place at entry", low=0.0),
     pulse_count=Field("pulses fired by the modulator", unit="", low=0.0),
-    entry_time_s=Field("entry, after the nominal burn", low=0.0),
+    entry_time_s=Field("time of entry, after the nominal burn", low=0.0),
     entry_speed_m_s=Field("inertial speed at entry", low=0.0),
     entry_flight_path_angle_deg=Field(
         "inertial flight-path angle at entry, negative below the horizon", low=-90.0, high=90.0
@@ -57,7 +57,7 @@ Metrics = metrics(
     entry_right_ascension_deg="right ascension of entry, from the node",
     entry_radius_km=at_end("radius_km", "distance from the Earth's centre at entry", low=0.0),
     entry_mass_kg=Field("mass at entry", low=0.0),
-    initial_velocity_error_m_s=Field("velocity after the burn less the desired one", low=0.0),
+    initial_velocity_error_m_s=Field("magnitude of the velocity after the burn less the desired one", low=0.0),
     actual_semi_major_axis_km=Field("semi-major axis after the burn, before any correction", low=0.0),
     actual_eccentricity=Field("eccentricity after the burn, before any correction", unit="", low=0.0),
     actual_perigee_argument_deg="argument of perigee after the burn, before any correction",
@@ -67,7 +67,7 @@ Metrics = metrics(
     burn_latitude_argument_deg="argument of latitude of the planned burn",
     burn_dv_m_s=Field("size of the planned burn", low=0.0),
     burn_angle_deg="alpha: angle of the planned burn from the retrograde direction",
-    planned_entry_time_s=Field("entry along the desired path, after the nominal burn", low=0.0),
+    planned_entry_time_s=Field("time of entry along the desired path, after the nominal burn", low=0.0),
 )  # fmt: skip
 
 

@@ -17,8 +17,8 @@ AXES, MODES = "xyz", (1, 2, 3, 4)
 State = states(
     **{f"q{i}": Field(f"attitude in the orbital frame, component {i}, scalar first", unit="") for i in range(4)},
     **{f"momentum_{axis}_n_m_s": f"total angular momentum along body {axis}" for axis in AXES},
-    **{f"modal_momentum_{i}": Field(f"momentum of mode {i}, kg^(1/2) m/s", unit="") for i in MODES},
-    **{f"eta_{i}": Field(f"displacement of mode {i}, kg^(1/2) m", unit="") for i in MODES},
+    **{f"modal_momentum_{i}": Field(f"momentum of mode {i}, √kg m/s", unit="") for i in MODES},
+    **{f"eta_{i}": Field(f"displacement of mode {i}, √kg m", unit="") for i in MODES},
     **{f"impulse_{axis}_n_m_s": f"impulse of the {axis} actuator so far" for axis in AXES},
     attitude_effort_s="integral of |q1| + |q2| + |q3| so far",
     scalar_effort_s="integral of |1 - q0| so far",

@@ -8,7 +8,7 @@ from mc_engine.physics.vectors import Vector, norm
 
 SETTLED = 1e-3  # of 1 - q0: the source's "accuracy 0.001"
 DAMPED = 0.005  # of each mode: Table 5's bound on the modal displacement
-_MODAL = "kg^(1/2) m"
+_MODAL = "√kg m"
 _STATE = {
     "q0": Field("attitude in the orbital frame, scalar part", unit=""),
     **{f"q{i}": Field(f"attitude in the orbital frame, component {i} of the vector part", unit="") for i in (1, 2, 3)},
@@ -17,14 +17,14 @@ _STATE = {
 }
 Outputs = outputs(
     **_STATE,
-    **{f"command_{axis}_n_m": Field(f"torque that the law asks for about {axis}", unit="N m") for axis in AXES},
+    **{f"command_{axis}_n_m": Field(f"commanded torque about {axis}", unit="N m") for axis in AXES},
     **{
         f"torque_{axis}_n_m": Field(f"torque of the {axis} actuator, mean over the sample", unit="N m") for axis in AXES
     },
-    scalar_error=Field("1 - q0", unit=""),
+    scalar_error=Field("1 − q0", unit=""),
     attitude_error_deg="angle between body and orbital frame",
     rate_rad_s="size of the inertial body rate",
-    largest_mode=Field(f"largest modal displacement without sign, {_MODAL}", unit=""),
+    largest_mode=Field(f"largest magnitude of the modal displacements, {_MODAL}", unit=""),
     control_effort_n_m_s="impulse of all actuators so far",
     **{f"pulse_count_{axis}": Field(f"pulses about {axis} so far", unit="") for axis in AXES},
 )
@@ -36,26 +36,29 @@ Metrics = metrics(
     settling_time_s=last_above(
         "scalar_error",
         SETTLED,
-        "last time with 1 - q0 above 1e-3; the length of the flight where it never settles",
+        "last time with 1 − q0 above 0.001; the length of the flight where it never settles",
         low=0.0,
     ),
     damping_time_s=last_above(
-        "largest_mode", DAMPED, "last time with the displacement of any mode above 0.005; as settling_time_s", low=0.0
+        "largest_mode",
+        DAMPED,
+        "last time with the displacement of any mode above 0.005; the length of the flight where it stays above",
+        low=0.0,
     ),
     control_effort_n_m_s=at_end(
         "control_effort_n_m_s", "impulse of all actuators: integral of |u1| + |u2| + |u3|", low=0.0
     ),
     attitude_effort_s=Field("integral of |q1| + |q2| + |q3|", low=0.0),
-    scalar_effort_s=Field("integral of |1 - q0|", low=0.0),
-    q_vector_norm=Field("size of the vector part at the end", unit="", low=0.0, high=1.0),
+    scalar_effort_s=Field("integral of |1 − q0|", low=0.0),
+    q_vector_norm=Field("norm of the quaternion's vector part at the end", unit="", low=0.0, high=1.0),
     attitude_error_deg=at_end("attitude_error_deg", "angle between body and orbital frame at the end", low=0.0),
-    eta_norm=Field(f"root of the sum of squares of the modal displacements at the end, {_MODAL}", unit="", low=0.0),
+    eta_norm=Field(f"root sum square of the modal displacements at the end, {_MODAL}", unit="", low=0.0),
     pulse_count=Field("pulses of all modulators", unit="", low=0.0),
     min_pulse_s=Field("shortest pulse of any modulator; none for an ideal actuator", sometimes=True, low=0.0),
     **{f"pulse_count_{axis}": at_end(f"pulse_count_{axis}", f"pulses about {axis}", unit="") for axis in AXES},
     **{f"min_pulse_{axis}_s": Field(f"shortest pulse about {axis}", sometimes=True) for axis in AXES},
     **{f"on_time_{axis}_s": f"time that the {axis} thrusters fired" for axis in AXES},
-    **{f"impulse_{axis}_n_m_s": f"impulse of the {axis} actuator, without sign" for axis in AXES},
+    **{f"impulse_{axis}_n_m_s": f"integral of the torque magnitude of the {axis} actuator" for axis in AXES},
     **{f"propellant_{axis}_kg": f"propellant for the impulse of the {axis} actuator" for axis in AXES},
     propellant_kg=Field("propellant for the impulse of all actuators", low=0.0),
 )

@@ -44,13 +44,23 @@ Inputs = inputs(
     yaw_error_deg=_error("pointing error towards the pole, across the thrust, all burns", 80.0),
     **_each("pitch_error_{}_deg", "pitch error of burn {}, added to that of all", 80.0, BURNS),
     **_each("yaw_error_{}_deg", "yaw error of burn {}, added to that of all", 80.0, BURNS),
-    **_each("initial_position_{}_m", "{} error of the first place", 1e6, AXES, unit="m"),
-    **_each("initial_velocity_{}_m_s", "{} error of the first velocity", 1e3, AXES, unit="m/s"),
+    **_each("initial_position_{}_m", "{} error of the initial position", 1e6, AXES, unit="m"),
+    **_each("initial_velocity_{}_m_s", "{} error of the initial velocity", 1e3, AXES, unit="m/s"),
     tail_off_factor=_factor("duration of the tail-off over its nominal value", 0.0, 100.0),
     accelerometer_scale_error=_error("relative error of the sensed velocity", 0.5, unit=""),
-    **_each("navigation_position_{}_m", "{} error of the place that the last burn is aimed from", 1e6, AXES, unit="m"),
     **_each(
-        "navigation_velocity_{}_m_s", "{} error of the velocity that the last burn is aimed from", 1e3, AXES, unit="m/s"
+        "navigation_position_{}_m",
+        "{} error of the navigated position from which the last burn is aimed",
+        1e6,
+        AXES,
+        unit="m",
+    ),
+    **_each(
+        "navigation_velocity_{}_m_s",
+        "{} error of the navigated velocity from which the last burn is aimed",
+        1e3,
+        AXES,
+        unit="m/s",
     ),
     burns=Setting(2.0, "number of burns", low=2.0, high=3.0, whole=True, unit=""),
     initial_inclination_deg=Setting(28.5, "inclination of the parking orbit", low=0.0, high=90.0),
@@ -73,11 +83,9 @@ Inputs = inputs(
     **_transfer(1),
     **_transfer(2),
     shutdown=Setting("time", "what ends a burn", choices=SHUTDOWNS),
-    tail_off_s=Setting(
-        0.0, "time in which the thrust falls to zero after the command, along a line", low=0.0, high=60.0
-    ),
+    tail_off_s=Setting(0.0, "time in which the thrust falls linearly to zero after the command", low=0.0, high=60.0),
     guidance=Setting("open_loop", "the stored program, or its last burn aimed again", choices=GUIDANCE),
     propellant_limit_kg=Setting(16775.0, "propellant on board, for the margin; the total of table 2", low=0.0),
-    tolerance=Setting(1e-10, "error of an integration step over the state's size", low=1e-14, high=1e-4, unit=""),
+    tolerance=Setting(1e-10, "error of an integration step relative to the state", low=1e-14, high=1e-4, unit=""),
     time_limit_s=Setting(1e6, "a flight that lasts longer ends without a result", low=1.0),
 )

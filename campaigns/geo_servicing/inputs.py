@@ -51,7 +51,7 @@ def _planned(default: float, description: str, low: float, high: float, error: s
 
 
 Inputs = inputs(
-    epoch_error_days=Parameter(0.0, "true start later than epoch_utc by"),
+    epoch_error_days=Parameter(0.0, "delay of the true start after epoch_utc"),
     mass_error_kg=Parameter(0.0, "true less planned mass of the servicing module at the start"),
     area_factor=Parameter(1.0, "true over planned area towards the Sun", low=0.0, unit=""),
     reflectivity_factor=Parameter(1.0, "true over planned radiation pressure coefficient", low=0.0, unit=""),
@@ -64,22 +64,26 @@ Inputs = inputs(
     out_of_plane_deg=_angle(0.0, "tilt of the thrust to the normal, all burns", 45.0),
     radial_deg=_angle(0.0, "tilt of the thrust outward, all burns", 45.0),
     **{name: parameter for k in range(1, BURNS + 1) for name, parameter in _burn(k).items()},
-    thrust_noise_pct=Parameter(0.0, "1-sigma of a fresh thrust error at every inspection burn", low=0.0),
-    pointing_noise_deg=Parameter(0.0, "1-sigma of a fresh tilt each way at every inspection burn", low=0.0),
-    nav_position_m=Parameter(10.0, "1-sigma of a fix of the module along each axis", low=0.0),
-    nav_velocity_m_s=Parameter(0.1, "1-sigma of a fix of the module along each axis", low=0.0),
-    target_nav_position_m=Parameter(0.0, "the same of the target; 0: fixes are relative to it", low=0.0),
-    target_nav_velocity_m_s=Parameter(0.0, "the same of the target; 0: fixes are relative to it", low=0.0),
+    thrust_noise_pct=Parameter(0.0, "1-sigma of the thrust error of each inspection burn", low=0.0),
+    pointing_noise_deg=Parameter(0.0, "1-sigma of the tilt about each of two axes of each inspection burn", low=0.0),
+    nav_position_m=Parameter(10.0, "1-sigma of the position of a fix of the module along each axis", low=0.0),
+    nav_velocity_m_s=Parameter(0.1, "1-sigma of the velocity of a fix of the module along each axis", low=0.0),
+    target_nav_position_m=Parameter(
+        0.0, "1-sigma of the position of a fix of the target; 0: fixes relative to the target", low=0.0
+    ),
+    target_nav_velocity_m_s=Parameter(
+        0.0, "1-sigma of the velocity of a fix of the target; 0: fixes relative to it", low=0.0
+    ),
     **_craft("module", "servicing module", 42150.26012, 0.000325, 54.99),
     **_craft("target", "target module", 42150.93311, 0.000315, 55.0),
-    target_area_to_mass_factor=Parameter(1.0, "C_R A/m of the target over that of the module", low=0.0, unit=""),
+    target_area_to_mass_factor=Parameter(1.0, "C_R·A/m of the target over that of the module", low=0.0, unit=""),
     standoff_m=Parameter(39.5, "nominal separation ahead or behind", low=0.0),
-    around_low_m=Parameter(20.0, "fly-around: least range wanted", low=0.0),
-    around_high_m=Parameter(80.0, "fly-around: largest range wanted", low=0.0),
-    chi1=Parameter(0.85, "L22/L11 of the terminal matrix of the inspection law, rev^2", low=0.0, unit=""),
-    chi2=Parameter(0.0, "L12/L11 of it, rev", unit=""),
+    around_low_m=Parameter(20.0, "fly-around: smallest desired range", low=0.0),
+    around_high_m=Parameter(80.0, "fly-around: largest desired range", low=0.0),
+    chi1=Parameter(0.85, "L22/L11 of the terminal matrix of the inspection law, rev²", low=0.0, unit=""),
+    chi2=Parameter(0.0, "L12/L11 of the terminal matrix of the inspection law, rev", unit=""),
     control_weight=Parameter(0.0, "w/L11 of the inspection law", low=0.0, unit=""),
-    coast_revolutions=Parameter(1.0, "coast that the inspection law works with, m", low=0.5, unit=""),
+    coast_revolutions=Parameter(1.0, "coast that the inspection law assumes, m, in revolutions", low=0.5, unit=""),
     phase=Setting("phasing", "task", choices=PHASES._fields),
     epoch_utc=Setting(
         "2019-01-01T12:00:00",
@@ -97,11 +101,16 @@ Inputs = inputs(
     sun_and_moon=Setting(True, "attraction by Sun and Moon"),
     sunlight=Setting(True, "pressure of sunlight"),
     mass_kg=Setting(2500.0, "planned mass of the servicing module", low=1.0, dispersed_by="mass_error_kg"),
-    thrust_n=Setting(1.0, "its nominal thrust", low=1e-6, dispersed_by="thrust_error_pct"),
-    isp_s=Setting(1600.0, "its specific impulse", low=1.0),
-    area_m2=Setting(50.0, "its area towards the Sun", low=0.0, dispersed_by="area_factor"),
+    thrust_n=Setting(1.0, "nominal thrust of the servicing module", low=1e-6, dispersed_by="thrust_error_pct"),
+    isp_s=Setting(1600.0, "specific impulse of the servicing module", low=1.0),
+    area_m2=Setting(50.0, "area of the servicing module towards the Sun", low=0.0, dispersed_by="area_factor"),
     reflectivity=Setting(
-        1.3, "its radiation pressure coefficient C_R", low=0.0, high=2.0, dispersed_by="reflectivity_factor", unit=""
+        1.3,
+        "radiation pressure coefficient C_R of the servicing module",
+        low=0.0,
+        high=2.0,
+        dispersed_by="reflectivity_factor",
+        unit="",
     ),
     initial_longitude_deg=Setting(
         92.5, "planned longitude at the start, east", low=-360.0, high=360.0, dispersed_by="initial_longitude_error_deg"
@@ -116,29 +125,35 @@ Inputs = inputs(
     planned_corrections=Setting(
         3.0, "number of corrections of the designed schedule", low=2, high=BURNS, whole=True, unit=""
     ),
-    aim=Setting("fuel", "what the designed schedule spares", choices=AIMS._fields),
+    aim=Setting("fuel", "what the designed schedule minimises", choices=AIMS._fields),
     aim_drift_deg_rev=Setting(0.012, "actual drift that the designed schedule ends with", low=-1.0, high=1.0),
     first_coast_h=Setting(12.0, "least coast before the first correction of the phasing", low=0.0),
     least_coast_h=Setting(6.0, "least coast before every later one, and between those of the inspection", low=0.0),
     longest_transfer_days=Setting(10.0, "longest time that the designed schedule may take", low=0.1, high=1000.0),
     largest_last_deg_rev=Setting(0.0, "largest last correction; 0: by (3.31)", low=0.0, high=10.0),
-    longitude_tolerance_deg=Setting(0.05, "of the end, for the schedule and its gains", low=1e-6, high=10.0),
-    period_tolerance_s=Setting(5.0, "of the end, for the schedule and its gains", low=1e-6, high=1e4),
-    eccentricity_tolerance=Setting(4e-4, "of the end, for the schedule", low=1e-7, high=0.1, unit=""),
-    feedback=Setting(True, "corrections answer what navigation tells at ignition"),
+    longitude_tolerance_deg=Setting(
+        0.05, "tolerance of the final longitude, for the schedule and its gains", low=1e-6, high=10.0
+    ),
+    period_tolerance_s=Setting(
+        5.0, "tolerance of the final period, for the schedule and its gains", low=1e-6, high=1e4
+    ),
+    eccentricity_tolerance=Setting(
+        4e-4, "tolerance of the final eccentricity, for the schedule", low=1e-7, high=0.1, unit=""
+    ),
+    feedback=Setting(True, "each correction is computed from the navigation state at ignition"),
     navigation=Setting("filtered", "what navigation knows", choices=NAVIGATION._fields),
     fix_period_s=Setting(3600.0, "time from one fix to the next", low=10.0, high=1e6),
-    filter_noise_m_s2=Setting(1e-9, "1-sigma of the acceleration that the filter does not know", low=0.0),
+    filter_noise_m_s2=Setting(1e-9, "1-sigma of the unmodelled acceleration that the filter assumes", low=0.0),
     assumed_thrust_pct=Setting(0.5, "1-sigma of the thrust error that laws and filter expect", low=0.0),
     assumed_pointing_deg=Setting(0.5, "1-sigma of the tilt that the filter expects", low=0.0),
-    geometry=Setting("behind", "place of the module beside the target", choices=GEOMETRIES._fields),
+    geometry=Setting("behind", "position of the module relative to the target", choices=GEOMETRIES._fields),
     inspection_law=Setting(
         "single",
-        "one correction at a time, or pairs that take the relative ellipse away",
+        "one correction at a time, or pairs that remove the relative ellipse",
         choices=INSPECTION_LAWS._fields,
     ),
     observation_days=Setting(0.0, "time before the inspection first decides", low=0.0),
-    settle_time_days=Setting(15.0, "when the inspection counts as settled", low=0.0),
+    settle_time_days=Setting(15.0, "time from which the inspection counts as settled", low=0.0),
     range_low_m=Setting(19.1, "least settled range that counts as steady", low=0.0),
     range_high_m=Setting(82.0, "largest settled range that counts as steady", low=0.0),
     tolerance=Setting(1e-11, "relative error of an integration step", low=1e-14, high=1e-6, unit=""),

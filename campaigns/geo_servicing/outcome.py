@@ -17,7 +17,7 @@ NONE = float("nan")
 
 Outputs = outputs(
     longitude_deviation_deg="longitude less the required one, of the servicing module",
-    mean_longitude_deviation_deg="the same of its osculating mean longitude",
+    mean_longitude_deviation_deg="osculating mean longitude less the required longitude",
     drift_rate_deg_rev="drift by the osculating period, east positive",
     period_error_s="osculating period less the sidereal day",
     eccentricity=Field("osculating eccentricity", unit=""),
@@ -27,13 +27,13 @@ Outputs = outputs(
     along_track_m="module ahead of the target, along the target's transverse axis",
     radial_m="module above the target, along its radius",
     range_m="distance of the two craft",
-    settled_range_m="the same once settle_time_days have passed; 0 before",
+    settled_range_m="distance of the two craft once settle_time_days have passed; 0 before",
     settled_nearness_m="minus the range once settle_time_days have passed; far below before",
     settled_along_track_m="module ahead of the target once settle_time_days have passed",
     settled_radial_m="module above the target once settle_time_days have passed",
     relative_drift_m="drift of the module past the target in a revolution, by osculating elements",
     relative_eccentricity=Field("length of the difference of the eccentricity vectors", unit=""),
-    corrections=Field("burns so far", unit=""),
+    corrections=Field("number of burns so far", unit=""),
 )
 
 
@@ -43,19 +43,33 @@ def _some(description: str, **more: Any) -> Field:
 
 
 Metrics = metrics(
-    longitude_deviation_deg=_some("longitude less the required one at the end of the transfer, or of a flight without"),
-    mean_longitude_deviation_deg=_some("the same of the osculating mean longitude"),
-    daily_mean_longitude_deviation_deg=_some("mean of the longitude deviation over the sidereal day after"),
-    drift_rate_deg_rev=_some("drift by the osculating period at the end of the transfer, or of a flight without"),
-    actual_drift_rate_deg_rev=_some("what the mean longitude changes in the sidereal day after"),
-    period_error_s=_some("osculating period less the sidereal day at the end of the transfer, or of a flight without"),
-    actual_period_error_s=_some("the same by the actual drift"),
-    eccentricity=_some("osculating eccentricity at the end of the transfer, or of a flight without", low=0.0, unit=""),
+    longitude_deviation_deg=_some(
+        "longitude less the required one at the end of the transfer, or of a flight without a transfer"
+    ),
+    mean_longitude_deviation_deg=_some("osculating mean longitude less the required one at the end of the transfer"),
+    daily_mean_longitude_deviation_deg=_some(
+        "mean of the longitude deviation over the sidereal day after the transfer"
+    ),
+    drift_rate_deg_rev=_some(
+        "drift by the osculating period at the end of the transfer, or of a flight without a transfer"
+    ),
+    actual_drift_rate_deg_rev=_some(
+        "change of the mean longitude in the sidereal day after the transfer, per revolution"
+    ),
+    period_error_s=_some(
+        "osculating period less the sidereal day at the end of the transfer, or of a flight without a transfer"
+    ),
+    actual_period_error_s=_some("period by the actual drift rate, less the sidereal day"),
+    eccentricity=_some(
+        "osculating eccentricity at the end of the transfer, or of a flight without a transfer", low=0.0, unit=""
+    ),
     peak_eccentricity=maximum_of("eccentricity", "largest osculating eccentricity of the flight", low=0.0, unit=""),
-    inclination_deg=_some("osculating inclination at the end of the transfer, or of a flight without", low=0.0),
-    delta_v_m_s=at_end("delta_v_m_s", "characteristic velocity", low=0.0),
+    inclination_deg=_some(
+        "osculating inclination at the end of the transfer, or of a flight without a transfer", low=0.0
+    ),
+    delta_v_m_s=at_end("delta_v_m_s", "characteristic velocity of all burns", low=0.0),
     transfer_time_s=_some("end of the last burn of the phasing", low=0.0),
-    corrections=at_end("corrections", "burns", low=0.0, unit=""),
+    corrections=at_end("corrections", "number of burns", low=0.0, unit=""),
     final_longitude_deviation_deg=at_end(
         "longitude_deviation_deg", "longitude less the required one at the end of the flight"
     ),

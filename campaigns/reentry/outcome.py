@@ -47,9 +47,9 @@ def _peak(what: str, unit: str, text: str) -> dict[str, Field]:
     """Columns of a peak: its value, and when, where and how fast it was."""
     return {
         f"peak_{what}_{unit}": Field(text, low=0.0),
-        f"peak_{what}_time_s": Field(f"{text}: when", low=0.0),
-        f"peak_{what}_altitude_km": Field(f"{text}: at what altitude", low=0.0),
-        f"peak_{what}_speed_m_s": Field(f"{text}: at what speed over ground", low=0.0),
+        f"peak_{what}_time_s": Field(f"time of the {text}", low=0.0),
+        f"peak_{what}_altitude_km": Field(f"altitude of the {text}", low=0.0),
+        f"peak_{what}_speed_m_s": Field(f"speed over ground at the {text}", low=0.0),
     }
 
 
@@ -59,11 +59,11 @@ Metrics = metrics(
     **_peak("dynamic_pressure", "pa", "largest dynamic pressure"),
     **_peak("heat_rate", "w_m2", "largest convective heat rate at the stagnation point"),
     heat_load_j_m2=at_end("heat_load_j_m2", "convective heat load at the stagnation point", low=0.0),
-    corridor_violations=Field("how many of the corridor's four limits were passed", low=0.0, unit=""),
+    corridor_violations=Field("number of the corridor's four limits that were exceeded", low=0.0, unit=""),
     min_altitude_km="altitude of the first pull-out, or of the end of a flight without one",
-    min_altitude_time_s=Field("when that was", low=0.0),
-    exits=Field("how often the vehicle left the atmosphere, upwards through the exit altitude", low=0.0, unit=""),
-    exit_time_s=Field("first exit", sometimes=True, low=0.0),
+    min_altitude_time_s=Field("time of the first pull-out, or of the end of a flight without one", low=0.0),
+    exits=Field("number of exits from the atmosphere, upwards through the exit altitude", low=0.0, unit=""),
+    exit_time_s=Field("time of the first exit", sometimes=True, low=0.0),
     exit_speed_m_s=Field("speed over ground at the first exit", sometimes=True, low=0.0),
     exit_flight_path_angle_deg=Field("flight-path angle over ground at the first exit", sometimes=True),
     exit_inertial_speed_m_s=Field("inertial speed at the first exit", sometimes=True, low=0.0),
@@ -84,13 +84,13 @@ Metrics = metrics(
     target_longitude_deg=Field("longitude of the target, east", sometimes=True),
     reference_range_km=Field("distance over ground to the end of the reference path", sometimes=True),
     saturated_share=Field(
-        "share of the guidance's samples at which its command was at a limit",
+        "fraction of the guidance's samples at which its command was at a limit",
         sometimes=True,
         low=0.0,
         high=1.0,
         unit="",
     ),
-    reversals=Field("how often the guidance changed the side of the lift", low=0.0, unit=""),
+    reversals=Field("number of bank reversals of the guidance", low=0.0, unit=""),
     relative_speed_m_s=Field("speed over ground at entry", low=0.0),
     relative_flight_path_angle_deg="flight-path angle over ground at entry",
     ballistic_coefficient_kg_m2=Field(

@@ -275,7 +275,7 @@ class HistoriesSection(Section):
 class RetentionSection(Section):
     """[retention]"""
 
-    histories: HistoriesSection = Field(default=HistoriesSection())
+    histories: HistoriesSection = Field(default_factory=HistoriesSection)
 
 
 class TunedSection(Section):
@@ -378,7 +378,7 @@ class CampaignFile(Section):
     retention: RetentionSection = Field(default_factory=RetentionSection)
     sensitivity: SensitivitySection | None = Field(default=None, description="contributions of the inputs")
     simulator: SimulatorSection | None = Field(default=None, description="a program or FMU, in place of a model")
-    report: ReportSection = Field(default=ReportSection(), description="probability and confidence of the report")
+    report: ReportSection = Field(default_factory=ReportSection, description="probability and confidence of the report")
     tuning: TuningSection | None = Field(default=None, description="for `mc-engine tune`")
 
 

@@ -1,6 +1,6 @@
 """Compiled models as what flies a campaign's cases."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -41,9 +41,11 @@ class CompiledFlyer(Flyer):
             self._model, inputs, noise, self._seed, folder=self._folder, width=self._width, build=self._build
         )
 
-    def history(self, inputs: Inputs, noise: int, rows: int, alone: bool = False) -> tuple[Columns, Columns]:
+    def histories(
+        self, inputs: Inputs, noise: np.ndarray, rows: int, alone: bool = False
+    ) -> Iterator[tuple[Columns, Columns]]:
         width = 1 if alone else None
-        return flight.fly_history(self._model, inputs, noise, self._seed, folder=self._folder, width=width, rows=rows)
+        return flight.fly_histories(self._model, inputs, noise, self._seed, folder=self._folder, width=width, rows=rows)
 
     def digest(self) -> str:
         return source_digest(self._model, self._folder)

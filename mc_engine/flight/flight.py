@@ -1,10 +1,8 @@
-"""Flight of cases: converts inputs to SI, calls the model's `prepare`, runs the kernel, converts the results back."""
+"""Flight of cases: prepares them, runs the kernel, converts the results back."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,106 +12,24 @@ from mc_engine.errors import ModelError
 from mc_engine.flight.kernel import Builder, adaptive_arguments, build_kernel, fixed_arguments, grid_of, usual_width
 from mc_engine.flight.kernel_parts import blocks_of, settings_class
 from mc_engine.interruption import in_another_thread
-from mc_engine.lanes.functions import TABLES
 from mc_engine.lanes.kernel_data import gathered
 from mc_engine.lanes.philox import noise_key
 from mc_engine.model.designs import designing
 from mc_engine.model.fields import AdaptiveStep, FixedStep, Parameter, Setting
-from mc_engine.model.preparation import call_prepare
-from mc_engine.model.reading import place_of
+from mc_engine.model.preparation import Inputs, Prepared, prepare
 from mc_engine.model.record import Model, Refusals
 from mc_engine.model.trial import refuse_unfit
 from mc_engine.status import OK, REFUSED, STATUS_NAME
 from mc_engine.store.histories import PHASE_COLUMN, rows_to_keep
-from mc_engine.suggestions import hint
 
 if TYPE_CHECKING:
     from mc_engine.flight.interpreted import InterpretedFlight
 
-Inputs = Mapping[str, Any]
 _NO_TABLES, _NO_HISTORY = np.empty(0), np.empty((0, 0))
 _MOST_RECORDED = 200_000  # rows of a flight, of which its history keeps some
 _USUAL_ROOM = 50_000  # rows that are recorded without counting them first
 _OVERSAMPLED = 4  # times as many rows as are kept, where steps are so long that they are divided
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
-
-
-@dataclass
-class Prepared:
-    """Cases ready for the kernel: SI parameter rows, setting codes, and which cases were refused and why."""
-
-    parameters: np.ndarray  # float64[n_kernel_parameters, n]
-    settings: np.ndarray  # float64[n, n_settings]
-    refusals: Refusals
-    tables: np.ndarray  # float64[...], what `prepare` adds to the model's tables, one case's numbers after another's
-
-
-def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
-    """SI parameters for the kernel.
-
-    inputs : every parameter and setting of the model by column name, in declared units; a value counts for
-        all cases, an array [n_cases] gives one each.
-    """
-    si = SimpleNamespace()
-    refusals = Refusals.none(n_cases)
-    for parameter in model.parameters:
-        column = np.broadcast_to(np.asarray(inputs[parameter.name], dtype=np.float64), n_cases)
-        refusals.add(np.isnan(column), f"{parameter.name} is not a number")
-        refusals.add(np.isinf(column), f"{parameter.name} is infinite")
-        outside = ~((column >= parameter.low) & (column <= parameter.high))
-        refusals.add(outside, f"{parameter.name} is outside {parameter.low:g} to {parameter.high:g} {parameter.unit}")
-        setattr(si, parameter.symbol, column * parameter.si_factor)
-    settings = np.column_stack(
-        [_setting_codes(setting, inputs[setting.name], n_cases) for setting in model.settings] or [np.zeros(n_cases)]
-    )
-    columns: Mapping[str, np.ndarray] = vars(si)
-    if model.prepare is not None:
-        words = SimpleNamespace(**{setting.symbol: settings[:, i] for i, setting in enumerate(model.settings)})
-        columns = call_prepare(model, si, words, refusals)
-    if not isinstance(columns, Mapping):
-        raise ModelError(f"{_design(model)} gives {type(columns).__name__}; it must return a dictionary of arrays by "
-                         "the fields of kernel_parameters")  # fmt: skip
-    names = model.kernel_parameters._fields  # type: ignore[attr-defined]
-    rows = [_parameter_row(model, columns, name, n_cases) for name in names]
-    tables = np.asarray(columns.get(TABLES, np.empty(0)), dtype=np.float64).ravel()
-    return Prepared(np.array(rows).reshape(len(names), n_cases), settings, refusals, tables)
-
-
-def _parameter_row(model: Model, columns: Mapping[str, Any], name: str, n_cases: int) -> np.ndarray:
-    """One kernel parameter of all cases; ModelError if the design does not give it."""
-    if name not in columns:
-        source = (
-            f"{_design(model)} does not give it" if model.prepare else "no parameter has this name without its unit"
-        )
-        raise ModelError(f'kernel_parameters has the field "{name}", but {source}{hint(name, columns)}')
-    try:
-        column = np.asarray(columns[name])
-    except ValueError:  # of rows that differ in length
-        column = np.asarray(None)
-    # one number counts for all cases; an array of one would do so by mistake
-    if column.dtype.kind in "biuf" and column.shape in ((), (n_cases,)):
-        return np.broadcast_to(column.astype(np.float64, copy=False), n_cases)
-    raise ModelError(f'{_design(model)} gives "{name}" as {_described(columns[name], column)}; it must be a number for '
-                     f"each of {n_cases} cases")  # fmt: skip
-
-
-def _described(value: Any, column: np.ndarray) -> str:
-    """What is wrong with a column."""
-    if column.dtype.kind == "c":
-        return "complex numbers"
-    if column.ndim == 0:
-        return type(value).__name__
-    return f"shape {column.shape}" if column.dtype.kind in "biuf" else f"an array of {column.dtype.name}"
-
-
-def _design(model: Model) -> str:
-    return f"{place_of(model.prepare)}: `prepare`" if model.prepare else "the model"
-
-
-def _setting_codes(setting: Any, values: Any, n_cases: int) -> np.ndarray:
-    if np.ndim(values) == 0:
-        return np.full(n_cases, setting.code(values))
-    return np.array([setting.code(value) for value in values], dtype=np.float64)
 
 
 def fly(
@@ -133,16 +49,20 @@ def fly(
     width : cases at a time, 1, 8 or 16; by default what is fastest for the model.
     clock : another one of the kind of the model's own; the kernel is the same.  build : see `Builder`.
     """
-    n, width = len(case_ids), width or usual_width(model)
-    ready = prepare(model, inputs, n)
-    status = np.where(ready.refusals.mask, REFUSED, OK).astype(np.float64)
-    time = np.full(n, np.nan)
-    states = np.full((len(model.states), n), np.nan)
-    metrics = np.full((_n_results(model), n), np.nan)
+    width = width or usual_width(model)
+    ready = prepare(model, inputs, len(case_ids))
+    out = _unflown(model, ready.refusals)
     for chosen in _groups_by_settings(ready):
-        flight = _fly_group(model, clock or model.clock, ready, chosen, case_ids, seed, folder, width, build)
-        time[chosen], status[chosen], states[:, chosen], metrics[:, chosen] = flight
-    return _columns(model, ready.refusals, (time, status, states, metrics))
+        flown = _fly_group(model, clock or model.clock, ready, chosen, case_ids, seed, folder, width, build)
+        for numbers, results in zip(out, flown, strict=True):
+            numbers[..., chosen] = results
+    return _columns(model, ready.refusals, out)
+
+
+def _unflown(model: Model, refusals: Refusals) -> tuple[np.ndarray, ...]:
+    """Time, status, states and metrics as kernels give them, of cases that are refused or have yet to fly."""
+    time, _, states, metrics = (np.full_like(numbers, np.nan) for numbers in _outputs(model, len(refusals.reason)))
+    return time, np.where(refusals.mask, REFUSED, OK).astype(np.float64), states, metrics
 
 
 def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> dict[str, np.ndarray]:
@@ -309,61 +229,83 @@ def fly_interpreted(
 
 
 def fly_history(
+    model: Model, inputs: Inputs, case_id: int, seed: int, *, folder: Path | None = None, **options: Any
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """(columns, history) of one case, see `fly_histories`."""
+    return next(fly_histories(model, inputs, np.array([case_id]), seed, folder=folder, **options))
+
+
+def fly_histories(
     model: Model,
     inputs: Inputs,
-    case_id: int,
+    case_ids: np.ndarray,
     seed: int,
     *,
     folder: Path | None = None,
     width: int | None = None,
     rows: int = 1500,
-) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """(columns, history) of one case alone: the same bits as among others, whatever the width of the build.
+) -> Iterator[tuple[dict[str, np.ndarray], dict[str, np.ndarray]]]:
+    """(columns, history) of each case, flown alone: the same bits as among others, whatever the width of the build.
 
     rows : of the history, see `mc_engine.store.histories.rows_to_keep`; fewer where a fixed grid has fewer steps
     history : t_s and the model's outputs in declared units; empty if the case was refused.  Of a time with two rows
         the first is before an event or a sample of the control, the second after it.
     """
     width = width or usual_width(model)
-    ready = prepare(model, inputs, 1)
+    ready = prepare(model, inputs, len(case_ids))
     names = ["t_s", *(quantity.name for quantity in model.quantities), *([PHASE_COLUMN] if model.phases else [])]
-    if ready.refusals.mask[0]:
-        columns = fly(model, inputs, np.array([case_id]), seed, folder=folder, width=width)
-        return columns, {name: np.empty(0) for name in names}
-    settings = np.ascontiguousarray(ready.settings[0])
-    ids, parameters = np.full(width, case_id), np.repeat(ready.parameters, width, axis=1)
+    for place, case_id in enumerate(case_ids):
+        refusals = Refusals(ready.refusals.reason[[place]])
+        if refusals.mask[0]:
+            yield _columns(model, refusals, _unflown(model, refusals)), {name: np.empty(0) for name in names}
+            continue
+        out, table = _recorded(model, ready, place, case_id, seed, folder, width, rows, len(names))
+        table[:, 1 : 1 + len(model.quantities)] /= [quantity.si_factor for quantity in model.quantities]
+        kept = table[rows_to_keep(table, rows)]
+        history = {name: kept[:, i] for i, name in enumerate(names)}
+        if model.phases:
+            history[PHASE_COLUMN] = phase_words(model, kept[:, -1])
+        yield _columns(model, refusals, out), history
+
+
+def _recorded(
+    model: Model,
+    ready: Prepared,
+    place: int,
+    case_id: int,
+    seed: int,
+    folder: Path | None,
+    width: int,
+    rows: int,
+    n_columns: int,
+) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """(time, status, states and metrics, recorded rows) of one of the cases that are ready, in SI.
+
+    Of these rows the history keeps some: they are those of all steps of the flight if memory allows, and of adaptive
+    steps so long that there are fewer than wanted, also those of the parts that they are divided into.
+    """
+    settings = np.ascontiguousarray(ready.settings[place])
+    ids, parameters = np.full(width, case_id), np.repeat(ready.parameters[:, [place]], width, axis=1)
     cases, out = (parameters, settings, ready.tables), _outputs(model, width)
 
     def recorded(room: int, pace: float) -> tuple[int, np.ndarray]:
         """(rows that the flight has, as many of them as there is room for)."""
-        history = np.empty((room, len(names)))
+        history = np.empty((room, n_columns))
         bound = _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, history, pace)
         return in_another_thread(bound), history
 
-    pace = _history_pace(model, settings, rows, lambda: recorded(1, 1.0)[0])
-    n_rows, table = recorded(_USUAL_ROOM, pace)
-    table = table[:n_rows] if n_rows <= _USUAL_ROOM else recorded(n_rows, pace)[1]
-    columns = _columns(model, ready.refusals, tuple(numbers[..., :1] for numbers in out))
-    table[:, 1 : 1 + len(model.quantities)] /= [quantity.si_factor for quantity in model.quantities]
-    kept = table[rows_to_keep(table, rows)]
-    history = {name: kept[:, i] for i, name in enumerate(names)}
-    if model.phases:
-        history[PHASE_COLUMN] = phase_words(model, kept[:, -1])
-    return columns, history
-
-
-def _history_pace(model: Model, settings: np.ndarray, rows: int, at_steps: Callable[[], int]) -> float:
-    """Pace at which a history is recorded, of which `rows` rows are kept: all steps of the flight if memory allows.
-
-    at_steps : tells how many rows an adaptive flight has at its own steps.  Steps so long that there are fewer than
-    wanted are divided.  On a fixed grid the pace is in steps.
-    """
-    most = max(_MOST_RECORDED, _OVERSAMPLED * rows)
+    most, pace = max(_MOST_RECORDED, _OVERSAMPLED * rows), 1.0
     if isinstance(model.clock, FixedStep):
         n_steps = grid_of(model.clock, settings_of(model, settings))[0]
-        return float(-(-2 * n_steps // most))
-    n = at_steps()
-    return most / n if n > most else float(max(1, -(-_OVERSAMPLED * rows // n)))
+        pace = float(-(-2 * n_steps // most))  # in steps
+    n_rows, table = recorded(_USUAL_ROOM, pace)
+    if isinstance(model.clock, AdaptiveStep):
+        wanted = most / n_rows if n_rows > most else float(max(1, -(-_OVERSAMPLED * rows // n_rows)))
+        if wanted != pace:
+            n_rows, table = recorded(_USUAL_ROOM, pace := wanted)
+    if n_rows > _USUAL_ROOM:
+        n_rows, table = recorded(n_rows, pace)
+    return tuple(numbers[..., :1] for numbers in out), table[:n_rows]
 
 
 # ---- chosen inputs, all others at the model's own values: for studies that no campaign file describes

@@ -1,11 +1,11 @@
 """What flies a case: the one interface between the runner and a compiled model or a simulator.
 
 Inputs of a chunk of cases go in, as columns in declared units; columns of results, statuses and reasons come out, and
-the time history of one case.  The runner, the store and all studies know nothing else of what flies.
+the time histories of some.  The runner, the store and all studies know nothing else of what flies.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from subprocess import Popen
 from typing import Any
@@ -63,9 +63,12 @@ class Flyer(ABC):
         """
 
     @abstractmethod
-    def history(self, inputs: Inputs, noise: int, rows: int, alone: bool = False) -> tuple[Columns, Columns]:
-        """(results, history) of one case; history : t_s and the outputs, about `rows` rows, none of a refused case.
+    def histories(
+        self, inputs: Inputs, noise: np.ndarray, rows: int, alone: bool = False
+    ) -> Iterator[tuple[Columns, Columns]]:
+        """(results, history) of each case, flown by itself when it is asked for.
 
+        history : t_s and the outputs, about `rows` rows, none of a refused case.
         alone : by the build for one case, where there are several.
         """
 

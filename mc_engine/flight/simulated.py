@@ -3,7 +3,7 @@
 import os
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -67,10 +67,16 @@ class SimulatorFlyer(Flyer):
             refusals.add(~((column >= item.low) & (column <= item.high)), outside)
         return list(refusals.reason)
 
-    def history(self, inputs: Inputs, noise: int, rows: int, alone: bool = False) -> tuple[Columns, Columns]:
+    def histories(
+        self, inputs: Inputs, noise: np.ndarray, rows: int, alone: bool = False
+    ) -> Iterator[tuple[Columns, Columns]]:
+        columns = {name: np.broadcast_to(np.asarray(value), len(noise)) for name, value in inputs.items()}
+        for case in range(len(noise)):
+            yield self._history({name: column[[case]] for name, column in columns.items()}, noise[[case]], rows)
+
+    def _history(self, columns: Columns, noise: np.ndarray, rows: int) -> tuple[Columns, Columns]:
         found: list[Columns] = []
-        columns = {name: np.broadcast_to(np.asarray(value), 1) for name, value in inputs.items()}
-        flight = _Flight(self, columns, np.array([noise]), None, never, on_history=found.append)
+        flight = _Flight(self, columns, noise, None, never, on_history=found.append)
         flight.fly()
         names = ["t_s", *(output.name for output in self._simulator.outputs)]
         history = found[0] if found and found[0] else {name: np.empty(0) for name in names}

@@ -162,9 +162,11 @@ def _machine() -> Any:
 @cache
 def _target() -> tuple[Any, ...]:
     """What machine code is made for, besides the versions in the kernel's own name: the processor and its
-    instructions, and what the environment asks of numba."""
+    instructions, and what the environment and a file in the working folder ask of numba."""
     features = sorted(name for name, has in binding.get_host_cpu_features().items() if has)
-    asked = sorted((name, value) for name, value in os.environ.items() if name.startswith("NUMBA_"))
+    asked: list[tuple[str, Any]] = sorted(item for item in os.environ.items() if item[0].startswith("NUMBA_"))
+    file = Path(".numba_config.yaml")
+    asked += [(file.name, file.read_bytes())] if file.is_file() else []
     return binding.get_process_triple(), binding.get_host_cpu_name(), features, asked
 
 

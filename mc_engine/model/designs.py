@@ -38,6 +38,8 @@ def kept_design(design: Callable[..., np.ndarray], *inputs: Any) -> np.ndarray:
 
     Returns the array, of any shape and numeric type.
 
+    One design is computed at a time.  A design may ask for others, but not in threads that it waits for.
+
     A design is computed again after a change of the inputs, of a source in the folder of `design` or one that these
     import, of the engine's physics, of NumPy or SciPy, or of the processor, and if its file is damaged.  A cache that
     cannot be written costs the time of a computation, no result.

@@ -1,8 +1,12 @@
-"""Calls a model's `prepare` and explains its errors; it is plain NumPy code, with other rules than physics."""
+"""Cases made ready for the kernel: inputs in SI, what the model's `prepare` makes of them, refusals.
+
+`prepare` is plain NumPy code, with other rules than physics, so its errors are explained here.
+"""
 
 import inspect
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,12 +14,93 @@ from typing import Any
 import numpy as np
 
 from mc_engine.errors import ModelError
+from mc_engine.lanes.functions import TABLES
 from mc_engine.model.faults import place_in_model
 from mc_engine.model.fields import Parameter
+from mc_engine.model.reading import place_of
 from mc_engine.model.record import Model, Refusals
 from mc_engine.suggestions import hint
 
+Inputs = Mapping[str, Any]
 MISUSES = (TypeError, KeyError, AttributeError, ValueError)
+
+
+@dataclass
+class Prepared:
+    """Cases ready for the kernel: SI parameter rows, setting codes, and which cases were refused and why."""
+
+    parameters: np.ndarray  # float64[n_kernel_parameters, n]
+    settings: np.ndarray  # float64[n, n_settings]
+    refusals: Refusals
+    tables: np.ndarray  # float64[...], what `prepare` adds to the model's tables, one case's numbers after another's
+
+
+def prepare(model: Model, inputs: Inputs, n_cases: int) -> Prepared:
+    """SI parameters for the kernel.
+
+    inputs : every parameter and setting of the model by column name, in declared units; a value counts for
+        all cases, an array [n_cases] gives one each.
+    """
+    si = SimpleNamespace()
+    refusals = Refusals.none(n_cases)
+    for parameter in model.parameters:
+        column = np.broadcast_to(np.asarray(inputs[parameter.name], dtype=np.float64), n_cases)
+        refusals.add(np.isnan(column), f"{parameter.name} is not a number")
+        refusals.add(np.isinf(column), f"{parameter.name} is infinite")
+        outside = ~((column >= parameter.low) & (column <= parameter.high))
+        refusals.add(outside, f"{parameter.name} is outside {parameter.low:g} to {parameter.high:g} {parameter.unit}")
+        setattr(si, parameter.symbol, column * parameter.si_factor)
+    settings = np.column_stack(
+        [_setting_codes(setting, inputs[setting.name], n_cases) for setting in model.settings] or [np.zeros(n_cases)]
+    )
+    columns: Mapping[str, np.ndarray] = vars(si)
+    if model.prepare is not None:
+        words = SimpleNamespace(**{setting.symbol: settings[:, i] for i, setting in enumerate(model.settings)})
+        columns = call_prepare(model, si, words, refusals)
+    if not isinstance(columns, Mapping):
+        raise ModelError(f"{_design(model)} gives {type(columns).__name__}; it must return a dictionary of arrays by "
+                         "the fields of kernel_parameters")  # fmt: skip
+    names = model.kernel_parameters._fields  # type: ignore[attr-defined]
+    rows = [_parameter_row(model, columns, name, n_cases) for name in names]
+    tables = np.asarray(columns.get(TABLES, np.empty(0)), dtype=np.float64).ravel()
+    return Prepared(np.array(rows).reshape(len(names), n_cases), settings, refusals, tables)
+
+
+def _parameter_row(model: Model, columns: Mapping[str, Any], name: str, n_cases: int) -> np.ndarray:
+    """One kernel parameter of all cases; ModelError if the design does not give it."""
+    if name not in columns:
+        source = (
+            f"{_design(model)} does not give it" if model.prepare else "no parameter has this name without its unit"
+        )
+        raise ModelError(f'kernel_parameters has the field "{name}", but {source}{hint(name, columns)}')
+    try:
+        column = np.asarray(columns[name])
+    except ValueError:  # of rows that differ in length
+        column = np.asarray(None)
+    # one number counts for all cases; an array of one would do so by mistake
+    if column.dtype.kind in "biuf" and column.shape in ((), (n_cases,)):
+        return np.broadcast_to(column.astype(np.float64, copy=False), n_cases)
+    raise ModelError(f'{_design(model)} gives "{name}" as {_described(columns[name], column)}; it must be a number for '
+                     f"each of {n_cases} cases")  # fmt: skip
+
+
+def _described(value: Any, column: np.ndarray) -> str:
+    """What is wrong with a column."""
+    if column.dtype.kind == "c":
+        return "complex numbers"
+    if column.ndim == 0:
+        return type(value).__name__
+    return f"shape {column.shape}" if column.dtype.kind in "biuf" else f"an array of {column.dtype.name}"
+
+
+def _design(model: Model) -> str:
+    return f"{place_of(model.prepare)}: `prepare`" if model.prepare else "the model"
+
+
+def _setting_codes(setting: Any, values: Any, n_cases: int) -> np.ndarray:
+    if np.ndim(values) == 0:
+        return np.full(n_cases, setting.code(values))
+    return np.array([setting.code(value) for value in values], dtype=np.float64)
 
 
 def call_prepare(model: Model, inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> Any:

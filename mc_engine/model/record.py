@@ -122,6 +122,10 @@ class Model:
     def __post_init__(self) -> None:
         refuse_contradictions(self)
 
+    def __hash__(self) -> int:
+        """Of what tells most models apart; that of all fields takes as long as the flight of a case."""
+        return hash((self.name, self.title, self.watching))
+
     def input(self, name: str) -> Parameter | Setting:
         """The parameter or setting called `name`; KeyError if the model has none."""
         items: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
@@ -151,7 +155,9 @@ class Refusals:
 
     def add(self, mask: np.ndarray, sentence: str) -> None:
         """Refuse the cases in `mask` (bool[n_cases]) unless they were refused before."""
-        self.reason[mask & (self.reason == "")] = sentence
+        refused = mask & np.ones(self.reason.shape, dtype=bool)  # also refuses a mask that is none
+        if refused.any():  # seldom; comparing the words of all cases takes longest
+            self.reason[refused & (self.reason == "")] = sentence
 
     @property
     def mask(self) -> np.ndarray:

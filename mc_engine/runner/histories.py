@@ -1,6 +1,7 @@
 """Saved time histories: the chosen cases are flown once more, one by one, and sampled over time."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,8 @@ import pandas as pd
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import noise_ids
-from mc_engine.flight.chunks import NOMINAL_NOISE
-from mc_engine.flight.flyer import Columns
+from mc_engine.flight.chunks import CHUNKS_PER_WORKER
+from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.statistics.worst import limits_on, worst_cases
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, OK, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
@@ -24,15 +25,14 @@ def inputs_of(campaign: Campaign, case_id: int | None) -> tuple[dict[str, Any], 
     """(inputs, what addresses the noise) of a case of a campaign, or of its nominal case."""
     if case_id is None:
         return dict(campaign.nominal), NOMINAL_NOISE
-    return _inputs_of_all(campaign, [case_id])[0]
+    table, noise = _drawn(campaign, [case_id])
+    return full_inputs(campaign, {name: column[0] for name, column in table.items()}), int(noise[0])
 
 
-def _inputs_of_all(campaign: Campaign, case_ids: list[int]) -> list[tuple[dict[str, Any], int]]:
-    """As `inputs_of`, of several cases, which are drawn together."""
+def _drawn(campaign: Campaign, case_ids: Sequence[int]) -> tuple[Columns, np.ndarray]:
+    """(case table, what addresses the noise) of some cases."""
     ids = np.array(case_ids, dtype=np.int64)
-    table, noise = case_table(campaign, ids), noise_ids(campaign, ids)
-    rows = ({name: column[row] for name, column in table.items()} for row in range(ids.size))
-    return [(full_inputs(campaign, inputs), int(number)) for inputs, number in zip(rows, noise, strict=True)]
+    return case_table(campaign, ids), noise_ids(campaign, ids)
 
 
 def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Callable[[], bool]) -> bool:
@@ -48,22 +48,30 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     retained = retained_cases(store, campaign)
     if _are_kept(store, campaign, retained):
         return True
-    flights = [(-1, *inputs_of(campaign, None))] if campaign.retention.nominal else []
-    flights += [(case, *flight) for case, flight in zip(retained, _inputs_of_all(campaign, retained), strict=True)]
-
-    def history(*flight: Any) -> Columns | None:
-        return None if stopped() else _flown_history(campaign, *flight)
-
-    pool = Parallel(
-        n_jobs=min(workers, max(len(flights), 1), flyer_of(campaign).most_workers or workers), backend="threading"
-    )
-    histories = list(pool(delayed(history)(*flight) for flight in flights))
-    if any(columns is None for columns in histories):
+    flyer = flyer_of(campaign)
+    workers = min(workers, flyer.most_workers or workers)
+    size = -(-len(retained) // (CHUNKS_PER_WORKER * workers)) or 1
+    pieces = [[-1]] if campaign.retention.nominal else []
+    pieces += [retained[first : first + size] for first in range(0, len(retained), size)]
+    pool = Parallel(n_jobs=min(workers, max(len(pieces), 1)), backend="threading")
+    flown = pool(delayed(_histories_of)(campaign, flyer, piece, stopped) for piece in pieces)
+    histories = [columns for piece in flown for columns in piece]
+    if len(histories) < sum(map(len, pieces)):
         return False
     filled = [columns for columns in histories if columns["case_id"].size]
     if filled:
         store.write_histories({name: np.concatenate([columns[name] for columns in filled]) for name in filled[0]})
     return True
+
+
+def _histories_of(campaign: Campaign, flyer: Flyer, cases: Sequence[int], stopped: Callable[[], bool]) -> list[Columns]:
+    """The histories of some cases, or of the nominal, which is [-1]; none any more once `stopped()` is true."""
+    if stopped():
+        return []
+    table, noise = ({}, np.array([NOMINAL_NOISE])) if cases == [-1] else _drawn(campaign, cases)
+    flights = flyer.histories(full_inputs(campaign, table), noise, campaign.retention.rows)
+    wanted = takewhile(lambda _: not stopped(), cases)
+    return [_with_case(case, next(flights)[1]) for case in wanted]
 
 
 def _are_kept(store: Store, campaign: Campaign, retained: list[int]) -> bool:
@@ -101,11 +109,6 @@ def _dangerous_cases(store: Store) -> set[int]:
         return set()
     table = store.cases(["case_id", "status"])
     return set(table.loc[table["status"].isin(_DANGEROUS), "case_id"])
-
-
-def _flown_history(campaign: Campaign, case_id: int, inputs: dict[str, Any], noise: int) -> Columns:
-    _, history = flyer_of(campaign).history(inputs, noise, campaign.retention.rows)
-    return _with_case(case_id, history)
 
 
 def _with_case(case_id: int, history: Columns) -> Columns:

@@ -253,7 +253,7 @@ def replay(path: str | Path, case_id: int) -> Replay:
     campaign = campaign_of(store)
     table, flyer = case_table(campaign, np.array([case_id])), flyer_of(campaign)
     inputs, noise = inputs_of(campaign, case_id)
-    flight, history = flyer.history(inputs, noise, Retention().rows, alone=True)
+    flight, history = next(flyer.histories(inputs, np.array([noise]), Retention().rows, alone=True))
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
     again = {**table, **flight}

@@ -26,6 +26,7 @@ MANY_NEIGHBOURS = 300  # from here on the surface is smooth at the scale of a co
 COARSER = 2
 LEFT_OUT = 400  # cases, one at a time, on which the number of neighbours is chosen
 MOSTLY = 0.95  # of them must have a surface through their neighbours
+WORSE_FOR_GOOD = 10.0  # times the smallest squared error: the surface bends too little, with more neighbours even less
 AS_GOOD = 1.01  # of the smallest squared error: the fewest neighbours that reach it bend the surface least
 WIDEST_HOLE = 0.6  # of the reach of the neighbourhood: where the nearest case is farther away, there is a hole
 MOST_CASES = 50_000  # smoothed; of more, so many are picked evenly
@@ -218,8 +219,10 @@ def _chosen_neighbours(tree: "scipy.spatial.cKDTree", cloud: np.ndarray, z: np.n
         misses = (fit.value(z) - z[rows]) ** 2
         # Cases on a few levels of an input: near ones fix no surface before a second and third level are among them.
         scores.append(float(np.mean(misses[fit.fixed])) if fit.fixed.mean() >= MOSTLY else np.inf)
+        if scores[-1] > WORSE_FOR_GOOD * min(scores):
+            break
     least = min(scores)
-    chosen = next(number for number, score in zip(choices, scores, strict=True) if score <= AS_GOOD * least)
+    chosen = next(number for number, score in zip(choices, scores, strict=False) if score <= AS_GOOD * least)
     return chosen, 1.0 - least / max(float(np.var(z[rows])), 1e-300) if least < np.inf else 1.0
 
 
@@ -256,8 +259,10 @@ class _Fit:
     @classmethod
     def of(cls, cloud: np.ndarray, at: np.ndarray, distance: np.ndarray, near: np.ndarray, cubic: bool) -> "_Fit":
         reach = 1.0001 * distance[:, -1:] + 1e-12
-        weight = (1.0 - (distance / reach) ** 3) ** 3
-        u, v = np.moveaxis((cloud[near] - at[:, None, :]) / reach[:, :, None], -1, 0)
+        away = distance / reach
+        left = 1.0 - away * away * away
+        weight = left * left * left
+        u, v = ((cloud[:, axis][near] - at[:, axis, None]) / reach for axis in (0, 1))
         terms = [np.ones_like(u), u, v, u * u, u * v, v * v]
         terms += [u * u * u, u * u * v, u * v * v, v * v * v] if cubic else []
         design = np.stack(terms, axis=-1)

@@ -38,7 +38,7 @@ def rows_to_keep(table: np.ndarray, rows: int) -> np.ndarray:
     left = np.flatnonzero(np.append(True, ~equal.all(axis=1)))
     if left.size <= rows:
         return left
-    t, values = table[left, 0], _in_ranges(table[left, 1:])
+    t, values = table[left, 0], _in_ranges(np.ascontiguousarray(table[left, 1:].T))
     always = _events_and_edges(table[:, 0], t, values, rows)
     span = np.diff(t, prepend=t[0]) / max(t[-1] - t[0], np.finfo(float).tiny)
     bend = np.sqrt(_chord_errors(t, values))
@@ -50,18 +50,19 @@ def rows_to_keep(table: np.ndarray, rows: int) -> np.ndarray:
 
 
 def _in_ranges(values: np.ndarray) -> np.ndarray:
-    """Quantities in units of their ranges; 0 where one is not finite or constant."""
-    finite = np.where(np.isfinite(values), values, np.nan)
-    held = np.where(np.isnan(finite).all(axis=0), 0.0, finite)
-    low, high = np.nanmin(held, axis=0), np.nanmax(held, axis=0)
-    return np.nan_to_num((held - low) / np.where(high > low, high - low, 1.0))
+    """Quantities in units of their ranges; 0 where one is not finite or constant.  float64[n_quantities, n]."""
+    finite, values = np.isfinite(values), 0.5 * values  # halved, so that no range is above the largest number
+    low = np.where(finite, values, np.inf).min(axis=1, keepdims=True)
+    high = np.where(finite, values, -np.inf).max(axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        return np.where(finite & (high > low), (values - low) / (high - low), 0.0)
 
 
 def _events_and_edges(recorded: np.ndarray, t: np.ndarray, values: np.ndarray, rows: int) -> np.ndarray:
     """Mask of the rows that are kept in any case.  recorded : float64[n], the times with those of repeated rows."""
     instants, counts = np.unique(recorded, return_counts=True)
     is_event = (counts > 2)[np.searchsorted(instants, t)]
-    jumps = np.where(np.diff(t) == 0.0, np.abs(np.diff(values, axis=0)).max(axis=1, initial=0.0), 0.0)
+    jumps = np.where(np.diff(t) == 0.0, np.abs(np.diff(values)).max(axis=0, initial=0.0), 0.0)
     edges = np.flatnonzero(jumps > _EDGE)
     edges = edges[np.argsort(-jumps[edges], kind="stable")[: _MOST_EDGES * rows]]
     always = is_event
@@ -73,24 +74,19 @@ def _chord_errors(t: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Of each row, how far the straight line between its neighbours errs, in the quantity where it errs most."""
     errors = np.zeros(t.size)
     width = t[2:] - t[:-2]
-    share = ((t[1:-1] - t[:-2]) / np.where(width > 0.0, width, 1.0))[:, None]
-    chord = values[:-2] + share * (values[2:] - values[:-2])
-    errors[1:-1] = np.abs(values[1:-1] - chord).max(axis=1, initial=0.0)
+    share = (t[1:-1] - t[:-2]) / np.where(width > 0.0, width, 1.0)
+    chord = values[:, :-2] + share * (values[:, 2:] - values[:, :-2])
+    errors[1:-1] = np.abs(values[:, 1:-1] - chord).max(axis=0, initial=0.0)
     return errors
 
 
 def _shares(density: np.ndarray, total: int) -> np.ndarray:
-    """min(1, c density), with the c that makes the sum `total`; all where there are no more."""
-    low, high = 0.0, 1.0
-    while np.minimum(1.0, high * density).cumsum()[-1] < total and high < 1e30:
-        high *= 2.0
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        if np.minimum(1.0, middle * density).cumsum()[-1] < total:
-            low = middle
-        else:
-            high = middle
-    return np.minimum(1.0, high * density)
+    """min(1, c density), with the c that makes the sum `total`; 1 for each above 0 where they are no more than that."""
+    falling = np.sort(density)[::-1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        c = (total - np.arange(falling.size)) / falling[::-1].cumsum()[::-1]  # where as many of the largest are 1
+        right = np.flatnonzero(c * falling <= 1.0)
+    return np.minimum(1.0, c[right[0]] * density) if right.size else (density > 0.0).astype(np.float64)
 
 
 PHASE_COLUMN = "phase"  # of histories of a model with phases: its name, in words

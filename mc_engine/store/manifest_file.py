@@ -195,7 +195,7 @@ class Head(Record):
     settings: list[_Described] = []
     quantities: list[_Described] = []
     requirements: list[_Requirement] = []
-    report: ReportSection = ReportSection()
+    report: ReportSection = Field(default_factory=ReportSection)
     looks: list[CaseNumber] = []
     figures: list[_Figure] = []
     published: list[_Published] = []

@@ -8,7 +8,6 @@ with them; every page has a checksum.  The SHA-256 of a part is verified before 
 import json
 import re
 import uuid
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -189,7 +188,8 @@ def write_aside(
     table = _part_table(run, columns, first, count, arrays)
     content = parquet_bytes(table)
     file = file or f"cases/{part_name(first, count)}"
-    digest, status = sha256(content).hexdigest(), dict(sorted(Counter(table.column("status").to_pylist()).items()))
+    counts = table.column("status").value_counts().to_pylist()
+    digest, status = sha256(content).hexdigest(), dict(sorted((row["values"], row["counts"]) for row in counts))
     temporary = temporary_name(f"{file}.{uuid.uuid4().hex[:8]}.{digest[:32]}")
     write_synced(run, temporary, content, file)
     return Written(Part(file, first, count, len(content), digest, status), temporary)

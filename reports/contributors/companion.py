@@ -10,9 +10,10 @@ import numpy as np
 from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_chance
 from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest, surely
 from reports.document.blocks import Cell, Column, FigureBlock, Table
+from reports.run.chosen_units import spread_text
 from reports.run.contributions import UNEXPLAINED, Contributions, Contributor
 from reports.run.flown import Flown
-from reports.text.numbers import count, number, percent, with_unit
+from reports.text.numbers import count, fixed, number, percent
 
 _TRENDS = {"src": "SRC", "prcc": "PRCC", "spearman": "Spearman"}
 
@@ -83,7 +84,7 @@ def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> I
             )
         )
         rest = float(np.sqrt(max(sigma**2 - explained**2, 0.0)))
-        told = [with_unit(number(value, 3), flown.unit(metric)) for value in (sigma, explained, rest)]
+        told = [spread_text(flown, metric, value) for value in (sigma, explained, rest)]
         yield f"σ {told[0]}; root sum square {told[1]}, rest {told[2]}"
 
 
@@ -96,7 +97,7 @@ def sigma_contribution(contributor: Contributor, sigma: float) -> float | None:
 
 def _sigma_cell(flown: Flown, metric: str, contributor: Contributor) -> Cell:
     value = sigma_contribution(contributor, flown.summaries[metric].sd or 0.0)
-    return Cell("–") if not value else Cell(with_unit(number(value, 3), flown.unit(metric)), value)
+    return Cell("–") if not value else Cell(spread_text(flown, metric, value), value)
 
 
 def _trends(sensitivity: Sensitivity, name: str, k: int) -> list[Cell]:
@@ -121,11 +122,14 @@ def _note(flown: Flown, contributions: Contributions) -> str:
             "effect is the variance that remains, on average, when all other inputs are known; where inputs interact, "
             "the variance falls by another amount if the input is held at its nominal value."
         ) + (reduction if contributions.held else "")
+    names = {row.input for rows in contributions.by_metric.values() for row in strongest(rows)}
+    unexplained = (
+        "Unexplained: fraction that the surrogate model behind the total effects attributes to no input (random draws "
+        "in flight, discontinuities); a total effect may be larger by up to it. "
+    ) * (UNEXPLAINED in names)
     note = (
-        "Estimated from the table of cases. Unexplained: fraction that the surrogate model behind the total effects "
-        "attributes to no input (random draws in flight, discontinuities); a total effect may be larger by up to it. "
-        f"{each} SRC, PRCC and Spearman: trends with their direction. R²: fraction of the variance that the linear "
-        "regression behind SRC explains."
+        f"Estimated from the table of cases. {unexplained}{each} SRC, PRCC and Spearman: trends with their direction. "
+        "R²: fraction of the variance that the linear regression behind SRC explains."
     )
     if contributions.trends.correlated is not None:
         first, second, rho = contributions.trends.correlated
@@ -141,6 +145,5 @@ def _note(flown: Flown, contributions: Contributions) -> str:
 def _cell(value: float | None, interval: tuple[float, float] | None) -> Cell:
     if value is None:
         return Cell("–")
-    text = f"{value:.2f}".replace("-0.00", "0.00").replace("-", "−")
-    bounds = "" if interval is None else f" [{interval[0]:.2f}, {interval[1]:.2f}]".replace("-", "−")
-    return Cell(text + bounds, value)
+    bounds = "" if interval is None else f" [{fixed(interval[0], 2)}, {fixed(interval[1], 2)}]"
+    return Cell(fixed(value, 2) + bounds, value)

@@ -1,6 +1,7 @@
 """Widths of the columns of a printed table, chosen so that its rows take as few lines as possible."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,15 +14,33 @@ INSET = 7.0  # of a column, both sides together
 JUMPS = (4.0, 8.0, 16.0, 32.0, 64.0, 128.0)  # points that a column may get at a time
 MONO = 0.602  # of the type size, the width of every letter of a column's name
 BADGE = 18.0  # mark and margins of a verdict
-_WORD = re.compile(r"\[[^\]]{1,22}\]|[^\s_/-]*[\s_/-]?")  # what is not broken: a word, an interval
+_WORD = re.compile(
+    r"\[[^\]]{1,22}\]|[^ \n_/-]*\d\u202f[^ \n]+ ?|[^ \n_/-]*[ \n_/-]?"
+)  # not broken: a word, an interval
 _VALUE = re.compile(r"[^ ]+ ?")  # of a column of numbers: with its unit, such as m/s
+_JOINED = re.compile(r"(?<=,) | (?=/ )|(?<=/) ")  # spaces within an interval, and within used / tried
+NO_BREAK = "\N{NO-BREAK SPACE}"
 COMMAND = 36  # letters of a command that is not broken
 BOLD = 1.15  # of the head
 SLACK = 1.06  # of a text over its lines: a line seldom ends at the edge
 
 
-def widths(table: Table) -> list[float]:
-    """Width of each column in points, together that of the page: longest words first, then where it saves lines."""
+def unbroken(table: Table) -> Table:
+    """The table with intervals and counts in its columns of numbers held on one line, where the page has the room."""
+    numbers = [column.kind == "number" for column in table.columns]
+    rows = tuple(
+        tuple(
+            replace(cell, text=_JOINED.sub(NO_BREAK, cell.text)) if is_number else cell
+            for is_number, cell in zip(numbers, cells, strict=True)
+        )
+        for cells in table.rows
+    )
+    joined = replace(table, rows=rows)
+    return joined if _sizes(joined)[1].sum() + INSET * len(numbers) < ROOM else table
+
+
+def _sizes(table: Table) -> tuple[np.ndarray, np.ndarray]:
+    """Widths of all texts, float64[n_rows, n_columns, 2], and of the longest word of each column."""
     shape = (len(table.rows) + 1, len(table.columns), 2)  # the head is a row, and a cell has its text and a small one
     size, least = np.zeros(shape), np.zeros(len(table.columns))
     room = [1.0, *(max(0.5 * rows, 1.0) if rows else np.inf for rows in spans(table))]  # of all rows of a cell
@@ -38,13 +57,22 @@ def widths(table: Table) -> list[float]:
                 )
                 longest = max((lettering.width(word, TYPE) for word in words), default=0.0)
                 least[k] = max(least[k], longest * scale + BADGE * bool(cell.tone and part == 0))
+    return size, least
+
+
+def widths(table: Table) -> list[float]:
+    """Width of each column in points, together that of the page: longest words first, then where it saves lines."""
+    size, least = _sizes(table)
     if least.sum() + INSET * len(least) >= ROOM:
         return list((least + INSET) * ROOM / (least + INSET).sum())
     width = least.copy()
     while (left := ROOM - INSET * len(width) - width.sum()) > JUMPS[0]:
         lines = _lines(size, width)
+        others = [np.delete(lines, k, axis=1).max(axis=1, initial=1.0) for k in range(len(width))]
         jumps = [(k, jump) for k in range(len(width)) for jump in JUMPS if jump <= left]
-        gain, k, jump = max((_saved(lines, size[:, k], width[k] + jump, k) / jump, k, jump) for k, jump in jumps)
+        gain, k, jump = max(
+            (_saved(lines[:, k], others[k], _lines(size[:, k], width[k] + jump)) / jump, k, jump) for k, jump in jumps
+        )
         if not gain:
             break
         width[k] += jump
@@ -64,12 +92,10 @@ def _lines(size: np.ndarray, width: np.ndarray | float) -> np.ndarray:
     return np.ceil(SLACK * size / (np.asarray(width)[..., None] + 0.01)).sum(axis=-1)
 
 
-def _saved(lines: np.ndarray, size: np.ndarray, width: float, k: int) -> float:
-    """Lines of all rows that a width of a column saves, and something for those that another column still takes."""
-    fewer = _lines(size, width)
-    others = np.delete(lines, k, axis=1).max(axis=1, initial=1.0)
-    rows = np.maximum(lines[:, k], others) - np.maximum(fewer, others)
-    return float(rows.sum() + 0.15 * (lines[:, k] - fewer).sum())
+def _saved(lines: np.ndarray, others: np.ndarray, fewer: np.ndarray) -> float:
+    """Lines of all rows that a column saves which takes fewer, and something for those that another one still takes."""
+    rows = np.maximum(lines, others) - np.maximum(fewer, others)
+    return float(rows.sum() + 0.15 * (lines - fewer).sum())
 
 
 def _scale(column: Column, text: str) -> float:

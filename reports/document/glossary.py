@@ -76,7 +76,7 @@ GLOSSARY = Terms(
         (
             "limit in a time history",
             "Drawn where the metric of the requirement is the largest or smallest value of the quantity in the saved "
-            "histories.",
+            "histories. A dashed limit holds at the end of the flight, or must be met once.",
         ),
         (
             "comparison of options",

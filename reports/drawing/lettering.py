@@ -15,14 +15,13 @@ _WIDTHS = dict(zip(map(chr, range(32, 127)), (
     82, 59, 59, 52, 64, 34, 64, 84,
 ), strict=True)) | dict.fromkeys("−×≤≥ω", 84) | dict.fromkeys("⁰¹²³⁴⁵⁶⁷⁸⁹⁻·’", 40) | {"\u202f": 20}  # fmt: skip
 _OTHER = 66
-_BOLD = 1.1
 _QUOTE = {'"': "&quot;"}  # so that no text looks like a colour in an attribute
 _NO_XML = re.compile(r"[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def width(text: str, size: float = TYPE, bold: bool = False) -> float:
+def width(text: str, size: float = TYPE) -> float:
     """Width of one line."""
-    return sum(_WIDTHS.get(sign, _OTHER) for sign in text) * size / 100.0 * (_BOLD if bold else 1.0)
+    return sum(_WIDTHS.get(sign, _OTHER) for sign in text) * size / 100.0
 
 
 def widest(lines: Sequence[str]) -> float:
@@ -32,33 +31,32 @@ def widest(lines: Sequence[str]) -> float:
 
 def wrapped(text: str, room: float, most: int = 9) -> list[str]:
     """Lines not wider than `room`, but for single words; what goes beyond `most` lines is left on the last."""
-    if not text:
-        return []
     lines: list[str] = []
-    for paragraph in text.split("\n"):
-        line = ""
+    for paragraph in text.split("\n") if text else ():
+        lines.append("")
         for word in paragraph.split(" "):
-            longer = f"{line} {word}" if line else word
-            if line and width(longer) > room and len(lines) < most - 1:
-                lines.append(line)
-                line = word
+            longer = f"{lines[-1]} {word}".lstrip()
+            if lines[-1] and width(longer) > room and len(lines) < most:
+                lines.append(word)
             else:
-                line = longer
-        lines.append(line)
+                lines[-1] = longer
     return lines
 
 
 def text(
-    x: float, y: float, words: str, *, anchor: str = "start", fill: str = INK, turned: bool = False, bold: bool = False
-) -> str:
-    """One line as SVG, its baseline at y; turned : reads upwards."""
-    place = f'transform="translate({x:.1f} {y:.1f}) rotate(-90)"' if turned else f'x="{x:.1f}" y="{y:.1f}"'
-    style = f' text-anchor="{anchor}"' * (anchor != "start")
-    style += ' font-weight="bold"' * bold
-    return f'<text {place} fill="{fill}"{style}>{escape(_NO_XML.sub(" ", words), _QUOTE)}</text>'
-
-
-def lines(x: float, y: float, texts: Sequence[str], *, anchor: str = "start", turned: bool = False) -> Iterator[str]:
-    """Lines below one another, the baseline of the first at y; turned ones to the right of one another, from x."""
-    for k, words in enumerate(texts):
-        yield text(x + LINE * k * turned, y + LINE * k * (not turned), words, anchor=anchor, turned=turned)
+    x: float,
+    y: float,
+    lines: Sequence[str],
+    anchor: str = "start",
+    fill: str = INK,
+    turned: bool = False,
+    bold: bool = False,
+) -> Iterator[str]:
+    """Lines as SVG, the baseline of the first at y; turned ones read upwards, each to the right of the one before."""
+    style = f' text-anchor="{anchor}"' * (anchor != "start") + ' font-weight="bold"' * bold
+    for k, words in enumerate(lines):
+        across, down = x + LINE * k * turned, y + LINE * k * (not turned)
+        place = f'x="{across:.1f}" y="{down:.1f}"'
+        if turned:
+            place = f'transform="translate({across:.1f} {down:.1f}) rotate(-90)"'
+        yield f'<text {place} fill="{fill}"{style}>{escape(_NO_XML.sub(" ", words), _QUOTE)}</text>'

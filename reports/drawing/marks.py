@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from reports.drawing.palette import PAPER, field_colour
+from reports.drawing.palette import CIVIDIS, PAPER, blended
 from reports.text.numbers import number
 
 MARGIN = 0.04  # of an axis, beyond the marks on it
@@ -22,9 +22,9 @@ MOST_TOLD = 8  # texts of a mark that are told to those who do not see it
 
 @dataclass(frozen=True)
 class Points:
-    """x, y : float64[n].  sign : "circle", "ring", "diamond", "x", "square", "triangle-up", "cross" or "star".
+    """x, y : float64[n].  sign : "circle", "diamond", "x", "square", "triangle-up", "cross" or "star".
 
-    name : of them all.  texts : of each of them, in place of its coordinates.  x_ends, y_ends : ends of intervals.
+    name : of them all.  texts : of each of them, in place of its coordinates.  edge : colour of their edge, if any.
     cases : their case numbers, so that a reader can choose them; columns : names of the columns of cases that x and y
     are, and of one that `texts` tell, so that a page with all cases finds those that are not drawn; of x alone where y
     is the rank.
@@ -38,20 +38,16 @@ class Points:
     size: float = 4.0
     opacity: float = 1.0
     edge: str = ""
+    edge_width: float = 0.4
     texts: Sequence[str] = ()
     cases: np.ndarray | None = None
     columns: tuple[str, ...] | None = None
-    x_ends: tuple[np.ndarray, np.ndarray] | None = None
-    y_ends: tuple[np.ndarray, np.ndarray] | None = None
     key: str = ""
 
 
 @dataclass(frozen=True)
 class Line:
-    """Through x, y : float64[n], interrupted at NaN.  step : "hv", "vh" or none.
-
-    name : what it is; text : in place of the coordinates under the pointer.
-    """
+    """Through x, y : float64[n], interrupted at NaN.  text : in place of the coordinates under the pointer."""
 
     x: np.ndarray
     y: np.ndarray
@@ -60,18 +56,8 @@ class Line:
     dash: str = "solid"
     width: float = 1.8
     opacity: float = 1.0
-    step: str = ""
     text: str = ""
     key: str = ""
-
-    @property
-    def corners(self) -> tuple[np.ndarray, np.ndarray]:
-        """The points of the line, with the corners of its steps."""
-        x, y = np.asarray(self.x, dtype=np.float64), np.asarray(self.y, dtype=np.float64)
-        if not self.step:
-            return x, y
-        x, y = np.repeat(x, 2), np.repeat(y, 2)
-        return (x[1:], y[:-1]) if self.step == "hv" else (x[:-1], y[1:])
 
 
 @dataclass(frozen=True)
@@ -123,7 +109,7 @@ class Field:
     def colours(self) -> list[str]:
         """The colour between each two levels."""
         n = self.levels.size - 1
-        return [field_colour((k + 0.5) / n) for k in range(n)]
+        return [blended((k + 0.5) / n, *CIVIDIS) for k in range(n)]
 
     @property
     def bands(self) -> Iterator[Band]:
@@ -154,6 +140,14 @@ class Limit:
     near: bool = True
     key: str = ""
 
+    def across(self, x_ends: tuple[float, float], y_ends: tuple[float, float], log: bool = False) -> Line:
+        """The line between the ends of the other axis, with enough places for the pointer to find it."""
+        other = y_ends if self.axis == "x" else x_ends
+        along = np.geomspace(*other, 9) if log else np.linspace(*other, 9)
+        at = np.full(along.size, self.at)
+        x, y = (at, along) if self.axis == "x" else (along, at)
+        return Line(x, y, self.colour, self.name, self.dash, self.width, text=self.name)
+
 
 Mark = Points | Line | Band | Bar | Field | Limit
 _ACROSS = ("x", "left", "right")  # members of marks that are places on the axis of x, and on that of y
@@ -166,8 +160,6 @@ def extent(mark: Mark) -> tuple[list[np.ndarray], list[np.ndarray]]:
         at = [np.array([mark.at])] if mark.near else []
         return (at, []) if mark.axis == "x" else ([], at)
     x, y = ([getattr(mark, name) for name in names if hasattr(mark, name)] for names in (_ACROSS, _UP))
-    if isinstance(mark, Points):
-        x, y = [*x, *(mark.x_ends or ())], [*y, *(mark.y_ends or ())]
     return x, y
 
 
@@ -175,6 +167,12 @@ def finite(values: Iterable[Any]) -> np.ndarray:
     """float64[n]: all numbers of these arrays that are finite."""
     every = np.concatenate([np.empty(0), *(np.asarray(part, dtype=np.float64).ravel() for part in values)])
     return every[np.isfinite(every)]
+
+
+def _range(label: str, values: Iterable[Any]) -> str:
+    """From where to where the finite ones of these numbers reach, in words."""
+    numbers = finite(values)
+    return f"{label} {number(numbers.min(), 4)} to {number(numbers.max(), 4)}" if numbers.size else ""
 
 
 @dataclass(frozen=True)
@@ -214,9 +212,10 @@ class Axis:
         return low - (0.0 if self.zero and low == 0.0 else room), high + (0.0 if self.zero and high == 0.0 else room)
 
 
-def rows_axis(names: Sequence[str], grid: bool = False) -> Axis:
-    """An upright axis with a row for each name, the first on top."""
-    return Axis(reach=(len(names) - 0.5, -0.5), ticks=tuple(enumerate(names)), grid=grid)
+def names_axis(names: Sequence[str], label: str = "", *, down: bool = False, grid: bool = False) -> Axis:
+    """An axis with a place for each name; down : an upright one, the first name on top."""
+    ends = -0.5, len(names) - 0.5
+    return Axis(label, reach=ends[::-1] if down else ends, ticks=tuple(enumerate(names)), grid=grid)
 
 
 @dataclass(frozen=True)
@@ -242,8 +241,8 @@ class Plot:
 
     @property
     def words(self) -> str:
-        """What it shows, for those who do not see it: the texts of its few points, else its ranges, and its limits."""
-        listed = [mark.texts for mark in self.marks if isinstance(mark, Points) and len(mark.texts) <= MOST_TOLD]
+        """What it shows, for those who do not see it: texts of few points and bars, else its ranges, and its limits."""
+        listed = [mark.texts for mark in self.marks if isinstance(mark, Points | Bar) and len(mark.texts) <= MOST_TOLD]
         said = [text for texts in listed for text in texts] or [self._ranges()]
         said += [mark.name for mark in self.marks if isinstance(mark, Limit)]
         title = f"{self.title}: " if self.title not in ("", self.y.name) else ""
@@ -252,18 +251,10 @@ class Plot:
     def _ranges(self) -> str:
         """What the marks reach over on both axes, and the field in them."""
         extents = [extent(mark) for mark in self.marks if not isinstance(mark, Limit | Band)]
-        ranges = [
-            (self.y.name or self.y.label, [a for _, y in extents for a in y]),
-            (self.x.name or self.x.label, [a for x, _ in extents for a in x]),
-        ]
-        ranges += [(field.label, [field.z]) for field in filter(None, [self.field])]
-        seen = [(label, finite(values)) for label, values in ranges]
-        told = [
-            f"{label} {number(numbers.min(), 4)} to {number(numbers.max(), 4)}"
-            for label, numbers in seen
-            if numbers.size
-        ]
-        return " against ".join(told[:2]) + "".join(f", {text}" for text in told[2:])
+        x, y = ([part for both in extents for part in both[k]] for k in (0, 1))
+        told = [_range(axis.name or axis.label, values) for axis, values in ((self.y, y), (self.x, x))]
+        over = _range(self.field.label, [self.field.z]) if self.field else ""
+        return ", ".join(filter(None, (" against ".join(filter(None, told)), over)))
 
     @property
     def field(self) -> Field | None:
@@ -308,21 +299,33 @@ def between(
 ) -> Band:
     """The band from `low` to `high` over x, each float64[n]; in pieces where they are not numbers."""
     good = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
-    pieces = [
-        rows for rows in np.split(np.arange(x.size), np.flatnonzero(np.diff(good)) + 1) if rows.size and good[rows[0]]
-    ]
-    rings = [np.column_stack([np.r_[x[k], x[k][::-1]], np.r_[low[k], high[k][::-1]]]) for k in pieces]
-    line = joined(rings) if rings else np.empty((0, 2))
-    return Band(line[:, 0], line[:, 1], colour, opacity, name, key=key)
+    pieces = np.split(np.arange(x.size), np.flatnonzero(np.diff(good)) + 1)
+    rings = [np.column_stack([np.r_[x[k], x[k][::-1]], np.r_[low[k], high[k][::-1]]]) for k in pieces if good[k].any()]
+    across, up = joined(rings).T
+    return Band(across, up, colour, opacity, name, key=key)
+
+
+def intervals(
+    low: np.ndarray, high: np.ndarray, at: np.ndarray, colour: str, key: str = "", upright: bool = False
+) -> Line:
+    """A line from each low to its high, at these places of the other axis; upright : along y."""
+    along, across = np.ravel(np.column_stack([low, high, np.full(low.size, np.nan)])), np.repeat(at, 3)
+    x, y = (across, along) if upright else (along, across)
+    return Line(x, y, colour, "interval", width=2.2, text=key or "interval", key=key)
+
+
+def stepped(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The corners of a line through the points that goes along x, then along y."""
+    return np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]
 
 
 def joined(outlines: Sequence[np.ndarray]) -> np.ndarray:
     """Curves float64[k, 2] in one array, separated by rows of NaN, at which a line is interrupted."""
     parts = [part for outline in outlines for part in (outline, np.full((1, 2), np.nan))]
-    return np.concatenate(parts[:-1])
+    return np.concatenate([np.empty((0, 2)), *parts[:-1]])
 
 
 def nominal_ring(place: tuple[float, float], colour: str, name: str = "nominal") -> Points:
     """A ring around one point, its inside filled with the colour of the page."""
     x, y = (np.array([value], dtype=np.float64) for value in place)
-    return Points(x, y, colour, name, "ring", 12.0, edge=PAPER, key=name)
+    return Points(x, y, PAPER, name, size=12.0, edge=colour, edge_width=3.0, key=name)

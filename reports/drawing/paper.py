@@ -5,23 +5,22 @@ All lengths are points.  The typesetter sets the text in the typeface of the pag
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
 from reports.drawing import lettering
 from reports.drawing.lettering import LINE, TYPE
-from reports.drawing.marks import Axis, Drawing, Field, Mark, Plot
-from reports.drawing.palette import GRID, MUTED, on_paper, on_screen
+from reports.drawing.marks import Axis, Bar, Drawing, Field, Mark, Plot
+from reports.drawing.palette import GRID, MUTED, ON_PAPER, ON_SCREEN, coloured
 from reports.drawing.strokes import SWATCH, Frame, part_of_axis, stroked, swatch
-from reports.drawing.ticks import log_numerals, log_ticks, nice_ticks, numerals
+from reports.drawing.ticks import axis_ticks, numerals
 
 WIDTH = 493.2  # 174 mm, the text width of the page
 SHORT = 0.46  # points of height on paper for a pixel on the screen
 GAP = 14.0  # between panels
 UPRIGHT, BETWEEN = 1.8 * TYPE, 5.0  # distance of tick labels of an upright axis; gap between those of another
 KEY_GAP = 12.0  # between entries of a key
-BAR = 9.0  # width of a colour scale
+BAR = 14.0  # width of a colour scale and of the gap to its right
 Ends = tuple[float, float]
 
 
@@ -41,35 +40,42 @@ def strips(drawing: Drawing, width: float = WIDTH) -> list[str]:
 
 
 def _picture(body: list[str], top: float, bottom: float, width: float) -> str:
-    return on_paper(
+    head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 {top:.1f} {width:.1f} {bottom - top:.1f}" '
         f'width="{width:.1f}pt" height="{bottom - top:.1f}pt" font-family="DejaVu Sans, sans-serif" font-size="{TYPE}" '
-        f'fill="none">{"".join(body)}</svg>'
+        'fill="none">'
     )
+    return coloured("".join([head, *body, "</svg>"]), ON_PAPER)
 
 
 def _panel_rows(drawing: Drawing, whole: float) -> Iterator[tuple[list[str], float]]:
     """SVG elements of each row of panels and the y of its lower edge; the first row has the key above it."""
     body, top = _key(drawing.key, whole)
-    clip = 0
-    for row in rows_of(drawing.plots, drawing.across):
+    rows = -(-len(drawing.plots) // drawing.across)
+    for number, row in enumerate(np.array_split(np.arange(len(drawing.plots)), rows)):
         width = (whole - GAP * (len(row) - 1)) / len(row)
-        boxes = [_Box(plot, GAP * k + width * k, top, width) for k, plot in enumerate(row)]
-        head, foot = max(box.head for box in boxes), max(box.foot for box in boxes)
-        height = max(SHORT * box.plot.height for box in boxes)
-        for box in boxes:
-            body += box.drawn(head, height, clip)
-            clip += 1
-        top += head + height + foot + 6.0
+        panels = []
+        for k, plot in enumerate(drawing.plots[row[0] : row[-1] + 1]):
+            left = (GAP + width) * k
+            scale = _colour_scale(plot.field, plot.height) if plot.field else None
+            room = _Panel(scale, 0.0, 0.0).frame_left + BAR if scale else 0.0
+            panels.append(_Panel(plot, left, width - room))
+            panels += [_Panel(scale, left + width - room, room)] if scale else []
+        upper = top + 5.0 + LINE * max(len(panel.title) for panel in panels)
+        lower = upper + max(panel.height for panel in panels)
+        for k, panel in enumerate(panels):
+            body += panel.drawn(top, upper, lower, f"c{number}-{k}")
+        top = lower + max(panel.foot for panel in panels) + 6.0
         yield body, top
         body = []
 
 
-def rows_of(plots: tuple[Plot, ...], across: int) -> list[tuple[Plot, ...]]:
-    """The panels in rows of at most `across`, as even as can be; a shorter row is as wide as the others."""
-    rows = -(-len(plots) // across)
-    bounds = [round(k * len(plots) / rows) for k in range(rows + 1)]
-    return [plots[a:b] for a, b in pairwise(bounds)]
+def _colour_scale(field: Field, height: float) -> Plot:
+    """The colours of a field and their values, as a narrow panel."""
+    n, levels = len(field.colours), field.levels
+    boxes = Bar(np.zeros(n), np.ones(n), levels[:-1], levels[1:], field.colours, 1.0)
+    up = Axis(field.label, reach=(float(levels[0]), float(levels[-1])), most=8, grid=False)
+    return Plot((boxes,), Axis(reach=(0.0, 1.0), ticks=()), up, height=height)
 
 
 def _key(key: tuple[Mark, ...], whole: float) -> tuple[list[str], float]:
@@ -81,7 +87,7 @@ def _key(key: tuple[Mark, ...], whole: float) -> tuple[list[str], float]:
         long = lettering.widest(lines)
         if x and x + inset + long > whole:
             x, y = 0.0, y + LINE + 1.0
-        elements += [*swatch(mark, x, y - 2.6), *lettering.lines(x + inset, y, lines)]
+        elements += [*swatch(mark, x, y - 2.6), *lettering.text(x + inset, y, lines)]
         y += LINE * (len(lines) - 1)
         x += inset + long + KEY_GAP
     return elements, y + 7.0 if key else 0.0
@@ -90,13 +96,15 @@ def _key(key: tuple[Mark, ...], whole: float) -> tuple[list[str], float]:
 def page_swatch(mark: Mark) -> str:
     """The mark's sample in the key of a figure on the screen, as SVG in colours of the page."""
     width, height = SWATCH
-    sample = on_screen("".join(swatch(mark, 0.0, 0.5 * height)))
+    sample = coloured("".join(swatch(mark, 0.0, 0.5 * height)), ON_SCREEN)
     return f'<svg viewBox="0 0 {width:g} {height:g}" fill="none">{sample}</svg>'
 
 
 @dataclass(frozen=True)
 class _Ticks:
-    places: list[float]
+    """places : on the axis; texts : lines of each; power : of ten that the numbers leave out; turned : upwards."""
+
+    places: np.ndarray
     texts: list[list[str]]
     power: str = ""
     turned: bool = False
@@ -105,164 +113,98 @@ class _Ticks:
     def widest(self) -> float:
         return max(map(lettering.widest, self.texts), default=0.0)
 
-    @property
-    def lines(self) -> int:
-        return max(map(len, self.texts), default=0)
 
-
-def _ticks(axis: Axis, ends: tuple[float, float], room: float, upright: bool) -> _Ticks:
+def _ticks(axis: Axis, ends: Ends, room: float, upright: bool) -> _Ticks:
     """The ticks of an axis of length `room` points, as many as fit without overlap."""
     if axis.ticks is not None:
-        low, high = min(ends), max(ends)
-        own = [(place, text) for place, text in axis.ticks if low <= place <= high]
-        slot = room / max(len(own), 1) - 4.0
-        wrap = 0.34 * WIDTH if upright else slot
-        texts = [lettering.wrapped(text, wrap, 4) for _, text in own]
-        wrapped = _Ticks([place for place, _ in own], texts)
-        if upright or wrapped.widest <= slot:
-            return wrapped
-        return _Ticks(wrapped.places, [lettering.wrapped(text, 90.0, 2) for _, text in own], turned=True)
-    for places in _choices(axis, ends):
-        decades = axis.log and places[-1] >= 10.0 * places[0]
-        words, power = (log_numerals(places), "") if decades else numerals(places)
+        return _own_ticks([(at, text) for at, text in axis.ticks if min(ends) <= at <= max(ends)], room, upright)
+    many = [axis_ticks(*ends, most, log=axis.log, whole=axis.whole) for most in range(axis.most, 1, -1)]
+    outermost = many[0][:: max(len(many[0]) - 1, 1)]  # one tick alone says nothing of a scale
+    for places in [*(some for some in many if len(some) > 1), outermost]:
+        texts, power = numerals(places, axis.log)
         apart = np.abs(np.diff(part_of_axis(np.array(places), ends, axis.log))) * room
-        sizes = [UPRIGHT if upright else lettering.width(text) + BETWEEN for text in words]
-        if all(distance >= 0.5 * (a + b) for distance, (a, b) in zip(apart, pairwise(sizes), strict=True)):
+        sizes = np.array([UPRIGHT if upright else lettering.width(text) + BETWEEN for text in texts])
+        if (apart >= 0.5 * (sizes[1:] + sizes[:-1])).all():
             break
-    return _Ticks(places, [[text] for text in words], power)
+    return _Ticks(np.array(places), [[text] for text in texts], power)
 
 
-def _choices(axis: Axis, ends: Ends) -> Iterator[list[float]]:
-    """Tick values from many to few: one alone says nothing of a scale, so the last choice is the outermost two."""
-    log = axis.log and len(log_ticks(*ends, axis.most)) > 1  # a narrow range may hold no 1, 2 or 5 of a decade
-    many = [log_ticks(*ends, most) if log else nice_ticks(*ends, most, axis.whole)
-            for most in range(axis.most, 1, -1)]  # fmt: skip
-    yield from (places for places in many if len(places) > 1)
-    yield many[0][:: max(len(many[0]) - 1, 1)]
+def _own_ticks(own: list[tuple[float, str]], room: float, upright: bool) -> _Ticks:
+    """Words along an axis: in lines as wide as their slots, or turned where a word is wider."""
+    places, slot = np.array([at for at, _ in own]), room / max(len(own), 1) - 4.0
+    ticks = _Ticks(places, [lettering.wrapped(text, 0.34 * WIDTH if upright else slot, 4) for _, text in own])
+    if upright or ticks.widest <= slot:
+        return ticks
+    return _Ticks(places, [lettering.wrapped(text, 90.0, 2) for _, text in own], turned=True)
 
 
-class _Box:
+class _Panel:
     """One panel: computes the space that its texts take, then draws itself."""
 
-    def __init__(self, plot: Plot, left: float, top: float, width: float):
-        self.plot, self.left, self.top, self.right = plot, left, top, left + width
-        height = SHORT * plot.height
-        x_ends, y_ends = plot.ends
-        self.y_ticks = _ticks(plot.y, y_ends, height, True)
-        self.y_label = lettering.wrapped(plot.y.label, height + 12.0, 2)
-        self.scale = _Scale(plot.field, height) if plot.field else None
-        self.frame_left = left + self.y_ticks.widest + 5.0 + LINE * len(self.y_label)
-        self.frame_right = self.right - (self.scale.width if self.scale else 5.0)
-        room = self.frame_right - self.frame_left
-        self.ends = x_ends, y_ends
-        if plot.equal:
-            self.ends = _equal(x_ends, y_ends, room, height)
-            self.y_ticks = _ticks(plot.y, self.ends[1], height, True)
-        self.x_ticks = _ticks(plot.x, self.ends[0], room, False)
+    def __init__(self, plot: Plot, left: float, width: float):
+        self.plot, self.left, self.right, self.height = plot, left, left + width, SHORT * plot.height
         self.title = lettering.wrapped(plot.title, width - 4.0, 3)
-        self.x_label = lettering.wrapped(plot.x.label, room - 2.0 * lettering.width(self.x_ticks.power), 2)
+        self.ends = plot.ends
+        self.y_ticks = _ticks(plot.y, self.ends[1], self.height, True)
+        self.y_label = _label(plot.y, self.y_ticks, self.height + 12.0)
+        self.frame_left = left + self.y_ticks.widest + 5.0 + LINE * len(self.y_label)
+        room = self.right - 5.0 - self.frame_left
+        if plot.equal:
+            self.ends = _equal(*self.ends, room, self.height)
+            self.y_ticks = _ticks(plot.y, self.ends[1], self.height, True)
+        self.x_ticks = _ticks(plot.x, self.ends[0], room, False)
+        self.x_label = _label(plot.x, self.x_ticks, room)
+        lines = LINE * max(map(len, self.x_ticks.texts), default=0)
+        self.tick_room = 3.0 + (self.x_ticks.widest if self.x_ticks.turned else lines)
+        self.foot = self.tick_room + LINE * len(self.x_label)
 
-    @property
-    def tick_room(self) -> float:
-        return (self.x_ticks.widest if self.x_ticks.turned else LINE * self.x_ticks.lines) + 3.0
-
-    @property
-    def head(self) -> float:
-        return 3.0 + LINE * (len(self.title) + bool(self.y_ticks.power))
-
-    @property
-    def foot(self) -> float:
-        return self.tick_room + LINE * (len(self.x_label) if self.plot.x.label else bool(self.x_ticks.power))
-
-    def drawn(self, head: float, height: float, clip: int) -> Iterator[str]:
-        top = self.top + head
-        frame = Frame(
-            self.frame_left, top, self.frame_right, top + height, *self.ends, self.plot.x.log, self.plot.y.log
-        )
-        for k, line in enumerate(self.title):
-            yield lettering.text(self.left, top - head + LINE * (k + 1) - 1.0, line, bold=k == 0)
-        yield from self._grid(frame)
-        yield (f'<clipPath id="c{clip}"><path d="M{frame.left:.2f} {frame.top:.2f}H{frame.right:.2f}V{frame.bottom:.2f}'
-               f'H{frame.left:.2f}z"/></clipPath><g clip-path="url(#c{clip})">')  # fmt: skip
+    def drawn(self, top: float, upper: float, lower: float, clip: str) -> Iterator[str]:
+        """SVG elements, its title from `top` on, its axes from `upper` to `lower`; clip : a name of its own."""
+        logs = self.plot.x.log, self.plot.y.log
+        frame = Frame(self.frame_left, upper, self.right - 5.0, lower, *self.ends, *logs)
+        yield from lettering.text(self.left, top + LINE - 1.0, self.title[:1], bold=True)
+        yield from lettering.text(self.left, top + 2.0 * LINE - 1.0, self.title[1:])
+        left, right = f"M{frame.left:.2f}", f"H{frame.right:.2f}"
+        lines = [f"M{x:.2f} {upper:.2f}V{lower:.2f}" for x in frame.x(self.x_ticks.places) if self.plot.x.grid]
+        lines += [f"{left} {y:.2f}{right}" for y in frame.y(self.y_ticks.places) if self.plot.y.grid]
+        yield f'<path d="{"".join(lines)}" stroke="{GRID}" stroke-width=".5"/>' if lines else ""
+        yield f'<clipPath id="{clip}"><path d="{left} {upper:.2f}{right}V{lower:.2f}H{frame.left:.2f}z"/></clipPath>'
+        yield f'<g clip-path="url(#{clip})">'
         for mark in self.plot.marks:
             yield from stroked(mark, frame)
-        yield "</g>"
-        yield from self._axes(frame)
-        if self.scale:
-            yield from self.scale.drawn(frame)
+        yield f'</g><path d="{left} {upper:.2f}V{lower:.2f}{right}" stroke="{MUTED}" stroke-width=".6"/>'
+        yield from self._texts(frame)
 
-    def _grid(self, frame: Frame) -> Iterator[str]:
-        lines = [
-            f"M{x:.2f} {frame.top:.2f}V{frame.bottom:.2f}"
-            for x in frame.x(np.array(self.x_ticks.places))
-            if self.plot.x.grid
-        ]
-        lines += [
-            f"M{frame.left:.2f} {y:.2f}H{frame.right:.2f}"
-            for y in frame.y(np.array(self.y_ticks.places))
-            if self.plot.y.grid
-        ]
-        yield f'<path d="{"".join(lines)}" stroke="{GRID}" stroke-width=".5"/>' if lines else ""
-
-    def _axes(self, frame: Frame) -> Iterator[str]:
-        corner = f"M{frame.left:.2f} {frame.top:.2f}V{frame.bottom:.2f}H{frame.right:.2f}"
-        yield f'<path d="{corner}" stroke="{MUTED}" stroke-width=".6"/>'
-        for place, lines in zip(frame.y(np.array(self.y_ticks.places)), self.y_ticks.texts, strict=True):
-            y = place + 2.7 - 0.5 * LINE * (len(lines) - 1)
-            yield from lettering.lines(frame.left - 3.0, y, lines, anchor="end")
-        yield from self._x_ticks(frame)
-        if self.y_ticks.power:
-            yield lettering.text(frame.left + 1.0, frame.top - 2.0, self.y_ticks.power)
-        middle = 0.5 * (frame.top + frame.bottom)
-        yield from lettering.lines(self.left + 7.0, middle, self.y_label, anchor="middle", turned=True)
-        below = frame.bottom + self.tick_room
-        power_width = lettering.width(self.x_ticks.power) + 3.0 if self.x_ticks.power else 0.0
-        farthest = frame.right - power_width - 0.5 * lettering.widest(self.x_label)
-        x = min(0.5 * (frame.left + frame.right), farthest)
-        yield from lettering.lines(x, below + LINE - 2.4, self.x_label, anchor="middle")
-        if self.x_ticks.power:
-            yield lettering.text(frame.right, below + LINE - 2.4, self.x_ticks.power, anchor="end")
-
-    def _x_ticks(self, frame: Frame) -> Iterator[str]:
-        ticks = self.x_ticks
-        for place, lines in zip(frame.x(np.array(ticks.places)), ticks.texts, strict=True):
-            if ticks.turned:
-                x = place + 2.7 - 0.5 * LINE * (len(lines) - 1)
-                yield from lettering.lines(x, frame.bottom + 4.0, lines, anchor="end", turned=True)
+    def _texts(self, frame: Frame) -> Iterator[str]:
+        """Of both axes: ticks, then labels."""
+        for at, lines in zip(frame.y(self.y_ticks.places), self.y_ticks.texts, strict=True):
+            yield from lettering.text(frame.left - 3.0, at + _first_line(lines), lines, anchor="end")
+        for at, lines in zip(frame.x(self.x_ticks.places), self.x_ticks.texts, strict=True):
+            if self.x_ticks.turned:
+                yield from lettering.text(at + _first_line(lines), frame.bottom + 4.0, lines, anchor="end", turned=True)
             else:
                 half = 0.5 * lettering.widest(lines)
-                x = min(max(place, self.left + half), self.right - half)
-                yield from lettering.lines(x, frame.bottom + LINE, lines, anchor="middle")
+                x = min(max(at, self.left + half), self.right - half)
+                yield from lettering.text(x, frame.bottom + LINE, lines, anchor="middle")
+        middle = 0.5 * (frame.left + frame.right), 0.5 * (frame.top + frame.bottom)
+        yield from lettering.text(self.left + 7.0, middle[1], self.y_label, anchor="middle", turned=True)
+        below = frame.bottom + self.tick_room + LINE - 2.4
+        yield from lettering.text(middle[0], below, self.x_label, anchor="middle")
 
 
-class _Scale:
-    """The colour scale to the right of a field."""
+def _first_line(lines: list[str]) -> float:
+    """Where the baseline of the first of these lines lies, when their middle is at 0."""
+    return 2.7 - 0.5 * LINE * (len(lines) - 1)
 
-    def __init__(self, field: Field, height: float):
-        self.field = field
-        ends = float(field.levels[0]), float(field.levels[-1])
-        self.ticks = _ticks(Axis(most=8), ends, height, True)
-        self.label = lettering.wrapped(field.label, height, 2)
-        self.width = 10.0 + BAR + 4.0 + self.ticks.widest + LINE * len(self.label) + 3.0
 
-    def drawn(self, frame: Frame) -> Iterator[str]:
-        left, levels = frame.right + 10.0, self.field.levels
-        own = Frame(left, frame.top, left + BAR, frame.bottom, (0.0, 1.0), (float(levels[0]), float(levels[-1])))
-        for (low, high), colour in zip(pairwise(own.y(levels).tolist()), self.field.colours, strict=True):
-            yield f'<path d="M{left:.1f} {low:.2f}h{BAR}V{high:.2f}h-{BAR}z" fill="{colour}"/>'
-        for place, (text,) in zip(own.y(np.array(self.ticks.places)).tolist(), self.ticks.texts, strict=True):
-            yield lettering.text(left + BAR + 3.0, place + 2.7, text)
-        if self.ticks.power:
-            yield lettering.text(left, frame.top - 3.0, self.ticks.power)
-        x, y = left + BAR + 3.0 + self.ticks.widest + LINE, 0.5 * (frame.top + frame.bottom)
-        yield from lettering.lines(x, y, self.label, anchor="middle", turned=True)
+def _label(axis: Axis, ticks: _Ticks, room: float) -> list[str]:
+    """The lines of an axis label, with the power of ten that its numbers leave out."""
+    return lettering.wrapped(" ".join(filter(None, (axis.label, ticks.power))), room, 2)
 
 
 def _equal(x: Ends, y: Ends, width: float, height: float) -> tuple[Ends, Ends]:
     """Axis ranges with one scale for both axes; the range that is too short is extended on both sides."""
     unit = max(abs(x[1] - x[0]) / width, abs(y[1] - y[0]) / height)
-    ends = []
-    for (low, high), length in ((x, width), (y, height)):
-        extra = 0.5 * (unit * length - abs(high - low)) * (1.0 if high >= low else -1.0)
-        ends.append((low - extra, high + extra))
-    return ends[0], ends[1]
+    extra = [0.5 * np.copysign(unit * length - abs(high - low), high - low)
+             for (low, high), length in ((x, width), (y, height))]  # fmt: skip
+    return (x[0] - extra[0], x[1] + extra[0]), (y[0] - extra[1], y[1] + extra[1])

@@ -1,6 +1,6 @@
 """Marks as SVG in a frame, in colours of the page."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import singledispatch
 
@@ -15,13 +15,15 @@ MOST_COLOURS = 7  # of it
 LEAST_SIGN = 6.0  # size of a point in it, in pixels
 LAYERS = 8  # a cloud is drawn in so many, so that where many points lie it is darker
 DASHES = {"solid": "", "dash": ' stroke-dasharray="4 2.4"', "dot": ' stroke-dasharray="1 1.8"'}
-SHAPES = {  # outlines about the middle of a sign of width 2
-    "diamond": "m0-1.2l1.2 1.2-1.2 1.2-1.2-1.2z",
-    "square": "m-.9-.9h1.8v1.8h-1.8z",
-    "triangle-up": "m0-1.1l1.1 1.9h-2.2z",
-    "star": "m0-1.3l.4 .9 .9 .1-.7 .6 .2 1-.8-.5-.8 .5 .2-1-.7-.6 .9-.1z",
+SIGNS = {  # outlines about the middle of a sign of width 2, and the width of the round pen that draws them
+    "circle": ("h.001", 2.0),  # a pen that hardly moves: far shorter than circles
+    "diamond": ("m0-1.2l1.2 1.2-1.2 1.2-1.2-1.2z", 0.0),
+    "square": ("m-.9-.9h1.8v1.8h-1.8z", 0.0),
+    "triangle-up": ("m0-1.1l1.1 1.9h-2.2z", 0.0),
+    "star": ("m0-1.3l.4 .9 .9 .1-.7 .6 .2 1-.8-.5-.8 .5 .2-1-.7-.6 .9-.1z", 0.0),
+    "x": ("m-.8-.8l1.6 1.6m0-1.6l-1.6 1.6", 0.3),
+    "cross": ("m-.9 0h1.8m-.9-.9v1.8", 0.3),
 }
-ARMS = {"x": "m-.8-.8l1.6 1.6m0-1.6l-1.6 1.6", "cross": "m-.9 0h1.8m-.9-.9v1.8"}
 
 
 @dataclass(frozen=True)
@@ -32,19 +34,19 @@ class Frame:
     top: float
     right: float
     bottom: float
-    x_ends: tuple[float, float]
-    y_ends: tuple[float, float]
+    x_ends: tuple[float, float] = (0.0, 1.0)
+    y_ends: tuple[float, float] = (0.0, 1.0)
     x_log: bool = False
     y_log: bool = False
 
-    def x(self, values: np.ndarray | float) -> np.ndarray:
+    def x(self, values: np.ndarray) -> np.ndarray:
         return self.left + (self.right - self.left) * part_of_axis(values, self.x_ends, self.x_log)
 
-    def y(self, values: np.ndarray | float) -> np.ndarray:
+    def y(self, values: np.ndarray) -> np.ndarray:
         return self.bottom - (self.bottom - self.top) * part_of_axis(values, self.y_ends, self.y_log)
 
 
-def part_of_axis(values: np.ndarray | float, ends: tuple[float, float], log: bool) -> np.ndarray:
+def part_of_axis(values: np.ndarray, ends: tuple[float, float], log: bool) -> np.ndarray:
     """Positions along an axis, 0 at its begin and 1 at its end, limited to ±20: PDF readers lose digits beyond."""
     with np.errstate(divide="ignore", invalid="ignore"):
         place: Callable[..., np.ndarray] = np.log10 if log else np.asarray
@@ -61,37 +63,32 @@ def stroked(mark: object, frame: Frame) -> Iterator[str]:
 def swatch(mark: Mark, x: float, y: float) -> Iterator[str]:
     """A sample of the mark for a key, from x on, its middle at y."""
     width, height = SWATCH
-    frame = Frame(x, y - 0.5 * height, x + width, y + 0.5 * height, (0.0, 1.0), (0.0, 1.0))
+    frame = Frame(x, y - 0.5 * height, x + width, y + 0.5 * height)
     ends, middle = np.array([0.0, 1.0]), np.full(2, 0.5)
     if isinstance(mark, Points):
-        size, at = max(mark.size, LEAST_SIGN), middle[:1]
-        yield from _points(replace(mark, x=at, y=at, x_ends=None, y_ends=None, size=size, opacity=1.0), frame)
+        one = replace(mark, x=middle[:1], y=middle[:1], size=max(mark.size, LEAST_SIGN), opacity=1.0)
+        yield from _points(one, frame)
     elif isinstance(mark, Line | Limit):
         yield from _line(Line(ends, middle, mark.colour, dash=mark.dash, width=mark.width), frame)
     else:
-        one_or_more = mark.colours if isinstance(mark, Field) else mark.colour
-        every = [one_or_more] if isinstance(one_or_more, str) else one_or_more
-        colours = [every[k] for k in np.linspace(0, len(every) - 1, min(len(every), MOST_COLOURS)).astype(int)]
-        n, opacity = len(colours), 1.0 if isinstance(mark, Field) else mark.opacity
-        edges = np.linspace(0.0, 1.0, n + 1)
+        every = np.atleast_1d(mark.colours if isinstance(mark, Field) else mark.colour)
+        n = min(every.size, MOST_COLOURS)
+        colours, edges = every[np.linspace(0, every.size - 1, n).astype(int)].tolist(), np.linspace(0.0, 1.0, n + 1)
+        opacity = 1.0 if isinstance(mark, Field) else mark.opacity
         yield from _bar(Bar(edges[:-1], edges[1:], np.zeros(n), np.ones(n), colours, opacity), frame)
 
 
 @stroked.register
 def _line(mark: Line, frame: Frame) -> Iterator[str]:
-    x, y = mark.corners
-    yield from _path(_pen(frame.x(x), frame.y(y)), mark.colour, mark.width, mark.dash, mark.opacity)
+    where, faint = _pen(frame.x(mark.x), frame.y(mark.y)), _faint(mark.opacity)
+    if where:
+        style = f'stroke="{mark.colour}" stroke-width="{LINE * mark.width:.2f}"{DASHES[mark.dash]}{faint}'
+        yield f'<path d="{where}" {style}/>'
 
 
 @stroked.register
 def _limit(mark: Limit, frame: Frame) -> Iterator[str]:
-    at = float((frame.x if mark.axis == "x" else frame.y)(mark.at))
-    where = (
-        f"M{at:.2f} {frame.top:.2f}V{frame.bottom:.2f}"
-        if mark.axis == "x"
-        else f"M{frame.left:.2f} {at:.2f}H{frame.right:.2f}"
-    )
-    yield from _path(where, mark.colour, mark.width, mark.dash)
+    yield from _line(mark.across(frame.x_ends, frame.y_ends), frame)
 
 
 @stroked.register
@@ -104,16 +101,15 @@ def _band(mark: Band, frame: Frame) -> Iterator[str]:
 
 @stroked.register
 def _bar(mark: Bar, frame: Frame) -> Iterator[str]:
-    left, right = (np.round(frame.x(edge), 2).tolist() for edge in (mark.left, mark.right))
-    bottom, top = (np.round(frame.y(edge), 2).tolist() for edge in (mark.bottom, mark.top))
-    boxes = [f"M{a} {c}H{b}V{d}H{a}z" for a, b, c, d in zip(left, right, bottom, top, strict=True)]
-    colours = [mark.colour] * len(boxes) if isinstance(mark.colour, str) else mark.colour
+    edges = frame.x(mark.left), frame.x(mark.right), frame.y(mark.bottom), frame.y(mark.top)
+    boxes = np.round(np.column_stack(edges), 2).tolist()
+    colours, inks = (np.broadcast_to(one, len(boxes)).tolist() for one in (mark.colour, mark.ink))
     for colour in dict.fromkeys(colours):
-        these = "".join(box for box, one in zip(boxes, colours, strict=True) if one == colour)
-        yield f'<path d="{these}" fill="{colour}" fill-opacity="{mark.opacity:g}"/>'
-    inks = [mark.ink] * len(boxes) if isinstance(mark.ink, str) else mark.ink
-    for a, b, c, d, label, ink in zip(left, right, bottom, top, mark.labels, inks, strict=False):
-        yield lettering.text((a + b) / 2, (c + d) / 2 + 2.7, label, anchor="middle", fill=ink)
+        these = (box for box, one in zip(boxes, colours, strict=True) if one == colour)
+        outlines = "".join(f"M{a} {c}H{b}V{d}H{a}z" for a, b, c, d in these)
+        yield f'<path d="{outlines}" fill="{colour}" fill-opacity="{mark.opacity:g}"/>'
+    for (a, b, c, d), label, ink in zip(boxes, mark.labels, inks, strict=False):
+        yield from lettering.text((a + b) / 2, (c + d) / 2 + 2.7, [label], anchor="middle", fill=ink)
 
 
 @stroked.register
@@ -125,54 +121,22 @@ def _field(mark: Field, frame: Frame) -> Iterator[str]:
 @stroked.register
 def _points(mark: Points, frame: Frame) -> Iterator[str]:
     x, y = frame.x(mark.x), frame.y(mark.y)
-    yield from _intervals(mark, frame, x, y)
     inside = (x > frame.left - 9) & (x < frame.right + 9) & (y > frame.top - 9) & (y < frame.bottom + 9)
-    places = list(zip(np.round(x[inside], 1).tolist(), np.round(y[inside], 1).tolist(), strict=True))
-    for layer in range(min(LAYERS if mark.opacity < 1.0 else 1, len(places))):
-        some = places[layer::LAYERS] if mark.opacity < 1.0 else places
-        yield from signs(some, mark.sign, SIGN * mark.size, mark.colour, mark.opacity, mark.edge)
+    (shape, pen), r = SIGNS[mark.sign], 0.5 * SIGN * mark.size
+    places = (np.round(np.column_stack([x[inside], y[inside]]), 1) / r).round(3).tolist()
+    rim = SIGN * mark.edge_width / r if mark.edge else 0.0  # half of it outside the sign, half inside
+    strokes = [*[(mark.edge, pen + rim)] * bool(rim), (mark.colour, max(pen - rim, 0.0))]
+    layers = LAYERS if mark.opacity < 1.0 else 1
+    for layer in range(min(layers, len(places))):
+        outlines = "".join(f"M{x:g} {y:g}{shape}" for x, y in places[layer::layers])
+        for colour, width in strokes:
+            pencil = f'stroke="{colour}" stroke-width="{width:.3f}" stroke-linecap="round"'
+            style = pencil if width else f'fill="{colour}"'
+            yield f'<path transform="scale({r:.3f})" d="{outlines}" {style}{_faint(mark.opacity)}/>'
 
 
-def _intervals(mark: Points, frame: Frame, x: np.ndarray, y: np.ndarray) -> Iterator[str]:
-    """Bars with caps between the ends of intervals."""
-    paths = []
-    if mark.x_ends:
-        low, high = (frame.x(end) for end in mark.x_ends)
-        rows = np.column_stack([np.fmin(low, x), np.fmax(high, x), y]).round(2).tolist()
-        paths += [f"M{a} {c}H{b}" for a, b, c in rows]
-    if mark.y_ends:
-        low, high = (frame.y(end) for end in mark.y_ends)
-        rows = np.column_stack([x, np.fmax(low, y), np.fmin(high, y)]).round(2).tolist()
-        paths += [f"M{a} {b}V{c}M{a - 1.5:.2f} {b}h3M{a - 1.5:.2f} {c}h3" for a, b, c in rows]
-    if paths:
-        yield from _path("".join(paths), mark.colour, 1.6)
-
-
-def signs(
-    places: Sequence[tuple[float, float]], sign: str, size: float, colour: str, opacity: float = 1.0, edge: str = ""
-) -> Iterator[str]:
-    """Signs of one kind at these places of the page."""
-    faint = f' opacity="{opacity:g}"' if opacity < 1.0 else ""
-    r = 0.5 * size
-    if sign == "ring":
-        rings = "".join(f'<circle cx="{x}" cy="{y}" r="{r:.2f}"/>' for x, y in places)
-        yield f'<g fill="{edge or "none"}" stroke="{colour}" stroke-width="1.5"{faint}>{rings}</g>'
-    elif sign in SHAPES:
-        scaled = "".join(f"M{x / r:.3f} {y / r:.3f}{SHAPES[sign]}" for x, y in places)
-        yield f'<path transform="scale({r:.3f})" d="{scaled}" fill="{colour}"{faint}/>'
-    elif sign in ARMS:
-        arms = "".join(f"M{x / r:.3f} {y / r:.3f}{ARMS[sign]}" for x, y in places)
-        yield f'<path transform="scale({r:.3f})" d="{arms}" stroke="{colour}" stroke-width=".6"{faint}/>'
-    else:  # a round pen that hardly moves: far shorter than circles
-        dots = "".join(f"M{x} {y}h.01" for x, y in places)
-        for tint, width in ((edge, size + 0.5), (colour, size)) if edge else ((colour, size),):
-            yield f'<path d="{dots}" stroke="{tint}" stroke-width="{width:.2f}" stroke-linecap="round"{faint}/>'
-
-
-def _path(where: str, colour: str, width: float, dash: str = "solid", opacity: float = 1.0) -> Iterator[str]:
-    faint = f' opacity="{opacity:g}"' if opacity < 1.0 else ""
-    if where:
-        yield f'<path d="{where}" stroke="{colour}" stroke-width="{LINE * width:.2f}"{DASHES[dash]}{faint}/>'
+def _faint(opacity: float) -> str:
+    return f' opacity="{opacity:g}"' if opacity < 1.0 else ""
 
 
 def _pen(x: np.ndarray, y: np.ndarray, close: bool = False) -> str:

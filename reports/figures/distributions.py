@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from textwrap import fill
 
 import numpy as np
 
@@ -16,7 +15,6 @@ CENTRAL = (0.005, 0.995)  # what a histogram must show well
 SPOILT = 3.0  # times the width of the central part: a wider range is cut
 FAR = 10.0  # times the width of all bins: a nominal or limit farther away is told, not drawn
 NORMAL_REACH, NORMAL_POINTS = 4.0, 81  # standard deviations on either side, places of a printed distribution
-TITLE_WIDTH = 28  # characters above a narrow panel
 
 
 def histogram(
@@ -47,25 +45,24 @@ def histogram(
     texts = [
         f"{number(a)} to {number(b)}: {count(int(n))} cases" for (a, b), n in zip(pairwise(edges), counts, strict=True)
     ]
-    marks: list[Mark] = list(_bounds(drawn, summary.confidence, top)) if with_intervals else []
+    marks: list[Mark] = [_bounds(drawn, summary.confidence, top)] * with_intervals
     bottom = np.zeros(counts.size)
     marks.append(Bar(edges[:-1], edges[1:], bottom, counts, SKY, texts=texts, column=column, key="cases"))
     marks += _percentile_lines(drawn, outer, with_intervals)
     beyond = [count(values.size - int(counts.sum()))] if counts.sum() < values.size else []
-    if nominal is not None and _near(nominal, edges):
-        marks.append(Limit(nominal, "x", INK, f"nominal {number(nominal)}", "dot", key="nominal"))
-    elif nominal is not None:
-        beyond.append(f"nominal {number(nominal)}")
-    far = [number(limit) for limit in limits if not _near(limit, edges)]
-    beyond += [f"limit{'s' * (len(far) > 1)} {' and '.join(far)}"] if far else []
-    for limit in limits:
-        if _near(limit, edges):
-            marks.append(Limit(limit, "x", VERMILION, f"required limit {number(limit)}", key="required limit"))
+    known = [] if nominal is None else [nominal]
+    for places, words, key, colour, dash in (
+        (known, "nominal", "nominal", INK, "dot"), (limits, "limit", "required limit", VERMILION, "solid"),
+    ):  # fmt: skip
+        near = [at for at in places if _near(at, edges)]
+        far = [number(at) for at in places if at not in near]
+        marks += [Limit(at, "x", colour, f"{key} {number(at)}", dash, key=key) for at in near]
+        beyond += [f"{words}{'s' * (len(far) > 1)} {' and '.join(far)}"] if far else []
     if normal:
         words = f"printed normal distribution, {number(normal[0])} ± {number(normal[1])} (1 σ)"
         key = "normal distribution that the source prints"
         marks.append(Line(curve[0], curve[1], GREEN, width=2.0, text=words, key=key))
-    told = fill(f"{', '.join(beyond)} beyond the axis", TITLE_WIDTH) if beyond else ""
+    told = f"{', '.join(beyond)} beyond the axis" if beyond else ""
     x = Axis(label, most=5, whole=bool(edges[1] - edges[0] == 1.0), grid=False, margin=0.03)
     y = Axis("cases", reach=(0.0, top), most=4, whole=True)
     return Plot(tuple(marks), x, y, "\n".join(filter(None, (title, told))), height)
@@ -91,24 +88,21 @@ def _quantiles_within(summary: Summary, probabilities: Sequence[float], edges: n
     return [q for q in known if all(end is None or low <= end <= high for end in (q.value, q.lower, q.upper))]
 
 
-def _bounds(quantiles: Sequence[Quantile], confidence: float, top: float) -> Iterator[Bar]:
+def _bounds(quantiles: Sequence[Quantile], confidence: float, top: float) -> Bar:
     """Intervals of the quantiles, as high as the panel."""
-    key = f"{percent(0.5 * (1.0 + confidence))} confidence bounds of a percentile, distribution-free"
-    for quantile in quantiles:
-        if quantile.lower is not None and quantile.upper is not None:
-            left, right = np.array([[quantile.lower], [quantile.upper]])
-            yield Bar(left, right, np.zeros(1), np.array([top]), BLUE, 0.3, key=key)
+    ends = [(q.lower, q.upper) for q in quantiles if q.lower is not None and q.upper is not None]
+    left, right = np.array(ends).reshape(-1, 2).T
+    key = f"{percent(0.5 * (1.0 + confidence))} confidence bounds of a percentile, distribution-free" if ends else ""
+    return Bar(left, right, np.zeros(left.size), np.full(left.size, top), BLUE, 0.3, key=key)
 
 
 def _percentile_lines(quantiles: Sequence[Quantile], outer: Sequence[float], with_intervals: bool) -> Iterator[Limit]:
     both = f"{' and '.join(percent(p, 3) for p in outer)} percentiles"
-    for quantile in quantiles:
-        bounds = f" {interval(quantile.lower, quantile.upper)}" if with_intervals else ""
-        words = f"{percent(quantile.probability, 3)} percentile {number(quantile.value)}{bounds}"
-        if quantile.probability == 0.5:
-            yield Limit(quantile.value, "x", ORANGE, words, key="median")
-        else:
-            yield Limit(quantile.value, "x", BLUE, words, "dash", key=both)
+    for q in quantiles:
+        bounds = f" {interval(q.lower, q.upper)}" if with_intervals else ""
+        words = f"{percent(q.probability, 3)} percentile {number(q.value)}{bounds}"
+        colour, dash, key = (ORANGE, "solid", "median") if q.probability == 0.5 else (BLUE, "dash", both)
+        yield Limit(q.value, "x", colour, words, dash, key=key)
 
 
 def histograms(plots: Sequence[Plot]) -> Drawing:
@@ -141,6 +135,5 @@ def bin_edges(values: np.ndarray) -> np.ndarray:
         half = max(abs(low), 1.0) * 1e-3
         return np.linspace(low - half, high + half, FEWEST_BINS + 1)
     spread = float(np.subtract(*np.percentile(values, [75, 25])))
-    width = 2.0 * spread / values.size ** (1.0 / 3.0)
-    bins = int(np.ceil((high - low) / width)) if width * MOST_BINS > high - low else MOST_BINS
-    return np.linspace(low, high, min(max(bins, FEWEST_BINS), MOST_BINS) + 1)
+    width = max(2.0 * spread / values.size ** (1.0 / 3.0), (high - low) / MOST_BINS)
+    return np.linspace(low, high, int(np.clip(np.ceil((high - low) / width), FEWEST_BINS, MOST_BINS)) + 1)

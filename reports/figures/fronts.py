@@ -6,7 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
-from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, nominal_ring
+from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, nominal_ring, stepped
 from reports.drawing.palette import BLUE, INK, MUTED, ORANGE, SKY, VERMILION
 from reports.text.numbers import count
 
@@ -42,8 +42,10 @@ def front_figure(
     cloud = np.vstack([infeasible.shown, feasible.shown])
     pairs = list(combinations(range(len(labels)), 2))[:MOST_PANELS]
     name, colour = ("best if the constraints are left out", ORANGE) if relaxed else ("front", BLUE)
-    reaches = [objective_reach(cloud[:, k], front[:, k], [values[k] for _, values in published]) for k in
-               range(len(labels))]  # fmt: skip
+    # The front, the published points, and the nearer half of the candidates.
+    middle = np.median(cloud, axis=0, keepdims=True) if cloud.size else cloud
+    places = np.vstack([front, middle, *(values for _, values in published)])
+    axes = [Axis(label, reach=Axis(margin=MARGIN).ends([seen])) for label, seen in zip(labels, places.T, strict=True)]
     plots = []
     for i, k in pairs:
         marks: list[Mark] = []
@@ -52,21 +54,13 @@ def front_figure(
             marks.append(Points(candidates.shown[:, i], candidates.shown[:, k], tint, words, opacity=0.45, key=key))
         x, y = front[:, i], front[:, k]
         if len(pairs) == 1:
-            marks.append(Line(x, y, colour, "front", width=1.6, step="hv" if first_small else "vh"))
+            steps = stepped(x, y) if first_small else stepped(y, x)[::-1]
+            marks.append(Line(*steps, colour, "front", width=1.6))
         marks.append(Points(x, y, colour, name, size=6.0, key=f"{name}: {count(len(x))} candidates" if len(x) else ""))
         for place, (point, values) in enumerate(published):
             marks.append(nominal_ring((values[i], values[k]), (VERMILION, INK)[place % 2], point))
-        axes = Axis(labels[i], reach=reaches[i]), Axis(labels[k], reach=reaches[k])
-        plots.append(Plot(tuple(marks), *axes, height=440.0 if len(pairs) == 1 else 340.0))
+        plots.append(Plot(tuple(marks), axes[i], axes[k], height=440.0 if len(pairs) == 1 else 340.0))
     return Drawing("Candidates and the front of the objectives", tuple(plots))
-
-
-def objective_reach(cloud: np.ndarray, front: np.ndarray, published: Sequence[float]) -> tuple[float, float]:
-    """Axis of an objective: the front, the published points, and the nearer half of the candidates."""
-    places = np.concatenate([front, np.array(published), [np.median(cloud)] if cloud.size else []])
-    low, high = (float(places.min()), float(places.max())) if places.size else (0.0, 1.0)
-    margin = MARGIN * (high - low) or 0.05 * max(abs(low), 1.0)
-    return low - margin, high + margin
 
 
 def candidates_beyond(plot: Plot) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -29,16 +30,15 @@ class HistoryLine:
 
 
 @dataclass(frozen=True)
-class Phases:
-    """Names and first times of the phases of one case, and all of them in words for the key; empty without phases."""
+class HistoryLimit:
+    """A required limit at a value of a quantity, with its words.
 
-    begins: tuple[tuple[str, float], ...] = ()
-    words: str = ""
+    other : what it asks for where it need not hold along the whole flight.
+    """
 
-    def marks(self) -> Iterator[Limit]:
-        """A dotted line where each phase after the first begins."""
-        for name, time in self.begins[1:]:
-            yield Limit(time, "x", MUTED, f"{name} begins", "dot", 1.0, False, self.words)
+    at: float
+    words: str
+    other: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,17 +62,22 @@ class Envelope:
             yield self.curves[low], self.curves[high], opacity, words
 
 
+def phase_limits(begins: Sequence[tuple[str, float]], words: str) -> list[Limit]:
+    """A dotted line where each phase after the first begins.  begins : names and first times; words : for the key."""
+    return [Limit(time, "x", MUTED, f"{name} begins", "dot", 1.0, False, words) for name, time in begins[1:]]
+
+
 def history_plot(
     name: str,
     label: str,
     time: str,
     lines: Sequence[HistoryLine],
     envelope: Envelope | None = None,
-    limits: Sequence[tuple[float, str]] = (),
-    phases: Phases | None = None,
+    limits: Sequence[HistoryLimit] = (),
+    phases: Sequence[Limit] = (),
 ) -> Plot:
-    """A quantity against the time.  limits : required limits with their words.  phases : of the nominal case."""
-    marks: list[Mark] = [*(phases.marks() if phases else ())]
+    """A quantity against the time.  phases : see `phase_limits`."""
+    marks: list[Mark] = [*phases]
     if envelope is not None:
         for low, high, opacity, words in envelope.bands():
             marks.append(between(envelope.at, low, high, SKY, opacity, words, words))
@@ -81,10 +86,11 @@ def history_plot(
     marks += case_lines(lines, lambda line: thinned(line.t, line.quantities[name]))
     bottom, top = Plot(tuple(marks), Axis(), Axis()).ends[1]
     far = []
-    for at, words in limits:
-        near = bottom - FAR * (top - bottom) <= at <= top + FAR * (top - bottom)
-        marks.append(Limit(at, "y", VERMILION, words, "solid", 2.0, near, "required limit" if near else ""))
-        far += [] if near else [f"limit {number(at)} beyond the axis"]
+    for limit in limits:
+        near = bottom - FAR * (top - bottom) <= limit.at <= top + FAR * (top - bottom)
+        style, key = ("dash", limit.other) if limit.other else ("solid", "required limit")
+        marks.append(Limit(limit.at, "y", VERMILION, limit.words, style, 2.0, near, key if near else ""))
+        far += [] if near else [f"limit {number(limit.at)} beyond the axis"]
     axes = Axis(time, margin=0.0), Axis(name=label, most=5)
     return Plot(tuple(marks), *axes, "\n".join([label, *far]), 260.0, quantity=name)
 
@@ -128,13 +134,11 @@ def thinned(t: np.ndarray, y: np.ndarray, samples: int = SAMPLES) -> tuple[np.nd
     """The curve with about `samples` points; lowest and highest of every stretch stay, so that no pulse is lost."""
     if t.size <= samples:
         return t, y
-    bounds = np.linspace(0, t.size, samples // 2 + 1).astype(int)[:-1]
-    filled_low, filled_high = np.where(np.isfinite(y), y, np.inf), np.where(np.isfinite(y), y, -np.inf)
-    keep = {0, t.size - 1}
-    for begin, end in zip(bounds, [*bounds[1:], t.size], strict=True):
-        keep.add(begin + int(np.argmin(filled_low[begin:end])))
-        keep.add(begin + int(np.argmax(filled_high[begin:end])))
-    rows = np.array(sorted(keep))
+    bounds = np.linspace(0, t.size, samples // 2 + 1).astype(int)
+    low, high = (np.where(np.isfinite(y), y, beyond) for beyond in (np.inf, -np.inf))
+    extremes = [begin + pick for begin, end in pairwise(bounds)
+                for pick in (low[begin:end].argmin(), high[begin:end].argmax())]  # fmt: skip
+    rows = np.unique([0, *extremes, t.size - 1])
     return t[rows], y[rows]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from mc_engine.statistics import SurfaceMap
 from reports.drawing.marks import Axis, Drawing, Field, Mark, Plot, Points
-from reports.drawing.ticks import covering
+from reports.drawing.ticks import nice_ticks
 from reports.text.numbers import count, number, with_unit
 
 LEVELS = 12
@@ -64,7 +64,6 @@ def surface_method(surface: SurfaceMap, unit: str) -> str:
 def contour_levels(values: np.ndarray) -> np.ndarray:
     """Round contour levels that cover the values."""
     low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    if high - low <= 1e-9 * max(abs(low), abs(high)):
-        half = max(abs(low), 1.0) * 1e-6
-        return np.array([low - half, low + half])
-    return np.array(covering(low, high, LEVELS))
+    if high - low <= 1e-9 * max(abs(low), abs(high)):  # one value all over has a range, too
+        high = low + 1e-6 * max(abs(low), 1.0)
+    return np.array(nice_ticks(low, high, LEVELS, cover=True))

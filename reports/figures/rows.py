@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot, Points, rows_axis
+from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot, Points, finite, intervals, names_axis
 from reports.drawing.palette import BLUE, GREEN, INK, MUTED, ORANGE, PAPER, SKY, VERMILION
 from reports.text.numbers import SPACE, count, number
 
@@ -15,8 +15,6 @@ SPREAD = (0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0)  # probabilities of what is dra
 SPANS = ((0, 6, MUTED, 1.2, "all cases"), (1, 5, SKY, 7.0, "5 % to 95 %"),
          (2, 4, BLUE, 11.0, "middle half of the cases"))  # of SPREAD, with colour, width and words  # fmt: skip
 FAR_APART = 30.0  # levels whose medians differ by such a ratio are drawn on a logarithmic axis
-RATIOS = ((1.02, 1.04, 1.06, 1.08), (1.05, 1.1, 1.15, 1.2), (1.1, 1.2, 1.3, 1.5), (1.25, 1.5, 2.0, 3.0),
-          (2.0, 5.0, 10.0, 20.0), (10.0, 100.0, 1e3, 1e4))  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -34,31 +32,26 @@ class MarginRow:
 
 def margin_figure(rows: Sequence[MarginRow]) -> Drawing:
     """Margins of requirements relative to the width of their limits."""
-    marks: list[Mark] = []
-    for place, row in enumerate(rows):
-        y, bound = np.array([float(place)]), "none" if row.demonstrated is None else _percent(row.demonstrated)
-        text = f"{row.name}: demonstrated {bound}, worst case {_percent(row.worst)}"
-        if row.demonstrated is not None:
-            x, key = _drawn_margin(row.demonstrated), "demonstrated bound (tolerance limit)"
-            ends = np.minimum(x, 0.0), np.maximum(x, 0.0)
-            marks.append(Bar(*ends, y - 0.3, y + 0.3, TONES[row.tone], 0.35, (text,)))
-            marks.append(Points(x, y, BLUE, key, "diamond", 9.0, texts=(text,), key=key))
-        marks.append(Points(_drawn_margin(row.worst), y, INK, "worst case", "x", 8.0, texts=(text,), key="worst case"))
-    marks.append(Limit(0.0, "x", VERMILION, "limit", key="limit"))
-    names = [row.name if row.demonstrated is None else f"{row.name}, {_percent(row.demonstrated)}" for row in rows]
-    reached = [
-        float(_drawn_margin(margin)[0])
-        for row in rows
-        for margin in (row.demonstrated, row.worst)
-        if margin is not None
-    ]
-    x_axis = Axis("margin over width of the limits [%]", reach=(min(*reached, 0.0) - 5.0, max(*reached, 0.0) + 5.0))
-    plot = Plot(tuple(marks), x_axis, rows_axis(names), height=70.0 + 26.0 * len(rows))
-    return Drawing("Margins relative to the width of the limits", (plot,), 1)
-
-
-def _drawn_margin(margin: float) -> np.ndarray:
-    return np.array([100.0 * min(max(margin, -MOST_MARGIN), MOST_MARGIN)])
+    place = np.arange(len(rows), dtype=np.float64)
+    margins = np.array([(row.demonstrated, row.worst) for row in rows], dtype=np.float64).reshape(-1, 2)
+    bound, worst = 100.0 * np.clip(margins.T, -MOST_MARGIN, MOST_MARGIN)
+    words = ["none" if row.demonstrated is None else _percent(row.demonstrated) for row in rows]
+    texts = [f"{row.name}: demonstrated {bound}, worst case {_percent(row.worst)}"
+             for row, bound in zip(rows, words, strict=True)]  # fmt: skip
+    known = np.flatnonzero(np.isfinite(bound)).tolist()
+    tones, told, x, y = [TONES[rows[k].tone] for k in known], [texts[k] for k in known], bound[known], place[known]
+    key = "demonstrated bound (tolerance limit)"
+    marks = (
+        Bar(np.fmin(x, 0.0), np.fmax(x, 0.0), y - 0.3, y + 0.3, tones, 0.35, told),
+        Points(x, y, BLUE, key, "diamond", 9.0, texts=told, key=key * bool(known)),
+        Points(worst, place, INK, "worst case", "x", 8.0, texts=texts, key="worst case"),
+        Limit(0.0, "x", VERMILION, "limit", key="limit"),
+    )
+    names = [row.name if bound == "none" else f"{row.name}, {bound}" for row, bound in zip(rows, words, strict=True)]
+    ends = np.r_[bound[known], worst, 0.0]
+    x_axis = Axis("margin over width of the limits [%]", reach=(float(ends.min()) - 5.0, float(ends.max()) + 5.0))
+    plot = Plot(marks, x_axis, names_axis(names, down=True), height=70.0 + 26.0 * len(rows))
+    return Drawing("Margins relative to the width of the limits", (plot,), 1, "; ".join(texts))
 
 
 def _percent(margin: float) -> str:
@@ -82,30 +75,21 @@ def change_panel(
     ):
         rows = np.flatnonzero(np.isfinite(value) & (significant == sure)).tolist()
         texts = [f"{metrics[k]}: {number(value[k], 3)}, {number(lower[k], 3)} to {number(upper[k], 3)}" for k in rows]
-        ends = lower[rows], upper[rows]
-        marks.append(Points(value[rows], np.array(rows), colour, key, sign, 8.0, texts=texts, x_ends=ends, key=key))
-    ticks = tuple((tick, number(tick, 3)) for tick in ratio_ticks(reach)) if unchanged else None
-    x = Axis(reach=reach, log=bool(unchanged), ticks=ticks)
-    return Plot(tuple(marks), x, rows_axis(metrics, True), title, 70.0 + 24.0 * len(metrics))
+        marks.append(intervals(lower[rows], upper[rows], np.array(rows), colour))
+        marks.append(Points(value[rows], np.array(rows), colour, key, sign, 8.0, texts=texts, key=key))
+    x = Axis(reach=reach, log=bool(unchanged))
+    return Plot(tuple(marks), x, names_axis(metrics, down=True, grid=True), title, 70.0 + 24.0 * len(metrics))
 
 
 def change_reach(estimates: np.ndarray, unchanged: float) -> tuple[float, float]:
     """Ends of the axis of changes: every value and, unless they reach far beyond, every interval."""
     scaled = np.log(estimates) if unchanged else estimates
-    values = np.append(scaled[np.isfinite(scaled[:, 0]), 0], np.log(unchanged) if unchanged else 0.0)
-    every = np.append(scaled[np.isfinite(scaled)], values)
+    values = finite([scaled[:, 0], [np.log(unchanged) if unchanged else 0.0]])
+    every = finite([scaled, values])
     room = max(float(np.ptp(values)), 0.1)
     low = max(float(every.min()), float(values.min()) - room) - 0.05 * room
     high = min(float(every.max()), float(values.max()) + room) + 0.05 * room
     return (float(np.exp(low)), float(np.exp(high))) if unchanged else (low, high)
-
-
-def ratio_ticks(span: tuple[float, float]) -> list[float]:
-    """Round ratios inside the span, at most seven of them, 1 always among them."""
-    widest = max(span[1], 1.0 / span[0])
-    steps = next((steps for steps in RATIOS if widest <= steps[-1] * 1.05), RATIOS[-1])
-    ticks = sorted({round(1.0 / step, 3) for step in steps} | {1.0, *steps})
-    return [tick for tick in ticks if span[0] <= tick <= span[1]]
 
 
 def level_panel(label: str, levels: Sequence[str], quantiles: np.ndarray, used: Sequence[int]) -> Plot:
@@ -122,7 +106,7 @@ def level_panel(label: str, levels: Sequence[str], quantiles: np.ndarray, used: 
     known = median[np.isfinite(median)]
     log = bool(known.size and np.nanmin(quantiles) > 0.0 and known.max() > FAR_APART * known.min())
     title = f"{label}{', logarithmic' if log else ''}"
-    return Plot(tuple(marks), Axis(log=log), rows_axis(levels), title, 40.0 + 26.0 * len(levels))
+    return Plot(tuple(marks), Axis(log=log), names_axis(levels, down=True), title, 40.0 + 26.0 * len(levels))
 
 
 def tornado(metric: str, names: Sequence[str], total: np.ndarray, first: np.ndarray, interval: str) -> Plot:
@@ -130,14 +114,9 @@ def tornado(metric: str, names: Sequence[str], total: np.ndarray, first: np.ndar
     marks: list[Mark] = []
     for values, colour, offset, key in ((total, BLUE, -0.18, "total effect"), (first, SKY, 0.2, "first-order effect")):
         rows = np.flatnonzero(np.isfinite(values[:, 0]))
-        value, place = values[rows, 0], rows + offset
-        texts = [f"{names[row]}: {key} {number(size, 2)}" for row, size in zip(rows.tolist(), value, strict=True)]
-        size = np.fmax(value, 0.0)
+        texts = [f"{names[row]}: {key} {number(values[row, 0], 2)}" for row in rows.tolist()]
+        (size, low, high), place = np.maximum(values[rows], 0.0).T, rows + offset
         marks.append(Bar(np.zeros(rows.size), size, place - 0.17, place + 0.17, colour, 0.9, texts, key=key))
-        known = np.isfinite(values[rows, 1])
-        low, high = np.fmax(values[rows[known], 1:], 0.0).T
-        key = f"{interval} interval" if known.any() else ""
-        marks.append(Points(size[known], place[known], INK, size=2.5, x_ends=(low, high), key=key,
-                            texts=[texts[k] for k in np.flatnonzero(known)]))  # fmt: skip
+        marks.append(intervals(low, high, place, INK, f"{interval} interval" * bool(np.isfinite(low).any())))
     x = Axis("fraction of the variance", zero=True, most=5)
-    return Plot(tuple(marks), x, rows_axis(names), metric, 34.0 + 20.0 * len(names))
+    return Plot(tuple(marks), x, names_axis(names, down=True), metric, 34.0 + 20.0 * len(names))

@@ -6,10 +6,11 @@ import numpy as np
 import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.drivers import SuccessCurve
-from reports.drawing.marks import Axis, Bar, Limit, Line, Mark, Plot, Points, between, joined
+from reports.drawing.marks import Axis, Bar, Limit, Line, Mark, Plot, Points, between, intervals, names_axis
 from reports.drawing.palette import BLUE, INK, MUTED, SKY, VERMILION, blended
 from reports.text.numbers import count, number, percent
 
+WEAK = "#f7f7f7"  # the colour of no correlation
 LIGHT = 0.6  # a cell of a weaker correlation is light, and takes black numbers
 MOST_POINTS = 160  # of a probability plot: the outermost ones whole, the others evenly along the axis
 OUTERMOST = 20  # on either side
@@ -22,23 +23,21 @@ def success_panel(requirement: str, label: str, curve: SuccessCurve, overall: fl
     fraction = 100.0 * curve.passed / curve.tried
     names = [curve.levels[int(k)] for k in curve.middle] if curve.levels else []
     place = np.arange(len(names), dtype=np.float64) if names else curve.middle
-    marks: list[Mark] = [Limit(100.0 * overall, "y", VERMILION, "all cases", "dash", 1.4, key="all cases")]
-    x = Axis(label, reach=(-0.5, len(names) - 0.5), ticks=tuple(enumerate(names)))
-    if not names:
-        bins = [np.array([[low, y], [high, y]]) for low, high, y in zip(curve.low, curve.high, fraction, strict=True)]
-        left, right = joined(bins).T
-        marks.insert(0, Line(left, right, MUTED, "bin", width=1.5, key="extent of the bin"))
-        x = Axis(label)
+    where = names or [number(float(at), 3) for at in place]
     texts = [
-        f"{where}: {count(int(passed))} of {count(int(tried))} cases pass, {number(float(share), 4)} %"
-        for where, passed, tried, share in zip(
-            names or [number(float(at), 3) for at in place], curve.passed, curve.tried, fraction, strict=True
-        )
+        f"{one}: {count(int(passed))} of {count(int(tried))} cases pass, {number(float(share), 4)} %"
+        for one, passed, tried, share in zip(where, curve.passed, curve.tried, fraction, strict=True)
     ]
+    extents = [] if names else [intervals(curve.low, curve.high, fraction, MUTED, "extent of the bin")]
     key = f"share of a bin that passes, at its median, with {percent(confidence)} Clopper–Pearson interval"
-    ends = 100.0 * curve.lower, 100.0 * curve.upper
-    marks.append(Points(place, fraction, BLUE, size=6.0, texts=texts, y_ends=ends, key=key))
-    return Plot(tuple(marks), x, Axis("pass [%]", most=5), requirement, 260.0)
+    marks: tuple[Mark, ...] = (
+        *extents,
+        intervals(100.0 * curve.lower, 100.0 * curve.upper, place, BLUE, upright=True),
+        Limit(100.0 * overall, "y", VERMILION, "all cases", "dash", 1.4, key="all cases"),
+        Points(place, fraction, BLUE, size=6.0, texts=texts, key=key),
+    )
+    x = names_axis(names, label, grid=True) if names else Axis(label)
+    return Plot(marks, x, Axis("pass [%]", most=5), requirement, 260.0)
 
 
 def correlation_matrix(names: Sequence[str], rho: np.ndarray) -> Plot:
@@ -52,17 +51,16 @@ def correlation_matrix(names: Sequence[str], rho: np.ndarray) -> Plot:
     cells = Bar(
         columns - 0.48,
         columns + 0.48,
-        rows - 0.46,
-        rows + 0.46,
-        [blended(VERMILION if value < 0.0 else BLUE, abs(value)) for value in values],
+        rows - 1.46,
+        rows - 0.54,
+        [blended(abs(value), WEAK, VERMILION if value < 0.0 else BLUE) for value in values],
         1.0,
         [f"{names[i]}, {names[k]}: {label}" for i, k, label in zip(rows, columns, labels, strict=True)],
-        labels,
+        [label.replace("0.", ".") for label in labels],  # as correlations are printed: the cells are narrow
         ["#000000" if abs(value) < LIGHT else "#ffffff" for value in values],
         "rank correlation: blue positive, red negative",
     )
-    x = Axis(reach=(-0.5, len(names) - 1.5), ticks=tuple(enumerate(names[:-1])), grid=False)
-    y = Axis(reach=(len(names) - 0.5, 0.5), ticks=tuple(enumerate(names))[1:], grid=False)
+    x, y = names_axis(names[:-1]), names_axis(names[1:], down=True)
     return Plot((cells,), x, y, height=60.0 + 28.0 * len(names))
 
 

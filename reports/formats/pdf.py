@@ -12,7 +12,7 @@ import typst
 
 from mc_engine.errors import EngineError
 from reports.document.blocks import Block, Document, FigureBlock, Table, Terms, Text
-from reports.document.columns import spans, widths
+from reports.document.columns import spans, unbroken, widths
 from reports.drawing import paper
 from reports.drawing.pictures import fonts
 
@@ -85,6 +85,7 @@ def _plain_block(block: Block, width: float = paper.WIDTH) -> dict[str, Any]:
         strips = paper.strips(drawing, width)
         body: dict[str, Any] = {"caption": block.caption, "alternative": drawing.alternative, "strips": strips}
     else:
+        block = unbroken(block) if isinstance(block, Table) else block
         body = asdict(block)
         body["style"] = body.pop("kind", "")  # of a text; "kind" says which block it is
         if isinstance(block, Table):

@@ -7,7 +7,7 @@ in which the campaign file gives them.  Statistics and verdicts are computed in 
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import cached_property
-from math import isfinite, log10
+from math import inf, isfinite, log10
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,10 @@ from mc_engine.statistics.first_order import Contributor
 from mc_engine.statistics.worst import Limits
 from mc_engine.units import convert
 from reports.run.flown import ColumnFacts, Flown
+from reports.text.numbers import number, with_unit
 
 COMFORTABLE = (0.01, 1e4)  # where the largest number may lie in its own unit
+FINE = 1e-3  # a smaller σ is not told in a unit
 IDEAL = (1.0, 1e3)  # where it lies in the unit chosen instead, if it can
 # Units of one quantity, the smallest first; a column changes to another one of its own row only.
 _LADDERS = (
@@ -65,6 +67,8 @@ def chosen_unit(unit: str, numbers: Iterable[float | None]) -> str:
 
     def awkwardness(other: str) -> float:
         size = convert(largest, unit, other)
+        if not 0.0 < size < inf:
+            return inf
         return max(log10(size / IDEAL[1]), log10(IDEAL[0] / size), 0.0)
 
     return min(reversed(_LADDER[unit]), key=awkwardness)  # of equally good ones, the largest unit
@@ -92,8 +96,17 @@ class ShownRun(Flown):
         if name not in self._units:
             unit = self._own.unit(name)
             role = self._own.columns[name].role if name in self._own.columns else ""
-            self._units[name] = unit if role == "dispersion" else chosen_unit(unit, self._sizes(name))
+            kept = role == "dispersion" or self._fine(name, unit)
+            self._units[name] = unit if kept else chosen_unit(unit, self._sizes(name))
         return self._units[name]
+
+    def _fine(self, name: str, unit: str) -> bool:
+        """Whether a metric spreads so little that a larger unit would hide it: 1 s of an end of burn after 6 hours."""
+        summary = self._own.summaries.get(name)
+        if summary is None or not summary.spread or self._own.limits(name) != Limits():
+            return False
+        chosen = chosen_unit(unit, self._sizes(name))
+        return chosen != unit and convert(summary.spread, unit, chosen) < FINE
 
     def _sizes(self, name: str) -> list[float | None]:
         """What the numbers of a column come to, in the table and in the histories, and its limits."""
@@ -175,3 +188,10 @@ class ShownRun(Flown):
     @property
     def contributions(self) -> Any:
         return self._own.contributions
+
+
+def spread_text(flown: Flown, metric: str, spread: float) -> str:
+    """A part of a metric's σ in the unit that suits σ: 55 s of a time that is told in days."""
+    told, sigma = flown.unit(metric), flown.summaries[metric].spread
+    unit = chosen_unit(told, [sigma]) if sigma and sigma < FINE else told
+    return with_unit(number(convert(spread, told, unit) if unit != told else spread, 3), unit)

@@ -1,6 +1,6 @@
 """The run as the report sees it: the table, the nominal, what every column is, and which metrics matter."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from mc_engine.model.figures import KINDS, MapFigure, ScatterFigure, from_record
-from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, was_looked_at
+from mc_engine.statistics import SAMPLING_DESIGNS, Summary, Verdict, summarize, was_looked_at
 from mc_engine.statistics.first_order import Contributor, contributors
 from mc_engine.statistics.worst import Limits, limits_on
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
@@ -17,6 +17,8 @@ from reports.run.all_cases import Run, all_cases, without_attributes
 from reports.run.contributions import Contributions
 from reports.run.contributions import contributions as contributions_of
 from reports.text.numbers import axis_label, count, named, words
+
+NEGLIGIBLE = 1e-7  # of the size of a metric
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,10 @@ class Flown:
     def words(self, name: str) -> str:
         return words(name, self.unit(name))
 
+    def listed(self, names: Iterable[str]) -> str:
+        """Several columns in words, for a sentence."""
+        return ", ".join(self.words(name) for name in names)
+
     def axis(self, name: str) -> str:
         """An axis label: the column's name in words with its unit; of an input that is a symbol, its meaning too."""
         # Of the inputs' own records: the columns of a run upstream have its name before their meaning.
@@ -144,10 +150,14 @@ class Flown:
 
     def absence(self, *names: str) -> str:
         """Why the table of cases lacks one of the columns, as the end of a sentence; empty if it lacks none."""
-        shared = {record["name"] for key in ("parameters", "settings") for record in self.manifest.get(key, [])}
+        records = [record for key in ("parameters", "settings") for record in self.manifest.get(key, [])]
+        shared = {str(record["name"]): str(record.get("unit", "")) for record in records}
         for name in names:
-            if name not in self.cases.columns:
-                return f"the run does not disperse {name}" if name in shared else f"the run has no column {name}"
+            if name in self.cases.columns:
+                continue
+            if name in shared:
+                return f"the run does not disperse the {words(name, shared[name])}"
+            return f"the run has no column {name}"
         return ""
 
     @cached_property
@@ -231,17 +241,31 @@ class Flown:
 
     @cached_property
     def key_metrics(self) -> list[str]:
-        """The metrics that matter: those with a requirement, then those that the model maps or plots; else all."""
+        """The metrics that matter: those with a requirement, then those that the model maps or plots; else all.
+
+        Without those of a negligible spread, of which distributions, contributors and convergence say nothing.
+        """
         wanted = [verdict.metric for verdict in self.verdicts]
         for figure in self.figures:
             wanted += [figure.metric] if isinstance(figure, MapFigure) else []
             wanted += [figure.y, figure.x] if isinstance(figure, ScatterFigure) else []
         metrics = [fact.name for fact in self.with_role("metric")]
-        return [name for name in dict.fromkeys(wanted) if name in metrics] or metrics
+        known = [name for name in dict.fromkeys(wanted) if name in metrics]
+        return [name for name in known or metrics if not self.negligible(name)] or metrics
 
     def limits(self, metric: str) -> Limits:
         """The tightest limits that the requirements set on a metric."""
         return limits_on(metric, self.manifest.get("requirements", []))
+
+    def negligible(self, name: str) -> bool:
+        """Whether the spread of a column is too small to draw: no limit on it, and σ below a ten-millionth of its size.
+
+        Such a spread is mostly the tolerance of an event or of the integration.
+        """
+        summary = self.summaries.get(name) or summarize(self.values(name), probabilities=())
+        if summary.constant or summary.sd is None or self.limits(name) != Limits():
+            return False
+        return summary.sd < NEGLIGIBLE * max(abs(summary.minimum or 0.0), abs(summary.maximum or 0.0))
 
     def largest_is_worst(self, metric: str) -> bool:
         """Whether the bad end of a metric is the upper one; with two limits, that with the smaller margin."""

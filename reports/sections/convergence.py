@@ -30,13 +30,14 @@ def convergence_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
     if told:
         drawn = list(told)[:MOST_DRAWN]
         panels = tuple(_estimate_panel(flown, name, run) for name in drawn for run in told[name])
-        caption = f"Mean and outer percentile of the key metrics against the number of cases{flown.sample_words}"
+        first = f"first {MOST_DRAWN} " if len(told) > MOST_DRAWN else ""
+        caption = f"Mean and outer percentile of the {first}key metrics against the number of cases{flown.sample_words}"
         yield FigureBlock(caption, Drawing("Running estimates", panels, 4), "half")
         yield _convergence_table(flown, told)
     silent = [name for name in runs if name not in told]
     if silent:
         yield (
-            f"Convergence not assessed for {', '.join(silent)}: fewer than {FEWEST} cases have a number, "
+            f"Convergence not assessed for {flown.listed(silent)}: fewer than {FEWEST} cases have a number, "
             "or it is the same in all of them."
         )
 

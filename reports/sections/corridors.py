@@ -37,7 +37,7 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     placed = np.isfinite(x) & np.isfinite(y)
     used = np.flatnonzero(placed)
     if not used.size:
-        lacking = f"none of {count(flown.n_held)} cases has both {figure.x} and {figure.y}"
+        lacking = f"none of {count(flown.n_held)} cases has both {flown.words(figure.x)} and {flown.words(figure.y)}"
         return f"{figure.title}: not drawn; {flown.absence(figure.x, figure.y) or lacking}."
     words, member = _classes([verdict.name for verdict in verdicts], violated, inside_words(flown, verdicts))
     # every violation stays in the picture, as far as there is room

@@ -16,7 +16,7 @@ from reports.drawing.marks import Drawing, Plot, Points, nominal_ring
 from reports.drawing.palette import VERMILION
 from reports.figures.clouds import Outline, case_scatter
 from reports.figures.distributions import histogram, histograms
-from reports.figures.histories import Envelope, HistoryLine, Phases, history_figure, history_plot
+from reports.figures.histories import Envelope, HistoryLimit, HistoryLine, history_figure, history_plot, phase_limits
 from reports.figures.maps import metric_map
 from reports.run.cloud_regions import cloud_regions
 from reports.run.default_figures import history_figures, scatter_figures
@@ -27,7 +27,7 @@ from reports.run.outcomes import case_outcomes, outcome_names
 from reports.run.phases import phase_times, phases_in_words, quantity_names
 from reports.sections.case_tables import FEW_CASES, input_words
 from reports.sections.published import published_law
-from reports.text.numbers import axis_label, count, counted, number, percent
+from reports.text.numbers import axis_label, count, counted, number, percent, with_unit
 
 POINTS_SHOWN = 2000
 FEWEST_SHOWN = 50  # of an outcome, as far as there are so many
@@ -39,6 +39,7 @@ COLOURED_OVER_BANDS = 2  # more would hide the band
 WORST_RANKS = 10
 HISTORIES_SHOWN = 40
 FEWEST_VALUES = 10  # of a histogram
+NEGLIGIBLE_SPREAD = "standard deviation below a ten-millionth of the value"
 NOMINAL = -1
 
 
@@ -79,16 +80,19 @@ def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
 def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
     x, y, z = (flown.values(name) for name in (figure.x, figure.y, figure.metric))
     used = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z))
-    reason = flown.absence(figure.metric) or _no_map(figure, x[used], y[used], z[used])
+    reason = flown.absence(figure.metric) or _no_map(flown, figure, x[used], y[used], z[used])
     if reason:
         return f"{figure.title}: not drawn; {reason}."
     surface = map_metric(x, y, z)
     if surface is not None and surface.explained < LEAST_EXPLAINED:
         return f"{figure.title}: not drawn; {_too_little_explained(flown, figure, surface.explained)}."
     if surface is None or not np.isfinite(surface.value).any():
-        few = f"the run has too few cases over {figure.x} and {figure.y} for a map"
-        unsure = (f"nowhere is its surface over {figure.x} and {figure.y} sure enough: other inputs scatter it, the "
-                  f"{count(used.size)} cases are too few, or they lie on a line")  # fmt: skip
+        over = f"{flown.words(figure.x)} and {flown.words(figure.y)}"
+        few = f"the run has too few cases over {over} for a map"
+        unsure = (
+            f"nowhere is its surface over {over} sure enough: other inputs scatter it, the {count(used.size)} cases "
+            "are too few, or they lie on a line"
+        )
         return f"{figure.title}: not drawn; {few if used.size < FEWEST else unsure}."
     rows = thinned_rows(used, flown.rows(flown.worst(figure.metric, WORST_RANKS)["case_id"]))
     labels = flown.axis(figure.x), flown.axis(figure.y), flown.axis(figure.metric)
@@ -128,14 +132,14 @@ def _too_little_explained(flown: Flown, figure: MapFigure, share: float) -> str:
     return f"{said}; the two inputs that explain most are {a} and {b}, {percent(max(pairs[best], 0.0), 0)}"
 
 
-def _no_map(figure: MapFigure, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> str:
+def _no_map(flown: Flown, figure: MapFigure, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> str:
     """Why there is nothing to map in the cases that have all three numbers; empty if there is."""
     if not z.size:
-        return f"no case has a number for {figure.metric}, {figure.x} and {figure.y}"
+        return f"no case has a number for all of {flown.listed((figure.metric, figure.x, figure.y))}"
     if z.size > 1 and nearly_equal(z.min(), z.max()):
-        return f"{figure.metric} is {number(z[0])} in all cases"
+        return f"{flown.words(figure.metric)} is {with_unit(number(z[0]), flown.unit(figure.metric))} in all cases"
     flat = [name for name, values in ((figure.x, x), (figure.y, y)) if nearly_equal(values.min(), values.max())]
-    return f"{flat[0]} is the same in all cases" if z.size > 1 and flat else ""
+    return f"{flown.words(flat[0])} is the same in all cases" if z.size > 1 and flat else ""
 
 
 def nominal_rings(flown: Flown, x: str, y: str) -> tuple[Points, ...]:
@@ -155,8 +159,12 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
     x, y = flown.values(figure.x), flown.values(figure.y)
     used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
     if not used.size:
-        reason = flown.absence(figure.x, figure.y) or f"no case has both {figure.x} and {figure.y}"
+        reason = (
+            flown.absence(figure.x, figure.y) or f"no case has both {flown.words(figure.x)} and {flown.words(figure.y)}"
+        )
         return f"{figure.title}: not drawn; {reason}."
+    if narrow := [name for name in (figure.x, figure.y) if flown.negligible(name)]:
+        return f"{figure.title}: not drawn, {NEGLIGIBLE_SPREAD}: {flown.listed(narrow)}."
     regions = cloud_regions(flown, (figure.x, figure.y), x[used], y[used])
     drawing = outcome_scatter(flown, figure.x, figure.y, regions)
     impossible = bool(regions) and not any(region.kind == "ellipse" for region in regions)
@@ -187,15 +195,16 @@ def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     key, others = _drawable(flown)
     title = "Distributions of the key metrics" if others else "Distributions of the metrics"
     yield from _distribution_figures(flown, key, title)
-    few = [name for name, item in flown.summaries.items() if 0 < item.n_used < FEWEST_VALUES and not item.constant]
-    if few:
-        yield f"Not drawn, fewer than {FEWEST_VALUES} cases have a number: {', '.join(few)}."
-    silent = [name for name, item in flown.summaries.items() if item.n_used == 0]
-    constant = [name for name, item in flown.summaries.items() if item.constant]
-    if constant:
-        yield f"Not drawn, the same in all cases that have it: {', '.join(constant)}."
-    if silent:
-        yield f"Not drawn, no case has a number: {', '.join(silent)}."
+    found = flown.summaries.items()
+    reasons = {
+        f"fewer than {FEWEST_VALUES} cases have a number": [
+            name for name, item in found if 0 < item.n_used < FEWEST_VALUES and not item.constant
+        ],
+        "the same in all cases that have it": [name for name, item in found if item.constant],
+        NEGLIGIBLE_SPREAD: [name for name, item in found if item.n_used >= FEWEST_VALUES and flown.negligible(name)],
+        "no case has a number": [name for name, item in found if item.n_used == 0],
+    }
+    yield from (f"Not drawn, {reason}: {flown.listed(names)}." for reason, names in reasons.items() if names)
 
 
 def other_distributions(flown: Flown) -> Iterator[FigureBlock]:
@@ -205,7 +214,8 @@ def other_distributions(flown: Flown) -> Iterator[FigureBlock]:
 
 def _drawable(flown: Flown) -> tuple[list[str], list[str]]:
     """Metrics with a distribution: those that matter, and the others."""
-    names = [name for name, item in flown.summaries.items() if item.n_used >= FEWEST_VALUES and not item.constant]
+    enough = [name for name, item in flown.summaries.items() if item.n_used >= FEWEST_VALUES and not item.constant]
+    names = [name for name in enough if not flown.negligible(name)]
     return [name for name in flown.key_metrics if name in names], [
         name for name in names if name not in flown.key_metrics
     ]
@@ -266,8 +276,10 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
     saved = quantity_names(flown.histories)
     asked = list(dict.fromkeys(name for figure in wanted for name in figure.quantities))
     missing = [name for name in asked if name not in saved]
-    constant = [name for name in asked if name in saved and is_constant(flown.histories[name].to_numpy())]
-    drawn = [name for name in asked if name not in missing and name not in constant]
+    silent = [name for name in asked if name in saved and not np.isfinite(flown.histories[name].to_numpy()).any()]
+    known = [name for name in asked if name in saved and name not in silent]
+    constant = [name for name in known if is_constant(flown.histories[name].to_numpy())]
+    drawn = [name for name in known if name not in constant]
     histories = saved_histories(flown, drawn)
     yield from _envelope_words(flown, histories.envelopes)
     for figure in wanted:
@@ -275,7 +287,9 @@ def history_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
         if plots:
             yield FigureBlock(figure.title, history_figure(plots), "half")
     if constant:
-        yield f"Not drawn, constant in every saved case: {', '.join(constant)}."
+        yield f"Not drawn, the same in all saved cases at all times: {flown.listed(constant)}."
+    if silent:
+        yield f"Not drawn, no saved case has a number: {flown.listed(silent)}."
     if missing:
         yield f"Not drawn, the histories have no such output: {', '.join(missing)}."
 
@@ -286,12 +300,12 @@ class SavedHistories:
 
     lines: tuple[HistoryLine, ...]
     envelopes: dict[str, Envelope]
-    limits: dict[str, tuple[tuple[float, str], ...]]
+    limits: dict[str, tuple[HistoryLimit, ...]]
 
     def plot(self, flown: Flown, name: str) -> Plot:
         """The panel of one quantity."""
         label, time = flown.axis(name), axis_label("time", flown.unit("t_s"))
-        phases = Phases(tuple(phase_times(flown)), phases_in_words(flown))
+        phases = phase_limits(phase_times(flown), phases_in_words(flown))
         return history_plot(name, label, time, self.lines, self.envelopes.get(name), self.limits.get(name, ()), phases)
 
 
@@ -328,7 +342,7 @@ def _envelope_words(flown: Flown, envelopes: dict[str, Envelope]) -> Iterator[st
             "at every time of those that still fly. These cases were saved whatever their result."
         )
     elif flown.random:
-        yield f"Envelopes need {FEWEST_CASES} saved cases from case 0 on: `first = {FEWEST_CASES}` under [retention]."
+        yield f"Envelopes need {FEWEST_CASES} saved cases from case 0 on: “first = {FEWEST_CASES}” under [retention]."
 
 
 def is_constant(values: np.ndarray) -> bool:

@@ -184,7 +184,9 @@ def summary_sentence(flown: Flown) -> str:
         return "The campaign sets no requirement; the key results follow."
     total = len(outcomes)
     if all(outcome == "pass" for outcome in outcomes):
-        met = "The requirement is met" if total == 1 else f"All {total} requirements are met"
+        met = {1: "The requirement is met", 2: "Both requirements are met"}.get(
+            total, f"All {total} requirements are met"
+        )
         return f"{met}{' by the cases flown so far' if flown.n_tried < flown.n_wanted else ''}."
     parts = [(outcomes.count("pass"), "met"), (outcomes.count("fail"), "failed"),
              (outcomes.count("not demonstrable"), "not demonstrable with these cases")]  # fmt: skip

@@ -31,7 +31,7 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
     if missing:
         return f"{figure.title}: not drawn; the histories have no output {missing[0]}."
     if not np.isfinite(flown.histories[names].to_numpy(dtype=np.float64)).all(axis=1).any():
-        return f"{figure.title}: not drawn; no saved case has both {figure.x} and {figure.y}."
+        return f"{figure.title}: not drawn; no saved case has both {flown.words(names[0])} and {flown.words(names[1])}."
     fair = fair_cases(np.unique(flown.histories["case_id"]).tolist()) if flown.random else []
     bands_or_reason = profile_bands(flown.histories, fair, figure.x, figure.y)
     bands = bands_or_reason if isinstance(bands_or_reason, tuple) else ()
@@ -83,7 +83,7 @@ def profile_bands(histories: pd.DataFrame, case_ids: Sequence[int], x: str, y: s
     closed = [np.abs(flight[-1] - flight[0]) < CLOSED * (ends[1] - ends[0]) for flight in flights]
     n_legs = float(np.median([len(leg) for leg in legs]))
     if n_legs > MOST_LEGS or (n_legs > 1 and np.mean([flight.all() for flight in closed]) > 0.5):
-        return f"No bands: {y} does not run flight way along these curves, they are closed or oscillate"
+        return f"No bands: {y} is not monotonic along these curves, which are closed or oscillate"
     rising = sum(leg[0] > 0 for leg in legs if leg) > 0.5 * len(legs)
     levels = np.linspace(ends[0][1], ends[1][1], LEVELS)
     candidates = [_first_passage_envelope(flights, levels, rising)]

@@ -32,7 +32,7 @@ import pandas as pd
 
 from mc_engine.statistics import Summary, summarize
 from mc_engine.studies.published import CLOSE, IMPROVED, NOT_REACHED, REACHED, UNKNOWN, WITH_REASON, outcome
-from reports.document.blocks import Cell, Column, Table
+from reports.document.blocks import Cell, Column, Table, Text
 from reports.run.flown import Flown
 from reports.text.numbers import count, counted, exact, number, with_unit
 
@@ -41,7 +41,7 @@ TONES = {REACHED: "good", CLOSE: "good", IMPROVED: "good", NOT_REACHED: "open", 
 TONES = {REACHED: "good", CLOSE: "good", IMPROVED: "good", NOT_REACHED: "open", UNKNOWN: ""}
 
 
-def published_blocks(flown: Flown) -> Iterator[Table | str]:
+def published_blocks(flown: Flown) -> Iterator[Table | Text | str]:
     """Published values beside those that this run computes; of the others, how many there are."""
     records = [record for record in flown.manifest.get("published", []) if own_statistic(flown, record) is None]
     computed = [(record, *our_value(flown, record)) for record in records]
@@ -64,10 +64,10 @@ def published_blocks(flown: Flown) -> Iterator[Table | str]:
         yield Table("Published and computed values", columns, rows, note)
     left = len(records) - len(rows)
     if left:
-        yield (
-            f"{counted(left, 'further published value')} of the model {'is' if left == 1 else 'are'} not computed by "
-            "the cases of this run; the command published --compute computes them."
-        )
+        told = rows or len(records) < len(flown.manifest["published"])
+        what = counted(left, f"{'further ' if told else ''}published value")
+        yield f"{what} of the model {'is' if left == 1 else 'are'} not computed by the cases of this run, but by:"
+        yield Text((f"mc-engine published {flown.manifest['model']['name']} --compute",), "code")
 
 
 def _row(record: Mapping[str, Any], where: str, verdict: str) -> tuple[Cell, ...]:

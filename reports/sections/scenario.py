@@ -4,11 +4,23 @@ from collections.abc import Iterator
 
 from mc_engine.units import UNITS, convert
 from reports.document.blocks import Cell, Column, Table
+from reports.run.chosen_units import spread_text
 from reports.run.flown import Flown
 from reports.run.phases import phase_times
 from reports.sections.tables import fixed_table, input_table
 from reports.text.numbers import counted, number, with_unit
 
+EVENTS = ("time of ", "start of ", "end of ")  # how the meaning of an event's time begins
+DESIGNS = {
+    "mc": "independent random draws",
+    "lhs": "Latin hypercube sampling",
+    "sobol": "scrambled Sobol’ points",
+    "grid": "all combinations of given values",
+    "one_at_a_time": "one input changed at a time",
+    "table": "rows of a given table",
+    "saltelli": "blocks for Sobol’ indices",
+    "morris": "trajectories of elementary effects",
+}
 AT_EVENT = 4  # numbers that a row of the timeline tells
 
 
@@ -29,7 +41,8 @@ def _vehicle(flown: Flown) -> str:
     said.append(f"Source of the model: {model['source'].rstrip('.')}." if model.get("source") else "")
     dispersed = counted(len(flown.with_role("dispersion")), "dispersed input")
     said.append(
-        f"{counted(flown.n_wanted, 'case')} of the design “{flown.design}” with {dispersed}, and one nominal case with "
+        f"{counted(flown.n_wanted, 'case')} of the design “{flown.design}”{_design_words(flown)} with {dispersed}, and "
+        "one nominal case with "
         "all inputs at their nominal values."
     )
     if upstream:
@@ -37,12 +50,17 @@ def _vehicle(flown: Flown) -> str:
     return " ".join(filter(None, said))
 
 
+def _design_words(flown: Flown) -> str:
+    return f" ({DESIGNS[flown.design]})" if flown.design in DESIGNS else ""
+
+
 def timeline_table(flown: Flown) -> Table | None:
     """The phases of the nominal case and the events whose times the metrics tell, in their order; None without any."""
     times = {}
     for fact in flown.with_role("metric"):
         words, value = flown.words(fact.name), flown.own.nominal_value(fact.name)
-        if value is not None and _is_time(flown.own.unit(fact.name)) and words.endswith(" time"):
+        is_event = words.endswith(" time") or fact.description.startswith(EVENTS)
+        if value is not None and _is_time(flown.own.unit(fact.name)) and is_event:
             times[fact.name] = words.removesuffix(" time")
     phases = phase_times(flown)
     if not times and not phases:
@@ -50,12 +68,15 @@ def timeline_table(flown: Flown) -> Table | None:
     rows = [_phase_row(flown, place, *begin) for place, begin in enumerate(phases)]
     for name in sorted(times, key=lambda event: _seconds(flown, event)):
         summary, event = flown.summaries[name], times[name]
-        spread = "–" if summary.sd is None else number(0.0 if summary.constant else summary.sd, 3)
+        spread = "–" if summary.sd is None else spread_text(flown, name, summary.spread or 0.0)
         rows.append(
             (
                 Cell(event[:1].upper() + event[1:], small=flown.columns[name].description),
-                Cell(with_unit(number(flown.nominal_value(name), 5), flown.unit(name)), _seconds(flown, name)),
-                Cell(with_unit(spread, flown.unit(name)) if summary.sd is not None else "–", summary.sd),
+                Cell(
+                    with_unit(number(flown.nominal_value(name), 5), flown.unit(name)),
+                    _seconds(flown, name),
+                ),
+                Cell(spread, summary.sd),
                 Cell("; ".join(_at_event(flown, name, event)) or "–"),
             )
         )

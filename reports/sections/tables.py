@@ -8,10 +8,11 @@ from mc_engine.units import convert
 from reports.document.blocks import Cell, Column, Table
 from reports.run.chosen_units import chosen_unit
 from reports.run.flown import Flown
-from reports.text.numbers import axis_label, count, exact, interval, number, percent, with_unit
+from reports.text.numbers import axis_label, count, exact, fixed, interval, number, percent, spelled, with_unit
 
 TONES = {"pass": "good", "fail": "bad", "not demonstrable": "open"}
 REASONS_SHOWN = 20
+SHORT_NUMBER = 5  # letters of a fraction that stays in its own unit: 0.005 1/s
 LONGEST_NUMBER = 14  # letters of a parameter’s value; a longer one is a computed number
 
 
@@ -67,7 +68,7 @@ def shape_cell(summary: Summary) -> Cell:
     if summary.shape is None:
         return Cell("–")
     shape = summary.shape
-    figures = f"{shape.skewness:.2f}, {shape.excess_kurtosis:.2f}".replace("-", "−")
+    figures = f"{fixed(shape.skewness, 2)}, {fixed(shape.excess_kurtosis, 2)}"
     return Cell("near normal" if shape.looks_normal else "not normal", small=figures)
 
 
@@ -167,12 +168,17 @@ def dispersed_table(records: Iterable[Mapping[str, Any]], caption: str) -> Table
     rows = tuple(
         (
             Cell(axis_label(record["name"], record["unit"]), small=record["description"]),
-            Cell(", ".join(filter(None, (record["distribution"], record.get("bounds", ""))))),
+            Cell(distribution_text(record)),
             Cell(record["source"] or "not stated"),
         )
         for record in records
     )
     return Table(caption, columns, rows)
+
+
+def distribution_text(record: Mapping[str, Any]) -> str:
+    """The distribution of an input with the bounds that it is drawn between."""
+    return spelled(", ".join(filter(None, (str(record.get("distribution", "")), str(record.get("bounds", ""))))))
 
 
 def _fixed_row(record: Mapping[str, Any]) -> tuple[Cell, ...]:
@@ -181,7 +187,7 @@ def _fixed_row(record: Mapping[str, Any]) -> tuple[Cell, ...]:
     if isinstance(value, float):
         shown = chosen_unit(unit, [value])
         converted = exact(float(f"{convert(value, unit, shown):.12g}")) if shown != unit else text
-        if len(converted) < len(text):
+        if len(converted) < len(text) and (abs(value) >= 1.0 or len(text) > SHORT_NUMBER):
             text, unit = converted, shown
         text = text if len(text) <= LONGEST_NUMBER else number(value, 8)
     sort = float(value) if isinstance(value, int | float) else None
@@ -202,13 +208,14 @@ def input_table(flown: Flown) -> Table | None:
     for record in records:
         name, unit = str(record["name"]), str(record.get("unit", ""))
         ends = flown.every.ends(name)
-        drawn = f"{number(ends[0], 4)} to {number(ends[1], 4)}" if ends else "–"
+        spread = 0.5 * (ends[1] - ends[0]) if ends and ends[1] > ends[0] else None
+        drawn = " to ".join(number(end, 4, spread) for end in ends) if ends else "–"
         nominal = record.get("nominal", "")
         rows.append(
             (
                 Cell(axis_label(name, unit), small=str(record.get("description", ""))),
                 Cell(exact(nominal) if nominal != "" else "–"),
-                Cell(str(record.get("distribution", ""))),
+                Cell(distribution_text(record)),
                 Cell(drawn),
                 Cell(str(record.get("source") or "not stated"), small=str(record.get("note") or "")),
             )

@@ -1,7 +1,7 @@
 """What `mc-engine compare A B --report FILE` writes: the comparison of two runs as a page or as a PDF."""
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
@@ -30,10 +30,11 @@ from reports.formats.pdf import render_pdf
 from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown, Run
 from reports.studies.comparison_overlays import overlay_blocks
-from reports.text.numbers import count, number, percent, with_unit, words
+from reports.text.numbers import axis_label, count, number, percent, words
 
 MOST_ROWS = 40  # of the figure
 LEAST_P = 1e-12  # a smaller p-value means no more
+ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
 WIDEST, FEW_SIGMA = 20.0, 5.0  # the axis of shifts: so many medians, or so many σ at least
 GLOSSARY = Terms(
     (
@@ -132,11 +133,23 @@ def _run_facts(comparison: Comparison) -> tuple[tuple[str, str], ...]:
     reason = comparison.pairing.reason
     facts = []
     for letter, name, cases, ok, created in zip(
-        "AB", comparison.names, comparison.cases, comparison.ok, comparison.created, strict=True
+        "AB", _short_names(comparison.names), comparison.cases, comparison.ok, comparison.created, strict=True
     ):
         flown = f"{count(cases)} cases, {count(ok)} completed"
         facts.append((f"Run {letter}", f"{name}: {flown}, {created[:16].replace('T', ' ')}".rstrip(", ")))
     return (*facts, ("Cases", f"{reason[:1].upper()}{reason[1:]}"))
+
+
+def _short_names(names: tuple[str, str]) -> tuple[str, ...]:
+    """The names as given; of absolute paths the last parts, as many as tell them apart."""
+    if not any(PurePosixPath(name).is_absolute() for name in names):
+        return names
+    parts = [(name,) if "://" in name else PurePosixPath(name).parts for name in names]
+    for depth in range(1, max(map(len, parts))):
+        short = tuple(str(PurePosixPath(*one[-depth:])) if one[1:] else one[0] for one in parts)
+        if len(set(short)) == len(short):
+            return short
+    return tuple(one[-1] for one in parts)
 
 
 def _change_cards(comparison: Comparison) -> Iterator[Card]:
@@ -190,10 +203,14 @@ def _metric_blocks(comparison: Comparison, units: Mapping[str, str]) -> Iterator
         yield _metric_table(comparison, units, moved)
     same = [metric.metric for metric in comparison.metrics if metric.same]
     if same:
-        yield f"The same in both runs: {', '.join(same)}."
+        yield f"The same in both runs: {_listed(comparison, same)}."
     absent = [metric.metric for metric in comparison.metrics if not metric.same and not finite(metric.shift)]
     if absent:
-        yield f"Without a number in one of the runs: {', '.join(absent)}."
+        yield f"Without a number in one of the runs: {_listed(comparison, absent)}."
+
+
+def _listed(comparison: Comparison, metrics: list[str]) -> str:
+    return ", ".join(words(metric, comparison.units[metric]) for metric in metrics)
 
 
 def _ranked(comparison: Comparison) -> list[MetricChange]:
@@ -267,7 +284,7 @@ def _metric_table(comparison: Comparison, units: Mapping[str, str], moved: list[
 
 def _metric_row(comparison: Comparison, change: MetricChange, unit: str) -> tuple[Cell, ...]:
     own = comparison.units[change.metric]
-    scale = convert(change.deviation[0], own, unit) if unit != own else change.deviation[0]
+    scales = [convert(deviation, own, unit) if unit != own else deviation for deviation in change.deviation]
     means = [convert(mean, own, unit) if unit != own else mean for mean in change.mean]
     used = " and ".join(f"{count(k)} / {count(n)}" for k, n in zip(change.n_used, change.n_tried, strict=True))
     if change.differing is not None:
@@ -275,8 +292,8 @@ def _metric_row(comparison: Comparison, change: MetricChange, unit: str) -> tupl
         lost = change.n_tried[0] - change.n_used[0]
         used += f", {count(lost)} without a number" if lost else ""
     return (
-        Cell(with_unit(words(change.metric, own), f"[{unit}]" if unit else ""), small=used),
-        *(_number_cell(value, scale) for value in means),
+        Cell(axis_label(words(change.metric, own), unit), small=used),
+        *(_number_cell(value, scale) for value, scale in zip(means, scales, strict=True)),
         _estimate_cell(change.shift_in_sigma),
         _p_value_cell(change.shift_adjusted, comparison.alpha),
         _estimate_cell(change.ratio),
@@ -285,7 +302,8 @@ def _metric_row(comparison: Comparison, change: MetricChange, unit: str) -> tupl
 
 
 def _number_cell(value: float, scale: float) -> Cell:
-    return Cell(number(value, scale=scale), value) if np.isfinite(value) else Cell("–")
+    spread = scale if scale > ROUNDING * abs(value) else None
+    return Cell(number(value, scale=spread), value) if np.isfinite(value) else Cell("–")
 
 
 def _estimate_cell(estimate: Estimate) -> Cell:

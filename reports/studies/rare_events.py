@@ -20,7 +20,7 @@ from reports.document.blocks import (
     as_blocks,
     numbered,
 )
-from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points, nominal_ring
+from reports.drawing.marks import Axis, Drawing, Limit, Line, Plot, Points, intervals, nominal_ring
 from reports.drawing.palette import BLUE, INK, PURPLE, VERMILION
 from reports.figures.clouds import case_scatter
 from reports.sections.figure_blocks import thinned_by_outcome
@@ -262,9 +262,8 @@ def _probability_figure(result: dict[str, Any], shown: list[dict[str, Any]]) -> 
         Limit(0.0, "x", INK, "limit", width=1.0),
         Line(margin, probability, BLUE, "levels", width=2.0, key="levels"),
         Points(margin, probability, BLUE, "levels", size=6.0),
-        Points(
-            np.zeros(1), p, VERMILION, "not met", size=8.0, y_ends=(lower, upper), key="P(failure) with its interval"
-        ),
+        intervals(lower, upper, np.zeros(1), VERMILION, upright=True),
+        Points(np.zeros(1), p, VERMILION, "not met", size=8.0, key="P(failure) with its interval"),
     )
     x = Axis(axis_label("margin", result["metric"]["unit"]), reach=Axis().ends([margin, np.zeros(1)])[::-1])
     words = (

@@ -69,7 +69,12 @@ def limit_words(tuned: Tuned, constraint: Mapping[str, Any]) -> str:
         for word, limit in limits
         if limit is not None
     ]
-    return f"{constraint['metric']} {' and '.join(texts)}{quantile_words(constraint)}"
+    return f"{' and '.join(texts)}{quantile_words(constraint)}"
+
+
+def metric_words(tuned: Tuned, measure: Mapping[str, Any]) -> str:
+    """The metric of an objective or a constraint in words."""
+    return words(measure["metric"], tuned.units[measure["name"]])
 
 
 def quantile_words(measure: Mapping[str, Any]) -> str:

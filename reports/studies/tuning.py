@@ -7,11 +7,11 @@ import numpy as np
 
 from mc_engine.studies.tuning_folder import UNFINISHED, TuningRecord, infeasibility
 from reports.document.blocks import Block, Card, Document, FigureBlock, Section, Table, Terms, Text, as_blocks, numbered
-from reports.drawing.marks import Axis, Drawing, Line, Plot
+from reports.drawing.marks import Axis, Drawing, Line, Plot, stepped
 from reports.drawing.palette import BLUE
 from reports.figures.fronts import Candidates, candidates_beyond, front_figure
 from reports.sections.figure_blocks import POINTS_SHOWN, thinned_rows
-from reports.studies.tuned import Tuned, inside, limit_words, quantile_words
+from reports.studies.tuned import Tuned, inside, limit_words, metric_words, quantile_words
 from reports.studies.tuning_tables import (
     front_table,
     held_by_bounds,
@@ -111,7 +111,8 @@ def _constraint_cards(tuned: Tuned) -> Iterator[Card]:
         yield Card(
             label=constraint["name"],
             answer="within reach" if met else "out of reach",
-            detail=f"{limit_words(tuned, constraint)}: {count(met)} of {count(len(values))} candidates; "
+            detail=f"{metric_words(tuned, constraint)} {limit_words(tuned, constraint)}: "
+            f"{count(met)} of {count(len(values))} candidates; "
             f"the {side} found is {tuned.with_unit(constraint['name'], float(near))}.",
             tone="good" if met else "bad",
         )
@@ -128,13 +129,17 @@ def _objective_cards(tuned: Tuned) -> Iterator[Card]:
         yield Card(
             label=f"{objective['name']}, to be {'small' if objective['goal'] == 'minimise' else 'large'}",
             answer=best if tuned.record.feasible else f"{best} without constraints",
-            detail=f"{objective['metric']}{quantile_words(objective)}; up to {other} at the other end of the front.",
+            detail=f"{metric_words(tuned, objective)}{quantile_words(objective)}; "
+            f"up to {other} at the other end of the front.",
         )
 
 
 def _search_warnings(tuned: Tuned) -> Iterator[str]:
     if not tuned.record.feasible:
-        yield "There is no front: no candidate is inside all limits. What is drawn and listed leaves them out."
+        yield (
+            "There is no front: no candidate is inside all limits. The figure and the table of the best candidates "
+            "ignore the limits."
+        )
     failed = int((tuned.evaluations["failed_cases"] > 0).sum())
     if failed:
         ends = tuned.evaluations["commonest_failure"][tuned.evaluations["failed_cases"] > 0].value_counts(sort=False)
@@ -214,7 +219,7 @@ def _progress_blocks(tuned: Tuned) -> tuple[Block, ...]:
     key = f"after each of {count(x.size)} generations"
     panels = tuple(
         Plot(
-            (Line(x, y, BLUE, width=2.0, step="hv", key=key),),
+            (Line(*stepped(x, y), BLUE, width=2.0, key=key),),
             Axis("candidates flown", most=4),
             Axis(name=label, zero=True),
             label,

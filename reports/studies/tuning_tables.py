@@ -11,7 +11,7 @@ from reports.document.blocks import Cell, Column, Table
 from reports.sections.provenance import origin_table
 from reports.sections.tables import dispersed_table, value_table
 from reports.studies.tuned import Tuned, inside, limit_words
-from reports.text.numbers import axis_label, count, exact, number, percent, with_unit
+from reports.text.numbers import axis_label, column_texts, count, exact, number, percent, with_unit
 
 ROWS_SHOWN = 30  # of the front
 MOST_PARAMETERS = 8  # in the table of the front
@@ -46,13 +46,15 @@ def _candidate_table(tuned: Tuned, rows: pd.DataFrame, caption: str, note: str) 
         *(Column(tuned.label(name), "number") for name in names),
     )
     limits = {constraint["name"]: constraint for constraint in tuned.plan["constraints"]}
+    texts = {name: column_texts(rows[name].tolist()) for name in names}
     body = []
-    for _, row in rows.iterrows():
+    for place, (_, row) in enumerate(rows.iterrows()):
         cells = [Cell(count(int(row["candidate"])), int(row["candidate"]))]
         for name in names:
             value = float(row[name])
             outside = name in limits and not bool(inside(np.array(value), limits[name]))
-            cells.append(Cell(number(value, 4), value if np.isfinite(value) else None, tone="bad" if outside else ""))
+            known = value if np.isfinite(value) else None
+            cells.append(Cell(texts[name][place], known, tone="bad" if outside else ""))
         body.append(tuple(cells))
     return Table(caption, columns, tuple(body), note)
 
@@ -138,7 +140,7 @@ def measure_table(tuned: Tuned) -> Table:
             Cell(constraint["name"]),
             Cell("constraint"),
             _metric_cell(tuned, constraint),
-            Cell(limit_words(tuned, constraint).removeprefix(f"{constraint['metric']} ")),
+            Cell(limit_words(tuned, constraint)),
             Cell(constraint["source"]),
         )
         for constraint in tuned.plan["constraints"]

@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Callable, Iterable, Sequence
+from decimal import Decimal
 from functools import partial
 from itertools import pairwise
 from math import floor, isfinite, log10
 
 from mc_engine.units import UNITS, unit_suffix
 
+NO_BREAK = "\N{NO-BREAK SPACE}"
 SPACE = "\u202f"  # narrow, no-break: groups digits and stands before a unit
 MOST_DIGITS = 8  # of one number in a table
 LONGEST_SYMBOL = 3  # letters
@@ -39,9 +41,10 @@ def number(value: float | None, digits: int = 5, scale: float | None = None) -> 
         return "not a number" if value != value else ("∞" if value > 0 else "−∞")
     if value == 0.0 or (scale is not None and abs(value) < _NEGLIGIBLE * scale):
         return "0"
-    if not 1e-4 <= abs(value) < 1e7:
+    coarse = scale is not None and isfinite(scale) and scale >= 1e-4  # a small value needs no digits of its own
+    if abs(value) >= 1e7 or (abs(value) < 1e-4 and not coarse):
         mantissa, exponent = f"{value:.{max(digits - 2, 2)}e}".split("e")
-        return f"{_trim(mantissa)}·10{str(int(exponent)).translate(_SUPERSCRIPT)}".replace("-", "−")
+        return _power(_trim(mantissa), int(exponent))
     decimals = max(digits - 1 - floor(log10(abs(value))), 0)
     if scale is not None and isfinite(scale) and scale > 0.0:
         room = max(MOST_DIGITS - 1 - floor(log10(abs(value))), 0)
@@ -52,6 +55,10 @@ def number(value: float | None, digits: int = 5, scale: float | None = None) -> 
     return "0" if float(text.replace(",", "")) == 0.0 else text.replace(",", SPACE).replace("-", "−")
 
 
+def _power(mantissa: str, exponent: int) -> str:
+    return f"{mantissa}·10{str(exponent).translate(_SUPERSCRIPT)}".replace("-", "−")
+
+
 def column_texts(values: Sequence[float | None]) -> list[str]:
     """The numbers of one column of a table: digits follow their spread, and values that differ never print alike."""
     numbers = [value for value in values if value is not None and isfinite(value)]
@@ -59,9 +66,10 @@ def column_texts(values: Sequence[float | None]) -> list[str]:
     apart = [b for a, b in pairwise(distinct) if b - a > _ROUNDING * max(abs(a), abs(b))]
     if not apart:
         return [number(value, 4) for value in values]
-    if max(map(abs, numbers)) < 1e7 and distinct[-1] - distinct[0] >= 1e-5:
-        decimals = range(min(max(2 - floor(log10(distinct[-1] - distinct[0])), 0), MOST_DIGITS), 16)
-        styles: Iterable[Callable[[float], str]] = (partial(_fixed, decimals=digits) for digits in decimals)
+    largest, spread = max(map(abs, numbers)), distinct[-1] - distinct[0]
+    if largest < 1e7 and (spread >= 1e-5 or largest >= 1e-4):
+        decimals = range(min(max(2 - floor(log10(spread)), 0), MOST_DIGITS), 16)
+        styles: Iterable[Callable[[float], str]] = (partial(fixed, decimals=digits) for digits in decimals)
     else:
         styles = (partial(number, digits=digits) for digits in range(4, 18))
     for style in styles:
@@ -71,7 +79,8 @@ def column_texts(values: Sequence[float | None]) -> list[str]:
     return texts
 
 
-def _fixed(value: float, decimals: int) -> str:
+def fixed(value: float, decimals: int) -> str:
+    """A number with so many decimals; what rounds to zero has no sign."""
     text = f"{value:,.{decimals}f}" if abs(value) >= 1e4 else f"{value:.{decimals}f}"
     return text.removeprefix("-" if float(text.replace(",", "")) == 0.0 else " ").replace(",", SPACE).replace("-", "−")
 
@@ -105,18 +114,32 @@ def percentile(probability: float) -> str:
 
 
 def exact(value: float | str | bool) -> str:
-    """An input as it was given: shortest text that reads back to the same number, yes and no for switches."""
+    """An input as it was given: all its digits, as few as tell the number, yes and no for switches."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str):
         return value
     text = repr(float(value))
+    if isfinite(value) and ("e" in text or abs(value) >= 1e7):
+        mantissa, exponent = f"{Decimal(text).normalize():e}".split("e")
+        return _power(mantissa, int(exponent))
     return text.removesuffix(".0").replace("-", "−")
 
 
+def spelled(text: str) -> str:
+    """The words of a distribution with signs, powers and units as they are printed: 1·10⁻⁵ for 1e-05, m² for m^2.
+
+    No line ends before a unit or a value.
+    """
+    days = re.sub(r"(?<=\d)(?<!= 1)(?<!up to 1) day\b", " days", text)
+    joined = re.sub(r"(?<=\d) (?=[%°µA-Za-z])(?!to\b)", SPACE, days).replace(" = ", f"{NO_BREAK}={NO_BREAK}")
+    powers = re.sub(r"(?<![\w.])(-?\d[\d.]*)e([+-]?\d+)(?!\w)", lambda power: _power(power[1], int(power[2])), joined)
+    return re.sub(r"(?<!\S)-(?=\d)", "−", _raised(powers))
+
+
 def with_unit(text: str, unit: str) -> str:
-    """The text with its unit behind it."""
-    return f"{text}{SPACE}{typeset(unit)}" if unit else text
+    """A number with its unit behind it: 2.5 kg, 1 day, 10 days."""
+    return f"{text}{SPACE}{unit if text == '1' and unit == 'day' else typeset(unit)}" if unit else text
 
 
 def words(name: str, unit: str) -> str:
@@ -143,7 +166,12 @@ def axis_label(text: str, unit: str) -> str:
 
 
 def typeset(unit: str) -> str:
-    """A unit as it is printed: W/m² for W/m^2, µN for uN, deg/√h for deg/sqrt(h)."""
-    raised = re.sub(r"\^(\d+)", lambda power: power[1].translate(_SUPERSCRIPT), unit)
-    rooted = re.sub(r"sqrt\((\w)\)", r"√\1", raised)
+    """A unit as it is printed: W/m² for W/m^2, µN for uN, deg/√h for deg/sqrt(h), days for day."""
+    if unit == "day":
+        return "days"
+    rooted = re.sub(r"sqrt\((\w)\)", r"√\1", _raised(unit))
     return re.sub(r"\bu(?=(?:m|s|g|N|T|rad)\b)", "µ", rooted).replace("Ohm", "Ω").replace(" ", SPACE)
+
+
+def _raised(text: str) -> str:
+    return re.sub(r"\^(\d+)(?!\w)", lambda power: power[1].translate(_SUPERSCRIPT), text)

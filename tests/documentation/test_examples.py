@@ -58,13 +58,13 @@ def test_the_job_array_flies_and_resumes_its_pieces_to_one_run(tmp_path, name):
         text = text.replace(line, f"{line.split('=')[0]}={ours}")
     script.write_text(text)
     subprocess.run(
-        [sys.executable, "-m", "mc_engine", "init", "small"], cwd=tmp_path, env=_environment(tmp_path), check=True
+        [sys.executable, "-m", "mc_engine", "init", "small"], cwd=tmp_path, env=environment_in(tmp_path), check=True
     )
     file = tmp_path / "small" / "campaign.toml"
     file.write_text(file.read_text().replace("cases = 2000", "cases = 60"))
     for job in ("1", "2", "2"):  # the last one again, as after a kill
         told = {key: value.format(job=job) for key, value in ARRAYS[name].items()}
-        environment = {**_environment(tmp_path), **told}
+        environment = {**environment_in(tmp_path), **told}
         done = subprocess.run(["bash", script], cwd=tmp_path, env=environment, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     merged = runner.merge(tmp_path / "merged", sorted((tmp_path / "shards").iterdir()), workers=1)
@@ -72,7 +72,7 @@ def test_the_job_array_flies_and_resumes_its_pieces_to_one_run(tmp_path, name):
     assert open_store(merged.path).cases().equals(whole.cases())
 
 
-def _environment(folder):
+def environment_in(folder):
     """The shell's, with an `mc-engine` that is this interpreter's."""
     program = folder / "bin" / "mc-engine"
     if not program.exists():

@@ -30,7 +30,7 @@ def initial():
 
 
 @physics
-def rhs(p):
+def rhs(t, p):
     return State(v=FACTOR * p.gravity)
 
 

@@ -1,13 +1,11 @@
 """Mistakes of a newcomer in the smallest model: one sentence with the place and the fix, before anything is flown."""
 
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate, with_input, write_campaign
-from small_run import ENVIRONMENT
+from told import told
 
 from mc_engine.errors import ModelError
 from mc_engine.flight import flight
@@ -352,8 +350,8 @@ ADAPTIVE = [(CLOCK, "AdaptiveStep(until=10_000.0)"), ("FixedStep", "AdaptiveStep
 UNEQUAL = ["an output more", "an output fewer", "a state more"]
 
 
-@pytest.mark.parametrize("clock", [[], ADAPTIVE], ids=["fixed", "adaptive"])
 @pytest.mark.parametrize("mistake", UNEQUAL)
+@pytest.mark.parametrize("clock", [[], ADAPTIVE], ids=["fixed", "adaptive"])
 def test_no_kernel_is_built_for_other_counts_than_the_model_declares(mistake, clock, tmp_path, monkeypatch):
     monkeypatch.setattr(flight, "refuse_unfit", lambda *model: None)
     model = campaign_with(tmp_path, *RECORDS[mistake][0], *clock).model
@@ -365,11 +363,10 @@ def test_no_kernel_is_built_for_other_counts_than_the_model_declares(mistake, cl
 @pytest.mark.parametrize("verb", ["check", "run"])
 def test_the_command_line_says_it_in_one_line(verb, tmp_path):
     write_campaign(tmp_path / "model", *RECORDS["one metric more"][0])
-    options = ["--out", str(tmp_path / "run")] if verb == "run" else []
-    command = [sys.executable, "-m", "mc_engine", verb, str(tmp_path / "model"), *options]
-    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, check=False)
-    assert done.returncode == 2
-    assert RECORDS["one metric more"][2] in done.stderr.splitlines()[-1]
+    options = ["--out", tmp_path / "run"] if verb == "run" else []
+    status, _, complaint = told(verb, tmp_path / "model", *options)
+    assert status == 2
+    assert RECORDS["one metric more"][2] in complaint.splitlines()[-1]
     assert not (tmp_path / "run").exists()
 
 

@@ -35,14 +35,14 @@ def test_the_shell_completes_campaigns_by_name_and_by_path(tmp_path, begun, offe
 
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["check", "--help"]])
 def test_help_takes_less_than_150_ms_of_a_processor(words):
-    """User time of the whole process, the best of some tries; a fresh one, as in a shell."""
+    """User time of a whole fresh process, as in a shell; on a busy machine one of five."""
     script = (
         f"import resource; from mc_engine.command_line.commands import app\ntry: app({words})\nfinally: print(chr(10), "
     )
     script += "resource.getrusage(resource.RUSAGE_SELF).ru_utime)"
     command = [sys.executable, "-c", script]
-    tries = [subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT).stdout for _ in range(5)]
-    assert min(float(text.split()[-1]) for text in tries) < 0.150
+    tries = (subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT).stdout for _ in range(5))
+    assert any(float(text.split()[-1]) < 0.150 for text in tries)
 
 
 # ---- streams that refuse what is written to them

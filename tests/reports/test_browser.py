@@ -1,5 +1,7 @@
 """The page in a real browser: all drawn, cases chosen and looked up, nothing logged, nothing asked of a network."""
 
+from dataclasses import replace
+
 import pytest
 from browser import INSTALLED, chromium
 from landing_run import landing_run
@@ -7,7 +9,7 @@ from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_html
-from reports.document.blocks import FigureBlock, blocks_of
+from reports.document.blocks import FigureBlock, Section, Text, blocks_of
 
 pytestmark = pytest.mark.skipif(not INSTALLED, reason="needs the Debian package chromium")
 COUNT = "document.getElementById('selection-count').textContent"
@@ -311,4 +313,17 @@ def test_nothing_reaches_beyond_a_printed_page(browser, file):
         assert browser.run(BEYOND) == []
     finally:
         browser.ask("Emulation.setEmulatedMedia", media="")
+        browser.ask("Emulation.clearDeviceMetricsOverride")
+
+
+def test_a_line_of_code_is_no_wider_than_a_phone(browser, tmp_path):
+    line = "mc-engine published a_model_with_a_long_name --compute --no-slow --update-lock"
+    own = Section("own", "Commands", (Text((line,), "code"),))
+    document = build(synthetic_run(60), "run")
+    (tmp_path / "report.html").write_bytes(render_html(replace(document, sections=(own, *document.sections))))
+    browser.ask("Emulation.setDeviceMetricsOverride", width=390, height=900, deviceScaleFactor=1, mobile=True)
+    try:
+        browser.open(tmp_path / "report.html")
+        assert browser.run("document.documentElement.scrollWidth") == 390
+    finally:
         browser.ask("Emulation.clearDeviceMetricsOverride")

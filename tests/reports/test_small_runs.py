@@ -26,7 +26,7 @@ SMALL = {
     "one failed case": (synthetic_run(1, failed=1), "All 1 cases failed"),
     "all failed": (synthetic_run(30, failed=30), "All 30 cases failed: no metric has a number."),
     "constant": (constant(synthetic_run(30, failed=0)), "the same in all cases"),
-    "a metric without numbers": (without_numbers(synthetic_run(30, failed=0)), "no case has a number: propellant_kg."),
+    "a metric without numbers": (without_numbers(synthetic_run(30, failed=0)), "no case has a number: propellant."),
 }
 
 

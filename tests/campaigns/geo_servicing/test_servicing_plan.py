@@ -1,5 +1,10 @@
 """Drift model, Bellman's recursion and the designed corrections."""
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from first_order import longitude_after, radius_deviation, relative_eccentricity
@@ -19,6 +24,7 @@ from mc_engine.flight.kernel_parts import settings_class
 
 PERFECT = {"navigation": "perfect", "schedule": "designed"}
 DAY = 86_400.0
+PROJECT = str(Path(__file__).parents[3])
 PUBLISHED_BURNS = (7_726.3, 4_569.1, 1_290.3)
 
 
@@ -213,6 +219,26 @@ def test_the_designed_corrections_meet_all_tolerances_for_less_than_the_sources(
     assert designed["eccentricity"] < 4e-4
     assert designed["delta_v_m_s"] < 5.43
     assert designed["transfer_time_s"] < 10.0 * DAY
+
+
+PLAN = """
+import numpy as np
+from campaigns.geo_servicing.model import MODEL
+from mc_engine.flight.flight import settings_of
+
+codes = np.array([setting.code(setting.default) for setting in MODEL.settings])
+print(settings_of(MODEL, codes).tables.tobytes().hex())
+"""
+
+
+def test_the_plan_is_the_same_whatever_threads_blas_has(tmp_path):
+    (tmp_path / "plan.py").write_text(PLAN)
+    plans = []
+    for threads in "12":
+        chosen = {"OPENBLAS_NUM_THREADS": threads, "MC_ENGINE_CACHE": str(tmp_path / threads), "PYTHONPATH": PROJECT}
+        command = [sys.executable, tmp_path / "plan.py"]
+        plans.append(subprocess.run(command, env=os.environ | chosen, capture_output=True, check=True).stdout)
+    assert plans[0] == plans[1]
 
 
 @pytest.mark.parametrize(

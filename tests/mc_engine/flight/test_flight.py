@@ -48,7 +48,7 @@ def chosen(inputs, cases):
     return {name: value[cases] if np.ndim(value) else value for name, value in inputs.items()}
 
 
-def flown(model, inputs, cases, *, width=8, chunk=N_CASES, threads=1):
+def flown(model, inputs, cases, *, width=16, chunk=N_CASES, threads=1):
     """Columns of the cases, flown in chunks by threads, put together in the order of `cases`."""
     parts = [cases[first : first + chunk] for first in range(0, len(cases), chunk)]
     with ThreadPoolExecutor(threads) as pool:
@@ -68,7 +68,7 @@ def different(one, other):
 
 @pytest.fixture(scope="module")
 def whole(model, inputs):
-    """All cases in order, eight at a time, in one chunk."""
+    """All cases in order, sixteen at a time, in one chunk."""
     columns = flown(model, inputs, np.arange(N_CASES))
     assert set(columns["status"]) == {"ok"}
     assert columns["pulse_count"].max() > 1
@@ -76,7 +76,7 @@ def whole(model, inputs):
 
 
 # The builds of other widths than a run's own take long to compile.
-@pytest.mark.parametrize("width", [8, *(pytest.param(width, marks=pytest.mark.deep) for width in (1, 16))])
+@pytest.mark.parametrize("width", [16, *(pytest.param(width, marks=pytest.mark.deep) for width in (1, 8))])
 @pytest.mark.parametrize(
     ("chunk", "n_cases", "threads", "shuffled"),
     [(1, 64, 2, False), (7, 203, 1, True), (64, 1000, 2, True), (1000, 1000, 1, True)],
@@ -92,7 +92,7 @@ def test_fifty_cases_flown_alone_have_the_bytes_of_the_batch(model, inputs, whol
     cases = np.random.default_rng(7).choice(N_CASES, 50, replace=False)
     for case in cases:
         one = chosen(inputs, np.array([case]))
-        alone = fly(model, one, np.array([case]), SEED, width=8)
+        alone = fly(model, one, np.array([case]), SEED)
         assert different(alone, chosen(whole, np.array([case]))) == [], case
         columns, history = fly_history(model, one, int(case), SEED, rows=100)
         assert different(columns, chosen(whole, np.array([case]))) == [], case

@@ -23,42 +23,12 @@ from mc_engine.flight import kernel
 from mc_engine.flight.flight import fly
 from mc_engine.lanes import kernel_cache
 from mc_engine.model import load_model
-
-FALL = """
-from mc_engine.lanes import physics
-from mc_engine.model import FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
-
-Inputs = inputs(gravity_m_s2=Parameter(9.0, "acceleration"))
-State = states(v_m_s="speed")
-Outputs = outputs(v_m_s="speed")
-Metrics = metrics(speed_m_s=at_end("v_m_s", "speed"))
-
-
-@physics
-def initial():
-    return State(v=0.0)
-
-
-@physics
-def rhs(t, s, p):
-    return State(v=FACTOR * p.gravity)
-
-
-@physics
-def observe(s):
-    return Outputs(v=s.v)
-
-
-MODEL = model(
-    name="fall", title="Fall", inputs=Inputs, states=State, outputs=Outputs, metrics=Metrics,
-    clock=FixedStep(0.5, 2.0), initial=initial, rhs=rhs, observe=observe,
-)
-"""
+from tests.faults.falling import MODEL as FALL
 
 
 def fall(factor):
     """Source of a model whose speed after 2 s is 2 * factor * gravity."""
-    return FALL.replace("FACTOR", str(factor))
+    return FALL.replace("FACTOR = 1.0\n", "").replace("FACTOR", str(factor))
 
 
 def speed(folder, name, gravity=9.0, width=1):
@@ -224,6 +194,20 @@ def test_threads_may_write_the_same_file_of_the_cache_at_once(tmp_path, monkeypa
         list(threads.map(partial(kernel_cache.replace_file, tmp_path / "a.kernel"), [b"first", b"other"]))
     assert (tmp_path / "a.kernel").read_bytes() in (b"first", b"other")
     assert [path.name for path in tmp_path.iterdir()] == ["a.kernel"]
+
+
+def test_a_file_with_options_of_numba_in_the_working_folder_belongs_to_what_a_kernel_is_compiled_for(
+    tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    one, files = kernel_cache.Kernel(tmp_path / "kernel.py", lambda form: ("", None)), []
+    for options in (None, b"opt: 0", b"opt: 3"):
+        if options is not None:
+            (tmp_path / ".numba_config.yaml").write_bytes(options)
+        kernel_cache._target.cache_clear()
+        files.append(one.file(("float64",)))
+    kernel_cache._target.cache_clear()
+    assert len({*files}) == 3
 
 
 def test_a_full_disk_of_the_cache_is_told_and_the_cases_fly(tmp_path, monkeypatch, caplog):

@@ -12,9 +12,14 @@ OSCILLATOR = load_model("oscillator.py", FOLDER)
 RAIL = load_model("rail.py", FOLDER)
 
 
+def inputs_of(model, inputs):
+    """These inputs by column name, the model's defaults for the others."""
+    return {item.name: item.default for item in (*model.parameters, *model.settings)} | inputs
+
+
 def flown(model, width=8, case_ids=None, seed=1, **inputs):
-    """Columns of cases with these inputs by column name, the model's defaults for the others."""
-    columns = {item.name: item.default for item in (*model.parameters, *model.settings)} | inputs
+    """Columns of cases with these inputs, the model's defaults for the others."""
+    columns = inputs_of(model, inputs)
     n = max(np.size(value) for value in columns.values())
     ids = np.arange(n) if case_ids is None else np.asarray(case_ids)
     return fly(model, columns, ids, seed, folder=FOLDER, width=width)

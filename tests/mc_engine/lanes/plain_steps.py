@@ -1,4 +1,4 @@
-"""Steps over Python floats, for the twins of multistep methods, and the cases that they fly."""
+"""The loop on a fixed grid over Python floats, for the twins of all its methods, and cases of multistep methods."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ def by(model, method):
 
 
 def twin(steps, case, seed, h, inputs):
-    """End state [m, m/s] of one case of the oscillator by a plain loop of steps h over Python floats.
+    """End state [m, m/s] and memory of one case of the oscillator by a plain loop of steps h over Python floats.
 
     steps : of a method: steps.restart(), and steps.advance(rhs, step, h, s), the state at the end of one
     """
@@ -72,4 +72,4 @@ def twin(steps, case, seed, h, inputs):
             return OSCILLATOR.rhs(t, s, m, p, None)
 
         s = steps.advance(rhs, step, h, s)
-    return s
+    return s, m

@@ -1,32 +1,21 @@
 """Adaptive flight: orders, events, peaks, histories, and lanes that never look at each other."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from flown_models import FOLDER, flown, inputs_of, same_bytes
 from scipy.optimize import brentq
 
-from mc_engine.flight.flight import fly, fly_history
+from mc_engine.flight.flight import fly_history
 from mc_engine.model import load_model
 
-FOLDER = Path(__file__).resolve().parent / "adaptive"
 MU = 398600.4418e9
 
 
-def inputs_of(model, inputs):
-    return {**{item.name: item.default for item in (*model.parameters, *model.settings)}, **inputs}
-
-
-def flown(model, width=8, ids=None, **inputs):
-    """Columns of the cases with these inputs."""
-    n = max((np.size(value) for value in inputs.values()), default=1)
-    return fly(model, inputs_of(model, inputs), np.arange(n) if ids is None else ids, 1, folder=FOLDER, width=width)
-
-
-def bits(columns, cases=slice(None)):
-    """Columns as bytes and words."""
-    return {name: list(v[cases]) if v.dtype == object else v[cases].tobytes() for name, v in columns.items()}
+def of_cases(columns, cases):
+    """The rows of some cases."""
+    return {name: column[cases] for name, column in columns.items()}
 
 
 @pytest.fixture(scope="module")
@@ -49,18 +38,18 @@ def day(orbit):
 
 @pytest.mark.parametrize("width", [1, 16])
 def test_every_width_gives_the_same_bits(orbit, day, width):
-    assert bits(flown(orbit, width, speed_m_s=SPEEDS)) == bits(day)
+    same_bytes(flown(orbit, width, speed_m_s=SPEEDS), day)
 
 
 def test_neither_order_nor_company_of_the_cases_changes_a_bit(wave):
     rng = np.random.default_rng(2)
     inputs = {"omega_rad_s": rng.uniform(0.3, 3.0, 60), "noise_m_s2": rng.uniform(0.0, 0.1, 60)}
     straight, order = flown(wave, **inputs), rng.permutation(60)
-    shuffled = flown(wave, ids=order, **{name: values[order] for name, values in inputs.items()})
-    assert bits(shuffled) == bits(straight, order)
+    shuffled = flown(wave, case_ids=order, **{name: values[order] for name, values in inputs.items()})
+    same_bytes(shuffled, of_cases(straight, order))
     for case in rng.integers(0, 60, 12):
         alone = flown(wave, 1, np.array([case]), **{name: values[case] for name, values in inputs.items()})
-        assert bits(alone) == bits(straight, slice(case, case + 1))
+        same_bytes(alone, of_cases(straight, slice(case, case + 1)))
 
 
 def test_apogee_and_perigee_are_those_of_kepler(day):
@@ -124,7 +113,7 @@ def test_a_peak_is_as_exact_as_the_integrator_and_not_the_step(wave):
 
 def test_the_control_is_sampled_at_its_times_with_its_own_draws(wave):
     """Samples at 0, 7, 14, ... 49 s: the last push is the draw of the eighth."""
-    longer = flown(wave, noise_m_s2=1.0, stop_s=np.array([50.0, 55.9, 56.1]), ids=np.array([4, 4, 4]))
+    longer = flown(wave, noise_m_s2=1.0, stop_s=np.array([50.0, 55.9, 56.1]), case_ids=np.array([4, 4, 4]))
     assert longer["push_m_s2"][0] == longer["push_m_s2"][1] != longer["push_m_s2"][2]
 
 
@@ -137,7 +126,7 @@ def test_a_history_disturbs_nothing_and_has_every_event_and_top_of_the_flight(wa
     for rows in (11, 501):
         columns, history = fly_history(wave, inputs, 0, 1, folder=FOLDER, rows=rows, width=width)
         t, height = history["t_s"], history["height_m"]
-        assert bits(columns) == bits(plain)
+        same_bytes(columns, plain)
         assert (t[0], t[-1], height[-1]) == (0.0, plain["end_time_s"][0], plain["end_x_m"][0])
         assert (np.diff(t) > 0.0).all()
         assert height == pytest.approx(np.sin(1.3 * t), abs=1e-9)
@@ -170,7 +159,7 @@ def test_a_poisoned_case_ends_with_its_status_and_leaves_its_neighbours_bits_alo
     assert set(mixed["status"][sick > 0.0]) == {status}
     assert np.isnan(mixed["top_m"][sick > 0.0]).all()
     assert np.isfinite(mixed["end_x_m"]).all()
-    assert bits(mixed, sick == 0.0) == bits(healthy, sick == 0.0)
+    same_bytes(of_cases(mixed, sick == 0.0), of_cases(healthy, sick == 0.0))
 
 
 def test_a_case_that_needs_more_attempts_than_allowed_ends_as_step_limit(wave):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, OSCILLATOR, flown
+from flown_models import FOLDER, OSCILLATOR, flown, inputs_of
 
 from mc_engine.flight.flight import fly_history
 from mc_engine.lanes.extrema import crest, crest_time, crest_value
@@ -50,10 +50,9 @@ def test_the_smallest_value_mirrors_the_largest():
 
 
 def test_a_quantity_with_corners_never_exceeds_its_values_at_the_steps(columns):
-    inputs = {item.name: item.default for item in (*OSCILLATOR.parameters, *OSCILLATOR.settings)}
     for case in range(0, 60, 6):
-        one = inputs | {name: float(value[case]) for name, value in SWINGS.items()} | {"step_s": 0.05}
-        _, history = fly_history(OSCILLATOR, one, case, 1, folder=FOLDER)
+        one = {name: float(value[case]) for name, value in SWINGS.items()} | {"step_s": 0.05}
+        _, history = fly_history(OSCILLATOR, inputs_of(OSCILLATOR, one), case, 1, folder=FOLDER, width=8)
         at = int(np.argmax(history["x_km"]))
         assert columns["sampled_top_km"][case] == history["x_km"][at]
         assert columns["sampled_top_time_s"][case] == history["t_s"][at]

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, OSCILLATOR, RAIL, flown, same_bytes
+from flown_models import FOLDER, OSCILLATOR, RAIL, flown, inputs_of, same_bytes
+from plain_steps import ahead, twin
 
 from mc_engine.flight.flight import fly_history
 from mc_engine.lanes.functions import fma
-from mc_engine.lanes.philox import Draws, noise_key
 
 RANDOM = np.random.default_rng(3)
 MIXED = {
@@ -26,35 +26,27 @@ def test_the_error_falls_by_sixteen_when_the_step_is_halved():
     assert coarse < 1e-5
 
 
-def ahead(s, h, slopes):
-    """State plus h times its slopes, rounded once."""
-    return type(s)(*(fma(h, slope, y) for y, slope in zip(s, slopes, strict=True)))
+class ClassicSteps:
+    """Steps by the classic method of fourth order over Python floats."""
 
+    def restart(self):
+        """Nothing is kept from step to step."""
 
-def twin(case, seed, h, inputs):
-    """End state [m, m/s] and memory of one case by a plain loop of steps h over Python floats."""
-    row = {parameter.name: parameter.default for parameter in OSCILLATOR.parameters}
-    row |= {name: float(value[case]) for name, value in inputs.items() if np.ndim(value)}
-    p = OSCILLATOR.kernel_parameters(*(row[item.name] * item.si_factor for item in OSCILLATOR.parameters))
-    s, m = OSCILLATOR.initial(p, None), OSCILLATOR.start(p, None)
-    for step in range(int(np.ceil(inputs["until_s"] / h))):
-        t, sample = step * h, step / inputs["every"]
-        if sample.is_integer():
-            m = OSCILLATOR.control(t, s, m, p, None, Draws(noise_key(seed), float(case), sample))
-        k1 = OSCILLATOR.rhs(t, s, m, p, None)
-        k2 = OSCILLATOR.rhs(t + 0.5 * h, ahead(s, 0.5 * h, k1), m, p, None)
-        k3 = OSCILLATOR.rhs(t + 0.5 * h, ahead(s, 0.5 * h, k2), m, p, None)
-        k4 = OSCILLATOR.rhs(t + h, ahead(s, h, k3), m, p, None)
+    def advance(self, rhs, step, h, s):
+        t = step * h
+        k1 = rhs(t, s)
+        k2 = rhs(t + 0.5 * h, ahead(s, 0.5 * h, k1))
+        k3 = rhs(t + 0.5 * h, ahead(s, 0.5 * h, k2))
+        k4 = rhs(t + h, ahead(s, h, k3))
         slopes = [fma(2.0, b + c, a + d) for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
-        s = ahead(s, h * (1.0 / 6.0), slopes)
-    return s, m
+        return ahead(s, h * (1.0 / 6.0), slopes)
 
 
 @pytest.mark.parametrize("width", [1, 8])
 def test_a_plain_loop_over_python_floats_gives_the_same_bits(width):
     columns = flown(OSCILLATOR, width=width, seed=9, **MIXED)
     for case in range(0, 37, 4):
-        s, m = twin(case, 9, 0.1, MIXED)
+        s, m = twin(ClassicSteps(), case, 9, 0.1, MIXED)
         assert (columns["end_x_km"][case], columns["end_v_m_s"][case]) == (s.x / 1e3, s.v)
         assert (columns["samples"][case], columns["sampled_at_s"][case]) == (m.samples, m.sampled_at)
 
@@ -118,9 +110,7 @@ def test_a_case_that_becomes_nan_keeps_its_last_finite_state_and_its_neighbours_
 
 
 def test_the_history_of_a_broken_case_ends_with_its_last_finite_look():
-    inputs = {item.name: item.default for item in (*OSCILLATOR.parameters, *OSCILLATOR.settings)} | {
-        "breaks_at_s": 2.05
-    }
+    inputs = inputs_of(OSCILLATOR, {"breaks_at_s": 2.05})
     columns, history = fly_history(OSCILLATOR, inputs, 0, 1, folder=FOLDER, width=8)
     assert columns["status"][0] == "not-finite"
     assert np.isfinite(history["x_km"]).all()
@@ -129,8 +119,7 @@ def test_the_history_of_a_broken_case_ends_with_its_last_finite_look():
 
 @pytest.mark.parametrize("width", [1, 8])
 def test_the_history_runs_from_the_first_state_to_the_last_one_of_the_row(width):
-    inputs = {item.name: item.default for item in (*OSCILLATOR.parameters, *OSCILLATOR.settings)}
-    inputs |= {name: value[4] if np.ndim(value) else value for name, value in MIXED.items()}
+    inputs = inputs_of(OSCILLATOR, {name: value[4] if np.ndim(value) else value for name, value in MIXED.items()})
     columns, history = fly_history(OSCILLATOR, inputs, 4, 1, folder=FOLDER, width=width)
     same_bytes(columns, {name: row[4:5] for name, row in flown(OSCILLATOR, **MIXED).items()})
     assert history["t_s"].tolist() == pytest.approx([0.1 * k for k in range(74)])
@@ -145,8 +134,8 @@ def test_one_case_and_eight_at_a_time_give_the_same_bytes():
 @pytest.mark.parametrize("rows", [10, 1000])
 def test_the_history_has_every_bounce_at_its_time_however_few_its_rows_are(rows):
     """A ball from 5 m at 10 m/s^2 meets the floor at 1, 3, 5, 7 and 9 s, all between two steps."""
-    inputs = {item.name: item.default for item in (*RAIL.parameters, *RAIL.settings)}
-    inputs |= {"gravity_m_s2": 10.0, "x0_m": 5.0, "wall_m": 0.0, "step_s": 0.3, "last_s": 9.9}
+    ball = {"gravity_m_s2": 10.0, "x0_m": 5.0, "wall_m": 0.0, "step_s": 0.3, "last_s": 9.9}
+    inputs = inputs_of(RAIL, ball)
     columns, history = fly_history(RAIL, inputs, 0, 1, folder=FOLDER, rows=rows, width=8)
     t, height = history["t_s"], history["x_m"]
     bounces = np.abs(t[:, None] - [1.0, 3.0, 5.0, 7.0, 9.0]).argmin(axis=0)

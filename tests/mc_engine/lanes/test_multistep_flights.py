@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from flown_models import FOLDER, OSCILLATOR, RAIL, flown, same_bytes
+from flown_models import FOLDER, OSCILLATOR, RAIL, flown, inputs_of, same_bytes
 from plain_steps import MIXED, by
 
 from mc_engine.flight.flight import fly_history, fly_interpreted
@@ -28,9 +28,8 @@ def test_a_case_keeps_its_bytes_at_every_width_in_any_order_and_company(method):
 @pytest.mark.parametrize("method", ["abm10", "gj7"])
 def test_a_flight_by_python_and_a_history_give_the_bits_of_the_kernel(method):
     model = by(OSCILLATOR, method)
-    inputs = {item.name: item.default for item in (*OSCILLATOR.parameters, *OSCILLATOR.settings)}
-    inputs |= {name: value[4] if np.ndim(value) else value for name, value in MIXED.items()}
-    columns, history = fly_history(model, inputs, 4, 1, folder=FOLDER)
+    inputs = inputs_of(OSCILLATOR, {name: value[4] if np.ndim(value) else value for name, value in MIXED.items()})
+    columns, history = fly_history(model, inputs, 4, 1, folder=FOLDER, width=8)
     same_bytes(columns, {name: row[4:5] for name, row in flown(model, **MIXED).items()})
     assert history["t_s"][-1] == columns["end_time_s"][0]
     assert history["x_km"][-1] == columns["end_x_km"][0]

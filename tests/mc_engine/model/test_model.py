@@ -12,7 +12,7 @@ from small_run import ENVIRONMENT
 from mc_engine.errors import ModelError
 from mc_engine.model import Event, Extremum, Field, Parameter, load_model
 
-WAVE_FOLDER = Path(__file__).resolve().parents[1] / "lanes" / "adaptive"
+WAVE_FOLDER = Path(__file__).resolve().parents[1] / "lanes" / "models"
 WAVE = load_model("wave.py", WAVE_FOLDER)
 
 

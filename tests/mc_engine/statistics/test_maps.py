@@ -96,3 +96,15 @@ def test_a_hole_between_the_cases_stays_blank():
 def test_too_few_cases_give_no_map(n):
     x, y = scattered(n)
     assert map_metric(x, y, quadratic(x, y)) is None
+
+
+@pytest.mark.parametrize("noise", [1e-3, 0.1, 0.5])
+def test_neighbourhoods_that_are_left_out_as_far_too_wide_would_not_have_been_chosen(monkeypatch, noise):
+    draw = np.random.Generator(np.random.Philox(key=3))
+    x, y = draw.normal(size=(2, 2000))
+    z = SURFACES["waves"](x, y) + noise * draw.normal(size=2000)
+    short = map_metric(x, y, z, points=11)
+    monkeypatch.setattr("mc_engine.statistics.maps.WORSE_FOR_GOOD", np.inf)
+    whole = map_metric(x, y, z, points=11)
+    assert short.neighbours == whole.neighbours
+    assert (short.explained, short.value.tobytes()) == (whole.explained, whole.value.tobytes())

@@ -1,11 +1,13 @@
 """Candidates flown side by side: the same as each alone, nominal or over the same dispersed cases."""
 
+import threading
+
 import numpy as np
 import pytest
 from apogee_tuning import apogee_and_speed, apogee_campaign
 
 from mc_engine.campaign.cases import case_table
-from mc_engine.flight.chunks import fly_cases
+from mc_engine.flight.chunks import fly_cases, fly_in_threads
 from mc_engine.studies.candidates import cases_per_candidate, fly_candidates
 
 CHOICES = np.array([[300.0, 100.0], [250.0, 60.0], [600.0, 200.0], [400.0, 150.0], [200.0, 50.0]])
@@ -31,6 +33,33 @@ def test_candidates_fly_alike_alone_together_and_by_two_threads():
         rows = [row for row in together.limited.tolist() if row in scores.limited.tolist()]
         assert rows == scores.limited.tolist()
     assert cases_per_candidate(campaign, campaign.tuning) == 11
+
+
+class Ending:
+    """Flies nothing, and ends the process, as a model's `prepare` may."""
+
+    batch, most_workers = 8, None
+
+    def make_ready(self):
+        """Nothing to compile."""
+
+    def fly(self, inputs, noise):
+        raise SystemExit("no licence")
+
+
+def test_a_flight_that_ends_its_thread_is_not_waited_for():
+    ends = []
+
+    def fly():
+        try:
+            fly_in_threads(apogee_campaign(), {}, np.arange(64), [], 2, Ending())
+        except SystemExit as end:
+            ends.append(str(end))
+
+    thread = threading.Thread(target=fly, daemon=True)
+    thread.start()
+    thread.join(20.0)
+    assert ends == ["no licence"]
 
 
 @pytest.mark.parametrize(("limit", "rank"), [("at_least", 2), ("at_most", 1)])

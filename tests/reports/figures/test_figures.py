@@ -2,6 +2,7 @@
 
 import json
 import re
+from base64 import b64decode
 
 import numpy as np
 import pytest
@@ -81,13 +82,18 @@ def test_the_printed_figures_are_the_same_bytes_twice_and_hold_no_date(drawings)
 
 def test_numbers_that_differ_by_little_stay_different_on_the_screen():
     values = -2.0 + 1e-5 * np.array([0.0, 0.5, np.nan, 1.0, 0.25, 0.75])
-    shown = np.array(screen.rounded(values, 5), dtype=float)
-    assert np.nanmax(np.abs(shown - values)) < 1e-9
-    assert np.isnan(shown[2])
-    assert screen.rounded([1.0, 1.0 + 2**-52], 5)[1] == 1.0 + 2**-52
-    assert screen.rounded([-0.123456789, 2.0], 5) == [-0.12346, 2.0]
-    assert screen.rounded([1 / 3, 1 / 3], 5) == [0.33333, 0.33333]
-    assert screen.rounded([], 5) == []
+    many = screen.packed(np.tile(values, 10))
+    for shown in (np.array(screen.packed(values), dtype=float), np.frombuffer(b64decode(many["bdata"]), many["dtype"])):
+        assert np.nanmax(np.abs(shown - np.resize(values, shown.size))) < 1e-9
+        assert np.isnan(shown[2])
+    assert screen.packed([1.0, 1.0 + 2**-52])[1] == 1.0 + 2**-52
+    assert screen.packed([]) == []
+
+
+@pytest.mark.parametrize("size", [1e300, 1e-300])
+def test_numbers_beyond_single_precision_reach_the_page(size):
+    shown = screen.packed(np.tile([size, -2.0 * size, 0.0], 10))
+    assert np.frombuffer(b64decode(shown["bdata"]), shown["dtype"])[:3].tolist() == [size, -2.0 * size, 0.0]
 
 
 def test_dollar_signs_in_names_are_no_mathematics():

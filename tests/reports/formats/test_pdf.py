@@ -47,6 +47,12 @@ def test_the_same_run_gives_the_same_bytes(pdf):
     assert render_pdf(build(synthetic_run(3000), "run")) == pdf
 
 
+def test_a_small_text_is_below_the_number_with_its_unit_and_neither_is_broken(pdf, tmp_path):
+    text = text_of(pdf, tmp_path)
+    assert re.search(r"^ *fuel +at most 2\.5[\u202f ]kg  ", text, re.MULTILINE)
+    assert re.search(r"  for 99\.73[\u202f ]% with", text)
+
+
 def test_two_readers_open_it_and_see_the_same_pages_with_ink_on_each(pdf):
     pages = pypdf.PdfReader(io.BytesIO(pdf)).pages
     drawn = pypdfium2.PdfDocument(pdf)

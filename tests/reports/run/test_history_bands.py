@@ -93,4 +93,4 @@ def test_a_report_draws_bands_with_the_nominal_and_the_two_worst(drawing):
 
 def test_a_quantity_that_never_changes_is_named_instead_of_drawn(drawing):
     document, _ = drawing
-    assert "Not drawn, constant in every saved case: position_error_m." in repr(document)
+    assert "Not drawn, the same in all saved cases at all times: position error." in repr(document)

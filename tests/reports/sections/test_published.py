@@ -49,7 +49,7 @@ def test_only_what_the_run_computes_has_a_row():
         {"quantity": "in words", "published": "about six minutes", "at_most": 360.0, **column},
         {"quantity": "lost", "published": "lost", "status": "lost", **column},
     ]
-    table, sentence = published_blocks(Flown(run, "run"))
+    table, sentence, command = published_blocks(Flown(run, "run"))
     assert [row[0].text for row in table.rows] == ["far", "close", "near", "better", "in words", "lost"]
     verdicts = ["not reached", "close", "reached", "improved", "reached", "unknown"]
     assert [row[4].text for row in table.rows] == verdicts
@@ -57,3 +57,4 @@ def test_only_what_the_run_computes_has_a_row():
     assert table.rows[1][3].text == "−1.61\u202fs"
     assert table.rows[1][1].small == "restored"
     assert sentence.startswith("2 further published values of the model are not computed by the cases of this run")
+    assert command.paragraphs == (f"mc-engine published {run.manifest['model']['name']} --compute",)

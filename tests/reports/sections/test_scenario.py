@@ -29,6 +29,18 @@ def test_the_timeline_tells_when_and_what_else_is_known_of_the_event():
     assert table.rows[0][3].text == "altitude 41.5\u202fkm"
 
 
+def test_a_time_whose_meaning_is_the_end_of_a_phase_is_an_event():
+    run = synthetic_run(50, failed=0)
+    run.manifest["columns"] += [
+        {"name": "burn_out_2_s", "unit": "s", "role": "metric", "description": "end of the second burn"},
+        {"name": "on_time_x_s", "unit": "s", "role": "metric", "description": "time that the x thrusters fired"},
+    ]
+    run.table = run.table.assign(burn_out_2_s=90.0 + run.table["case_id"], on_time_x_s=3.0)
+    run.nominal_row |= {"burn_out_2_s": 90.0, "on_time_x_s": 3.0}
+    table = next(one for one in section(run, "scenario").blocks if isinstance(one, Table))
+    assert [row[0].text for row in table.rows] == ["Burn out 2", "Settling"]
+
+
 def test_phases_of_the_nominal_case_are_in_the_timeline_and_marked_in_the_histories():
     run = synthetic_run(50, failed=0)
     t = run.history["t_s"]

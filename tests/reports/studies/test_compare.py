@@ -11,7 +11,7 @@ from synthetic_run import synthetic_run
 from mc_engine.errors import StoreError
 from mc_engine.studies.comparison import compare_runs
 from reports.document.blocks import FigureBlock, Table, blocks_of
-from reports.figures.rows import ratio_ticks
+from reports.drawing.ticks import axis_ticks
 from reports.formats.html import render_html
 from reports.studies.comparison import build_comparison, write_comparison
 
@@ -129,7 +129,7 @@ def test_the_same_run_twice_has_no_figure_and_says_so():
     assert document.subtitle.startswith("No significant change")
     assert not list(blocks_of(document, FigureBlock))
     page = render_html(document).decode()
-    assert "The same in both runs: correction_impulse_m_s" in page
+    assert "The same in both runs: correction impulse" in page
     assert "Code: the same in both runs." in page
 
 
@@ -149,6 +149,31 @@ def test_names_and_campaign_lines_stay_text():
     assert page.count("&lt;script&gt;alert(1)&lt;/script&gt;") >= 2
 
 
+@pytest.mark.parametrize(
+    ("names", "shown"),
+    [
+        (("/data/runs/a", "/data/runs/b"), ("a", "b")),
+        (("/data/old/run", "/data/new/run"), ("old/run", "new/run")),
+        (("runs/a", "https://host/b"), ("runs/a", "https://host/b")),
+        (("/data/a", "/data/a"), ("a", "a")),
+    ],
+)
+def test_a_comparison_names_its_runs_without_the_path_of_a_disk(names, shown):
+    document = build_comparison(compared(names=names))
+    assert [value.split(": ")[0] for _, value in document.facts[:2]] == list(shown)
+    assert "/data" not in repr(document)
+
+
+def test_the_mean_of_each_run_has_the_digits_of_its_own_spread():
+    found = compared(shift=9000.0)
+    change = next(one for one in found.metrics if one.metric == "peak_force_n")
+    wide = replace(change, mean=(0.0355, 9433.6055), deviation=(0.0201, 5000.0))
+    metrics = [wide if one is change else one for one in found.metrics]
+    rows = tables(build_comparison(replace(found, metrics=metrics)))["Metrics of both runs"].rows
+    (row,) = [row for row in rows if "peak force" in row[0].text]
+    assert [cell.text for cell in row[1:3]] == ["0.0355", "9434"]
+
+
 def test_page_and_pdf_are_the_same_bytes_twice(tmp_path):
     found = compared(shift=8.0, seed=2)
     for name in ("compare.html", "compare.pdf"):
@@ -164,7 +189,7 @@ def test_a_folder_that_is_not_there_is_said(tmp_path):
 
 @pytest.mark.parametrize("span", [(0.97, 1.02), (0.8, 1.1), (0.5, 3.0), (0.1, 8.0), (1e-4, 1e3)])
 def test_the_ticks_of_a_ratio_lie_inside_and_hold_one(span):
-    ticks = ratio_ticks(span)
+    ticks = axis_ticks(*span, 6, log=True)
     assert 1.0 in ticks
     assert 2 <= len(ticks) <= 9
     assert np.all(np.diff(ticks) > 0.0)

@@ -86,8 +86,9 @@ def test_levels_and_failed_inputs_are_listed_and_drawn(tmp_path):
     (figure,) = blocks_of(document, FigureBlock)
     _, levels, *_ = figure.drawing.plots[0].marks
     np.testing.assert_array_equal(levels.y, [0.1, 1e-2, 1e-3, 1e-4])
-    point = screen.specifications(figure.drawing)[0]["data"][-1]
-    assert point["y"][0] - point["error_y"]["arrayminus"][0] == pytest.approx(1.5e-5)
+    interval, point = screen.specifications(figure.drawing)[0]["data"][-2:]
+    assert interval["y"] == [pytest.approx(1.5e-5), pytest.approx(2.7e-5), None]
+    assert interval["x"][:2] == 2 * point["x"]
     assert "interval 1.5·10⁻⁵ to 2.7·10⁻⁵" in figure.drawing.alternative
 
 

@@ -4,7 +4,21 @@ import math
 
 import pytest
 
-from reports.text.numbers import axis_label, count, exact, interval, named, number, percent, typeset, with_unit, words
+from reports.text.numbers import (
+    axis_label,
+    column_texts,
+    count,
+    exact,
+    fixed,
+    interval,
+    named,
+    number,
+    percent,
+    spelled,
+    typeset,
+    with_unit,
+    words,
+)
 
 
 @pytest.mark.parametrize(
@@ -32,6 +46,20 @@ def test_digits_follow_the_spread_so_that_mean_and_limits_can_be_compared():
     assert number(231.4, scale=140.0) == "231"
 
 
+def test_a_value_far_below_its_spread_is_written_like_its_neighbours():
+    assert number(5.79e-5, scale=0.0213) == "0.0001"
+    assert number(-3.891e-5, scale=0.00131) == "−0.00004"
+    assert number(5.79e-5, scale=2e-5) == "5.79·10⁻⁵"
+
+
+def test_values_of_a_narrow_column_have_the_same_decimals():
+    assert column_texts([0.0003248, 0.00032436, 0.00032495]) == ["0.00032480", "0.00032436", "0.00032495"]
+
+
+def test_what_rounds_to_zero_has_no_sign():
+    assert [fixed(value, 2) for value in (-0.004, 0.004, -0.006)] == ["0.00", "0.00", "−0.01"]
+
+
 def test_no_number_has_more_than_eight_digits_however_narrow_the_spread():
     assert number(7800.00119612, scale=1e-6) == "7800.0012"
 
@@ -52,7 +80,18 @@ def test_an_interval_says_when_the_cases_are_too_few():
     assert interval(1.0, None) == "[1, –]"
 
 
-@pytest.mark.parametrize(("value", "text"), [(246.0, "246"), (0.0175, "0.0175"), (True, "yes"), ("off", "off")])
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (246.0, "246"),
+        (0.0175, "0.0175"),
+        (1e-8, "1·10⁻⁸"),
+        (-1e9, "−1·10⁹"),
+        (12345678.5, "1.23456785·10⁷"),
+        (True, "yes"),
+        ("off", "off"),
+    ],
+)
 def test_an_input_is_written_as_it_was_given(value, text):
     assert exact(value) == text
 
@@ -94,3 +133,19 @@ def test_a_number_that_is_nothing_beside_the_spread_is_0():
     assert number(6.66e-16, 4, 0.35) == "0"
     assert number(6.66e-16, 4) == "6.66·10⁻¹⁶"
     assert number(-2e-6, 4, 1e-5) != "0"
+
+
+def test_days_are_counted_and_parts_of_other_units_stay():
+    assert with_unit("1", "day") == "1\u202fday"
+    assert with_unit("10", "day") == "10\u202fdays"
+    assert axis_label("time", "day") == "time [days]"
+    assert typeset("deg/day") == "deg/day"
+
+
+def test_the_words_of_a_distribution_have_printed_signs_and_powers():
+    found = [spelled(text) for text in ("normal, mean = -2, σ = 5e-4 m^2", "uniform, -2 to 1 day", "any, 3e+07")]
+    assert found == [
+        "normal, mean\xa0=\xa0−2, σ\xa0=\xa05·10⁻⁴\u202fm²",
+        "uniform, −2 to 1\u202fdays",
+        "any, 3·10⁷",
+    ]
