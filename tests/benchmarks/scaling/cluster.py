@@ -189,7 +189,7 @@ class Recovery:
 
 
 def recovery(workers: int, campaign: Campaign, folder: Path, chunk: int) -> Recovery:
-    """Kill half of the workers when half of the parts are committed, and see the run to its end."""
+    """Kill half of the workers when half of the parts are committed, and wait for the end of the run."""
     half, instants = campaign.cases // chunk // 2, []
     with cluster_of(workers) as cluster:
 

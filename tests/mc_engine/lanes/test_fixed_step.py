@@ -51,7 +51,7 @@ def test_a_plain_loop_over_python_floats_gives_the_same_bits(width):
         assert (columns["samples"][case], columns["sampled_at_s"][case]) == (m.samples, m.sampled_at)
 
 
-def test_a_case_keeps_its_bytes_in_any_order_and_company():
+def test_a_case_keeps_its_bytes_in_any_order_among_any_cases():
     whole = flown(OSCILLATOR, **MIXED)
     order = np.random.default_rng(1).permutation(37)
     shuffled = {name: value[order] if np.ndim(value) else value for name, value in MIXED.items()}

@@ -1,4 +1,4 @@
-"""Flights by multistep methods: bytes at every width and in any company, histories, stops and events."""
+"""Flights by multistep methods: bytes at every width and among any other cases, histories, stops and events."""
 
 import math
 
@@ -12,7 +12,7 @@ from mc_engine.flight.interpreted import InterpretedFlight
 
 
 @pytest.mark.parametrize("method", ["abm11", "gj8"])
-def test_a_case_keeps_its_bytes_at_every_width_in_any_order_and_company(method):
+def test_a_case_keeps_its_bytes_at_every_width_in_any_order_among_any_cases(method):
     model = by(OSCILLATOR, method)
     whole = flown(model, **MIXED)
     for width in (1, 16):
