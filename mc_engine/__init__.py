@@ -8,7 +8,8 @@ from importlib import import_module
 TYPE_CHECKING = False  # not from `typing`, for which `python -m mc_engine` would look in the working folder
 if TYPE_CHECKING:
     from mc_engine.campaign.cases import case_table
-    from mc_engine.campaign.loading import Campaign, list_campaigns, load_campaign
+    from mc_engine.campaign.loading import Campaign, load_campaign
+    from mc_engine.campaign.search import list_campaigns
     from mc_engine.errors import CampaignError, EngineError, ModelError, RunInterrupted, StoreError
     from mc_engine.model.fields import AdaptiveStep, Event, Extremum, Field, FixedStep, Parameter, Setting
     from mc_engine.model.record import Model, Refusals
@@ -21,7 +22,8 @@ if TYPE_CHECKING:
     from mc_engine.studies.tuning_folder import TuningRecord, open_tuning
 
 _HOME = {
-    "campaign.loading": ("Campaign", "list_campaigns", "load_campaign"),
+    "campaign.loading": ("Campaign", "load_campaign"),
+    "campaign.search": ("list_campaigns",),
     "campaign.cases": ("case_table",),
     "errors": ("CampaignError", "EngineError", "ModelError", "RunInterrupted", "StoreError"),
     "model.record": (

@@ -1,5 +1,6 @@
 """The process of the command line: `mc-engine`, or `python -m mc_engine`."""
 
+import gc
 import os
 import sys
 from importlib import import_module
@@ -22,6 +23,7 @@ def main() -> None:
     from mc_engine.unforeseen import UNFORESEEN, catch_all, refuse_small_memory, unforeseen
 
     install_handlers()  # before the rest is loaded, which takes longest
+    gc.set_threshold(50_000)  # a command makes objects by the ten thousand, and hardly any garbage to look for
     for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(library, "1")  # for small matrices its threads cost more than they gain
     # or pydantic reads the metadata of all installed packages; also in processes that the engine starts

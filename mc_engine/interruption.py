@@ -15,9 +15,10 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from types import FrameType
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -26,6 +27,7 @@ from mc_engine.text import clean
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
+S = TypeVar("S")
 T = TypeVar("T")
 INTERRUPTED = 4  # the exit status
 _MODEL_FAULT = 2  # the exit status of a faulty model
@@ -159,6 +161,28 @@ def in_another_thread(work: Callable[[], T]) -> T:
         _COMMAND_LINE.abandoned = True
         raise
     return outcome.result()
+
+
+def in_threads(work: Callable[[S], T], items: Sequence[S], workers: int) -> list[T]:
+    """What `work` returns for each of the items, by up to `workers` daemon threads, which delay no end of the process.
+
+    Raises the first that `work` raises; items not begun by then are left.  A signal is handled at once.
+    """
+    if not items:
+        return []
+    from concurrent.futures import FIRST_EXCEPTION, Future, wait
+    from multiprocessing.pool import ThreadPool
+
+    outcomes: list[Future[T]] = [Future() for _ in items]
+    tasks = [(partial(work, item), outcome) for item, outcome in zip(items, outcomes, strict=True)]
+    with ThreadPool(min(workers, len(items))) as pool:
+        pool.starmap_async(_settle, tasks, chunksize=1)
+        while True:
+            done, waiting = wait(outcomes, _LOOK_EVERY_S, FIRST_EXCEPTION)  # Windows handles no signal in one long wait
+            if failed := [outcome for outcome in done if outcome.exception() is not None]:
+                failed[0].result()
+            if not waiting:
+                return [outcome.result() for outcome in outcomes]
 
 
 def _settle(work: Callable[[], T], outcome: "Future[T]") -> None:

@@ -16,12 +16,12 @@ from reports.sections.diagnostics import correlation_blocks, normal_probability_
 from reports.sections.figure_blocks import (
     distribution_blocks,
     history_blocks,
-    map_blocks,
     other_distributions,
     scatter_blocks,
 )
 from reports.sections.headline import cost_cards, summary_sentence, verdict_cards, warnings
 from reports.sections.levels import level_blocks
+from reports.sections.map_blocks import map_blocks
 from reports.sections.profiles import profile_blocks
 from reports.sections.provenance import campaign_facts, provenance_table
 from reports.sections.published import published_blocks

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from mc_engine.campaign.dispersions import Dispersion
-from mc_engine.campaign.inputs import accepted_range, check_value, inputs_of, number
+from mc_engine.campaign.inputs import accepted_range, check_value, number
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import CampaignSection
 from mc_engine.campaign.tables_beside import numbers, read_columns, switches, words
-from mc_engine.model.fields import Parameter, Setting
+from mc_engine.model.fields import Parameter, Setting, inputs_of
 from mc_engine.model.files import FileFault, resolve_beside
 from mc_engine.model.simulator import System
 from mc_engine.suggestions import hint

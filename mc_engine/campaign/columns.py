@@ -1,21 +1,27 @@
 """The columns of a run's case table after case_id, status and reason.
 
 In order: columns taken from an upstream run, dispersions, metrics, time and state at the end.
+The names alone are needed to fly; what stores the columns is loaded where they are made.
 """
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.model.fields import Parameter, Setting
 from mc_engine.model.simulator import System
-from mc_engine.store.parts import Column
+
+if TYPE_CHECKING:
+    from mc_engine.store.parts import Column
 
 END_TIME = "end_time_s"
 END_PHASE = "end_phase"  # of a model with phases
 
 
-def input_column(item: Parameter | Setting) -> Column:
+def input_column(item: Parameter | Setting) -> "Column":
     """The column of an input that differs from case to case."""
+    from mc_engine.store.parts import Column
+
     kind = "number"
     if isinstance(item, Setting) and (item.choices or item.date):
         kind = "word"
@@ -24,8 +30,10 @@ def input_column(item: Parameter | Setting) -> Column:
     return Column(item.name, item.unit, "dispersion", item.description, kind)
 
 
-def result_columns(model: System) -> list[Column]:
+def result_columns(model: System) -> "list[Column]":
     """Metrics, and time and state at the end of the flight; of a simulator, metrics alone."""
+    from mc_engine.store.parts import Column
+
     columns = [Column(metric.name, metric.unit, "metric", metric.description) for metric in model.metrics]
     if not model.states:
         return columns
@@ -38,7 +46,7 @@ def result_columns(model: System) -> list[Column]:
     return columns
 
 
-def case_columns(model: System, dispersions: Sequence[Dispersion], upstream: Sequence[Column] = ()) -> list[Column]:
+def case_columns(model: System, dispersions: Sequence[Dispersion], upstream: "Sequence[Column]" = ()) -> "list[Column]":
     """All columns of a campaign's table; `upstream` are those of the run that it takes inputs from."""
     return [
         *upstream,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mc_engine.campaign.distribution_keys import DispersionContext, build_distribution
+from mc_engine.campaign.distribution_keys import DispersionContext, build_distribution, checked_values
 from mc_engine.campaign.inputs import check_value, number
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import DISTRIBUTIONS, DispersionSection
@@ -119,11 +119,7 @@ def _levels(context: DispersionContext, distribution: Distribution | None) -> tu
     if isinstance(distribution, Constant):
         return (distribution.value,)
     if keys.values is not None:
-        values = [
-            check_value(value, context.item, context.findings, f"values {k}")
-            for k, value in enumerate(keys.values, start=1)
-        ]
-        return tuple(value for value in values if value is not None)
+        return tuple(value for value in checked_values(context) if value is not None)
     if isinstance(context.item, Setting):
         context.findings.add("values", "is missing; a setting takes its levels from values = [...]")
         return ()

@@ -70,8 +70,7 @@ def build_distribution(context: DispersionContext) -> Distribution | None:
 
 def _truncated(distribution: Continuous, context: DispersionContext) -> Continuous | Truncated | None:
     """The distribution between the bounds `lower` and `upper` of the file."""
-    lower = -math.inf if context.keys.lower is None else context.keys.lower
-    upper = math.inf if context.keys.upper is None else context.keys.upper
+    lower, upper = _cut(context)
     if not _in_order(context, lower, upper):
         return None
     if (lower, upper) == (-math.inf, math.inf):
@@ -80,6 +79,12 @@ def _truncated(distribution: Continuous, context: DispersionContext) -> Continuo
         context.findings.add("lower" if lower > -math.inf else "upper", "the bounds leave nothing of the distribution")
         return None
     return truncate(distribution, lower, upper)
+
+
+def _cut(context: DispersionContext) -> tuple[float, float]:
+    """The bounds of the file, infinite where it has none."""
+    lower, upper = context.keys.lower, context.keys.upper
+    return -math.inf if lower is None else lower, math.inf if upper is None else upper
 
 
 def _in_order(context: DispersionContext, lower: float, upper: float) -> bool:
@@ -172,11 +177,16 @@ def _exponential(context: DispersionContext) -> Distribution:
     return Exponential(_given_or_nominal(context.keys.origin, context), context.keys.scale)
 
 
-def _discrete(context: DispersionContext) -> Distribution | None:
-    values = [
+def checked_values(context: DispersionContext) -> list[Scalar | None]:
+    """The key `values` as the input takes it; None for each value with a mistake."""
+    return [
         check_value(value, context.item, context.findings, f"values {k}")
         for k, value in enumerate(context.keys.values, start=1)
     ]
+
+
+def _discrete(context: DispersionContext) -> Distribution | None:
+    values = checked_values(context)
     weights = context.keys.weights if context.keys.weights is not None else [1.0] * len(values)
     if len(weights) != len(values):
         context.findings.add("weights", f"{len(weights)} weights for {len(values)} values")
@@ -196,8 +206,7 @@ def _empirical(context: DispersionContext) -> Distribution | None:
         return None
     if keys.unit is not None:
         measured = tuple(convert(value, keys.unit, context.item.unit) for value in measured)
-    lower = -math.inf if keys.lower is None else keys.lower
-    upper = math.inf if keys.upper is None else keys.upper
+    lower, upper = _cut(context)
     if not _in_order(context, lower, upper):
         return None
     kept = Empirical(measured).within(lower, upper)

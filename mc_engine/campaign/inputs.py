@@ -3,15 +3,8 @@
 from mc_engine.campaign.reading import Findings, shown
 from mc_engine.dates import EXAMPLE, date_text, modified_julian_date
 from mc_engine.model.fields import Parameter, Setting
-from mc_engine.model.simulator import System
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.suggestions import hint, listed
-
-
-def inputs_of(model: System) -> dict[str, Parameter | Setting]:
-    """All parameters and settings by name."""
-    inputs: list[Parameter | Setting] = [*model.parameters, *model.settings]
-    return {item.name: item for item in inputs}
 
 
 def check_value(value: Scalar, item: Parameter | Setting, findings: Findings, key: str) -> Scalar | None:

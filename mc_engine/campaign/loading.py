@@ -17,12 +17,10 @@ from mc_engine.campaign.case_table import cases_of_table, table_dispersions
 from mc_engine.campaign.chain import chained_count, check_taken, take_inputs
 from mc_engine.campaign.covariances import spread_covariances
 from mc_engine.campaign.dispersions import Dispersion, build_dispersion
-from mc_engine.campaign.inputs import inputs_of
 from mc_engine.campaign.parts import (
     Correlation,
     Requirement,
     Retention,
-    Worst,
     check_correlations,
     check_metric,
     check_requirements,
@@ -34,18 +32,12 @@ from mc_engine.campaign.parts import (
     with_step_limit,
 )
 from mc_engine.campaign.reading import Findings, Sections, parse_toml, read_sections
-from mc_engine.campaign.search import (
-    SHIPPED,
-    ShippedCampaign,
-    campaign_name,
-    campaign_text,
-    find_campaign,
-    list_campaigns,
-)
-from mc_engine.campaign.sections import CampaignSection, schema
+from mc_engine.campaign.search import campaign_name, campaign_text, find_campaign
+from mc_engine.campaign.sections import CampaignSection
 from mc_engine.campaign.sensitivity_design import SensitivityDesign, check_sensitivity
 from mc_engine.campaign.tuning_section import Tuning, check_tuning
 from mc_engine.errors import CampaignError, ModelError
+from mc_engine.model.fields import inputs_of
 from mc_engine.model.simulator import System
 from mc_engine.sampling.designs import BY_LEVELS, DESIGNS, IN_BLOCKS, RANDOM, level_count
 from mc_engine.sampling.distributions import Scalar
@@ -55,22 +47,6 @@ from mc_engine.suggestions import hint
 
 if TYPE_CHECKING:
     from mc_engine.campaign.upstream import Upstream
-
-__all__ = [
-    "SHIPPED",
-    "Campaign",
-    "Correlation",
-    "Dispersion",
-    "Requirement",
-    "Retention",
-    "ShippedCampaign",
-    "Tuning",
-    "Worst",
-    "find_campaign",
-    "list_campaigns",
-    "load_campaign",
-    "schema",
-]
 
 
 @dataclass(frozen=True)

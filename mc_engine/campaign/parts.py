@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mc_engine.campaign.dispersions import Dispersion
-from mc_engine.campaign.inputs import accepted_range, check_value, inputs_of, number
+from mc_engine.campaign.inputs import accepted_range, check_value, number
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.search import SHIPPED
 from mc_engine.campaign.sections import (
@@ -22,7 +22,7 @@ from mc_engine.campaign.sections import (
 )
 from mc_engine.errors import MOST_SHOWN, ModelError
 from mc_engine.model.faults import naming_faults
-from mc_engine.model.fields import AdaptiveStep, Parameter, Setting
+from mc_engine.model.fields import AdaptiveStep, Setting, inputs_of
 from mc_engine.model.fmu import fmu_simulator
 from mc_engine.model.preparation import call_prepare
 from mc_engine.model.program import SimulatorSection, program_simulator
@@ -129,16 +129,11 @@ def nominal_values(model: System, overrides: Mapping[str, Scalar], findings: Fin
             checked = check_value(overrides[item.name], item, findings, item.name)
             values[item.name] = default if checked is None else checked
         else:
-            _check_default(default, item, findings)
+            if not isinstance(default, bool | str) and not item.low <= default <= item.high:
+                own = f"the model's own value {number(default)}"
+                findings.add(item.name, f"{own} is not within {accepted_range(item)}; give one")
             values[item.name] = default
     return values
-
-
-def _check_default(default: Scalar, item: Parameter | Setting, findings: Findings) -> None:
-    if not isinstance(default, bool | str) and not item.low <= default <= item.high:
-        findings.add(
-            item.name, f"the model's own value {number(default)} is not within {accepted_range(item)}; give one"
-        )
 
 
 def with_step_limit(model: System, section: CampaignSection | None, findings: Findings) -> System:

@@ -6,7 +6,7 @@ A mistake in one section does not hide those in others: each table is validated 
 import json
 import re
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, TypeVar, get_args
@@ -149,21 +149,17 @@ def read_sections(document: dict[str, Any], findings: Findings) -> Sections:
     inside = {name: findings.under(name) for name in CampaignFile.model_fields}
     _note_what_flies(document, inside["campaign"])
     return Sections(
-        campaign=read(CampaignSection, document.get("campaign"), inside["campaign"])
-        if "campaign" in document
-        else None,
+        campaign=_optional(CampaignSection, document, inside),
         parameters=_parameters(document, inside["parameters"]),
-        dispersions=_read_each(_dispersion, _named_tables(document, "dispersion", findings)),
-        correlations=_read_each(partial(read, CorrelationSection), _listed_tables(document, "correlation", findings)),
-        requirements=_read_each(
-            partial(read, RequirementSection), _freely_named_tables(document, "requirement", findings)
-        ),
+        dispersions=_tables(_dispersion, document, "dispersion", findings),
+        correlations=_tables(CorrelationSection, document, "correlation", findings, listed=True),
+        requirements=_tables(RequirementSection, document, "requirement", findings, free=True),
         retention=read(RetentionSection, document.get("retention", {}), inside["retention"]),
         tuning=_tuning(document["tuning"], inside["tuning"]) if "tuning" in document else None,
         inputs=_optional(InputsSection, document, inside),
         sensitivity=_optional(SensitivitySection, document, inside),
         report=read(ReportSection, document.get("report", {}), inside["report"]),
-        program=read(SimulatorSection, document["simulator"], inside["simulator"]) if "simulator" in document else None,
+        program=_optional(SimulatorSection, document, inside),
     )
 
 
@@ -210,44 +206,35 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _read_each(
-    reader: Callable[[Any, Findings], _AnySection | None], entries: Iterable[tuple[str, Any, Findings]]
+def _tables(
+    section: type[_AnySection] | Callable[[Any, Findings], _AnySection | None],
+    document: dict[str, Any],
+    name: str,
+    findings: Findings,
+    *,
+    listed: bool = False,
+    free: bool = False,
 ) -> dict[str, _AnySection]:
-    """The entries that could be read, by name."""
-    sections = {}
-    for name, raw, section_findings in entries:
-        section = reader(raw, section_findings)
-        if section is not None:
-            sections[name] = section
-    return sections
+    """The tables [name.NAME] of a document that could be read, by name; of a list [[name]] by place, "name 1".
 
-
-def _named_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
-    raw = document.get(name, {})
-    if isinstance(raw, dict):
-        return [(key, entry, findings.under(name, key)) for key, entry in raw.items()]
-    header = f"{findings.place}.{name}" if findings.place else name
-    findings.add(name, f"{shown(raw)} is not a table; write [{header}.NAME]")
-    return []
-
-
-def _freely_named_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
-    """The tables whose names the file chooses; one that is no word is noted and left out."""
-    entries = _named_tables(document, name, findings)
-    wrong = [entry for entry in entries if not _FREE_NAME.fullmatch(entry[0])]
-    for key, _, _ in wrong:
-        findings.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
-    return [entry for entry in entries if entry not in wrong]
-
-
-def _listed_tables(document: dict[str, Any], name: str, findings: Findings) -> list[tuple[str, Any, Findings]]:
-    raw = document.get(name, [])
+    section : class of each, or what reads one.  free : the file chooses the names; one that is no word is left out.
+    """
+    raw: Any = document.get(name, [] if listed else {})
+    if type(raw) is not (list if listed else dict):
+        header = f"{findings.place}.{name}" if findings.place else name
+        of_list = f"a list of tables; write [[{header}]] with two brackets"
+        findings.add(name, f"{shown(raw)} is not {of_list if listed else f'a table; write [{header}.NAME]'}")
+        return {}
+    reader = partial(read, section) if isinstance(section, type) else section
     if isinstance(raw, list):
-        places = [f"{name} {k}" for k in range(1, len(raw) + 1)]
-        return [(place, entry, findings.under(place)) for place, entry in zip(places, raw, strict=True)]
-    header = f"{findings.place}.{name}" if findings.place else name
-    findings.add(name, f"{shown(raw)} is not a list of tables; write [[{header}]] with two brackets")
-    return []
+        raw = {f"{name} {k}": entry for k, entry in enumerate(raw, start=1)}
+    sections = {}
+    for key, entry in raw.items():
+        if free and not _FREE_NAME.fullmatch(key):
+            findings.add(name, f"{shown(key)} is no name; use letters, digits, _ and -, 60 at most")
+        elif (table := reader(entry, findings.under(key) if listed else findings.under(name, key))) is not None:
+            sections[key] = table
+    return sections
 
 
 def _tuning(raw: Any, findings: Findings) -> TuningSections | None:
@@ -259,10 +246,10 @@ def _tuning(raw: Any, findings: Findings) -> TuningSections | None:
     objectives = raw.get("objective")
     return TuningSections(
         head=read(TuningSection, {key: value for key, value in raw.items() if key not in tables}, findings),
-        parameters=_read_each(partial(read, TunedSection), _named_tables(raw, "parameter", findings)),
-        objectives=_read_each(partial(read, ObjectiveSection), _freely_named_tables(raw, "objective", findings)),
-        constraints=_read_each(partial(read, ConstraintSection), _freely_named_tables(raw, "constraint", findings)),
-        published=_read_each(partial(read, PublishedPointSection), _listed_tables(raw, "published", findings)),
+        parameters=_tables(TunedSection, raw, "parameter", findings),
+        objectives=_tables(ObjectiveSection, raw, "objective", findings, free=True),
+        constraints=_tables(ConstraintSection, raw, "constraint", findings, free=True),
+        published=_tables(PublishedPointSection, raw, "published", findings, listed=True),
         objective_names=tuple(objectives) if isinstance(objectives, dict) else (),
     )
 
@@ -335,15 +322,11 @@ def _message(section: type[Section] | None, details: ErrorDetails) -> str:
             return f"{shown(value)} is not known{hint(value, allowed)}"
         return f"{shown(value)} is not one of {listed(allowed)}"
     whole = f"; write {int(value)}" if isinstance(value, float) and value.is_integer() else ""
-    limits = {key: _plain(limit) for key, limit in context.items()}
+    limits = {key: f"{limit:g}" if isinstance(limit, float) else limit for key, limit in context.items()}
     template = _MESSAGES.get(kind)
     if template is None:
         return f"{shown(value)}: {_lower_first(details['msg'])}"
     return template.format(shown=shown(value), whole=whole, **limits)
-
-
-def _plain(limit: Any) -> Any:
-    return f"{limit:g}" if isinstance(limit, float) else limit
 
 
 def _keys(section: type[BaseModel]) -> dict[str, FieldInfo]:

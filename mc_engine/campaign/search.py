@@ -1,5 +1,6 @@
 """Finds campaign files, the shipped ones by name and any other by its path, and reads their text."""
 
+import os
 import re
 import tomllib
 from pathlib import Path
@@ -86,14 +87,11 @@ def find_campaign(reference: str | Path) -> Path:
     if text in shipped:
         return shipped[text]
     path = Path(text)
-    try:
-        file = path / "campaign.toml" if path.is_dir() else path
-        if file.is_file():
-            if (place := str(file.resolve())) != readable(place):
-                raise CampaignError(readable(text), [Problem("", NO_TEXT)])
-            return file
-    except (OSError, ValueError):  # a name too long, or with a zero byte, is no path
-        pass
+    file = path / "campaign.toml" if os.path.isdir(path) else path
+    if os.path.isfile(file):  # not Path.is_file: a name may be too long, or hold a zero byte
+        if (place := str(file.resolve())) != readable(place):
+            raise CampaignError(readable(text), [Problem("", NO_TEXT)])
+        return file
     raise CampaignError(without_secrets(text), [Problem("", _not_found(text, path, list(shipped)))])
 
 
@@ -141,15 +139,8 @@ def _title(path: Path) -> str:
     return str(campaign.get("title", "")) if isinstance(campaign, dict) else ""
 
 
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except (OSError, ValueError):
-        return False
-
-
 def _not_found(text: str, path: Path, names: list[str]) -> str:
-    if text and _is_folder(path):
+    if text and os.path.isdir(path):
         others = [name for name in campaign_paths(f"{text.rstrip('/')}/") if name.endswith(".toml")]
         instead = f", but {others[0]}" if others else "; `mc-engine init DIR` makes a campaign in a new folder"
         return f"holds no campaign.toml{instead}"

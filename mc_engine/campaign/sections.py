@@ -253,12 +253,9 @@ class WorstSection(Section):
     )
 
 
-def _one_or_many(value: Any) -> str:
-    return "many" if isinstance(value, list) else "one"
-
-
 Worst = Annotated[
-    Annotated[WorstSection, Tag("one")] | Annotated[list[WorstSection], Tag("many")], Discriminator(_one_or_many)
+    Annotated[WorstSection, Tag("one")] | Annotated[list[WorstSection], Tag("many")],
+    Discriminator(lambda value: "many" if isinstance(value, list) else "one"),
 ]
 
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mc_engine.campaign.inputs import check_value, inputs_of, number
+from mc_engine.campaign.inputs import check_value, number
 from mc_engine.campaign.parts import check_limits, check_metric
 from mc_engine.campaign.reading import Findings, TuningSections
 from mc_engine.campaign.sections import ConstraintSection, ObjectiveSection, PublishedPointSection, TunedSection
-from mc_engine.model.fields import Setting
+from mc_engine.model.fields import Setting, inputs_of
 from mc_engine.model.simulator import System
 from mc_engine.sampling.designs import RANDOM
 from mc_engine.suggestions import hint, listed

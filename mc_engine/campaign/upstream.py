@@ -18,11 +18,11 @@ import numpy as np
 import pyarrow as pa
 
 from mc_engine.campaign.columns import input_column
-from mc_engine.campaign.inputs import inputs_of
 from mc_engine.campaign.reading import Findings
 from mc_engine.campaign.sections import InputsSection
 from mc_engine.durable_file import read_file
 from mc_engine.errors import StoreError
+from mc_engine.model.fields import inputs_of
 from mc_engine.model.simulator import System
 from mc_engine.sampling.distributions import Scalar
 from mc_engine.shell_words import shell_word
@@ -183,21 +183,17 @@ def link(rows: Rows, section: InputsSection, model: System, own_columns: Iterabl
         nominal[name] = float(convert(float(rows.nominal[column]), unit, item.unit))
     kept = [input_column(inputs[name]) for name in links]
     names: dict[str, str] = {}
-    used = {*own_columns, *_OURS, *inputs}
+    used, prefix = {*own_columns, *_OURS, *inputs}, re.sub(r"\W+", "_", rows.facts["name"])
     for column_ in rows.columns:
         if column_.name == "case_id" or links.get(column_.name) == column_.name:
             continue
-        name = column_.name if column_.name not in used else f"{_identifier(rows.facts['name'])}_{column_.name}"
+        name = column_.name if column_.name not in used else f"{prefix}_{column_.name}"
         role = "dispersion" if column_.role == "dispersion" else "upstream"
         description = f"{rows.facts['name']}: {column_.description}"
         names[column_.name] = name
         kept.append(Column(name, column_.unit, role, description, column_.kind))
         table[name] = rows.table[column_.name]
     return Upstream(rows, links, tuple(kept), names, table, nominal, failed)
-
-
-def _identifier(name: str) -> str:
-    return re.sub(r"\W+", "_", name)
 
 
 def _links(upstream: Mapping[str, Column], section: InputsSection, model: System, findings: Findings) -> dict[str, str]:

@@ -1,8 +1,11 @@
 """The commands before a flight: init, check, plan, sample, list, schema, units."""
 
 import json
+import os
 import shutil
-from contextlib import nullcontext
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -20,6 +23,7 @@ from mc_engine.command_line.app import (
     new_file,
 )
 from mc_engine.numbers_in_text import LEAST_SHARE
+from mc_engine.safe_path import safe_environment
 from mc_engine.shell_words import shell_word
 
 if TYPE_CHECKING:
@@ -33,7 +37,7 @@ def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where the new campaign is to be.", parser=new_file)],
 ) -> None:
     """Copy the smallest campaign, a model and its file, to DIR as a start for your own."""
-    from mc_engine.campaign.loading import SHIPPED
+    from mc_engine.campaign.search import SHIPPED
 
     names = ("campaign.toml", "model.py")
     for name in names:
@@ -63,9 +67,7 @@ def check(
     A few cases are flown in a process of their own: results must be there and be independent of the other cases in the
     batch, and every declared dispersion, metric and event must matter.
     """
-    from mc_engine.flight.contract import flights_beside
-
-    with flights_beside(file) if model else nullcontext() as process:
+    with _flights_beside(file) if model else nullcontext() as process:
         campaign, flyer, problems = _checked(file, process)
     if problems:
         heading = f"{campaign.model_reference}: {counted(problems, 'problem')}"
@@ -77,6 +79,24 @@ def check(
     )
     for line in flyer.remarks() if model else []:
         typer.echo(line)
+
+
+@contextmanager
+def _flights_beside(file: str) -> "Iterator[Process]":
+    """A process of its own, which the model may kill or hang: it loads a campaign and waits to fly a few cases.
+
+    file : as the user named it.  The process loads what `check` loads meanwhile, and is killed at the end.
+    """
+    import subprocess
+
+    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, "--wait"]
+    other = {"PYTHONHASHSEED": "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0", "TZ": "UTC-14"}
+    pipe, environment = subprocess.PIPE, {**safe_environment(), **other}
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=environment) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def _checked(file: str, process: "Process | None") -> "tuple[Campaign, Flyer, list[str]]":
@@ -187,7 +207,7 @@ def list_() -> None:
 @exit_status()
 def schema() -> None:
     """The JSON schema of campaign files, for an editor."""
-    from mc_engine.campaign.loading import schema as campaign_schema
+    from mc_engine.campaign.sections import schema as campaign_schema
 
     typer.echo(json.dumps(campaign_schema(), indent=2, ensure_ascii=False))
 

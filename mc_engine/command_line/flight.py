@@ -186,9 +186,7 @@ def _with_progress(
     with Progress() as progress, publisher or nullcontext():
         if not progress.stream.isatty():
             echo_preparation(system)
-        store = fly(runner, progress)
-    raise_if_signalled()  # by a signal after the last case, which has stopped nothing
-    return store
+        return fly(runner, progress)
 
 
 def finish(
@@ -209,7 +207,10 @@ def finish(
         verdict_line,
     )
 
-    if store.manifest.get("shard"):
+    shard = store.manifest.get("shard")
+    if url is not None or not (no_report or shard):
+        raise_if_signalled()  # by a signal that came too late to stop the flight: it stops what is left to do
+    if shard:
         if url is not None:
             echo_publication(store.path, url)
         _finish_shard(store, max_failed)

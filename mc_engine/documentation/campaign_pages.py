@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mc_engine.campaign.loading import SHIPPED, ShippedCampaign, list_campaigns
+from mc_engine.campaign.search import SHIPPED, ShippedCampaign, list_campaigns
 from mc_engine.documentation.markdown_text import code, escaped, table
 from mc_engine.model import AdaptiveStep, Event, Model, Named, Parameter, Setting, load_model
 from mc_engine.status import STATUS_NAME, STATUS_TEXT

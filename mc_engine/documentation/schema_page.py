@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from mc_engine.campaign.loading import schema
+from mc_engine.campaign.sections import schema
 from mc_engine.documentation.markdown_text import code, escaped, table
 
 _HEAD = """# Keys of a campaign file

@@ -24,7 +24,7 @@ import numpy as np
 
 from mc_engine.errors import EngineError, StoreError
 from mc_engine.flight.flyer import NOMINAL_NOISE
-from mc_engine.flight.program_flight import Flown, ProgramFlight, flown
+from mc_engine.flight.program_flight import Flown, ProgramFlight, flown, in_time
 from mc_engine.model.faults import fault_of
 from mc_engine.model.simulator import Refuse, Simulator, load_simulator
 from mc_engine.process_tree import adopt_orphans, die_with_parent, end_children, own_children
@@ -291,7 +291,7 @@ def _history(simulator: Simulator, table: Any) -> dict[str, np.ndarray]:
             raise ValueError(f'the column "{name}" of the history is no numbers') from None
     if len(counts := {np.size(column): None for column in columns.values()}) > 1:
         raise ValueError(f"columns of the history have {' and '.join(map(str, counts))} rows")
-    return columns
+    return in_time(columns)
 
 
 def folder_name(noise: int) -> str:

@@ -17,6 +17,7 @@ from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.sensitivity_design import noise_ids, upstream_ids
 from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer, never
 from mc_engine.flight.flyers import flyer_of
+from mc_engine.interruption import in_threads
 from mc_engine.model.faults import naming_faults
 from mc_engine.sampling.distributions import column
 from mc_engine.status import OK, STATUS_NAME
@@ -172,8 +173,6 @@ def fly_in_threads(
     inputs : the dispersed columns.  noise : int64[n], what addresses the noise of each case.
     flyer : if another one than the campaign's own.
     """
-    from joblib import Parallel, delayed
-
     flyer = flyer or flyer_of(campaign)
 
     def fly_rows(rows: slice) -> Columns:
@@ -187,7 +186,7 @@ def fly_in_threads(
     pieces = [slice(first, first + size) for first in range(0, len(noise), size)]
     if len(pieces) == 1:
         return fly_rows(pieces[0])
-    tables: Any = Parallel(n_jobs=workers, backend="threading")(delayed(fly_rows)(piece) for piece in pieces)
+    tables = in_threads(fly_rows, pieces, workers)
     return {name: np.concatenate([columns[name] for columns in tables]) for name in wanted}
 
 

@@ -41,11 +41,8 @@ class CompiledFlyer(Flyer):
             self._model, inputs, noise, self._seed, folder=self._folder, width=self._width, build=self._build
         )
 
-    def histories(
-        self, inputs: Inputs, noise: np.ndarray, rows: int, alone: bool = False
-    ) -> Iterator[tuple[Columns, Columns]]:
-        width = 1 if alone else None
-        return flight.fly_histories(self._model, inputs, noise, self._seed, folder=self._folder, width=width, rows=rows)
+    def histories(self, inputs: Inputs, noise: np.ndarray, rows: int) -> Iterator[tuple[Columns, Columns]]:
+        return flight.fly_histories(self._model, inputs, noise, self._seed, folder=self._folder, rows=rows)
 
     def digest(self) -> str:
         return source_digest(self._model, self._folder)

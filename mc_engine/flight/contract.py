@@ -5,12 +5,8 @@
 """
 
 import json
-import os
 import subprocess
-import sys
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,7 +16,6 @@ from mc_engine.model.faults import MORE
 from mc_engine.model.reading import is_shipped, source_faults
 from mc_engine.model.record import compiled_model
 from mc_engine.model.trial import run_through
-from mc_engine.safe_path import safe_environment
 
 if TYPE_CHECKING:
     from mc_engine.campaign.loading import Campaign
@@ -41,7 +36,7 @@ def refuse_breaches(campaign: "Campaign") -> None:
 
 
 def _trial_faults(campaign: "Campaign") -> list[str]:
-    from mc_engine.flight.repeatability import nominal_inputs  # later than the process of `flights_beside`
+    from mc_engine.flight.repeatability import nominal_inputs
 
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -53,24 +48,8 @@ def _trial_faults(campaign: "Campaign") -> list[str]:
     return []
 
 
-@contextmanager
-def flights_beside(file: str) -> Iterator["subprocess.Popen[str]"]:
-    """A process of its own, which the model may kill or hang: it loads a campaign and waits to fly a few cases.
-
-    file : as the user named it.  The process loads what `check` loads meanwhile, and is killed at the end.
-    """
-    command = [sys.executable, "-m", "mc_engine.flight.contract_flight", file, "--wait"]
-    other = {"PYTHONHASHSEED": "1" if os.environ.get("PYTHONHASHSEED") == "0" else "0", "TZ": "UTC-14"}
-    pipe, environment = subprocess.PIPE, {**safe_environment(), **other}
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, text=True, env=environment) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
 def flight_faults(campaign: "Campaign", process: "subprocess.Popen[str]") -> list[str]:
-    """What `mc_engine.flight.contract_flight` finds in the process of `flights_beside`."""
+    """What `process`, one of `mc_engine.flight.contract_flight` that waits, finds in flights of a few cases."""
     from mc_engine.flight.repeatability import model_digests
 
     try:

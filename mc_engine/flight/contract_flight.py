@@ -20,8 +20,8 @@ from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
-from mc_engine.flight.chunks import NOMINAL_NOISE
 from mc_engine.flight.flight import fly, grid_of
+from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.flight.kernel_parts import watching_events
 from mc_engine.flight.lost_numbers import first_lost
 from mc_engine.flight.repeatability import influences, model_digests, nominal_inputs, note_environment

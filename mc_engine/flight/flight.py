@@ -20,7 +20,6 @@ from mc_engine.model.preparation import Inputs, Prepared, prepare
 from mc_engine.model.record import Model, Refusals
 from mc_engine.model.trial import refuse_unfit
 from mc_engine.status import OK, REFUSED, STATUS_NAME
-from mc_engine.store.histories import PHASE_COLUMN, rows_to_keep
 
 if TYPE_CHECKING:
     from mc_engine.flight.interpreted import InterpretedFlight
@@ -251,6 +250,8 @@ def fly_histories(
     history : t_s and the model's outputs in declared units; empty if the case was refused.  Of a time with two rows
         the first is before an event or a sample of the control, the second after it.
     """
+    from mc_engine.store.histories import PHASE_COLUMN, rows_to_keep  # what `check` flies has no history
+
     width = width or usual_width(model)
     ready = prepare(model, inputs, len(case_ids))
     names = ["t_s", *(quantity.name for quantity in model.quantities), *([PHASE_COLUMN] if model.phases else [])]

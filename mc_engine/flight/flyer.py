@@ -63,13 +63,10 @@ class Flyer(ABC):
         """
 
     @abstractmethod
-    def histories(
-        self, inputs: Inputs, noise: np.ndarray, rows: int, alone: bool = False
-    ) -> Iterator[tuple[Columns, Columns]]:
+    def histories(self, inputs: Inputs, noise: np.ndarray, rows: int) -> Iterator[tuple[Columns, Columns]]:
         """(results, history) of each case, flown by itself when it is asked for.
 
         history : t_s and the outputs, about `rows` rows, none of a refused case.
-        alone : by the build for one case, where there are several.
         """
 
     @abstractmethod
@@ -88,7 +85,7 @@ class Flyer(ABC):
     def faults_in_flight(self, process: Process) -> list[str]:
         """Sentences on what flights of a few cases show.
 
-        process : has loaded the campaign and waits to fly, see `mc_engine.flight.contract.flights_beside`.
+        process : one of `mc_engine.flight.contract_flight`, which has loaded the campaign and waits to fly.
         """
 
     def remarks(self) -> list[str]:

@@ -47,7 +47,7 @@ class InterpretedFlight:
         self.t = 0.0
         self._names: dict[str, dict[str, Any]] = {}
         self._has_powers = has_powers(getattr(model, name) for name in PHYSICS)
-        functions = functions_of(model, self)
+        self._unwatched = functions = functions_of(model, self)
         self._functions = functions._replace(**{name: self._called(name, getattr(functions, name)) for name in PHYSICS})
         self.model, self._settings = model, settings_class(model)
         self._picks = second_order_of(model, self) if uses_rates(model.clock) else ()
@@ -101,6 +101,7 @@ class InterpretedFlight:
                 elif name in _INTRINSICS:
                     names[name] = _INTRINSICS[name]
             names |= {"total": self.total, "map_fields": self.map_fields, "record": self.record}
+            names["unset"] = self.unset
         return self._names[module]
 
     def total(self, fields: Sequence[Number]) -> Number:
@@ -121,6 +122,10 @@ class InterpretedFlight:
         if getattr(function, "__name__", "") == "is_lost":
             self.origin = next((row[1].origin for row, lost in zip(rows, results, strict=True) if lost), self.origin)
         return _record(type(first), results)
+
+    def unset(self, function: Callable[..., Any], f: Any, *arguments: Any) -> Any:
+        """A result of function(f, *arguments), of which the loops use the fields alone: no call of the flight."""
+        return function(self._unwatched, *arguments)
 
     def counted(self, what: str, count: int) -> Callable[[Any], Any]:
         def hand_on(fields: Any) -> Any:

@@ -190,7 +190,18 @@ class ProgramFlight:
         if missing := [name for name in wanted[1:] if name not in names]:
             raise ValueError(f'{self._program.history} has no column "{missing[0]}"')
         places = [0, *(names.index(name) for name in wanted[1:])]  # the first column is the time, whatever its name
-        return {name: table[:, place] for name, place in zip(wanted, places, strict=True)}
+        return in_time({name: table[:, place] for name, place in zip(wanted, places, strict=True)})
+
+
+def in_time(history: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The history as it is; ValueError with a sentence unless its times are numbers that never fall."""
+    times = history["t_s"]
+    if not np.isfinite(times).all():
+        raise ValueError("a time of the history is not a number")
+    if (falls := np.flatnonzero(np.diff(times) < 0.0)).size:
+        before, after = times[falls[0]], times[falls[0] + 1]
+        raise ValueError(f"the times of the history fall from {before:.10g} s to {after:.10g} s")
+    return history
 
 
 def last_lines(stderr: bytes, count: int = 3) -> str:

@@ -67,9 +67,7 @@ class SimulatorFlyer(Flyer):
             refusals.add(~((column >= item.low) & (column <= item.high)), outside)
         return list(refusals.reason)
 
-    def histories(
-        self, inputs: Inputs, noise: np.ndarray, rows: int, alone: bool = False
-    ) -> Iterator[tuple[Columns, Columns]]:
+    def histories(self, inputs: Inputs, noise: np.ndarray, rows: int) -> Iterator[tuple[Columns, Columns]]:
         columns = {name: np.broadcast_to(np.asarray(value), len(noise)) for name, value in inputs.items()}
         for case in range(len(noise)):
             yield self._history({name: column[[case]] for name, column in columns.items()}, noise[[case]], rows)
@@ -141,7 +139,8 @@ class SimulatorFlyer(Flyer):
         workers = min(cores, self.most_workers or cores)
         whole = seconds * self._campaign.cases / workers
         takes = f"{whole / 3600.0:.2g} hours" if whole > _FEW_MINUTES else f"{whole:.2g} s"
-        lines.append(f"{seconds:.3g} s a case, {takes} for {self._campaign.cases:,} cases on {workers} workers")
+        who = f"{workers} worker{'s' * (workers > 1)}"
+        lines.append(f"{seconds:.3g} s a case, {takes} for {self._campaign.cases:,} cases on {who}")
         return lines
 
     @staticmethod

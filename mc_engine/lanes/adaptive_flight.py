@@ -47,6 +47,7 @@ from mc_engine.lanes.tuples import (
     select,
     spread,
     total,
+    unset,
 )
 from mc_engine.status import NO_STOP, NOT_FINITE, STEP_LIMIT
 
@@ -156,17 +157,24 @@ def _begin(f, p, o, key, case):
 begin = compile_inline(_begin)
 
 
-def _first_instant(f, clock, case, s, m, p, o, atol):
-    """(first instant, first length) of every lane."""
+def _departure(f, p, o, key, case):
+    """The first `Instant` of every lane; for its type alone, see `unset`."""
+    s, m = begin(f, p, o, key, case)
     t = case * 0.0
-    k = spread(f.rhs(t, s, m, p, o), t)
+    return arrive(f, t, s, m, p, o, t)
+
+
+departure = compile_inline(_departure)
+
+
+def _length(f, clock, t, s, m, k, p, o, atol):
+    """Length [s] of the first attempt of every lane.  k : derivative of the state."""
     longest = minimum(clock.until, clock.period)
     h = first_length(f, t, s, k, m, p, o, atol, clock.rtol, clock.order, longest + t)
-    h = where(clock.first + t > 0.0, clock.first + t, h)
-    return sense(f, t, s, m, k, p, o, _REACH * h), h
+    return where(clock.first + t > 0.0, clock.first + t, h)
 
 
-first = compile_inline(_first_instant)
+length_at_start = compile_inline(_length)
 
 
 def _metrics_at_end(f, here, best, when, p, o):
@@ -187,14 +195,13 @@ def _noted(f, here, fired, noting, p, o):
 noted = compile_inline(_noted)
 
 
-def _changed(f, key, case, sample, here, fired, switching, sampling, p, o, reach):
-    """The instant after what the model does at it: `switch` on events, `control` at samples."""
+def _changed(f, key, case, sample, here, fired, switching, sampling, p, o):
+    """(state, memory) after what the model does at an instant: `switch` on events, `control` at samples."""
     t = here.t
     like = spread(f.events(t, here.s, here.m, p, o), t)
     state, memory = f.switch(t, here.s, here.m, p, o, first_fields(map_fields(_fired_flag, fired, t), like))
     s, m = select(switching, spread(state, t), here.s), select(switching, spread(memory, t), here.m)
-    m = select(sampling, spread(f.control(t, s, m, p, o, Draws(key, case, sample)), t), m)
-    return arrive(f, t, s, m, p, o, reach)
+    return s, select(sampling, spread(f.control(t, s, m, p, o, Draws(key, case, sample)), t), m)
 
 
 changed = compile_inline(_changed)
@@ -235,20 +242,37 @@ def _fly(
     o = load_scalars(setting_class, settings)
     p, case = load_fields(parameter_class, parameters, 0, width), load(cases, 0, width)
     waiting = width
-    s, m = begin(f, p, o, key, case)
-    atol = scalars_like(s, atol)
-    here, h = first(f, clock, case, s, m, p, o, atol)
+    here = unset(departure, f, p, o, key, case)
+    atol = scalars_like(here.s, atol)
     kinds, signs = f.kinds_of(here.values), f.signs_of(here.values)
     zero = case * 0.0
+    new, altered = zero == zero, zero > 0.0  # lanes that begin a case, lanes that the model has changed
     active, status, attempts, sample, limit = zero + 1.0, zero, zero, zero + 1.0, zero + _NEVER
-    last_ideal = zero + _NONE  # of the step before this one: there is none
+    h, last_ideal = zero, zero + _NONE  # of the step before this one: there is none
     closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
     bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
     best, when = here.values, map_fields(first_time, here.values, zero)
     rows, due = 0, 0.0
-    if history.shape[0] > 0:
-        rows = record_row(f, history, rows, here.t, here.s, here.m, p, o)
     while True:
+        if any_lane(new | altered):
+            if any_lane(new):
+                s, m = begin(f, p, o, key, case)
+                t, s, m = where(new, 0.0, here.t), select(new, s, here.s), select(new, m, here.m)
+                here = Instant(t, s, m, here.k, here.senses, here.rates, here.values)
+                status, attempts = where(new, 0.0, status), where(new, 0.0, attempts)
+                sample, limit = where(new, 1.0, sample), where(new, _NEVER, limit)
+                last_ideal = where(new, _NONE, last_ideal)
+                closing = closing & (not new)
+                if history.shape[0] > 0 and rows == 0:
+                    rows = record_row(f, history, rows, t, s, m, p, o)
+            k = spread(f.rhs(here.t, here.s, here.m, p, o), zero)
+            if any_lane(new):
+                h = where(new, length_at_start(f, clock, zero, here.s, here.m, k, p, o, atol), h)
+            start = sense(f, here.t, here.s, here.m, k, p, o, _REACH * h)
+            here = select(new | altered, start, here)
+            best = map_fields(best_value, kinds, best, here.values, altered)
+            best = select(new, here.values, best)
+            when = select(new, map_fields(first_time, here.values, zero), when)
         flying = active > 0.5
         target = minimum(clock.until + zero, sample * clock.period)
         room = target - here.t
@@ -317,13 +341,14 @@ def _fly(
             here = Instant(here.t, here.s, m, here.k, here.senses, here.rates, here.values)
         sampling = arrived & (not ended) & (here.t >= sample * clock.period)
         switching = closed & (not ended) & f.switches_of(fired)
-        if any_lane(sampling | switching):
-            after = changed(f, key, case, sample, here, fired, switching, sampling, p, o, _REACH * h)
-            here = select(sampling | switching, after, here)
-            best = map_fields(best_value, kinds, best, here.values, sampling | switching)
+        altered = sampling | switching
+        if any_lane(altered):
+            s, m = changed(f, key, case, sample, here, fired, switching, sampling, p, o)
+            here = Instant(here.t, s, m, here.k, here.senses, here.rates, here.values)
             sample = where(sampling, sample + 1.0, sample)
-            last_ideal = where(sampling | switching, _NONE, last_ideal)
+            last_ideal = where(altered, _NONE, last_ideal)
         done = ended | stuck | capped
+        new = flying & (not flying)
         if (recorded and lane_holds(closed | sampling, 0)) or (history.shape[0] > 0 and lane_holds(done, 0)):
             is_event = lane_holds(closed, 0)
             rows = record_change(f, history, rows, is_event, here.t, here.s, here.m, p, o)
@@ -348,16 +373,6 @@ def _fly(
             if not any_lane(active > 0.5):
                 break
             new = fresh > 0.5
-            if any_lane(new):
-                s, m = begin(f, p, o, key, case)
-                start, length = first(f, clock, case, s, m, p, o, atol)
-                here, h = select(new, start, here), where(new, length, h)
-                best = select(new, start.values, best)
-                when = select(new, map_fields(first_time, start.values, zero), when)
-                status, attempts = where(new, 0.0, status), where(new, 0.0, attempts)
-                sample, limit = where(new, 1.0, sample), where(new, _NEVER, limit)
-                last_ideal = where(new, _NONE, last_ideal)
-                closing = closing & (not new)
     return rows
 
 

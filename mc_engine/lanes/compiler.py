@@ -1,6 +1,8 @@
 """Compiler flags and decorators: the only module that sets options of numba."""
 
-from collections.abc import Callable
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from numba import config, njit, types
@@ -61,9 +63,23 @@ class KernelCompilation:
     def library(self, form: Form) -> tuple[str, Any]:
         """(name of the kernel in its library, library) for arguments of a form."""
         self.dispatcher._compilation_chain_init_hook()
-        with global_compiler_lock:
+        with global_compiler_lock, _without_garbage_collection():
             compiled = self.dispatcher._compiler.compile(tuple(_type(word) for word in form), None)
         return compiled.fndesc.llvm_func_name, compiled.library
+
+
+@contextmanager
+def _without_garbage_collection() -> Iterator[None]:
+    """numba makes objects by the million and keeps most: the search for garbage among them takes up to a tenth longer.
+
+    A compilation holds some tens of megabytes more."""
+    was_on = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_on:
+            gc.enable()
 
 
 def compile_kernel(function: Callable[..., Any]) -> KernelCompilation:

@@ -117,6 +117,17 @@ def map_fields(typingctx, function, *args):
 
 
 @intrinsic
+def unset(typingctx, function, *args):
+    """Zeros in place of what function(*args) gives, for a variable that a loop sets before it is read."""
+    result = function.get_call_type(typingctx, args, {}).return_type
+
+    def codegen(context, builder, sig, values):
+        return ir.Constant(context.get_value_type(result), None)
+
+    return result(function, types.StarArgTuple.from_types(args)), codegen
+
+
+@intrinsic
 def joined(typingctx, *tuples):
     """One plain tuple of the fields of all tuples."""
     result = _tuple_type([field for fields in tuples for field in fields])

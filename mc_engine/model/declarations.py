@@ -37,17 +37,28 @@ class Metric:
     sometimes: bool = field(default=False, kw_only=True)
     unit: str = field(default=OF_NAME, kw_only=True)
 
+    def meaning(self, output: str) -> str:
+        """The metric in words, of the description of its output: "largest speed", "time of the smallest altitude"."""
+        if self.event:
+            return f"{output} at the event {self.event}"
+        if self.extremum is None:
+            return f"{output} at the end"
+        if self.extremum.kind == "last_above":
+            return f"last time of the {output} above its level"
+        extreme = f"{'largest' if self.extremum.kind == 'max' else 'smallest'} {output}"
+        return extreme if self.source == "value" else f"time of the {extreme}"
+
     def as_field(self, name: str) -> Field:
         """The metric's column."""
         low, high, sometimes = self.low, self.high, self.sometimes
         return Field(self.description, low=low, high=high, sometimes=sometimes, name=name, unit=self.unit)
 
 
-def maximum_of(output: str, description: str, *, smooth: bool = True, **options: Any) -> Metric:
+def maximum_of(output: str, description: str = "", *, smooth: bool = True, **options: Any) -> Metric:
     """The largest value of an output along the flight: metrics(top_speed_m_s=maximum_of("speed_m_s", "top speed")).
 
     output : str, the name of an output
-    description : str, one line
+    description : str, one line; by default in the words of the output
     smooth : bool, between steps the extremum is that of a parabola; an output with corners is taken at the steps
     options : low, high, sometimes, unit; see `Field`
 
@@ -60,7 +71,7 @@ def maximum_of(output: str, description: str, *, smooth: bool = True, **options:
     return _extreme("max", "value", output, description, smooth, options)
 
 
-def minimum_of(output: str, description: str, *, smooth: bool = True, **options: Any) -> Metric:
+def minimum_of(output: str, description: str = "", *, smooth: bool = True, **options: Any) -> Metric:
     """The smallest value of an output along the flight.
 
     output, description, smooth, options : as of `maximum_of`
@@ -74,7 +85,7 @@ def minimum_of(output: str, description: str, *, smooth: bool = True, **options:
     return _extreme("min", "value", output, description, smooth, options)
 
 
-def time_of_maximum(output: str, description: str, *, smooth: bool = True, **options: Any) -> Metric:
+def time_of_maximum(output: str, description: str = "", *, smooth: bool = True, **options: Any) -> Metric:
     """The time of the largest value of an output.
 
     output, description, smooth, options : as of `maximum_of`
@@ -88,7 +99,7 @@ def time_of_maximum(output: str, description: str, *, smooth: bool = True, **opt
     return _extreme("max", "time", output, description, smooth, options)
 
 
-def time_of_minimum(output: str, description: str, *, smooth: bool = True, **options: Any) -> Metric:
+def time_of_minimum(output: str, description: str = "", *, smooth: bool = True, **options: Any) -> Metric:
     """The time of the smallest value of an output.
 
     output, description, smooth, options : as of `maximum_of`
@@ -106,7 +117,7 @@ def _extreme(kind: str, source: str, output: str, description: str, smooth: bool
     return Metric(source, Extremum("", output, kind, smooth=smooth), "", description, **options)
 
 
-def last_above(output: str, level: float, description: str, **options: Any) -> Metric:
+def last_above(output: str, level: float, description: str = "", **options: Any) -> Metric:
     """The last time at which an output was above `level`.
 
     output, description, options : as of `maximum_of`
@@ -121,7 +132,7 @@ def last_above(output: str, level: float, description: str, **options: Any) -> M
     return Metric("time", Extremum("", output, "last_above", level), "", description, **options)
 
 
-def at_end(output: str, description: str, **options: Any) -> Metric:
+def at_end(output: str, description: str = "", **options: Any) -> Metric:
     """The value of an output, or of the time "t_s", at the end of the case.
 
     output, description, options : as of `maximum_of`
@@ -135,15 +146,15 @@ def at_end(output: str, description: str, **options: Any) -> Metric:
     return Metric("end", None, output, description, **options)
 
 
-def value_at(event: str, output: str, description: str, **options: Any) -> Metric:
+def value_at(event: str, output: str, description: str = "", **options: Any) -> Metric:
     """The value of an output where an event first crosses zero: value_at("apogee", "altitude_km", "altitude there").
 
     Of a delayed event, where it crosses, not where it acts.  In a case without the event it is not a number, which
     needs sometimes=True if it is so in all.
 
     event : str, the name of an event
-    output : str, the name of an output
-    description : str, one line
+    output : str, the name of an output; `time_of` is for the time
+    description : str, one line; by default in the words of the output and the event
     options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
@@ -156,11 +167,11 @@ def value_at(event: str, output: str, description: str, **options: Any) -> Metri
     return Metric("event", None, output, description, event=event, **options)
 
 
-def time_of(event: str, description: str, **options: Any) -> Metric:
+def time_of(event: str, description: str = "", **options: Any) -> Metric:
     """The time at which an event first crosses zero; see `value_at`.
 
     event : str, the name of an event
-    description : str, one line
+    description : str, one line; by default in the words of the output and the event
     options : low, high, sometimes, unit; see `Field`
 
     Returns the Metric, for `metrics`.
@@ -294,7 +305,7 @@ def unit_of(name: str) -> str:
     >>> unit_of("burn_dv_m_s"), unit_of("heat_load_mj_m2")
     ('m/s', 'MJ/m^2')
     """
-    known = [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
+    known = units_at_the_end(name)
     longest = max((unit_suffix(unit) for unit in known), key=len, default="")
     units = [unit for unit in known if unit_suffix(unit) == longest]
     if longest.startswith("_1_"):  # stage_1_s is a time of stage 1, or a rate
@@ -306,6 +317,11 @@ def unit_of(name: str) -> str:
     meant = _meant(name)
     ending = f'; did you mean "{meant}"?' if meant else ""
     raise ModelError(f'"{name}" ends in no unit{ending}; say unit="" for a plain number; `mc-engine units` lists all')
+
+
+def units_at_the_end(name: str) -> list[str]:
+    """Every unit that a column's name may end in."""
+    return [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
 
 
 def _meant(name: str) -> str:

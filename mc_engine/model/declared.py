@@ -87,7 +87,7 @@ def model(
     start : p, o; gives the first discrete state.  A model with phases, delayed events or metrics at events names its
         class in `memory`, too
     control : draws too; gives the next discrete state, at each sample, the first at t = 0
-    extrema : dict of extremes that `evaluate` finds in `best` and `when`, such as {"force": maximum_of("force_n", "")}.
+    extrema : dict of extremes that `evaluate` finds in `best` and `when`, such as {"force": maximum_of("force_n")}.
         Those of the metrics are there under the metrics' own names, without unit.
     prepare(inputs, settings, refusals) : dict, by the fields of `kernel_parameters`, of SI arrays or of numbers for all
         cases, such as {**vars(inputs), "burn_dv": dv}.  NumPy, for many cases at once: inputs and settings have an
@@ -147,7 +147,7 @@ def model(
         settings=tuple(item for item in inputs.declared if isinstance(item, Setting)),
         states=states.declared,
         quantities=outputs.declared,
-        metrics=metrics.declared,
+        metrics=_meant(metrics, outputs),
         clock=clock,
         kernel_parameters=kernel_parameters,
         initial=_called("initial", initial, kept),
@@ -224,8 +224,6 @@ def _memory(
             continue
         if metric.event not in events:
             raise ModelError(f'metric "{name}": there is no event "{metric.event}"{hint(metric.event, events)}')
-        if metric.output not in ("", *symbols):
-            raise ModelError(f'metric "{name}": there is no output "{metric.output}"{hint(metric.output, symbols)}')
         noted.append((metric.event, symbols.get(metric.output, "")))
     kept = Memory(memory, phases, events, noted)
     controls = any(phase.control for phase in phases.values())
@@ -288,6 +286,19 @@ def _starting(memory: Any) -> PhysicsFunction:
         return memory()
 
     return start
+
+
+def _meant(metrics: Any, outputs: Any) -> tuple[Field, ...]:
+    """The metrics; one that the engine computes and that has no description is described in the words of its output."""
+    words = {item.name: item.description for item in outputs.declared} | {_TIME.name: "time", "": "time"}
+    fields = []
+    for item in metrics.declared:
+        metric = metrics.computed.get(item.name)
+        if metric is not None and not item.description:
+            output = metric.extremum.quantity if metric.extremum else metric.output
+            item = replace(item, description=metric.meaning(words[output]))
+        fields.append(item)
+    return tuple(fields)
 
 
 def _extrema(metrics: Any, outputs: Any, named: Mapping[str, Metric]) -> tuple[tuple[Extremum, ...], dict[str, str]]:

@@ -20,6 +20,7 @@ from typing import Any
 from mc_engine.errors import EngineError, ModelError
 from mc_engine.lanes.number import Origin
 from mc_engine.suggestions import hint, nearest
+from mc_engine.units import UNITS, unit_suffix
 
 MORE = "; `mc-engine check` tells more"
 PHYSICS = (
@@ -76,13 +77,13 @@ def fault_of_trial(error: Exception) -> str:
     frame, line = frame_in_model(error)
     text = " ".join(str(error).split())
     if _OF_ARRAYS.search(text):
-        text = _EACH_CASE
+        text = f"{_of_math(frame, line) if isinstance(error, TypeError) else ''}{_EACH_CASE}"
     elif left_out := _LEFT_OUT.match(text):
         text = f"{left_out[1]}(...) leaves out {left_out[2]}; give every field that has no default"
     elif unknown := _UNKNOWN_FIELD.match(text):
         text = f'{unknown[1]}(...) has no field "{unknown[2]}"{_hint_of_field(error, unknown[1], unknown[2])}'
     elif not isinstance(error, EngineError):  # which says the fix itself
-        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}; {PHYSICS}"
+        text = f"{type(error).__name__}: {_ARRAY.sub('a number', text)}{_hint_of_attribute(error)}; {PHYSICS}"
     return f"{source_place(frame.f_code.co_filename, line) if frame else 'the model'}: {text}"
 
 
@@ -90,6 +91,30 @@ def _hint_of_field(error: Exception, record: str, field: str) -> str:
     frame, _ = frame_in_model(error)
     made = (frame.f_globals | frame.f_locals).get(record) if frame else None
     return hint(field, getattr(made, "_fields", ()))
+
+
+def _hint_of_attribute(error: Exception) -> str:
+    """What an unknown field of a record was meant to be: that of a column, which physics has without its unit."""
+    if not isinstance(error, AttributeError) or not hasattr(error.obj, "_fields"):
+        return ""
+    name, known = str(error.name), error.obj._fields
+    units = {unit_suffix(unit) for unit in UNITS if unit}
+    symbol = next((symbol for symbol in known if name.startswith(symbol) and name.removeprefix(symbol) in units), "")
+    return f'; a column\'s name is without its unit in physics, "{symbol}"' if symbol else hint(name, known)
+
+
+def _of_math(frame: FrameType | None, line: int) -> str:
+    """What is wrong with a line that calls a function of Python's `math`; "" for other lines."""
+    from mc_engine import lanes  # which loads the compiler
+
+    if frame is None:
+        return ""
+    for module, name in re.findall(r"(math\.)?\b(\w+)\(", linecache.getline(frame.f_code.co_filename, line)):
+        function = getattr(math, name, None)
+        if function and (module or frame.f_globals.get(name) is function):
+            fix = "import it from mc_engine.lanes" if name in lanes.__all__ else "mc_engine.lanes has no such function"
+            return f"`{name}` of Python's math takes a single number; {fix}; "
+    return ""
 
 
 def source_place(file: str, line: int) -> str:

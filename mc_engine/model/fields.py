@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
@@ -143,6 +144,11 @@ class Setting(Named):
         return float(value) * (1.0 if isinstance(self.default, bool) else self.si_factor)
 
 
+def inputs_of(system: Any) -> dict[str, Parameter | Setting]:
+    """All parameters and settings of a model or simulator, by name."""
+    return {item.name: item for item in (*system.parameters, *system.settings)}
+
+
 @dataclass(frozen=True)
 class Extremum:
     """The largest or smallest value of one output along the flight, and its time.
@@ -264,12 +270,18 @@ def uses_rates(clock: FixedStep | AdaptiveStep) -> bool:
 _WORDS = {str: "a text", bool: "True or False", float: "a number", int: "a number", NoneType: "None"}
 
 
+@cache
+def _declared_types(kind: type) -> dict[str, Any]:
+    """The declared type of each field of a dataclass, by name."""
+    return get_type_hints(kind)
+
+
 def refuse_other_types(record: Any, what: str) -> None:
     """ModelError if a field of `record`, a dataclass, is of another type than its class declares.
 
     what : the beginning of the sentence, such as 'event "apogee"'.
     """
-    for name, kind in get_type_hints(type(record)).items():
+    for name, kind in _declared_types(record.__class__).items():
         value = getattr(record, name)
         if not _is_of(value, kind):
             raise ModelError(f"{what} has {value!r} as its `{name}`; it must be {_words(kind)}")

@@ -54,11 +54,6 @@ def _flag(number, wanted):
 
 
 @physics
-def _either(flag, other):
-    return where(other > 0.5, 1.0, flag)
-
-
-@physics
 def _due(due, crossing, acted, t, after):
     """Time at which the action is due; a crossing while it is being waited for changes nothing."""
     due = where(acted > 0.5, _NEVER, due)
@@ -241,7 +236,7 @@ class Memory:
         hit = steps.add(ComposedFunction([], record_class("Hit", [*acted]), whole(range(len(acted)))), *acted.values())
         any_acted = next(iter(acted.values()))
         for pick in acted.values():
-            any_acted = steps.add(_either, any_acted, pick)
+            any_acted = steps.add(_moved, any_acted, pick, ("constant", 1.0, ""))
         before: list[Call] = [(self._only_own(), whole([_MEMORY]))] if self._own_fields else []
         kept = ComposedFunction(before, tuple, [("argument", _STATE, ""), *([("result", 0, "")] if before else [])])
         return steps.add(Alternatives(("argument", 6, ""), (kept, called)), *arguments, hit, any_acted)

@@ -19,13 +19,14 @@ from typing import Any, Literal, NamedTuple
 from pydantic import Field as Key
 
 from mc_engine.errors import ModelError
+from mc_engine.model.declarations import units_at_the_end
 from mc_engine.model.fields import Field, Parameter
 from mc_engine.model.files import FileFault, resolve_beside
 from mc_engine.model.simulator import LARGEST_MIB, LONGEST_S, Simulator
 from mc_engine.model.sources import Sources
 from mc_engine.section import Section
 from mc_engine.suggestions import hint
-from mc_engine.units import UNITS, unit_suffix
+from mc_engine.units import unit_suffix
 
 PLACES = ("folder", "case_id", "seed")  # that a command may name in braces
 JSON_INPUT = "json"
@@ -123,8 +124,11 @@ def program_simulator(section: SimulatorSection, directory: Path, problems: Prob
     for name in section.files:
         add_file(name, "files", directory, contents, problems)
     reads = {name: _reading(name, metric, section, problems) for name, metric in section.metric.items()}
-    for key in ("result", "history", *section.input):
-        _check_file_name(key, getattr(section, key, None) or key, problems)
+    inside = {"result": section.result, "history": section.history, **{f"input.{name}": name for name in section.input}}
+    for key, named in inside.items():
+        file = named or ""
+        if os.path.isabs(file) or os.path.normpath(file).startswith("..") or "\0" in file:
+            problems.append((key, f'"{file}" lies outside the folder of the case; name a file in it'))
     if section.result is not None and not section.result.endswith((".json", ".csv")):
         problems.append(("result", f'"{section.result}" ends in neither .json nor .csv'))
     if section.echo is not None and not (section.result or "").endswith(".json"):
@@ -161,7 +165,10 @@ def described_simulator(
         return Simulator(
             title=section.title or f"The {'FMU' if 'fmu' in flies else 'program'} {name}",
             name=name,
-            parameters=tuple(_parameter(name, one) for name, one in section.parameter.items()),
+            parameters=tuple(
+                Parameter(one.default, one.description or name, **_named(name, one))
+                for name, one in section.parameter.items()
+            ),
             metrics=tuple(_field(name, one, one.sometimes) for name, one in section.metric.items()),
             outputs=tuple(_field(name, one) for name, one in section.output.items()),
             time_limit_s=section.time_limit_s,
@@ -269,7 +276,10 @@ def _inputs(
         except TemplateSyntaxError as error:
             problems.append((key, f"{kind}, line {error.lineno}: {error.message}"))
             continue
-        for missing in sorted(meta.find_undeclared_variables(tree) - {*known}):
+        names = meta.TrackingCodeGenerator(tree.environment)
+        names.optimizer = None  # it would compute the constants of the template
+        names.visit(tree)
+        for missing in sorted(names.undeclared_identifiers - {*known}):
             problems.append((key, f'{kind}: "{missing}" is no input{hint(missing, known)}'))
         inputs[name] = text
     return inputs
@@ -308,28 +318,13 @@ def _reading(
     return None, metric.pattern
 
 
-def _check_file_name(key: str, name: str, problems: Problems) -> None:
-    if os.path.isabs(name) or os.path.normpath(name).startswith("..") or "\0" in name:
-        problems.append((key, f'"{name}" lies outside the folder of the case; name a file in it'))
-
-
-def _parameter(name: str, section: ParameterSection) -> Parameter:
-    low = -float("inf") if section.low is None else section.low
-    high = float("inf") if section.high is None else section.high
-    unit, meaning = _unit(name, section), section.description or name
-    return Parameter(section.default, meaning, low=low, high=high, name=name, unit=unit)
-
-
 def _field(name: str, section: NumberSection, sometimes: bool = False) -> Field:
-    low = -float("inf") if section.low is None else section.low
-    high = float("inf") if section.high is None else section.high
-    unit, meaning = _unit(name, section), section.description or name
-    return Field(meaning, sometimes=sometimes, low=low, high=high, name=name, unit=unit)
+    return Field(section.description or name, sometimes=sometimes, **_named(name, section))
 
 
-def _unit(name: str, section: NumberSection) -> str:
-    """The unit that a number declares, or that its name ends in; "" where it ends in none."""
-    if section.unit is not None:
-        return section.unit
-    ends = [unit for unit in UNITS if unit and name.endswith(unit_suffix(unit)) and name != unit_suffix(unit)]
-    return max(ends, key=lambda unit: len(unit_suffix(unit)), default="")
+def _named(name: str, section: NumberSection) -> dict[str, Any]:
+    """Range, name and unit of a number: the unit that it declares, or that its name ends in, if it ends in one."""
+    unit, ranged = section.unit, {key: getattr(section, key) for key in ("low", "high")}
+    if unit is None:
+        unit = max(units_at_the_end(name), key=lambda unit: len(unit_suffix(unit)), default="")
+    return {"name": name, "unit": unit} | {key: value for key, value in ranged.items() if value is not None}

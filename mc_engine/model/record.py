@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.machinery import ModuleSpec
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -32,6 +32,7 @@ from mc_engine.model.fields import (
     FixedStep,
     Parameter,
     Setting,
+    inputs_of,
 )
 from mc_engine.model.figures import Figure
 from mc_engine.model.files import FileFault, resolve_beside
@@ -40,6 +41,7 @@ from mc_engine.model.rules import refuse_contradictions
 from mc_engine.model.sources import Sources, sources_of_file, sources_of_module
 from mc_engine.model.syntax_tree import parse
 
+_Kind = TypeVar("_Kind", bound=Any)
 NoMemory = namedtuple("NoMemory", "unused")  # of a model without `start`
 
 
@@ -128,11 +130,7 @@ class Model:
 
     def input(self, name: str) -> Parameter | Setting:
         """The parameter or setting called `name`; KeyError if the model has none."""
-        items: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
-        for item in items:
-            if item.name == name:
-                return item
-        raise KeyError(name)
+        return inputs_of(self)[name]
 
 
 @dataclass
@@ -178,23 +176,27 @@ def load_model(reference: str, beside: Path | None = None) -> Model:
     >>> load_model("model.py").title
     'Apogee raised by one burn'
     """
-    sources = load_sources(reference, beside, "MODEL")
-    model = getattr(sources.module, "MODEL", None)
-    if not isinstance(model, Model):
-        raise ModelError(f'"{reference}" has no MODEL; end it with MODEL = model(...)')
+    return load_record(reference, beside, "MODEL", Model)
+
+
+def load_record(reference: str, beside: Path | None, name: str, kind: type[_Kind]) -> _Kind:
+    """The `name`, MODEL or SIMULATOR, of a module or file; ModelError where it is missing or broken."""
+    sources = _from_file(reference, beside) if reference.endswith(".py") else _from_module(reference, name)
+    record: Any = getattr(sources.module, name, None)
+    if not isinstance(record, kind):
+        raise ModelError(_without(reference, name))
     try:
-        curves = blocks_in(value for value in vars(model).values() if isinstance(value, PhysicsFunction))
-        sources = sources.with_data(model.data, [block.file for block in curves if block.file])
+        curves = blocks_in(value for value in vars(record).values() if isinstance(value, PhysicsFunction))
+        sources = sources.with_data(record.data, [block.file for block in curves if block.file])
     except ModelError as error:
         raise ModelError(f'"{reference}": {error}') from None
-    object.__setattr__(model, "reference", reference)
-    object.__setattr__(model, "sources", sources)
-    return model
+    object.__setattr__(record, "reference", reference)
+    object.__setattr__(record, "sources", sources)
+    return record
 
 
-def load_sources(reference: str, beside: Path | None, name: str) -> Sources:
-    """Import the module or file that defines `name`, MODEL or SIMULATOR; ModelError where it is missing or broken."""
-    return _from_file(reference, beside) if reference.endswith(".py") else _from_module(reference, name)
+def _without(reference: str, name: str) -> str:
+    return f'"{reference}" has no {name}; end it with {name} = {"model" if name == "MODEL" else "Simulator"}(...)'
 
 
 def compiled_model(system: Any) -> Model:
@@ -230,8 +232,7 @@ def _from_module(reference: str, name: str) -> Sources:
     if spec is None:
         raise ModelError(f'there is no module "{reference}"; a file beside the campaign ends in .py')
     if not _defines(spec, name):
-        example = "model" if name == "MODEL" else "Simulator"
-        raise ModelError(f'"{reference}" has no {name}; end it with {name} = {example}(...)')
+        raise ModelError(_without(reference, name))
     try:
         return sources_of_module(reference, Path(spec.origin or "").parent)
     except ModuleNotFoundError as error:

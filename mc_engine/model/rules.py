@@ -11,7 +11,6 @@ from mc_engine.model.fields import (
     DIRECTIONS,
     AdaptiveStep,
     Event,
-    Extremum,
     FixedStep,
     Named,
     Setting,
@@ -63,8 +62,12 @@ def refuse_contradictions(model: "Model") -> None:
     _refuse_twice("event", [item.name for item in model.event_list])
     for setting in model.settings:
         _refuse_choice(setting)
+    outputs = [output.name for output in model.quantities]
     for extremum in model.extrema:
-        _refuse_extremum(extremum, [output.name for output in model.quantities])
+        _refuse_word("extremum", extremum.name)
+        if extremum.quantity not in outputs:
+            near = hint(extremum.quantity, outputs)
+            raise ModelError(f'extremum "{extremum.name}": there is no output "{extremum.quantity}"{near}')
     if model.control is not None and model.start is None:
         raise ModelError("the model has `control`, but no `memory`; give memory=Memory, a named tuple with a default "
                          "for each field, or write start(p, o), which gives the first one")  # fmt: skip
@@ -135,13 +138,6 @@ def _refuse_word(what: str, name: str) -> None:
     if not name.isidentifier() or iskeyword(name) or name.startswith("_"):
         raise ModelError(f'the {what} "{name}" is no name for a number in Python; take letters, digits and "_", '
                          "begin with a letter, and leave out words such as lambda and class")  # fmt: skip
-
-
-def _refuse_extremum(extremum: Extremum, outputs: list[str]) -> None:
-    name = f'extremum "{extremum.name}"'
-    _refuse_word("extremum", extremum.name)
-    if extremum.quantity not in outputs:
-        raise ModelError(f'{name}: there is no output "{extremum.quantity}"{hint(extremum.quantity, outputs)}')
 
 
 def _refuse_event(event: Event, switches: bool) -> None:

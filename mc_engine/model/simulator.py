@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import ModelError
-from mc_engine.model.fields import Field, Parameter, Setting
+from mc_engine.model.fields import Field, Parameter, Setting, inputs_of
 from mc_engine.model.figures import Figure
-from mc_engine.model.record import Model, load_sources
+from mc_engine.model.record import Model, load_record
 from mc_engine.model.rules import refuse_false_simulator
 from mc_engine.model.sources import Sources
 
@@ -166,11 +166,7 @@ class Simulator:
 
     def input(self, name: str) -> Parameter | Setting:
         """The parameter or setting called `name`; KeyError if the simulator has none."""
-        every: tuple[Parameter | Setting, ...] = (*self.parameters, *self.settings)
-        for item in every:
-            if item.name == name:
-                return item
-        raise KeyError(name)
+        return inputs_of(self)[name]
 
 
 def _declared(name: str, what: str, made: Any) -> Any:
@@ -194,15 +190,6 @@ def load_simulator(reference: str, beside: Path | None = None) -> Simulator:
 
     Raises ModelError with one sentence where the module, the file or its SIMULATOR is missing or broken.
     """
-    sources = load_sources(reference, beside, "SIMULATOR")
-    simulator = getattr(sources.module, "SIMULATOR", None)
-    if not isinstance(simulator, Simulator):
-        raise ModelError(f'"{reference}" has no SIMULATOR; end it with SIMULATOR = Simulator(...)')
-    try:
-        sources = sources.with_data(simulator.data)
-    except ModelError as error:
-        raise ModelError(f'"{reference}": {error}') from None
-    name = simulator.name or Path(reference).stem.rpartition(".")[2]
-    for key, value in (("reference", reference), ("sources", sources), ("name", name)):
-        object.__setattr__(simulator, key, value)
+    simulator = load_record(reference, beside, "SIMULATOR", Simulator)
+    object.__setattr__(simulator, "name", simulator.name or Path(reference).stem.rpartition(".")[2])
     return simulator

@@ -75,7 +75,9 @@ def run_through(model: Model, p: Any, o: Any, seed: int = 0, *, finite: bool = F
 
     p : named tuple of arrays [FEW].  o : the settings.  finite : the start and its derivative must be finite, too.
     """
-    _refuse_other_tables(model, o)
+    if model.tables is not None and (o.tables.ndim != 1 or o.tables.size == 0 or np.isnan(o.tables).all()):
+        # which is not what NumPy makes of None
+        raise _breach(model.tables, "tables", f"an array of shape {o.tables.shape}", "float64[n], numbers in one row")
     with suppress(_ByZero):
         _run_through(model, p, o, seed, finite)
 
@@ -334,12 +336,6 @@ def _part_giving(function: Any, field: str) -> Callable[..., Any]:
     fields = getattr(getattr(function, "record", None), "_fields", ())
     source, index, _ = function.picks[fields.index(field)] if field in fields else ("", 0, "")
     return _part_giving(function.calls[index][0], field) if source == "result" else function
-
-
-def _refuse_other_tables(model: Model, o: Any) -> None:
-    """Breach unless the tables are numbers in one row, which is not what NumPy makes of None.  o : the settings."""
-    if model.tables is not None and (o.tables.ndim != 1 or o.tables.size == 0 or np.isnan(o.tables).all()):
-        raise _breach(model.tables, "tables", f"an array of shape {o.tables.shape}", "float64[n], numbers in one row")
 
 
 def _refuse_infinite(

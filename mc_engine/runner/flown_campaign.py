@@ -1,36 +1,40 @@
-"""The campaign of a run directory, as it was flown.  Used by resume, extend, replay, merge and worker processes."""
+"""The campaign of a run directory, as it was flown.  Used by resume, extend, replay, merge and worker processes.
+
+`refuse_undeclared_data`, which `check` calls, loads nothing of the store.
+"""
 
 import os
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from mc_engine.campaign.loading import Campaign, load_campaign
-from mc_engine.campaign.sensitivity_design import companion
-from mc_engine.campaign.upstream import COMPANION
 from mc_engine.durable_file import make_way, write_inside
 from mc_engine.errors import CampaignError, EngineError, ModelError, Problem, StoreError
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.model.record import Model, load_model, sources_of
 from mc_engine.model.simulator import Simulator, load_simulator
-from mc_engine.runner.manifest import columns_of, sampling_digest
-from mc_engine.sampling.designs import EXTENSIBLE
-from mc_engine.sampling.streams import SEED_CONTRACT
-from mc_engine.store.derived_files import FIGURES, REPLAYS
-from mc_engine.store.parts import CASE_COLUMNS, PART_FOLDERS
 from mc_engine.store.run_files import SENSITIVITY, SIMULATOR, readable
-from mc_engine.store.store import Store
 
-_OWN = (*PART_FOLDERS, SENSITIVITY, FIGURES, REPLAYS, SIMULATOR)  # folders of a run directory
+if TYPE_CHECKING:
+    from mc_engine.store.store import Store
 
 
-def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
+def campaign_of(store: "Store", directory: Path | None = None) -> Campaign:
     """The campaign of a run, with its present number of cases.
 
     directory : folder of the campaign's files, by default the run directory with its copies.
     StoreError if its results were imported, or if the model, the campaign or the engine's sources have changed since
     the run began.
     """
+    from mc_engine.campaign.sensitivity_design import companion
+    from mc_engine.campaign.upstream import COMPANION
+    from mc_engine.runner.manifest import columns_of, sampling_digest
+    from mc_engine.sampling.designs import EXTENSIBLE
+    from mc_engine.sampling.streams import SEED_CONTRACT
+    from mc_engine.store.parts import CASE_COLUMNS
+
     if imported := store.manifest.get("imported"):
         why = f"its results were imported from {imported['file']}; the engine did not fly them"
         raise StoreError(f"{store.path}: {why}")
@@ -63,6 +67,11 @@ def campaign_of(store: Store, directory: Path | None = None) -> Campaign:
 
 def companions_of(campaign: Campaign) -> dict[str, bytes]:
     """Contents by name of the files that the campaign reads from its own folder.  The run directory keeps copies."""
+    from mc_engine.campaign.upstream import COMPANION
+    from mc_engine.store.derived_files import FIGURES, REPLAYS
+    from mc_engine.store.parts import PART_FOLDERS
+
+    folders_of_a_run = (*PART_FOLDERS, SENSITIVITY, FIGURES, REPLAYS, SIMULATOR)
     empirical = [dispersion for dispersion in campaign.dispersions if dispersion.dist == "empirical"]
     files = {dispersion.spec["file"] for dispersion in empirical} | set(campaign.messages)
     base = campaign.directory.resolve()
@@ -74,7 +83,7 @@ def companions_of(campaign: Campaign) -> dict[str, bytes]:
         if name != readable(name):
             sentence = f"reads {name!a}, whose name is no text in UTF-8; give it another"
             raise CampaignError(campaign.name, [Problem("campaign.model", sentence)])
-        if name.split("/")[0] in _OWN:
+        if name.split("/")[0] in folders_of_a_run:
             sentence = (
                 f'{name}: every run has a folder "{name.split("/")[0]}" of its own; give the model\'s another name'
             )

@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Sequence
 from itertools import takewhile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.loading import Campaign
@@ -13,10 +12,15 @@ from mc_engine.campaign.sensitivity_design import noise_ids
 from mc_engine.flight.chunks import CHUNKS_PER_WORKER
 from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer
 from mc_engine.flight.flyers import flyer_of
+from mc_engine.interruption import in_threads
+from mc_engine.runner.summary import metric_parts
 from mc_engine.statistics.worst import limits_on, worst_cases
-from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, OK, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
+from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
 from mc_engine.store.parts import problem_of
 from mc_engine.store.store import Store
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _DANGEROUS = tuple(STATUS_NAME[code] for code in (WORKER_DIED, TIME_LIMIT, CRASHED, MEMORY_LIMIT, NO_RESULT))
 
@@ -41,8 +45,6 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     Cases that killed their worker, crashed, or exceeded a limit are left out, since they would do so again.  Nothing is
     flown if undamaged histories of the same cases are stored already.
     """
-    from joblib import Parallel, delayed
-
     if not campaign.model.quantities:  # of a simulator without outputs
         return True
     retained = retained_cases(store, campaign)
@@ -53,8 +55,7 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
     size = -(-len(retained) // (CHUNKS_PER_WORKER * workers)) or 1
     pieces = [[-1]] if campaign.retention.nominal else []
     pieces += [retained[first : first + size] for first in range(0, len(retained), size)]
-    pool = Parallel(n_jobs=min(workers, max(len(pieces), 1)), backend="threading")
-    flown = pool(delayed(_histories_of)(campaign, flyer, piece, stopped) for piece in pieces)
+    flown = in_threads(lambda piece: _histories_of(campaign, flyer, piece, stopped), pieces, workers)
     histories = [columns for piece in flown for columns in piece]
     if len(histories) < sum(map(len, pieces)):
         return False
@@ -75,17 +76,15 @@ def _histories_of(campaign: Campaign, flyer: Flyer, cases: Sequence[int], stoppe
 
 
 def _are_kept(store: Store, campaign: Campaign, retained: list[int]) -> bool:
+    """Whether undamaged histories of these cases are stored; a refused case, which has never started, has none."""
     part = store.history_part
     if part is None or problem_of(store.path / part.file, store.histories):
         return False
-    expected = {*retained, -1} if campaign.retention.nominal else {*retained}
-    return set(store.histories().get("case_id", [])) == {case for case in expected if _has_history(store, case)}
-
-
-def _has_history(store: Store, case_id: int) -> bool:
-    """False for a refused case, which has never started."""
-    row = store.nominal() if case_id < 0 else store.row(case_id)
-    return row["status"] != STATUS_NAME[REFUSED]
+    refused = STATUS_NAME[REFUSED]
+    expected = {*retained} - _cases_that_ended(store, (refused,))
+    if campaign.retention.nominal and store.nominal()["status"] != refused:
+        expected.add(-1)
+    return set(store.histories().get("case_id", [])) == expected
 
 
 def retained_cases(store: Store, campaign: Campaign) -> list[int]:
@@ -94,21 +93,21 @@ def retained_cases(store: Store, campaign: Campaign) -> list[int]:
     chosen = [*range(min(retention.first, store.n_cases)), *(case for case in retention.cases if case < store.n_cases)]
     requirements = [vars(requirement) for requirement in campaign.requirements]
     for worst in retention.worst:
-        table = store.cases(["case_id", "status", worst.metric])  # by case_id, which decides between equal values
+        # every case has its row, by case_id, which decides between equal values
+        values = np.concatenate([numbers[worst.metric] for _, numbers in metric_parts(store, [worst.metric])])
         limits = limits_on(worst.metric, requirements) if worst.side is None else None
-        rows = worst_cases(
-            table[worst.metric], table["status"] == STATUS_NAME[OK], worst.n_cases, worst.side != "smallest", limits
-        )
-        chosen += [int(case) for case in table["case_id"].to_numpy()[rows]]
-    dangerous = _dangerous_cases(store)
+        rows = worst_cases(values, np.isfinite(values), worst.n_cases, worst.side != "smallest", limits)
+        chosen += rows.tolist()
+    dangerous = _cases_that_ended(store, _DANGEROUS)
     return [case for case in dict.fromkeys(chosen) if case not in dangerous]
 
 
-def _dangerous_cases(store: Store) -> set[int]:
-    if not set(store.status_counts()) & set(_DANGEROUS):
+def _cases_that_ended(store: Store, words: Sequence[str]) -> set[int]:
+    """The cases with one of these statuses."""
+    if not set(store.status_counts()) & set(words):
         return set()
     table = store.cases(["case_id", "status"])
-    return set(table.loc[table["status"].isin(_DANGEROUS), "case_id"])
+    return set(table.loc[table["status"].isin(words), "case_id"])
 
 
 def _with_case(case_id: int, history: Columns) -> Columns:
@@ -116,6 +115,8 @@ def _with_case(case_id: int, history: Columns) -> Columns:
     return {"case_id": np.full(len(history["t_s"]), case_id, dtype=np.int64), **history}
 
 
-def history_frame(case_id: int, history: Columns) -> pd.DataFrame:
+def history_frame(case_id: int, history: Columns) -> "pd.DataFrame":
     """One history as a table: case_id, t_s and the outputs."""
+    import pandas as pd
+
     return pd.DataFrame(_with_case(case_id, history))

@@ -11,10 +11,9 @@ from typing import Any
 
 from mc_engine.campaign.cases import dispersion_records
 from mc_engine.campaign.columns import case_columns
-from mc_engine.campaign.inputs import inputs_of
 from mc_engine.campaign.loading import Campaign
 from mc_engine.flight.flyers import flyer_of
-from mc_engine.model.fields import Named, Setting
+from mc_engine.model.fields import Named, Setting, inputs_of
 from mc_engine.model.figures import to_record
 from mc_engine.model.simulator import System
 from mc_engine.sampling.streams import SEED_CONTRACT

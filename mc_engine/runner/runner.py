@@ -8,13 +8,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from mc_engine.campaign.cases import case_table
-from mc_engine.campaign.loading import Campaign, Retention, load_campaign
+from mc_engine.campaign.loading import Campaign, load_campaign
+from mc_engine.campaign.parts import Retention
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
@@ -31,6 +31,9 @@ from mc_engine.store.repair import mend_journal
 from mc_engine.store.run_files import JOURNAL, default_folder
 from mc_engine.store.store import Store, create_store
 from mc_engine.store.urls import is_url
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 THREADS = Backend()
 
@@ -54,7 +57,7 @@ class Replay:
 
     equal: bool
     differences: tuple[str, ...]
-    history: pd.DataFrame
+    history: "pd.DataFrame"
     row: dict[str, Any]
     lost: str = ""
     tolerance: float | None = None
@@ -253,7 +256,7 @@ def replay(path: str | Path, case_id: int) -> Replay:
     campaign = campaign_of(store)
     table, flyer = case_table(campaign, np.array([case_id])), flyer_of(campaign)
     inputs, noise = inputs_of(campaign, case_id)
-    flight, history = next(flyer.histories(inputs, np.array([noise]), Retention().rows, alone=True))
+    flight, history = next(flyer.histories(inputs, np.array([noise]), Retention().rows))
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
     again = {**table, **flight}

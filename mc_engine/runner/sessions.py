@@ -177,17 +177,17 @@ def _failed(status: dict[str, int]) -> int:
     return sum(count for word, count in status.items() if word != STATUS_NAME[OK])
 
 
-def _interrupted(store: Store) -> RunInterrupted:
+def _interrupted(store: Store, without: str = "") -> RunInterrupted:
     done, total = sum(store.status_counts().values()), len(store.wanted)
     store.note("interrupted", cases=done)
-    return RunInterrupted(f"interrupted with {done:,} of {total:,} cases;")
+    return RunInterrupted(f"interrupted with {done:,} of {total:,} cases{without};")
 
 
 def _fly_histories(store: Store, campaign: Campaign, session: Session, stopped: Callable[[], bool]) -> None:
     """Fly the saved time histories.  A shard has none: the worst cases are known once all shards are merged."""
     whole = len(store.wanted) == store.n_cases
     if whole and not write_histories(store, campaign, session.workers, stopped):
-        raise _interrupted(store)
+        raise _interrupted(store, " and without the saved time histories")
 
 
 def _fly_companion(store: Store, campaign: Campaign, session: Session, repair: bool, stop: threading.Event) -> None:

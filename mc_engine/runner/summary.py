@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 from mc_engine.errors import StoreError
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from mc_engine.statistics.streaming import Passes, Streamed
 
 PARTS_AHEAD = 2
+_DIGITS, _ALL_DIGITS = 8, 17  # of a metric: as a rule, and of a double
 
 
 def failed_cases(store: Store) -> int:
@@ -180,9 +182,18 @@ def summary_lines(metric: str, summary: "Summary", unit: str, random: bool) -> l
     if summary.n_used == 0:
         return [head]
     sd = "-" if summary.sd is None else f"{summary.sd:.6g}"
-    lines = [head, f"  mean {summary.mean:.8g}, sd {sd}, from {summary.minimum:.8g} to {summary.maximum:.8g}"]
+    told = f"{{:.{_digits(summary)}g}}".format
+    lines = [head, f"  mean {told(summary.mean)}, sd {sd}, from {told(summary.minimum)} to {told(summary.maximum)}"]
     for item in summary.quantiles:
-        limits = [f"{limit:.8g}" if limit is not None else "too few cases" for limit in (item.lower, item.upper)]
+        limits = [told(limit) if limit is not None else "too few cases" for limit in (item.lower, item.upper)]
         interval = f"  [{', '.join(limits)}]" if random else ""
-        lines.append(f"  {100.0 * item.probability:>7.3f} %  {item.value:.8g}{interval}")
+        lines.append(f"  {100.0 * item.probability:>7.3f} %  {told(item.value)}{interval}")
     return lines
+
+
+def _digits(summary: "Summary") -> int:
+    """Significant digits that tell the cases apart: eight, or more where the spread is small, as of Julian dates."""
+    largest = max(abs(summary.minimum or 0.0), abs(summary.maximum or 0.0))
+    if summary.constant or not largest or not summary.sd or not isfinite(summary.sd):
+        return _DIGITS
+    return min(max(3 + floor(log10(largest)) - floor(log10(summary.sd)), _DIGITS), _ALL_DIGITS)

@@ -12,6 +12,7 @@ among them, takes as many cases as 2 r - 1 failures.
 Clopper & Pearson, Biometrika 26 (1934), 404-413.
 """
 
+from bisect import bisect_left
 from collections.abc import Callable
 
 import numpy as np
@@ -136,23 +137,17 @@ def acceptance_number(tried: int, share: float, confidence: float) -> int | None
 
 
 def fewest_cases(demonstrates: Callable[[int], bool], failures: int) -> int:
-    """The smallest number of cases above `failures` that demonstrates, and all larger ones with it; bisection."""
-    too_few, enough = failures, failures + 1
+    """The smallest number of cases above `failures` that demonstrates, and all larger ones with it."""
+    enough = failures + 1
     while not demonstrates(enough):
-        too_few, enough = enough, 2 * enough
-    while enough - too_few > 1:
-        middle = (too_few + enough) // 2
-        too_few, enough = (too_few, middle) if demonstrates(middle) else (middle, enough)
-    return enough
+        enough *= 2
+    return bisect_left(range(enough), True, lo=failures + 1, key=demonstrates)
 
 
 def most_failures(demonstrates: Callable[[int], bool], tried: int) -> int | None:
     """The largest number of failures below `tried` that demonstrates, and all smaller ones with it; None if none."""
-    most, too_many = -1, tried
-    while too_many - most > 1:
-        middle = (most + too_many) // 2
-        most, too_many = (middle, too_many) if demonstrates(middle) else (most, middle)
-    return None if most < 0 else most
+    too_many = bisect_left(range(tried), True, key=lambda failures: not demonstrates(failures))
+    return too_many - 1 if too_many else None
 
 
 def _demonstrates(cases: int, share: float, confidence: float, failures: int) -> bool:

@@ -218,7 +218,7 @@ def _spread_ratio(a: np.ndarray, b: np.ndarray, paired: bool, unit: float, z: fl
 
     start = float(np.log(other.mean() / before.mean()))
     logarithm, p_value = _inverted(score, start, 1.0 / sqrt(min(before.size, other.size)), z)
-    return Estimate(*(float(np.exp(end)) for end in (logarithm.value, logarithm.lower, logarithm.upper))), p_value
+    return Estimate(*(float(np.exp(end)) for end in astuple(logarithm))), p_value
 
 
 def _inverted(score: Callable[[float], float], start: float, step: float, z: float) -> tuple[Estimate, float]:
@@ -269,9 +269,7 @@ def _mean_score(a: np.ndarray, b: np.ndarray) -> float:
 
 def _newcombe(counted: tuple[int, int], tried: tuple[int, int], confidence: float) -> Estimate:
     """Difference of two shares, from Wilson's limits of each: Newcombe, Stat. Med. 17 (1998), 873-890, method 10."""
-    (a, b), (low_a, low_b), (high_a, high_b) = zip(
-        *(_wilson(k, n, confidence) for k, n in zip(counted, tried, strict=True)), strict=True
-    )
+    (a, low_a, high_a), (b, low_b, high_b) = (_wilson(k, n, confidence) for k, n in zip(counted, tried, strict=True))
     value = b - a
     return Estimate(value, value - sqrt((b - low_b) ** 2 + (high_a - a) ** 2),
                     value + sqrt((high_b - b) ** 2 + (a - low_a) ** 2))  # fmt: skip

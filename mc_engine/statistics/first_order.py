@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
+import scipy  # loads its packages when they are used
 
 from mc_engine.statistics.input_columns import InputColumn, equal_bins, finite_rows, input_columns
 
@@ -30,7 +30,7 @@ def first_order(column: InputColumn, table: np.ndarray) -> tuple[np.ndarray, np.
     if n <= 2 * bins or bins < 2:
         return np.full(table.shape[1], np.nan), np.full(table.shape[1], np.nan)
     centred = standardised(table)
-    members = csr_array((np.ones(n), (index, np.arange(n))), shape=(bins, n))
+    members = scipy.sparse.csr_array((np.ones(n), (index, np.arange(n))), shape=(bins, n))
     mean = ((members @ centred) / members.sum(axis=1)[:, None])[index]
     inside = centred - mean
     share = 1.0 - (inside**2).sum(axis=0) / (n - bins) * (n - 1) / n

@@ -8,9 +8,12 @@ Geodesics on the ellipsoid: C. F. F. Karney, Journal of Geodesy 87 (2013), 43-55
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from pyproj import Geod
+
+if TYPE_CHECKING:
+    from pyproj import Geod
 
 WGS84 = (6378137.0, 1.0 / 298.257223563)  # equatorial radius [m], flattening; NGA.STND.0036, table 3.1
 # Equatorial radius [m] and flattening by the name of a planet; Mars and Venus as spheres, B. A. Archinal et al.,
@@ -29,7 +32,9 @@ class LocalPlane:
     ellipsoid: tuple[float, float] = WGS84
 
     @property
-    def _geod(self) -> Geod:
+    def _geod(self) -> "Geod":
+        from pyproj import Geod
+
         return Geod(a=self.ellipsoid[0], f=self.ellipsoid[1])
 
     def points(self, latitude: np.ndarray, longitude: np.ndarray) -> np.ndarray:

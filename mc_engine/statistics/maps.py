@@ -13,7 +13,10 @@ hull of the cases, in a hole between them, or with a large error are NaN: a map 
 inputs explain less than `LEAST_EXPLAINED` of the metric's variance in cross-validation, no point has a value.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 import scipy  # loads its packages when they are used
@@ -87,26 +90,41 @@ def map_metric(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int = 101) -
     >>> map_metric(x.ravel(), y.ravel(), (x + 10.0 * y).ravel()).value.tolist()
     [[0.0, 1.0, 2.0], [10.0, 11.0, 12.0]]
     """
-    pairs = [near_one(np.asarray(values, dtype=np.float64)) for values in (x, y, z)]
-    surface = _surface_map(pairs[0][0], pairs[1][0], pairs[2][0], points)
-    if surface is None:
-        return None
-    x, y, value = (
-        in_units(*scaled) for scaled in zip((surface.x, surface.y, surface.value), (e for _, e in pairs), strict=True)
-    )
-    return replace(
-        surface, x=x, y=y, value=value, error=None if surface.error is None else in_units(surface.error, pairs[2][1])
-    )
+    return map_metrics(x, y, [z], points)[0]
 
 
-def _surface_map(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int) -> SurfaceMap | None:
-    grid = _full_grid(x, y, z)
-    if grid is not None:
-        return grid
-    used = np.isfinite(x) & np.isfinite(y) & np.isfinite(z)
-    if used.sum() < FEWEST or not _spread(x[used]) or not _spread(y[used]):
-        return None
-    return _smoothed(x[used], y[used], z[used], points, x.size)
+def map_metrics(
+    x: np.ndarray, y: np.ndarray, metrics: Sequence[np.ndarray], points: int = 101
+) -> list[SurfaceMap | None]:
+    """The `map_metric` of each of several metrics over the same two inputs; what they have in common is made once."""
+    (x, x_exponent), (y, y_exponent) = (near_one(np.asarray(values, dtype=np.float64)) for values in (x, y))
+    scaled = [near_one(np.asarray(z, dtype=np.float64)) for z in metrics]
+    surfaces = _surface_maps(x, y, [z for z, _ in scaled], points)
+    return [
+        surface
+        and replace(
+            surface,
+            x=in_units(surface.x, x_exponent),
+            y=in_units(surface.y, y_exponent),
+            value=in_units(surface.value, exponent),
+            error=None if surface.error is None else in_units(surface.error, exponent),
+        )
+        for surface, (_, exponent) in zip(surfaces, scaled, strict=True)
+    ]
+
+
+def _surface_maps(x: np.ndarray, y: np.ndarray, metrics: Sequence[np.ndarray], points: int) -> list[SurfaceMap | None]:
+    surfaces = [_full_grid(x, y, z) for z in metrics]
+    scattered = [k for k, surface in enumerate(surfaces) if surface is None]
+    numbers = {k: np.isfinite(x) & np.isfinite(y) & np.isfinite(metrics[k]) for k in scattered}
+    for _, same in groupby(sorted(scattered, key=lambda k: numbers[k].tobytes()), lambda k: numbers[k].tobytes()):
+        together = list(same)
+        used = numbers[together[0]]
+        if used.sum() >= FEWEST and _spread(x[used]) and _spread(y[used]):
+            smoothed = _smoothed(x[used], y[used], [metrics[k][used] for k in together], points, x.size)
+            for k, surface in zip(together, smoothed, strict=True):
+                surfaces[k] = surface
+    return surfaces
 
 
 def explained_share(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> float:
@@ -165,34 +183,42 @@ def _node_means(node: np.ndarray, z: np.ndarray, nodes: int) -> tuple[np.ndarray
     return mean, np.sqrt(variance)
 
 
-def _smoothed(x: np.ndarray, y: np.ndarray, z: np.ndarray, points: int, tried: int) -> SurfaceMap | None:
-    n_used, middle, spread = x.size, float(z.mean()), float(np.ptp(z)) or 1.0
-    low, high = (x.min(), y.min()), (x.max(), y.max())
-    rows = np.unique(np.linspace(0, n_used - 1, min(n_used, MOST_CASES)).astype(np.int64))
-    x, y, z = x[rows], y[rows], (z[rows] - middle) / spread
-    centre, scale = np.array([x.mean(), y.mean()]), np.array([x.std(), y.std()])
-    cloud = (np.column_stack([x, y]) - centre) / scale
-    hull = _hull(cloud)
-    if hull is None:
-        return None
-    tree = scipy.spatial.cKDTree(cloud)
-    neighbours, explained = _chosen_neighbours(tree, cloud, z)
-    if explained < LEAST_EXPLAINED:
-        x_axis, y_axis = (np.array(ends) for ends in zip(low, high, strict=True))
-        blank = np.full((2, 2), np.nan)
-        return SurfaceMap(x_axis, y_axis, blank, blank, False, 0, neighbours, n_used, tried, rows.size, explained)
-    points = points if neighbours < MANY_NEIGHBOURS else points // COARSER + 1
-    x_axis, y_axis = (np.linspace(*ends, points) for ends in zip(low, high, strict=True))
-    at = (np.stack(np.meshgrid(x_axis, y_axis), axis=-1).reshape(-1, 2) - centre) / scale
-    inside = (at @ hull[:, :2].T + hull[:, 2] <= 1e-9).all(axis=1)
-    fit, deviation = _surface(tree, cloud, z, at[inside], neighbours)
-    blank = ~(deviation <= MOST_ERROR)
-    fit[blank] = deviation[blank] = np.nan
-    value, error = np.full(at.shape[0], np.nan), np.full(at.shape[0], np.nan)
-    value[inside], error[inside] = middle + spread * fit, spread * deviation
-    shape = (points, points)
-    value, error = value.reshape(shape), error.reshape(shape)
-    return SurfaceMap(x_axis, y_axis, value, error, False, 0, neighbours, n_used, tried, rows.size, explained)
+@dataclass(frozen=True)
+class _Cloud:
+    """Scattered cases in the plane of their two inputs, each centred and divided by its standard deviation.
+
+    rows : int64[n], of all cases those that are smoothed.  places : float64[n, 2].  ends : float64[2, 2], the smallest
+    and the largest number of each input.  hull : half planes (a, b, c), a x + b y + c <= 0 inside.
+    """
+
+    rows: np.ndarray
+    places: np.ndarray
+    ends: np.ndarray
+    centre: np.ndarray
+    scale: np.ndarray
+    hull: np.ndarray
+    tree: "scipy.spatial.cKDTree"
+
+    @classmethod
+    def of(cls, x: np.ndarray, y: np.ndarray) -> "_Cloud | None":
+        """None for cases on a line."""
+        ends = np.array([[x.min(), x.max()], [y.min(), y.max()]])
+        rows = np.unique(np.linspace(0, x.size - 1, min(x.size, MOST_CASES)).astype(np.int64))
+        x, y = x[rows], y[rows]
+        centre, scale = np.array([x.mean(), y.mean()]), np.array([x.std(), y.std()])
+        places = (np.column_stack([x, y]) - centre) / scale
+        hull = _hull(places)
+        return None if hull is None else cls(rows, places, ends, centre, scale, hull, scipy.spatial.cKDTree(places))
+
+    def axes(self, points: int) -> tuple[np.ndarray, np.ndarray]:
+        """A grid over both inputs."""
+        (left, right), (low, high) = self.ends
+        return np.linspace(left, right, points), np.linspace(low, high, points)
+
+    def nodes(self, points: int) -> tuple[np.ndarray, np.ndarray]:
+        """Places float64[points^2, 2] of the nodes of the grid, and which of them lie inside the hull."""
+        at = (np.stack(np.meshgrid(*self.axes(points)), axis=-1).reshape(-1, 2) - self.centre) / self.scale
+        return at, (at @ self.hull[:, :2].T + self.hull[:, 2] <= 1e-9).all(axis=1)
 
 
 def _hull(cloud: np.ndarray) -> np.ndarray | None:
@@ -202,43 +228,81 @@ def _hull(cloud: np.ndarray) -> np.ndarray | None:
     return scipy.spatial.ConvexHull(cloud).equations if widths[0] > 1e-6 * widths[1] else None
 
 
-def _chosen_neighbours(tree: "scipy.spatial.cKDTree", cloud: np.ndarray, z: np.ndarray) -> tuple[int, float]:
-    """(number of neighbours, fraction of the variance of z that it predicts), by leaving cases out one at a time.
+def _smoothed(
+    x: np.ndarray, y: np.ndarray, metrics: Sequence[np.ndarray], points: int, tried: int
+) -> list[SurfaceMap | None]:
+    """Maps of metrics that have a number in all of these cases."""
+    cloud = _Cloud.of(x, y)
+    if cloud is None:
+        return [None for _ in metrics]
+    middles, spreads = [float(z.mean()) for z in metrics], [float(np.ptp(z)) or 1.0 for z in metrics]
+    shapes = [(z[cloud.rows] - middle) / spread for z, middle, spread in zip(metrics, middles, spreads, strict=True)]
+    choices = _chosen_neighbours(cloud, shapes)
+    explained = [k for k, (_, share) in enumerate(choices) if not share < LEAST_EXPLAINED]
+    fitted: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    for neighbours in {choices[k][0] for k in explained}:
+        together = [k for k in explained if choices[k][0] == neighbours]
+        surfaces = _surfaces(cloud, [shapes[k] for k in together], neighbours, points)
+        fitted.update(zip(together, surfaces, strict=True))
+    maps: list[SurfaceMap | None] = []
+    for k, (neighbours, share) in enumerate(choices):
+        fit, deviation = fitted.get(k, (np.full((2, 2), np.nan), np.full((2, 2), np.nan)))
+        value, error, axes = middles[k] + spreads[k] * fit, spreads[k] * deviation, cloud.axes(len(fit))
+        maps.append(SurfaceMap(*axes, value, error, False, 0, neighbours, x.size, tried, cloud.rows.size, share))
+    return maps
+
+
+def _chosen_neighbours(cloud: _Cloud, metrics: Sequence[np.ndarray]) -> list[tuple[int, float]]:
+    """Of each metric (number of neighbours, fraction of its variance that it predicts), by leaving cases out one at a
+    time.
 
     A smaller number is chosen where it predicts as well.
     """
-    rows = np.unique(np.linspace(0, len(cloud) - 1, min(len(cloud), LEFT_OUT)).astype(np.int64))
-    choices = [number for number in NEIGHBOURS if number < len(cloud)]
+    places, n = cloud.places, len(cloud.places)
+    rows = np.unique(np.linspace(0, n - 1, min(n, LEFT_OUT)).astype(np.int64))
+    choices = [number for number in NEIGHBOURS if number < n]
     if len(choices) < 2:
-        return min(NEIGHBOURS[0], len(cloud)), 1.0  # too few cases to leave any out
-    distance, near = tree.query(cloud[rows], k=choices[-1] + 1)
+        return [(min(NEIGHBOURS[0], n), 1.0) for _ in metrics]  # too few cases to leave any out
+    distance, near = cloud.tree.query(places[rows], k=choices[-1] + 1)
     distance, near = distance[:, 1:], near[:, 1:]  # without the case itself
-    scores = []
+    scores: list[list[float]] = [[] for _ in metrics]
     for number in choices:
-        fit = _Fit.of(cloud, cloud[rows], distance[:, :number], near[:, :number], cubic=False)
-        misses = (fit.value(z) - z[rows]) ** 2
-        # Cases on a few levels of an input: near ones fix no surface before a second and third level are among them.
-        scores.append(float(np.mean(misses[fit.fixed])) if fit.fixed.mean() >= MOSTLY else np.inf)
-        if scores[-1] > WORSE_FOR_GOOD * min(scores):
+        open_ones = [k for k, so_far in enumerate(scores) if not (so_far and so_far[-1] > WORSE_FOR_GOOD * min(so_far))]
+        if not open_ones:
             break
+        fit = _Fit.of(places, places[rows], distance[:, :number], near[:, :number], cubic=False)
+        for k in open_ones:
+            misses = (fit.value(metrics[k]) - metrics[k][rows]) ** 2
+            # Cases on a few levels of an input: near ones fix no surface before a second and third level are among them
+            scores[k].append(float(np.mean(misses[fit.fixed])) if fit.fixed.mean() >= MOSTLY else np.inf)
+    return [_choice(choices, scored, float(np.var(z[rows]))) for scored, z in zip(scores, metrics, strict=True)]
+
+
+def _choice(choices: Sequence[int], scores: Sequence[float], variance: float) -> tuple[int, float]:
+    """The fewest neighbours that are as good as any, and the fraction of the variance that the best predict."""
     least = min(scores)
     chosen = next(number for number, score in zip(choices, scores, strict=False) if score <= AS_GOOD * least)
-    return chosen, 1.0 - least / max(float(np.var(z[rows])), 1e-300) if least < np.inf else 1.0
+    return chosen, 1.0 - least / max(variance, 1e-300) if least < np.inf else 1.0
 
 
-def _surface(
-    tree: "scipy.spatial.cKDTree", cloud: np.ndarray, z: np.ndarray, at: np.ndarray, neighbours: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Fitted value and its error at each point of `at`; NaN where the neighbours do not support a surface."""
-    value, error = np.full(len(at), np.nan), np.full(len(at), np.nan)
-    for first in range(0, len(at), POINTS_AT_ONCE):
-        some = slice(first, first + POINTS_AT_ONCE)
-        distance, near = tree.query(at[some], k=neighbours)
-        fit = _Fit.of(cloud, at[some], distance, near, cubic=True)
+def _surfaces(
+    cloud: _Cloud, metrics: Sequence[np.ndarray], neighbours: int, points: int
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Fitted value and its error of each metric on the grid; NaN where the cases do not support a value."""
+    points = points if neighbours < MANY_NEIGHBOURS else points // COARSER + 1
+    at, inside = cloud.nodes(points)
+    nodes = np.flatnonzero(inside)
+    fitted = [(np.full(len(at), np.nan), np.full(len(at), np.nan)) for _ in metrics]
+    for some in (nodes[first : first + POINTS_AT_ONCE] for first in range(0, nodes.size, POINTS_AT_ONCE)):
+        distance, near = cloud.tree.query(at[some], k=neighbours)
+        fit = _Fit.of(cloud.places, at[some], distance, near, cubic=True)
         usable = fit.fixed & (distance[:, 0] <= WIDEST_HOLE * distance[:, -1])
-        value[some] = np.where(usable, fit.value(z), np.nan)
-        error[some] = np.where(usable, np.hypot(fit.standard_error(z), fit.cubic_step(z)), np.nan)
-    return value, error
+        for z, (value, error) in zip(metrics, fitted, strict=True):
+            deviation = np.hypot(fit.standard_error(z), fit.cubic_step(z))
+            sure = usable & (deviation <= MOST_ERROR)
+            value[some] = np.where(sure, fit.value(z), np.nan)
+            error[some] = np.where(sure, deviation, np.nan)
+    return [(value.reshape(points, points), error.reshape(points, points)) for value, error in fitted]
 
 
 @dataclass(frozen=True)
@@ -268,41 +332,56 @@ class _Fit:
         design = np.stack(terms, axis=-1)
         normal = np.swapaxes(design * weight[:, :, None], 1, 2) @ design
         quadratic = normal[:, :TERMS, :TERMS]
-        widths = np.linalg.eigvalsh(quadratic)
+        widths, vectors = np.linalg.eigh(quadratic)
         fixed = widths[:, 0] > 1e-10 * widths[:, -1]
         safe = np.where(fixed[:, None, None], quadratic, np.eye(TERMS))
-        return cls(near, weight, design, safe, _value_row(safe), _value_row(normal) if cubic else None, fixed)
+        cubic_row = _value_row(*np.linalg.eigh(normal)) if cubic else None
+        return cls(near, weight, design, safe, _value_row(widths, vectors), cubic_row, fixed)
 
     def value(self, z: np.ndarray) -> np.ndarray:
         """The quadratic at the points."""
-        return np.einsum("mk,mk->m", self._smoother(self.row), z[self.near])
+        return np.einsum("mk,mk->m", self._smoother, z[self.near])
 
     def cubic_step(self, z: np.ndarray) -> np.ndarray:
         """From the quadratic to the cubic, at the points."""
-        assert self.cubic_row is not None
-        return np.einsum("mk,mk->m", self._smoother(self.cubic_row), z[self.near]) - self.value(z)
+        return np.einsum("mk,mk->m", self._cubic_smoother, z[self.near]) - self.value(z)
 
-    def _smoother(self, row: np.ndarray) -> np.ndarray:
+    @cached_property
+    def _smoother(self) -> np.ndarray:
         """float64[m, k]: what turns the neighbours' values into the fitted one."""
-        return self.weight * (self.design[:, :, : row.shape[1]] @ row[:, :, None])[:, :, 0]
+        return self.weight * (self.design[:, :, :TERMS] @ self.row[:, :, None])[:, :, 0]
+
+    @cached_property
+    def _cubic_smoother(self) -> np.ndarray:
+        assert self.cubic_row is not None
+        return self.weight * (self.design @ self.cubic_row[:, :, None])[:, :, 0]
+
+    @cached_property
+    def _weighted(self) -> np.ndarray:
+        """The transposed quadratic terms, weighted."""
+        return np.swapaxes(self.design[:, :, :TERMS] * self.weight[:, :, None], 1, 2)
+
+    @cached_property
+    def _freedom(self) -> np.ndarray:
+        """float64[m], degrees of freedom that the cases leave for a scatter about the quadratic."""
+        hat = np.linalg.solve(self.normal, self._weighted @ np.swapaxes(self._weighted, 1, 2))
+        return self.weight.sum(axis=1) - np.trace(hat, axis1=1, axis2=2)
 
     def standard_error(self, z: np.ndarray) -> np.ndarray:
         """Of the quadratic's value, from the scatter about it; NaN where the cases leave no freedom for a scatter."""
-        design = self.design[:, :, :TERMS]
-        weighted = design * self.weight[:, :, None]
-        right = np.swapaxes(weighted, 1, 2) @ z[self.near][:, :, None]
-        residual = z[self.near] - (design @ np.linalg.solve(self.normal, right))[:, :, 0]
-        hat = np.linalg.solve(self.normal, np.swapaxes(weighted, 1, 2) @ weighted)
-        freedom = self.weight.sum(axis=1) - np.trace(hat, axis1=1, axis2=2)
-        enough = freedom > 0.5
-        variance = (self.weight * residual**2).sum(axis=1) / np.where(enough, freedom, 1.0)
-        error = np.sqrt(variance * (self._smoother(self.row) ** 2).sum(axis=1))
+        right = self._weighted @ z[self.near][:, :, None]
+        residual = z[self.near] - (self.design[:, :, :TERMS] @ np.linalg.solve(self.normal, right))[:, :, 0]
+        enough = self._freedom > 0.5
+        variance = (self.weight * residual**2).sum(axis=1) / np.where(enough, self._freedom, 1.0)
+        error = np.sqrt(variance * (self._smoother**2).sum(axis=1))
         return np.where(enough, error, np.nan)
 
 
-def _value_row(normal: np.ndarray) -> np.ndarray:
-    """First row of the inverses of normal matrices; terms that the cases do not tell apart are left out."""
-    widths, vectors = np.linalg.eigh(normal)
+def _value_row(widths: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """First row of the inverses of normal matrices, from their eigenvalues and eigenvectors.
+
+    Terms that the cases do not tell apart are left out.
+    """
     determined = widths > 1e-10 * widths[:, -1:]
     return np.einsum(
         "mij,mj->mi", vectors, np.where(determined, vectors[:, 0, :] / np.where(determined, widths, 1.0), 0.0)

@@ -5,6 +5,7 @@ distribution (Wilks, Ann. Math. Statist. 12 (1941), 91-96; David & Nagaraja, Ord
 A limit that would need more cases than there are is None, never a guess.
 """
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil, floor
@@ -53,20 +54,14 @@ def quantile_ranks(n: int, probability: float, confidence: float = 0.90) -> tupl
     >>> quantile_ranks(100, 0.5), quantile_ranks(100, 0.99865)
     ((42, 59), (99, None))
     """
-    tail = 0.5 * (1.0 - confidence)
-    lower = _first_rank(n, probability, tail, strictly=True) - 1
-    upper = _first_rank(n, probability, 1.0 - tail, strictly=False)
-    return (lower if lower >= 1 else None), (upper if upper <= n else None)
 
+    def below(rank: int) -> float:
+        return float(scipy.special.bdtr(rank - 1, n, probability))
 
-def _first_rank(n: int, probability: float, level: float, strictly: bool) -> int:
-    """The smallest rank r in 1 ... n+1 with P(Binomial(n, p) <= r - 1) >= level (or > level); bisection."""
-    low, high = 0, n + 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        reached = scipy.special.bdtr(middle - 1, n, probability)
-        low, high = (low, middle) if (reached > level if strictly else reached >= level) else (middle, high)
-    return high
+    ranks, tail = range(1, n + 1), 0.5 * (1.0 - confidence)
+    lower = bisect_right(ranks, tail, key=below)  # so many ranks are low enough
+    upper = bisect_left(ranks, 1.0 - tail, key=below) + 1
+    return lower or None, (upper if upper <= n else None)
 
 
 def estimate_place(n: int, probability: float) -> float:

@@ -7,7 +7,6 @@ normal, so the cases inside are counted.  `density_regions` assumes only indepen
 from dataclasses import dataclass
 from functools import cached_property
 
-import contourpy
 import numpy as np
 import scipy  # loads its packages when they are used
 
@@ -162,6 +161,8 @@ class Density:
 
     def outlines(self, level: float) -> tuple[np.ndarray, ...]:
         """The closed curves on which the density is at the level."""
+        import contourpy
+
         x, y = (low + cell * (np.arange(CELLS) + 0.5) for low, cell in zip(self.low, self.cell, strict=True))
         lines = contourpy.contour_generator(x, y, self.field.T).lines(level)
         return tuple(self.centre + (np.asarray(line) * self.spread) @ self.axes.T for line in lines)

@@ -55,7 +55,9 @@ def stream(
             first = columns[str(requirements[0]["metric"])]
             counts.add(columns.__getitem__, np.ones(first.size, dtype=bool))
     used = [name for name in metrics if tallies[name].n_used]
-    wanted = {name: _ranks(tallies[name].n_used, probabilities, confidence) for name in used}
+    wanted = {
+        name: set().union(*(ranks_read(tallies[name].n_used, p, confidence) for p in probabilities)) for name in used
+    }
 
     def asked(metric: str, rank: int) -> float:
         wanted[metric].add(rank)
@@ -83,7 +85,3 @@ def stream(
         quantiles = (ranked_quantile(tally.n_used, ranked[name].__getitem__, p, confidence) for p in probabilities)
         summaries[name] = summary_of(spreads[name], tuple(quantiles), confidence)
     return Streamed(summaries, counts, *judge_counted(counts, lambda name, rank: ranked[name][rank], design, looked))
-
-
-def _ranks(n: int, probabilities: Iterable[float], confidence: float) -> set[int]:
-    return set().union(*(ranks_read(n, probability, confidence) for probability in probabilities))

@@ -170,7 +170,10 @@ def _chains(
         noise = np.where(rng.random(length.size) < _KEEPS_NOISE, state.noise, FRESH)
         flown = _flown(flights, u, noise, state.run, level)
         accepted = flown.margin <= threshold
-        state = _chosen(accepted, flown, state)
+        state = Members(
+            np.where(accepted[:, None], flown.u, state.u),
+            *(np.where(accepted, new, old) for new, old in zip(flown[1:], state[1:], strict=True)),
+        )
         kept.append(state)
         shares.append(float(accepted.mean()))
         scale = min(max(scale * math.exp((shares[-1] - _WANTED_ACCEPTANCE) / math.sqrt(len(shares))), 1e-3), 10.0)
@@ -186,13 +189,6 @@ def _shared_out(seeds: Members, per_run: int) -> tuple[Members, np.ndarray]:
     place = np.arange(seeds.run.size) - np.repeat(first, count)
     each = np.repeat(count, count)
     return seeds, per_run // each + (place < per_run % each)
-
-
-def _chosen(accepted: np.ndarray, new: Members, old: Members) -> Members:
-    return Members(
-        np.where(accepted[:, None], new.u, old.u),
-        *(np.where(accepted, a, b) for a, b in zip(new[1:], old[1:], strict=True)),
-    )
 
 
 def _remarks(climb: Climb, estimates: np.ndarray, upper: float) -> list[str]:

@@ -18,18 +18,7 @@ from zlib import crc32
 
 import numpy as np
 
-from mc_engine.durable_file import (
-    copy_into,
-    inner_names,
-    leave,
-    make_way,
-    names_in,
-    open_to_append,
-    read_inside,
-    remove_file,
-    remove_folder,
-    write_all,
-)
+from mc_engine import durable_file as disk
 from mc_engine.errors import DiskError
 from mc_engine.store.run_files import SIMULATOR
 
@@ -53,7 +42,7 @@ class RowLog:
         """The recorded rows of these cases, by case; a line that was not written whole is left out."""
         recorded: dict[int, Row] = {}
         for name in _logs(self._run, self._first, self._stop):
-            for line in read_inside(self._run, name).splitlines():
+            for line in disk.read_inside(self._run, name).splitlines():
                 mark, _, text = line.partition(b" ")
                 if mark == _mark(text):
                     row = json.loads(text)
@@ -75,14 +64,14 @@ class RowLog:
         assert self._case_ids is not None  # of `of`
         text = json.dumps({"case_id": int(self._case_ids[place]), **row}).encode()
         try:
-            write_all(self._opened(), _mark(text) + b" " + text + b"\n")
+            disk.write_all(self._opened(), _mark(text) + b" " + text + b"\n")
         except OSError as error:
             raise DiskError(f"{self._run / self._name}: {error.strerror or error}") from error
 
     def _opened(self) -> int:
         if self._descriptor is None:
-            self._descriptor = open_to_append(self._run, self._name)
-            write_all(self._descriptor, b"\n")  # after a line that a kill cut short
+            self._descriptor = disk.open_to_append(self._run, self._name)
+            disk.write_all(self._descriptor, b"\n")  # after a line that a kill cut short
         return self._descriptor
 
     def close(self) -> None:
@@ -95,20 +84,20 @@ class RowLog:
         """Forget the rows, which a part holds now."""
         self.close()
         if os.path.lexists(self._run / SIMULATOR):
-            remove_file(self._run, self._name)
+            disk.remove_file(self._run, self._name)
 
 
 def remove_logs(run: Path) -> None:
     """Remove all logs of a run whose cases are complete, and their folder if nothing else is in it."""
     for name in _logs(run, 0, 2**62):
-        remove_file(run, name)
-    if os.path.lexists(run / SIMULATOR) and not names_in(run, SIMULATOR):
-        remove_folder(run, SIMULATOR)
+        disk.remove_file(run, name)
+    if os.path.lexists(run / SIMULATOR) and not disk.names_in(run, SIMULATOR):
+        disk.remove_folder(run, SIMULATOR)
 
 
 def _logs(run: Path, first: int, stop: int) -> Iterator[str]:
     """Names of the files with rows of any of the cases first .. stop - 1."""
-    for name in names_in(run, SIMULATOR) if os.path.lexists(run / SIMULATOR) else ():
+    for name in disk.names_in(run, SIMULATOR) if os.path.lexists(run / SIMULATOR) else ():
         match = _NAME.fullmatch(name)
         if match is not None and int(match[1]) < stop and first < int(match[2]):
             yield f"{SIMULATOR}/{name}"
@@ -124,16 +113,16 @@ def keep_case(run: Path, name: str, folder: Path, texts: Mapping[str, bytes], mo
     name : of its folder in the run.  folder : of its files, of which the regular ones are copied; it may be missing.
     texts : contents of further files by name.  most : folders that a run may have, or None.
     """
-    make_way(run, f"{SIMULATOR}/{name}")
-    if most is not None and len(names_in(run, SIMULATOR)) >= most:
+    disk.make_way(run, f"{SIMULATOR}/{name}")
+    if most is not None and len(disk.names_in(run, SIMULATOR)) >= most:
         return
-    remove_folder(run, f"{SIMULATOR}/{name}")
+    disk.remove_folder(run, f"{SIMULATOR}/{name}")
     for path, kept in _regular_files(folder):
         if kept.split("/")[0] not in texts:
-            copy_into(run, f"{SIMULATOR}/{name}/{kept}", path)
+            disk.copy_into(run, f"{SIMULATOR}/{name}/{kept}", path)
     for file, text in texts.items():
-        make_way(run, f"{SIMULATOR}/{name}/{file}")
-        leave(run, f"{SIMULATOR}/{name}/{file}", text)
+        disk.make_way(run, f"{SIMULATOR}/{name}/{file}")
+        disk.leave(run, f"{SIMULATOR}/{name}/{file}", text)
 
 
 def _regular_files(folder: Path) -> Iterator[tuple[Path, str]]:
@@ -143,5 +132,5 @@ def _regular_files(folder: Path) -> Iterator[tuple[Path, str]]:
             path = Path(way) / name
             with suppress(ValueError, OSError):
                 inner = path.relative_to(folder).as_posix()
-                if stat.S_ISREG(path.lstat().st_mode) and os.access(path, os.R_OK) and inner_names(inner):
+                if stat.S_ISREG(path.lstat().st_mode) and os.access(path, os.R_OK) and disk.inner_names(inner):
                     yield path, inner

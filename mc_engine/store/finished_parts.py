@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from mc_engine.store.store import Store
 
 _ASIDE = re.compile(r"\.(part-[^/]*\.parquet)\.[0-9a-f]{8}\.([0-9a-f]{32})\.tmp")
-
-
 _RECEIPT = "cases/.receipt.tmp"
 
 
@@ -47,21 +45,15 @@ def count_finished(store: "Store") -> None:
 
 def finished_parts(run: Path) -> Iterator[Written]:
     """The complete, unrecorded parts of `run`; on return their bytes are synced to the disk."""
-    noted = _noted(run)  # first: to commit a part writes another receipt
+    noted: Part | None = None  # read first: to commit a part writes another receipt
+    with suppress(StoreError, ValueError, RecursionError):  # there is none, or it is incomplete
+        noted = receipt_of(json.loads(read_inside(run, _RECEIPT, limit=MOST_OF_TEXT)))
     if noted is not None and (part := _whole(run, noted.file, noted.file, noted.sha256)):
         yield Written(part, part.file)
     for name in names_in(run, "cases"):
         match = _ASIDE.fullmatch(name)
         if match is not None and (part := _whole(run, f"cases/{name}", f"cases/{match[1]}", match[2])):
             yield Written(part, f"cases/{name}")
-
-
-def _noted(run: Path) -> Part | None:
-    """The part in the last receipt; None if there is none, or it is incomplete."""
-    try:
-        return receipt_of(json.loads(read_inside(run, _RECEIPT, limit=MOST_OF_TEXT)))
-    except (StoreError, ValueError, RecursionError):
-        return None
 
 
 def _whole(run: Path, present_name: str, file: str, digest: str) -> Part | None:

@@ -54,14 +54,8 @@ def encode(number: int, at: str, event: str, facts: dict[str, Any]) -> bytes:
     return body + b',"crc":"%08x"}\n' % zlib.crc32(body)
 
 
-def decode(line: bytes, number: int) -> Entry | None:
-    """The entry of a line without its newline; None unless its checksum holds and its number is `number`."""
-    entry = _decoded(line)
-    return entry if entry is not None and entry.number == number else None
-
-
-def _decoded(line: bytes) -> Entry | None:
-    """The entry of a line, whatever its number; None unless its checksum holds."""
+def decode(line: bytes) -> Entry | None:
+    """The entry of a line without its newline; None unless its checksum holds."""
     tail = _TAIL.fullmatch(line[-_TAIL_LENGTH:])
     body = line[:-_TAIL_LENGTH]
     if tail is None or int(tail[1], 16) != zlib.crc32(body):
@@ -87,7 +81,7 @@ def scan(content: bytes) -> Scan:
     damaged: list[int] = []
     last = unread = 0  # number of the last good line, lines since then
     for line in lines:
-        entry = _decoded(line)
+        entry = decode(line)
         # The last condition bounds the list of damaged lines where a line has an absurd number.
         if entry is None or entry.number < last + 1 + (unread > 0) or entry.number * _SHORTEST > len(content):
             unread += 1
@@ -131,7 +125,7 @@ class Journal:
         """Write and sync one line.  After an error the line is not valid, and `append` may be tried again."""
         number = len(self.entries) + 1
         line = encode(number, utc_now(), event, facts)
-        entry = decode(line[:-1], number)
+        entry = decode(line[:-1])
         assert entry is not None  # just encoded
         if self.certain and os.path.getsize(self.path) != self._size:
             raise StoreError(f"{self.path}: another process has written here; this process stops and writes nothing")

@@ -9,7 +9,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import from_json
 
 from mc_engine.durable_file import read_inside
@@ -19,7 +19,7 @@ from mc_engine.section import ReportSection, Share
 from mc_engine.status import MOST_CASES
 from mc_engine.store.journal import plain
 from mc_engine.store.parts import CASE_COLUMNS, Column
-from mc_engine.store.receipts import first_mistake
+from mc_engine.store.receipts import validated
 
 FORMAT = 1  # of the directory; the manifest's "format"
 
@@ -83,7 +83,7 @@ class _Described(_Named):
     note: str = ""
 
 
-class _Column(_Named):
+class ColumnRecord(_Named):
     unit: str
     role: str
     description: str
@@ -174,7 +174,7 @@ class _Provenance(Record):
     git: _Git | None = None
 
 
-def _each_once(columns: list[_Column]) -> list[_Column]:
+def _each_once(columns: list[ColumnRecord]) -> list[ColumnRecord]:
     names = [column.name for column in columns]
     if names[: len(CASE_COLUMNS)] != [column.name for column in CASE_COLUMNS] or len({*names}) < len(names):
         raise ValueError("its columns are not those of a case table")
@@ -209,7 +209,7 @@ class _Manifest(Head):
     imported: _Imported | None = None
     sensitivity: _Sensitivity | None = None
     ranges: dict[str, Annotated[list[float | None], Field(min_length=2, max_length=2)]] = {}
-    columns: Annotated[list[_Column], AfterValidator(_each_once)]
+    columns: Annotated[list[ColumnRecord], AfterValidator(_each_once)]
 
     @model_validator(mode="after")
     def _requires_of_its_columns(self) -> "_Manifest":
@@ -223,7 +223,7 @@ class _UpstreamFacts(_Campaign):
     """Metadata of the copied upstream run.  A metric may be NaN, also that of the nominal case."""
 
     cases: CaseNumber = 0
-    columns: Annotated[list[_Column], AfterValidator(_each_once)]
+    columns: Annotated[list[ColumnRecord], AfterValidator(_each_once)]
     nominal: dict[str, Annotated[float, Field(allow_inf_nan=True)] | int | str | bool]
     figures: list[_Figure] = []
     inputs: list[_Described] = []
@@ -240,7 +240,7 @@ def manifest_bytes(record: Mapping[str, Any]) -> bytes:
     """The bytes of a manifest; ModelError if the model's description would make an invalid one."""
     try:
         content = json.dumps(record, indent=1, ensure_ascii=False, allow_nan=False, default=plain).encode()
-        _checked(_Manifest, from_json(content))
+        validated(_Manifest, from_json(content))
     except ValueError as error:
         raise ModelError(f"the model's description cannot be written to a manifest: {error}") from error
     return content
@@ -248,7 +248,9 @@ def manifest_bytes(record: Mapping[str, Any]) -> bytes:
 
 def parse_upstream(content: bytes | str) -> dict[str, Any]:
     """The metadata of the copied upstream run; ValueError with a sentence if they are not valid."""
-    return _checked(_UpstreamFacts, from_json(content))[0]
+    record = from_json(content)
+    validated(_UpstreamFacts, record)
+    return dict(record)
 
 
 _Kind = TypeVar("_Kind", bound=Record)
@@ -262,15 +264,8 @@ def checked_record(content: bytes | str, kind: type[_Kind], newest: int) -> tupl
     record = from_json(content, allow_inf_nan=False)
     if isinstance(record, dict) and isinstance(record.get("format"), int) and record["format"] > newest:
         raise ValueError(f"was written by a newer engine; this one reads format {newest}")
-    return _checked(kind, record)
-
-
-def _checked(kind: type[_Kind], record: Any) -> tuple[dict[str, Any], _Kind]:
-    try:
-        validated = kind.model_validate(record)
-    except ValidationError as error:
-        raise ValueError(first_mistake(error)) from None
-    return dict(record), validated
+    checked = validated(kind, record)
+    return dict(record), checked
 
 
 def cases_in(manifest: dict[str, Any], n_cases: int) -> range:

@@ -152,16 +152,13 @@ def _copy(url: str, folder: Path) -> None:
         make_folder(folder / part_folder)
 
 
-def fetched(url: str) -> Path:
-    """A copy of the run at `url`, in a directory that is removed when this process ends."""
-    scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))
-    atexit.register(shutil.rmtree, scratch, ignore_errors=True)
-    return fetch(url, scratch / url.rstrip("/").rpartition("/")[2])
-
-
 def local_copy(place: str | Path) -> Path:
     """The directory `place`; for a URL, a copy that is removed when this process ends."""
-    return fetched(str(place)) if is_url(place) else Path(place)
+    if not is_url(place):
+        return Path(place)
+    scratch = Path(tempfile.mkdtemp(prefix="mc-engine-"))
+    atexit.register(shutil.rmtree, scratch, ignore_errors=True)
+    return fetch(str(place), scratch / str(place).rstrip("/").rpartition("/")[2])
 
 
 def refuse_unreachable(url: str) -> None:

@@ -147,12 +147,7 @@ def parquet_bytes(table: pa.Table) -> bytes:
 
 def is_part_file(file: str) -> bool:
     """True if `file`, relative to the run directory, is the name of a part, as the engine gives them."""
-    return is_history_file(file) or cases_in_name(file) is not None
-
-
-def is_history_file(file: str) -> bool:
-    """True if `file`, relative to the run directory, is the name of saved time histories."""
-    return _HISTORY_PART.fullmatch(file) is not None
+    return _HISTORY_PART.fullmatch(file) is not None or cases_in_name(file) is not None
 
 
 def cases_in_name(file: str) -> tuple[int, int] | None:
@@ -258,18 +253,14 @@ def parquet_table(content: Any, names: Sequence[str] | None = None, most: int = 
     try:
         source = pa.BufferReader(content) if isinstance(content, bytes) else content
         file = pq.ParquetFile(source, pre_buffer=False, page_checksum_verification=True)
-        _refuse_size(file.metadata, most)
+        sizes = [file.metadata.row_group(k).total_byte_size for k in range(file.metadata.num_row_groups)]
+        if max(file.metadata.num_rows * file.metadata.num_columns, *sizes, sum(sizes) // 16, 0) > most:
+            raise ValueError(f"it has more than the {most:,} cells that are read at once")
         table = file.read(names, use_threads=False)
         table.validate(full=True)  # words are UTF-8, and offsets lie inside
         return table
     except (pa.ArrowException, OSError, KeyError, OverflowError) as error:
         raise ValueError(f"no readable Parquet file: {next(iter(str(error).splitlines()), '')}") from error
-
-
-def _refuse_size(metadata: Any, most: int) -> None:
-    sizes = [metadata.row_group(k).total_byte_size for k in range(metadata.num_row_groups)]
-    if max(metadata.num_rows * metadata.num_columns, *sizes, sum(sizes) // 16, 0) > most:
-        raise ValueError(f"it has more than the {most:,} cells that are read at once")
 
 
 def content_problem(content: bytes, part: Part) -> str:

@@ -7,7 +7,7 @@ Checksums detect damage, not forgery.
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -83,22 +83,21 @@ _EVENTS: Mapping[str, type[_Event]] = {
 
 def receipt_of(facts: Any) -> Part:
     """The receipt of a part from the facts of its line; ValueError with a sentence if they are not valid."""
-    return _part(_checked(_Receipt, facts))
+    return _part(validated(_Receipt, facts))
 
 
-def _checked(kind: type[_Event], facts: Any) -> Any:
+_Kind = TypeVar("_Kind", bound=BaseModel)
+
+
+def validated(kind: type[_Kind], record: Any) -> _Kind:
+    """A record as a `kind`; ValueError with place and kind of the first mistake, without text from the record."""
     try:
-        return kind.model_validate(facts)
+        return kind.model_validate(record)
     except ValidationError as error:
-        raise ValueError(first_mistake(error)) from None
-
-
-def first_mistake(error: ValidationError) -> str:
-    """Place and kind of the first mistake in a record, as a sentence without text from the record."""
-    first = error.errors(include_url=False, include_input=False, include_context=False)[0]
+        first = error.errors(include_url=False, include_input=False, include_context=False)[0]
     place = ".".join(str(key) for key in first["loc"] if key != "[key]")
     message = first["msg"].removeprefix("Value error, ")
-    return f"{place!a}: {message[:1].lower()}{message[1:]}"
+    raise ValueError(f"{place!a}: {message[:1].lower()}{message[1:]}")
 
 
 def _part(record: _Receipt) -> Part:
@@ -127,7 +126,7 @@ class Receipts:
     def take(self, entry: Entry) -> None:
         """Apply one more line; ValueError with a sentence, without any change, if the line is not valid."""
         kind = _EVENTS.get(entry.event)
-        record: Any = None if kind is None else _checked(kind, entry.facts)
+        record: Any = None if kind is None else validated(kind, entry.facts)
         if (entry.event == "created") != (entry.number == 1):
             raise ValueError("a run is created in line 1, and once")
         if entry.event in ("part", "part-replaced"):

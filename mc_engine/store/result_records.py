@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, create_model
 
-from mc_engine.store.manifest_file import Head, Record, checked_record
+from mc_engine.store.manifest_file import ColumnRecord, Head, Record, checked_record
 from mc_engine.store.run_files import RARE_EVENT, TUNING
 
 FORMAT = 2  # of the directories; 1 had no journal
@@ -19,11 +19,17 @@ Some = Annotated[int, Field(ge=1, le=2**63)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 Limit = float | None
-Kind = Literal["number", "integer", "word", "switch"]
+
+
+class _Column(ColumnRecord):
+    """Of a table of results; unlike that of a run it may leave its words out."""
+
+    unit: str = ""
+    description: str = ""
+
 
 _NAMED: Shape = {"name": str, "unit": (str, ""), "description": (str, "")}
-_COLUMN = {**_NAMED, "role": str, "kind": (Kind, "number")}
-_TABLE = {"rows": Count, "columns": [_COLUMN]}
+_TABLE = {"rows": Count, "columns": list[_Column]}
 _LIMITS: Shape = {"metric": str, "at_most": Limit, "at_least": Limit, "source": (str, "")}
 _SEARCH: Shape = {
     **dict.fromkeys(("population", "generations", "flown", "cases"), Some),
@@ -73,9 +79,8 @@ _SHAPES: dict[str, Shape] = {TUNING: {"tuning": _SEARCH}, RARE_EVENT: {"rare_eve
 def parse_result(content: bytes, kind: str) -> dict[str, Any]:
     """The record in these bytes, with defaults filled in; ValueError with a sentence if it is not valid."""
     tables = {"tables": dict.fromkeys(TABLES[kind], _TABLE)}
-    record = checked_record(content, _model({"format": Literal[2], **_SHAPES[kind], **tables}, Head), FORMAT)[
-        1
-    ].model_dump()
+    shape = {"format": Literal[2], **_SHAPES[kind], **tables}
+    record = checked_record(content, _model(shape, Head), FORMAT)[1].model_dump()
     if kind == TUNING:
         _refuse_other_columns(record)
     elif len({item[key] is None for item in record["rare_event"]["inputs"] for key in ("across", "across_sigma")}) > 1:

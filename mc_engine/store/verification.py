@@ -7,6 +7,7 @@ Checksums detect damage, not forgery.
 import os
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from mc_engine.store.derived_files import STRANGE, derived_files, remade_by
 from mc_engine.store.histories import read_histories
 from mc_engine.store.journal import Scan, read_journal, scan
 from mc_engine.store.manifest_file import cases_in, columns_in, edited_files, parse_manifest
-from mc_engine.store.parts import PART_FOLDERS, Part, is_part_file, problem_of, read_part
+from mc_engine.store.parts import PART_FOLDERS, is_part_file, problem_of, read_part
 from mc_engine.store.receipts import Receipts, receipts_of
 from mc_engine.store.result_folder import COMMANDS, read_result, result_files
 from mc_engine.store.run_files import (
@@ -175,18 +176,12 @@ def _head_problems(run: Path, journal: Scan) -> Iterator[str]:
 
 def _part_problems(run: Path, counted: Receipts, manifest: dict[str, Any] | None) -> Iterator[Damage]:
     columns = None if manifest is None else columns_in(manifest)
-    for part in counted.parts if counted.nominal is None else [*counted.parts, counted.nominal]:
-        yield from _damage_of(run, part, lambda: read_part(run, part, columns))  # noqa: B023
-    if (kept := counted.histories) is not None:
-        if manifest is None:
-            yield from _damage_of(run, kept, lambda: read_part(run, kept))
-        else:
-            yield from _damage_of(run, kept, lambda: read_histories(run, kept, manifest.get("quantities", [])))
-
-
-def _damage_of(run: Path, part: Part, read: Callable[[], object]) -> Iterator[Damage]:
-    if problem := problem_of(run / part.file, read):
-        yield Damage(f"{part.file}: {problem}", IN_THE_WAY if _is_folder(run / part.file) else REPAIR)
+    for part in counted.all_parts():
+        read: Callable[[], object] = partial(read_part, run, part, None if part is counted.histories else columns)
+        if part is counted.histories and manifest is not None:
+            read = partial(read_histories, run, part, manifest.get("quantities", []))
+        if problem := problem_of(run / part.file, read):
+            yield Damage(f"{part.file}: {problem}", IN_THE_WAY if _is_folder(run / part.file) else REPAIR)
 
 
 def _is_folder(path: Path) -> bool:

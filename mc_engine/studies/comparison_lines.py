@@ -77,7 +77,7 @@ def _metric_cells(change: MetricChange, comparison: Comparison) -> tuple[str, ..
     unit = comparison.units[change.metric]
     return (
         f"{change.metric}{f' [{unit}]' if unit else ''}",
-        _four_digits(change.shift.value),
+        f"{change.shift.value:.4g}",  # of a change that is in the table, which is a number
         _with_interval(change.shift_in_sigma),
         _p_value_text(change.shift_adjusted, comparison.alpha),
         _with_interval(change.ratio),
@@ -96,10 +96,6 @@ def _with_interval(estimate: Estimate) -> str:
     if not np.isfinite(estimate.value):
         return "-"
     return f"{estimate.value:.3g} [{estimate.lower:.3g}, {estimate.upper:.3g}]"
-
-
-def _four_digits(value: float) -> str:
-    return f"{value:.4g}" if np.isfinite(value) else "-"
 
 
 def _p_value_text(value: float, alpha: float) -> str:

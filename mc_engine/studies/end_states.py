@@ -45,13 +45,15 @@ def write_oem(store: Store, columns: Sequence[str], out: Path, epoch: str, frame
     a day counts 86 400 s.  frame, centre : of the states; the run does not know them, so they are not checked.
     StoreError where columns or epoch do not fit.
     """
-    start = _epoch(epoch)
+    try:
+        start = modified_julian_date(epoch)
+    except ValueError:
+        raise StoreError(f'epoch "{epoch}" is no date such as 2026-01-31T12:00:00') from None
     table = store.cases(["case_id", "status", END_TIME, *columns])
     flown = table[table["status"] == STATUS_NAME[OK]]
     states = np.column_stack([_in_unit(store, flown, name, to) for name, to in zip(columns, _OEM_UNITS, strict=True)])
-    name = "".join(
-        letter if letter.isalnum() else "_" for letter in str(store.manifest["campaign"].get("name", "case"))
-    ).upper()
+    campaign = str(store.manifest["campaign"]["name"])
+    name = "".join(letter if letter.isalnum() else "_" for letter in campaign).upper()
     lines = [
         "CCSDS_OEM_VERS = 3.0",
         f"CREATION_DATE = {datetime.now(UTC).strftime('%Y-%m-%dT%H:%M:%S')}",
@@ -67,13 +69,6 @@ def _segment(name: str, epoch: str, state: np.ndarray, frame: str, centre: str) 
     yield from ("", "META_START", f"OBJECT_NAME = {name}", f"OBJECT_ID = {name}", f"CENTER_NAME = {centre}")
     yield from (f"REF_FRAME = {frame}", "TIME_SYSTEM = UTC", f"START_TIME = {epoch}", f"STOP_TIME = {epoch}")
     yield from ("META_STOP", " ".join([epoch, *(repr(float(value)) for value in state)]))
-
-
-def _epoch(text: str) -> float:
-    try:
-        return modified_julian_date(text)
-    except ValueError:
-        raise StoreError(f'epoch "{text}" is no date such as 2026-01-31T12:00:00') from None
 
 
 def _in_unit(store: Store, table: pd.DataFrame, name: str, to: str) -> np.ndarray:

@@ -117,13 +117,17 @@ def measure(cases: Flight, widths: Iterable[int], repeats: int = 60) -> Timing:
         flights[width] = caller(cases, width)
         flights[width]()
         timing.ready_s[width] = time.perf_counter() - start
-    for _ in range(repeats):
-        for width, fly in flights.items():
-            case_s, ns = fly()
-            timing.case_s[width] = min(timing.case_s.get(width, np.inf), case_s)
-            if np.isfinite(ns):
-                timing.ns[width] = min(timing.ns.get(width, np.inf), ns)
+    for width, (case_s, ns) in zip(flights, _shortest([*flights.values()], repeats), strict=True):
+        timing.case_s[width] = case_s
+        if np.isfinite(ns):
+            timing.ns[width] = ns
     return timing
+
+
+def _shortest(callers: list[Callable[[], tuple[float, float]]], repeats: int) -> list[tuple[float, float]]:
+    """The shortest times of each of several flights, which take turns."""
+    times = np.array([[call() for call in callers] for _ in range(repeats)])
+    return [(float(case_s), float(ns)) for case_s, ns in times.min(axis=0)]
 
 
 @dataclass(frozen=True)
@@ -160,8 +164,9 @@ def compare_methods(campaign: Campaign, n_cases: int | None, repeats: int) -> li
         found = _first_within(trials, clocks, max(known[0][1], _ROUNDING))
         known += [found] if found else []
     timed = campaign_flight(campaign, n_cases)
-    times = _shortest(timed, [clock for clock, _ in known], repeats)
-    own, *others = [MethodTiming(clock, error, seconds) for (clock, error), seconds in zip(known, times, strict=True)]
+    models = [replace(timed, model=replace(timed.model, clock=clock)) for clock, _ in known]
+    times = _shortest([caller(cases, usual_width(timed.model)) for cases in models], repeats + 1)
+    own, *others = [MethodTiming(*method, case_s) for method, (case_s, _) in zip(known, times, strict=True)]
     return [own, *sorted(others, key=lambda timing: timing.case_s)]
 
 
@@ -179,21 +184,13 @@ def _first_within(trials: "_Trials", clocks: Iterator[Clock], most: float) -> tu
     return before
 
 
-def _shortest(timed: Flight, clocks: list[Clock], repeats: int) -> list[float]:
-    width = usual_width(timed.model)
-    callers = [caller(replace(timed, model=replace(timed.model, clock=clock)), width) for clock in clocks]
-    best = [np.inf] * len(callers)
-    for _ in range(repeats + 1):
-        best = [min(shortest, call()[0]) for shortest, call in zip(best, callers, strict=True)]
-    return best
-
-
 class _Trials:
     """Flights of a few cases by other clocks, and their errors."""
 
     def __init__(self, cases: Flight):
         self.cases, clock = cases, cases.model.clock
         assert isinstance(clock, FixedStep)
+        self._ids = np.arange(cases.n_cases)
         flown = cases.model, cases.inputs, self._ids, cases.seed
         codes = flight.bound_flight(*flown, folder=cases.folder, width=usual_width(cases.model))[2]
         self.n_steps, step, every = flight.grid_of(clock, flight.settings_of(cases.model, codes))
@@ -205,10 +202,6 @@ class _Trials:
         sizes = [np.nanmax(abs(own[f"end_{state.name}"] * state.si_factor)) for state in cases.model.states]
         self._scales = np.array([size if np.isfinite(size) and size > 0.0 else 1.0 for size in sizes])
         self._true = self._flown(self._adaptive("dop853", _TIGHT))
-
-    @property
-    def _ids(self) -> np.ndarray:
-        return np.arange(self.cases.n_cases)
 
     def ladders(self) -> Iterator[Iterator[Clock]]:
         """Of every other method its clocks, from rough to fine."""

@@ -34,6 +34,7 @@ class LimitState:
     """margin(u, noise) of a campaign and one of its requirements, which remembers what its cases came to.
 
     names : the dispersed inputs, one column of u each.  status, metric : of every case flown, in order.
+    metric_field : the metric of the requirement, as the model declares it.
     watch : called before each flight with the number of cases flown and failed so far; it may raise.
     """
 
@@ -46,6 +47,7 @@ class LimitState:
     ):
         refuse_unmappable(campaign)
         self.campaign, self.requirement = campaign, requirement
+        self.metric_field = next(field for field in campaign.model.metrics if field.name == requirement.metric)
         self.names = [
             dispersion.name for dispersion in campaign.dispersions if not isinstance(dispersion.distribution, Constant)
         ]

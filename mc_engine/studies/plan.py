@@ -18,7 +18,7 @@ from mc_engine.statistics.requirements import JOINT, SAMPLING_DESIGNS, joint_sha
 from mc_engine.statistics.time_uniform import smallest_sample as smallest_at_any_time
 
 ROWS = 6  # failures 0 to 5
-_RANKS = 3  # of two-sided intervals
+_RANKS = ("smallest and the largest", "2nd smallest and largest", "3rd smallest and largest")  # of two-sided intervals
 
 
 class PlanRow(NamedTuple):
@@ -53,13 +53,8 @@ def table_lines(rows: Sequence[PlanRow], share: float, confidence: float) -> Ite
 def interval_lines(share: float, confidence: float) -> Iterator[str]:
     """Cases for an interval between order statistics that holds the share (two-sided, Wilks)."""
     yield f"{'between the':>28}  {'cases':>9}"
-    for rank in range(1, _RANKS + 1):
-        words = "smallest and the largest" if rank == 1 else f"{_ordinal(rank)} smallest and largest"
+    for rank, words in enumerate(_RANKS, start=1):
         yield f"{words:>28}  {smallest_interval_sample(share, confidence, rank):>9}"
-
-
-def _ordinal(rank: int) -> str:
-    return f"{rank}{({2: 'nd', 3: 'rd'}).get(rank, 'th')}"
 
 
 def plan_lines(campaign: Campaign, failures: Sequence[int] = range(ROWS), two_sided: bool = False) -> Iterator[str]:

@@ -4,9 +4,10 @@ The lock file is generated; the documentation and the README show it, and a test
 """
 
 import importlib
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -61,20 +62,14 @@ def write_lock(path: Path, values: Mapping[str, Value], records: Sequence[Record
         "",
         "[ours]",
     ]
+    quoted = partial(json.dumps, ensure_ascii=False)  # a string of JSON is one of TOML
     for record in records:
         if (name := record["quantity"]) in values:
-            lines.append(f"{_quoted(name)} = {_written(values[name])}")
+            value = values[name]
+            written = quoted(value) if isinstance(value, str) else repr(float(f"{value:.{KEPT_DIGITS}g}"))
+            lines.append(f"{quoted(name)} = {written}")
     write_durably(lock_file(path), "\n".join([*lines, ""]).encode())
     return lock_file(path)
-
-
-def _written(value: Value) -> str:
-    """A TOML string, or a number to ten digits."""
-    return _quoted(value) if isinstance(value, str) else repr(float(f"{value:.{KEPT_DIGITS}g}"))
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 class _Computer:

@@ -85,8 +85,7 @@ def estimate_rare_event(
 
 
 def _flown_cases(limit: LimitState, estimate: RareEvent) -> tuple[list[Column], dict[str, np.ndarray]]:
-    campaign, cases = limit.campaign, estimate.cases
-    metric = next(candidate for candidate in campaign.model.metrics if candidate.name == limit.requirement.metric)
+    campaign, cases, metric = limit.campaign, estimate.cases, limit.metric_field
     inputs = limit.inputs(cases.u)
     columns = [
         Column("case_id", "", "case", "number of the case, in the order flown", "integer"),
@@ -115,7 +114,7 @@ def _flown_cases(limit: LimitState, estimate: RareEvent) -> tuple[list[Column], 
 
 def _result_record(limit: LimitState, estimate: RareEvent) -> dict[str, Any]:
     """The result as JSON; None for infinite values."""
-    metric = next(candidate for candidate in limit.campaign.model.metrics if candidate.name == limit.requirement.metric)
+    metric = limit.metric_field
     inputs, remark = _failed_inputs(limit, estimate)
     return {
         "requirement": asdict(limit.requirement),

@@ -61,7 +61,9 @@ def _campaign_facts(manifest: Mapping[str, Any]) -> dict[str, str]:
     campaign = manifest.get("campaign", {})
     facts = {key: str(campaign.get(key, "")) for key in ("model", "design", "seed", "cases")}
     for record in manifest.get("inputs", []):
-        facts[f"dispersion {record['name']}"] = _joined(record, "distribution", "bounds")
+        facts[f"dispersion {record['name']}"] = ", ".join(
+            str(record[key]) for key in ("distribution", "bounds") if record.get(key)
+        )
         facts[f"nominal {record['name']}"] = str(record.get("nominal", ""))
     for kind in ("parameter", "setting"):
         for record in manifest.get(f"{kind}s", []):
@@ -79,10 +81,6 @@ def _requirement(record: Mapping[str, Any]) -> str:
     ]
     wanted = f"in {record.get('share')} of the cases with confidence {record.get('confidence')}"
     return f"{record.get('metric')} {' and '.join(limits)} {wanted}"
-
-
-def _joined(record: Mapping[str, Any], *keys: str) -> str:
-    return ", ".join(str(record[key]) for key in keys if record.get(key))
 
 
 def _short(digest: Any) -> str:

@@ -34,17 +34,13 @@ def trace_case(
     flight = _TracedFlight(model, seconds)
     time, _, states, _ = fly_interpreted(flight, inputs, noise, seed, _WITHOUT_END)
     rows = pd.DataFrame(flight.rows)
-    trace = rows[~_repeats(rows)].reset_index(drop=True)
+    before = rows.shift()
+    repeats = (rows.eq(before) | (rows.isna() & before.isna())).all(axis=1)  # a sample or an event that changes nothing
+    trace = rows[~repeats].reset_index(drop=True)
     units = {"t_s": "s", **{field.name: field.unit for field in (*model.states, *model.quantities)}}
     trace.attrs["units"] = {name: units.get(name, "") for name in trace.columns}
     end = {f"end_{field.name}": row[0] / field.si_factor for field, row in zip(model.states, states, strict=True)}
     return trace, {"end_time_s": float(time[0]), **end}
-
-
-def _repeats(rows: pd.DataFrame) -> pd.Series:
-    """Where a row is the one before: of a sample or an event that changes nothing."""
-    before = rows.shift()
-    return (rows.eq(before) | (rows.isna() & before.isna())).all(axis=1)
 
 
 class _TracedFlight(InterpretedFlight):

@@ -77,16 +77,11 @@ def tune(
     """
     tuning = campaign.tuning
     if tuning is None:
-        raise CampaignError(
-            campaign.name,
-            [
-                Problem(
-                    "tuning",
-                    "is missing: nothing says what is to be tuned, and for what; write [tuning.parameter.NAME] and "
-                    "[tuning.objective.NAME], as flexible_satellite/stage_1 does",
-                )
-            ],
+        message = (
+            "is missing: nothing says what is to be tuned, and for what; write [tuning.parameter.NAME] and "
+            "[tuning.objective.NAME], as flexible_satellite/stage_1 does"
         )
+        raise CampaignError(campaign.name, [Problem("tuning", message)])
     path = Path(out) if out is not None else default_folder(campaign.name)
     plan: dict[str, Any] = {
         "seed": (tuning.seed if tuning.seed is not None else campaign.seed % _SEED_RANGE) if seed is None else seed,

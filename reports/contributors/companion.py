@@ -83,7 +83,7 @@ def _about(flown: Flown, contributions: Contributions, metric: str, k: int) -> I
                 [sigma_contribution(contributor, sigma) or 0.0 for contributor in contributions.by_metric[metric]]
             )
         )
-        rest = float(np.sqrt(max(sigma**2 - explained**2, 0.0)))
+        rest = float(np.sqrt(max(sigma - explained, 0.0)) * np.sqrt(sigma + explained))  # squares may overflow
         told = [spread_text(flown, metric, value) for value in (sigma, explained, rest)]
         yield f"σ {told[0]}; root sum square {told[1]}, rest {told[2]}"
 

@@ -18,7 +18,8 @@ _WORD = re.compile(
     r"\[[^\]]{1,22}\]|[^ \n_/-]*\d\u202f[^ \n]+ ?|[^ \n_/-]*[ \n_/-]?"
 )  # not broken: a word, an interval
 _VALUE = re.compile(r"[^ ]+ ?")  # of a column of numbers: with its unit, such as m/s
-_JOINED = re.compile(r"(?<=,) | (?=/ )|(?<=/) ")  # spaces within an interval, and within used / tried
+# Spaces within an interval and within used / tried: all of them, or all but the one before the stroke.
+_JOINED = re.compile(r"(?<=,) | (?=/ )|(?<=/) "), re.compile(r"(?<=,) |(?<=/) ")
 NO_BREAK = "\N{NO-BREAK SPACE}"
 COMMAND = 36  # letters of a command that is not broken
 BOLD = 1.15  # of the head
@@ -26,17 +27,35 @@ SLACK = 1.06  # of a text over its lines: a line seldom ends at the edge
 
 
 def unbroken(table: Table) -> Table:
-    """The table with intervals and counts in its columns of numbers held on one line, where the page has the room."""
+    """The table with the intervals and counts in its columns of numbers on one line each, where the page has the room.
+
+    A count is broken before its stroke where the table takes fewer lines so.
+    """
+    found = [one for one in (_joined(table, spaces) for spaces in _JOINED) if _least(one) < ROOM]
+    return min(found, key=_printed_lines, default=table)
+
+
+def _joined(table: Table, spaces: re.Pattern[str]) -> Table:
+    """The table with these spaces in its columns of numbers made unbreakable."""
     numbers = [column.kind == "number" for column in table.columns]
     rows = tuple(
         tuple(
-            replace(cell, text=_JOINED.sub(NO_BREAK, cell.text)) if is_number else cell
+            replace(cell, text=spaces.sub(NO_BREAK, cell.text)) if is_number else cell
             for is_number, cell in zip(numbers, cells, strict=True)
         )
         for cells in table.rows
     )
-    joined = replace(table, rows=rows)
-    return joined if _sizes(joined)[1].sum() + INSET * len(numbers) < ROOM else table
+    return replace(table, rows=rows)
+
+
+def _least(table: Table) -> float:
+    """Width that the longest words of all columns take."""
+    return float(_sizes(table)[1].sum() + INSET * len(table.columns))
+
+
+def _printed_lines(table: Table) -> float:
+    """Lines that the rows of the table take."""
+    return float(_lines(_sizes(table)[0], np.array(widths(table)) - INSET).max(axis=1).sum())
 
 
 def _sizes(table: Table) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,7 @@
 """Colours that survive colour blindness and grey print: Okabe & Ito's eight, and cividis for fields.
 
 Okabe & Ito, Color Universal Design (2008).  Nunez, Anderton & Renslow, PLoS ONE 13 (2018) e0199239 (cividis).
-Colours with an @ are the page's own and follow its light or dark mode.
+Colours with an @ are the page's own and follow its light or dark mode; so does the blue, which is lighter in the dark.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ INK, MUTED, GRID, PAPER = "@ink", "@muted", "@grid", "@paper"
 
 # What the page colours are on paper, and in a page's style sheet.
 ON_PAPER = {INK: "#1b1f23", MUTED: "#6c757d", GRID: "#dfe3e6", PAPER: "#ffffff"}
-ON_SCREEN = {colour: f"var(--{colour[1:]})" for colour in ON_PAPER}
+ON_SCREEN = {colour: f"var(--{colour[1:]})" for colour in ON_PAPER} | {BLUE: "var(--blue)"}
 
 LINES = (ORANGE, PURPLE, GREEN, SKY, BLUE, VERMILION)  # of cases; the last ones also stand for medians and limits
 DASHES = ("solid", "dash", "dot")

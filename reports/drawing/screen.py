@@ -22,7 +22,11 @@ FEW = 24  # numbers that are written as such
 FLOATS = (1e-30, 1e30)  # largest of some numbers that float32 holds with room to spare
 NEAR = 100.0  # a float32 keeps enough digits of numbers up to so many times their spread
 TITLE_LINE = 17  # pixels
+ABOVE, ROUND_TITLE = 12, 6  # pixels above the axes; more of them where there is a title, besides its lines
+PAD, CAPITAL = 7, 9  # pixels above a title; more of them above two lines, where plotly forgets the first one's height
 WRAP = 28  # characters of a title
+ACROSS, ALONE = 32, 64  # characters of a line of the label below a panel of several, and below a single one
+UPRIGHT = 9  # pixels of height for a character of the label beside a panel
 LONG = 8  # characters of a tick label; of longer ones there are few, or they turn and take the room of the panel
 FRAME = 56  # pixels above and below the rows of a panel that has rows
 BINS = "bins"  # the mark of bars that count cases
@@ -34,20 +38,26 @@ def packed(values: Any) -> Any:
     array = np.asarray(values, dtype=np.float64)
     if array.size <= FEW:
         return [value if isfinite(value) else None for value in array.tolist()]
-    size = float(np.abs(array[np.isfinite(array)]).max(initial=0.0))
-    return typed(array, "f8" if _alike(array) or (size and not FLOATS[0] <= size <= FLOATS[1]) else "f4")
+    return typed(array, "f8" if _alike(array) else _kind(array))
 
 
 def column(values: np.ndarray) -> dict[str, Any]:
-    """Numbers of all cases for the page's scripts: four bytes each, from the smallest where they differ little."""
+    """Numbers of all cases for the page's scripts: four bytes each where these hold them, from the smallest where they
+    differ little."""
     start = float(values[np.isfinite(values)].min()) if _alike(values) else 0.0
-    return {**typed(values - start, "f4"), **({"start": start} if start else {})}
+    return {**typed(values - start, _kind(values - start)), **({"start": start} if start else {})}
+
+
+def _kind(values: np.ndarray) -> str:
+    """Four bytes a number, or eight where a float32 does not hold the largest."""
+    size = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    return "f8" if size and not FLOATS[0] <= size <= FLOATS[1] else "f4"
 
 
 def _alike(values: np.ndarray) -> bool:
     """Whether a float32 keeps too few digits of the differences between these numbers."""
     finite = values[np.isfinite(values)]
-    return bool(finite.size and np.abs(finite).max() > NEAR * np.ptp(finite))
+    return bool(finite.size and 0.5 * np.abs(finite).max() / NEAR > np.ptp(0.5 * finite))  # halves: no overflow
 
 
 def typed(values: np.ndarray, kind: str) -> dict[str, str]:
@@ -64,13 +74,14 @@ def plain(text: str) -> str:
 
 def specifications(drawing: Drawing) -> list[dict[str, Any]]:
     """The "data" and "layout" of each panel; colours may be "@ink" and other page colours."""
-    return [{"data": [trace for mark in plot.marks for trace in traced(mark, plot)], "layout": _layout(plot)}
-            for plot in drawing.plots]  # fmt: skip
+    characters = ALONE if len(drawing.plots) == 1 else ACROSS
+    return [{"data": [trace for mark in plot.marks for trace in traced(mark, plot)],
+             "layout": _layout(plot, characters)} for plot in drawing.plots]  # fmt: skip
 
 
 def history_panel(time: str) -> dict[str, Any]:
     """The layout of one quantity of a single case, still without its title."""
-    layout = _layout(Plot((), Axis(time), Axis(most=5), "quantity", 240.0))
+    layout = _layout(Plot((), Axis(time), Axis(most=5), "quantity", 240.0), ACROSS)
     for axis in ("xaxis", "yaxis"):
         del layout[axis]["range"]
     return layout
@@ -156,8 +167,14 @@ def _field(mark: Field, plot: Plot) -> Iterator[dict[str, Any]]:
     }  # fmt: skip
 
 
-def _axis(axis: Axis, ends: tuple[float, float], **own_keys: Any) -> dict[str, Any]:
-    """The layout of one axis, in the colours of the page."""
+def _lines(text: str, characters: int) -> str:
+    """The text in lines of at most so many characters, where its words allow that."""
+    lines = (line for part in text.split("\n") for line in wrap(part, characters, break_long_words=False))
+    return "<br>".join(map(plain, lines))
+
+
+def _axis(axis: Axis, ends: tuple[float, float], characters: int, **own_keys: Any) -> dict[str, Any]:
+    """The layout of one axis, in the colours of the page; characters : of a line of its label."""
     own = axis.ticks
     if own is None and axis.log:
         found = axis_ticks(*ends, axis.most, log=True)
@@ -165,7 +182,7 @@ def _axis(axis: Axis, ends: tuple[float, float], **own_keys: Any) -> dict[str, A
         own = tuple(zip(found, map(number, found) if power else texts, strict=True))
     longest = max(map(len, numerals(axis_ticks(*ends, axis.most))[0]), default=0)
     return {
-        "title": {"text": plain(axis.label), "standoff": 8, "font": {"size": 13}},
+        "title": {"text": _lines(axis.label, characters), "standoff": 8, "font": {"size": 13}},
         "automargin": True, "gridcolor": GRID, "linecolor": MUTED, "tickcolor": MUTED, "zeroline": False,
         "ticks": "outside", "ticklen": 4, "showline": True, "exponentformat": "power", "minexponent": 5,
         "nticks": axis.most + 1 if longest < LONG else 4,
@@ -178,16 +195,19 @@ def _axis(axis: Axis, ends: tuple[float, float], **own_keys: Any) -> dict[str, A
     }  # fmt: skip
 
 
-def _layout(plot: Plot) -> dict[str, Any]:
+def _layout(plot: Plot, characters: int) -> dict[str, Any]:
+    """The layout of a panel; characters : of a line of the label below it."""
     x_ends, y_ends = plot.ends
     cases = any(getattr(mark, "cases", None) is not None or getattr(mark, "column", "") for mark in plot.marks)
     equal = {"scaleanchor": "x", "scaleratio": 1} if plot.equal else {}
-    lines = [plain(line) for part in plot.title.split("\n") for line in wrap(part, WRAP)]
+    title = _lines(plot.title, WRAP)
+    lines = title.count("<br>") + 1 if title else 0
+    top = ABOVE + (ROUND_TITLE + TITLE_LINE * lines if lines else 0)  # plotly's own room puts two lines out of sight
     return {
-        "title": {"text": "<br>".join(lines), "font": {"size": 12.5}, "x": 0.0, "xref": "paper", "y": 1.0,
-                  "yref": "container", "yanchor": "top", "automargin": True, "pad": {"t": 4, "b": 2}},
-        "height": round(plot.height + TITLE_LINE * max(len(lines) - 1, 0) + (FRAME if plot.y.ticks else 0)),
-        "margin": {"l": 50, "r": 14, "t": 12, "b": 44, "pad": 0},
+        "title": {"text": title, "font": {"size": 12.5}, "x": 0.0, "xref": "paper", "y": 1.0,
+                  "yref": "container", "yanchor": "top", "pad": {"t": PAD + (CAPITAL if lines > 1 else 0)}},
+        "height": round(plot.height + TITLE_LINE * max(lines - 1, 0) + (FRAME if plot.y.ticks else 0)),
+        "margin": {"l": 50, "r": 14, "t": top, "b": 44, "pad": 0},
         "font": {"family": "inherit", "size": 12, "color": INK},
         "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
         "hoverlabel": {"bgcolor": PAPER, "bordercolor": MUTED, "font": {"color": INK}, "namelength": -1},
@@ -195,5 +215,6 @@ def _layout(plot: Plot) -> dict[str, Any]:
         "uniformtext": {"mode": "show", "minsize": 5},
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
         "dragmode": "select" if cases else "zoom",
-        "xaxis": _axis(plot.x, x_ends), "yaxis": _axis(plot.y, y_ends, **equal),
+        "xaxis": _axis(plot.x, x_ends, characters),
+        "yaxis": _axis(plot.y, y_ends, round(plot.height) // UPRIGHT, **equal),
     }  # fmt: skip

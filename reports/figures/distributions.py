@@ -8,7 +8,7 @@ import numpy as np
 from mc_engine.statistics import Quantile, Summary
 from reports.drawing.marks import Axis, Bar, Drawing, Limit, Line, Mark, Plot
 from reports.drawing.palette import BLUE, GREEN, INK, ORANGE, SKY, VERMILION
-from reports.text.numbers import count, interval, number, percent
+from reports.text.numbers import count, interval, limit_number, number, percent
 
 FEWEST_BINS, MOST_BINS = 8, 48
 CENTRAL = (0.005, 0.995)  # what a histogram must show well
@@ -54,9 +54,10 @@ def histogram(
     for places, words, key, colour, dash in (
         (known, "nominal", "nominal", INK, "dot"), (limits, "limit", "required limit", VERMILION, "solid"),
     ):  # fmt: skip
+        shown = number if key == "nominal" else limit_number
         near = [at for at in places if _near(at, edges)]
-        far = [number(at) for at in places if at not in near]
-        marks += [Limit(at, "x", colour, f"{key} {number(at)}", dash, key=key) for at in near]
+        far = [shown(at) for at in places if at not in near]
+        marks += [Limit(at, "x", colour, f"{key} {shown(at)}", dash, key=key) for at in near]
         beyond += [f"{words}{'s' * (len(far) > 1)} {' and '.join(far)}"] if far else []
     if normal:
         words = f"printed normal distribution, {number(normal[0])} ± {number(normal[1])} (1 σ)"

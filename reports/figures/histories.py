@@ -8,7 +8,7 @@ import numpy as np
 
 from reports.drawing.marks import Axis, Band, Drawing, Limit, Line, Mark, Plot, between
 from reports.drawing.palette import DASHES, INK, LINES, MUTED, SKY, VERMILION
-from reports.text.numbers import count, number, percent
+from reports.text.numbers import count, limit_number, percent
 
 SAMPLES = 400  # on the screen and on paper; extremes between them are kept
 OPACITIES = (0.25, 0.45)  # of the wider and of the narrower band
@@ -90,7 +90,7 @@ def history_plot(
         near = bottom - FAR * (top - bottom) <= limit.at <= top + FAR * (top - bottom)
         style, key = ("dash", limit.other) if limit.other else ("solid", "required limit")
         marks.append(Limit(limit.at, "y", VERMILION, limit.words, style, 2.0, near, key if near else ""))
-        far += [] if near else [f"limit {number(limit.at)} beyond the axis"]
+        far += [] if near else [f"limit {limit_number(limit.at)} beyond the axis"]
     axes = Axis(time, margin=0.0), Axis(name=label, most=5)
     return Plot(tuple(marks), *axes, "\n".join([label, *far]), 260.0, quantity=name)
 

@@ -8,7 +8,7 @@ import scipy  # loads its packages when they are used
 from mc_engine.statistics.drivers import SuccessCurve
 from reports.drawing.marks import Axis, Bar, Limit, Line, Mark, Plot, Points, between, intervals, names_axis
 from reports.drawing.palette import BLUE, INK, MUTED, SKY, VERMILION, blended
-from reports.text.numbers import count, number, percent
+from reports.text.numbers import count, limit_number, number, percent
 
 WEAK = "#f7f7f7"  # the colour of no correlation
 LIGHT = 0.6  # a cell of a weaker correlation is light, and takes black numbers
@@ -85,7 +85,7 @@ def probability_plot(
     ]
     reach = Axis().ends([values])
     near = [at for at in limits if reach[0] <= at <= reach[1]]
-    marks += [Limit(at, "x", VERMILION, f"required limit {number(at)}", key="required limit") for at in near]
+    marks += [Limit(at, "x", VERMILION, f"required limit {limit_number(at)}", key="required limit") for at in near]
     most = 1.04 * max(abs(float(ends[0])), 2.2)
     ticks = tuple((float(scipy.special.ndtri(p)), percent(p, 4)) for p in TICKS if abs(scipy.special.ndtri(p)) <= most)
     y = Axis(name="cumulative probability", reach=(-most, most), ticks=ticks)

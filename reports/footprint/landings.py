@@ -9,7 +9,7 @@ from mc_engine.statistics.footprint import Footprint, footprint
 from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, LocalPlane
 from reports.footprint.map_files import Mark
 from reports.run.flown import Flown
-from reports.text.numbers import count, number, with_unit
+from reports.text.numbers import count, limit_number, with_unit
 
 TARGET = "target"
 
@@ -95,7 +95,7 @@ def _down(flown: Flown, figure: FootprintFigure) -> np.ndarray:
 
 def height_limit(flown: Flown, figure: FootprintFigure) -> str:
     column, limit = figure.ends_below or ("", 0.0)
-    return with_unit(number(limit), flown.unit(column))
+    return with_unit(limit_number(limit), flown.unit(column))
 
 
 def planet_of(flown: Flown, figure: FootprintFigure) -> str:

@@ -118,4 +118,6 @@ def _cell_text(cell: Cell, column: Column) -> str:
     if cell.tone:
         text = f"**{MARKS[cell.tone]}{text}**"
     small = escaped(cell.small)
-    return f"{text} ({small})" if small and text else text or small
+    if small and text:
+        return f"{text} {small}" if cell.small.startswith(("(", "[")) else f"{text} ({small})"
+    return text or small

@@ -19,6 +19,9 @@ from reports.run.contributions import contributions as contributions_of
 from reports.text.numbers import axis_label, count, named, words
 
 NEGLIGIBLE = 1e-7  # of the size of a metric
+SQUARABLE = 1e140  # largest number, and inverse of the smallest spread, whose squares over all cases can be summed
+NEGLIGIBLE_SPREAD = "standard deviation below a ten-millionth of the value"
+UNSQUARABLE = "numbers beyond 1e140 or a standard deviation below 1e-140"
 
 
 @dataclass(frozen=True)
@@ -243,7 +246,7 @@ class Flown:
     def key_metrics(self) -> list[str]:
         """The metrics that matter: those with a requirement, then those that the model maps or plots; else all.
 
-        Without those of a negligible spread, of which distributions, contributors and convergence say nothing.
+        Without those that are not drawn, of which distributions, contributors and convergence say nothing.
         """
         wanted = [verdict.metric for verdict in self.verdicts]
         for figure in self.figures:
@@ -251,21 +254,31 @@ class Flown:
             wanted += [figure.y, figure.x] if isinstance(figure, ScatterFigure) else []
         metrics = [fact.name for fact in self.with_role("metric")]
         known = [name for name in dict.fromkeys(wanted) if name in metrics]
-        return [name for name in known or metrics if not self.negligible(name)] or metrics
+        drawn = [name for name in known or metrics if not self.undrawn(name)]
+        return drawn or [name for name in metrics if self.undrawn(name) != UNSQUARABLE]
 
     def limits(self, metric: str) -> Limits:
         """The tightest limits that the requirements set on a metric."""
         return limits_on(metric, self.manifest.get("requirements", []))
 
-    def negligible(self, name: str) -> bool:
-        """Whether the spread of a column is too small to draw: no limit on it, and σ below a ten-millionth of its size.
+    def undrawn(self, name: str) -> str:
+        """Why no figure shows the spread of a column, in words: it is negligible, or not to be squared; else empty.
 
-        Such a spread is mostly the tolerance of an event or of the integration.
+        Negligible: no limit on it, and σ below a ten-millionth of its size, mostly the tolerance of an event or of the
+        integration.
         """
         summary = self.summaries.get(name) or summarize(self.values(name), probabilities=())
-        if summary.constant or summary.sd is None or self.limits(name) != Limits():
-            return False
-        return summary.sd < NEGLIGIBLE * max(abs(summary.minimum or 0.0), abs(summary.maximum or 0.0))
+        if summary.constant or summary.sd is None:
+            return ""
+        size = max(abs(summary.minimum or 0.0), abs(summary.maximum or 0.0))
+        if size > SQUARABLE or not summary.sd >= 1.0 / SQUARABLE:
+            return UNSQUARABLE
+        return NEGLIGIBLE_SPREAD if self.limits(name) == Limits() and summary.sd < NEGLIGIBLE * size else ""
+
+    def unsquarable(self, *names: str) -> str:
+        """The columns among these that have such numbers that nothing can be computed of their squares; else empty."""
+        found = [name for name in names if self.undrawn(name) == UNSQUARABLE]
+        return f"{UNSQUARABLE}: {self.listed(found)}" if found else ""
 
     def largest_is_worst(self, metric: str) -> bool:
         """Whether the bad end of a metric is the upper one; with two limits, that with the smaller margin."""

@@ -15,7 +15,7 @@ import numpy as np
 from mc_engine.statistics import Verdict
 from reports.figures.histories import HistoryLimit
 from reports.run.flown import Flown
-from reports.text.numbers import number, with_unit
+from reports.text.numbers import limit_number, with_unit
 
 NOMINAL = -1
 FEWEST = 3  # saved cases that bear it out
@@ -39,7 +39,7 @@ def _limit_lines(
     for sign, own, side in (("≤", verdict.at_most, 1.0), ("≥", verdict.at_least, -1.0)):
         if saved and own is not None:
             at = flown.told(quantity, own)
-            words = f"{flown.words(verdict.metric)} {sign} {with_unit(number(at), flown.unit(quantity))}"
+            words = f"{flown.words(verdict.metric)} {sign} {with_unit(limit_number(at), flown.unit(quantity))}"
             if all(_is_near(value, side * (side * y).max(), y) for value, y in saved):
                 yield HistoryLimit(at, f"required limit: {words}")
             elif other := _other_end(saved, side):

@@ -11,7 +11,7 @@ from mc_engine.statistics.worst import Limits
 from reports.document.blocks import Cell, Column, Table
 from reports.run.flown import ColumnFacts, Flown
 from reports.run.outcomes import inside
-from reports.text.numbers import axis_label, column_texts, count, exact, number, with_unit
+from reports.text.numbers import axis_label, column_texts, count, exact, limit_number, with_unit
 
 WORST = 5
 WORST_METRICS = 4
@@ -78,7 +78,8 @@ def _worst_words(flown: Flown, metric: str) -> str:
     limits = flown.limits(metric)
     if not limits.two_sided:
         return f"Cases with the {'smallest' if limits.at_least is not None else 'largest'} {flown.words(metric)}"
-    ends = [with_unit(number(end), flown.unit(metric)) for end in (limits.at_least, limits.at_most)]
+    both = [end for end in (limits.at_least, limits.at_most) if end is not None]
+    ends = [with_unit(limit_number(end), flown.unit(metric)) for end in both]
     return f"Cases with the smallest margin of {flown.words(metric)} to its limits, {ends[0]} and {ends[1]}"
 
 

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from itertools import compress
 
-import contourpy
 import numpy as np
 
 from mc_engine.model.figures import CorridorFigure
-from mc_engine.statistics import SurfaceMap, Verdict, map_metric
+from mc_engine.statistics import SurfaceMap, Verdict
+from mc_engine.statistics.maps import map_metrics
 from reports.document.blocks import FigureBlock, Table
 from reports.drawing.marks import Points
 from reports.figures.clouds import LIMIT_SETS, Outline, case_scatter
@@ -39,6 +39,8 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
     if not used.size:
         lacking = f"none of {count(flown.n_held)} cases has both {flown.words(figure.x)} and {flown.words(figure.y)}"
         return f"{figure.title}: not drawn; {flown.absence(figure.x, figure.y) or lacking}."
+    if reason := flown.unsquarable(figure.x, figure.y):
+        return f"{figure.title}: not drawn; {reason}."
     words, member = _classes([verdict.name for verdict in verdicts], violated, inside_words(flown, verdicts))
     # every violation stays in the picture, as far as there is room
     rows = thinned_rows(used, np.flatnonzero(violated.any(axis=0))[: len(used) // 2 if used.size < 4000 else 2000])
@@ -90,11 +92,15 @@ def _limit_lines(
     Of a count, such as that of exits, the surface between two cases means nothing.
     """
     x, y = flown.values(figure.x), flown.values(figure.y)
+    metrics = {name: flown.values(name) for name in dict.fromkeys(verdict.metric for verdict in verdicts)}
+    metrics = {name: values for name, values in metrics.items() if _continuous(values)}
+    surfaces = dict(zip(metrics, map_metrics(x, y, [*metrics.values()]), strict=True))
     for verdict, beyond in zip(verdicts, violated, strict=True):
-        values = flown.values(verdict.metric)
-        surface = map_metric(x, y, values) if _continuous(values) else None
-        if surface is None or not _decides(surface, x, y, values, beyond):
+        surface = surfaces.get(verdict.metric)
+        if surface is None or not _decides(surface, x, y, metrics[verdict.metric], beyond):
             continue
+        import contourpy
+
         generator = contourpy.contour_generator(surface.x, surface.y, np.ma.masked_invalid(surface.value))
         for limit in (verdict.at_most, verdict.at_least):
             curves = [] if limit is None else generator.lines(limit)

@@ -2,14 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from math import ceil
 
 import numpy as np
 
-from mc_engine.model.figures import MapFigure, ScatterFigure
-from mc_engine.statistics import map_metric
-from mc_engine.statistics.maps import FEWEST, LEAST_EXPLAINED, explained_share
+from mc_engine.model.figures import ScatterFigure
 from mc_engine.statistics.summary import nearly_equal
 from reports.document.blocks import FigureBlock
 from reports.drawing.marks import Drawing, Plot, Points, nominal_ring
@@ -17,29 +14,26 @@ from reports.drawing.palette import VERMILION
 from reports.figures.clouds import Outline, case_scatter
 from reports.figures.distributions import histogram, histograms
 from reports.figures.histories import Envelope, HistoryLimit, HistoryLine, history_figure, history_plot, phase_limits
-from reports.figures.maps import metric_map
 from reports.run.cloud_regions import cloud_regions
 from reports.run.default_figures import history_figures, scatter_figures
-from reports.run.flown import Flown
+from reports.run.flown import NEGLIGIBLE_SPREAD, UNSQUARABLE, Flown
 from reports.run.history_bands import FEWEST_CASES, OUTER, fair_cases, history_envelopes, outer_percentile
 from reports.run.history_limits import history_limits
 from reports.run.outcomes import case_outcomes, outcome_names
 from reports.run.phases import phase_times, phases_in_words, quantity_names
 from reports.sections.case_tables import FEW_CASES, input_words
 from reports.sections.published import published_law
-from reports.text.numbers import axis_label, count, counted, number, percent, with_unit
+from reports.text.numbers import axis_label, count, counted, percent
 
 POINTS_SHOWN = 2000
 FEWEST_SHOWN = 50  # of an outcome, as far as there are so many
 MOST_PANELS = 16  # of a figure
 LOW_PANEL = 160.0  # height of the histograms of other metrics
-STRONGEST_INPUTS = 4  # among whose pairs the one is looked for that explains most
 COLOURED_CASES = 8
 COLOURED_OVER_BANDS = 2  # more would hide the band
 WORST_RANKS = 10
 HISTORIES_SHOWN = 40
 FEWEST_VALUES = 10  # of a histogram
-NEGLIGIBLE_SPREAD = "standard deviation below a ten-millionth of the value"
 NOMINAL = -1
 
 
@@ -64,84 +58,6 @@ def thinned_by_outcome(rows: np.ndarray, outcome: np.ndarray, most: int = POINTS
     return np.sort(np.concatenate(chosen)) if chosen else rows
 
 
-def map_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
-    """The model's maps; a sentence in place of one that cannot be drawn, one for all over inputs not dispersed."""
-    elsewhere = []
-    for figure in (drawn for drawn in flown.figures if isinstance(drawn, MapFigure)):
-        absent = flown.absence(figure.x, figure.y)
-        if not absent:
-            yield _map_block(flown, figure)
-        elif not figure.upstream:
-            elsewhere.append(f"{figure.title} ({absent})")
-    if elsewhere:
-        yield f"Not drawn: {'; '.join(elsewhere)}."
-
-
-def _map_block(flown: Flown, figure: MapFigure) -> FigureBlock | str:
-    x, y, z = (flown.values(name) for name in (figure.x, figure.y, figure.metric))
-    used = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z))
-    reason = flown.absence(figure.metric) or _no_map(flown, figure, x[used], y[used], z[used])
-    if reason:
-        return f"{figure.title}: not drawn; {reason}."
-    surface = map_metric(x, y, z)
-    if surface is not None and surface.explained < LEAST_EXPLAINED:
-        return f"{figure.title}: not drawn; {_too_little_explained(flown, figure, surface.explained)}."
-    if surface is None or not np.isfinite(surface.value).any():
-        over = f"{flown.words(figure.x)} and {flown.words(figure.y)}"
-        few = f"the run has too few cases over {over} for a map"
-        unsure = (
-            f"nowhere is its surface over {over} sure enough: other inputs scatter it, the {count(used.size)} cases "
-            "are too few, or they lie on a line"
-        )
-        return f"{figure.title}: not drawn; {few if used.size < FEWEST else unsure}."
-    rows = thinned_rows(used, flown.rows(flown.worst(figure.metric, WORST_RANKS)["case_id"]))
-    labels = flown.axis(figure.x), flown.axis(figure.y), flown.axis(figure.metric)
-    drawing = metric_map(
-        surface,
-        np.column_stack([x[rows], y[rows]]),
-        z[rows],
-        flown.case_ids[rows],
-        labels,
-        flown.unit(figure.metric),
-        n_points=int(used.size),
-        rings=nominal_rings(flown, figure.x, figure.y),
-        columns=(figure.x, figure.y, figure.metric),
-    )
-    return FigureBlock(f"{figure.title}.", drawing, "wide")
-
-
-def _too_little_explained(flown: Flown, figure: MapFigure, share: float) -> str:
-    """How little the two inputs explain, and which two explain most."""
-    x, y = flown.words(figure.x), flown.words(figure.y)
-    said = f"{x} and {y} together explain {percent(max(share, 0.0), 0)} of the variance of {flown.words(figure.metric)}"
-    names = [
-        contributor.name
-        for contributor in flown.contributors(figure.metric)
-        if np.isfinite(flown.values(contributor.name)).any()
-    ]
-    values = flown.values(figure.metric)
-    pairs = {
-        (a, b): explained_share(flown.values(a), flown.values(b), values)
-        for a, b in combinations(names[:STRONGEST_INPUTS], 2)
-        if {a, b} != {figure.x, figure.y}
-    }
-    best = max(pairs, key=lambda pair: np.nan_to_num(pairs[pair], nan=-1.0), default=None)
-    if best is None or not pairs[best] > share:
-        return f"{said}, and no two inputs more"
-    a, b = (flown.words(name) for name in best)
-    return f"{said}; the two inputs that explain most are {a} and {b}, {percent(max(pairs[best], 0.0), 0)}"
-
-
-def _no_map(flown: Flown, figure: MapFigure, x: np.ndarray, y: np.ndarray, z: np.ndarray) -> str:
-    """Why there is nothing to map in the cases that have all three numbers; empty if there is."""
-    if not z.size:
-        return f"no case has a number for all of {flown.listed((figure.metric, figure.x, figure.y))}"
-    if z.size > 1 and nearly_equal(z.min(), z.max()):
-        return f"{flown.words(figure.metric)} is {with_unit(number(z[0]), flown.unit(figure.metric))} in all cases"
-    flat = [name for name, values in ((figure.x, x), (figure.y, y)) if nearly_equal(values.min(), values.max())]
-    return f"{flown.words(flat[0])} is the same in all cases" if z.size > 1 and flat else ""
-
-
 def nominal_rings(flown: Flown, x: str, y: str) -> tuple[Points, ...]:
     """A ring around the nominal case, if it has both numbers."""
     place = flown.nominal_value(x), flown.nominal_value(y)
@@ -163,8 +79,9 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
             flown.absence(figure.x, figure.y) or f"no case has both {flown.words(figure.x)} and {flown.words(figure.y)}"
         )
         return f"{figure.title}: not drawn; {reason}."
-    if narrow := [name for name in (figure.x, figure.y) if flown.negligible(name)]:
-        return f"{figure.title}: not drawn, {NEGLIGIBLE_SPREAD}: {flown.listed(narrow)}."
+    if reasons := [(why, name) for name in (figure.x, figure.y) if (why := flown.undrawn(name))]:
+        told = "; ".join(f"{why}: {flown.listed([name])}" for why, name in reasons)
+        return f"{figure.title}: not drawn, {told}."
     regions = cloud_regions(flown, (figure.x, figure.y), x[used], y[used])
     drawing = outcome_scatter(flown, figure.x, figure.y, regions)
     impossible = bool(regions) and not any(region.kind == "ellipse" for region in regions)
@@ -201,7 +118,10 @@ def distribution_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
             name for name, item in found if 0 < item.n_used < FEWEST_VALUES and not item.constant
         ],
         "the same in all cases that have it": [name for name, item in found if item.constant],
-        NEGLIGIBLE_SPREAD: [name for name, item in found if item.n_used >= FEWEST_VALUES and flown.negligible(name)],
+        **{
+            why: [name for name, item in found if item.n_used >= FEWEST_VALUES and flown.undrawn(name) == why]
+            for why in (NEGLIGIBLE_SPREAD, UNSQUARABLE)
+        },
         "no case has a number": [name for name, item in found if item.n_used == 0],
     }
     yield from (f"Not drawn, {reason}: {flown.listed(names)}." for reason, names in reasons.items() if names)
@@ -215,7 +135,7 @@ def other_distributions(flown: Flown) -> Iterator[FigureBlock]:
 def _drawable(flown: Flown) -> tuple[list[str], list[str]]:
     """Metrics with a distribution: those that matter, and the others."""
     enough = [name for name, item in flown.summaries.items() if item.n_used >= FEWEST_VALUES and not item.constant]
-    names = [name for name in enough if not flown.negligible(name)]
+    names = [name for name in enough if not flown.undrawn(name)]
     return [name for name in flown.key_metrics if name in names], [
         name for name in names if name not in flown.key_metrics
     ]

@@ -9,7 +9,7 @@ from mc_engine.statistics.worst import Limits
 from reports.document.blocks import Card
 from reports.run.flown import Flown
 from reports.sections.tables import TONES, limit_text
-from reports.text.numbers import count, number, percent, percentile, with_unit
+from reports.text.numbers import beside_limit, count, limit_number, number, percent, percentile, with_unit
 
 MOST_COSTS = 4
 
@@ -77,7 +77,7 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         if limits == Limits() or limits.two_sided:
             rest += _tails(flown, summary, flown.stated.outer)
             low, high = (number(end, 4, spread) for end in (summary.minimum, summary.maximum))
-            answer = f"{low} to {with_unit(high, unit)}{_of_limits(limits, unit)}"
+            answer = f"{low} to {with_unit(high, unit)} in the cases flown{_against(limits, unit)}"
             yield Card(flown.words(name), answer, f"{'; '.join([*rest, f'from {used}'])}.")
             continue
         large = limits.at_most is not None
@@ -88,7 +88,7 @@ def _cost_cards(flown: Flown, names: list[str]) -> Iterator[Card]:
         shown, where = number(end, 4, spread), "in the cases flown"
         for verdict in flown.verdicts:  # what the verification matrix says is demonstrated, in the same digits
             if verdict.metric == name and verdict.demonstrated is not None:
-                shown = number(verdict.demonstrated)
+                shown = beside_limit(verdict.demonstrated, verdict.margin)
                 where = f"in {percent(verdict.share, 3)} of cases, {percent(verdict.confidence)} confidence"
                 break
         answer = f"at {'most' if large else 'least'} {with_unit(shown, unit)} {where}"
@@ -102,18 +102,18 @@ def _tails(flown: Flown, summary: Summary, probabilities: tuple[float, ...]) -> 
         quantile, upper = summary.at(probability), probability > 0.5
         bound = None if quantile is None else (quantile.upper if upper else quantile.lower)
         if quantile is not None and bound is not None:
-            value, limit = (number(end, 4, summary.spread) for end in (quantile.value, bound))
+            value, edge = (number(end, 4, summary.spread) for end in (quantile.value, bound))
             side = "upper" if upper else "lower"
-            yield f"{percentile(probability)} {value}, {each} {side} confidence bound {limit}"
+            yield f"{percentile(probability)} {value}, {each} {side} confidence bound {edge}"
 
 
-def _of_limits(limits: Limits, unit: str) -> str:
-    """The two limits behind a range: of ±5 s, or of 24 to 55 m."""
+def _against(limits: Limits, unit: str) -> str:
+    """The two limits behind a range: limits ±5 s, or limits 24 to 55 m."""
     if limits.at_most is None or limits.at_least is None:
         return ""
     if limits.at_least == -limits.at_most:
-        return f" of ±{with_unit(number(limits.at_most), unit)}"
-    return f" of {number(limits.at_least)} to {with_unit(number(limits.at_most), unit)}"
+        return f", limits ±{with_unit(limit_number(limits.at_most), unit)}"
+    return f", limits {limit_number(limits.at_least)} to {with_unit(limit_number(limits.at_most), unit)}"
 
 
 def _same(flown: Flown, name: str, used: str) -> tuple[str, str]:

@@ -10,7 +10,7 @@ from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.figures.rows import MarginRow, margin_figure
 from reports.run.flown import Flown
 from reports.sections.tables import TONES, limit_text
-from reports.text.numbers import SPACE, count, number, percent, with_unit
+from reports.text.numbers import SPACE, beside_limit, count, number, percent, with_unit
 
 
 def requirement_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str | None]:
@@ -120,8 +120,12 @@ def _limit_shown(verdict: Verdict, unit: str) -> str:
     if verdict.enclosed is not None:
         low, high = verdict.enclosed
         fine = 0.01 * (high - low)  # the ends to four digits of the width
+        if fine < 1e-7 * max(abs(low), abs(high)):
+            return f"{beside_limit(low, fine)} to {with_unit(beside_limit(high, fine), unit)}"
         return f"{number(low, scale=fine)} to {with_unit(number(high, scale=fine), unit)}"
-    return "–" if verdict.demonstrated is None else with_unit(number(verdict.demonstrated), unit)
+    if verdict.demonstrated is None:
+        return "–"
+    return with_unit(beside_limit(verdict.demonstrated, verdict.margin), unit)
 
 
 def risk_table(flown: Flown) -> Table | None:

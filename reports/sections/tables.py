@@ -8,7 +8,18 @@ from mc_engine.units import convert
 from reports.document.blocks import Cell, Column, Table
 from reports.run.chosen_units import chosen_unit
 from reports.run.flown import Flown
-from reports.text.numbers import axis_label, count, exact, fixed, interval, number, percent, spelled, with_unit
+from reports.text.numbers import (
+    axis_label,
+    count,
+    exact,
+    fixed,
+    interval,
+    limit_number,
+    number,
+    percent,
+    spelled,
+    with_unit,
+)
 
 TONES = {"pass": "good", "fail": "bad", "not demonstrable": "open"}
 REASONS_SHOWN = 20
@@ -18,8 +29,8 @@ LONGEST_NUMBER = 14  # letters of a parameter’s value; a longer one is a compu
 
 def limit_text(verdict: Verdict, unit: str) -> str:
     """The required limit in words: at most 2.5 kg."""
-    at_most = None if verdict.at_most is None else with_unit(number(verdict.at_most), unit)
-    at_least = None if verdict.at_least is None else with_unit(number(verdict.at_least), unit)
+    at_most = None if verdict.at_most is None else with_unit(limit_number(verdict.at_most), unit)
+    at_least = None if verdict.at_least is None else with_unit(limit_number(verdict.at_least), unit)
     if at_most and at_least:
         return f"from {at_least} to {at_most}"
     return f"at most {at_most}" if at_most else f"at least {at_least}"

@@ -168,7 +168,7 @@ def _cost_cards(result: dict[str, Any]) -> Iterator[Card]:
         yield Card(
             label="cases",
             answer=count(result["cases"]),
-            detail=f"Plain Monte Carlo needs {number(plain, 3)} for the same standard error, "
+            detail=f"Plain Monte Carlo needs {number(float(f'{plain:.3g}'))} for the same standard error, "
             f"{number(plain / result['cases'], 3)} times as many.",
         )
 
@@ -259,7 +259,7 @@ def _probability_figure(result: dict[str, Any], shown: list[dict[str, Any]]) -> 
     margin, probability = (np.array([item[key] for item in shown]) for key in ("margin", "probability"))
     p, lower, upper = (np.array([result[key]]) for key in ("probability", "lower", "upper"))
     marks = (
-        Limit(0.0, "x", INK, "limit", width=1.0),
+        Limit(0.0, "x", INK, "limit", width=1.0, key="limit"),
         Line(margin, probability, BLUE, "levels", width=2.0, key="levels"),
         Points(margin, probability, BLUE, "levels", size=6.0),
         intervals(lower, upper, np.zeros(1), VERMILION, upright=True),

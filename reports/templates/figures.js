@@ -1,5 +1,6 @@
 "use strict";
-// Figures: drawn as they come in sight, with the page's own colours (those written "@ink"), again when light turns dark.
+// Figures: drawn as they come in sight, with the page's own colours (those written "@ink", and the blue of most marks,
+// which is lighter on a dark page), again when light turns dark.
 const reportFigures = (function () {
   const figures = JSON.parse(document.getElementById("figures").textContent);
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
@@ -16,18 +17,17 @@ const reportFigures = (function () {
   }
 
   function pageColours(onPaper) {
-    if (onPaper) return { ink: "#1b1f23", muted: "#5d666f", grid: "#dfe3e6", paper: "#ffffff" };
+    if (onPaper) return { "@ink": "#1b1f23", "@muted": "#5d666f", "@grid": "#dfe3e6", "@paper": "#ffffff" };
     const style = getComputedStyle(document.documentElement);
-    const found = {};
-    for (const name of ["ink", "muted", "grid", "paper"]) found[name] = style.getPropertyValue("--" + name).trim();
+    const found = { "#0072B2": style.getPropertyValue("--blue").trim() };
+    for (const name of ["ink", "muted", "grid", "paper"]) found["@" + name] = style.getPropertyValue("--" + name).trim();
     return found;
   }
 
   // Only colour members are replaced: a text such as "@ink" in a name stays a text.
   function coloured(value, member) {
     if (typeof value === "string") {
-      const colour = /color$/i.test(member) && value[0] === "@" ? colours[value.slice(1)] : undefined;
-      return colour === undefined ? value : colour;
+      return (/color$/i.test(member) && colours[value]) || value;
     }
     if (ArrayBuffer.isView(value)) return value;
     if (Array.isArray(value)) return member === "customdata" || value.length > 64 ? value : value.map((item) => coloured(item, member));

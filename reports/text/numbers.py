@@ -12,6 +12,7 @@ from mc_engine.units import UNITS, unit_suffix
 NO_BREAK = "\N{NO-BREAK SPACE}"
 SPACE = "\u202f"  # narrow, no-break: groups digits and stands before a unit
 MOST_DIGITS = 8  # of one number in a table
+MOST_GIVEN = 14  # of a limit that somebody wrote; more are of a conversion
 LONGEST_SYMBOL = 3  # letters
 LONGEST_LABEL = 44  # letters of an axis label, without its unit
 _ROUNDING = 1e-12  # of the size of two numbers: closer ones count as equal
@@ -53,6 +54,25 @@ def number(value: float | None, digits: int = 5, scale: float | None = None) -> 
     if scale is None:
         text = _trim(text)
     return "0" if float(text.replace(",", "")) == 0.0 else text.replace(",", SPACE).replace("-", "−")
+
+
+def limit_number(value: float) -> str:
+    """A limit with all digits that it was given, such as those of a Julian date; a converted one in five digits."""
+    given = len(Decimal(repr(float(value))).normalize().as_tuple().digits)
+    return _significant(value, max(given, 5)) if given <= MOST_GIVEN else number(value)
+
+
+def beside_limit(value: float, margin: float | None) -> str:
+    """A number that is compared with a limit: in five digits, or as many as show the margin in three."""
+    if not value or not margin or not isfinite(value) or not isfinite(margin):
+        return number(value)
+    digits = max(3 + floor(log10(abs(value))) - floor(log10(abs(margin))), 5)
+    return number(value) if digits == 5 else _significant(value, min(digits, MOST_GIVEN))
+
+
+def _significant(value: float, digits: int) -> str:
+    """All the digits asked for; `number` has one less beside a power of ten."""
+    return number(value, digits + (abs(value) >= 1e7 or abs(value) < 1e-4))
 
 
 def _power(mantissa: str, exponent: int) -> str:

@@ -33,7 +33,6 @@ from mc_engine.store.journal import plain
 from reports.document.blocks import Block, Document, FigureBlock, Table, numbered
 from reports.run.flown import Flown
 from reports.user_sections import template_process
-from reports.user_sections.markdown_blocks import sections_of
 from reports.user_sections.template_process import BEGIN, END
 
 ANCHOR = "own"
@@ -145,6 +144,8 @@ def with_own_sections(document: Document, template: Path, run: RunFacts, runs: S
 
     Raises TemplateError, one sentence with the line, for whatever is wrong with the template.
     """
+    from reports.user_sections.markdown_blocks import sections_of
+
     named = {word: _named(document, kind) for word, kind in _KINDS.items()}
     try:
         source = template.read_text(encoding="utf-8")

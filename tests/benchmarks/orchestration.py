@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from mc_engine import load_campaign
-from mc_engine.campaign.loading import Retention
+from mc_engine.campaign.parts import Retention
 from mc_engine.runner import runner
 from tests.benchmarks.kernel_clock import KernelClock
 

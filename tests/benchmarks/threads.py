@@ -13,7 +13,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from mc_engine import load_campaign
-from mc_engine.campaign.loading import Campaign, Retention
+from mc_engine.campaign.loading import Campaign
+from mc_engine.campaign.parts import Retention
 from mc_engine.runner import runner
 
 

@@ -31,11 +31,3 @@ def pause_time(command, gain, time_constant, on, off):
 def dead_band(gain, on):
     """Constant command below which no pulse ever comes."""
     return on / gain
-
-
-def shortest_pulse(gain, time_constant, level, on, off):
-    """Length [s] of the shortest pulse that a steady command brings, about that of a command near zero.
-
-    -T ln(1 - h / (K U)), h = on - off: the usual estimate, for the lag falling from h to 0 with a drive of -K U.
-    """
-    return -time_constant * np.log(1.0 - np.asarray(on - off, dtype=float) / (gain * level))

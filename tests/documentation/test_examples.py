@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import typer
 import yaml
+from typer.testing import CliRunner
 
 import mc_engine
 from mc_engine import load_campaign, open_store
@@ -57,9 +58,7 @@ def test_the_job_array_flies_and_resumes_its_pieces_to_one_run(tmp_path, name):
     for line, ours in (("CAMPAIGN=my_case", "small"), ("PIECES=20", "2"), ("WORKERS=16", "1")):
         text = text.replace(line, f"{line.split('=')[0]}={ours}")
     script.write_text(text)
-    subprocess.run(
-        [sys.executable, "-m", "mc_engine", "init", "small"], cwd=tmp_path, env=environment_in(tmp_path), check=True
-    )
+    assert CliRunner().invoke(app, ["init", str(tmp_path / "small")]).exit_code == 0
     file = tmp_path / "small" / "campaign.toml"
     file.write_text(file.read_text().replace("cases = 2000", "cases = 60"))
     for job in ("1", "2", "2"):  # the last one again, as after a kill

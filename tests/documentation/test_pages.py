@@ -9,7 +9,7 @@ import pytest
 from handwritten_pages import PAGES, blocks, commands, name_of
 
 import mc_engine
-from mc_engine.campaign.loading import SHIPPED
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.documentation.commands_page import commands as verbs
 from mc_engine.documentation.website import HOME
 from mc_engine.flight.chunks import fly_nominal

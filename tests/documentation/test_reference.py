@@ -6,7 +6,8 @@ import re
 import pytest
 
 import mc_engine
-from mc_engine.campaign.loading import list_campaigns, schema
+from mc_engine.campaign.search import list_campaigns
+from mc_engine.campaign.sections import schema
 from mc_engine.documentation import commands_page, function_pages, schema_page
 from mc_engine.documentation.campaign_pages import model_reference
 from mc_engine.documentation.markdown_text import escaped, prose

@@ -6,7 +6,7 @@ Every mutation is a function of a seed alone, so that a number in a failed test 
 import re
 import shutil
 
-from mc_engine.campaign.loading import SHIPPED
+from mc_engine.campaign.search import SHIPPED
 
 # Every model, every design, every section, every kind of value.
 BASES = (

@@ -181,7 +181,7 @@ def test_a_worker_of_other_sources_is_refused(campaign, whole):
     """A machine with another engine would write other numbers: it says so, and writes none."""
     setup = WorkerSetup(str(whole.path), str(campaign.directory), CASES)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("mc_engine.runner.flown_campaign.sampling_digest", lambda: "another")
+        patch.setattr("mc_engine.runner.manifest.sampling_digest", lambda: "another")
         with pytest.raises(StoreError, match="was flown by other sources"):
             run_in_worker(setup, Task(0, 10))
     assert run_in_worker(setup, Task(0, 10)).part.rows == 10

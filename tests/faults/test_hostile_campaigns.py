@@ -1,7 +1,5 @@
 """Campaign files that are broken or meant to break: one sentence and exit status 2, within two seconds."""
 
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -62,21 +60,3 @@ def test_a_mutated_campaign_is_refused_in_sentences_or_is_still_a_campaign(bases
     record_property("refused", refused)
     record_property("longest [s]", longest)
     assert refused > 0.7 * count  # the others exchange lines or values that may be exchanged
-
-
-@pytest.mark.parametrize(
-    "content",
-    [
-        b"x = " + b"[" * 100_000,
-        b'[campaign]\nmodel = "\\u0000.py"\n',
-    ],
-)
-def test_a_process_of_the_command_line_says_the_same_and_exits_with_2(tmp_path, content):
-    path = tmp_path / "campaign.toml"
-    path.write_bytes(content)
-    done = subprocess.run(
-        [sys.executable, "-m", "mc_engine", "check", path], capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout) == (REFUSED, "")
-    assert done.stderr.startswith("campaign.toml: ")
-    assert "Traceback" not in done.stderr

@@ -9,7 +9,8 @@ import time
 import pytest
 from trapped import ENVIRONMENT
 
-from mc_engine.campaign.loading import SHIPPED, load_campaign
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.flight.chunks import fly_nominal
 from mc_engine.interruption import COMPLETING
 

@@ -81,11 +81,11 @@ for line in sys.stdin:
 
 
 class Races:
-    def __init__(self, folder, locks=True):
-        """locks : False for a file system that has none, as the racers and all that they start see it."""
+    def __init__(self, folder, before=""):
+        """before : source that the racers and all that they start run first."""
         command = [sys.executable, "-c", SERVER, str(folder), str(CHUNK)]
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-        (folder / "sitecustomize.py").write_text("" if locks else WITHOUT_LOCKS)
+        (folder / "sitecustomize.py").write_text(before)
         path = os.pathsep.join([str(folder), FORKING["PYTHONPATH"]])
         self._server = subprocess.Popen(command, env={**FORKING, "PYTHONPATH": path}, **pipes)
         assert json.loads(self._server.stdout.readline()) == "ready"
@@ -108,11 +108,11 @@ class Races:
         self._server.wait(timeout=30.0)
 
 
-def check_races(folder, count, seed):
+def check_races(folder, count, seed, before=""):
     """So many races; how long the refused ones waited [s]."""
     campaign = stones(folder / "campaign", CASES)
     whole = results(runner.run(campaign, folder / "whole", workers=2, chunk=CHUNK).path)
-    races, rng, waited = Races(folder / "campaign"), np.random.default_rng(seed), []
+    races, rng, waited = Races(folder / "campaign", before), np.random.default_rng(seed), []
     try:
         for number in range(count):
             run = folder / f"run-{number}"
@@ -174,13 +174,13 @@ def interrupted(whole, run, damaged=False):
     return run
 
 
-def check_three_at_once(long_run, folder, count, locks, meanwhile=None):
+def check_three_at_once(long_run, folder, count, before="", meanwhile=None):
     """Three racers of each kind, so many times; what the refused ones were told.
 
     meanwhile : what happens to the directory of a resumed run while they race.
     """
     (campaign, whole, expected), told = long_run, []
-    with Races(campaign, locks=locks) as races:
+    with Races(campaign, before) as races:
         for number in range(count):
             for verb in ("resume",) if meanwhile else ("run", "resume", "repair"):
                 run = folder / f"{verb}-{number}"
@@ -223,7 +223,7 @@ SOME = [2, pytest.param(20, marks=pytest.mark.slow)]
 
 @pytest.mark.parametrize("count", SOME)
 def test_of_three_at_once_one_writes_without_locks_of_the_system(long_run, tmp_path, count, record_property):
-    told = check_three_at_once(long_run, tmp_path, count, locks=False)
+    told = check_three_at_once(long_run, tmp_path, count, WITHOUT_LOCKS)
     record_property("racers refused", len(told))
     words = ("is writing here", "is about to begin here", "holds a run already")
     assert all(any(word in said for word in words) for said in told), told
@@ -231,6 +231,6 @@ def test_of_three_at_once_one_writes_without_locks_of_the_system(long_run, tmp_p
 
 @pytest.mark.parametrize("count", SOME)
 def test_a_lock_deleted_in_flight_lets_nobody_in(long_run, tmp_path, count, record_property):
-    told = check_three_at_once(long_run, tmp_path, count, locks=True, meanwhile=delete_lock)
+    told = check_three_at_once(long_run, tmp_path, count, meanwhile=delete_lock)
     record_property("racers refused", len(told))
     assert all("is writing here" in said for said in told), told

@@ -21,19 +21,19 @@ CASES = 3200  # sixteen chunks for two workers
 GONE_WITHIN_S = 20.0
 
 
-def begin(folder, backend, sleep_s):
-    """A run on the command line, in a process group of its own, whose first part has landed."""
+def begin(folder, backend, sleep_s, awaited="run/cases/part-*"):
+    """A run on the command line, in a process group of its own, in which the awaited file is there."""
     campaign = campaign_folder(folder / "campaign", CASES)
     command = [sys.executable, "-m", "mc_engine", "run", str(campaign), "--out", str(folder / "run"), "--no-report"]
     process = subprocess.Popen(
         [*command, "--workers", "2", "--backend", backend],
-        env={**ENVIRONMENT, "STONES_SLEEP_S": f"{sleep_s}"},
+        env={**ENVIRONMENT, "STONES_SLEEP_S": f"{sleep_s}", "STONES_ASLEEP": str(folder / "asleep")},
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
     )
     deadline = time.monotonic() + 120.0
-    while not list((folder / "run" / "cases").glob("part-*")):
+    while not list(folder.glob(awaited)):
         if process.poll() is not None or time.monotonic() > deadline:
             process.kill()
             raise AssertionError(process.communicate()[1])
@@ -93,7 +93,7 @@ def test_one_signal_lets_what_is_in_flight_land_and_says_how_to_go_on(tmp_path, 
 
 @pytest.mark.parametrize("backend", ["loky", pytest.param("threading", marks=pytest.mark.slow), "dask"])
 def test_the_second_signal_ends_at_once(tmp_path, backend, record_property):
-    process = begin(tmp_path, backend, 12.0)
+    process = begin(tmp_path, backend, 12.0, awaited="asleep")
     processes = family(process)
     process.send_signal(signal.SIGINT)
     time.sleep(1.0)

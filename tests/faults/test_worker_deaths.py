@@ -13,7 +13,7 @@ from killed_runs import FORKING
 from trapped import files_of, trapped
 
 from mc_engine import open_store
-from mc_engine.errors import EngineError, ModelError
+from mc_engine.errors import ModelError
 from mc_engine.runner import runner
 from mc_engine.runner.backends import Backend
 from mc_engine.store.verification import damage
@@ -191,11 +191,6 @@ def test_a_case_that_takes_too_long_and_one_that_eats_its_memory_are_given_up(tm
     plain = runner.run(trapped(tmp_path / "plain", 200), tmp_path / "plain_run").cases()
     rest = frame["status"] == "ok"
     assert frame[rest].drop(columns="trap").equals(plain[rest].drop(columns="trap"))
-
-
-def test_a_thread_cannot_be_limited():
-    with pytest.raises(EngineError, match="a thread cannot be limited in time or memory"):
-        Backend("threading", case_seconds=1.0)
 
 
 @pytest.mark.parametrize("backend", ["threading", "loky"])

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mc_engine import load_campaign
-from mc_engine.campaign.loading import SHIPPED
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.physics.constants import EQUATORIAL_RADIUS, MU_EARTH
 
 HEAD = """

@@ -1,6 +1,7 @@
 """The smallest campaign with deliberate mistakes, for the tests of what the engine says about them."""
 
-from mc_engine.campaign.loading import SHIPPED, load_campaign
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import SHIPPED
 
 MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
 
-from mc_engine.campaign.loading import SHIPPED
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.command_line.next_step import after_flight, after_search
 from mc_engine.errors import DiskError, StoreError
 from mc_engine.store import store

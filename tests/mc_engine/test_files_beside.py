@@ -5,9 +5,11 @@ import subprocess
 import sys
 
 import pytest
+from cart import call
 from small_run import ENVIRONMENT
 
-from mc_engine.campaign.loading import SHIPPED, load_campaign
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import CampaignError, StoreError
 from mc_engine.flight.kernel import source_digest
 from mc_engine.runner.flown_campaign import companions_of
@@ -82,8 +84,8 @@ def test_physics_in_other_files_flies_again_in_another_process_and_follows_their
     first, second, edited = ((tmp_path / run / "cases").iterdir() for run in ("first", "second", "edited"))
     bytes_of = [next(parts).read_bytes() for parts in (first, second, edited)]
     assert bytes_of[0] == bytes_of[1] != bytes_of[2]
-    assert "same bits" in flown(tmp_path, "replay", "first", 3)  # the run has files of its own
-    flown(tmp_path, "extend", "first", "--cases", 32, "--no-report")
+    assert replay(tmp_path / "first", 3).equal  # the run has files of its own
+    assert extend(tmp_path / "first", 32, workers=1).n_cases == 32
 
 
 def test_the_sources_of_an_installed_model_are_all_that_it_reaches_in_its_package(tmp_path, monkeypatch):
@@ -138,11 +140,11 @@ def put(folder, files):
 def test_declared_data_goes_with_the_run_and_counts_as_the_models_source(tmp_path):
     model = model_with_data('("factors.csv", "data/table.csv")', later=LATER)
     folder = put(tmp_path / "mine", {"model.py": model, "data/table.csv": "1.0\n", "thesis.csv": "2.0\n"})
-    flown(tmp_path, "check", folder)
+    assert call("check", folder).exit_code == 0
     flown(tmp_path, "run", folder, "--cases", 16, "--no-report", "--out", "first")
     assert {path.name for path in (tmp_path / "first").rglob("*.csv")} == {"factors.csv", "table.csv"}
     (folder / "factors.csv").write_text("3.9e14,0.0\n")
-    assert "same bits" in flown(tmp_path, "replay", "first", 3)
+    assert replay(tmp_path / "first", 3).equal
     flown(tmp_path, "run", folder, "--cases", 16, "--no-report", "--out", "edited")
     first, edited = (next((tmp_path / run / "cases").iterdir()).read_bytes() for run in ("first", "edited"))
     assert first != edited

@@ -41,6 +41,7 @@ main()
 """
 CAMPAIGN, REPORTS = "mc_engine.campaign.loading.load_campaign", "reports.write_reports"
 KERNEL = "mc_engine.flight.flight._bound_kernel"
+HISTORIES = "mc_engine.runner.sessions.write_histories"  # the last that is flown
 
 
 def command(place, body, *arguments, by="SIGTERM", then=""):
@@ -86,12 +87,20 @@ def test_a_signal_that_a_library_swallows_stops_the_flight_that_follows(tmp_path
 
 
 @pytest.mark.parametrize("body", ["send()", "\n    ".join(["try: send()", "finally: send()"])])
-def test_a_signal_while_the_reports_are_written_names_the_command_that_writes_them(tmp_path, body):
-    run = tmp_path / "run"
+def test_a_signal_after_the_flight_stops_the_reports_and_names_the_command_that_writes_them(tmp_path, body):
+    run, unreported = tmp_path / "run", tmp_path / "unreported"
     status, said = ended(REPORTS, body, "run", "minimal", "--cases", 20, "--out", run)
     assert (status, said) == (4, f"interrupted; all cases are there, `mc-engine report {run}` writes the reports")
     assert is_complete(run)
     assert ended(REPORTS, body, "report", run) == (4, f"interrupted; `mc-engine report {run}` writes the reports")
+    late = "\n    ".join(["done = original(*arguments)", "send()", "return done"])
+    done = command(HISTORIES, late, "run", "minimal", "--cases", 20, "--no-report", "--out", unreported)
+    assert done.returncode == 0
+    assert COMPLETING in done.stderr.splitlines()
+    assert is_complete(unreported)
+    early = "\n    ".join(["send()", "return original(*arguments)"])
+    status, said = ended(HISTORIES, early, "run", "minimal", "--cases", 20, "--no-report", "--out", tmp_path / "cut")
+    assert (status, said.split(";")[0]) == (4, "interrupted with 20 of 20 cases and without the saved time histories")
 
 
 def test_a_signal_to_a_verb_that_keeps_nothing_says_to_give_it_again():

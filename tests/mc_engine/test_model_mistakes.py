@@ -126,6 +126,9 @@ LINES = [
     ("g = g + 0.0 * int(s.x)", EACH_CASE),
     ("g = round(g)", EACH_CASE),
     ("g = g * math.sqrt(r2)", EACH_CASE, "import math"),
+    ("g = g * math.cbrt(r2)", "`cbrt` of Python's math takes a single number; mc_engine.lanes has no", "import math"),
+    ("g = g * math.sqrt(2.0) if s.x > 0.0 else g", "`: Python cannot decide", "import math"),
+    ("g = g * tan(s.x)", "`tan` of Python's math takes a single number", "from math import tan"),
     ("for _ in range(r2):\n    g = g + 0.0", "loops of a fixed number"),
     ("while r2 > 1.0:\n    r2 = 0.5 * r2", EACH_CASE),
     ("assert s.x > 0.0", EACH_CASE),
@@ -145,6 +148,8 @@ LINES = [
     ("far = (s.x > 0.0) & s.y", ALLOWED),
     ("a = 2.0 * s", ALLOWED),
     ("g = g.norm()", "a number has no attribute 'norm'; write it with"),
+    ("g = g * s.vz", "object has no attribute 'vz'; known are \"x\", \"y\", \"vx\", \"vy\""),
+    ("g = g * p.burn_dv_m_s", "a column's name is without its unit in physics, \"burn_dv\""),
     ("g = s.x(2.0)", "a number is not callable; write it with"),
     ("g = g + 0.0 * o.foo", "has no attribute 'foo'"),
     ("g = g * tan(s.x)", "name 'tan' is not defined; write it with"),
@@ -342,7 +347,8 @@ def test_what_only_the_compiler_finds_is_one_sentence_with_the_line_too(tmp_path
         assert re.match(place(folder, lines) + r"kernels cannot run this \(.+\); ", sentence), (lines, sentence)
         assert ALLOWED in sentence
         assert not re.search(rf"{re.escape(str(tmp_path))}|site-packages|0x[0-9a-f]{{6}}|\n", sentence), sentence
-    with pytest.raises(ModelError, match="kernels cannot run this"):
+    told = rf"cannot be flown: {place(folder, lines)}kernels cannot run this .*calls of .*floor, pow.*{re.escape(MORE)}"
+    with pytest.raises(ModelError, match=told):
         run(campaign, tmp_path / "run")
 
 

@@ -8,8 +8,6 @@ from mc_engine.store.run_files import TUNING
 from mc_engine.studies.genetic_search import non_dominated
 from mc_engine.studies.tuning_folder import UNFINISHED, open_tuning
 
-MEASURES = ["cost", "error", "limited"]
-
 
 def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False, end="all generations"):
     """The record of a search whose constraint allows y up to `limit`; below 0 nothing is feasible."""

@@ -1,7 +1,11 @@
 """The page in a real browser: all drawn, cases chosen and looked up, nothing logged, nothing asked of a network."""
 
+from base64 import b64decode
 from dataclasses import replace
+from io import BytesIO
 
+import numpy as np
+import pypdf
 import pytest
 from browser import INSTALLED, chromium
 from landing_run import landing_run
@@ -9,7 +13,8 @@ from payloads import PAYLOADS, hostile
 from synthetic_run import synthetic_run
 
 from reports import build, render_html
-from reports.document.blocks import FigureBlock, Section, Text, blocks_of
+from reports.document.blocks import Cell, Column, FigureBlock, Section, Table, Text, blocks_of, numbered
+from reports.drawing.marks import Axis, Drawing, Line, Plot
 
 pytestmark = pytest.mark.skipif(not INSTALLED, reason="needs the Debian package chromium")
 COUNT = "document.getElementById('selection-count').textContent"
@@ -314,6 +319,37 @@ def test_nothing_reaches_beyond_a_printed_page(browser, file):
     finally:
         browser.ask("Emulation.setEmulatedMedia", media="")
         browser.ask("Emulation.clearDeviceMetricsOverride")
+
+
+def test_a_title_of_two_lines_is_in_its_panel(browser, tmp_path):
+    title = "the mean deviation of the longitude over a whole day"
+    plot = Plot((Line(np.arange(3.0), np.arange(3.0), "@ink"),), Axis("time [s]"), Axis(), title)
+    own = Section("own", "Own", (FigureBlock("Lines", Drawing("Curves", (plot,))),))
+    document = replace(build(synthetic_run(60), "run"), sections=(own,))
+    (tmp_path / "report.html").write_bytes(render_html(numbered(document)))
+    browser.open(tmp_path / "report.html")
+    browser.until(f"{DRAWN}.every(Boolean)")
+    lines = "[...document.querySelectorAll('.gtitle .line')].map((line) => line.getBoundingClientRect())"
+    panel = "document.querySelector('.panel').getBoundingClientRect().top"
+    frame = "document.querySelector('.panel .nsewdrag').getBoundingClientRect().top"
+    tops, bottoms = (browser.run(f"{lines}.map((box) => box.{side})") for side in ("top", "bottom"))
+    assert len(tops) == 2
+    assert min(tops) >= browser.run(panel)
+    assert max(bottoms) <= browser.run(frame)
+
+
+def test_a_printed_table_repeats_its_head_on_every_page(browser, tmp_path):
+    rows = tuple((Cell(f"row {k}"), Cell("value")) for k in range(150))
+    long = Table("A long table", (Column("What it is"), Column("Value")), rows)
+    own = Section("own", "Own", (long,))
+    document = replace(build(synthetic_run(60), "run"), sections=(own,))
+    (tmp_path / "report.html").write_bytes(render_html(document))
+    browser.open(tmp_path / "report.html")
+    printed = b64decode(browser.ask("Page.printToPDF", preferCSSPageSize=True)["data"])
+    pages = [page.extract_text() for page in pypdf.PdfReader(BytesIO(printed)).pages]
+    pages = [text for text in pages if "row" in text]
+    assert len(pages) > 2
+    assert all("What it is" in text for text in pages)
 
 
 def test_a_line_of_code_is_no_wider_than_a_phone(browser, tmp_path):

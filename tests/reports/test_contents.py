@@ -37,13 +37,6 @@ def said(document):
     return repr(document)
 
 
-def test_the_sections_come_in_the_order_of_a_review(document):
-    assert [section.anchor for section in document.sections] == [
-        "requirements", "scenario", "distributions", "drivers", "maps", "histories", "scatter", "cases", "worst",
-        "metrics", "correlations", "normality", "convergence", "inputs", "status", "published", "provenance", "reading",
-    ]  # fmt: skip
-
-
 def test_chapters_have_numbers_appendices_letters_and_parts_neither(document):
     numbers = {section.anchor: section.number for section in document.sections}
     assert [numbers[name] for name in ("requirements", "scenario", "worst")] == ["1", "2", "7"]

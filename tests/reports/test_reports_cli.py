@@ -1,8 +1,5 @@
 """Reports written into a run directory, and the arrows between the packages."""
 
-import ast
-from pathlib import Path
-
 import numpy as np
 import pytest
 from synthetic_run import synthetic_run
@@ -64,16 +61,3 @@ def test_a_table_of_25_metrics_makes_a_page_below_eight_megabytes():
 
 def test_the_package_offers_these_names_and_no_others():
     assert set(reports.__all__) == PUBLIC
-
-
-def test_statistics_know_no_reports_and_no_campaigns():
-    for file in (Path(reports.__file__).parents[1] / "mc_engine" / "statistics").glob("*.py"):
-        assert not [name for name in _imports(file) if name.startswith(("reports", "campaigns", "matplotlib"))]
-
-
-def _imports(file):
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            yield node.module or ""

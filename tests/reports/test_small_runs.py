@@ -19,6 +19,13 @@ def without_numbers(run):
     return run
 
 
+def with_numbers(run, low, high):
+    part = np.linspace(0.0, 1.0, len(run.table))
+    run.table["propellant_kg"] = low * (1.0 - part) + high * part
+    return run
+
+
+UNDRAWN = "numbers beyond 1e140 or a standard deviation below 1e-140: propellant."
 SMALL = {
     "no case": (synthetic_run(0, failed=0), "No case was flown."),
     "one case": (synthetic_run(1, failed=0), "too few cases"),
@@ -26,6 +33,9 @@ SMALL = {
     "one failed case": (synthetic_run(1, failed=1), "All 1 cases failed"),
     "all failed": (synthetic_run(30, failed=30), "All 30 cases failed: no metric has a number."),
     "constant": (constant(synthetic_run(30, failed=0)), "the same in all cases"),
+    "the whole range of numbers": (with_numbers(synthetic_run(300, failed=0), -1.7e308, 1.7e308), UNDRAWN),
+    "numbers of 1e160": (with_numbers(synthetic_run(300, failed=0), 1e160, 3e160), UNDRAWN),
+    "numbers that no square tells from 0": (with_numbers(synthetic_run(300, failed=0), 1e-300, 3e-300), UNDRAWN),
     "a metric without numbers": (without_numbers(synthetic_run(30, failed=0)), "no case has a number: propellant."),
 }
 

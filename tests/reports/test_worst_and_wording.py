@@ -49,7 +49,7 @@ def test_the_headline_of_a_two_sided_metric_names_both_ends_and_its_limits():
     card = next(one for one in build(run, "run").costs if one.label == "correction impulse")
     low, high = (float(one.replace("−", "-")) for one in re.findall(r"[−\d.]+", card.answer)[:2])
     assert (low, high) == pytest.approx((values.min(), values.max()), abs=5e-3)
-    assert card.answer.endswith("of ±8\u202fm/s")
+    assert card.answer.endswith(" in the cases flown, limits ±8\u202fm/s")
     assert "at most" not in card.answer
 
 

@@ -11,7 +11,8 @@ from campaigns.geo_injection.design.kept_programs import SEQUENCES
 from campaigns.geo_injection.design.program import from_text, to_text
 from campaigns.geo_injection.model import sequence_of
 from mc_engine.campaign.cases import case_table
-from mc_engine.campaign.loading import list_campaigns, load_campaign
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import list_campaigns
 from mc_engine.flight.flight import fly
 
 FILES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "geo_injection")

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mc_engine.campaign.loading import list_campaigns, load_campaign
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import list_campaigns
 from mc_engine.flight.flight import fly
 
 NAMES = sorted(one.name for one in list_campaigns() if one.name.split("/")[0] == "geo_servicing")

@@ -5,7 +5,8 @@ import pytest
 from reentry_flights import PLANAR, fly_cases
 
 from campaigns.reentry.critical_trajectories import APOAPSIS, critical_periapses, interface_km
-from mc_engine.campaign.loading import list_campaigns, load_campaign
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import list_campaigns
 from mc_engine.flight.flight import fly
 
 NAMES = sorted(campaign.name for campaign in list_campaigns() if campaign.name.split("/")[0] == "reentry")

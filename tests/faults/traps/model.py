@@ -1,19 +1,22 @@
 """A stone that falls, and cases that take their worker with them: `trap` kills it, hangs it, eats its memory or exits.
 
 The traps stand where a model's own Python runs, in `prepare`; those named in the environment variable TRAPS_OFF
-(their numbers, with commas) do nothing.  STONES_SLEEP_S makes every chunk take so long.
+(their numbers, with commas) do nothing.  STONES_SLEEP_S makes every chunk take so long; the first that sleeps makes the
+file STONES_ASLEEP.
 """
 
 import os
 import sys
 import time
 from collections import namedtuple
+from pathlib import Path
 
 import numpy as np
 
 from mc_engine.lanes import physics
 from mc_engine.model import FixedStep, Parameter, at_end, inputs, metrics, model, outputs, states
 
+HISTORIES = 3  # of the nominal case and two more, which are flown together and are no chunk
 KILLS, HANGS, EATS, EXITS = 1.0, 2.0, 3.0, 4.0
 
 Inputs = inputs(
@@ -28,7 +31,9 @@ Parameters = namedtuple("Parameters", "height speed")
 
 
 def prepare(inputs, settings, refusals):
-    if inputs.trap.size > 1:
+    if inputs.trap.size > HISTORIES:
+        if asleep := os.environ.get("STONES_ASLEEP"):
+            Path(asleep).touch()
         time.sleep(float(os.environ.get("STONES_SLEEP_S", "0")))
     off = os.environ.get("TRAPS_OFF", "").split(",")
     armed = {trap for trap in np.unique(inputs.trap) if f"{trap:g}" not in off}

@@ -1,7 +1,7 @@
 import pytest
 from toy import load, problems
 
-from mc_engine.campaign.loading import Requirement, Retention, Worst
+from mc_engine.campaign.parts import Requirement, Retention, Worst
 
 TWO = """
 [dispersion.speed_pct]

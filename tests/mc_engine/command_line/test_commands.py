@@ -1,5 +1,4 @@
 import csv
-import subprocess
 import sys
 from types import ModuleType, SimpleNamespace
 
@@ -7,7 +6,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 from cart import CAMPAIGN, MODEL, call, fails_with, small_store
-from small_run import ENVIRONMENT, block, created
+from small_run import block
 
 import mc_engine.runner
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
@@ -111,7 +110,7 @@ def test_plan_gives_the_classic_sample_sizes(here):
 
 
 def test_list_names_every_shipped_campaign():
-    from mc_engine.campaign.loading import list_campaigns
+    from mc_engine.campaign.search import list_campaigns
 
     lines = call("list").stdout.splitlines()
     named = [line.split()[0] for line in lines if not line.startswith(" ")]
@@ -125,7 +124,7 @@ def minimal(tmp_path, monkeypatch):
     folder.mkdir(parents=True)
     (folder / "model.py").write_text(MODEL)
     (folder / "campaign.toml").write_text(CAMPAIGN)
-    monkeypatch.setattr("mc_engine.campaign.loading.SHIPPED", folder.parent)
+    monkeypatch.setattr("mc_engine.campaign.search.SHIPPED", folder.parent)
 
 
 def test_init_makes_a_campaign_that_checks(here, minimal):
@@ -304,19 +303,3 @@ def test_a_path_that_is_no_run_is_a_usage_error_that_names_it(here, calls, verb,
     case = [0] if verb == ["replay"] else []
     fails_with(2, call(*verb, folder, *case), folder)
     assert calls.runner == []
-
-
-def test_the_module_runs_like_the_command(here):
-    created(here / "flown")
-    done = subprocess.run(
-        [sys.executable, "-m", "mc_engine", "status", "flown"], capture_output=True, text=True, env=ENVIRONMENT
-    )
-    assert done.returncode == 0, done.stderr
-    assert "0 of 40 cases" in done.stdout
-
-
-def test_every_verb_of_the_contract_has_its_help():
-    for verb in "init check plan sample run status resume extend replay report verify list schema".split():
-        result = call(verb, "--help")
-        assert result.exit_code == 0
-        assert "Usage: " in result.stdout

@@ -17,7 +17,7 @@ import pytest
 from small_run import ENVIRONMENT
 
 import mc_engine
-from mc_engine.campaign.loading import SHIPPED
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import DiskError
 from mc_engine.flight import kernel
 from mc_engine.flight.flight import fly

@@ -135,7 +135,11 @@ MISTAKES = {
     "template": ("case.txt.j2", "other.j2", 'other.j2: "mas_kg" is no input; did you mean "mass_kg"?'),
     "default": ("low = 0.1", "low = 20.0", "mass_kg: the model's own value 10 is not within"),
     "tolerance": ("time_limit_s", "tolerance = 1e-9\ntime_limit_s", "has a `tolerance`, and `replay` compares bits"),
-    "outside": ('"case.txt" =', '"../case.txt" =', "lies outside the folder of the case"),
+    "outside": (
+        '"case.txt" =',
+        '"../case.txt" =',
+        'input.../case.txt: "../case.txt" lies outside the folder of',
+    ),
 }
 
 

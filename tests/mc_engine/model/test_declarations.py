@@ -24,6 +24,23 @@ def test_one_declaration_makes_the_tuple_and_the_columns():
     assert metrics(top_m_s=maximum_of("v_m_s", "top"), e=Field("e", unit=""))._fields == ("e",)
 
 
+def test_a_computed_metric_without_a_description_is_described_in_the_words_of_its_output(tmp_path):
+    metrics = """Metrics = metrics(top_speed_m_s=maximum_of("speed_m_s"), low_km=minimum_of("altitude_km"),
+        top_time_s=time_of_maximum("speed_m_s"), end_speed_m_s=at_end("speed_m_s"), end_s=at_end("t_s"),
+        apogee_altitude_km=value_at("apogee", "altitude_km"), apogee_s=time_of("apogee"),
+        fast_s=last_above("speed_m_s", 7e3), named_m_s=maximum_of("speed_m_s", "greatest speed"))"""
+    campaign = campaign_with(
+        tmp_path,
+        ("maximum_of, metrics,", "last_above, maximum_of, metrics, minimum_of, time_of, time_of_maximum, value_at,"),
+        ("Metrics = metrics(", f"{metrics}\nOld = metrics("),
+    )
+    assert [item.description for item in campaign.model.metrics] == [
+        "largest speed", "smallest altitude", "time of the largest speed", "speed at the end", "time at the end",
+        "altitude at the event apogee", "time at the event apogee", "last time of the speed above its level",
+        "greatest speed",
+    ]  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("name", "unit"),
     [("x_m", "m"), ("vx_m_s", "m/s"), ("ve_pct", "%"), ("delay_days", "day"), ("load_mj_m2", "MJ/m^2"), ("isp_s", "s")],
@@ -80,22 +97,6 @@ def test_a_mistake_in_a_declaration_is_named_with_its_fix(mistake, tmp_path):
     (problem,) = error.value.problems
     assert problem.message.startswith("model.py, line ")
     assert sentence in problem.message
-
-
-IN_PHYSICS = {
-    "state without a field": (("vy=g * s.y)", ")"), "State(...) leaves out 'vy'; give every field that has no default"),
-    "unknown field": (("vy=g * s.y)", "v_y=g * s.y)"), 'State(...) has no field "v_y"; did you mean "vy"?'),
-    "another record": (("return Outputs(altitude=", "return State(x=0.0, y=0.0, vx="), ("speed=sqrt", "vy=sqrt"),
-                       "`observe` gives "),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("mistake", IN_PHYSICS)
-def test_a_record_made_wrongly_is_named_with_its_line(mistake, tmp_path):
-    *edits, sentence = IN_PHYSICS[mistake]
-    (found,) = breaches(campaign_with(tmp_path, *edits))
-    assert found.startswith("model.py, line ")
-    assert sentence in found
 
 
 def flown(folder, *edits):
@@ -248,13 +249,6 @@ def test_a_discrete_state_of_records_flies_as_one_of_numbers_at_every_width_and_
     assert time[0] == expected["end_time_s"][0]
     names = [metric.name for metric in nested.model.metrics]
     assert metrics[names.index("samples")][0] == expected["samples"][0]
-
-
-def test_a_record_of_the_discrete_state_keeps_its_fields(tmp_path):
-    other = ("where(fast, Top(s.vx, t), m.top)", "Memory(s.vx, t)")
-    (found,) = breaches(campaign_with(tmp_path, *NESTED, other))
-    assert "`control` gives Memory(top, samples)" in found
-    assert "the named tuple of `start`, Top(speed, time)" in found
 
 
 SHARED = (

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from small_run import ENVIRONMENT
 
-from mc_engine.campaign.loading import SHIPPED
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.model import designs, kept_design, load_model
 
 INPUTS = np.array([1.0, np.nan, 3.0])

@@ -38,6 +38,8 @@ def test_a_summary_in_lines_says_how_many_cases_it_rests_on():
     assert lines[1] == "  mean 1.5, sd 0.707107, from 1 to 2"
     assert lines[4] == "   50.000 %  1.5  [too few cases, too few cases]"
     assert "[" not in summary_lines("fuel_kg", summarize(np.array([1.0, 2.0])), "kg", random=False)[4]
+    epochs = summary_lines("epoch_days", summarize(2460000.5 + np.array([0.0, 1e-6, 4e-6])), "day", random=False)
+    assert epochs[1] == "  mean 2460000.50000167, sd 2.08172e-06, from 2460000.5 to 2460000.500004"
     assert summary_lines("fuel_kg", summarize(np.array([np.nan])), "kg", True) == [
         "fuel_kg [kg]: 0 of 1 cases have a number"
     ]

@@ -2,16 +2,11 @@
 
 import json
 import os
-import re
 import shutil
 import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
-from small_run import ENVIRONMENT
 
 from mc_engine import load_campaign, open_store
 from mc_engine.errors import ModelError, RunInterrupted, StoreError
@@ -67,31 +62,6 @@ def test_an_interrupted_run_is_completed_to_the_same_table(tmp_path):
     whole = runner.resume(tmp_path / "run")
     assert table_bytes(whole) == table_bytes(runner.run(campaign, tmp_path / "fresh"))
     assert damage(whole.path) == []
-
-
-def test_ctrl_c_on_the_command_line_exits_with_4_and_resume_completes_it(tmp_path):
-    command = [sys.executable, "-m", "mc_engine"]
-    process = subprocess.Popen(
-        [*command, "run", "minimal", "--cases", "3000000", "--out", "run", "--no-report"],
-        cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    deadline = time.monotonic() + 120.0
-    while not list((tmp_path / "run" / "cases").glob("part-*.parquet")) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    process.send_signal(signal.SIGINT)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 4, errors
-    assert "mc-engine resume run" in errors
-    assert "Traceback" not in errors
-    assert open_store(tmp_path / "run").missing()
-
-
-def test_a_run_that_was_moved_stands_alone(flown, tmp_path):
-    moved = tmp_path / "elsewhere"
-    shutil.copytree(flown.path, moved)
-    replay = runner.replay(moved, 3)
-    assert replay.equal
-    assert damage(runner.extend(moved, 2100).path) == []
 
 
 def test_replays_have_the_bits_of_the_run_and_a_history_that_ends_with_the_case(flown):
@@ -181,14 +151,3 @@ def test_a_model_that_breaks_while_preparing_is_named_with_its_cases(tmp_path):
     (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
     with pytest.raises(ModelError, match=r"cases \d+ to \d+ cannot be flown: model.py, line \d+: ZeroDivisionError"):
         runner.run(load_campaign(tmp_path, cases=100), tmp_path / "run")
-
-
-@pytest.mark.parametrize("slip", ["s.y // 2.0", "s.y**0.5"])
-def test_physics_that_does_not_compile_is_named_with_its_line(tmp_path, slip):
-    line = rf"cannot be flown: model.py, line 28: `r2 = s.x \* s.x \+ {re.escape(slip)}`: "
-    source = (load_campaign("minimal").directory / "model.py").read_text()
-    source = source.replace("s.x * s.x + s.y * s.y\n    g", f"s.x * s.x + {slip}\n    g")
-    (tmp_path / "model.py").write_text(source)
-    (tmp_path / "campaign.toml").write_text(load_campaign("minimal").text)
-    with pytest.raises(ModelError, match=f"{line}.*calls of .*floor, pow.*; `mc-engine check` tells more"):
-        runner.run(load_campaign(tmp_path), tmp_path / "run")

@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import binomtest, fisher_exact, norm
 
 from mc_engine.sampling.streams import uniforms
+from mc_engine.statistics import change_tests
 from mc_engine.statistics.change_tests import holm, metric_change, share_change
 from mc_engine.studies.comparison import ALPHA
 
@@ -16,32 +17,34 @@ def normal(name, seed, n=N):
     return norm.ppf(uniforms(seed, name, np.arange(n)))
 
 
-def smallest_adjusted(seed, paired, shift=0.0, together=0.0):
-    """Adjusted p-values of the shift of metric 2, and the smallest of all shifts and spreads of eight metrics."""
-    found = []
-    for k in range(METRICS):
-        a, own = normal(f"a{k}", seed), normal(f"b{k}", seed)
-        b = together * a + np.sqrt(1.0 - together**2) * own + (shift if k == 2 else 0.0)
-        one = metric_change("y", a, b, paired=paired)
-        found += [one.shift_p, one.spread_p]
-    adjusted = holm(found)
-    return adjusted[4], adjusted.min()
+def p_values(k, seed, paired, together, shift=0.0):
+    """Of the shift and of the spread of metric k, whose two runs go so far together."""
+    a, own = normal(f"a{k}", seed), normal(f"b{k}", seed)
+    b = together * a + np.sqrt(1.0 - together**2) * own + shift
+    change = metric_change("y", a, b, paired=paired)
+    return change.shift_p, change.spread_p
 
 
 @pytest.mark.parametrize(("paired", "together"), [(False, 0.0), (True, 0.0), (True, 0.7)])
-def test_a_shift_of_three_tenths_of_sigma_is_found_ninety_nine_times_of_a_hundred(paired, together):
-    found = sum(smallest_adjusted(seed, paired, 0.3, together)[0] <= ALPHA for seed in range(100))
+def test_of_a_hundred_comparisons_a_shift_of_three_tenths_of_sigma_is_found_in_99_and_one_gives_a_false_alarm_at_most(
+    monkeypatch, paired, together
+):
+    """Of eight metrics, first none is shifted, and then metric 2 alone."""
+    # the ends of the intervals take nearly all of the time, and no p-value depends on them
+    monkeypatch.setattr(change_tests, "_root", lambda score, level, start, step: start)
+    alarms = found = 0
+    for seed in range(100):
+        none = [p_values(k, seed, paired, together) for k in range(METRICS)]
+        alarms += holm(np.ravel(none)).min() <= ALPHA
+        shifted = [*none[:2], p_values(2, seed, paired, together, 0.3), *none[3:]]
+        found += holm(np.ravel(shifted))[4] <= ALPHA
     assert found >= 99
-
-
-@pytest.mark.parametrize(("paired", "together"), [(False, 0.0), (True, 0.7)])
-def test_nothing_changed_gives_at_most_one_false_alarm_in_a_hundred_comparisons(paired, together):
-    alarms = sum(smallest_adjusted(seed, paired, 0.0, together)[1] <= ALPHA for seed in range(100))
     assert alarms <= 1
 
 
 @pytest.mark.parametrize("paired", [False, True])
-def test_the_interval_of_a_ratio_holds_the_true_one_as_often_as_it_says(paired):
+def test_the_interval_of_a_ratio_holds_the_true_one_as_often_as_it_says(monkeypatch, paired):
+    monkeypatch.setattr(change_tests, "_shift", lambda *_: (change_tests.UNKNOWN, 1.0))  # is not asked here
     held = []
     for seed in range(300):
         a, own = normal("a", seed, 200), normal("b", seed, 200)
@@ -59,7 +62,8 @@ def test_the_same_numbers_are_no_change_and_rounding_is_none():
 
 
 @pytest.mark.parametrize("paired", [False, True])
-def test_intervals_hold_the_true_shift_as_often_as_they_say(paired):
+def test_intervals_hold_the_true_shift_as_often_as_they_say(monkeypatch, paired):
+    monkeypatch.setattr(change_tests, "_spread_ratio", lambda *_: (change_tests.UNKNOWN, 1.0))  # is not asked here
     held = []
     for seed in range(200):
         a = np.exp(normal("a", seed, 300))

@@ -10,13 +10,6 @@ from mc_engine.store.opening import open_store
 from mc_engine.store.verification import damage
 
 
-def test_an_intact_run_has_no_damage(store):
-    filled(store)
-    store.write_nominal(row(7))
-    store.write_histories({"case_id": [3], "t_s": [0.0], "force_n": [1.0]})
-    assert damage(store.path) == []
-
-
 def everything(store):
     filled(store)
     store.write_nominal(row(7))

@@ -5,7 +5,7 @@ import pytest
 
 import mc_engine
 from mc_engine import load_campaign, open_run
-from mc_engine.campaign.loading import SHIPPED
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import ModelError, StoreError
 from mc_engine.physics.constants import MU_EARTH
 from mc_engine.runner import runner

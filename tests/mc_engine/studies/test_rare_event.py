@@ -10,7 +10,8 @@ from scipy import integrate, optimize, stats
 from typer.testing import CliRunner
 
 from mc_engine.campaign.cases import case_table, full_inputs
-from mc_engine.campaign.loading import SHIPPED, load_campaign
+from mc_engine.campaign.loading import load_campaign
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.command_line.commands import app
 from mc_engine.errors import CampaignError, RunInterrupted
 from mc_engine.flight.flight import fly

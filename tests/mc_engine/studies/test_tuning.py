@@ -12,7 +12,7 @@ from apogee_tuning import CHOICE, apogee_and_speed, apogee_campaign
 from cart import call, fails_with
 
 from mc_engine import open_tuning, tune
-from mc_engine.campaign.loading import SHIPPED
+from mc_engine.campaign.search import SHIPPED
 from mc_engine.errors import RunInterrupted
 from mc_engine.studies.tuning import Generation, dominated_shares, is_stalled
 from mc_engine.studies.tuning_folder import infeasibility

@@ -37,3 +37,15 @@ def test_words_that_are_held_together_are_not_taken_for_two():
     columns = (Column("Metric", "text"), Column(head, "number"))
     narrow = Table("Statistics", columns, tuple((Cell("a long name of a metric " * 6), Cell("1")) for _ in range(9)))
     assert widths(narrow)[1] >= lettering.width(head, TYPE) + INSET
+
+
+def test_a_count_is_broken_before_its_stroke_where_the_text_beside_it_then_takes_fewer_lines():
+    """At 10 000 cases the limits of a verification matrix once had less of the width than the counts beside them."""
+    counted = Cell("10\u202f000 / 10\u202f000")
+    columns = (Column("Requirement", "text"), *(Column("Inside / tried", "number") for _ in range(5)))
+    long = Cell("a limit with its confidence and its source " * 3)
+    crowded, short = (
+        unbroken(Table("Limits", columns, ((cell, *[counted] * 5),) * 3)) for cell in (long, Cell("load"))
+    )
+    assert crowded.rows[0][1].text == f"10\u202f000 /{NO_BREAK}10\u202f000"
+    assert short.rows[0][1].text == f"10\u202f000{NO_BREAK}/{NO_BREAK}10\u202f000"

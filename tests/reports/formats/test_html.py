@@ -106,4 +106,4 @@ def test_what_users_write_stays_text(payload, harmless):
     assert shape(struck) == shape(harmless)
     for figure in figures(struck):
         assert "<" not in figure["layout"].get("title", {}).get("text", "")
-        assert "<" not in figure["layout"]["xaxis"]["title"]["text"]
+        assert "<" not in figure["layout"]["xaxis"]["title"]["text"].replace("<br>", "")  # the page's own line ends

@@ -49,6 +49,12 @@ def test_every_table_figure_and_section_is_there(document):
     assert sum(token.type == "table_open" for token in tokens(text)) == len(list(blocks_of(document, Table)))
 
 
+def test_what_a_cell_says_in_brackets_has_no_second_ones(document):
+    text = render_markdown(document).decode()
+    assert not re.search(r"\(\(|\(\\\[", text)
+    assert re.search(r"% \\\[\d", text)  # a demonstrated probability with its bounds
+
+
 def test_every_picture_is_a_file_with_its_alternative_text(document):
     text = render_markdown(document).decode()
     files = {file.name: file.content for file in figure_files(document)}

@@ -1,13 +1,10 @@
 """The convergence section of a report, and reports of runs with next to nothing in them."""
 
-import numpy as np
 import pytest
 from synthetic_run import synthetic_run
 
-from reports import build, render_html
 from reports.document.blocks import FigureBlock, Table
 from reports.drawing.ticks import log_ticks
-from reports.formats.pdf import render_pdf
 from reports.run.flown import Flown
 from reports.sections.convergence import convergence_blocks
 
@@ -40,36 +37,6 @@ def test_chosen_cases_do_not_converge(design):
     run = synthetic_run(100)
     run.manifest["campaign"]["design"] = design
     assert blocks(run) == []
-
-
-def _constant(run):
-    for name in ("propellant_kg", "peak_force_n", "settling_time_s"):
-        run.table[name] = 0.1
-    return run
-
-
-def _one_without_numbers(run):
-    run.table["propellant_kg"] = np.nan
-    return run
-
-
-@pytest.mark.parametrize(
-    "run",
-    [
-        lambda: synthetic_run(0, failed=0),
-        lambda: synthetic_run(1, failed=0),
-        lambda: synthetic_run(2, failed=0),
-        lambda: synthetic_run(2, failed=2),
-        lambda: synthetic_run(40, failed=40),
-        lambda: _constant(synthetic_run(60, failed=0)),
-        lambda: _one_without_numbers(synthetic_run(60, failed=0)),
-    ],
-    ids=["none", "one", "two", "two failed", "all failed", "constant", "one metric without numbers"],
-)
-def test_next_to_nothing_makes_a_whole_report_without_a_warning(run):
-    document = build(run(), "run")
-    assert render_html(document)
-    assert render_pdf(document)
 
 
 def test_the_axis_of_cases_has_numbers_that_fit():

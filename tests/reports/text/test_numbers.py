@@ -6,11 +6,13 @@ import pytest
 
 from reports.text.numbers import (
     axis_label,
+    beside_limit,
     column_texts,
     count,
     exact,
     fixed,
     interval,
+    limit_number,
     named,
     number,
     percent,
@@ -149,3 +151,29 @@ def test_the_words_of_a_distribution_have_printed_signs_and_powers():
         "uniform, −2 to 1\u202fdays",
         "any, 3·10⁷",
     ]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (2.5, "2.5"),
+        (2460000.500003, "2\u202f460\u202f000.500003"),
+        (123456.7, "123\u202f456.7"),
+        (2460000.5000003, "2\u202f460\u202f000.5000003"),
+        (12345000.0, "1.2345·10⁷"),
+        (10000004.0, "1.0000004·10⁷"),
+        (1.2345e-5, "1.2345·10⁻⁵"),
+        (2.5 / 86400.0, "2.894·10⁻⁵"),  # converted
+        (100.0 / 3.0, "33.333"),
+        (-1e50, "−1·10⁵⁰"),
+    ],
+)
+def test_a_limit_has_the_digits_that_it_was_given(value, text):
+    assert limit_number(value) == text
+
+
+def test_what_is_compared_with_a_limit_shows_how_far_it_is_from_it():
+    assert beside_limit(2460000.4999983613, 1.36e-6) == "2\u202f460\u202f000.4999984"
+    assert beside_limit(1.91234, 0.59) == "1.9123"
+    assert beside_limit(6431.49, 0.011) == "6431.49"
+    assert beside_limit(2.0, None) == beside_limit(2.0, 0.0) == "2"
