@@ -72,7 +72,8 @@ class KernelCompilation:
 def _without_garbage_collection() -> Iterator[None]:
     """numba makes objects by the million and keeps most: the search for garbage among them takes up to a tenth longer.
 
-    A compilation holds some tens of megabytes more."""
+    A compilation holds some tens of megabytes more.
+    """
     was_on = gc.isenabled()
     gc.disable()
     try:

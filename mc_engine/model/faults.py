@@ -105,10 +105,10 @@ def _hint_of_attribute(error: Exception) -> str:
 
 def _of_math(frame: FrameType | None, line: int) -> str:
     """What is wrong with a line that calls a function of Python's `math`; "" for other lines."""
-    from mc_engine import lanes  # which loads the compiler
-
     if frame is None:
         return ""
+    from mc_engine import lanes  # which loads the compiler
+
     for module, name in re.findall(r"(math\.)?\b(\w+)\(", linecache.getline(frame.f_code.co_filename, line)):
         function = getattr(math, name, None)
         if function and (module or frame.f_globals.get(name) is function):

@@ -19,7 +19,7 @@ J. Theor. Biol. 254 (2008), 178-196 (PRCC).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -55,6 +55,17 @@ class Sensitivity:
     r_squared: np.ndarray
     unexplained: np.ndarray
     correlated: tuple[str, str, float] | None
+
+
+class _Fit(NamedTuple):
+    """A regression of standardised metrics on standardised columns.
+
+    coefficient : float64[n_columns, n_metrics];  partial : partial correlations, likewise;  r_squared : [n_metrics]
+    """
+
+    coefficient: np.ndarray
+    partial: np.ndarray
+    r_squared: np.ndarray
 
 
 def sensitivity(inputs: Mapping[str, Any], metrics: Mapping[str, np.ndarray]) -> Sensitivity:
@@ -123,17 +134,16 @@ def _fill(
     indices["spearman"][place] = standardised(ranks).T @ standardised(metric_ranks) / n
     fit = _regression(np.column_stack([plain, *groups]), varying)
     if fit is not None:
-        coefficient, _, indices["r_squared"][where] = fit
-        indices["src"][place] = coefficient[: len(ordered)]
+        indices["src"][place] = fit.coefficient[: len(ordered)]
+        indices["r_squared"][where] = fit.r_squared
     fit = _regression(np.column_stack([ranks, *groups]), metric_ranks)
     if fit is not None:
-        indices["prcc"][place] = fit[1][: len(ordered)]
+        indices["prcc"][place] = fit.partial[: len(ordered)]
 
 
-def _regression(columns: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Least squares of each standardised metric on all standardised columns; None where the cases are too few for it.
+def _regression(columns: np.ndarray, table: np.ndarray) -> _Fit | None:
+    """Least squares of each metric on all columns; None where the cases are too few for it.
 
-    Returns coefficients and partial correlations, float64[n_columns, n_metrics], and r_squared, float64[n_metrics].
     A column that the others give exactly has no coefficient of its own: NaN.
     """
     n = len(columns)
@@ -151,7 +161,7 @@ def _regression(columns: np.ndarray, table: np.ndarray) -> tuple[np.ndarray, np.
     spread = np.maximum(1.0 - r_squared, 1e-12) * np.diag(inverse)[:, None]
     partial = coefficient / np.sqrt(coefficient**2 + spread)
     coefficient[tied] = partial[tied] = np.nan
-    return coefficient, partial, r_squared
+    return _Fit(coefficient, partial, r_squared)
 
 
 def _strongest_correlation(columns: Sequence[InputColumn], n: int) -> tuple[str, str, float] | None:

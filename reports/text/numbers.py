@@ -72,7 +72,8 @@ def beside_limit(value: float, margin: float | None) -> str:
 
 def _significant(value: float, digits: int) -> str:
     """All the digits asked for; `number` has one less beside a power of ten."""
-    return number(value, digits + (abs(value) >= 1e7 or abs(value) < 1e-4))
+    beside_power = abs(value) >= 1e7 or abs(value) < 1e-4
+    return number(value, digits + 1 if beside_power else digits)
 
 
 def _power(mantissa: str, exponent: int) -> str:
