@@ -1,6 +1,5 @@
 """The process of the command line: `mc-engine`, or `python -m mc_engine`."""
 
-import gc
 import os
 import sys
 from importlib import import_module
@@ -18,12 +17,13 @@ def _forget_working_folder() -> None:
 
 def main() -> None:
     """Run the command line in this process; does not return."""
+    from mc_engine.garbage_collection import collect_rarely
     from mc_engine.interruption import install_handlers
     from mc_engine.text import clean_streams
     from mc_engine.unforeseen import UNFORESEEN, catch_all, refuse_small_memory, unforeseen
 
     install_handlers()  # before the rest is loaded, which takes longest
-    gc.set_threshold(50_000)  # a command makes objects by the ten thousand, and hardly any garbage to look for
+    collect_rarely()
     for library in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(library, "1")  # for small matrices its threads cost more than they gain
     # or pydantic reads the metadata of all installed packages; also in processes that the engine starts

@@ -122,7 +122,8 @@ def nearest_unit(unit: str, allowed: Iterable[str]) -> str | None:
     """The allowed unit that was probably meant, such as "N m" by "Nm" and "m/s^2" by "m/s²"; or None."""
     names = [name for name in allowed if name]
     squeezed = {_squeezed(name): name for name in names}
-    return squeezed.get(_squeezed(unit)) or nearest(unit, names)
+    without_bars = {short.replace("/", ""): name for short, name in squeezed.items()}
+    return squeezed.get(_squeezed(unit)) or without_bars.get(_squeezed(unit)) or nearest(unit, names)
 
 
 def unit_hint(unit: str) -> str:

@@ -9,7 +9,7 @@ from collections import namedtuple
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy  # loads its packages when they are used
 
 from campaigns.geo_servicing.bellman import Corrections, best_corrections, planned_cost
 from campaigns.geo_servicing.drift_model import DRIFT_PER_DV, E_PER_DV, after_correction, braking, fastest, largest_last
@@ -177,7 +177,7 @@ def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[
     bounds += [(0.0, size) if sign > 0.0 else (-size, 0.0) for sign, size in zip(signs, largest, strict=True)]
     conditions = ({"type": "eq", "fun": equal}, {"type": "ineq", "fun": inside})
     first = np.concatenate([start.coasts / SIDEREAL_DAY, start.dv])
-    search = minimize(
+    search = scipy.optimize.minimize(
         cost, first, method="SLSQP", bounds=bounds, constraints=conditions, options={"maxiter": 300, "ftol": 1e-10}
     )
     feasible = np.abs(equal(search.x)).max() < 1e-6 and inside(search.x).min() > -1e-6

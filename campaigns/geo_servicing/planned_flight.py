@@ -7,7 +7,7 @@ from collections import namedtuple
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
+import scipy  # loads its packages when they are used
 
 from campaigns.geo_servicing.corrections import Burn, Memory, drift_of
 from campaigns.geo_servicing.drift_model import perturbation_coefficients
@@ -77,7 +77,7 @@ class Craft:
     def fly(self, t: float, s: np.ndarray, length: float, push: float) -> np.ndarray:
         """State float64[14] after an arc of this length [s] under a thrust ahead [N]."""
         m = Memory(burn=Burn(dv=0.0, outward=0.0, ahead=push, across=0.0))
-        flight = solve_ivp(
+        flight = scipy.integrate.solve_ivp(
             lambda time, y: rhs(time, State(*y), m, self.p, self.o), (t, t + length), s, "DOP853", **_TOLERANCES
         )
         return np.asarray(flight.y[:, -1])

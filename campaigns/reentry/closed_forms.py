@@ -4,8 +4,7 @@ Angles are in radians; a flight-path angle is negative down.  B is mass over dra
 """
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import minimize_scalar
+import scipy  # loads its packages when they are used
 
 
 def steep_peak(speed: float, angle: float, scale: float) -> float:
@@ -30,7 +29,7 @@ def shallow_peak(slope: float) -> float:
         x0 = min(1e-5, 1e-4 * slope**2)
         first = [slope * x0 + x0**2 / slope, slope + 2.0 * x0 / slope]
     # beyond x = 2.5 the speed is below a twelfth of the first
-    path = solve_ivp(
+    path = scipy.integrate.solve_ivp(
         lambda x, y: (y[1], np.expm1(2.0 * x) / y[0]),
         (x0, 2.5),
         first,
@@ -39,7 +38,9 @@ def shallow_peak(slope: float) -> float:
         atol=1e-16,
         dense_output=True,
     )
-    top = minimize_scalar(lambda x: -path.sol(x)[0] * np.exp(-2.0 * x), bounds=(0.2, 2.4), method="bounded")
+    top = scipy.optimize.minimize_scalar(
+        lambda x: -path.sol(x)[0] * np.exp(-2.0 * x), bounds=(0.2, 2.4), method="bounded"
+    )
     return -float(top.fun)
 
 

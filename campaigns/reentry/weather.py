@@ -14,7 +14,7 @@ NASA/TM-2011-216467) and of J. W. Campbell, NASA TM X-3529 (1977).
 from collections import namedtuple
 
 import numpy as np
-from scipy.special import ndtr, ndtri
+import scipy  # loads its packages when they are used
 
 from mc_engine.lanes import floor, look_up, maximum, minimum, physics
 
@@ -62,7 +62,7 @@ def normal_deviates(draw: np.ndarray, count: int) -> np.ndarray:
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     z = z ^ (z >> np.uint64(31))
-    return ndtri(((z >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52)
+    return scipy.special.ndtri(((z >> np.uint64(12)).astype(np.float64) + 0.5) * 2.0**-52)
 
 
 def gauss_markov(deviates: np.ndarray, length: float) -> np.ndarray:
@@ -85,7 +85,7 @@ def weather_nodes(draw: np.ndarray, density_size, wind_size, mean_size) -> np.nd
     for first in range(0, draw.size, BLOCK):
         block = slice(first, first + BLOCK)
         deviates = normal_deviates(draw[block], 2 * DEPTH + 1)
-        depth = np.where(draw[block] > 0.0, ndtr(deviates[:, -1]), 0.0)
+        depth = np.where(draw[block] > 0.0, scipy.special.ndtr(deviates[:, -1]), 0.0)
         altitudes = node_altitudes(depth)
         nodes = _random_part(deviates[:, :-1], sizes[:, block], altitudes)
         nodes[:, :, 1] += np.asarray(mean_size)[block, None] * standard_profile(3, altitudes)

@@ -42,11 +42,11 @@ def report(
     folders: Annotated[
         list[str], typer.Argument(metavar="RUN...", help="Directories of runs, or URLs of published ones.")
     ],
-    kind: Annotated[
-        str | None,
+    kinds: Annotated[
+        list[str] | None,
         typer.Option(
             "--format",
-            help="html, pdf, md or json; by default html and pdf, with the data as json.",
+            help="html, pdf, md or json; may be given several times. By default html and pdf, with the data as json.",
             autocompletion=beginning(REPORT_FORMATS),
         ),
     ] = None,
@@ -59,8 +59,9 @@ def report(
     advise(lambda: f"interrupted; `mc-engine report {' '.join(map(shell_word, folders))}` writes the reports")
     from mc_engine.store.run_files import RUN, kind_of
 
-    if kind not in (None, *REPORT_FORMATS):
-        leave(USAGE, f'--format "{kind}" is not known; {", ".join(REPORT_FORMATS)}')
+    for kind in kinds or ():
+        if kind not in REPORT_FORMATS:
+            leave(USAGE, f'--format "{kind}" is not known; {", ".join(REPORT_FORMATS)}')
     if template is not None and not template.is_file():
         leave(USAGE, f"--template {template}: there is no such file")
     paths, published = [], {}
@@ -71,7 +72,7 @@ def report(
         paths.append(existing_run(folder).path if kind_of(folder) in (RUN, None) else folder)
     options: dict[str, Any] = {} if template is None else {"template": template, "beside": paths}
     for path in paths:
-        for file in write_reports(path, ("html", "pdf") if kind is None else (kind,), **options):
+        for file in write_reports(path, tuple(kinds or ("html", "pdf")), **options):
             typer.echo(f"{published[path]}/{file.name}" if path in published else str(file))
         if path in published:
             echo_publication(path, published[path])

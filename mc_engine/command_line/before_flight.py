@@ -120,7 +120,7 @@ def plan(
     file: Annotated[
         str | None, typer.Argument(metavar="[FILE_OR_NAME]", help="A campaign, for the requirements that it sets.")
     ] = None,
-    share: Annotated[float | None, typer.Option(help="Share of cases to be demonstrated, such as 0.9973.")] = None,
+    share: Annotated[float | None, typer.Option(help="Success probability to be demonstrated, such as 0.9973.")] = None,
     confidence: Annotated[float | None, typer.Option(help="Confidence of the demonstration, such as 0.90.")] = None,
     failures: Annotated[
         int | None, typer.Option(min=0, max=1_000_000, help="Only the row for this many failures.")
@@ -129,7 +129,7 @@ def plan(
         bool, typer.Option("--two-sided", help="Also the cases for an interval between order statistics (Wilks).")
     ] = False,
 ) -> None:
-    """How many cases demonstrate a share of success with a confidence, for 0, 1, 2, ... failures among them.
+    """How many cases demonstrate a success probability with a confidence, for 0, 1, 2, ... failures among them.
 
     Give --share and --confidence, or a campaign whose requirements are planned for, one by one and together.
     """

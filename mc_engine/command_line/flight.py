@@ -202,8 +202,9 @@ def finish(
         analyses_line,
         case_line,
         failed_cases,
-        judgement,
+        nominal_line,
         not_finite_line,
+        outcomes,
         verdict_line,
     )
 
@@ -218,9 +219,11 @@ def finish(
     reports = [] if no_report else write_reports(store.path, ("html", "pdf"))
     typer.echo(f"run          {store.path}")
     typer.echo(f"cases        {case_line(store)}")
+    if nominal := nominal_line(store):
+        typer.echo(f"nominal      failed: {nominal}")
     if analyses := analyses_line(store):
         typer.echo(f"analyses     {analyses}")
-    judged, joint = judgement(store)
+    judged, joint = outcomes(store)
     for verdict in (*judged, joint) if joint is not None else judged:
         typer.echo(f"requirement  {verdict_line(verdict, store.units)}")
     for report_path in reports:

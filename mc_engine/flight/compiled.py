@@ -27,7 +27,7 @@ class CompiledFlyer(Flyer):
     def __init__(self, campaign: Campaign):
         self._campaign = campaign
         self._model, self._folder, self._seed = compiled_model(campaign.model), campaign.directory, campaign.seed
-        self.batch = usual_width(self._model)
+        self.batch = self.histories_together = usual_width(self._model)
 
     def fly(
         self,

@@ -20,18 +20,20 @@ from mc_engine.campaign.cases import case_table, full_inputs
 from mc_engine.campaign.dispersions import Dispersion
 from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
-from mc_engine.flight.flight import fly, grid_of
+from mc_engine.flight.flight import fly, fly_interpreted, grid_of
 from mc_engine.flight.flyer import NOMINAL_NOISE
 from mc_engine.flight.kernel_parts import watching_events
 from mc_engine.flight.lost_numbers import first_lost
 from mc_engine.flight.repeatability import influences, model_digests, nominal_inputs, note_environment
+from mc_engine.garbage_collection import collect_rarely
 from mc_engine.model.faults import MORE, fault_of
-from mc_engine.model.fields import AdaptiveStep, FixedStep
-from mc_engine.model.phases import noted_field
+from mc_engine.model.fields import AdaptiveStep, Event, FixedStep
+from mc_engine.model.phases import due_field, noted_field
 from mc_engine.model.record import Model, compiled_model
 from mc_engine.model.trial import fixed_metrics
 from mc_engine.sampling.distributions import column, quantiles
 from mc_engine.status import NOT_FINITE, OK, STATUS_NAME, STATUS_TEXT
+from mc_engine.suggestions import listed
 
 _CASES = 32
 _BLOCKS = 4  # of lanes that they fill at most
@@ -40,6 +42,7 @@ _CUT = 5  # cases of the smaller part when they are flown in two
 _PLACES = np.array([0.05, 0.8, 0.95])
 _PARTNERS = 4  # cases in which an input is tried that does nothing in the nominal case
 LONGEST_S = 10.0  # of the flight of one case: with it, all that is flown here takes some minutes
+_INTERPRETED_S = 10.0  # of the nominal case flown by Python: the kernel that it spares takes about as long to compile
 _ZERO = 1e-6  # of an event function's reach: a flight that stops there has reached the zero
 
 Columns = Mapping[str, np.ndarray]
@@ -64,7 +67,7 @@ def faults(campaign: Campaign) -> list[str]:
             *_never_set(campaign, flown),
             *_always_the_same(campaign, flown),
             *_moving_nothing(campaign, inputs, ids),
-            *_never_crossing(campaign, inputs, ids),
+            *_never_crossing(campaign, inputs, ids, nominal),
         ]
     except EngineError as error:
         return [str(error).removesuffix(MORE)]
@@ -125,11 +128,22 @@ def _none_completing(campaign: Campaign, flown: Columns) -> Iterator[str]:
     text = {STATUS_NAME[code]: text for code, text in STATUS_TEXT.items()}[word]
     reasons = [str(reason) for reason in flown["reason"] if reason]
     sentence = f"none of the first {status.size} cases completes: {counts.max()} are {word}"
-    stops = [f'"{event.name}"' for event in compiled_model(campaign.model).event_list if event.action == "stop"]
     if word == "no-stop":
-        text = f"no stopping event crosses zero before the time limit, of {', '.join(stops)}; look at its function, "
-        text += "its direction and the clock's `until`"
+        text = _no_stop(compiled_model(campaign.model))
     yield f"{sentence} ({reasons[0] if word == 'refused' and reasons else text})"
+
+
+def _no_stop(model: Model) -> str:
+    """What to look at where no case meets a stopping event; a delayed one by its own name."""
+    delayed = {due_field(event.name): event.name for event in model.event_list}
+    stops = [event.name for event in model.event_list if event.action == "stop"]
+    own = listed(delayed.get(name, name) for name in stops)
+    if not delayed.keys() & {*stops}:
+        happens, look_at = "crosses zero", "its direction"
+    else:
+        happens, look_at = "acts", "its direction, its delay `after`"
+    return (f"no stopping event {happens} before the time limit, of {own}; look at its function, {look_at} and the "
+            "clock's `until`")  # fmt: skip
 
 
 def _not_finite(
@@ -242,34 +256,71 @@ def _trial_values(campaign: Campaign, dispersion: Dispersion) -> np.ndarray:
     return np.sort(values)[[0, 3 * values.size // 4, -1]]
 
 
-def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray) -> Iterator[str]:
-    """Events that fire in none of the cases: their functions keep one sign."""
+def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarray, nominal: Columns) -> Iterator[str]:
+    """Events that fire in none of the cases, of which at least one completes: their functions keep one sign.
+
+    The nominal case counts, too: flown by Python it shows most events, and only for those that it leaves open a kernel
+    is compiled that watches them in all cases.
+    """
     model = compiled_model(campaign.model)
-    if all(event.rare for event in model.event_list):
+    stops = [event for event in model.event_list if event.action == "stop"]
+    # a case completes by a stopping event: the only one has happened
+    asked = [event for event in model.event_list if not event.rare and (event.action != "stop" or len(stops) > 1)]
+    if not asked:
         return
-    reached = fly(watching_events(model), inputs, ids, campaign.seed, folder=campaign.directory)
-    ok = reached["status"] == STATUS_NAME[OK]
+    watched = watching_events(model)
+    reached = _nominal_reach(campaign, watched) if nominal["status"][0] == STATUS_NAME[OK] else {}
+    if all(_happens(model, event, reached) for event in asked):
+        return
+    noise = np.append(ids, NOMINAL_NOISE)
+    both = {
+        name: np.append(np.broadcast_to(values, ids.size), campaign.nominal[name]) for name, values in inputs.items()
+    }
+    flown = fly(watched, both, noise, campaign.seed, folder=campaign.directory)
+    ok = flown["status"] == STATUS_NAME[OK]
+    reached = {metric.name: flown[metric.name][ok] for metric in watched.metrics}
+    for event in asked:
+        if not _happens(model, event, reached):
+            yield _never_happens(model, event, reached, int(ok[:-1].sum()))
+
+
+def _nominal_reach(campaign: Campaign, watched: Model) -> Columns:
+    """The metrics of `watching_events` in the nominal case, flown by Python; none where it takes too long or fails."""
+    from mc_engine.flight.interpreted import InterpretedFlight  # which loads the compiler
+
+    flight = InterpretedFlight(watched, _INTERPRETED_S)
+    try:
+        _, status, _, metrics = fly_interpreted(flight, campaign.nominal, NOMINAL_NOISE, campaign.seed)
+    except Exception:
+        return {}  # no finding: kernels go on where Python raises, and the kernel that watches is asked
+    return {metric.name: row for metric, row in zip(watched.metrics, metrics, strict=False)} if status[0] == OK else {}
+
+
+def _happens(model: Model, event: Event, reached: Columns) -> bool:
+    """Whether an event happens, or its function reaches zero, in any of the cases; not if there is no case.
+
+    reached : the metrics of `watching_events`.
+    """
+    if not reached:
+        return False
     if model.phases:
-        yield from _never_firing(model, reached, ok)
-        return
-    for event in model.event_list:
-        least, most = reached[f"least_{event.name}"][ok], reached[f"most_{event.name}"][ok]
-        zero = _ZERO * np.fmax(np.abs(least), np.abs(most))
-        if not event.rare and not ((least <= zero) & (most >= -zero)).any():
-            sign = "above" if (least > 0.0).all() else "below"
-            yield (
-                f'the event "{event.name}" crosses zero in none of {ok.sum()} cases, its function stays {sign} it; '
-                "mend the function, or declare it with rare=True if it is for unusual cases"
-            )
+        return not np.isnan(reached[noted_field(event.name)]).all()
+    least, most = reached[f"least_{event.name}"], reached[f"most_{event.name}"]
+    zero = _ZERO * np.fmax(np.abs(least), np.abs(most))
+    return bool(((least <= zero) & (most >= -zero)).any())
 
 
-def _never_firing(model: Model, reached: Columns, ok: np.ndarray) -> Iterator[str]:
-    for event in model.event_list:
-        if not event.rare and np.isnan(reached[noted_field(event.name)][ok]).all():
-            yield (
-                f'the event "{event.name}" happens in none of {ok.sum()} cases, in the phases that look for it; mend '
-                "its function or its direction, or declare it with rare=True if it is for unusual cases"
-            )
+def _never_happens(model: Model, event: Event, reached: Columns, n_cases: int) -> str:
+    if model.phases:
+        return (
+            f'the event "{event.name}" happens in none of {n_cases} cases, in the phases that look for it; mend '
+            "its function or its direction, or declare it with rare=True if it is for unusual cases"
+        )
+    sign = "above" if (reached[f"least_{event.name}"] > 0.0).all() else "below"
+    return (
+        f'the event "{event.name}" crosses zero in none of {n_cases} cases, its function stays {sign} it; '
+        "mend the function, or declare it with rare=True if it is for unusual cases"
+    )
 
 
 def main() -> None:
@@ -278,6 +329,7 @@ def main() -> None:
     With `--wait` behind the name nothing is flown before the digests of another process come on standard input, as
     JSON; without them this process ends.
     """
+    collect_rarely()
     note_environment()
     campaign = load_campaign(sys.argv[1])
     waits = sys.argv[2:] == ["--wait"]

@@ -25,8 +25,10 @@ if TYPE_CHECKING:
     from mc_engine.flight.interpreted import InterpretedFlight
 
 _NO_TABLES, _NO_HISTORY = np.empty(0), np.empty((0, 0))
+_NO_RECORDING = _NO_HISTORY, np.empty(0, dtype=np.int64), np.ones(1)
 _MOST_RECORDED = 200_000  # rows of a flight, of which its history keeps some
-_USUAL_ROOM = 50_000  # rows that are recorded without counting them first
+_USUAL_ROOM = 2_000  # rows of adaptive steps that are recorded without counting them first
+_MOST_NUMBERS = 2**24  # of the rows of cases that fly together: 128 MiB
 _OVERSAMPLED = 4  # times as many rows as are kept, where steps are so long that they are divided
 _STATUS_WORDS = np.array([STATUS_NAME[code] for code in range(len(STATUS_NAME))], dtype=object)
 
@@ -69,15 +71,14 @@ def _columns(model: Model, refusals: Refusals, out: tuple[np.ndarray, ...]) -> d
     for numbers in out:
         numbers[np.isnan(numbers)] = np.nan  # processors and cards give it different signs
     time, status, states, metrics = out
-    last_phase = phase_words(model, metrics[-1])
-    metrics = metrics[: len(model.metrics)]
-    metrics[:, status != OK] = np.nan
     reason = refusals.reason.astype(object)
-    failed = (status != OK) & (last_phase != "")
-    reason[failed] = [f'in the phase "{word}"' for word in last_phase[failed]]
     columns = {"status": _STATUS_WORDS[status.astype(int)], "reason": reason, END_TIME: time}
     if model.phases:
-        columns[END_PHASE] = last_phase
+        columns[END_PHASE] = last_phase = phase_words(model, metrics[-1])
+        failed = (status != OK) & (last_phase != "")
+        reason[failed] = [f'in the phase "{word}"' for word in last_phase[failed]]
+    metrics = metrics[: len(model.metrics)]
+    metrics[:, status != OK] = np.nan
     columns |= {f"end_{field.name}": row / field.si_factor for field, row in zip(model.states, states, strict=True)}
     return columns | {field.name: row / field.si_factor for field, row in zip(model.metrics, metrics, strict=True)}
 
@@ -150,7 +151,7 @@ def _fly_group(
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
     cases = ready.parameters[:, index], settings, ready.tables
     ids = case_ids[index]
-    in_another_thread(_bound_kernel(model, clock, folder, width, cases, seed, ids, out, _NO_HISTORY, 1.0, build=build))
+    in_another_thread(_bound_kernel(model, clock, folder, width, cases, seed, ids, out, build=build))
     return tuple(numbers[..., :n] for numbers in out)
 
 
@@ -167,18 +168,18 @@ def _bound_kernel(
     seed: int,
     case_ids: np.ndarray,
     out: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
-    history: np.ndarray,
-    pace: float,
-    kernel: Callable[..., int] | None = None,
+    recording: tuple[Any, np.ndarray, Any] = _NO_RECORDING,
+    kernel: Callable[..., Any] | None = None,
     build: Builder | None = None,
-) -> Callable[[], int]:
+) -> Callable[[], Any]:
     """The kernel with all its arguments.
 
     inputs : parameters [n_kernel_parameters, n], setting codes, tables of the cases
-    pace : of the history, in steps from row to row or, if the steps are adaptive, in rows of a step
+    recording : history and its rows, see `mc_engine.lanes.history`; pace of each case or of all, in steps from row to
+        row or, if the steps are adaptive, in rows of a step
     kernel : in place of the model's own
     """
-    parameters, settings, tables = inputs
+    (parameters, settings, tables), (history, rows, pace) = inputs, recording
     chosen = settings_of(model, settings, tables)
     if kernel is None:
         refuse_unfit(model, parameters, chosen)
@@ -187,13 +188,14 @@ def _bound_kernel(
     numbers, data = _kernel_settings(model, settings, chosen), gathered(blocks_of(model))
     shared = np.ascontiguousarray(parameters), numbers, data, np.uint64(noise_key(seed)), cases
     if isinstance(clock, AdaptiveStep):
-        return partial(kernel, *shared, *adaptive_arguments(model, clock, chosen), *out, history, float(pace))
-    return partial(kernel, *shared, *fixed_arguments(clock, chosen), *out, history, int(pace))
+        paces = np.array(np.broadcast_to(pace, width), dtype=np.float64)
+        return partial(kernel, *shared, *adaptive_arguments(model, clock, chosen), *out, history, rows, paces)
+    return partial(kernel, *shared, *fixed_arguments(clock, chosen), *out, history, rows, int(pace[0]))
 
 
 def bound_flight(
     model: Model, inputs: Inputs, case_ids: np.ndarray, seed: int, *, folder: Path | None = None, width: int
-) -> tuple[Callable[[], int], np.ndarray, np.ndarray]:
+) -> tuple[Callable[[], Any], np.ndarray, np.ndarray]:
     """(function that flies by the kernel alone, its end times [s], its setting codes): what a speed is measured on.
 
     Of the cases that can start, those flown have the settings of the first, and are a whole number of `width`.
@@ -208,7 +210,7 @@ def bound_flight(
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
     cases = ready.parameters[:, chosen], settings, ready.tables
     ids = case_ids[chosen]
-    return _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, _NO_HISTORY, 1.0), out[0], settings
+    return _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out), out[0], settings
 
 
 def fly_interpreted(
@@ -223,7 +225,8 @@ def fly_interpreted(
     settings, out = np.ascontiguousarray(ready.settings[0]), _outputs(flight.model, 1)
     cases = ready.parameters, settings, ready.tables
     clock, ids = flight.model.clock, np.array([case_id])
-    _bound_kernel(flight.model, clock, None, 1, cases, seed, ids, out, history, 1.0, flight.kernel)()
+    recording = history, np.zeros(1, dtype=np.int64), np.ones(1)
+    _bound_kernel(flight.model, clock, None, 1, cases, seed, ids, out, recording, flight.kernel)()
     return out
 
 
@@ -244,69 +247,124 @@ def fly_histories(
     width: int | None = None,
     rows: int = 1500,
 ) -> Iterator[tuple[dict[str, np.ndarray], dict[str, np.ndarray]]]:
-    """(columns, history) of each case, flown alone: the same bits as among others, whatever the width of the build.
+    """(columns, history) of each case, in their order.  As many as there are lanes fly together when one is asked for.
+
+    Their bits are the same whatever the width and whichever other cases fly with them.
 
     rows : of the history, see `mc_engine.store.histories.rows_to_keep`; fewer where a fixed grid has fewer steps
     history : t_s and the model's outputs in declared units; empty if the case was refused.  Of a time with two rows
         the first is before an event or a sample of the control, the second after it.
     """
-    from mc_engine.store.histories import PHASE_COLUMN, rows_to_keep  # what `check` flies has no history
+    from mc_engine.store.histories import PHASE_COLUMN  # what `check` flies has no history
 
     width = width or usual_width(model)
     ready = prepare(model, inputs, len(case_ids))
     names = ["t_s", *(quantity.name for quantity in model.quantities), *([PHASE_COLUMN] if model.phases else [])]
-    for place, case_id in enumerate(case_ids):
-        refusals = Refusals(ready.refusals.reason[[place]])
-        if refusals.mask[0]:
+    groups = [np.split(group, range(width, group.size, width)) for group in _groups_by_settings(ready)]
+    batch_of = {int(place): batch for batches in groups for batch in batches for place in batch}
+    recorder = _Recorder(model, ready, case_ids, seed, folder, width, rows)
+    flown: dict[int, tuple[dict[str, np.ndarray], np.ndarray]] = {}
+    for place in range(len(case_ids)):
+        if place not in batch_of:
+            refusals = Refusals(ready.refusals.reason[[place]])
             yield _columns(model, refusals, _unflown(model, refusals)), {name: np.empty(0) for name in names}
             continue
-        out, table = _recorded(model, ready, place, case_id, seed, folder, width, rows, len(names))
-        table[:, 1 : 1 + len(model.quantities)] /= [quantity.si_factor for quantity in model.quantities]
-        kept = table[rows_to_keep(table, rows)]
-        history = {name: kept[:, i] for i, name in enumerate(names)}
+        if place not in flown:
+            flown.update(zip(batch_of[place].tolist(), recorder.flown(batch_of[place]), strict=True))
+        columns, table = flown.pop(place)
+        history = dict(zip(names, table, strict=True))
         if model.phases:
-            history[PHASE_COLUMN] = phase_words(model, kept[:, -1])
-        yield _columns(model, refusals, out), history
+            history[PHASE_COLUMN] = phase_words(model, table[-1])
+        yield columns, history
 
 
-def _recorded(
-    model: Model,
-    ready: Prepared,
-    place: int,
-    case_id: int,
-    seed: int,
-    folder: Path | None,
-    width: int,
-    rows: int,
-    n_columns: int,
-) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-    """(time, status, states and metrics, recorded rows) of one of the cases that are ready, in SI.
+class _Recorder:
+    """Flies cases of one settings together, each in a lane of its own, and keeps some rows of each.
 
-    Of these rows the history keeps some: they are those of all steps of the flight if memory allows, and of adaptive
-    steps so long that there are fewer than wanted, also those of the parts that they are divided into.
+    These rows are those of all steps of a flight if memory allows, and of adaptive steps so long that there are fewer
+    than wanted, also those of the parts that they are divided into.  The memory for them serves one batch after
+    another; where a batch has more rows than memory is meant for, it flies in pieces.
     """
-    settings = np.ascontiguousarray(ready.settings[place])
-    ids, parameters = np.full(width, case_id), np.repeat(ready.parameters[:, [place]], width, axis=1)
-    cases, out = (parameters, settings, ready.tables), _outputs(model, width)
 
-    def recorded(room: int, pace: float) -> tuple[int, np.ndarray]:
-        """(rows that the flight has, as many of them as there is room for)."""
-        history = np.empty((room, n_columns))
-        bound = _bound_kernel(model, model.clock, folder, width, cases, seed, ids, out, history, pace)
-        return in_another_thread(bound), history
+    def __init__(
+        self,
+        model: Model,
+        ready: Prepared,
+        case_ids: np.ndarray,
+        seed: int,
+        folder: Path | None,
+        width: int,
+        rows: int,
+    ):
+        self._model, self._ready, self._case_ids, self._seed, self._folder = model, ready, case_ids, seed, folder
+        self._width, self._rows, self._most = width, rows, max(_MOST_RECORDED, _OVERSAMPLED * rows)
+        self._factors = np.array([quantity.si_factor for quantity in model.quantities])
+        self._n_fields = 1 + self._factors.size + bool(model.phases)
+        self._history = np.empty((0, 0))
 
-    most, pace = max(_MOST_RECORDED, _OVERSAMPLED * rows), 1.0
-    if isinstance(model.clock, FixedStep):
-        n_steps = grid_of(model.clock, settings_of(model, settings))[0]
-        pace = float(-(-2 * n_steps // most))  # in steps
-    n_rows, table = recorded(_USUAL_ROOM, pace)
-    if isinstance(model.clock, AdaptiveStep):
-        wanted = most / n_rows if n_rows > most else float(max(1, -(-_OVERSAMPLED * rows // n_rows)))
-        if wanted != pace:
-            n_rows, table = recorded(_USUAL_ROOM, pace := wanted)
-    if n_rows > _USUAL_ROOM:
-        n_rows, table = recorded(n_rows, pace)
-    return tuple(numbers[..., :1] for numbers in out), table[:n_rows]
+    def flown(self, chosen: np.ndarray) -> Iterator[tuple[dict[str, np.ndarray], np.ndarray]]:
+        """(columns, history) of each case.  history : float64[1 + n_quantities, n_kept], in declared units.
+
+        chosen : indices of cases that can start, of one settings, as many as there are lanes or fewer.
+        """
+        out, counts = self._recorded(chosen)
+        together = self._together(counts)
+        if chosen.size > together:
+            for first in range(0, chosen.size, together):
+                yield from self.flown(chosen[first : first + together])
+            return
+        refusals = Refusals(self._ready.refusals.reason[chosen])
+        columns = _columns(self._model, refusals, tuple(numbers[..., : chosen.size] for numbers in out))
+        for lane, n_rows in enumerate(counts):
+            yield {name: values[lane : lane + 1] for name, values in columns.items()}, self._kept(lane, n_rows)
+
+    def _kept(self, lane: int, n_rows: int) -> np.ndarray:
+        from mc_engine.store.histories import rows_to_keep
+
+        table = self._history[lane * self._n_fields : (lane + 1) * self._n_fields, :n_rows]
+        table[1 : 1 + self._factors.size] /= self._factors[:, np.newaxis]
+        return table.take(rows_to_keep(table.T, self._rows), axis=1)
+
+    def _recorded(self, chosen: np.ndarray) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+        """((time, status, states, metrics) in SI, number of rows of each case), the rows recorded where they fit."""
+        clock, pace, room = self._model.clock, np.ones(self._width), _USUAL_ROOM
+        if isinstance(clock, FixedStep):
+            n_steps = grid_of(clock, settings_of(self._model, self._ready.settings[chosen[0]]))[0]
+            pace *= -(-2 * n_steps // self._most)  # in steps
+            room = min(2 * n_steps + 1, self._most)
+        out, counts = self._fly(chosen, pace, room)
+        if isinstance(clock, AdaptiveStep):
+            finer = np.maximum(1.0, -(-_OVERSAMPLED * self._rows // counts))
+            wanted = np.where(counts > self._most, self._most / counts, finer)
+            if (wanted != 1.0).any():
+                pace[: chosen.size] = wanted
+                if chosen.size > self._together(counts * wanted):
+                    return out, counts * wanted
+                out, counts = self._fly(chosen, pace, (counts * wanted).max())
+        if counts.max() > self._history.shape[1] and chosen.size <= self._together(counts):
+            out, counts = self._fly(chosen, pace, counts.max())
+        return out, counts
+
+    def _together(self, counts: np.ndarray) -> int:
+        """How many cases with so many rows there is memory for; always for one."""
+        return max(1, int(_MOST_NUMBERS // (self._n_fields * counts.max())))
+
+    def _fly(self, chosen: np.ndarray, pace: np.ndarray, room: float) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+        """(results, number of rows of each case).  room : wanted for rows of each; one case gets it in any case."""
+        n_lines = chosen.size * self._n_fields
+        if chosen.size > 1:
+            room = min(room, _MOST_NUMBERS // n_lines)
+        if n_lines > self._history.shape[0] or room > self._history.shape[1]:
+            self._history = np.empty((n_lines, int(room)))
+        index = np.resize(chosen, self._width)
+        settings, out = np.ascontiguousarray(self._ready.settings[chosen[0]]), _outputs(self._model, self._width)
+        inputs = self._ready.parameters[:, index], settings, self._ready.tables
+        rows = np.zeros(chosen.size, dtype=np.int64)  # lanes beyond these record nothing
+        recording = self._history, rows, pace
+        model, ids = self._model, self._case_ids[index]
+        bound = _bound_kernel(model, model.clock, self._folder, self._width, inputs, self._seed, ids, out, recording)
+        in_another_thread(bound)
+        return out, rows
 
 
 # ---- chosen inputs, all others at the model's own values: for studies that no campaign file describes

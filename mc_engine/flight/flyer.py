@@ -33,6 +33,7 @@ class Flyer(ABC):
     """Flies the cases of one campaign.  Used by several threads at once.
 
     batch : cases that fly together, of which one may end the worker of all.
+    histories_together : cases whose histories fly together.
     keeps_rows : a case may take long, so the row of each is recorded when it is complete, and a run that is stopped
         does not wait for the cases in flight.
     most_workers : that may fly cases of this campaign at a time, as licences allow; None for any number.
@@ -40,6 +41,7 @@ class Flyer(ABC):
     """
 
     batch: int
+    histories_together: int = 1
     keeps_rows: bool = False
     most_workers: int | None = None
     tolerance: float | None = None
@@ -64,7 +66,7 @@ class Flyer(ABC):
 
     @abstractmethod
     def histories(self, inputs: Inputs, noise: np.ndarray, rows: int) -> Iterator[tuple[Columns, Columns]]:
-        """(results, history) of each case, flown by itself when it is asked for.
+        """(results, history) of each case, flown when it is asked for, perhaps together with those that follow it.
 
         history : t_s and the outputs, about `rows` rows, none of a refused case.
         """

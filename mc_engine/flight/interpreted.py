@@ -54,7 +54,7 @@ class InterpretedFlight:
 
     def kernel(
         self, parameters: np.ndarray, settings: np.ndarray, data: Any, key: Any, cases: np.ndarray, *rest: Any
-    ) -> int:
+    ) -> None:
         """Fly the first case; arguments and results are those of the model's kernel."""
         model, adaptive = self.model, isinstance(self.model.clock, AdaptiveStep)
         fly = self._interpreted("adaptive_flight" if adaptive else "fixed_step")["fly"]
@@ -62,15 +62,16 @@ class InterpretedFlight:
         inputs = (parameters, settings, key, cases)
         common, must_stop = (model.kernel_parameters, self._settings, 1), "stop" in actions
         if adaptive:
-            pair, (clock, atol, *out, history, pace) = rest[:4], rest[4:]
+            pair, (clock, atol, *out, history, rows, pace) = rest[:4], rest[4:]
             order = (np.zeros(1, dtype=np.int64), *inputs, [Number(value) for value in clock], atol, must_stop)
-            return int(fly(self._functions, pair, *common, *order, out, history, pace))
-        n_steps, h, every, *tables, time, status, state, metrics, history, stride = rest
+            fly(self._functions, pair, *common, *order, out, history, rows, pace)
+            return
+        n_steps, h, every, *tables, time, status, state, metrics, history, rows, stride = rest
         stepping = self._interpreted("gauss_jackson" if self._picks else "multistep" if tables else "fixed_step")
         own = (*tables, *self._picks)
         method = Method(**{name: stepping[name] for name in Method._fields[:-1]}, tables=own)
         grid, kinds, results = (n_steps, h, every), (bool(actions), must_stop), (time, status, state, metrics)
-        return int(fly(self._functions, method, *common, *inputs, grid, kinds, results, history, stride))
+        fly(self._functions, method, *common, *inputs, grid, kinds, results, history, rows, stride)
 
     def _called(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         def called(*arguments: Any) -> Any:
@@ -86,9 +87,10 @@ class InterpretedFlight:
             return function(*(numbers(argument) for argument in arguments))
         return calling(name, function, *arguments)
 
-    def record(self, array: np.ndarray, row: int, t: Any, fields: Any) -> None:
-        """Write a row of the history.  fields : what `observe` has just given."""
-        array[row] = (t, *fields)
+    def record(self, history: np.ndarray, rows: np.ndarray, lanes: bool, t: Any, fields: Any) -> None:
+        """Write one more row of the history.  fields : what `observe` has just given."""
+        history[:, rows[0]] = (t, *fields)
+        rows += 1
 
     def _interpreted(self, module: str) -> dict[str, Any]:
         """The names of a module of loops, its compiled functions and intrinsics as Python runs them."""
@@ -184,6 +186,13 @@ def _stage_sums(memory: list[Any], like: Any, first: int, last: int, columns: np
     return tuple(_stage_sum(memory, like, first, last, columns, row) for row in weights)
 
 
+def _unequal(one: Any, other: Any) -> bool:
+    """See `mc_engine.lanes.lane_access.unequal`; records may hold records."""
+    if isinstance(one, tuple):
+        return any(map(_unequal, one, other))
+    return bool(one != other) and not (one != one and other != other)
+
+
 _INTRINSICS: dict[str, Callable[..., Any]] = {
     "spread": _spread,
     "least": functools.partial(functools.reduce, lambda x, y: x if x < y else y),
@@ -199,7 +208,7 @@ _INTRINSICS: dict[str, Callable[..., Any]] = {
     "store": _store,
     "store_fields": _store,
     "store_lane": lambda array, column, value, lane: _store(array, column, value),
-    "unequal": lambda one, other, like: one != other,
+    "unequal": lambda one, other, like: _unequal(one, other),
     "differ": lambda one, other, like: one != other,
     "lane_holds": lambda mask, lane: mask,
     "with_lane": lambda value, lane, item: number(item),

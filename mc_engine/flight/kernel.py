@@ -25,7 +25,7 @@ from mc_engine.model.fields import AdaptiveStep, FixedStep, uses_rates
 from mc_engine.model.imports import new_module
 from mc_engine.model.record import Model, sources_of
 
-Builder = Callable[[Model, Path | None, int], Callable[..., int]]  # gives, as `build_kernel`, what is called
+Builder = Callable[[Model, Path | None, int], Callable[..., Any]]  # gives, as `build_kernel`, what is called
 WIDTH = 8  # one register of eight doubles
 _MOST_STEPS = 10**9  # of a flight, as AdaptiveStep's attempts: a year of 0.03 s, a minute of one core
 _FEW_FIXED, _FEW_ADAPTIVE = 18, 12  # values
@@ -55,13 +55,14 @@ _F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 @compile_kernel
 def kernel(
     parameters, settings, data, key, cases, n_steps, h, control_every, {tables}time, status, state, metrics, history,
-    stride,
+    rows, stride,
 ):
     hand_over(BLOCKS, data)
     f, method = Functions({names}), Method(begin, restart, advance, single, ({tables}))
     grid, kinds, out = (n_steps, h, control_every), (HAS_EVENTS, MUST_STOP), (time, status, state, metrics)
-    return fly(
-        f, method, Parameters, Settings, {width}, parameters, settings, key, cases, grid, kinds, out, history, stride
+    fly(
+        f, method, Parameters, Settings, {width}, parameters, settings, key, cases, grid, kinds, out, history, rows,
+        stride,
     )
 '''
 _TABLES = "nodes, starts, columns, weights, columns_of, ahead, behind, at_end, n_differences"
@@ -89,14 +90,14 @@ _F, Parameters, Settings, HAS_EVENTS, MUST_STOP, BLOCKS = PARTS
 @compile_kernel
 def kernel(
     parameters, settings, data, key, cases, nodes, starts, columns, weights, clock, atol, time, status, state, metrics,
-    history, pace,
+    history, rows, pace,
 ):
     hand_over(BLOCKS, data)
     f = Functions({names})
     tables, out = (nodes, starts, columns, weights), (time, status, state, metrics)
-    return fly(
+    fly(
         f, tables, Parameters, Settings, {width}, lane_numbers({width}), parameters, settings, key, cases, clock, atol,
-        MUST_STOP, out, history, pace,
+        MUST_STOP, out, history, rows, pace,
     )
 '''
 

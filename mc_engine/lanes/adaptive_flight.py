@@ -223,6 +223,7 @@ def _fly(
     must_stop,
     out,
     history,
+    rows,
     pace,
 ):
     """Fly all cases of a chunk, the lanes taking them in turn.
@@ -232,9 +233,8 @@ def _fly(
     settings : float64[n_settings];  key : uint64;  cases : float64[n], case numbers
     clock : the fields of `Clock`, float64;  atol : float64[n_states], SI
     out : (time, status) float64[n], state float64[n_states, n], metrics float64[n_metrics, n]
-    history : float64[n_rows, 1 + n_quantities] of the first lane; no rows, no history
-    pace : history rows of a step; below 1 one for so many steps, and events have theirs all the same
-    Returns the number of history rows that the flight has.
+    history, rows : see `mc_engine.lanes.history`
+    pace : float64[width], history rows of a step; below 1 one for so many steps, and events have theirs all the same
     """
     align_stack()
     end_time, end_status, end_state, metrics = out
@@ -252,7 +252,7 @@ def _fly(
     closing, beyond, armed = zero > 0.0, here, map_fields(_nothing, here.values)
     bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
     best, when = here.values, map_fields(first_time, here.values, zero)
-    rows, due = 0, 0.0
+    due, rows_of_step = zero, load(pace, 0, width)
     while True:
         if any_lane(new | altered):
             if any_lane(new):
@@ -263,8 +263,8 @@ def _fly(
                 sample, limit = where(new, 1.0, sample), where(new, _NEVER, limit)
                 last_ideal = where(new, _NONE, last_ideal)
                 closing = closing & (not new)
-                if history.shape[0] > 0 and rows == 0:
-                    rows = record_row(f, history, rows, t, s, m, p, o)
+                if history.shape[0] > 0:
+                    record_row(f, history, rows, new, t, s, m, p, o)
             k = spread(f.rhs(here.t, here.s, here.m, p, o), zero)
             if any_lane(new):
                 h = where(new, length_at_start(f, clock, zero, here.s, here.m, k, p, o, atol), h)
@@ -326,13 +326,13 @@ def _fly(
         status = where(stuck | capped, failure, status)
         if must_stop:
             status = where(ended & (not stopped), _UNSTOPPED, status)
-        recorded = False
-        if history.shape[0] > 0 and lane_holds(arrived, 0):
-            due += pace
-            recorded = due >= 1.0 or lane_holds(closed, 0)
-            if recorded:
-                rows = record_step(f, tables, history, rows, int(due), here, now, p, o)
-                due -= float(int(due))
+        recorded = arrived
+        if history.shape[0] > 0:
+            due = where(arrived, due + rows_of_step, due)
+            recorded = arrived & ((due >= 1.0) | closed)
+            parts = where(recorded, floor(due), 0.0)
+            record_step(f, tables, history, rows, recorded, parts, here, now, p, o)
+            due = due - parts
         here = select(arrived, now, here)
         closing = closing & (not arrived)
         noting = closed & f.notes_of(fired)
@@ -349,9 +349,9 @@ def _fly(
             last_ideal = where(altered, _NONE, last_ideal)
         done = ended | stuck | capped
         new = flying & (not flying)
-        if (recorded and lane_holds(closed | sampling, 0)) or (history.shape[0] > 0 and lane_holds(done, 0)):
-            is_event = lane_holds(closed, 0)
-            rows = record_change(f, history, rows, is_event, here.t, here.s, here.m, p, o)
+        if history.shape[0] > 0:
+            shown = (recorded & (closed | sampling)) | done
+            record_change(f, history, rows, shown, closed, here.t, here.s, here.m, p, o)
         if any_lane(done):
             results = finish(f, here, best, when, p, o)
             fresh = zero
@@ -373,7 +373,6 @@ def _fly(
             if not any_lane(active > 0.5):
                 break
             new = fresh > 0.5
-    return rows
 
 
 fly = compile_inline(_fly)

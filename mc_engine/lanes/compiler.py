@@ -1,8 +1,6 @@
 """Compiler flags and decorators: the only module that sets options of numba."""
 
-import gc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 from numba import config, njit, types
@@ -47,8 +45,8 @@ def compile_callable(function: Callable[..., Any]) -> Any:
     """Dispatcher for code that several places of a kernel share without copying it: histories, and events in a step.
 
     A call keeps the compiler from computing once what both sides need.  Adaptive flights, which start a new case or
-    change one in every few rounds, take 5 to 40 % longer where these parts are shared, and 3 to 6 % longer where those
-    of their histories are, so theirs are inlined.
+    change one in every few rounds, take 5 to 40 % longer where these parts are shared, and 3 to 6 % longer where the
+    steps of their histories are, so theirs are inlined.
     """
     # numba takes over what is not set here from the function that calls
     return njit(forceinline=False, **_UNWRAPPED, **STRICT)(function)
@@ -63,24 +61,9 @@ class KernelCompilation:
     def library(self, form: Form) -> tuple[str, Any]:
         """(name of the kernel in its library, library) for arguments of a form."""
         self.dispatcher._compilation_chain_init_hook()
-        with global_compiler_lock, _without_garbage_collection():
+        with global_compiler_lock:
             compiled = self.dispatcher._compiler.compile(tuple(_type(word) for word in form), None)
         return compiled.fndesc.llvm_func_name, compiled.library
-
-
-@contextmanager
-def _without_garbage_collection() -> Iterator[None]:
-    """numba makes objects by the million and keeps most: the search for garbage among them takes up to a tenth longer.
-
-    A compilation holds some tens of megabytes more.
-    """
-    was_on = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if was_on:
-            gc.enable()
 
 
 def compile_kernel(function: Callable[..., Any]) -> KernelCompilation:

@@ -12,7 +12,6 @@ M. Dowell, P. Jarratt, "A modified regula falsi method", BIT 11 (1971) 168-174.
 from mc_engine.lanes.compiler import compile_inline
 from mc_engine.lanes.functions import any_lane, minimum, where
 from mc_engine.lanes.history import record_change, record_row
-from mc_engine.lanes.lane_access import lane_holds
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.tuples import any_field, least, map_fields, select, spread
 
@@ -96,8 +95,8 @@ def _follow(f, method, t, finish, h, s, end, m, p, o, g_start, g_end, flying, hi
     """What becomes of a step [t, finish] of length h in which some flying lane meets events.
 
     s, end : states at both ends of the step as if there were no events; g_start, g_end : event values there.
-    Returns (state, memory, time, stopped, overrun, lost, history rows): lanes that stop end at their event, the others
-    at `finish`; those are lost of which the values there do not tell whether they have met another.
+    Returns (state, memory, time, stopped, overrun, lost): lanes that stop end at their event, the others at `finish`;
+    those are lost of which the values there do not tell whether they have met another.
     Event functions of time see `finish` itself at the end, not the sum t + h: the next step starts from the same
     number, so an event on the grid is met once, neither missed nor met twice by a rounding.
     """
@@ -116,20 +115,19 @@ def _follow(f, method, t, finish, h, s, end, m, p, o, g_start, g_end, flying, hi
         time, end = where(stops, now, time), select(stops, state, end)
         on, hit = pending & (not stops), map_fields(_one_where, fired, t)
         m = select(pending, spread(f.note(now, state, m, p, o, hit), t), m)
-        recorded = history.shape[0] > 0 and lane_holds(on, 0)
-        if recorded:
-            rows = record_row(f, history, rows, now, state, m, p, o)
+        if history.shape[0] > 0:
+            record_row(f, history, rows, on, now, state, m, p, o)
         switched, memory = f.switch(now, state, m, p, o, hit)
         s, m = select(on, spread(switched, t), s), select(on, spread(memory, t), m)
         t, rest = where(on, now, t), where(on, rest - length, rest)
-        if recorded:
-            rows = record_change(f, history, rows, True, t, s, m, p, o)
+        if history.shape[0] > 0:
+            record_change(f, history, rows, on, on, t, s, m, p, o)
         g_start = select(on, spread(f.events(t, s, m, p, o), t), g_start)
         end = select(on, method.single(f, method.tables, t, rest, s, m, p, o), end)
         g_end = select(on, spread(f.events(finish, end, m, p, o), t), g_end)
         pending = on & any_field(map_fields(crossed, g_start, g_end, signs))
     lost = flying & (not stopped) & any_field(map_fields(is_lost, g_start, g_end, signs))
-    return end, m, time, stopped, pending, lost, rows
+    return end, m, time, stopped, pending, lost
 
 
 follow = compile_inline(_follow)

@@ -15,7 +15,7 @@ from mc_engine.lanes.compiler import compile_callable, compile_inline
 from mc_engine.lanes.events import follow, may_have_crossed
 from mc_engine.lanes.functions import any_lane, fma, where
 from mc_engine.lanes.history import look_shared, record_row
-from mc_engine.lanes.lane_access import lane_holds, unequal
+from mc_engine.lanes.lane_access import unequal
 from mc_engine.lanes.philox import Draws
 from mc_engine.lanes.physics_function import physics
 from mc_engine.lanes.stage_memory import stage_memory
@@ -100,8 +100,7 @@ track = compile_inline(_track)
 
 
 def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, history, rows):
-    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken, past) of every lane, history
-    rows.
+    """One grid step from t to `finish`: (state, memory, time, stopped, overrun, broken, past) of every lane.
 
     The event values at the start are taken anew, not handed on: they share what the first derivative computes.
     """
@@ -112,28 +111,28 @@ def _step(f, method, past, has_events, t, finish, h, s, m, p, o, flying, history
         g, g_end = spread(f.events(t, s, m, p, o), t), spread(f.events(now, end, m, p, o), t)
         met = flying & any_field(map_fields(may_have_crossed, g, g_end, f.signs_of(g)))
         if any_lane(met):
-            end, m, now, stopped, overrun, lost, rows = follow(
+            end, m, now, stopped, overrun, lost = follow(
                 f, method, t, finish, h, s, end, m, p, o, g, g_end, flying, history, rows
             )
             past = method.restart(past, met)
     size = total(end)
     broken = lost | (flying & (not (size - size == 0.0)))
-    return end, m, now, stopped, overrun & (not broken), broken, past, rows
+    return end, m, now, stopped, overrun & (not broken), broken, past
 
 
 step = compile_inline(_step)
 
 
-def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events, history, stride):
+def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events, history, rows, stride):
     """Fly one block from its first state to the stop or the time limit.
 
     The outputs are looked at where a step begins, beside its first derivative, with which they share most of
     their work, and where a flight ends.
-    Returns (time, state, memory, status, unstopped, best, when, last, rows): per lane, and the history rows
-    written, those of the first lane: the start, every `stride` steps and their samples, all events, and the end.
+    A history has the start, every `stride` steps and their samples, all events, and the end.
+    Returns (time, state, memory, status, unstopped, best, when, last) of every lane.
     """
     t = case * 0.0
-    flying, status, rows = t == t, t, 0
+    flying, status = t == t, t
     s, m = f.states_of(spread(f.initial(p, o), t)), spread(f.start(p, o), t)
     m = spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
     seen = look_shared(f, t, s, m, p, o)
@@ -143,10 +142,10 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
     t0 = t1 = t2 = t
     past = method.begin(method.tables, stage_memory(s, MOST_SLOPES), s, t)
     for k in range(n_steps):
-        recorded = history.shape[0] > 0 and lane_holds(flying, 0) and k % stride == 0
+        recorded = history.shape[0] > 0 and k % stride == 0
         if k > 0 and k % control_every == 0:
             if recorded:
-                rows = record_row(f, history, rows, t2, s, m, p, o)
+                record_row(f, history, rows, flying, t2, s, m, p, o)
             held = spread(f.control(t2, s, m, p, o, Draws(key, case, float(k // control_every))), t)
             past = method.restart(past, unequal(m, held, t))
             m = select(flying, held, m)
@@ -154,10 +153,10 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
         v2, w2 = f.peaks_of(seen), f.lasts_of(seen)
         best, when, last = track(flying, f.smooth_of(v2), (v0, v1, v2), (t0, t1, t2), (w1, w2), best, when, last)
         if recorded:  # looked at anew: so the outputs that only a history wants cost nothing where there is none
-            rows = record_row(f, history, rows, t2, s, m, p, o)
+            record_row(f, history, rows, flying, t2, s, m, p, o)
         # the grid's own time, not a sum of steps: no rounding piles up, and a sample falls where it belongs
         finish = case * 0.0 + float(k + 1) * h
-        end, memory, now, stopped, overrun, broken, past, rows = step(
+        end, memory, now, stopped, overrun, broken, past = step(
             f, method, past, has_events, t2, finish, h, s, m, p, o, flying, history, rows
         )
         moved = flying & (not broken)
@@ -174,12 +173,12 @@ def _fly_block(f, method, p, o, key, case, n_steps, h, control_every, has_events
             best, when, last = track(at_end, f.smooth_of(v3), (v1, v2, v3), (t1, t2, t), (w2, w3), best, when, last)
             when = map_fields(extrema.end_time, when, best, v3, t, at_end, t)
             best = map_fields(extrema.end_value, best, v3, at_end)
-            if history.shape[0] > 0 and lane_holds(at_end, 0):
-                rows = record_row(f, history, rows, t, s, m, p, o)
+            if history.shape[0] > 0:
+                record_row(f, history, rows, at_end, t, s, m, p, o)
         if not any_lane(flying):
             break
         v0, v1, w1, t0, t1, t2 = v1, v2, w2, t1, t2, finish
-    return t, s, m, status, flying, best, when, last, rows
+    return t, s, m, status, flying, best, when, last
 
 
 fly_block = compile_inline(_fly_block)
@@ -199,6 +198,7 @@ def _fly(
     kinds,
     out,
     history,
+    rows,
     stride,
 ):
     """Fly all cases of a chunk by a `Method`.
@@ -207,19 +207,18 @@ def _fly(
     settings : float64[n_settings];  key : uint64;  cases : float64[n], case numbers
     grid : (n_steps, h [s], control_every);  kinds : (has_events, must_stop), both literal truths
     out : (time, status) float64[n], state float64[n_states, n], metrics float64[n_metrics, n]
-    Returns the number of history rows of the last block.
+    history, rows : see `mc_engine.lanes.history`;  stride : grid steps from row to row
     """
     align_stack()
     n_steps, h, control_every = grid
     has_events, must_stop = kinds
     end_time, end_status, end_state, metrics = out
     o = load_scalars(setting_class, settings)
-    rows = 0
     for first in range(0, cases.shape[0], width):
         p = load_fields(parameter_class, parameters, first, width)
         case = load(cases, first, width)
-        t, s, m, status, unstopped, best, when, last, rows = fly_block(
-            f, method, p, o, key, case, n_steps, h, control_every, has_events, history, stride
+        t, s, m, status, unstopped, best, when, last = fly_block(
+            f, method, p, o, key, case, n_steps, h, control_every, has_events, history, rows, stride
         )
         if must_stop:
             status = where(unstopped, _UNSTOPPED, status)
@@ -229,7 +228,6 @@ def _fly(
         store(end_status, first, status)
         store_fields(end_state, first, s)
         store_fields(metrics, first, values)
-    return rows
 
 
 fly = compile_inline(_fly)

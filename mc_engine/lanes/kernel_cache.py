@@ -25,6 +25,7 @@ import numpy as np
 from llvmlite import binding
 
 from mc_engine.errors import ModelError
+from mc_engine.garbage_collection import without_collection
 
 try:
     import fcntl
@@ -75,8 +76,9 @@ class Kernel:
         return _MachineCode(json.loads(names), code, form)
 
     def _content(self, form: Form) -> bytes:
-        name, library = self.compiled(form)
-        code: bytes = library.object_file()
+        with without_collection():
+            name, library = self.compiled(form)
+            code: bytes = library.object_file()
         return json.dumps([name, *library.outside_names]).encode() + b"\n" + code
 
 

@@ -5,9 +5,11 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
+from numba.np import arrayobj
 
-from mc_engine.lanes.lane_type import I32, I64, Lanes, common_width, mask_type
+from mc_engine.lanes.lane_type import F64, I1, I32, I64, Lanes, common_width, mask_type
 from mc_engine.lanes.lowering import llvm_type
 from mc_engine.lanes.tuples import _item, _pack, _pointer
 
@@ -89,8 +91,44 @@ def store_lane(typingctx, array, column, value, lane):
 
 
 @intrinsic
+def record(typingctx, history, rows, lanes, time, fields):
+    """Write time and fields as one more row of each lane in which the mask holds; see `mc_engine.lanes.history`."""
+    count, width = len(fields) + 1, common_width(time)
+
+    def codegen(context, builder, sig, args):
+        # on the stack, for a choice of the lane there is no instruction
+        buffer = cgutils.alloca_once(builder, llvm_type(width), size=ir.Constant(I64, count))
+        for i, value in enumerate([args[3], *(_item(builder, args[4], i) for i in range(count - 1))]):
+            builder.store(value, builder.gep(buffer, [ir.Constant(I64, i)]))
+        numbers = builder.bitcast(buffer, F64.as_pointer())
+        holds = builder.zext(builder.bitcast(args[2], ir.IntType(width)), I64)
+        room = builder.extract_value(arrayobj.make_array(history)(context, builder, args[0]).shape, 1)
+        n_lanes = builder.extract_value(arrayobj.make_array(rows)(context, builder, args[1]).shape, 0)
+        with cgutils.for_range(builder, n_lanes, intp=I64) as loop:
+            lane = loop.index
+            with builder.if_then(builder.trunc(builder.lshr(holds, lane), I1)):
+                at = _pointer(context, builder, rows, args[1], None, lane, 1)
+                at = builder.bitcast(at, I64.as_pointer())
+                row = builder.load(at)
+                builder.store(builder.add(row, ir.Constant(I64, 1)), at)
+                with builder.if_then(builder.icmp_signed("<", row, room)):
+                    first = builder.mul(lane, ir.Constant(I64, count))
+                    for i in range(count):
+                        place = builder.add(lane, ir.Constant(I64, i * width))
+                        line = builder.add(first, ir.Constant(I64, i))
+                        target = _pointer(context, builder, history, args[0], line, row, 1)
+                        builder.store(builder.load(builder.gep(numbers, [place])), target)
+        return context.get_dummy_value()
+
+    return types.none(history, rows, lanes, time, fields), codegen
+
+
+@intrinsic
 def unequal(typingctx, one, other, like):
-    """Mask of the lanes in which any number of two records differs; records of lanes as wide as `like`."""
+    """Mask of the lanes in which any number of two records differs; records of lanes as wide as `like`.
+
+    What is not a number equals itself, such as the time of an event that has not happened yet.
+    """
     result = mask_type(common_width(like))
 
     def codegen(context, builder, sig, args):
@@ -120,6 +158,8 @@ def differ(typingctx, one, other, like):
 
 def _unequal(builder, ty, one, other):
     if not isinstance(ty, types.BaseTuple):
-        return builder.fcmp_unordered("!=", one, other)
+        # not by bits: what is not a number has one sign where it is written, and the processor's where it is computed
+        lost = [builder.fcmp_unordered("uno", number, number) for number in (one, other)]
+        return builder.or_(builder.fcmp_ordered("!=", one, other), builder.xor(*lost))
     masks = [_unequal(builder, ty[i], _item(builder, one, i), _item(builder, other, i)) for i in range(len(ty))]
     return functools.reduce(builder.or_, masks)

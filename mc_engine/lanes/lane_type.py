@@ -14,7 +14,7 @@ from numba import types
 from numba.core.datamodel.models import PrimitiveModel
 from numba.core.registry import cpu_target
 from numba.core.typeconv import Conversion
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.typing.templates import AbstractTemplate, ConcreteTemplate, infer_global, signature
 from numba.extending import lower_builtin, lower_cast, register_model
 
 from mc_engine.lanes.number import power_by_squaring
@@ -208,13 +208,19 @@ def _whole_power(context, builder, sig, args):
 
 
 def _try_lanes_first() -> None:
-    """Put the operators of lanes before numba's own, which know no lanes and would be tried in vain each time."""
+    """Put the operators of lanes before numba's own, and those of plain numbers next: each that is tried in vain costs
+    more than the one that fits."""
+
+    def order(template: Any) -> int:
+        is_ours = any(known.__module__ == __name__ for known in template.__mro__)
+        return 0 if is_ours else 1 if issubclass(template, ConcreteTemplate) else 2
+
     context = cpu_target.typing_context
     context.refresh()
     for op in (*_TYPED, operator.pow):
-        known = context._lookup_global(op).templates
-        ours = [template for template in known if template.__module__ == __name__]
-        context._globals[op] = types.Function((*ours, *(template for template in known if template not in ours)))
+        templates = sorted(context._lookup_global(op).templates, key=order)
+        context._remove_global(op)
+        context._insert_global(op, types.Function(tuple(templates)))
 
 
 _try_lanes_first()

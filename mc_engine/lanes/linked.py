@@ -9,10 +9,12 @@ replaces internal steps of numba, in this file alone.
 from collections.abc import Iterable
 from typing import Any
 
+from numba.core import errors
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import register_pass
+from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
 from numba.core.lowering import Lower
+from numba.core.transforms import canonicalize_cfg
 from numba.core.typed_passes import NativeLowering, NopythonRewrites
 
 from mc_engine.lanes.aligned_stack import align
@@ -170,10 +172,29 @@ class KernelCompiler(CompilerBase):
         return [_pipeline(self.state, KernelLowering)]
 
 
+class _Passes(PassManager):
+    """numba's passes, without what it does between two of them for its own debugging.
+
+    numba reports each pass as an event with all flags in it, times it, checks the function after it, and computes anew
+    how long every variable lives, which nothing asks for before the last but one pass does so itself.
+    """
+
+    def _runPass(self, index: int, pss: Any, internal_state: Any) -> None:
+        """Called by numba, once for each pass of each function."""
+        pss.analysis = self._analysis
+        with errors.new_error_context("Pass {name}", name=pss.name()):  # type: ignore[attr-defined]
+            pss.run_initialization(internal_state)
+            has_changed = pss.run_pass(internal_state)
+            pss.run_finalizer(internal_state)
+        if has_changed and _pass_registry.get(type(pss)).mutates_CFG:
+            internal_state.func_ir.blocks = canonicalize_cfg(internal_state.func_ir.blocks)
+
+
 def _pipeline(state: Any, last: Any) -> Any:
     """numba's own with another last step, and without a search for array expressions, of which kernels have none."""
-    manager = DefaultPassBuilder.define_nopython_pipeline(state)
-    kept = [(step, text) for step, text in manager.passes if step is not NopythonRewrites]
+    usual = DefaultPassBuilder.define_nopython_pipeline(state).passes
+    manager = _Passes("nopython")
+    kept = [(step, text) for step, text in usual if step is not NopythonRewrites]
     manager.passes = [(last if step is NativeLowering else step, text) for step, text in kept]
     manager.finalize()
     return manager

@@ -14,7 +14,7 @@ from numba.np import arrayobj
 
 from mc_engine.errors import ModelError
 from mc_engine.lanes.functions import TABLES
-from mc_engine.lanes.lane_type import Lanes, common_width, convert, number_type
+from mc_engine.lanes.lane_type import common_width, convert, number_type
 from mc_engine.lanes.lowering import fused, llvm_type
 
 
@@ -282,19 +282,3 @@ def store_fields(typingctx, array, first, fields):
         return context.get_dummy_value()
 
     return types.none(array, types.intp, fields), codegen
-
-
-@intrinsic
-def record(typingctx, array, row, time, fields):
-    """Write time and fields of the first lane to a row of array[n_rows, 1 + n_fields]."""
-
-    def codegen(context, builder, sig, args):
-        for i in range(len(fields) + 1):
-            value, ty = (args[2], time) if i == 0 else (_item(builder, args[3], i - 1), fields[i - 1])
-            if isinstance(ty, Lanes):
-                value = builder.extract_element(value, ir.Constant(ir.IntType(32), 0))
-            place = ir.Constant(ir.IntType(64), i)
-            _write(builder, value, _pointer(context, builder, array, args[0], args[1], place, 1))
-        return context.get_dummy_value()
-
-    return types.none(array, types.intp, time, fields), codegen

@@ -5,6 +5,7 @@ A design is computed once and kept in the cache folder, so that the next process
 
 import dataclasses
 import io
+import os
 import platform
 import sys
 import threading
@@ -76,6 +77,8 @@ def designing() -> Iterator[None]:
     """
     from threadpoolctl import threadpool_limits
 
+    if os.environ.get("OPENBLAS_NUM_THREADS") != "1":  # as it is in commands
+        import scipy.linalg  # noqa: F401  # its OpenBLAS must be there to be limited
     with _one_at_a_time, threadpool_limits(limits=1, user_api="blas"):
         yield
 

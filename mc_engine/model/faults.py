@@ -229,6 +229,9 @@ def _operation(origin: Origin) -> str:
         return origin.operation
     result = "not a number" if math.isnan(origin.result) else "infinite"
     values = [f"{argument:.6g}" for argument in origin.arguments if isinstance(argument, float | int)]
+    if " " in origin.operation:  # a curve in words; all digits tell an argument from the end of the points
+        at = ", ".join(repr(float(argument)) for argument in origin.arguments)
+        return f"{origin.operation} at {at} is {result}"
     if origin.operation in _FUNCTIONS:
         return f"{_FUNCTIONS[origin.operation]} of {values[0]} is {result}"
     if origin.operation.isidentifier():

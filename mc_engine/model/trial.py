@@ -201,7 +201,8 @@ def _same_record(function: Callable[..., Any], name: str, given: Any, source: st
 def _call(model: Model, name: str, *arguments: Any) -> Any:
     """The result of one function of the model, a named tuple with a field for each that the model declares."""
     function = _of_phase(getattr(model, name), arguments)
-    _refuse_short(function, name, arguments)
+    watched = getattr(model, name) is model.events  # also as `observe`, while events are watched
+    _refuse_short(function, "events" if watched else name, arguments)
     result = _run(function, arguments)
     if not hasattr(result, "_fields"):
         raise _breach(function, name, "nothing" if result is None else _shape_of(result), "a named tuple")

@@ -12,6 +12,8 @@ from mc_engine.errors import ModelError
 from mc_engine.suggestions import hint, listed
 from mc_engine.units import UNITS, unit_hint
 
+LARGEST = 1e300  # of the arguments
+
 
 def columns_of(path: Path, wanted: Mapping[str, str | None]) -> dict[str, np.ndarray]:
     """float64[n_rows], SI, of each wanted column.
@@ -43,11 +45,16 @@ def si_factor(name: str, unit: str | None = None) -> float:
 
 def _csv(path: Path) -> dict[str, np.ndarray]:
     """Columns by the names in the first line; lines that are empty or begin with # count for nothing."""
-    text = path.read_text(encoding="utf-8-sig")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise ModelError(f"{path.name} is no text in UTF-8; save it as CSV in UTF-8") from None
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
     if not lines:
         raise ModelError(f"{path.name} is empty")
     names = [name.strip().strip('"') for name in lines[0][1].split(",")]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise ModelError(f'{path.name} has two columns "{twice[0]}"; give each a name of its own')
     rows = []
     for number, line in lines[1:]:
         cells = line.split(",")
@@ -61,10 +68,13 @@ def _csv(path: Path) -> dict[str, np.ndarray]:
 
 
 def _parquet(path: Path) -> dict[str, np.ndarray]:
-    from pyarrow import parquet
+    from pyarrow import ArrowInvalid, parquet
 
     with path.open("rb") as file:
-        table = parquet.read_table(file)
+        try:
+            table = parquet.read_table(file)
+        except ArrowInvalid:
+            raise ModelError(f"{path.name} is no Parquet file") from None
     numbers = [name for name in table.column_names if str(table[name].type) in _NUMBERS]
     return {name: table[name].to_numpy().astype(np.float64) for name in numbers}
 
@@ -78,21 +88,34 @@ def caller_folder() -> Path:
     return Path(file).parent if file else Path.cwd()
 
 
-def array_of(values: Any, name: str) -> np.ndarray:
-    """The numbers of an argument; ModelError for the name of a column, where there is no file."""
+def array_of(values: Any, name: str, unit: str | None = None, dimensions: int = 1) -> np.ndarray:
+    """The numbers of an argument, in SI.  unit : that they are in, None for SI.
+
+    Raises ModelError for the name of a column, where there is no file, and for what is not so many rows of numbers.
+    """
     if isinstance(values, str):
         raise ModelError(f'"{values}" is a column, but there is no file; give {name} as numbers')
-    return np.asarray(values, dtype=np.float64)
+    try:
+        given = np.asarray(values)
+        numbers = given.astype(np.float64) if given.dtype.kind in "biufO" else np.asarray(np.nan)
+    except (TypeError, ValueError):  # rows of different lengths, or what is no number
+        numbers = np.asarray(np.nan)
+    if numbers.ndim != dimensions:
+        shape = "one row" if dimensions == 1 else "one row for each x"
+        raise ModelError(f"{name} must be numbers, {shape} of them")
+    return numbers * (1.0 if unit is None else si_factor(name, unit))
 
 
 def refuse_points(words: str, x: np.ndarray, values: np.ndarray, n: int) -> None:
     """ModelError unless x rises and there is a finite value, or a row of them, for each."""
     if x.ndim != 1 or x.size < 2 or values.shape[:1] != (n,):
-        raise ModelError(
-            f"{words}: {x.size} arguments, {len(values)} values; give two or more points, each with a value"
-        )
+        sizes = ((x.size, "argument"), (len(values), "value"))
+        given = ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for n, what in sizes)
+        raise ModelError(f"{words}: {given}; give two or more points, each with a value")
     if not (np.isfinite(x).all() and np.isfinite(values).all()):
         raise ModelError(f"{words}: a number is infinite or missing")
+    if np.abs(x).max() > LARGEST:  # the range itself is a number then
+        raise ModelError(f"{words}: the arguments are too large; keep them below {LARGEST:g}")
     wrong = np.flatnonzero(np.diff(x) <= 0.0)
     if wrong.size:
         i = int(wrong[0])

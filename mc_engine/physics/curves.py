@@ -79,7 +79,8 @@ def curve(
     """A function y(x) through points.
 
     file : CSV or Parquet, named from the folder of the module that calls; x and y are then names of columns, whose
-        ends say their units unless x_unit or y_unit does.  Without a file, x and y are numbers in SI.
+        ends say their units unless x_unit or y_unit does.  Without a file, x and y are numbers, in x_unit and y_unit,
+        or else in SI.
     x : rising, at least two points.  All numbers are finite.
     kind : "linear"; "cubic", smooth (continuous slope) and monotone where the points are (PCHIP, F. N. Fritsch and
         J. Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304); "nearest", of two equally near points the lower one.
@@ -94,7 +95,7 @@ def curve(
         read = columns_of(path, {str(x): x_unit, str(y): y_unit})
         xs, ys = read[str(x)], read[str(y)]
     else:
-        xs, ys = array_of(x, "x"), array_of(y, "y")
+        xs, ys = array_of(x, "x", x_unit), array_of(y, "y", y_unit)
     return _through(xs, ys, kind, outside, path)
 
 
@@ -148,8 +149,8 @@ def surface(
     """A function z(x, y) through the points of a grid.
 
     file : CSV or Parquet as in `curve`, one row for each point of the grid, in any order.
-    units : of columns whose names do not say theirs.
-    Without a file, x and y are rising numbers and z is float64[n_x, n_y], in SI.
+    units : by column, of those whose names do not say theirs.
+    Without a file, x and y are rising numbers and z is float64[n_x, n_y], in SI or in the units of "x", "y", "z".
     kind : "linear" in each direction (bilinear); "cubic" in each (bicubic), smooth (continuous slopes), and along the
         lines of the grid the cubic curve through their points; or "nearest".
     outside : as in `curve`.
@@ -158,12 +159,16 @@ def surface(
     _refuse_unknown(outside, OUTSIDE, "outside")
     words = f"the surface {file or ''}".rstrip()
     path = caller_folder() / file if file is not None else None
+    given = units or {}
+    for name in given.keys() - ({str(x), str(y), str(z)} if path is not None else {"x", "y", "z"}):
+        raise ModelError(f'{words}: units has "{name}", which is none of its numbers')
     if path is not None:
         names = [str(x), str(y), str(z)]
-        read = columns_of(path, {name: (units or {}).get(name) for name in names})
+        read = columns_of(path, {name: given.get(name) for name in names})
         xs, ys, zs = grid_of(words, *(read[name] for name in names))
     else:
-        xs, ys, zs = array_of(x, "x"), array_of(y, "y"), np.asarray(z, dtype=np.float64)
+        xs, ys = array_of(x, "x", given.get("x")), array_of(y, "y", given.get("y"))
+        zs = array_of(z, "z", given.get("z"), dimensions=2)
     refuse_points(words, xs, zs, xs.size)
     refuse_points(words, ys, zs.T, ys.size)
     first, second = (_axis(turnovers(points) if kind == "nearest" else points) for points in (xs, ys))

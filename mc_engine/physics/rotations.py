@@ -14,7 +14,7 @@ from collections import namedtuple
 from mc_engine.errors import ModelError
 from mc_engine.lanes import atan2, cos, physics, sin, sincos, sqrt, where
 from mc_engine.physics.attitude import quaternion_rates
-from mc_engine.physics.vectors import Matrix, Vector, cross, dot
+from mc_engine.physics.vectors import Matrix, Vector, added, cross, dot, unit
 
 Quaternion = namedtuple("Quaternion", "q0 q1 q2 q3")
 
@@ -146,18 +146,20 @@ def from_two_vectors(a, b):
     """The shortest rotation q with rotated(q, a) along b.  For opposite vectors, half a turn about some axis across.
 
     a, b : of any length but zero.  Frames: the axes of the second frame are those of the first, turned by q.
+    The direction is right to 1e-15, next to opposite vectors, too: there the sum of both directions h has no rounding,
+    and cos(angle / 2) and the axis come from it as |h|^2 / 2 and a x h.
     """
-    scale = sqrt(dot(a, a) * dot(b, b))
-    c = cross(a, b)
-    w = scale + dot(a, b)
+    a, b = unit(a), unit(b)
+    h = added(a, b)
+    c = cross(a, h)
+    w = 0.5 * dot(h, h)
     # an axis across a: its vector product with the axis that it has the smallest component along
     ax, ay, az = abs(a.x), abs(a.y), abs(a.z)
     along_x, along_y = (ax <= ay) & (ax <= az), ay <= az
     e = Vector(where(along_x, 1.0, 0.0), where(along_x, 0.0, where(along_y, 1.0, 0.0)),
                where(along_x, 0.0, where(along_y, 0.0, 1.0)))  # fmt: skip
     across = cross(a, e)
-    # next to opposite, the vector product has lost its digits
-    opposite = w < 1e-14 * scale
+    opposite = w < 1e-30  # to rounding
     return normalized(Quaternion(where(opposite, 0.0, w), where(opposite, across.x, c.x),
                                  where(opposite, across.y, c.y), where(opposite, across.z, c.z)))  # fmt: skip
 

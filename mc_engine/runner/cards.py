@@ -210,7 +210,7 @@ def _at(address: int, like: np.ndarray) -> np.ndarray:
 # ---- flights
 
 
-def _card_kernel(model: Model, folder: Path | None, width: int) -> Callable[..., int]:
+def _card_kernel(model: Model, folder: Path | None, width: int) -> Callable[..., None]:
     """What is called in place of the model's kernel, with its arguments; it fills the same arrays."""
     return partial(_fly_on_card, build_kernel(model, folder, width))
 
@@ -222,14 +222,13 @@ class CardFlyer(CompiledFlyer):
     _build = staticmethod(_card_kernel)
 
 
-def _fly_on_card(kernel: Any, *arguments: Any) -> int:
+def _fly_on_card(kernel: Any, *arguments: Any) -> None:
     with _COMPILING:
         code = _code_of(kernel, arguments)
     with least_busy() as card:
         card.fly(code, arguments)
     if (arguments[STATUS] == FAILED).any():
         raise ModelError(ENDED_WITH_ERROR)
-    return 0  # rows of a history
 
 
 _COMPILING, _CHOOSING = threading.Lock(), threading.Lock()

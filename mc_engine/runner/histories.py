@@ -1,4 +1,4 @@
-"""Saved time histories: the chosen cases are flown once more, one by one, and sampled over time."""
+"""Saved time histories: the chosen cases are flown once more, in batches, and sampled over time."""
 
 from collections.abc import Callable, Sequence
 from itertools import takewhile
@@ -14,7 +14,7 @@ from mc_engine.flight.flyer import NOMINAL_NOISE, Columns, Flyer
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import in_threads
 from mc_engine.runner.summary import metric_parts
-from mc_engine.statistics.worst import limits_on, worst_cases
+from mc_engine.statistics.worst import WorstSoFar, limits_on
 from mc_engine.status import CRASHED, MEMORY_LIMIT, NO_RESULT, REFUSED, STATUS_NAME, TIME_LIMIT, WORKER_DIED
 from mc_engine.store.parts import problem_of
 from mc_engine.store.store import Store
@@ -52,7 +52,8 @@ def write_histories(store: Store, campaign: Campaign, workers: int, stopped: Cal
         return True
     flyer = flyer_of(campaign)
     workers = min(workers, flyer.most_workers or workers)
-    size = -(-len(retained) // (CHUNKS_PER_WORKER * workers)) or 1
+    together = flyer.histories_together
+    size = together * max(1, -(-len(retained) // (CHUNKS_PER_WORKER * workers * together)))
     pieces = [[-1]] if campaign.retention.nominal else []
     pieces += [retained[first : first + size] for first in range(0, len(retained), size)]
     flown = in_threads(lambda piece: _histories_of(campaign, flyer, piece, stopped), pieces, workers)
@@ -91,15 +92,25 @@ def retained_cases(store: Store, campaign: Campaign) -> list[int]:
     """The cases whose history is saved: the first ones, those listed, and the worst completed ones; each once."""
     retention = campaign.retention
     chosen = [*range(min(retention.first, store.n_cases)), *(case for case in retention.cases if case < store.n_cases)]
-    requirements = [vars(requirement) for requirement in campaign.requirements]
-    for worst in retention.worst:
-        # every case has its row, by case_id, which decides between equal values
-        values = np.concatenate([numbers[worst.metric] for _, numbers in metric_parts(store, [worst.metric])])
-        limits = limits_on(worst.metric, requirements) if worst.side is None else None
-        rows = worst_cases(values, np.isfinite(values), worst.n_cases, worst.side != "smallest", limits)
-        chosen += rows.tolist()
+    for found in _worst_cases(store, campaign):
+        chosen += found.case_ids.tolist()
     dangerous = _cases_that_ended(store, _DANGEROUS)
     return [case for case in dict.fromkeys(chosen) if case not in dangerous]
+
+
+def _worst_cases(store: Store, campaign: Campaign) -> list[WorstSoFar]:
+    """The worst completed cases of each metric whose worst ones are to be saved, from one reading of the parts."""
+    requirements = [vars(requirement) for requirement in campaign.requirements]
+    asked, found = campaign.retention.worst, []
+    for worst in asked:
+        limits = limits_on(worst.metric, requirements) if worst.side is None else None
+        found.append(WorstSoFar(worst.n_cases, limits, worst.side != "smallest"))
+    if asked:
+        read = metric_parts(store, list(dict.fromkeys(worst.metric for worst in asked)))
+        for part, (_, numbers) in zip(store.parts, read, strict=True):
+            for worst, so_far in zip(asked, found, strict=True):
+                so_far.add(numbers[worst.metric], part.first)
+    return found
 
 
 def _cases_that_ended(store: Store, words: Sequence[str]) -> set[int]:

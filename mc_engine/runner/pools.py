@@ -22,7 +22,7 @@ from mc_engine.interruption import unsignalled_children
 from mc_engine.runner.backends import Backend, flyer_on
 from mc_engine.runner.cluster_pool import ClusterWorkerPool
 from mc_engine.runner.worker_process import WorkerSetup, begin_process, run_in_worker
-from mc_engine.runner.workers import Result, WorkerPool, result_of
+from mc_engine.runner.workers import Result, WorkerPool, keep_freed_memory, result_of
 from mc_engine.safe_path import safe_import_path
 from mc_engine.store.parts import Written
 from mc_engine.store.store import Store
@@ -60,6 +60,7 @@ class ThreadWorkerPool(WorkerPool):
         from multiprocessing.pool import ThreadPool
 
         super().__init__()
+        keep_freed_memory()
         self._run_task, self._workers = run_in_worker, min(workers, _MOST_THREADS)
         self._pool = ThreadPool(self._workers)  # daemon threads: they do not delay the end of the process
 

@@ -14,7 +14,7 @@ from mc_engine.errors import CampaignError, Problem
 from mc_engine.runner import runner
 from mc_engine.runner.backends import Backend
 from mc_engine.runner.progress import ProgressCall
-from mc_engine.runner.summary import judgement
+from mc_engine.runner.summary import outcomes
 from mc_engine.store.opening import open_store
 from mc_engine.store.store import Store
 
@@ -101,4 +101,4 @@ def decided(store: Store) -> bool:
     """True if every requirement passes or fails on the cases at hand."""
     from mc_engine.statistics.requirements import NOT_DEMONSTRABLE
 
-    return all(verdict.outcome != NOT_DEMONSTRABLE for verdict in judgement(store)[0])
+    return all(verdict.outcome != NOT_DEMONSTRABLE for verdict in outcomes(store)[0])

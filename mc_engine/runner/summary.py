@@ -60,14 +60,46 @@ def case_line(store: Store) -> str:
     return f"{sum(counts.values()):,} of {store.n_cases:,} cases" + (f": {words}" if words else "")
 
 
+def nominal_line(store: Store) -> str:
+    """The status of a nominal case that failed, with its reason; empty where it is ok."""
+    receipt = store.nominal_part
+    if receipt is None or STATUS_NAME[OK] in receipt.status:
+        return ""
+    row = store.nominal()
+    return ", ".join(str(row[name]) for name in ("status", "reason") if row[name])
+
+
 def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":
     """The verdicts on all requirements of the run, and the joint verdict if there are several."""
     requirements = store.manifest.get("requirements", [])
     if not requirements:
         return [], None
-    metrics = list(dict.fromkeys(str(record["metric"]) for record in requirements))
-    statistics = streamed(store, metrics, requirements)
+    statistics = streamed(store, _judged_metrics(requirements), requirements)
     return statistics.verdicts, statistics.joint
+
+
+def outcomes(store: Store) -> "tuple[list[Verdict], Verdict | None]":
+    """The same verdicts without the demonstrated bounds, for which alone the parts are read more than once."""
+    import numpy as np
+
+    from mc_engine.statistics import was_looked_at
+    from mc_engine.statistics.requirements import LimitCounts, judge_counted
+
+    requirements = store.manifest.get("requirements", [])
+    if not requirements:
+        return [], None
+    counts = LimitCounts(requirements)
+    for table, numbers in metric_parts(store, _judged_metrics(requirements)):
+        counts.add(numbers.__getitem__, np.ones(table.num_rows, dtype=bool))
+    return judge_counted(counts, None, _design(store), was_looked_at(store.manifest, store.n_cases))
+
+
+def _judged_metrics(requirements: Sequence[Mapping[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(str(record["metric"]) for record in requirements))
+
+
+def _design(store: Store) -> str:
+    return str(store.manifest["campaign"].get("design", "mc"))
 
 
 def analyses_line(store: Store) -> str:
@@ -90,7 +122,7 @@ def analyses_line(store: Store) -> str:
 def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
     """Such as "fuel: pass, mass_kg ≤ 2.5 kg in 9,998 of 10,000 cases (required: 99.73 % with 90 % confidence)"."""
     limits = [
-        f"{sign} {limit:g} {units.get(verdict.metric, '')}".rstrip()
+        f"{sign} {limit:,.12g} {units.get(verdict.metric, '')}".rstrip()
         for sign, limit in (("≤", verdict.at_most), ("≥", verdict.at_least))
         if limit is not None
     ]
@@ -103,7 +135,8 @@ def verdict_line(verdict: "Verdict", units: Mapping[str, str]) -> str:
 def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, Summary]":
     """Summary of every metric, or of those named; StoreError for a name that is no metric.
 
-    Each bound of a quantile holds with the confidence of [report].
+    Quantiles are the usual ones and those between which a case lies with the probability of [report]; each bound of a
+    quantile holds with its confidence.
 
     A failed case has no value, whatever its row contains.
     """
@@ -112,8 +145,12 @@ def summaries(store: Store, metrics: Sequence[str] | None = None) -> "dict[str, 
     for name in names:
         if name not in known:
             raise StoreError(f'{store.path}: there is no metric "{name}"; there are {", ".join(known) or "none"}')
-    confidence = ReportSection(**store.manifest.get("report", {})).confidence
-    return streamed(store, names, confidence=2.0 * confidence - 1.0).summaries
+    from mc_engine.statistics.order_statistics import QUANTILES
+
+    stated = ReportSection(**store.manifest.get("report", {}))
+    outer = (round(0.5 * (1.0 + sign * stated.probability), 12) for sign in (-1.0, 1.0))
+    probabilities = tuple(sorted({*QUANTILES, *outer}))
+    return streamed(store, names, probabilities=probabilities, confidence=2.0 * stated.confidence - 1.0).summaries
 
 
 def streamed(
@@ -136,7 +173,7 @@ def streamed(
         passes or (lambda names: (numbers for _, numbers in metric_parts(store, names))),
         metrics,
         requirements=requirements,
-        design=store.manifest["campaign"].get("design", "mc"),
+        design=_design(store),
         looked=was_looked_at(store.manifest, store.n_cases),
         probabilities=probabilities or QUANTILES,
         confidence=confidence,
@@ -148,10 +185,10 @@ def metric_parts(
 ) -> "Iterator[tuple[pa.Table, dict[str, np.ndarray]]]":
     """All parts in order: a table with these columns, and the metrics, NaN for cases that did not complete.
 
-    others : columns of the table besides the metrics and the status.  The next part is read in the background.
+    others : columns of the table besides the metrics and the status.  The next parts are read in the background.
     """
     columns = [column for column in store.columns if column.name in ("status", *metrics, *others)]
-    with ThreadPoolExecutor(1) as pool:
+    with ThreadPoolExecutor(PARTS_AHEAD) as pool:
         ahead: list[Future[tuple[pa.Table, dict[str, np.ndarray]]]] = []
         for part in store.parts:
             ahead.append(pool.submit(_metrics_of, store, part, columns, metrics))

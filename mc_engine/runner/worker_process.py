@@ -21,6 +21,7 @@ from mc_engine.flight.chunks import Task, run_task
 from mc_engine.flight.flyers import flyer_of
 from mc_engine.interruption import ignore_signals
 from mc_engine.runner.flown_campaign import campaign_of
+from mc_engine.runner.workers import keep_freed_memory
 from mc_engine.store.opening import open_store
 from mc_engine.store.parts import Column, Written
 
@@ -143,6 +144,7 @@ def begin_process(parent: int) -> None:
     """Set up this process as a worker of process `parent`."""
     ignore_signals()  # Ctrl-C reaches all processes of a terminal; the parent decides what to do
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    keep_freed_memory()
 
 
 def dask_setup(worker: object) -> None:

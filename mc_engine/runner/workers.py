@@ -5,8 +5,12 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import Any
 
+import numpy as np
+
 from mc_engine.flight.chunks import Task
 from mc_engine.store.parts import Written
+
+_LARGEST_KEPT = 31 * 2**20  # bytes; glibc raises its limits for blocks of up to 32 MiB
 
 
 @dataclass(frozen=True)
@@ -57,6 +61,16 @@ class WorkerPool(ABC):
     @abstractmethod
     def close(self, at_once: bool) -> None:
         """End the workers; at_once : without waiting for their tasks."""
+
+
+def keep_freed_memory() -> None:
+    """Have this process keep the memory of freed arrays for the arrays of the next chunk.
+
+    glibc gives the memory of arrays of more than 128 KiB back to the system when they are freed, so that each page of
+    the next array is a page fault, for which all threads wait in turn.  It raises that limit to the largest block that
+    was freed so far: mallopt(3), M_MMAP_THRESHOLD.  Without effect on other systems.
+    """
+    np.empty(_LARGEST_KEPT, dtype=np.uint8)
 
 
 def result_of(task: Task, future: Any, deaths: type[Exception]) -> Result:

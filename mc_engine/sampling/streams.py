@@ -48,21 +48,33 @@ def _first_doubles(key: np.ndarray, cases: np.ndarray) -> np.ndarray:
 
     Salmon, Moraes, Dror & Shaw, Parallel random numbers: as easy as 1, 2, 3, SC'11.
     """
-    # NumPy steps the counter before its first block, hence 1 in the lowest word.
-    words: tuple[np.ndarray, ...] = (np.ones_like(cases), np.zeros_like(cases), np.zeros_like(cases), cases)
-    low_key, high_key = int(key[0]), int(key[1])
-    for _ in range(10):
-        high0, low0 = _product(words[0], _MULTIPLIERS[0])
-        high1, low1 = _product(words[2], _MULTIPLIERS[1])
-        words = (high1 ^ words[1] ^ np.uint64(low_key), low1, high0 ^ words[3] ^ np.uint64(high_key), low0)
-        low_key, high_key = (low_key + _WEYL[0]) % _WORD, (high_key + _WEYL[1]) % _WORD
-    return (words[0] >> np.uint64(11)) * 2.0**-53
+    # NumPy steps the counter before its first block, hence 1 in the lowest word.  Words that are the same for all cases
+    # are arrays of one number, so that the first rounds, which have few others, cost little.
+    words = (np.ones(1, np.uint64), np.zeros(1, np.uint64), np.zeros(1, np.uint64), cases)
+    keys = [tuple(np.uint64((int(k) + i * w) % _WORD) for k, w in zip(key, _WEYL, strict=True)) for i in range(10)]
+    for low_key, high_key in keys[:-1]:
+        first, third = words[1] ^ low_key, words[3] ^ high_key
+        first, third = first ^ _upper(words[2], _MULTIPLIERS[1]), third ^ _upper(words[0], _MULTIPLIERS[0])
+        words = (first, words[2] * np.uint64(_MULTIPLIERS[1]), third, words[0] * np.uint64(_MULTIPLIERS[0]))
+    first = words[1] ^ keys[-1][0] ^ _upper(words[2], _MULTIPLIERS[1])  # of the last round this word alone
+    return (first >> np.uint64(11)) * 2.0**-53
 
 
-def _product(words: np.ndarray, multiplier: int) -> tuple[np.ndarray, np.ndarray]:
-    """Upper and lower 64 bits of words * multiplier, through four products of 32-bit halves."""
+def _upper(words: np.ndarray, multiplier: int) -> np.ndarray:
+    """Upper 64 of the 128 bits of words * multiplier, through four products of 32-bit halves.
+
+    Worked out in place: another array for each step would leave the cache.
+    """
     m_low, m_high = np.uint64(multiplier & 0xFFFFFFFF), np.uint64(multiplier >> 32)
     low, high = words & _LOW, words >> _HALF
-    middle = high * m_low + ((low * m_low) >> _HALF)
-    cross = low * m_high + (middle & _LOW)
-    return high * m_high + (middle >> _HALF) + (cross >> _HALF), words * np.uint64(multiplier)
+    middle = low * m_low
+    middle >>= _HALF
+    middle += high * m_low
+    low *= m_high
+    low += middle & _LOW
+    low >>= _HALF
+    middle >>= _HALF
+    high *= m_high
+    high += middle
+    high += low
+    return high

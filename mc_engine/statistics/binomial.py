@@ -151,13 +151,13 @@ def most_failures(demonstrates: Callable[[int], bool], tried: int) -> int | None
 
 
 def _demonstrates(cases: int, share: float, confidence: float, failures: int) -> bool:
-    """True if so few failures would be too lucky, had the share of success been just below `share`."""
+    """True if so few failures would be too lucky, had the success probability been just below `share`."""
     # betainc(n - k, k + 1, p) is the binomial chance of at most k failures when each case succeeds with p.
     return bool(scipy.special.betainc(cases - failures, failures + 1, share) <= 1.0 - confidence)
 
 
 def half_rate_share(share: float) -> float:
-    """The share of success of a system that fails half as often as `share` allows."""
+    """The success probability of a system that fails half as often as `share` allows."""
     return 0.5 * (1.0 + share)
 
 

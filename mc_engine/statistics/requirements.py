@@ -184,13 +184,13 @@ def judge_all(
 
 
 def judge_counted(
-    counts: LimitCounts, ranked: Callable[[str, int], float], design: str = "mc", looked: bool = False
+    counts: LimitCounts, ranked: Callable[[str, int], float] | None, design: str = "mc", looked: bool = False
 ) -> tuple[list[Verdict], Verdict | None]:
     """The verdict on each requirement that was counted, and the joint one; None for a single one or none.
 
-    ranked : metric and rank to the order statistic of the usable values, from 1.  looked : whether the number of cases
-    was decided by looking at them.  There is no joint verdict either where the requirements together leave nothing
-    to be asked for.  Its confidence is the smallest of theirs.
+    ranked : metric and rank to the order statistic of the usable values, from 1; None: no demonstrated bounds.
+    looked : whether the number of cases was decided by looking at them.  There is no joint verdict either where the
+    requirements together leave nothing to be asked for.  Its confidence is the smallest of theirs.
     """
     requirements = counts.requirements
     share = (
@@ -254,7 +254,7 @@ def _verdict(
     requirement: Mapping[str, Any],
     counts: LimitCounts,
     which: int,
-    ranked: Callable[[str, int], float],
+    ranked: Callable[[str, int], float] | None,
     design: str,
     looked: bool,
     among: int,
@@ -295,7 +295,9 @@ def _verdict(
         random=random,
         looked=looked,
     )
-    return _with_limits_shown(verdict, ranked, limits) if which >= 0 and known else verdict
+    if ranked is None or which < 0 or not known:
+        return verdict
+    return _with_limits_shown(verdict, ranked, limits)
 
 
 _UNKNOWN: tuple[str, float | None, float | None] = (NOT_DEMONSTRABLE, None, None)

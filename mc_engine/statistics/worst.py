@@ -89,14 +89,15 @@ class WorstSoFar:
     case_ids : int64, of the worst.
     """
 
-    def __init__(self, count: int, limits: Limits):
-        self.count, self.limits = count, limits
+    def __init__(self, count: int, limits: Limits | None, largest: bool = True):
+        self.count, self.limits, self.largest = count, limits, largest
         self.case_ids, self._goodness = np.zeros(0, dtype=np.int64), np.zeros(0)
 
     def add(self, values: np.ndarray, first: int) -> None:
         """values : float64[n] of the cases `first` and on, NaN for one that was not completed."""
         candidates = np.isfinite(values)
-        goodness = _goodness(values if candidates.all() else np.where(candidates, values, np.nan), True, self.limits)
+        finite = values if candidates.all() else np.where(candidates, values, np.nan)
+        goodness = _goodness(finite, self.largest, self.limits)
         if self.case_ids.size == self.count:
             candidates &= goodness < self._goodness[-1]
         rows = np.flatnonzero(candidates)

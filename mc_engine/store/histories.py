@@ -1,6 +1,6 @@
 """Tables of saved time histories: case_id, t_s, the model's outputs with units, and the phase; which rows they hold."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 _EVEN = 0.2  # share of the rows that lie evenly in time, so that no quiet stretch is left without
 _EDGE = 1e-2  # of the range of a quantity: a smaller jump is no edge
 _MOST_EDGES = 2  # times as many as the rows that are asked for
+_BLOCK = 2**16  # numbers that are gone through together
+_TINY = np.finfo(float).tiny
 
 
 def rows_to_keep(table: np.ndarray, rows: int) -> np.ndarray:
@@ -34,50 +36,96 @@ def rows_to_keep(table: np.ndarray, rows: int) -> np.ndarray:
     The density of the rest is that of C. de Boor, A Practical Guide to Splines, 1978, chapter XII: the square root of
     the second derivative, here of the quantity that bends most in units of its range.
     """
-    equal = (table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1]))
-    left = np.flatnonzero(np.append(True, ~equal.all(axis=1)))
+    columns = table.T
+    left = np.flatnonzero(_changes(columns))
     if left.size <= rows:
         return left
-    t, values = table[left, 0], _in_ranges(np.ascontiguousarray(table[left, 1:].T))
-    always = _events_and_edges(table[:, 0], t, values, rows)
-    span = np.diff(t, prepend=t[0]) / max(t[-1] - t[0], np.finfo(float).tiny)
-    bend = np.sqrt(_chord_errors(t, values))
-    density = (1.0 - _EVEN) * bend / max(bend.cumsum()[-1], np.finfo(float).tiny) + _EVEN * span
+    t = columns[0, left]
+    errors, jumps = _errors_and_jumps(t, columns[1:], left)
+    always = _at_events(columns[0])[left] | _at_edges(jumps, rows)
+    always[0] = always[-1] = True
+    bend = np.sqrt(errors)
+    density = (1.0 - _EVEN) * bend / max(bend.cumsum()[-1], _TINY)
+    density[1:] += _EVEN * ((t[1:] - t[:-1]) / max(t[-1] - t[0], _TINY))
     density[always] = np.inf
     shares = _shares(density, max(rows, int(always.sum()) + rows // 2))
     places = np.floor(shares.cumsum() + 0.5)
-    return left[always | (np.diff(places, prepend=0.0) > 0.0)]
+    always[1:] |= places[1:] > places[:-1]  # the first is kept in any case
+    return left[always]
+
+
+def _blocks(columns: np.ndarray) -> Iterator[np.ndarray]:
+    """Some quantities at a time: a processor takes several times longer over numbers that it cannot keep near."""
+    size = max(1, _BLOCK // columns.shape[1])
+    for first in range(0, len(columns), size):
+        yield columns[first : first + size]
+
+
+def _changes(columns: np.ndarray) -> np.ndarray:
+    """Mask of the first row and of those that differ from the one before; not a number equals its like."""
+    changes = np.zeros(columns.shape[1], dtype=bool)
+    changes[:1] = True
+    for block in _blocks(columns):
+        after, before = block[:, 1:], block[:, :-1]
+        differ = after != before
+        if np.isnan(block.min()):
+            differ &= (after == after) | (before == before)
+        changes[1:] |= differ.any(axis=0)
+    return changes
+
+
+def _errors_and_jumps(t: np.ndarray, quantities: np.ndarray, left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of the rows that are left: how far the straight line between the neighbours errs, and how far, without the first,
+    it jumps from the one before at the same time; in the quantity where most, in units of its range.
+
+    quantities : float64[n_quantities, n], of all rows.
+    """
+    errors, jumps = np.zeros(t.size), np.zeros(t.size - 1)
+    width = t[2:] - t[:-2]
+    share = (t[1:-1] - t[:-2]) / np.where(width > 0.0, width, 1.0)
+    for block in _blocks(quantities):
+        values = _in_ranges(block.take(left, axis=1) if left.size < block.shape[1] else block)
+        chord = values[:, 2:] - values[:, :-2]
+        chord *= share
+        chord += values[:, :-2]
+        chord -= values[:, 1:-1]
+        np.maximum(errors[1:-1], np.abs(chord, out=chord).max(axis=0), out=errors[1:-1])
+        change = values[:, 1:] - values[:, :-1]
+        np.maximum(jumps, np.abs(change, out=change).max(axis=0), out=jumps)
+    jumps[t[1:] != t[:-1]] = 0.0
+    return errors, jumps
 
 
 def _in_ranges(values: np.ndarray) -> np.ndarray:
     """Quantities in units of their ranges; 0 where one is not finite or constant.  float64[n_quantities, n]."""
-    finite, values = np.isfinite(values), 0.5 * values  # halved, so that no range is above the largest number
-    low = np.where(finite, values, np.inf).min(axis=1, keepdims=True)
-    high = np.where(finite, values, -np.inf).max(axis=1, keepdims=True)
+    values = 0.5 * values  # halved, so that no range is above the largest number
+    low, high = values.min(axis=1, keepdims=True), values.max(axis=1, keepdims=True)
+    finite: Any = np.isfinite(low) & np.isfinite(high)
+    if not finite.all():
+        finite = np.isfinite(values)
+        low = np.where(finite, values, np.inf).min(axis=1, keepdims=True)
+        high = np.where(finite, values, -np.inf).max(axis=1, keepdims=True)
+    varies = high > low
     with np.errstate(invalid="ignore"):
-        return np.where(finite & (high > low), (values - low) / (high - low), 0.0)
+        values -= np.where(varies, low, 0.0)
+        values /= np.where(varies, high - low, 1.0)
+    return values if finite.all() and varies.all() else np.where(finite & varies, values, 0.0)
 
 
-def _events_and_edges(recorded: np.ndarray, t: np.ndarray, values: np.ndarray, rows: int) -> np.ndarray:
-    """Mask of the rows that are kept in any case.  recorded : float64[n], the times with those of repeated rows."""
-    instants, counts = np.unique(recorded, return_counts=True)
-    is_event = (counts > 2)[np.searchsorted(instants, t)]
-    jumps = np.where(np.diff(t) == 0.0, np.abs(np.diff(values)).max(axis=0, initial=0.0), 0.0)
+def _at_events(t: np.ndarray) -> np.ndarray:
+    """Mask of the rows that are of an event: more than two of one time.  t : float64[n], of all rows."""
+    instant = np.append(0, (t[1:] != t[:-1]).cumsum())
+    is_event: np.ndarray = (np.bincount(instant) > 2)[instant]
+    return is_event
+
+
+def _at_edges(jumps: np.ndarray, rows: int) -> np.ndarray:
+    """Mask of the rows before and after the largest jumps.  jumps : float64[n - 1], from row to row."""
     edges = np.flatnonzero(jumps > _EDGE)
     edges = edges[np.argsort(-jumps[edges], kind="stable")[: _MOST_EDGES * rows]]
-    always = is_event
-    always[edges] = always[edges + 1] = always[0] = always[-1] = True
-    return always
-
-
-def _chord_errors(t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Of each row, how far the straight line between its neighbours errs, in the quantity where it errs most."""
-    errors = np.zeros(t.size)
-    width = t[2:] - t[:-2]
-    share = (t[1:-1] - t[:-2]) / np.where(width > 0.0, width, 1.0)
-    chord = values[:, :-2] + share * (values[:, 2:] - values[:, :-2])
-    errors[1:-1] = np.abs(values[:, 1:-1] - chord).max(axis=0, initial=0.0)
-    return errors
+    mask = np.zeros(jumps.size + 1, dtype=bool)
+    mask[edges] = mask[edges + 1] = True
+    return mask
 
 
 def _shares(density: np.ndarray, total: int) -> np.ndarray:

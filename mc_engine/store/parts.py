@@ -10,6 +10,7 @@ import re
 import uuid
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,11 @@ def attributes(columns: Sequence[Column]) -> dict[str, dict[str, str]]:
 
 def arrow_schema(columns: Sequence[Column]) -> pa.Schema:
     """The Arrow schema of tables of `columns`."""
+    return _schema(tuple(columns))
+
+
+@lru_cache(maxsize=16)  # each part is compared with it
+def _schema(columns: tuple[Column, ...]) -> pa.Schema:
     fields = []
     for column in columns:
         metadata = {"unit": column.unit, "role": column.role, "description": column.description}
@@ -123,6 +129,8 @@ def _arrow_array(column: Column, values: np.ndarray) -> pa.Array:
         words = pa.array([STATUS_NAME[int(code)] for code in codes], pa.string())
         return words.take(pa.array(positions))
     if column.kind == "word":
+        if values.size and isinstance(values[0], str) and (values == values[0]).all():  # as a rule; half the time
+            return pa.repeat(pa.scalar(str(values[0])), values.size)
         return pa.array(values, pa.string()).fill_null("")
     if column.kind == "number":
         return pa.array(values.astype(np.float64, copy=False))  # NaN stays NaN and does not become null

@@ -117,6 +117,10 @@ class Receipts:
         self.nominal: Part | None = None
         self.histories: Part | None = None
 
+    def begin_with(self, cases: int) -> None:
+        """Set the number of cases in the manifest, if the lines were taken before that was read."""
+        self.begun_with, self._asked = cases, self._asked or cases
+
     @property
     def cases(self) -> int | None:
         """Number of cases of the run, from the manifest or the last extension; at least those of the last part."""
@@ -150,6 +154,8 @@ class Receipts:
 
     def _with_cases(self, first: int, stop: int) -> slice:
         """Where the parts lie that hold any of the cases first .. stop - 1."""
+        if not self.parts or self.parts[-1].stop <= first:  # the next part, as a rule
+            return slice(len(self.parts), len(self.parts))
         before = bisect_right(self.parts, first, key=lambda part: part.stop)
         return slice(before, max(before, bisect_left(self.parts, stop, key=lambda part: part.first)))
 

@@ -115,7 +115,7 @@ class Store:
         except ValueError as error:
             raise StoreError(f"{path / MANIFEST}: {error}") from None
         self.columns = columns_in(self.manifest)
-        self._count(self.manifest["campaign"]["cases"])
+        self._counted.begin_with(self.manifest["campaign"]["cases"])
 
     def _original(self, name: str, fact: str) -> bytes:
         content = disk.read_short(self.path / name)
@@ -129,10 +129,7 @@ class Store:
         self._journal = Journal(self.path / JOURNAL)
         if not self._journal.entries or self._journal.entries[0].event != "created":
             raise StoreError(f'{self.path / JOURNAL}, line 1: damaged, it is not the event "created"')
-        self._count(self._counted.begun_with)
-
-    def _count(self, begun_with: int | None) -> None:
-        self._counted, wrong = receipts_of(self._journal.entries, begun_with)
+        self._counted, wrong = receipts_of(self._journal.entries, self._counted.begun_with)
         for number, why in wrong.items():
             raise damaged_line(self.path / JOURNAL, number, why)
         self._created = self._journal.entries[0].facts

@@ -23,6 +23,8 @@ def comparison_lines(comparison: Comparison) -> Iterator[str]:
     yield from _source_changes(comparison)
     yield from _metric_table(comparison)
     yield from (f"not compared: {sentence}" for sentence in comparison.left_out)
+    if len(comparison.shares) > 1:  # verdicts above are those of each run's own limits
+        yield "cases completed, and inside the limits of run B in both runs:"
     yield from (_share_line(share, comparison.alpha) for share in comparison.shares)
     yield answer(comparison)
 

@@ -55,7 +55,7 @@ def rare_event_lines(result: dict[str, Any]) -> Iterator[str]:
 def requirement_words(result: dict[str, Any]) -> str:
     requirement, unit = result["requirement"], result["metric"]["unit"]
     limits = [("at least", requirement["at_least"]), ("at most", requirement["at_most"])]
-    texts = [f"{word} {limit:g}{' ' * bool(unit)}{unit}" for word, limit in limits if limit is not None]
+    texts = [f"{word} {limit:,.12g}{' ' * bool(unit)}{unit}" for word, limit in limits if limit is not None]
     return f"{requirement['name']}: {requirement['metric']} {' and '.join(texts)}"
 
 

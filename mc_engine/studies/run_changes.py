@@ -75,7 +75,7 @@ def _campaign_facts(manifest: Mapping[str, Any]) -> dict[str, str]:
 
 def _requirement(record: Mapping[str, Any]) -> str:
     limits = [
-        f"{words} {record[key]:g}"
+        f"{words} {record[key]:,.12g}"
         for key, words in (("at_least", "at least"), ("at_most", "at most"))
         if record.get(key) is not None
     ]

@@ -20,7 +20,7 @@ from mc_engine.model.phases import BEGAN, PHASE
 from mc_engine.model.record import Model
 from mc_engine.store.histories import PHASE_COLUMN
 
-_WITHOUT_END = SimpleNamespace(shape=(2**62, 1))  # in place of the array of a history: every row has room
+_WITHOUT_END = SimpleNamespace(shape=(1, 2**62))  # in place of the array of a history: every row has room
 _AT_ROWS = ("rhs", "events", "observe", "evaluate")  # the first three are evaluated anew at the state of each row
 
 
@@ -62,7 +62,7 @@ class _TracedFlight(InterpretedFlight):
         self._held.update(named)
         return result
 
-    def record(self, array: Any, row: int, t: Any, fields: Any) -> None:
+    def record(self, history: Any, rows: Any, lanes: bool, t: Any, fields: Any) -> None:
         model, functions, arguments = self.model, self._functions, self._observed
         _, s, m, *_ = arguments
         with _named_numbers() as named:

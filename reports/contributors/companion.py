@@ -11,20 +11,24 @@ from mc_engine.statistics.sensitivity import FEWEST_CASES, Sensitivity, beyond_c
 from reports.contributors.tornado_figure import STRONGEST, contributor_figure, name_of, strongest, surely
 from reports.document.blocks import Cell, Column, FigureBlock, Table
 from reports.run.chosen_units import spread_text
-from reports.run.contributions import UNEXPLAINED, Contributions, Contributor
+from reports.run.contributions import MOST_METRICS, UNEXPLAINED, Contributions, Contributor
 from reports.run.flown import Flown
-from reports.text.numbers import count, fixed, number, percent
+from reports.text.numbers import count, counted, fixed, number, percent
 
 _TRENDS = {"src": "SRC", "prcc": "PRCC", "spearman": "Spearman"}
 
 
 def companion_blocks(flown: Flown, contributions: Contributions) -> Iterator[FigureBlock | Table | str]:
     """The figure of the effects, and a table of the strongest contributors of each metric with their 1σ budget."""
-    shown = [metric for metric, rows in contributions.by_metric.items() if rows]
+    key = flown.key_metrics[:MOST_METRICS]
+    shown = [metric for metric in key if contributions.by_metric[metric]]
     if shown:
         yield _effect_figure(flown, contributions, shown)
         yield _effect_table(flown, contributions, shown)
-    yield from no_contributors(flown, [metric for metric in contributions.by_metric if metric not in shown])
+    yield from no_contributors(flown, [metric for metric in key if metric not in shown])
+    others = sum(metric not in key and bool(rows) for metric, rows in contributions.by_metric.items())
+    if others:
+        yield f"The effects on {counted(others, 'other metric')} are in report.json."
 
 
 def no_contributors(flown: Flown, silent: list[str]) -> Iterator[str]:
@@ -55,7 +59,8 @@ def _effect_table(flown: Flown, contributions: Contributions, shown: list[str]) 
         *(Column(title, "number") for title in (_TRENDS.values() if contributions.trends else ())),
     )
     rows = []
-    for k, metric in enumerate(contributions.by_metric):
+    for metric in shown:
+        k = [*contributions.by_metric].index(metric)
         cell = Cell(flown.words(metric), small="; ".join(_about(flown, contributions, metric, k)))
         for contributor in strongest(contributions.by_metric[metric]):
             cells = [

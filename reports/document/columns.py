@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -31,8 +32,10 @@ def unbroken(table: Table) -> Table:
 
     A count is broken before its stroke where the table takes fewer lines so.
     """
-    found = [one for one in (_joined(table, spaces) for spaces in _JOINED) if _least(one) < ROOM]
-    return min(found, key=_printed_lines, default=table)
+    joined = [_joined(table, spaces) for spaces in _JOINED]
+    measured = [(one, *_sizes(one)) for one in joined]
+    found = [(_printed_lines(size, least), one) for one, size, least in measured if _page_width(least) < ROOM]
+    return min(found, key=lambda lines_and_table: lines_and_table[0], default=(0.0, table))[1]
 
 
 def _joined(table: Table, spaces: re.Pattern[str]) -> Table:
@@ -48,14 +51,14 @@ def _joined(table: Table, spaces: re.Pattern[str]) -> Table:
     return replace(table, rows=rows)
 
 
-def _least(table: Table) -> float:
-    """Width that the longest words of all columns take."""
-    return float(_sizes(table)[1].sum() + INSET * len(table.columns))
+def _page_width(columns: np.ndarray) -> float:
+    """Width of the page that columns of these widths take, with their insets."""
+    return float(columns.sum() + INSET * len(columns))
 
 
-def _printed_lines(table: Table) -> float:
-    """Lines that the rows of the table take."""
-    return float(_lines(_sizes(table)[0], np.array(widths(table)) - INSET).max(axis=1).sum())
+def _printed_lines(size: np.ndarray, least: np.ndarray) -> float:
+    """Lines that the rows of a table take, of which these are the `_sizes`."""
+    return float(_lines(size, np.array(_widths(size, least)) - INSET).max(axis=1).sum())
 
 
 def _sizes(table: Table) -> tuple[np.ndarray, np.ndarray]:
@@ -67,30 +70,41 @@ def _sizes(table: Table) -> tuple[np.ndarray, np.ndarray]:
         for row, cell in enumerate((Cell(column.title.replace("_", " ")), *(cells[k] for cells in table.rows))):
             for part, text in enumerate((cell.text, cell.small)):
                 scale = _scale(column, text) if part == 0 and row else 1.0 if row else BOLD
-                size[row, k, part] = lettering.width(text, TYPE) * scale + BADGE * bool(cell.tone and part == 0)
+                size[row, k, part] = _width(text) * scale + BADGE * bool(cell.tone and part == 0)
                 size[row, k, part] /= room[row] if k == 0 else 1.0
                 words = (
                     [text]
                     if (cell.tone and not part) or (column.kind == "code" and len(text) <= COMMAND)
                     else (_VALUE if column.kind == "number" and row and not part else _WORD).findall(text)
                 )
-                longest = max((lettering.width(word, TYPE) for word in words), default=0.0)
+                longest = max(map(_width, words), default=0.0)
                 least[k] = max(least[k], longest * scale + BADGE * bool(cell.tone and part == 0))
     return size, least
 
 
+@lru_cache(maxsize=10_000)
+def _width(text: str) -> float:
+    """Width of one line of the page's type; the same words stand in many cells."""
+    return lettering.width(text, TYPE)
+
+
 def widths(table: Table) -> list[float]:
     """Width of each column in points, together that of the page: longest words first, then where it saves lines."""
-    size, least = _sizes(table)
-    if least.sum() + INSET * len(least) >= ROOM:
+    return _widths(*_sizes(table))
+
+
+def _widths(size: np.ndarray, least: np.ndarray) -> list[float]:
+    if _page_width(least) >= ROOM:
         return list((least + INSET) * ROOM / (least + INSET).sum())
     width = least.copy()
     while (left := ROOM - INSET * len(width) - width.sum()) > JUMPS[0]:
         lines = _lines(size, width)
         others = [np.delete(lines, k, axis=1).max(axis=1, initial=1.0) for k in range(len(width))]
-        jumps = [(k, jump) for k in range(len(width)) for jump in JUMPS if jump <= left]
+        jumps = [jump for jump in JUMPS if jump <= left]
+        fewer = [_lines(size, width + jump) for jump in jumps]
+        saved = _saved(lines, np.stack(others, axis=1), np.stack(fewer)).tolist()
         gain, k, jump = max(
-            (_saved(lines[:, k], others[k], _lines(size[:, k], width[k] + jump)) / jump, k, jump) for k, jump in jumps
+            (saved[row][k] / jump, k, jump) for row, jump in enumerate(jumps) for k in range(len(width))
         )
         if not gain:
             break
@@ -106,18 +120,22 @@ def spans(table: Table) -> list[int]:
     return [lengths.get(k, 0) for k in range(len(cells))]
 
 
-def _lines(size: np.ndarray, width: np.ndarray | float) -> np.ndarray:
-    """Lines that texts of these sizes take, the small ones under the others."""
-    return np.ceil(SLACK * size / (np.asarray(width)[..., None] + 0.01)).sum(axis=-1)
+def _lines(size: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Lines float64[n_rows, n_columns] that texts of these sizes take, the small ones under the others."""
+    return np.ceil(SLACK * size / (width[:, None] + 0.01)).sum(axis=-1)
 
 
-def _saved(lines: np.ndarray, others: np.ndarray, fewer: np.ndarray) -> float:
-    """Lines of all rows that a column saves which takes fewer, and something for those that another one still takes."""
+def _saved(lines: np.ndarray, others: np.ndarray, fewer: np.ndarray) -> np.ndarray:
+    """Lines of all rows that each column saves which takes fewer, and something for those that another still takes.
+
+    lines : float64[n_rows, n_columns].  others : of them the most in any other column.  fewer : float64[..., n_rows,
+    n_columns].  Returns float64[..., n_columns].
+    """
     rows = np.maximum(lines, others) - np.maximum(fewer, others)
-    return float(rows.sum() + 0.15 * (lines - fewer).sum())
+    return np.asarray(rows.sum(axis=-2) + 0.15 * (lines - fewer).sum(axis=-2))
 
 
 def _scale(column: Column, text: str) -> float:
     """Ratio of a column's type width to that of the page's body text."""
-    plain = lettering.width(text, TYPE)
+    plain = _width(text)
     return len(text) * MONO * TYPE / plain if column.kind in ("code", "name") and plain else 1.0

@@ -47,7 +47,10 @@ class Points:
 
 @dataclass(frozen=True)
 class Line:
-    """Through x, y : float64[n], interrupted at NaN.  text : in place of the coordinates under the pointer."""
+    """Through x, y : float64[n], interrupted at NaN.  text : in place of the coordinates under the pointer.
+
+    near : whether the axes must reach it.
+    """
 
     x: np.ndarray
     y: np.ndarray
@@ -57,6 +60,7 @@ class Line:
     width: float = 1.8
     opacity: float = 1.0
     text: str = ""
+    near: bool = True
     key: str = ""
 
 
@@ -104,9 +108,10 @@ class Field:
     levels: np.ndarray
     label: str
     key: str = ""
+    opacity: float = 1.0
 
     @property
-    def colours(self) -> list[str]:
+    def colour(self) -> list[str]:
         """The colour between each two levels."""
         n = self.levels.size - 1
         return [blended((k + 0.5) / n, *CIVIDIS) for k in range(n)]
@@ -116,15 +121,13 @@ class Field:
         """The region between each two levels, its range as its name."""
         import contourpy
 
-        generator: Any = contourpy.contour_generator(
-            self.x, self.y, np.ma.masked_invalid(self.z), fill_type=contourpy.FillType.OuterOffset
-        )
-        for (low, high), colour in zip(pairwise(self.levels.tolist()), self.colours, strict=True):
-            points, offsets = generator.filled(low, high)
-            rings = [p[a:b] for p, o in zip(points, offsets, strict=True) for a, b in pairwise(o)]
-            if rings:
-                x, y = joined(rings).T
-                yield Band(x, y, colour, 1.0, f"{self.label}: {number(low)} to {number(high)}", FIELD_EDGE)
+        kind = contourpy.FillType.ChunkCombinedOffset
+        generator: Any = contourpy.contour_generator(self.x, self.y, np.ma.masked_invalid(self.z), fill_type=kind)
+        for (low, high), colour in zip(pairwise(self.levels.tolist()), self.colour, strict=True):
+            (points,), (offsets,) = generator.filled(low, high)
+            if points is not None:
+                x, y = joined(np.split(points, offsets[1:-1])).T
+                yield Band(x, y, colour, self.opacity, f"{self.label}: {number(low)} to {number(high)}", FIELD_EDGE)
 
 
 @dataclass(frozen=True)
@@ -140,27 +143,26 @@ class Limit:
     near: bool = True
     key: str = ""
 
-    def across(self, x_ends: tuple[float, float], y_ends: tuple[float, float], log: bool = False) -> Line:
+    def across(self, ends: tuple[float, float], log: bool) -> Line:
         """The line between the ends of the other axis, with enough places for the pointer to find it."""
-        other = y_ends if self.axis == "x" else x_ends
-        along = np.geomspace(*other, 9) if log else np.linspace(*other, 9)
+        along = np.geomspace(*ends, 9) if log else np.linspace(*ends, 9)
         at = np.full(along.size, self.at)
         x, y = (at, along) if self.axis == "x" else (along, at)
         return Line(x, y, self.colour, self.name, self.dash, self.width, text=self.name)
 
 
-Mark = Points | Line | Band | Bar | Field | Limit
-_ACROSS = ("x", "left", "right")  # members of marks that are places on the axis of x, and on that of y
-_UP = ("y", "bottom", "top")
+Stroke = Points | Line | Band | Bar  # what is drawn: the other marks consist of these
+Mark = Stroke | Field | Limit
+PLACES = {"x": ("x", "left", "right"), "y": ("y", "bottom", "top")}  # members of marks that are numbers of an axis
 
 
-def extent(mark: Mark) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """All numbers of a mark on either axis."""
-    if isinstance(mark, Limit):
-        at = [np.array([mark.at])] if mark.near else []
-        return (at, []) if mark.axis == "x" else ([], at)
-    x, y = ([getattr(mark, name) for name in names if hasattr(mark, name)] for names in (_ACROSS, _UP))
-    return x, y
+def values_of(marks: Iterable[Mark], axis: str) -> Iterator[Any]:
+    """All numbers of the marks on the axis "x" or "y"."""
+    for mark in marks:
+        if getattr(mark, "near", True):
+            yield from [getattr(mark, place) for place in PLACES[axis] if hasattr(mark, place)]
+        if isinstance(mark, Limit) and mark.near and mark.axis == axis:
+            yield mark.at
 
 
 def finite(values: Iterable[Any]) -> np.ndarray:
@@ -169,53 +171,38 @@ def finite(values: Iterable[Any]) -> np.ndarray:
     return every[np.isfinite(every)]
 
 
-def _range(label: str, values: Iterable[Any]) -> str:
-    """From where to where the finite ones of these numbers reach, in words."""
-    numbers = finite(values)
-    return f"{label} {number(numbers.min(), 4)} to {number(numbers.max(), 4)}" if numbers.size else ""
-
-
 @dataclass(frozen=True)
 class Axis:
-    """label : beside it; name : what it measures, where there is no label.  reach : its ends, in their order.
+    """label : beside it.  reach : its ends, in their order.  ticks : places and words of its own ticks.
 
-    ticks : places and words of its own ticks; most : of other ones; whole : at whole numbers only; zero : reaches 0.
-    Without a margin it ends at the outermost mark.
+    whole : ticks at whole numbers only.  Without a margin it ends at the outermost mark.
     """
 
     label: str = ""
-    name: str = ""
     reach: tuple[float, float] | None = None
     log: bool = False
     ticks: tuple[tuple[float, str], ...] | None = None
-    most: int = 6
     whole: bool = False
-    zero: bool = False
-    grid: bool = True
     margin: float = MARGIN
 
-    def ends(self, values: Iterable[np.ndarray]) -> tuple[float, float]:
+    def ends(self, values: Iterable[Any]) -> tuple[float, float]:
         """Both ends of the axis over marks with these values."""
         if self.reach is not None:
             return self.reach
-        seen = finite([*values, np.zeros(int(self.zero))])
-        seen = seen[seen > 0.0] if self.log else seen
-        if not seen.size:
-            return (1.0, 10.0) if self.log else (0.0, 1.0)
-        low, high = float(seen.min()), float(seen.max())
-        if self.log:
-            room = (high / low) ** self.margin if high > low else 1.5
-            return low / room, high * room
+        seen = finite(values)
+        seen = np.log10(seen[seen > 0.0]) if self.log else seen
+        low, high = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
         room = self.margin * (high - low)
         if high - low <= 1e-12 * max(abs(low), abs(high)):
             room = 0.05 * abs(high) or 1.0
-        return low - (0.0 if self.zero and low == 0.0 else room), high + (0.0 if self.zero and high == 0.0 else room)
+        low, high = low - room, high + room
+        return (10.0**low, 10.0 ** min(high, 308.0)) if self.log else (low, high)  # no float64 is larger
 
 
-def names_axis(names: Sequence[str], label: str = "", *, down: bool = False, grid: bool = False) -> Axis:
+def names_axis(names: Sequence[str], label: str = "", *, down: bool = False) -> Axis:
     """An axis with a place for each name; down : an upright one, the first name on top."""
     ends = -0.5, len(names) - 0.5
-    return Axis(label, reach=ends[::-1] if down else ends, ticks=tuple(enumerate(names)), grid=grid)
+    return Axis(label, reach=ends[::-1] if down else ends, ticks=tuple(enumerate(names)))
 
 
 @dataclass(frozen=True)
@@ -236,29 +223,48 @@ class Plot:
     @cached_property
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Ends of both axes."""
-        extents = [extent(mark) for mark in self.marks]
-        return self.x.ends(a for x, _ in extents for a in x), self.y.ends(a for _, y in extents for a in y)
+        return self.x.ends(values_of(self.marks, "x")), self.y.ends(values_of(self.marks, "y"))
+
+    @property
+    def strokes(self) -> Iterator[Stroke]:
+        """All that is drawn, from back to front."""
+        for mark in self.marks:
+            if isinstance(mark, Field):
+                yield from mark.bands
+            elif isinstance(mark, Limit):
+                other, log = (self.ends[1], self.y.log) if mark.axis == "x" else (self.ends[0], self.x.log)
+                yield mark.across(other, log)
+            else:
+                yield mark
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """What the axes of x and of y measure: the label beside an axis, or above the panel."""
+        above = self.title.partition("\n")[0]
+        return self.x.label or above, self.y.label or above
 
     @property
     def words(self) -> str:
         """What it shows, for those who do not see it: texts of few points and bars, else its ranges, and its limits."""
         listed = [mark.texts for mark in self.marks if isinstance(mark, Points | Bar) and len(mark.texts) <= MOST_TOLD]
-        said = [text for texts in listed for text in texts] or [self._ranges()]
+        said = [text for texts in listed for text in texts] or [" against ".join(self._ranges())]
         said += [mark.name for mark in self.marks if isinstance(mark, Limit)]
-        title = f"{self.title}: " if self.title not in ("", self.y.name) else ""
+        title = "" if self.title in ("", *self.names) and not any(listed) else f"{self.title}: "
         return title + "; ".join(filter(None, dict.fromkeys(said)))
 
-    def _ranges(self) -> str:
-        """What the marks reach over on both axes, and the field in them."""
-        extents = [extent(mark) for mark in self.marks if not isinstance(mark, Limit | Band)]
-        x, y = ([part for both in extents for part in both[k]] for k in (0, 1))
-        told = [_range(axis.name or axis.label, values) for axis, values in ((self.y, y), (self.x, x))]
-        over = _range(self.field.label, [self.field.z]) if self.field else ""
-        return ", ".join(filter(None, (" against ".join(filter(None, told)), over)))
+    def _ranges(self) -> Iterator[str]:
+        """From where to where the marks, and the field in them, reach on the axes of numbers."""
+        marks = [mark for mark in self.marks if not isinstance(mark, Limit | Band)]
+        told = [(name, values_of(marks, axis)) for name, axis in zip(self.names[::-1], "yx", strict=True)
+                if not getattr(self, axis).ticks]  # fmt: skip
+        told += [(field.label, iter(field.z)) for field in self.fields]
+        for name, values in told:
+            if (numbers := finite(values)).size:
+                yield f"{name} {number(numbers.min(), 4)} to {number(numbers.max(), 4)}"
 
     @property
-    def field(self) -> Field | None:
-        return next((mark for mark in self.marks if isinstance(mark, Field)), None)
+    def fields(self) -> list[Field]:
+        return [mark for mark in self.marks if isinstance(mark, Field)]
 
 
 @dataclass(frozen=True)
@@ -295,13 +301,14 @@ class Drawing:
 
 
 def between(
-    x: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str, opacity: float, name: str = "", key: str = ""
-) -> Band:
-    """The band from `low` to `high` over x, each float64[n]; in pieces where they are not numbers."""
+    x: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str, opacity: float, name: str = "", key: str = "",
+    upright: bool = False,
+) -> Band:  # fmt: skip
+    """The band from `low` to `high` over x, each float64[n]; interrupted at NaN; upright : x along y."""
     good = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
     pieces = np.split(np.arange(x.size), np.flatnonzero(np.diff(good)) + 1)
     rings = [np.column_stack([np.r_[x[k], x[k][::-1]], np.r_[low[k], high[k][::-1]]]) for k in pieces if good[k].any()]
-    across, up = joined(rings).T
+    across, up = joined(rings).T[:: -1 if upright else 1]
     return Band(across, up, colour, opacity, name, key=key)
 
 

@@ -13,7 +13,7 @@ from reports.drawing.lettering import LINE, TYPE
 from reports.drawing.marks import Axis, Bar, Drawing, Field, Mark, Plot
 from reports.drawing.palette import GRID, MUTED, ON_PAPER, ON_SCREEN, coloured
 from reports.drawing.strokes import SWATCH, Frame, part_of_axis, stroked, swatch
-from reports.drawing.ticks import axis_ticks, numerals
+from reports.drawing.ticks import MOST_TICKS, axis_ticks, numerals
 
 WIDTH = 493.2  # 174 mm, the text width of the page
 SHORT = 0.46  # points of height on paper for a pixel on the screen
@@ -57,10 +57,10 @@ def _panel_rows(drawing: Drawing, whole: float) -> Iterator[tuple[list[str], flo
         panels = []
         for k, plot in enumerate(drawing.plots[row[0] : row[-1] + 1]):
             left = (GAP + width) * k
-            scale = _colour_scale(plot.field, plot.height) if plot.field else None
-            room = _Panel(scale, 0.0, 0.0).frame_left + BAR if scale else 0.0
+            scales = [_colour_scale(field, plot.height) for field in plot.fields]
+            room = sum(_Panel(scale, 0.0, 0.0).frame_left + BAR for scale in scales)
             panels.append(_Panel(plot, left, width - room))
-            panels += [_Panel(scale, left + width - room, room)] if scale else []
+            panels += [_Panel(scale, left + width - room, room) for scale in scales]
         upper = top + 5.0 + LINE * max(len(panel.title) for panel in panels)
         lower = upper + max(panel.height for panel in panels)
         for k, panel in enumerate(panels):
@@ -72,9 +72,9 @@ def _panel_rows(drawing: Drawing, whole: float) -> Iterator[tuple[list[str], flo
 
 def _colour_scale(field: Field, height: float) -> Plot:
     """The colours of a field and their values, as a narrow panel."""
-    n, levels = len(field.colours), field.levels
-    boxes = Bar(np.zeros(n), np.ones(n), levels[:-1], levels[1:], field.colours, 1.0)
-    up = Axis(field.label, reach=(float(levels[0]), float(levels[-1])), most=8, grid=False)
+    n, levels = len(field.colour), field.levels
+    boxes = Bar(np.zeros(n), np.ones(n), levels[:-1], levels[1:], field.colour, field.opacity)
+    up = Axis(field.label, reach=(float(levels[0]), float(levels[-1])))
     return Plot((boxes,), Axis(reach=(0.0, 1.0), ticks=()), up, height=height)
 
 
@@ -118,7 +118,7 @@ def _ticks(axis: Axis, ends: Ends, room: float, upright: bool) -> _Ticks:
     """The ticks of an axis of length `room` points, as many as fit without overlap."""
     if axis.ticks is not None:
         return _own_ticks([(at, text) for at, text in axis.ticks if min(ends) <= at <= max(ends)], room, upright)
-    many = [axis_ticks(*ends, most, log=axis.log, whole=axis.whole) for most in range(axis.most, 1, -1)]
+    many = [axis_ticks(*ends, most, log=axis.log, whole=axis.whole) for most in range(MOST_TICKS, 1, -1)]
     outermost = many[0][:: max(len(many[0]) - 1, 1)]  # one tick alone says nothing of a scale
     for places in [*(some for some in many if len(some) > 1), outermost]:
         texts, power = numerals(places, axis.log)
@@ -165,12 +165,12 @@ class _Panel:
         yield from lettering.text(self.left, top + LINE - 1.0, self.title[:1], bold=True)
         yield from lettering.text(self.left, top + 2.0 * LINE - 1.0, self.title[1:])
         left, right = f"M{frame.left:.2f}", f"H{frame.right:.2f}"
-        lines = [f"M{x:.2f} {upper:.2f}V{lower:.2f}" for x in frame.x(self.x_ticks.places) if self.plot.x.grid]
-        lines += [f"{left} {y:.2f}{right}" for y in frame.y(self.y_ticks.places) if self.plot.y.grid]
+        lines = [f"M{x:.2f} {upper:.2f}V{lower:.2f}" for x in frame.x(self.x_ticks.places)]
+        lines += [f"{left} {y:.2f}{right}" for y in frame.y(self.y_ticks.places)]
         yield f'<path d="{"".join(lines)}" stroke="{GRID}" stroke-width=".5"/>' if lines else ""
         yield f'<clipPath id="{clip}"><path d="{left} {upper:.2f}{right}V{lower:.2f}H{frame.left:.2f}z"/></clipPath>'
         yield f'<g clip-path="url(#{clip})">'
-        for mark in self.plot.marks:
+        for mark in self.plot.strokes:
             yield from stroked(mark, frame)
         yield f'</g><path d="{left} {upper:.2f}V{lower:.2f}{right}" stroke="{MUTED}" stroke-width=".6"/>'
         yield from self._texts(frame)

@@ -4,7 +4,6 @@ The page's bundle of plotly.js has scatters and bars; a field is drawn as one fi
 """
 
 from base64 import b64encode
-from collections.abc import Iterator
 from functools import singledispatch
 from html import escape
 from math import isfinite
@@ -13,22 +12,21 @@ from typing import Any
 
 import numpy as np
 
-from reports.drawing.marks import Axis, Band, Bar, Drawing, Field, Limit, Line, Plot, Points
+from reports.drawing.marks import Axis, Band, Bar, Drawing, Field, Line, Plot, Points
 from reports.drawing.palette import GRID, INK, MUTED, PAPER
-from reports.drawing.ticks import axis_ticks, numerals
+from reports.drawing.ticks import MOST_TICKS, axis_ticks, numerals
 from reports.text.numbers import number
 
 FEW = 24  # numbers that are written as such
-FLOATS = (1e-30, 1e30)  # largest of some numbers that float32 holds with room to spare
-NEAR = 100.0  # a float32 keeps enough digits of numbers up to so many times their spread
+DIFFERENCE = 1e-5  # of the spread of some numbers: how far off each may be
 TITLE_LINE = 17  # pixels
 ABOVE, ROUND_TITLE = 12, 6  # pixels above the axes; more of them where there is a title, besides its lines
 PAD, CAPITAL = 7, 9  # pixels above a title; more of them above two lines, where plotly forgets the first one's height
-WRAP = 28  # characters of a title
-ACROSS, ALONE = 32, 64  # characters of a line of the label below a panel of several, and below a single one
+WRAP = 28  # characters of a line of a title, and of the label below a panel
 UPRIGHT = 9  # pixels of height for a character of the label beside a panel
 LONG = 8  # characters of a tick label; of longer ones there are few, or they turn and take the room of the panel
 FRAME = 56  # pixels above and below the rows of a panel that has rows
+SERIES = "<extra>%{fullData.name}</extra>"  # of a hover text: the name of the mark beside it
 BINS = "bins"  # the mark of bars that count cases
 CASES = "cases"  # the mark of a cloud whose points are cases, with their numbers as its customdata
 
@@ -38,33 +36,30 @@ def packed(values: Any) -> Any:
     array = np.asarray(values, dtype=np.float64)
     if array.size <= FEW:
         return [value if isfinite(value) else None for value in array.tolist()]
-    return typed(array, "f8" if _alike(array) else _kind(array))
+    return typed(array, _kind(array))
 
 
 def column(values: np.ndarray) -> dict[str, Any]:
-    """Numbers of all cases for the page's scripts: four bytes each where these hold them, from the smallest where they
-    differ little."""
-    start = float(values[np.isfinite(values)].min()) if _alike(values) else 0.0
-    return {**typed(values - start, _kind(values - start)), **({"start": start} if start else {})}
+    """Numbers of all cases for the page's scripts: four bytes each where these hold them, if need be from a start."""
+    finite = values[np.isfinite(values)]
+    near = finite.size and np.ptp(0.5 * finite) < 0.5 * abs(finite.min())  # halves: no overflow
+    start = float(finite.min()) if near and _kind(values) == "f8" else 0.0
+    return {**typed(values - start, _kind(values - start)), "start": start}
 
 
 def _kind(values: np.ndarray) -> str:
-    """Four bytes a number, or eight where a float32 does not hold the largest."""
-    size = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-    return "f8" if size and not FLOATS[0] <= size <= FLOATS[1] else "f4"
-
-
-def _alike(values: np.ndarray) -> bool:
-    """Whether a float32 keeps too few digits of the differences between these numbers."""
+    """Four bytes a number where these tell apart what differs, or eight."""
     finite = values[np.isfinite(values)]
-    return bool(finite.size and 0.5 * np.abs(finite).max() / NEAR > np.ptp(0.5 * finite))  # halves: no overflow
+    if not finite.size:
+        return "f4"
+    with np.errstate(over="ignore"):
+        error = np.abs(finite - finite.astype(np.float32))
+    return "f4" if (error <= DIFFERENCE * np.ptp(0.5 * finite)).all() else "f8"
 
 
 def typed(values: np.ndarray, kind: str) -> dict[str, str]:
     """An array of numbers as plotly.js reads it."""
-    with np.errstate(over="ignore"):
-        data = np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()
-    return {"dtype": kind, "bdata": b64encode(data).decode()}
+    return {"dtype": kind, "bdata": b64encode(np.ascontiguousarray(values, dtype=f"<{kind}").tobytes()).decode()}
 
 
 def plain(text: str) -> str:
@@ -74,64 +69,56 @@ def plain(text: str) -> str:
 
 def specifications(drawing: Drawing) -> list[dict[str, Any]]:
     """The "data" and "layout" of each panel; colours may be "@ink" and other page colours."""
-    characters = ALONE if len(drawing.plots) == 1 else ACROSS
-    return [{"data": [trace for mark in plot.marks for trace in traced(mark, plot)],
-             "layout": _layout(plot, characters)} for plot in drawing.plots]  # fmt: skip
+    return [{"data": [*(traced(stroke, plot) for stroke in plot.strokes), *map(_colour_scale, plot.fields)],
+             "layout": _layout(plot)} for plot in drawing.plots]  # fmt: skip
 
 
 def history_panel(time: str) -> dict[str, Any]:
     """The layout of one quantity of a single case, still without its title."""
-    layout = _layout(Plot((), Axis(time), Axis(most=5), "quantity", 240.0), ACROSS)
+    layout = _layout(Plot((), Axis(time), Axis(), "quantity", 240.0))
     for axis in ("xaxis", "yaxis"):
         del layout[axis]["range"]
     return layout
 
 
 @singledispatch
-def traced(mark: object, plot: Plot) -> Iterator[dict[str, Any]]:
-    """The traces of plotly.js that draw the mark."""
-    raise TypeError(f"{type(mark).__name__} is no mark that the screen draws")
+def traced(stroke: object, plot: Plot) -> dict[str, Any]:
+    """The trace of plotly.js that draws it."""
+    raise TypeError(f"{type(stroke).__name__} is no mark that the screen draws")
 
 
 @traced.register
-def _points(mark: Points, plot: Plot) -> Iterator[dict[str, Any]]:
+def _points(mark: Points, plot: Plot) -> dict[str, Any]:
     edge = {"line": {"width": mark.edge_width, "color": mark.edge}} if mark.edge else {}
-    texts = [plain(text) for text in mark.texts]
     cases = {} if mark.cases is None else {"meta": CASES, "customdata": mark.cases.tolist(), "columns": mark.columns}
-    yield {
+    texts = {"text": [plain(text) for text in mark.texts]} if mark.texts else {}
+    numbers = "" if texts and not cases else _numbers(plot)
+    told = "case %{customdata}" * bool(cases), numbers, "%{text}" * bool(texts)
+    return {
         "type": "scatter", "mode": "markers", "x": packed(mark.x), "y": packed(mark.y), "name": plain(mark.name),
         "marker": {"size": mark.size, "color": mark.colour, "opacity": mark.opacity, "symbol": mark.sign, **edge},
-        **cases, **({"text": texts} if texts else {}),
-        "hovertemplate": _pointed(plot, "case %{customdata}" * bool(cases), bool(texts)),
+        "hovertemplate": "<br>".join(filter(None, told)) + SERIES, **cases, **texts,
     }  # fmt: skip
 
 
-def _pointed(plot: Plot, first: str = "", text: bool = False) -> str:
-    """Template of the hover text: the names of both axes with their units, and the numbers."""
-    lines = [plain(axis.name or axis.label) for axis in (plot.x, plot.y)]
-    numbers = [f"{name + ': ' if name else ''}%{{{axis}:.5g}}" for name, axis in zip(lines, "xy", strict=True)]
-    told = [*[first] * bool(first), *([] if text and not first else numbers), *["%{text}"] * text]
-    return "<br>".join(told) + "<extra>%{fullData.name}</extra>"
+def _numbers(plot: Plot) -> str:
+    """Template of a hover text: the names of both axes with their units, and the numbers."""
+    lines = zip(map(plain, plot.names), ("%{x:.5g}", "%{y:.5g}"), strict=True)
+    return "<br>".join(f"{name}: {value}" if name else value for name, value in lines)
 
 
 @traced.register
-def _line(mark: Line, plot: Plot) -> Iterator[dict[str, Any]]:
-    yield {
+def _line(mark: Line, plot: Plot) -> dict[str, Any]:
+    return {
         "type": "scatter", "mode": "lines", "x": packed(mark.x), "y": packed(mark.y), "name": plain(mark.name),
-        "line": {"color": mark.colour, "width": mark.width, "dash": mark.dash},
-        "opacity": mark.opacity, "text": plain(mark.text),
-        "hovertemplate": "%{text}<extra></extra>" if mark.text else _pointed(plot),
+        "line": {"color": mark.colour, "width": mark.width, "dash": mark.dash}, "opacity": mark.opacity,
+        "text": plain(mark.text), "hovertemplate": "%{text}<extra></extra>" if mark.text else _numbers(plot) + SERIES,
     }  # fmt: skip
 
 
 @traced.register
-def _limit(mark: Limit, plot: Plot) -> Iterator[dict[str, Any]]:
-    yield from _line(mark.across(*plot.ends, (plot.y if mark.axis == "x" else plot.x).log), plot)
-
-
-@traced.register
-def _band(mark: Band, plot: Plot) -> Iterator[dict[str, Any]]:
-    yield {
+def _band(mark: Band, plot: Plot) -> dict[str, Any]:
+    return {
         "type": "scatter", "mode": "lines", "x": packed(mark.x), "y": packed(mark.y), "fill": "toself",
         "fillcolor": f"{mark.colour}{round(255 * mark.opacity):02x}",
         "line": {"width": 0.6 if mark.edge else 0, "color": mark.edge or mark.colour},
@@ -140,30 +127,28 @@ def _band(mark: Band, plot: Plot) -> Iterator[dict[str, Any]]:
 
 
 @traced.register
-def _bar(mark: Bar, plot: Plot) -> Iterator[dict[str, Any]]:
-    yield {
+def _bar(mark: Bar, plot: Plot) -> dict[str, Any]:
+    edges = {"meta": BINS, "columns": [mark.column], "edges": np.append(mark.left, mark.right[-1:]).tolist()}
+    return {
         "type": "bar", "x": packed(0.5 * (mark.left + mark.right)), "y": packed(mark.top - mark.bottom),
         "base": packed(mark.bottom), "width": packed(mark.right - mark.left),
         "marker": {"color": mark.colour, "opacity": mark.opacity, "line": {"width": 0}},
         "customdata": [plain(text) for text in mark.texts], "text": list(mark.labels),
         "textposition": "inside", "insidetextanchor": "middle", "textangle": 0, "insidetextfont": {"color": mark.ink},
-        **({"meta": BINS, "columns": [mark.column], "edges": np.append(mark.left, mark.right[-1:]).tolist()}
-           if mark.column else {}),
-        "hovertemplate": "%{customdata}<extra></extra>" if len(mark.texts) else _pointed(plot),
+        "hovertemplate": ("%{customdata}" if len(mark.texts) else _numbers(plot)) + "<extra></extra>",
+        **(edges if mark.column else {}),
     }  # fmt: skip
 
 
-@traced.register
-def _field(mark: Field, plot: Plot) -> Iterator[dict[str, Any]]:
-    for band in mark.bands:
-        yield from _band(band, plot)
-    levels, n = mark.levels.tolist(), len(mark.colours)
-    scale = [[end / n, colour] for k, colour in enumerate(mark.colours) for end in (k, k + 1)]
-    yield {
+def _colour_scale(field: Field) -> dict[str, Any]:
+    """A trace with the colours of a field beside the panel, and no point."""
+    levels, n = field.levels.tolist(), len(field.colour)
+    scale = [[end / n, colour] for k, colour in enumerate(field.colour) for end in (k, k + 1)]
+    bar = {"title": {"text": plain(field.label), "side": "right"}, "thickness": 14, "outlinewidth": 0, "tickcolor": INK}
+    return {
         "type": "scatter", "mode": "markers", "x": [None], "y": [None], "hoverinfo": "skip",
         "marker": {"color": [levels[0]], "cmin": levels[0], "cmax": levels[-1], "colorscale": scale, "showscale": True,
-                   "colorbar": {"title": {"text": plain(mark.label), "side": "right"}, "thickness": 14,
-                                "outlinewidth": 0, "tickcolor": INK}},
+                   "colorbar": bar},
     }  # fmt: skip
 
 
@@ -173,33 +158,29 @@ def _lines(text: str, characters: int) -> str:
     return "<br>".join(map(plain, lines))
 
 
-def _axis(axis: Axis, ends: tuple[float, float], characters: int, **own_keys: Any) -> dict[str, Any]:
+def _axis(axis: Axis, ends: tuple[float, float], characters: int) -> dict[str, Any]:
     """The layout of one axis, in the colours of the page; characters : of a line of its label."""
-    own = axis.ticks
+    own, places = axis.ticks, axis_ticks(*ends, MOST_TICKS, log=axis.log)
+    texts, power = numerals(places, axis.log)
     if own is None and axis.log:
-        found = axis_ticks(*ends, axis.most, log=True)
-        texts, power = numerals(found, True)
-        own = tuple(zip(found, map(number, found) if power else texts, strict=True))
-    longest = max(map(len, numerals(axis_ticks(*ends, axis.most))[0]), default=0)
+        own = tuple(zip(places, map(number, places) if power else texts, strict=True))
     return {
         "title": {"text": _lines(axis.label, characters), "standoff": 8, "font": {"size": 13}},
         "automargin": True, "gridcolor": GRID, "linecolor": MUTED, "tickcolor": MUTED, "zeroline": False,
         "ticks": "outside", "ticklen": 4, "showline": True, "exponentformat": "power", "minexponent": 5,
-        "nticks": axis.most + 1 if longest < LONG else 4,
-        "autotickangles": [0, *[30] * (axis.ticks is None), -90],  # names stand upright, as many as can be
+        "nticks": 4 if max(map(len, texts), default=0) >= LONG else 0,
+        "autotickangles": [0, -90] if axis.ticks else [0, 30, -90],  # names stand upright, as many as can be
         "range": [float(np.log10(end)) for end in ends] if axis.log else list(ends),
-        "type": "log" if axis.log else "linear", "showgrid": axis.grid,
+        "type": "log" if axis.log else "linear",
+        **({"tickformat": ",d"} if axis.whole else {}),
         **({} if own is None else {"tickvals": [at for at, _ in own], "ticktext": [plain(text) for _, text in own]}),
-        **({"tickformat": ",d"} if axis.whole and own is None else {}),
-        **own_keys,
     }  # fmt: skip
 
 
-def _layout(plot: Plot, characters: int) -> dict[str, Any]:
-    """The layout of a panel; characters : of a line of the label below it."""
+def _layout(plot: Plot) -> dict[str, Any]:
+    """The layout of a panel."""
     x_ends, y_ends = plot.ends
     cases = any(getattr(mark, "cases", None) is not None or getattr(mark, "column", "") for mark in plot.marks)
-    equal = {"scaleanchor": "x", "scaleratio": 1} if plot.equal else {}
     title = _lines(plot.title, WRAP)
     lines = title.count("<br>") + 1 if title else 0
     top = ABOVE + (ROUND_TITLE + TITLE_LINE * lines if lines else 0)  # plotly's own room puts two lines out of sight
@@ -215,6 +196,6 @@ def _layout(plot: Plot, characters: int) -> dict[str, Any]:
         "uniformtext": {"mode": "show", "minsize": 5},
         "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": MUTED, "activecolor": INK},
         "dragmode": "select" if cases else "zoom",
-        "xaxis": _axis(plot.x, x_ends, characters),
-        "yaxis": _axis(plot.y, y_ends, round(plot.height) // UPRIGHT, **equal),
+        "xaxis": _axis(plot.x, x_ends, WRAP),
+        "yaxis": _axis(plot.y, y_ends, round(plot.height) // UPRIGHT) | ({"scaleanchor": "x"} if plot.equal else {}),
     }  # fmt: skip

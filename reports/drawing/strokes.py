@@ -3,11 +3,12 @@
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import singledispatch
+from math import isfinite
 
 import numpy as np
 
 from reports.drawing import lettering
-from reports.drawing.marks import Band, Bar, Field, Limit, Line, Mark, Points
+from reports.drawing.marks import Band, Bar, Limit, Line, Mark, Points
 
 LINE, SIGN = 0.6, 0.5  # points for a pixel, of lines' widths and of signs' sizes
 SWATCH = (13.0, 6.0)  # width and height of a sample in a key
@@ -66,16 +67,15 @@ def swatch(mark: Mark, x: float, y: float) -> Iterator[str]:
     frame = Frame(x, y - 0.5 * height, x + width, y + 0.5 * height)
     ends, middle = np.array([0.0, 1.0]), np.full(2, 0.5)
     if isinstance(mark, Points):
-        one = replace(mark, x=middle[:1], y=middle[:1], size=max(mark.size, LEAST_SIGN), opacity=1.0)
-        yield from _points(one, frame)
+        size = max(mark.size, LEAST_SIGN)
+        yield from _points(replace(mark, x=middle[:1], y=middle[:1], size=size, opacity=1.0), frame)
     elif isinstance(mark, Line | Limit):
         yield from _line(Line(ends, middle, mark.colour, dash=mark.dash, width=mark.width), frame)
     else:
-        every = np.atleast_1d(mark.colours if isinstance(mark, Field) else mark.colour)
+        every = np.atleast_1d(mark.colour)
         n = min(every.size, MOST_COLOURS)
         colours, edges = every[np.linspace(0, every.size - 1, n).astype(int)].tolist(), np.linspace(0.0, 1.0, n + 1)
-        opacity = 1.0 if isinstance(mark, Field) else mark.opacity
-        yield from _bar(Bar(edges[:-1], edges[1:], np.zeros(n), np.ones(n), colours, opacity), frame)
+        yield from _bar(Bar(edges[:-1], edges[1:], np.zeros(n), np.ones(n), colours, mark.opacity), frame)
 
 
 @stroked.register
@@ -87,13 +87,8 @@ def _line(mark: Line, frame: Frame) -> Iterator[str]:
 
 
 @stroked.register
-def _limit(mark: Limit, frame: Frame) -> Iterator[str]:
-    yield from _line(mark.across(frame.x_ends, frame.y_ends), frame)
-
-
-@stroked.register
 def _band(mark: Band, frame: Frame) -> Iterator[str]:
-    outline = _pen(frame.x(mark.x), frame.y(mark.y), close=True)
+    outline = _pen(frame.x(mark.x), frame.y(mark.y), "z")
     style = f'fill-opacity="{mark.opacity:g}" fill-rule="evenodd"'
     style += f' stroke="{mark.edge}" stroke-width=".35"' if mark.edge else ""
     yield f'<path d="{outline}" fill="{mark.colour}" {style}/>'
@@ -110,12 +105,6 @@ def _bar(mark: Bar, frame: Frame) -> Iterator[str]:
         yield f'<path d="{outlines}" fill="{colour}" fill-opacity="{mark.opacity:g}"/>'
     for (a, b, c, d), label, ink in zip(boxes, mark.labels, inks, strict=False):
         yield from lettering.text((a + b) / 2, (c + d) / 2 + 2.7, [label], anchor="middle", fill=ink)
-
-
-@stroked.register
-def _field(mark: Field, frame: Frame) -> Iterator[str]:
-    for band in mark.bands:
-        yield from _band(band, frame)
 
 
 @stroked.register
@@ -139,14 +128,14 @@ def _faint(opacity: float) -> str:
     return f' opacity="{opacity:g}"' if opacity < 1.0 else ""
 
 
-def _pen(x: np.ndarray, y: np.ndarray, close: bool = False) -> str:
-    """A path through the points, lifted where they are not numbers."""
-    good = np.isfinite(x) & np.isfinite(y)
+def _pen(x: np.ndarray, y: np.ndarray, end: str = "") -> str:
+    """A path through the points, lifted where they are not numbers; end : of each piece, "z" closes it."""
     pieces, down = [], False
-    for px, py, finite in zip(np.round(x, 2).tolist(), np.round(y, 2).tolist(), good.tolist(), strict=True):
-        if finite:
-            pieces.append(f"{' ' if down else 'M'}{px:g} {py:g}")
-        elif down and close:
-            pieces.append("z")
-        down = finite
-    return "".join(pieces) + "z" * (close and down)
+    for across, up in zip(np.round(x, 2).tolist(), np.round(y, 2).tolist(), strict=True):
+        if isfinite(across) and isfinite(up):
+            pieces.append(f"{' ' if down else 'M'}{across:g} {up:g}")
+            down = True
+        elif down:
+            pieces.append(end)
+            down = False
+    return "".join(pieces) + end * down

@@ -4,11 +4,12 @@ from math import ceil, floor, inf, log10
 
 from reports.text.numbers import SPACE, number
 
+MOST_TICKS = 6  # of an axis
 STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 _SUPERSCRIPT = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
-def nice_ticks(low: float, high: float, most: int = 6, *, whole: bool = False, cover: bool = False) -> list[float]:
+def nice_ticks(low: float, high: float, most: int, *, whole: bool = False, cover: bool = False) -> list[float]:
     """Round values at most `most` steps long: between low and high, whichever is larger, or, to cover them, beyond."""
     low, high = min(low, high), max(low, high)
     rough, step = (high - low) / max(most, 1), 1.0
@@ -33,7 +34,7 @@ def log_ticks(low: float, high: float, most: int = 8) -> list[float]:
     return places
 
 
-def axis_ticks(low: float, high: float, most: int, *, log: bool = False, whole: bool = False) -> list[float]:
+def axis_ticks(low: float, high: float, most: int = MOST_TICKS, log: bool = False, whole: bool = False) -> list[float]:
     """Round values of an axis; a logarithmic one of less than a decade gets those of a linear one."""
     return log_ticks(low, high, most) if log and high >= 10.0 * low else nice_ticks(low, high, most, whole=whole)
 

@@ -64,8 +64,8 @@ def histogram(
         key = "normal distribution that the source prints"
         marks.append(Line(curve[0], curve[1], GREEN, width=2.0, text=words, key=key))
     told = f"{', '.join(beyond)} beyond the axis" if beyond else ""
-    x = Axis(label, most=5, whole=bool(edges[1] - edges[0] == 1.0), grid=False, margin=0.03)
-    y = Axis("cases", reach=(0.0, top), most=4, whole=True)
+    x = Axis(label, whole=bool(edges[1] - edges[0] == 1.0), margin=0.03)
+    y = Axis("cases", reach=(0.0, top), whole=True)
     return Plot(tuple(marks), x, y, "\n".join(filter(None, (title, told))), height)
 
 

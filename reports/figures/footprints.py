@@ -1,6 +1,6 @@
 """A footprint: the ends of the flights about their mean impact point, with the regions that hold them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,15 +19,14 @@ MEAN = Points(np.zeros(1), np.zeros(1), INK, "mean impact point", "cross", 11.0,
 class View:
     """Axes turned anticlockwise by an angle [rad] against east and north; equal: one scale for both."""
 
-    x_label: str = "east of the mean [km]"
-    y_label: str = "north of the mean [km]"
+    labels: tuple[str, str]
     angle: float = 0.0
     equal: bool = True
 
     @property
     def columns(self) -> tuple[str, str]:
         """Names of the places on its axes, as columns of the cases."""
-        return (f"place: {self.x_label}", f"place: {self.y_label}")
+        return (f"place: {self.labels[0]}", f"place: {self.labels[1]}")
 
     def turned(self, points: np.ndarray) -> np.ndarray:
         """Points float64[k, 2] in these axes."""
@@ -35,13 +34,16 @@ class View:
         return np.column_stack([c * points[:, 0] + s * points[:, 1], c * points[:, 1] - s * points[:, 0]])
 
 
+MAP = View(("east of the mean [km]", "north of the mean [km]"))
+
+
 def footprint_views(long_axis: float | None) -> list[View]:
     """The map; for a long cloud also the same along and across it, each with a scale of its own.
 
     long_axis : direction of a cloud much longer than wide [rad, from east to north].
     """
-    along = View("along the long axis [km]", "across it, to the left [km]", long_axis or 0.0, False)
-    return [View()] if long_axis is None else [View(), along]
+    along = View(("along the long axis [km]", "across it, to the left [km]"), long_axis or 0.0, False)
+    return [MAP] if long_axis is None else [MAP, along]
 
 
 def footprint_plot(
@@ -64,6 +66,7 @@ def footprint_plot(
     x, y = view.turned(points).T
     turned = [replace(outline, curves=tuple(map(view.turned, outline.curves))) for outline in outlines]
     marks: list[Mark] = [
+        *coast_lines(coasts if view.equal else ()),
         Points(x, y, BLUE, opacity=0.5, texts=names, cases=case_ids, columns=view.columns, key=key),
         *outline_lines(turned),
         MEAN,
@@ -74,36 +77,27 @@ def footprint_plot(
     flatness = float(np.clip(spans[1] / max(spans[0], 1e-9), 0.25, 0.75))
     height = 60.0 + 720.0 * flatness if view.equal else 380.0
     title = "" if view.equal else "Along and across, each with a scale of its own"
-    plot = Plot(tuple(marks), Axis(view.x_label), Axis(view.y_label), title, height, view.equal)
-    return over_coasts(plot, coasts) if coasts and view.equal else plot
+    return Plot(tuple(marks), Axis(view.labels[0]), Axis(view.labels[1]), title, height, view.equal)
 
 
 def surroundings(coasts: Sequence[np.ndarray], reach: float) -> Plot:
     """Where the footprint lies, when its own map shows no coast: a map that reaches so many km to the north."""
-    x, y = (Axis(label, reach=(-end, end)) for label, end in
-            ((View.x_label, WIDE * reach), (View.y_label, reach)))  # fmt: skip
-    return over_coasts(Plot((MEAN,), x, y, "The surroundings", 300.0, True), coasts)
+    x, y = Axis(MAP.labels[0], (-WIDE * reach, WIDE * reach)), Axis(MAP.labels[1], (-reach, reach))
+    return Plot((*coast_lines(coasts), MEAN), x, y, "The surroundings", 300.0, True)
 
 
-def over_coasts(plot: Plot, coasts: Sequence[np.ndarray]) -> Plot:
-    """The map over its coasts, which do not make it larger."""
-    x, y = joined(coasts).T
-    coast = Line(x, y, MUTED, COAST, width=1.2, text=COAST, key=COAST)
-    across, up = (replace(axis, reach=ends) for axis, ends in zip((plot.x, plot.y), plot.ends, strict=True))
-    return replace(plot, marks=(coast, *plot.marks), x=across, y=up)
+def coast_lines(coasts: Sequence[np.ndarray]) -> Iterator[Line]:
+    """The coasts in one line, which does not make a map larger."""
+    if coasts:
+        x, y = joined(coasts).T
+        yield Line(x, y, MUTED, COAST, width=1.2, text=COAST, near=False, key=COAST)
 
 
-def footprint_places(
-    views: Sequence[View], points: np.ndarray, cases: np.ndarray
-) -> Mapping[str, tuple[str, np.ndarray, np.ndarray]]:
-    """Where all cases lie on the axes: by column, its label, cases and numbers."""
-    return {
-        column: (label, cases, view.turned(points)[:, k])
+def footprint_drawing(plots: Sequence[Plot], views: Sequence[View], points: np.ndarray, cases: np.ndarray) -> Drawing:
+    """The maps in one figure.  points : km east and north of all cases that came down;  cases : their numbers."""
+    places = {
+        column: (label, cases, values)
         for view in views
-        for k, (column, label) in enumerate(zip(view.columns, (view.x_label, view.y_label), strict=True))
+        for column, label, values in zip(view.columns, view.labels, view.turned(points).T, strict=True)
     }
-
-
-def footprint_drawing(plots: Sequence[Plot], places: Mapping[str, tuple[str, np.ndarray, np.ndarray]]) -> Drawing:
-    """The maps in one figure."""
-    return Drawing("Ends of flights about their mean place", tuple(plots), 1, places=places)
+    return Drawing("Impact points about the mean impact point", tuple(plots), 1, places=places)

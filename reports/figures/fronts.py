@@ -1,7 +1,6 @@
 """Objectives of a tuning against each other: every candidate, the front, and what is published."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -14,18 +13,9 @@ MOST_PANELS = 6
 MARGIN = 0.06  # of the shown range
 
 
-@dataclass(frozen=True)
-class Candidates:
-    """Candidates of one kind: how many there are, and the objectives float64[n, n_objectives] of those shown."""
-
-    shown: np.ndarray
-    number: int
-
-
 def front_figure(
     labels: Sequence[str],
-    feasible: Candidates,
-    infeasible: Candidates,
+    candidates: Sequence[tuple[str, int, np.ndarray]],
     front: np.ndarray,
     published: Sequence[tuple[str, Sequence[float]]],
     *,
@@ -34,12 +24,12 @@ def front_figure(
 ) -> Drawing:
     """Panels of all pairs of the objectives.  labels : of their axes.
 
+    candidates : of each kind, its words, how many there are, and the objectives float64[n, n_objectives] of those shown
     front : float64[n, n_objectives], in the order of the first objective, not among the candidates;
     relaxed : whether it leaves out constraints;  published : name and values of each point
     first_small : whether the first objective is to be small; the line runs round what the front dominates
     """
-    clouds = ((infeasible, MUTED, "candidates outside a constraint"), (feasible, SKY, "feasible candidates"))
-    cloud = np.vstack([infeasible.shown, feasible.shown])
+    cloud = np.vstack([shown for _, _, shown in candidates])
     pairs = list(combinations(range(len(labels)), 2))[:MOST_PANELS]
     name, colour = ("best if the constraints are left out", ORANGE) if relaxed else ("front", BLUE)
     # The front, the published points, and the nearer half of the candidates.
@@ -49,9 +39,9 @@ def front_figure(
     plots = []
     for i, k in pairs:
         marks: list[Mark] = []
-        for candidates, tint, words in clouds:
-            key = f"{count(candidates.number)} {words}" if candidates.number else ""
-            marks.append(Points(candidates.shown[:, i], candidates.shown[:, k], tint, words, opacity=0.45, key=key))
+        for tint, (words, number, shown) in zip((MUTED, SKY), candidates, strict=True):
+            key = f"{count(number)} {words}" * bool(number)
+            marks.append(Points(shown[:, i], shown[:, k], tint, words, opacity=0.45, key=key))
         x, y = front[:, i], front[:, k]
         if len(pairs) == 1:
             steps = stepped(x, y) if first_small else stepped(y, x)[::-1]

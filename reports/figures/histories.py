@@ -1,12 +1,12 @@
 """Quantities along the flight, against time or one another: envelopes, the nominal and the worst of the saved cases."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from reports.drawing.marks import Axis, Band, Drawing, Limit, Line, Mark, Plot, between
+from reports.drawing.marks import Axis, Band, Drawing, Limit, Line, Mark, Plot, between, values_of
 from reports.drawing.palette import DASHES, INK, LINES, MUTED, SKY, VERMILION
 from reports.text.numbers import count, limit_number, percent
 
@@ -30,18 +30,6 @@ class HistoryLine:
 
 
 @dataclass(frozen=True)
-class HistoryLimit:
-    """A required limit at a value of a quantity, with its words.
-
-    other : what it asks for where it need not hold along the whole flight.
-    """
-
-    at: float
-    words: str
-    other: str = ""
-
-
-@dataclass(frozen=True)
 class Envelope:
     """Quantiles of a quantity over n_cases: float64[n] by probability, at the times or levels `at` float64[n].
 
@@ -53,13 +41,19 @@ class Envelope:
     n_cases: int
     rising: bool = False
 
-    def bands(self) -> Iterator[tuple[np.ndarray, np.ndarray, float, str]]:
-        """Lower and upper curve, opacity and words of each band, the widest first."""
+    def bands(self, upright: bool = False, way: str = "") -> Iterator[Band]:
+        """The widest first.  upright : the levels lie along y;  way : for the words, of flights up or down."""
         known = sorted(self.curves)
         for low, high, opacity in zip(known, known[::-1], OPACITIES, strict=False):
             reach = "smallest to largest" if low == 0.0 else f"{percent(low, 3)} to {percent(high, 3)}"
-            words = f"{reach} of {count(self.n_cases)} saved cases"
-            yield self.curves[low], self.curves[high], opacity, words
+            words = f"{reach} of {count(self.n_cases)} saved cases{way}"
+            yield between(self.at, self.curves[low], self.curves[high], SKY, opacity, words, words, upright)
+
+
+def required_limit(at: float, words: str, other: str = "") -> Limit:
+    """A required limit at a value of a quantity; other : what it asks for where not along the whole flight."""
+    words, dash = f"{other or 'required limit'}: {words}", "dash" if other else "solid"
+    return Limit(at, "y", VERMILION, words, dash, 2.0, key=other or "required limit")
 
 
 def phase_limits(begins: Sequence[tuple[str, float]], words: str) -> list[Limit]:
@@ -73,26 +67,22 @@ def history_plot(
     time: str,
     lines: Sequence[HistoryLine],
     envelope: Envelope | None = None,
-    limits: Sequence[HistoryLimit] = (),
+    limits: Sequence[Limit] = (),
     phases: Sequence[Limit] = (),
 ) -> Plot:
     """A quantity against the time.  phases : see `phase_limits`."""
     marks: list[Mark] = [*phases]
     if envelope is not None:
-        for low, high, opacity, words in envelope.bands():
-            marks.append(between(envelope.at, low, high, SKY, opacity, words, words))
+        marks += envelope.bands()
         words = f"{MEDIAN} of them"
         marks.append(Line(envelope.at, envelope.curves[0.5], INK, words, "dash", 1.6, key=words))
     marks += case_lines(lines, lambda line: thinned(line.t, line.quantities[name]))
-    bottom, top = Plot(tuple(marks), Axis(), Axis()).ends[1]
-    far = []
-    for limit in limits:
-        near = bottom - FAR * (top - bottom) <= limit.at <= top + FAR * (top - bottom)
-        style, key = ("dash", limit.other) if limit.other else ("solid", "required limit")
-        marks.append(Limit(limit.at, "y", VERMILION, limit.words, style, 2.0, near, key if near else ""))
-        far += [] if near else [f"limit {limit_number(limit.at)} beyond the axis"]
-    axes = Axis(time, margin=0.0), Axis(name=label, most=5)
-    return Plot(tuple(marks), *axes, "\n".join([label, *far]), 260.0, quantity=name)
+    bottom, top = Axis().ends(values_of(marks, "y"))
+    room = FAR * (top - bottom)
+    far = [limit for limit in limits if not bottom - room <= limit.at <= top + room]
+    marks += [replace(limit, near=False, key="") if limit in far else limit for limit in limits]
+    told = [f"limit {limit_number(limit.at)} beyond the axis" for limit in far]
+    return Plot(tuple(marks), Axis(time, margin=0.0), Axis(), "\n".join([label, *told]), 260.0, quantity=name)
 
 
 def history_figure(plots: Sequence[Plot]) -> Drawing:
@@ -104,13 +94,12 @@ def profile_figure(
     names: tuple[str, str], labels: tuple[str, str], lines: Sequence[HistoryLine], envelopes: Sequence[Envelope]
 ) -> Drawing:
     """One quantity against another, as altitude against speed, with envelopes of the first at levels of the second."""
+    across, up = names
     marks: list[Mark] = []
     for envelope in envelopes:
         way = f", {'up' if envelope.rising else 'down'}" if len(envelopes) > 1 else ""
-        for low, high, opacity, words in envelope.bands():
-            x, y = np.r_[low, high[::-1]], np.r_[envelope.at, envelope.at[::-1]]
-            marks.append(Band(x, y, SKY, opacity, words + way, key=words + way))
-    marks += case_lines(lines, lambda line: thinned_curve(line.quantities[names[0]], line.quantities[names[1]]))
+        marks += envelope.bands(upright=True, way=way)
+    marks += case_lines(lines, lambda line: thinned(line.quantities[across], line.quantities[up], by_length=True))
     plot = Plot(tuple(marks), Axis(labels[0]), Axis(labels[1]), height=440.0)
     return Drawing("Curves along flights, the nominal case among them", (plot,))
 
@@ -130,26 +119,23 @@ def case_lines(
             yield Line(*curve(line), LINES[place], line.name, DASHES[turn % len(DASHES)], 1.6, key=line.name)
 
 
-def thinned(t: np.ndarray, y: np.ndarray, samples: int = SAMPLES) -> tuple[np.ndarray, np.ndarray]:
-    """The curve with about `samples` points; lowest and highest of every stretch stay, so that no pulse is lost."""
-    if t.size <= samples:
-        return t, y
-    bounds = np.linspace(0, t.size, samples // 2 + 1).astype(int)
-    low, high = (np.where(np.isfinite(y), y, beyond) for beyond in (np.inf, -np.inf))
-    extremes = [begin + pick for begin, end in pairwise(bounds)
-                for pick in (low[begin:end].argmin(), high[begin:end].argmax())]  # fmt: skip
-    rows = np.unique([0, *extremes, t.size - 1])
-    return t[rows], y[rows]
+def thinned(
+    x: np.ndarray, y: np.ndarray, samples: int = SAMPLES, *, by_length: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """The curve with at most `samples` points: the lowest and the highest of every stretch, so that no pulse is lost.
 
-
-def thinned_curve(x: np.ndarray, y: np.ndarray, samples: int = SAMPLES) -> tuple[np.ndarray, np.ndarray]:
-    """The curve with about `samples` points, evenly along its length in the units of its two ranges.
-
-    Even in time, most points would lie at the end, where the flight is slow.
+    by_length : stretches of equal length in the units of the two ranges, not of equally many points, most of which may
+    lie where the curve hardly moves.
     """
     if x.size <= samples:
         return x, y
-    steps = [np.diff(values) / (np.nanmax(values) - np.nanmin(values) or 1.0) for values in (x, y)]
-    length = np.r_[0.0, np.cumsum(np.nan_to_num(np.hypot(*steps)))]
-    rows = np.unique(np.searchsorted(length, np.linspace(0.0, length[-1], samples)).clip(0, x.size - 1))
+    way = np.arange(x.size, dtype=np.float64)
+    if by_length:
+        steps = [np.diff(values) / (np.fmax.reduce(values) - np.fmin.reduce(values) or 1.0) for values in (x, y)]
+        way[1:] = np.cumsum(np.nan_to_num(np.hypot(*steps)))
+    bounds = np.unique(np.searchsorted(way, np.linspace(0.0, way[-1], samples // 2)))
+    low, high = (np.where(np.isfinite(y), y, beyond) for beyond in (np.inf, -np.inf))
+    extremes = [begin + pick for begin, end in pairwise(bounds)
+                for pick in (low[begin:end].argmin(), high[begin:end].argmax())]  # fmt: skip
+    rows = np.unique([0, *extremes, x.size - 1])
     return x[rows], y[rows]

@@ -40,7 +40,7 @@ def metric_map(
                key=f"cases, {shown} shown"),
         *rings,
     )  # fmt: skip
-    across, up = (Axis(label, grid=False, margin=0.0) for label in labels[:2])
+    across, up = (Axis(label, margin=0.0) for label in labels[:2])
     return Drawing("Filled contour map", (Plot(marks, across, up, height=500.0),))
 
 

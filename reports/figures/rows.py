@@ -1,7 +1,6 @@
 """Figures with a row for each requirement, metric, level or input: margins, changes, levels, contributors."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,45 +16,30 @@ SPANS = ((0, 6, MUTED, 1.2, "all cases"), (1, 5, SKY, 7.0, "5 % to 95 %"),
 FAR_APART = 30.0  # levels whose medians differ by such a ratio are drawn on a logarithmic axis
 
 
-@dataclass(frozen=True)
-class MarginRow:
-    """A requirement: its demonstrated and worst margin over the width of its limits, negative outside.
+def margin_figure(names: Sequence[str], margins: np.ndarray, tones: Sequence[str]) -> Drawing:
+    """Margins of requirements over the width of their limits, negative outside.
 
-    tone : of its verdict, "good", "bad" or "open".
+    margins : float64[n, 2], the demonstrated one, NaN if there is none, and that of the worst case.
+    tones : of the verdicts, "good", "bad" or "open".
     """
-
-    name: str
-    demonstrated: float | None
-    worst: float
-    tone: str
-
-
-def margin_figure(rows: Sequence[MarginRow]) -> Drawing:
-    """Margins of requirements relative to the width of their limits."""
-    place = np.arange(len(rows), dtype=np.float64)
-    margins = np.array([(row.demonstrated, row.worst) for row in rows], dtype=np.float64).reshape(-1, 2)
+    place = np.arange(len(names), dtype=np.float64)
     bound, worst = 100.0 * np.clip(margins.T, -MOST_MARGIN, MOST_MARGIN)
-    words = ["none" if row.demonstrated is None else _percent(row.demonstrated) for row in rows]
-    texts = [f"{row.name}: demonstrated {bound}, worst case {_percent(row.worst)}"
-             for row, bound in zip(rows, words, strict=True)]  # fmt: skip
     known = np.flatnonzero(np.isfinite(bound)).tolist()
-    tones, told, x, y = [TONES[rows[k].tone] for k in known], [texts[k] for k in known], bound[known], place[known]
+    words = [["none" if one != one else f"{number(100.0 * one, 3)}{SPACE}%" for one in row] for row in margins.tolist()]
+    labels = [f"{name}, {row[0]}".removesuffix(", none") for name, row in zip(names, words, strict=True)]
+    texts = [f"{name}: demonstrated {one}, worst case {other}" for name, (one, other) in zip(names, words, strict=True)]
+    x, y, colours, told = bound[known], place[known], [TONES[tones[k]] for k in known], [texts[k] for k in known]
     key = "demonstrated bound (tolerance limit)"
     marks = (
-        Bar(np.fmin(x, 0.0), np.fmax(x, 0.0), y - 0.3, y + 0.3, tones, 0.35, told),
+        Bar(np.fmin(x, 0.0), np.fmax(x, 0.0), y - 0.3, y + 0.3, colours, 0.35, told),
         Points(x, y, BLUE, key, "diamond", 9.0, texts=told, key=key * bool(known)),
         Points(worst, place, INK, "worst case", "x", 8.0, texts=texts, key="worst case"),
         Limit(0.0, "x", VERMILION, "limit", key="limit"),
     )
-    names = [row.name if bound == "none" else f"{row.name}, {bound}" for row, bound in zip(rows, words, strict=True)]
-    ends = np.r_[bound[known], worst, 0.0]
-    x_axis = Axis("margin over width of the limits [%]", reach=(float(ends.min()) - 5.0, float(ends.max()) + 5.0))
-    plot = Plot(marks, x_axis, names_axis(names, down=True), height=70.0 + 26.0 * len(rows))
+    ends = np.r_[x, worst, 0.0]
+    across = Axis("margin over width of the limits [%]", reach=(float(ends.min()) - 5.0, float(ends.max()) + 5.0))
+    plot = Plot(marks, across, names_axis(labels, down=True), height=70.0 + 26.0 * len(names))
     return Drawing("Margins relative to the width of the limits", (plot,), 1, "; ".join(texts))
-
-
-def _percent(margin: float) -> str:
-    return f"{number(100.0 * margin, 3)}{SPACE}%"
 
 
 def change_panel(
@@ -67,7 +51,6 @@ def change_panel(
     unchanged : 0 of a difference; 1 of a ratio, whose axis is logarithmic.
     """
     value, lower, upper = estimates.T
-    reach = change_reach(estimates, unchanged)
     marks: list[Mark] = [Limit(unchanged, "x", INK, "no change", "dash", 1.0, key="no change")]
     for sure, colour, sign, key in (
         (False, BLUE, "circle", "not significant"),
@@ -77,19 +60,20 @@ def change_panel(
         texts = [f"{metrics[k]}: {number(value[k], 3)}, {number(lower[k], 3)} to {number(upper[k], 3)}" for k in rows]
         marks.append(intervals(lower[rows], upper[rows], np.array(rows), colour))
         marks.append(Points(value[rows], np.array(rows), colour, key, sign, 8.0, texts=texts, key=key))
-    x = Axis(reach=reach, log=bool(unchanged))
-    return Plot(tuple(marks), x, names_axis(metrics, down=True, grid=True), title, 70.0 + 24.0 * len(metrics))
+    up = names_axis(metrics, down=True)
+    return Plot(tuple(marks), _change_axis(estimates, unchanged), up, title, 70.0 + 24.0 * len(metrics))
 
 
-def change_reach(estimates: np.ndarray, unchanged: float) -> tuple[float, float]:
-    """Ends of the axis of changes: every value and, unless they reach far beyond, every interval."""
-    scaled = np.log(estimates) if unchanged else estimates
-    values = finite([scaled[:, 0], [np.log(unchanged) if unchanged else 0.0]])
-    every = finite([scaled, values])
+def _change_axis(estimates: np.ndarray, unchanged: float) -> Axis:
+    """Reaches every value and, unless they reach far beyond, every interval."""
+    log = bool(unchanged)
+    changes = np.log(estimates / unchanged) if log else estimates
+    values = finite([changes[:, 0], 0.0])
     room = max(float(np.ptp(values)), 0.1)
-    low = max(float(every.min()), float(values.min()) - room) - 0.05 * room
-    high = min(float(every.max()), float(values.max()) + room) + 0.05 * room
-    return (float(np.exp(low)), float(np.exp(high))) if unchanged else (low, high)
+    seen = finite([changes, 0.0]).clip(values.min() - room, values.max() + room)
+    ends = np.array([seen.min() - 0.05 * room, seen.max() + 0.05 * room])
+    low, high = (unchanged * np.exp(ends) if log else ends).tolist()
+    return Axis(reach=(low, high), log=log)
 
 
 def level_panel(label: str, levels: Sequence[str], quantiles: np.ndarray, used: Sequence[int]) -> Plot:
@@ -118,5 +102,6 @@ def tornado(metric: str, names: Sequence[str], total: np.ndarray, first: np.ndar
         (size, low, high), place = np.maximum(values[rows], 0.0).T, rows + offset
         marks.append(Bar(np.zeros(rows.size), size, place - 0.17, place + 0.17, colour, 0.9, texts, key=key))
         marks.append(intervals(low, high, place, INK, f"{interval} interval" * bool(np.isfinite(low).any())))
-    x = Axis("fraction of the variance", zero=True, most=5)
+    ends = np.stack([total, first])
+    x = Axis("fraction of the variance", reach=(0.0, 1.04 * max(ends[np.isfinite(ends)].tolist(), default=0.01)))
     return Plot(tuple(marks), x, names_axis(names, down=True), metric, 34.0 + 20.0 * len(names))

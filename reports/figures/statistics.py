@@ -14,7 +14,6 @@ WEAK = "#f7f7f7"  # the colour of no correlation
 LIGHT = 0.6  # a cell of a weaker correlation is light, and takes black numbers
 MOST_POINTS = 160  # of a probability plot: the outermost ones whole, the others evenly along the axis
 OUTERMOST = 20  # on either side
-CONTENT = 0.90  # of the band of a probability plot, at every point by itself
 TICKS = (1e-6, 1e-5, 1e-4, 0.00135, 0.0228, 0.1587, 0.5, 0.8413, 0.9772, 0.99865, 0.9999, 0.99999, 0.999999)
 
 
@@ -29,15 +28,15 @@ def success_panel(requirement: str, label: str, curve: SuccessCurve, overall: fl
         for one, passed, tried, share in zip(where, curve.passed, curve.tried, fraction, strict=True)
     ]
     extents = [] if names else [intervals(curve.low, curve.high, fraction, MUTED, "extent of the bin")]
-    key = f"share of a bin that passes, at its median, with {percent(confidence)} Clopper–Pearson interval"
+    key = f"fraction of a bin's cases that pass, at its median, with {percent(confidence)} Clopper–Pearson interval"
     marks: tuple[Mark, ...] = (
         *extents,
         intervals(100.0 * curve.lower, 100.0 * curve.upper, place, BLUE, upright=True),
         Limit(100.0 * overall, "y", VERMILION, "all cases", "dash", 1.4, key="all cases"),
         Points(place, fraction, BLUE, size=6.0, texts=texts, key=key),
     )
-    x = names_axis(names, label, grid=True) if names else Axis(label)
-    return Plot(marks, x, Axis("pass [%]", most=5), requirement, 260.0)
+    x = names_axis(names, label) if names else Axis(label)
+    return Plot(marks, x, Axis("pass [%]"), requirement, 260.0)
 
 
 def correlation_matrix(names: Sequence[str], rho: np.ndarray) -> Plot:
@@ -65,18 +64,20 @@ def correlation_matrix(names: Sequence[str], rho: np.ndarray) -> Plot:
 
 
 def probability_plot(
-    values: np.ndarray, cases: np.ndarray, label: str, title: str, limits: Sequence[float] = (), column: str = ""
-) -> Plot:
+    values: np.ndarray, cases: np.ndarray, label: str, title: str, confidence: float,
+    limits: Sequence[float] = (), column: str = "",
+) -> Plot:  # fmt: skip
     """The sorted cases over the normal distribution with their mean and σ.
 
     values, cases : float64[n], sorted, and the case of each.  column : their name in the table of cases.
+    confidence : of the band, at every point by itself
     """
     n, z = values.size, plotting_positions(values.size)
     mean, deviation = float(values.mean()), float(values.std(ddof=1))
     ranks = shown_ranks(n)
-    tails = (0.5 - 0.5 * CONTENT, 0.5 + 0.5 * CONTENT)
+    tails = (0.5 - 0.5 * confidence, 0.5 + 0.5 * confidence)
     low, high = (scipy.special.ndtri(scipy.special.betaincinv(ranks + 1, n - ranks, p)) for p in tails)
-    normal = f"normal distribution with the same mean and σ, with {percent(CONTENT)} band of every rank"
+    normal = f"normal distribution with the same mean and σ, with {percent(confidence)} band of every rank"
     ends = z[[0, -1]]
     marks: list[Mark] = [
         between(mean + deviation * z[ranks], low, high, SKY, 0.35),
@@ -88,8 +89,8 @@ def probability_plot(
     marks += [Limit(at, "x", VERMILION, f"required limit {limit_number(at)}", key="required limit") for at in near]
     most = 1.04 * max(abs(float(ends[0])), 2.2)
     ticks = tuple((float(scipy.special.ndtri(p)), percent(p, 4)) for p in TICKS if abs(scipy.special.ndtri(p)) <= most)
-    y = Axis(name="cumulative probability", reach=(-most, most), ticks=ticks)
-    return Plot(tuple(marks), Axis(label, most=4), y, title, 250.0)
+    y = Axis("cumulative probability", reach=(-most, most), ticks=ticks)
+    return Plot(tuple(marks), Axis(label), y, title, 250.0)
 
 
 def plotting_positions(n: int) -> np.ndarray:

@@ -63,7 +63,7 @@ def histogram(table: pd.DataFrame, column: str) -> Picture:
     finite = values[np.isfinite(values)]
     _refuse_few(finite.size, 2, column)
     used = f"{count(finite.size)} of {count(values.size)} cases"
-    plot = distributions.histogram(finite, _column_label(table, column), summarize(values), OUTER, title=used)
+    plot = distributions.histogram(finite, _label(table, column), summarize(values), OUTER, title=used)
     return Picture(distributions.histograms([plot]))
 
 
@@ -74,7 +74,7 @@ def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
     _refuse_few(used.size, 1, f"{x} and {y}")
     cloud = Points(a[used], b[used], "", cases=_case_ids(table)[used])
     classes = [("cases with both numbers", int(used.size))]
-    axes = _column_label(table, x), _column_label(table, y)
+    axes = _label(table, x), _label(table, y)
     return Picture(case_scatter(cloud, np.zeros(used.size, dtype=np.int8), classes, axes, len(table)))
 
 
@@ -90,8 +90,8 @@ def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:
         raise EngineError(f"{metric}: too few cases over {x} and {y} for a map; draw a scatter instead")
     used = np.flatnonzero(np.isfinite(a) & np.isfinite(b) & np.isfinite(c))
     shown = used[np.linspace(0, used.size - 1, min(used.size, POINTS_ON_MAP)).astype(np.int64)]
-    labels = _column_label(table, x), _column_label(table, y), _column_label(table, metric)
-    points, unit = np.column_stack([a[shown], b[shown]]), _column_unit(table, metric)
+    labels = _label(table, x), _label(table, y), _label(table, metric)
+    points, unit = np.column_stack([a[shown], b[shown]]), _unit(table, metric)
     return Picture(
         metric_map(surface, points, c[shown], _case_ids(table)[shown], labels, unit, n_points=int(used.size))
     )
@@ -113,13 +113,12 @@ def _refuse_few(n_used: int, needed: int, what: str) -> None:
         raise EngineError(f"{what}: {n_used} cases have a number; the figure needs {needed}")
 
 
-def _column_unit(table: pd.DataFrame, column: str) -> str:
+def _unit(table: pd.DataFrame, column: str) -> str:
     return str(table.attrs.get("units", {}).get(column, ""))
 
 
-def _column_label(table: pd.DataFrame, column: str) -> str:
-    unit = _column_unit(table, column)
-    return axis_label(words(column, unit), unit)
+def _label(table: pd.DataFrame, column: str) -> str:
+    return axis_label(words(column, _unit(table, column)), _unit(table, column))
 
 
 def _case_ids(table: pd.DataFrame) -> np.ndarray:

@@ -14,7 +14,6 @@ from reports.drawing.marks import Drawing
 from reports.figures.clouds import Outline
 from reports.figures.footprints import (
     footprint_drawing,
-    footprint_places,
     footprint_plot,
     footprint_views,
     surroundings,
@@ -114,7 +113,7 @@ def _footprint_drawing(flown: Flown, landing: Landing) -> Drawing:
         for view in views
     ]
     plots += [surroundings(around, reach)] if around else []
-    return footprint_drawing(plots, footprint_places(views, points, flown.case_ids[landing.rows]))
+    return footprint_drawing(plots, views, points, flown.case_ids[landing.rows])
 
 
 def _circles(flown: Flown, landing: Landing) -> Iterator[Outline]:

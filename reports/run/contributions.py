@@ -53,7 +53,8 @@ class Contributor:
 
 @dataclass(frozen=True)
 class Contributions:
-    """By metric, the strongest contributor first; the unexplained share last.
+    """By metric, the strongest contributor first; the unexplained share last.  With flights it is every metric, those
+    that matter first, of which alone pages show tables and figures.
 
     flights : of the companion, 0 where all comes from the table of cases.  n_used, n_tried : by metric, the blocks or
     cases that the indices rest on.  members : the inputs in each group of the flights; empty without them.
@@ -79,10 +80,11 @@ class Contributions:
 
 
 def contributions(flown: "Flown") -> Contributions | None:
-    """Contributions to the metrics that matter; None where neither a companion nor a random table tells them."""
+    """Contributions to every metric by a companion, or to those that matter by a random table; None without either."""
     store, metrics = companion_of(flown), flown.key_metrics[:MOST_METRICS]
     if store is not None:
-        return _of_companion(flown, store, metrics)
+        every = [fact.name for fact in flown.with_role("metric")]
+        return _of_companion(flown, store, list(dict.fromkeys([*metrics, *every])))
     return _of_table(flown, metrics) if flown.random and flown.n_held >= FEWEST_CASES else None
 
 

@@ -310,7 +310,7 @@ class Flown:
 
     @cached_property
     def contributions(self) -> Contributions | None:
-        """Shares of the variance of the metrics that matter, by input and random draws."""
+        """Shares of the variance of the metrics, by input and random draws."""
         return contributions_of(self)
 
     def status_text(self, status: str) -> str:

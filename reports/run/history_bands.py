@@ -1,6 +1,7 @@
 """What the flights of many cases have in common: envelopes of a history quantity over the time."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pandas as pd
@@ -42,9 +43,15 @@ def history_envelopes(histories: pd.DataFrame, case_ids: Sequence[int], names: S
         return {}
     chosen = histories[histories["case_id"].isin(case_ids)].sort_values(["case_id", "t_s"], kind="stable")
     starts = np.flatnonzero(np.diff(chosen["case_id"].to_numpy(), prepend=-2))
-    times = np.split(chosen["t_s"].to_numpy(), starts[1:])
+    flights = [slice(*rows) for rows in pairwise([*starts.tolist(), len(chosen)])]
+    times = _by_flight(chosen["t_s"], flights)
     grid = _instants(times)
-    return {name: _envelope(grid, times, np.split(chosen[name].to_numpy(), starts[1:])) for name in names}
+    return {name: _envelope(grid, times, _by_flight(chosen[name], flights)) for name in names}
+
+
+def _by_flight(column: pd.Series, flights: list[slice]) -> list[np.ndarray]:
+    values = column.to_numpy()
+    return [values[rows] for rows in flights]
 
 
 def _instants(times: list[np.ndarray]) -> np.ndarray:

@@ -13,7 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from mc_engine.statistics import Verdict
-from reports.figures.histories import HistoryLimit
+from reports.drawing.marks import Limit
+from reports.figures.histories import required_limit
 from reports.run.flown import Flown
 from reports.text.numbers import limit_number, with_unit
 
@@ -22,9 +23,9 @@ FEWEST = 3  # saved cases that bear it out
 APART = 0.01  # of the range of a history
 
 
-def history_limits(flown: Flown, quantities: list[str]) -> dict[str, tuple[HistoryLimit, ...]]:
+def history_limits(flown: Flown, quantities: list[str]) -> dict[str, tuple[Limit, ...]]:
     """Limits by quantity of those requirements that bear on it."""
-    limits: dict[str, tuple[HistoryLimit, ...]] = {}
+    limits: dict[str, tuple[Limit, ...]] = {}
     for verdict in flown.own.verdicts:
         for name in quantities:
             saved = _saved(flown.own, verdict.metric, name) if verdict.metric else []
@@ -35,15 +36,15 @@ def history_limits(flown: Flown, quantities: list[str]) -> dict[str, tuple[Histo
 
 def _limit_lines(
     flown: Flown, verdict: Verdict, quantity: str, saved: list[tuple[float, np.ndarray]]
-) -> Iterator[HistoryLimit]:
+) -> Iterator[Limit]:
     for sign, own, side in (("≤", verdict.at_most, 1.0), ("≥", verdict.at_least, -1.0)):
         if saved and own is not None:
             at = flown.told(quantity, own)
             words = f"{flown.words(verdict.metric)} {sign} {with_unit(limit_number(at), flown.unit(quantity))}"
             if all(_is_near(value, side * (side * y).max(), y) for value, y in saved):
-                yield HistoryLimit(at, f"required limit: {words}")
+                yield required_limit(at, words)
             elif other := _other_end(saved, side):
-                yield HistoryLimit(at, f"{other}: {words}", other)
+                yield required_limit(at, words, other)
 
 
 def _other_end(saved: list[tuple[float, np.ndarray]], side: float) -> str:

@@ -51,7 +51,7 @@ def _estimate_panel(flown: Flown, name: str, run: RunningEstimate) -> Plot:
         between(run.cases, run.lower, run.upper, SKY, 0.35, interval, band_key),
         Line(run.cases, run.estimate, BLUE, what, width=2.0, key=key),
     )
-    return Plot(marks, Axis("cases", log=True, margin=0.0), Axis(flown.axis(name), most=5), what, 230.0)
+    return Plot(marks, Axis("cases", log=True, margin=0.0), Axis(flown.axis(name)), what, 230.0)
 
 
 def _running_estimates(flown: Flown, name: str) -> tuple[RunningEstimate, ...]:

@@ -79,7 +79,15 @@ def normal_probability_blocks(flown: Flown) -> Iterator[FigureBlock | str]:
         limits = flown.limits(name)
         drawn = tuple(at for at in (limits.at_least, limits.at_most) if at is not None)
         panels.append(
-            probability_plot(values[order], flown.case_ids[order], flown.axis(name), _shape(values[order]), drawn, name)
+            probability_plot(
+                values[order],
+                flown.case_ids[order],
+                flown.axis(name),
+                _shape(values[order]),
+                flown.stated.confidence,
+                drawn,
+                name,
+            )
         )
     caption = (
         "Normal probability plots of the key metrics. A normal distribution lies on the dashed line; cases outside the "

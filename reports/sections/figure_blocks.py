@@ -9,11 +9,11 @@ import numpy as np
 from mc_engine.model.figures import ScatterFigure
 from mc_engine.statistics.summary import nearly_equal
 from reports.document.blocks import FigureBlock
-from reports.drawing.marks import Drawing, Plot, Points, nominal_ring
+from reports.drawing.marks import Drawing, Limit, Plot, Points, nominal_ring
 from reports.drawing.palette import VERMILION
 from reports.figures.clouds import Outline, case_scatter
 from reports.figures.distributions import histogram, histograms
-from reports.figures.histories import Envelope, HistoryLimit, HistoryLine, history_figure, history_plot, phase_limits
+from reports.figures.histories import Envelope, HistoryLine, history_figure, history_plot, phase_limits
 from reports.run.cloud_regions import cloud_regions
 from reports.run.default_figures import history_figures, scatter_figures
 from reports.run.flown import NEGLIGIBLE_SPREAD, UNSQUARABLE, Flown
@@ -220,7 +220,7 @@ class SavedHistories:
 
     lines: tuple[HistoryLine, ...]
     envelopes: dict[str, Envelope]
-    limits: dict[str, tuple[HistoryLimit, ...]]
+    limits: dict[str, tuple[Limit, ...]]
 
     def plot(self, flown: Flown, name: str) -> Plot:
         """The panel of one quantity."""
@@ -262,7 +262,10 @@ def _envelope_words(flown: Flown, envelopes: dict[str, Envelope]) -> Iterator[st
             "at every time of those that still fly. These cases were saved whatever their result."
         )
     elif flown.random:
-        yield f"Envelopes need {FEWEST_CASES} saved cases from case 0 on: “first = {FEWEST_CASES}” under [retention]."
+        yield (
+            f"Envelopes need {FEWEST_CASES} saved cases from case 0 on: “first = {FEWEST_CASES}” under "
+            "[retention.histories]."
+        )
 
 
 def is_constant(values: np.ndarray) -> bool:

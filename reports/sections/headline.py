@@ -6,6 +6,7 @@ from mc_engine.model.figures import MapFigure
 from mc_engine.shell_words import shell_word
 from mc_engine.statistics import Summary, Verdict
 from mc_engine.statistics.worst import Limits
+from mc_engine.status import OK, STATUS_NAME
 from reports.document.blocks import Card
 from reports.run.flown import Flown
 from reports.sections.tables import TONES, limit_text
@@ -138,6 +139,11 @@ def warnings(flown: Flown) -> tuple[str, ...]:
     elif failed := flown.n_tried - flown.every.completed:
         sentences.append(
             f"{count(failed)} of {count(flown.n_tried)} cases failed; they count against every requirement."
+        )
+    status, reason = (str(flown.nominal.get(name) or "") for name in ("status", "reason"))
+    if status not in ("", STATUS_NAME[OK]):
+        sentences.append(
+            f"The nominal case failed with the status {status}{f', {reason}' if reason else ''}: it has no metrics."
         )
     if flown.looked and flown.n_tried and flown.verdicts:
         sentences.append(_how_looked_at(flown))

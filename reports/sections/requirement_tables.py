@@ -7,7 +7,7 @@ import numpy as np
 from mc_engine.statistics import Verdict
 from mc_engine.statistics.worst import Limits
 from reports.document.blocks import Cell, Column, FigureBlock, Table
-from reports.figures.rows import MarginRow, margin_figure
+from reports.figures.rows import margin_figure
 from reports.run.flown import Flown
 from reports.sections.tables import TONES, limit_text
 from reports.text.numbers import SPACE, beside_limit, count, number, percent, with_unit
@@ -25,7 +25,7 @@ def requirement_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str | Non
 
 def margin_block(flown: Flown) -> FigureBlock | None:
     """Margins of all requirements on one axis; None where no case has a number."""
-    rows, left_out = [], []
+    names, margins, tones, left_out = [], [], [], []
     for verdict in flown.own.verdicts:
         limits = Limits(verdict.at_most, verdict.at_least)
         if not _has_width(limits):
@@ -34,15 +34,17 @@ def margin_block(flown: Flown) -> FigureBlock | None:
         worst = limits.margins(flown.every.worst(verdict.metric, 1, limits)[verdict.metric].to_numpy(dtype=np.float64))
         demonstrated = None if verdict.margin is None else verdict.margin / limits.width
         if worst.size:
-            rows.append(MarginRow(verdict.name, demonstrated, float(worst[0]), TONES[verdict.outcome]))
-    if not rows:
+            names.append(verdict.name)
+            margins.append((demonstrated, float(worst[0])))
+            tones.append(TONES[verdict.outcome])
+    if not names:
         return None
     return FigureBlock(
         "Margins of the requirements, relative to the width of the limits: the distance between two limits, the size "
         "of a single one. Margins beyond 100 % are drawn at the edge."
         + f" Not drawn, the limit is 0: {', '.join(left_out)}."
         * bool(left_out),
-        margin_figure(rows),
+        margin_figure(names, np.array(margins, dtype=np.float64), tones),
     )
 
 

@@ -9,7 +9,7 @@ from mc_engine.studies.tuning_folder import UNFINISHED, TuningRecord, infeasibil
 from reports.document.blocks import Block, Card, Document, FigureBlock, Section, Table, Terms, Text, as_blocks, numbered
 from reports.drawing.marks import Axis, Drawing, Line, Plot, stepped
 from reports.drawing.palette import BLUE
-from reports.figures.fronts import Candidates, candidates_beyond, front_figure
+from reports.figures.fronts import candidates_beyond, front_figure
 from reports.sections.figure_blocks import POINTS_SHOWN, thinned_rows
 from reports.studies.tuned import Tuned, inside, limit_words, metric_words, quantile_words
 from reports.studies.tuning_tables import (
@@ -172,13 +172,15 @@ def _front_figure(tuned: Tuned) -> FigureBlock:
     names, every = tuned.objectives, tuned.evaluations
     finite = np.isfinite(every[names]).all(axis=1)
     others = every[finite & ~every["candidate"].isin(tuned.best["candidate"])]
-    parts = [others[others["feasible"]], others[~others["feasible"]]]
+    parts = [others[~others["feasible"]], others[others["feasible"]]]
     shown = [part[names].to_numpy()[thinned_rows(np.arange(len(part)), np.empty(0, int))] for part in parts]
     feasible = int(every["feasible"].sum())
     drawing = front_figure(
         [tuned.label(name) for name in names],
-        Candidates(shown[0], feasible),
-        Candidates(shown[1], len(every) - feasible),
+        [
+            ("candidates outside a constraint", len(every) - feasible, shown[0]),
+            ("feasible candidates", feasible, shown[1]),
+        ],
         tuned.best[names].to_numpy(),
         [(point["name"], [point["values"][name] for name in names]) for point in tuned.plan["published"]],
         relaxed=not tuned.record.feasible,
@@ -220,8 +222,8 @@ def _progress_blocks(tuned: Tuned) -> tuple[Block, ...]:
     panels = tuple(
         Plot(
             (Line(*stepped(x, y), BLUE, width=2.0, key=key),),
-            Axis("candidates flown", most=4),
-            Axis(name=label, zero=True),
+            Axis("candidates flown"),
+            Axis(reach=(0.0, 1.04 * max(y[np.isfinite(y)].tolist(), default=0.0))),
             label,
             250.0,
         )

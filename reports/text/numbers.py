@@ -81,7 +81,10 @@ def _power(mantissa: str, exponent: int) -> str:
 
 
 def column_texts(values: Sequence[float | None]) -> list[str]:
-    """The numbers of one column of a table: digits follow their spread, and values that differ never print alike."""
+    """The numbers of one column of a table: digits follow their spread, and values that differ never print alike.
+
+    Whole numbers have no decimals.
+    """
     numbers = [value for value in values if value is not None and isfinite(value)]
     distinct = sorted(set(numbers))
     apart = [b for a, b in pairwise(distinct) if b - a > _ROUNDING * max(abs(a), abs(b))]
@@ -89,7 +92,8 @@ def column_texts(values: Sequence[float | None]) -> list[str]:
         return [number(value, 4) for value in values]
     largest, spread = max(map(abs, numbers)), distinct[-1] - distinct[0]
     if largest < 1e7 and (spread >= 1e-5 or largest >= 1e-4):
-        decimals = range(min(max(2 - floor(log10(spread)), 0), MOST_DIGITS), 16)
+        whole = all(value.is_integer() for value in map(float, numbers))
+        decimals = range(0 if whole else min(max(2 - floor(log10(spread)), 0), MOST_DIGITS), 16)
         styles: Iterable[Callable[[float], str]] = (partial(fixed, decimals=digits) for digits in decimals)
     else:
         styles = (partial(number, digits=digits) for digits in range(4, 18))

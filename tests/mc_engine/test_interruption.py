@@ -41,7 +41,8 @@ main()
 """
 CAMPAIGN, REPORTS = "mc_engine.campaign.loading.load_campaign", "reports.write_reports"
 KERNEL = "mc_engine.flight.flight._bound_kernel"
-HISTORIES = "mc_engine.runner.sessions.write_histories"  # the last that is flown
+HISTORIES = "mc_engine.runner.sessions.write_histories"
+COMPANION = "mc_engine.runner.sessions._fly_companion"  # the last that is flown
 
 
 def command(place, body, *arguments, by="SIGTERM", then=""):
@@ -94,7 +95,7 @@ def test_a_signal_after_the_flight_stops_the_reports_and_names_the_command_that_
     assert is_complete(run)
     assert ended(REPORTS, body, "report", run) == (4, f"interrupted; `mc-engine report {run}` writes the reports")
     late = "\n    ".join(["done = original(*arguments)", "send()", "return done"])
-    done = command(HISTORIES, late, "run", "minimal", "--cases", 20, "--no-report", "--out", unreported)
+    done = command(COMPANION, late, "run", "minimal", "--cases", 20, "--no-report", "--out", unreported)
     assert done.returncode == 0
     assert COMPLETING in done.stderr.splitlines()
     assert is_complete(unreported)

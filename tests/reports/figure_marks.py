@@ -8,7 +8,7 @@ FORMS = {
     "map": "Filled contour map",
     "scatter": "Scatter of cases",
     "corridor": "Cases by the limits that they violate",
-    "footprint": "Ends of flights about their mean place",
+    "footprint": "Impact points about the mean impact point",
     "histories": "Curves against time, the nominal case among them",
     "profile": "Curves along flights, the nominal case among them",
     "margins": "Margins relative to the width of the limits",

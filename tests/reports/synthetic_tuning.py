@@ -10,7 +10,10 @@ from mc_engine.studies.tuning_folder import UNFINISHED, open_tuning
 
 
 def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False, end="all generations"):
-    """The record of a search whose constraint allows y up to `limit`; below 0 nothing is feasible."""
+    """The record of a search whose constraint allows y up to `limit`; below 0 nothing is feasible.
+
+    failed : of each generation's 10 candidates, those with failed cases; if all have some, none has a number.
+    """
     x, y = np.random.Generator(np.random.Philox(key=4)).random((2, n))
     columns = [
         Column("candidate", "", "candidate", "number", "integer"),
@@ -26,7 +29,7 @@ def synthetic_tuning(path, limit=0.5, n=300, failed=0, third=False, end="all gen
         Column("failed_cases", "", "candidate", "failed", "integer"),
         Column("commonest_failure", "", "candidate", "why", "word"),
     ]
-    excess = np.maximum(0.0, (y - limit) / (abs(limit) or 1.0))
+    excess = np.full(n, np.inf) if failed == 10 else np.maximum(0.0, (y - limit) / (abs(limit) or 1.0))
     arrays = {
         "candidate": np.arange(n), "generation": np.arange(n) // 10, "gain": x, "delay_s": y, "cost": x,
         "error": 1.0 - x + y, "limited": y, "violation": excess, "feasible": excess == 0.0,

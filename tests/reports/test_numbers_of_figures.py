@@ -189,7 +189,7 @@ def test_rank_correlations_are_those_of_pandas_over_the_cases_with_both_numbers(
 
 def test_a_probability_plot_puts_each_case_at_its_rank_and_normal_cases_on_the_line():
     values = np.sort(np.random.Generator(np.random.Philox(key=9)).normal(5.0, 2.0, 3000))
-    plot = probability_plot(values, np.arange(3000), "x", "", (7.0, 100.0))
+    plot = probability_plot(values, np.arange(3000), "x", "", 0.9, (7.0, 100.0))
     (points,) = [mark for mark in plot.marks if isinstance(mark, Points)]
     (line,) = [mark for mark in plot.marks if isinstance(mark, Line)]
     for x, z in zip(points.x, points.y, strict=True):

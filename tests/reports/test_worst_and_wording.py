@@ -156,6 +156,7 @@ STRUCK = (
     "free of distribution", "foretell", "How the cases ended", "Choices compared", "What was asked", "stands beside",
     "went astray", "go astray", "any shape", "driver", "unless said", "held against", "in any company",
     "in other company", "refused with a sentence", "no problems", "Whoever flies", "verbs?", "VERB",
+    "share of a bin", "share of success", "mean place",
 )  # fmt: skip
 OF_CARDS = ("cards.py", "cards.md", "card_code.py")  # NVIDIA's driver
 

@@ -3,7 +3,7 @@ primer vector is as long at the end of the coast after it as at its start.  Cano
 """
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy  # loads its packages when they are used
 
 from campaigns.geo_injection.design.coast import coast
 from campaigns.geo_injection.design.optimal import (
@@ -63,7 +63,7 @@ def _where_lengths_agree(problem: Problem, low: np.ndarray, high: np.ndarray) ->
         return np.nan if x is None else _gap(problem, x)
 
     try:
-        x = between(brentq(gap, 0.0, 1.0, xtol=1e-9))
+        x = between(scipy.optimize.brentq(gap, 0.0, 1.0, xtol=1e-9))
     except ValueError:  # a gap is not a number: there is no solution on the way
         return None
     return None if x is None else solve(problem, x)

@@ -7,7 +7,7 @@ from.  Axes: x to the ascending node of the parking orbit, z normal to the final
 from collections import namedtuple
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy  # loads its packages when they are used
 
 from campaigns.geo_injection.design.coast import coast
 
@@ -30,7 +30,9 @@ def two_impulses(plane_change: float, ratio: float) -> Impulsive:
         return float(sum(np.linalg.norm(change) for change in changes(inclination)))
 
     low = plane_change - max(abs(plane_change), 1e-9)
-    best = float(minimize_scalar(cost, bounds=(low, low + max(plane_change, 1e-9)), options={"xatol": 1e-12}).x)
+    best = float(
+        scipy.optimize.minimize_scalar(cost, bounds=(low, low + max(plane_change, 1e-9)), options={"xatol": 1e-12}).x
+    )
     best = best if plane_change > 0.0 else 0.0
     first, second = changes(best)
     start = np.array([1.0, 0.0, 0.0, 0.0, at_perigee * np.cos(best), at_perigee * np.sin(best)])

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy  # loads its packages when they are used
 
 from campaigns.geo_injection.design.coast import coast
 
@@ -182,7 +182,9 @@ def searched(conditions: Conditions, guess: np.ndarray, most: int | None = None)
         both = conditions(np.concatenate([x + steps, x - steps]))
         return np.nan_to_num((both[: x.size] - both[x.size :]).T / (2.0 * np.diag(steps)))
 
-    search = least_squares(value, guess, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=most)
+    search = scipy.optimize.least_squares(
+        value, guess, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=most
+    )
     x = search.x
     for _ in range(2):
         x = x - np.linalg.lstsq(slope(x), value(x), rcond=1e-9)[0]

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy  # loads its packages when they are used
 
 Response = Callable[[Any], Any]  # frequency [rad/s] -> complex gain
 FREQUENCIES = np.geomspace(1e-3, 1e4, 4001)
@@ -47,7 +47,7 @@ def crossover_of(loop: Response, level: float = 1.0) -> float:
     if not high.any() or high[-1]:
         raise ValueError("the gain does not fall through this level between 1e-3 and 1e4 rad/s")
     last = int(np.flatnonzero(high)[-1])
-    return float(np.exp(brentq(above, grid[last], grid[last + 1], xtol=1e-13)))
+    return float(np.exp(scipy.optimize.brentq(above, grid[last], grid[last + 1], xtol=1e-13)))
 
 
 def margins_of(loop: Response) -> Margins:

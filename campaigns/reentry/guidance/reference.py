@@ -10,7 +10,7 @@ from functools import lru_cache
 from itertools import count
 
 import numpy as np
-from scipy.integrate import solve_ivp
+import scipy  # loads its packages when they are used
 
 from campaigns.reentry.air import GAS_CONSTANT, sound_speed
 from campaigns.reentry.guidance import reference_table as table
@@ -114,7 +114,9 @@ def fly_reference(planner: Planner, rows: int = 4000) -> Reference:
         return planner.height(y[0], y[2])[0] - planner.plan.end
 
     low.terminal, low.direction = True, -1.0  # type: ignore[attr-defined]
-    path = solve_ivp(derivative, (0.0, 5000.0), begin, "DOP853", rtol=1e-10, atol=1e-9, events=low, dense_output=True)
+    path = scipy.integrate.solve_ivp(
+        derivative, (0.0, 5000.0), begin, "DOP853", rtol=1e-10, atol=1e-9, events=low, dense_output=True
+    )
     if path.t_events[0].size == 0:
         raise ModelError(
             "the planned entry does not come down to plan_stop_altitude_km, so that there is no reference path"
@@ -181,7 +183,9 @@ def riccati_gains(lost: np.ndarray, a: np.ndarray, b: np.ndarray, weights: Weigh
         return (m.T @ p + p @ m - np.outer(p @ v, v @ p) / weights.control + running).ravel()
 
     span = lost[-1] - lost[0]
-    solution = solve_ivp(backward, (0.0, span), final.ravel(), "LSODA", rtol=1e-7, atol=1e-9, dense_output=True)
+    solution = scipy.integrate.solve_ivp(
+        backward, (0.0, span), final.ravel(), "LSODA", rtol=1e-7, atol=1e-9, dense_output=True
+    )
     p = solution.sol(lost[-1] - lost).T.reshape(-1, 3, 3)
     return np.einsum("ni,nij->nj", b, p) / weights.control / _SCALES
 

@@ -71,10 +71,11 @@ def kernel_flight(problem: Problem, method: str, value: float | None, width: int
     time, status, states = np.empty(n), np.empty(n), np.empty((len(model.states), n))
     out = (time, status, states, np.empty((len(model.metrics), n)))
     kernel, key, cases = build_kernel(model, None, width), np.uint64(1), np.arange(float(n))
-    nothing, pace, data = np.empty((0, 0)), 1.0 if adaptive else 1, gathered(blocks_of(model))
+    no_history = np.empty((0, 0)), np.empty(0, dtype=np.int64), np.ones(n) if adaptive else 1
+    data = gathered(blocks_of(model))
 
     def fly() -> np.ndarray:
-        kernel(ready.parameters, settings, data, key, cases, *clock, *out, nothing, pace)
+        kernel(ready.parameters, settings, data, key, cases, *clock, *out, *no_history)
         return states
 
     return fly

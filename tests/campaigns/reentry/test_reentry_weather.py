@@ -97,6 +97,21 @@ def test_values_meet_the_nodes_and_slopes_are_derivatives(draw, h):
         assert here.north_slope == pytest.approx(high.north - low.north, abs=1e-4)
 
 
+def test_the_air_has_one_slope_on_both_sides_of_a_node():
+    """Differences over a metre below and above it agree; the slope is zero on both sides, as the air is level there."""
+    unity = np.ones(1)
+    table = weather_nodes(np.array([0.37]), unity, unity, unity)[0]
+    nodes, step, beside = table[:DEPTH].reshape(NODES, 3), 1.0, 1e-6  # m
+    steepest = np.abs(np.diff(nodes, axis=0)).max(axis=0) / SPACING
+    for altitude in node_altitudes(table[DEPTH:])[0][5:60]:
+        below, at, above = (weather_at(altitude + h, 0.0, table) for h in (-step, 0.0, step))
+        for field, largest in zip(("density", "east", "north"), steepest, strict=True):
+            before, here, after = (getattr(air, field) for air in (below, at, above))
+            assert abs((after - here) - (here - before)) / step < 0.01 * largest
+            slopes = [getattr(weather_at(altitude + h, 0.0, table), f"{field}_slope") for h in (-beside, beside)]
+            assert slopes == pytest.approx([0.0, 0.0], abs=1e-6 * largest)
+
+
 def twin_rates(t, y, table, drag, lift):
     """A sphere at rest, inertial axes, bank 60 degrees; winds from local north and east."""
     r, v = y[:3], y[3:]

@@ -249,8 +249,11 @@ def test_report_writes_the_formats_asked_for(here, calls):
     small_store(here / "flown")
     assert call("report", "flown").stdout.split() == ["flown/report.html", "flown/report.pdf"]
     assert call("report", "flown", "--format", "pdf").stdout.split() == ["flown/report.pdf"]
-    assert calls.reports == [("html", "pdf"), ("pdf",)]
+    several = call("report", "flown", "--format", "md", "--format", "json").stdout.split()
+    assert several == ["flown/report.md", "flown/report.json"]
+    assert calls.reports == [("html", "pdf"), ("pdf",), ("md", "json")]
     fails_with(2, call("report", "flown", "--format", "docx"), '"docx" is not known; html, pdf, md')
+    fails_with(2, call("report", "flown", "--format", "md", "--format", "docx"), '"docx" is not known')
     fails_with(2, call("report", "flown", "--template", "none.md"), "--template none.md: there is no such file")
 
 

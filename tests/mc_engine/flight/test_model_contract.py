@@ -11,8 +11,10 @@ from small_run import ENVIRONMENT
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.search import list_campaigns
 from mc_engine.errors import CampaignError
+from mc_engine.flight import contract_flight
 from mc_engine.flight.contract import breaches
 from mc_engine.flight.contract_flight import faults
+from mc_engine.flight.flight import fly
 
 
 def only(sentences):
@@ -52,6 +54,11 @@ FLOWN = {
         [("return s.x * s.vx", "return 1e12 + s.x * s.vx")],
         'no stopping event crosses zero before the time limit, of "apogee"',
     ),
+    "delayed event that acts too late": (
+        [('Event(climb, "falling", "stop")', 'Event(climb, "falling", "stop", after=1e9)')],
+        'no stopping event acts before the time limit, of "apogee"; look at its function, its direction, its delay '
+        "`after` and the clock's `until`",
+    ),
     "non-deterministic": (
         [
             ("from mc_engine.lanes", "import numpy as np\n\nfrom mc_engine.lanes"),
@@ -68,6 +75,12 @@ FLOWN = {
         "when it flies among other cases",
     ),
 }
+
+
+def test_events_may_share_a_function_that_gives_one_number(tmp_path):
+    campaign = campaign_with(tmp_path, ('"stop")}', '"stop"), "again": Event(climb, "falling", "stop")}'))
+    assert breaches(campaign) == []
+    assert faults(campaign) == []
 
 
 @pytest.mark.parametrize("mistake", FLOWN)
@@ -91,6 +104,26 @@ def test_a_switching_event_that_never_fires_is_missed_unless_it_is_declared_rare
         faults(campaign_with(tmp_path / "missed", *edits, (stop, f'{stop}, "moon": Event(moon, "rising", "switch")')))
     )
     assert 'the event "moon" crosses zero in none of 32 cases, its function stays below it' in missed
+
+
+def test_a_right_model_is_checked_with_the_kernel_of_its_run_alone(tmp_path, monkeypatch):
+    edits = [
+        in_front("@physics\ndef half_way(s):\n    return s.x"),
+        in_front("@physics\ndef switch(s, m):\n    return s, m"),
+        given("switch=switch"),
+    ]
+    stop = '"apogee": Event(climb, "falling", "stop")'
+    campaign = campaign_with(tmp_path, *edits, (stop, f'{stop}, "half_way": Event(half_way, "falling", "switch")'))
+    flown = []
+
+    def noted(model, *arguments, **options):
+        flown.append(model)
+        return fly(model, *arguments, **options)
+
+    monkeypatch.setattr(contract_flight, "fly", noted)
+    assert faults(campaign) == []
+    assert flown
+    assert not any(model.watching for model in flown)
 
 
 PREPARE = "def prepare(inputs, settings, refusals):\n    {}\n    return vars(inputs)\n\n\n@physics\ndef initial"

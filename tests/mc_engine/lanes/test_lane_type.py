@@ -1,14 +1,19 @@
 """Operators and functions on lanes against NumPy, which works on the same numbers one operation at a time."""
 
 import math
+import operator
 from fractions import Fraction
 
 import numpy as np
 import pytest
 from compiled_physics import WIDTHS, apply, bits, by_every_width
 from numba.core.errors import TypingError
+from numba.core.registry import cpu_target
+from numba.core.typing.templates import ConcreteTemplate
 
-from mc_engine.lanes import any_lane, copysign, floor, fma, maximum, minimum, physics, rint, sqrt, where
+from mc_engine.lanes import any_lane, copysign, floor, fma, lane_type, maximum, minimum, physics, rint, sqrt, where
+from mc_engine.lanes.compiler import compile_inline
+from mc_engine.lanes.lane_access import unequal
 
 INF, NAN = math.inf, math.nan
 RANDOM = np.random.default_rng(7)
@@ -190,3 +195,25 @@ def _library_sine(x, y):
 def test_what_cannot_be_done_to_every_lane_at_once_is_refused_by_the_compiler(function):
     with pytest.raises(TypingError):
         apply(function, 1, X, Y, 8)
+
+
+@pytest.mark.parametrize("op", [operator.add, operator.mul, operator.lt, operator.and_, operator.neg, operator.pow])
+def test_the_compiler_tries_the_operators_of_lanes_first_and_those_of_plain_numbers_next(op):
+    templates = cpu_target.typing_context._lookup_global(op).templates
+    ours = [lane_type.__name__ in {known.__module__ for known in template.__mro__} for template in templates]
+    plain = [issubclass(template, ConcreteTemplate) for template in templates[ours.count(True) :]]
+    assert ours[0]
+    assert ours == sorted(ours, reverse=True)
+    assert plain == sorted(plain, reverse=True)
+
+
+def _is_another(x, y):
+    return (where(unequal((x, y), (y, y), x), 1.0, 0.0),)
+
+
+def test_a_missing_number_equals_any_other_whatever_its_sign():
+    written, computed = NAN, np.copysign(NAN, -1.0)  # the sign of one that is computed is the processor's
+    first = [written, written, computed, written, 2.0, 0.0, INF, 2.0, INF]
+    second = [written, computed, written, 2.0, computed, -0.0, INF, 3.0, -INF]
+    another = by_every_width(compile_inline(_is_another), 1, first, second)[0]
+    assert another.tolist() == [0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 1.0]

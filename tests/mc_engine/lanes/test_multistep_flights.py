@@ -1,6 +1,7 @@
 """Flights by multistep methods: bytes at every width and among any other cases, histories, stops and events."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from plain_steps import MIXED, by
 
 from mc_engine.flight.flight import fly_history, fly_interpreted
 from mc_engine.flight.interpreted import InterpretedFlight
+from mc_engine.model import load_model
 
 
 @pytest.mark.parametrize("method", ["abm11", "gj8"])
@@ -37,6 +39,28 @@ def test_a_flight_by_python_and_a_history_give_the_bits_of_the_kernel(method):
     assert (time[0], states[0, 0] / 1e3, states[1, 0]) == tuple(
         columns[name][0] for name in ("end_time_s", "end_x_km", "end_v_m_s")
     )
+
+
+class Counted(InterpretedFlight):
+    """A flight by Python that notes the times of its right-hand sides."""
+
+    def call(self, name, function, arguments):
+        if name == "rhs":
+            self.times.append(float(arguments[0]))
+        return super().call(name, function, arguments)
+
+
+def test_a_discrete_state_with_what_is_not_a_number_yet_is_no_other_one():
+    # the times of events that have not happened: each sample would seem a change, after which DOP853 begins anew
+    rocket = load_model("phased_rocket.py", FOLDER)
+    model = by(replace(rocket, clock=replace(rocket.clock, until=6.0)), "abm10")
+    flight = Counted(model)
+    flight.times = []
+    _, _, states, _ = fly_interpreted(flight, inputs_of(model, {}), 0, 1)
+    coasting = [t for t in flight.times if 4.0 < t <= 6.0]
+    assert len(coasting) <= 2 * 200 + 2
+    columns = flown(model)
+    assert [columns[f"end_{item.name}"][0] for item in model.states] == states[:, 0].tolist()
 
 
 @pytest.mark.parametrize("method", ["abm11", "gj8"])

@@ -235,6 +235,45 @@ def test_what_is_wrong_with_a_call_is_said(folder):
         curve("missing.csv")
 
 
+def test_numbers_of_arrays_are_in_the_unit_that_is_said():
+    assert curve(x=[0, 2], y=[0, 180], x_unit="km", y_unit="deg")(1000.0) == pytest.approx(0.5 * np.pi, rel=1e-15)
+    tilted = surface(x=[0, 1], y=[0, 90], z=[[0, 1], [2, 3]], units={"y": "deg", "z": "km"})
+    assert tilted(0.5, 0.25 * np.pi) == pytest.approx(1500.0, rel=1e-15)
+    with pytest.raises(ModelError, match='units has "alpha", which is none of its numbers'):
+        surface(x=[0, 1], y=[0, 90], z=[[0, 1], [2, 3]], units={"alpha": "deg"})
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "sentence"),
+    [
+        ([0.0], [1.0], "1 argument, 1 value; give two or more points"),
+        ([-1e308, 1e308], [0.0, 1.0], "the arguments are too large"),
+        (1.0, 2.0, "x must be numbers, one row of them"),
+        (["0", "1"], [0.0, 1.0], "x must be numbers, one row of them"),
+        (np.array(["2020-01-01", "2020-01-02"], dtype="datetime64[s]"), [0.0, 1.0], "x must be numbers"),
+        ([[0.0, 1.0]], [0.0, 1.0], "x must be numbers, one row of them"),
+        ([0.0, 1.0], [0.0, 1j], "y must be numbers, one row of them"),
+    ],
+)
+def test_what_is_no_row_of_numbers_is_refused_with_one_sentence(x, y, sentence):
+    with pytest.raises(ModelError, match=sentence):
+        curve(x=x, y=y)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("twice.csv", b"x,y,y\n0,1,5\n1,2,5\n", 'twice.csv has two columns "y"'),
+        ("latin.csv", b"x,y\n0,\xb51\n1,2\n", "latin.csv is no text in UTF-8"),
+        ("text.parquet", b"x,y\n0,1\n", "text.parquet is no Parquet file"),
+    ],
+)
+def test_a_file_that_is_no_table_is_refused_with_one_sentence(folder, name, content, sentence):
+    (folder / name).write_bytes(content)
+    with pytest.raises(ModelError, match=sentence):
+        curve(name)
+
+
 @pytest.mark.parametrize(
     ("name", "factor"),
     [("time_s", 1.0), ("v_km_s", 1e3), ("alpha_deg", np.pi / 180.0), ("cd", 1.0), ("wind_m_s", 1.0), ("q_n_m", 1.0)],

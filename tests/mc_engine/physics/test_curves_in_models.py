@@ -9,6 +9,7 @@ from mc_engine.flight.contract import breaches
 from mc_engine.flight.flight import fly, fly_interpreted
 from mc_engine.flight.interpreted import InterpretedFlight
 from mc_engine.model import load_model
+from mc_engine.model.faults import origin_sentence
 
 MODEL = """
 from mc_engine.lanes import physics
@@ -123,6 +124,8 @@ def test_a_case_ends_where_its_curve_does(tmp_path):
     fly_interpreted(flight, {"mass_kg": 2.0}, 0, 1)
     assert flight.origin.operation == "the curve thrust.csv"
     assert 3.1 < flight.origin.arguments[0] < 3.6
+    at = flight.origin.arguments[0]
+    assert f"the curve thrust.csv at {at!r} is not a number (t = " in origin_sentence(flight.origin)
 
 
 def test_a_file_that_only_a_variable_names_is_refused(tmp_path):

@@ -157,6 +157,18 @@ def test_the_shortest_turn_from_one_vector_to_another_is_found():
     assert np.abs(2.0 * q[0] ** 2 - 1.0 - cosine).max() < 1e-14
 
 
+@pytest.mark.parametrize("short_of_half_a_turn", [1e-2, 1e-4, 1e-7, 1e-8, 1e-12, 1e-15])
+def test_the_turn_to_a_nearly_opposite_vector_keeps_all_digits(short_of_half_a_turn):
+    a = VECTORS
+    across = np.cross(a.T, np.random.default_rng(9).normal(size=(N, 3)))
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    b = -3.0 * Rotation.from_rotvec(-short_of_half_a_turn * across).apply(a.T).T
+    q = rotations.from_two_vectors(Vector(*a), Vector(*b))
+    turned = np.array(rotations.rotated(q, Vector(*a)))
+    directions = [v / np.linalg.norm(v, axis=0) for v in (turned, b)]
+    assert np.abs(directions[0] - directions[1]).max() < 4e-15
+
+
 def test_small_angles_are_right_to_third_order():
     angles = 1e-3 * VECTORS[:, :1000]
     q = np.array(rotations.from_small_angles(Vector(*angles)))

@@ -1,7 +1,20 @@
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
+import pytest
 from cart import small_store
 
-from mc_engine.runner.summary import failed_cases, judgement, summaries, summary_lines, verdict_line
+from mc_engine.runner.summary import (
+    failed_cases,
+    judgement,
+    metric_parts,
+    nominal_line,
+    outcomes,
+    summaries,
+    summary_lines,
+    verdict_line,
+)
 from mc_engine.statistics import summarize
 from mc_engine.status import OK, STATUS_NAME
 
@@ -15,10 +28,36 @@ def test_numbers_of_a_verdict_count_failed_cases_as_not_inside(tmp_path):
     assert np.isnan(store.cases()["propellant_kg"]).sum() == 4
 
 
+def test_outcomes_are_the_verdicts_without_their_bounds_from_one_reading_of_the_parts(tmp_path, monkeypatch):
+    store, passes = small_store(tmp_path / "flown"), []
+    verdicts, joint = judgement(store)
+    assert any(verdict.demonstrated is not None for verdict in verdicts)
+
+    def counted(*asked):
+        passes.append(asked)
+        return metric_parts(*asked)
+
+    monkeypatch.setattr("mc_engine.runner.summary.metric_parts", counted)
+    assert outcomes(store) == ([replace(verdict, demonstrated=None, enclosed=None) for verdict in verdicts], joint)
+    assert len(passes) == 1
+
+
+def test_a_nominal_case_that_failed_is_told_with_its_reason(tmp_path):
+    assert nominal_line(small_store(tmp_path / "flown")) == ""
+    failed = SimpleNamespace(
+        nominal_part=SimpleNamespace(status={"step-limit": 1}),
+        nominal=lambda: {"case_id": -1, "status": "step-limit", "reason": 'in the phase "hover"'},
+    )
+    assert nominal_line(failed) == 'step-limit, in the phase "hover"'
+
+
 def test_a_verdict_reads_as_a_sentence_with_its_unit(tmp_path):
     store = small_store(tmp_path / "flown")
-    line = verdict_line(judgement(store)[0][0], store.units)
+    verdict = judgement(store)[0][0]
+    line = verdict_line(verdict, store.units)
     assert line == "fuel: pass, propellant_kg ≤ 100 kg in 36 of 40 cases (required: 50 % with 90 % confidence)"
+    assert "propellant_kg ≤ 120,000,000 kg in" in verdict_line(replace(verdict, at_most=1.2e8), store.units)
+    assert "propellant_kg ≤ 2,459,000.12345 kg in" in verdict_line(replace(verdict, at_most=2459000.12345), store.units)
 
 
 def test_a_run_read_part_by_part_has_the_summaries_of_its_whole_table(tmp_path):
@@ -30,6 +69,15 @@ def test_a_run_read_part_by_part_has_the_summaries_of_its_whole_table(tmp_path):
     for name, summary in found.items():
         assert summary == summarize(np.where(ok, table[name], np.nan), confidence=0.8)
     assert (found["propellant_kg"].n_used, found["propellant_kg"].n_tried) == (36, 40)
+
+
+def test_a_summary_has_the_percentiles_that_the_report_states(tmp_path):
+    store = small_store(tmp_path / "flown")
+    store.manifest["report"] = {"probability": 0.8, "confidence": 0.9}
+    found = summaries(store)["propellant_kg"]
+    values = store.cases()["propellant_kg"]
+    assert [one.probability for one in found.quantiles] == [0.00135, 0.02275, 0.1, 0.5, 0.9, 0.97725, 0.99865]
+    assert found.at(0.9).value == pytest.approx(np.quantile(values.dropna(), 0.9, method="median_unbiased"), rel=0.05)
 
 
 def test_a_summary_in_lines_says_how_many_cases_it_rests_on():

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from mc_engine.statistics import worst_cases
+from mc_engine.statistics.worst import Limits, WorstSoFar
 
 VALUES = np.array([3.0, 9.0, np.nan, 9.0, 1.0, 7.0])
 OK = np.array([True, True, True, True, True, False])
@@ -22,3 +23,15 @@ def test_of_many_cases_with_ties_the_worst_are_those_of_a_full_sort(largest):
     rows = np.flatnonzero(ok)
     expected = rows[np.argsort(-values[rows] if largest else values[rows], kind="stable")[:200]]
     assert worst_cases(values, ok, 200, largest).tolist() == expected.tolist()
+
+
+@pytest.mark.parametrize("largest", [True, False])
+@pytest.mark.parametrize("limits", [None, Limits(at_most=70.0), Limits(at_most=70.0, at_least=20.0)])
+def test_of_cases_read_part_by_part_the_worst_are_those_of_the_whole_table(largest, limits):
+    values = np.random.default_rng(4).integers(0, 90, 3000).astype(float)
+    values[::7] = np.nan
+    so_far = WorstSoFar(50, limits, largest)
+    for first in range(0, 3000, 128):
+        so_far.add(values[first : first + 128], first)
+    whole = worst_cases(values, np.isfinite(values), 50, largest, limits)
+    assert so_far.case_ids.tolist() == whole.tolist()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mc_engine.store import histories
 from mc_engine.store.histories import rows_to_keep
 
 T = np.linspace(0.0, 100.0, 20_001)
@@ -50,3 +51,20 @@ def test_what_is_not_a_number_or_never_changes_takes_no_row_from_the_rest():
     table[5000:, 2] = 1.0
     assert (rows_to_keep(table, 50) == rows_to_keep(table[:, :2], 50)).all()
     assert rows_to_keep(table[:40], 50).tolist() == list(range(40))
+
+
+def test_the_rows_are_the_same_however_many_quantities_are_gone_through_together(monkeypatch):
+    """Edges, an event, repeated rows, a constant and what is not a number, each in a quantity of its own."""
+    t = np.sort(np.append(np.repeat(T[::4], 2), T[10_000]))
+    edges, held = np.floor(t) % 7.0, np.where(np.arange(t.size) % 2 == 0, np.ceil(t / 10.0), np.floor(t / 10.0))
+    lost = np.where(t > 80.0, np.nan, np.cos(t))
+    table = np.column_stack([t, np.sin(t), edges, held, lost, np.full(t.size, 3.0), np.where(t == 10.0, np.inf, t)])
+    kept = {}
+    for numbers in (1, 3 * t.size, 2**30):
+        monkeypatch.setattr(histories, "_BLOCK", numbers)
+        kept[numbers] = rows_to_keep(table, 60).tolist()
+        by_columns = np.ascontiguousarray(table.T).T  # as flights record them
+        assert rows_to_keep(by_columns, 60).tolist() == kept[numbers]
+    assert T[10_000] in t[kept[1]]  # the event
+    assert (np.diff(t[kept[1]]) == 0.0).sum() > 5  # edges
+    assert kept[1] == kept[3 * t.size] == kept[2**30]

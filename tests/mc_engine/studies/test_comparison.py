@@ -22,6 +22,17 @@ def test_the_same_run_again_is_no_change(tmp_path):
     assert "no significant change" in list(comparison_lines(found))[-1]
 
 
+def test_counts_by_the_limits_of_one_run_and_of_each_are_told_apart(tmp_path):
+    lines = list(comparison_lines(compared(run(tmp_path / "a"), run(tmp_path / "b", limit=2.0))))
+    verdict = next(line for line in lines if line.startswith("requirement fuel"))
+    heading = lines.index("cases completed, and inside the limits of run B in both runs:")
+    (counted,) = [line for line in lines if line.startswith("fuel: ")]
+    assert lines.index(verdict) < heading < lines.index(counted)
+    before, after = counted.removeprefix("fuel: ").split(",")[0].split(" -> ")
+    assert before == after  # the same cases
+    assert not verdict.startswith(f"requirement fuel: {before}")
+
+
 def test_a_shift_is_found_in_the_metric_that_moved_alone(tmp_path):
     found = compared(run(tmp_path / "a"), run(tmp_path / "b", shift=0.4, noise=2))
     assert [one.metric for one in found.shifted] == ["propellant_kg"]

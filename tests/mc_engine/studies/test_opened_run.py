@@ -131,4 +131,7 @@ def test_figures_of_a_table_draw_its_cases_with_its_units(run):
     assert np.array_equal(cloud.marks[0].x, table["magnitude_error_pct"])
     assert np.array_equal(cloud.marks[0].y, table["apogee_altitude_km"])
     (surface,) = fuel_map(table, "magnitude_error_pct", "pitch_error_deg", "apogee_altitude_km").drawing.plots
-    assert [surface.y.label, surface.field.label] == ["pitch error [deg]", "apogee altitude [km]"]
+    assert [surface.y.label, *(field.label for field in surface.fields)] == [
+        "pitch error [deg]",
+        "apogee altitude [km]",
+    ]

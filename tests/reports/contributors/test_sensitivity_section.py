@@ -9,6 +9,7 @@ from synthetic_run import synthetic_run
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table, Text
 from reports.drawing import paper, screen
+from reports.formats.json_data import render_json
 
 
 def section(run):
@@ -35,6 +36,23 @@ def test_the_settling_time_is_shared_as_its_closed_form_says(drawn):
     shares = dict(zip((text for _, text in panel.y.ticks), first.right, strict=True))
     assert shares["ve"] == pytest.approx(7.111 / 8.111, abs=0.02)
     assert shares["oe"] == pytest.approx(1.0 / 8.111, abs=0.02)
+
+
+def test_what_no_input_explains_is_a_row_of_its_own():
+    """Half of the variance of the settling time is noise that no input has."""
+    run = synthetic_run(2000, failed=0)
+    noise = np.random.Generator(np.random.Philox(key=7)).normal(0.0, np.sqrt(8.111), 2000)
+    run.table["settling_time_s"] += noise
+    document = build(run, "run")
+    records = json.loads(render_json(document))["contributors"]
+    (left,) = [one for one in records if one["metric"] == "settling_time_s" and one["input"] == "unexplained"]
+    assert left["total"] == pytest.approx(0.5, abs=0.05)
+    found = next(one for one in document.sections if one.anchor == "drivers")
+    rows = block(found, Table, "Contributors to each metric").rows
+    (row,) = [one for one in rows if one[0].text == "settling time" and one[1].text == "unexplained by the inputs"]
+    assert row[3].value == left["total"]
+    panel = next(one for one in block(found, FigureBlock).drawing.plots if one.title == "settling time")
+    assert "unexplained by the inputs" in [text for _, text in panel.y.ticks]
 
 
 def test_the_table_says_how_many_cases_each_index_rests_on(drawn):

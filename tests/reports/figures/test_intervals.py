@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mc_engine.statistics.drivers import SuccessCurve
-from reports.drawing.marks import Limit, Line, Points
+from reports.drawing.marks import Axis, Limit, Line, Plot, Points
 from reports.drawing.strokes import Frame, stroked
 from reports.figures.rows import change_panel, tornado
 from reports.figures.statistics import correlation_matrix, success_panel
@@ -62,4 +62,5 @@ def test_the_cells_of_a_correlation_matrix_stand_at_their_row_and_column():
     ],
 )
 def test_dashes_and_rings_are_drawn_on_paper(mark, sign):
-    assert sign in "".join(stroked(mark, FRAME))
+    (stroke,) = Plot((mark,), Axis(reach=(0.0, 1.0)), Axis(reach=(0.0, 1.0))).strokes
+    assert sign in "".join(stroked(stroke, FRAME))

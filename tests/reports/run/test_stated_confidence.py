@@ -67,6 +67,9 @@ def test_another_pair_is_that_of_headline_tables_bounds_and_data():
     percentiles = next(one for one in blocks_of(document, Table) if one.caption == "Percentiles of the metrics")
     assert [column.title for column in percentiles.columns[2:]] == ["0.5\u202f%", "50\u202f%", "99.5\u202f%"]
     assert "each holding with 80\u202f%" in percentiles.note
+    text = render_markdown(document).decode().replace("\u202f", " ")
+    assert "with 80 % band of every rank" in text
+    assert "90 %" not in text.replace("99.73 % and 90 % by default", "")
     assert any("99.5th percentile" in card.detail and "80\u202f% upper" in card.detail for card in document.costs)
     record = json.loads(render_json(document))
     assert (record["probability"], record["confidence"]) == (0.99, 0.8)

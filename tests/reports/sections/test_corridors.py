@@ -5,12 +5,13 @@ import json
 import numpy as np
 import pytest
 from figure_marks import FORMS, classes, marks_of
-from landing_run import landing_run
+from landing_run import REQUIREMENTS, landing_run
 
 from reports.contents import build
-from reports.document.blocks import FigureBlock
+from reports.document.blocks import FigureBlock, blocks_of
 from reports.drawing import paper, screen
 from reports.drawing.marks import Line, Points
+from reports.formats.json_data import render_json
 
 
 def corridor(document):
@@ -60,6 +61,30 @@ def test_without_a_violation_a_sentence_says_that_all_cases_are_inside():
     (section,) = [one for one in build(run, "run").sections if one.anchor == "corridor"]
     (said,) = section.blocks
     assert said.paragraphs == ("Entry corridor: not drawn; all cases are inside all limits.",)
+
+
+def test_only_a_count_over_all_requirements_is_said_to_be_inside_all_limits():
+    """The corridor has two of the three requirements: its cases are inside these two, the other counts inside all."""
+    far = {"name": "far", "metric": "latitude_deg", "at_most": 54.1, "at_least": None, "share": 0.9, "confidence": 0.9}
+    run = landing_run(300, failed=5, requirements=[*REQUIREMENTS, far])
+    table = run.table
+    two = (table["peak_load_g"] <= 9.0) & (table["exits"] <= 0.0)
+    inside_all = int((two & (table["latitude_deg"] <= 54.1)).sum())
+    assert 0 < inside_all < two.sum() < 295
+    document = build(run, "run")
+    in_corridor = classes(corridor(document).drawing)
+    assert in_corridor["inside the limits of load, inside"] == int(two.sum())
+    assert "inside all limits" not in in_corridor
+    others = [classes(block.drawing) for block in blocks_of(document, FigureBlock)]
+    said = [found["inside all limits"] for found in others if "inside all limits" in found]
+    assert json.loads(render_json(document))["counts"]["inside_all_limits"] == inside_all
+    assert set(said) == {inside_all}
+    run = landing_run(300, failed=0, requirements=[*REQUIREMENTS, far])
+    run.table = run.table.assign(peak_load_g=8.0 + 1e-3 * table["angle_deg"], exits=0.0)
+    (section,) = [one for one in build(run, "run").sections if one.anchor == "corridor"]
+    assert section.blocks[0].paragraphs == (
+        "Entry corridor: not drawn; all cases are inside the limits of load, inside.",
+    )
 
 
 @pytest.mark.parametrize("cases", [0, 1, 2, 60])

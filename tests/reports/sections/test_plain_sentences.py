@@ -10,7 +10,6 @@ from synthetic_run import synthetic_run
 from mc_engine.model.figures import HistoryFigure, MapFigure, ProfileFigure, ScatterFigure, to_record
 from reports.contents import build
 from reports.document.blocks import FigureBlock, Table, Text, blocks_of
-from reports.figures.histories import HistoryLimit
 from reports.run.flown import Flown
 from reports.run.history_limits import history_limits
 from reports.sections.tables import distribution_text, input_table
@@ -130,7 +129,8 @@ def climbing_away():
 def test_a_limit_on_the_other_end_of_a_history_says_when_it_holds(run, words):
     """All flights are 900 m off at some time: none must stay below the line."""
     (limit,) = history_limits(Flown(run, "run"), ["position_error_m"])["position_error_m"]
-    assert limit == HistoryLimit(1.0, f"{words}: final position error ≤ 1\u202fm", words)
+    assert limit.name == f"{words}: final position error ≤ 1\u202fm"
+    assert (limit.at, limit.axis, limit.key) == (1.0, "y", words)
 
 
 def test_a_limit_that_flights_meet_as_they_begin_is_not_drawn():

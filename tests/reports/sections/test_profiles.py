@@ -12,7 +12,7 @@ from reports.contents import build
 from reports.document.blocks import FigureBlock
 from reports.drawing import paper, screen
 from reports.drawing.marks import Band, Line
-from reports.figures.histories import thinned_curve
+from reports.figures.histories import thinned
 from reports.sections.profiles import first_descent, profile_bands
 
 
@@ -109,7 +109,7 @@ def test_histories_without_the_quantity_or_without_numbers_are_said():
 
 def test_thinning_goes_by_the_length_of_the_curve():
     t = np.r_[np.linspace(0.0, 1.0, 50), np.full(5000, 1.0)]  # fast at first, then at rest
-    x, y = thinned_curve(t, 2.0 * t)
+    x, y = thinned(t, 2.0 * t, by_length=True)
     assert x.size <= 400
     assert np.diff(x).max() < 0.03
     assert (x[0], x[-1], y[-1]) == (0.0, 1.0, 2.0)

@@ -69,6 +69,14 @@ def test_a_run_extended_by_hand_says_so():
     assert "extended" not in " ".join(warnings(flown(campaign=mc())))
 
 
+def test_a_nominal_case_that_failed_is_told():
+    run = synthetic_run(500, failed=0)
+    assert "nominal case failed" not in " ".join(warnings(Flown(run, "run")))
+    run.nominal_row |= {"status": "step-limit", "reason": 'in the phase "hover"'}
+    sentence = 'The nominal case failed with the status step-limit, in the phase "hover": it has no metrics.'
+    assert sentence in warnings(Flown(run, "run"))
+
+
 def test_two_limits_show_the_interval_and_its_margin():
     band = {**FUEL, "at_least": -1.0}
     row = texts(requirement_table(flown(2000, campaign=mc(2000), requirements=[band])))[0]

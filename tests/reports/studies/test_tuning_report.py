@@ -32,6 +32,11 @@ def infeasible(tmp_path_factory):
     return build_tuning(synthetic_tuning(tmp_path_factory.mktemp("tuning") / "out", limit=-1.0), "out")
 
 
+@pytest.fixture(scope="module")
+def without_numbers(tmp_path_factory):
+    return build_tuning(synthetic_tuning(tmp_path_factory.mktemp("tuning") / "out", limit=-1.0, failed=10), "out")
+
+
 def table(document, caption):
     (found,) = [block for block in blocks_of(document, Table) if block.caption.startswith(caption)]
     return found
@@ -110,8 +115,8 @@ def test_a_search_that_was_killed_is_reported_with_what_it_has(tmp_path):
     assert render_pdf(found).startswith(b"%PDF")
 
 
-def test_both_renderers_take_it_and_give_the_same_bytes_twice(document, infeasible):
-    for one in (document, infeasible):
+def test_both_renderers_take_it_and_give_the_same_bytes_twice(document, infeasible, without_numbers):
+    for one in (document, infeasible, without_numbers):
         page = render_html(one)
         assert b"Tuning report" in page
         assert page == render_html(one)

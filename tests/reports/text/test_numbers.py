@@ -58,6 +58,11 @@ def test_values_of_a_narrow_column_have_the_same_decimals():
     assert column_texts([0.0003248, 0.00032436, 0.00032495]) == ["0.00032480", "0.00032436", "0.00032495"]
 
 
+def test_whole_numbers_of_a_column_have_no_decimals():
+    assert column_texts([0.0, 1.0, None, 1.0]) == ["0", "1", "–", "1"]
+    assert column_texts([0.0, 1.0, 0.5]) == ["0.00", "1.00", "0.50"]
+
+
 def test_what_rounds_to_zero_has_no_sign():
     assert [fixed(value, 2) for value in (-0.004, 0.004, -0.006)] == ["0.00", "0.00", "−0.01"]
 

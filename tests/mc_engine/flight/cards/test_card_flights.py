@@ -184,7 +184,7 @@ MODEL = model(
 """
 
 
-def erring(parameters, settings, data, key, cases, time, status, state, metrics, history, stride):
+def erring(parameters, settings, data, key, cases, time, status, state, metrics, history, rows, stride):
     """A kernel that cannot fly case 7: no physics that is compiled raises, so it is written by hand."""
     if cases[0] == 7.0:
         raise ValueError
@@ -199,7 +199,7 @@ def test_a_flight_that_ends_with_an_error_is_told_as_on_the_processor(tmp_path, 
         time, results = np.zeros(2), [np.zeros(2), np.zeros((1, 2)), np.zeros((1, 2))]
         data = np.zeros((1, 2)), np.zeros(1), np.zeros(1, dtype=np.uint64), np.uint64(1)
         with pytest.raises(ModelError, match="physics ended with an error") if 7.0 in cases else nullcontext():
-            cards._fly_on_card(kernel, *data, cases, time, *results, np.zeros((0, 0)), 1)
+            cards._fly_on_card(kernel, *data, cases, time, *results, np.zeros((0, 0)), np.zeros(0, dtype=np.int64), 1)
         assert time[0] == 3.0
         assert (time[1] == cases[1]) == (7.0 not in cases)
 
