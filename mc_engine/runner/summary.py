@@ -62,11 +62,9 @@ def case_line(store: Store) -> str:
 
 def nominal_line(store: Store) -> str:
     """The status of a nominal case that failed, with its reason; empty where it is ok."""
-    receipt = store.nominal_part
-    if receipt is None or STATUS_NAME[OK] in receipt.status:
-        return ""
     row = store.nominal()
-    return ", ".join(str(row[name]) for name in ("status", "reason") if row[name])
+    failed = row.get("status", STATUS_NAME[OK]) != STATUS_NAME[OK]
+    return ", ".join(str(row[name]) for name in ("status", "reason") if row[name]) if failed else ""
 
 
 def judgement(store: Store) -> "tuple[list[Verdict], Verdict | None]":

@@ -1,5 +1,4 @@
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -43,12 +42,13 @@ def test_outcomes_are_the_verdicts_without_their_bounds_from_one_reading_of_the_
 
 
 def test_a_nominal_case_that_failed_is_told_with_its_reason(tmp_path):
-    assert nominal_line(small_store(tmp_path / "flown")) == ""
-    failed = SimpleNamespace(
-        nominal_part=SimpleNamespace(status={"step-limit": 1}),
-        nominal=lambda: {"case_id": -1, "status": "step-limit", "reason": 'in the phase "hover"'},
-    )
-    assert nominal_line(failed) == 'step-limit, in the phase "hover"'
+    store = small_store(tmp_path / "flown")
+    assert nominal_line(store) == ""
+    row = {column.name: store.cases()[column.name].iloc[0] for column in store.columns}
+    store.write_nominal({**row, "status": "ok", "reason": ""})
+    assert nominal_line(store) == ""
+    store.write_nominal({**row, "status": "step-limit", "reason": 'in the phase "hover"'})
+    assert nominal_line(store) == 'step-limit, in the phase "hover"'
 
 
 def test_a_verdict_reads_as_a_sentence_with_its_unit(tmp_path):
