@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from mc_engine import CampaignError, StoreError, load_campaign, open_run, replay, resume, run
 from mc_engine.command_line.commands import app
+from mc_engine.runner import histories
 from mc_engine.runner.importing import import_results
 from mc_engine.runner.runner import Backend, extend, rerun
 from mc_engine.runner.summary import judgement
@@ -221,3 +222,14 @@ def test_words_and_numbers_of_imported_results_are_checked(tmp_path, flown):
     assert store.status_counts() == {"ok": 99, "crashed": 1}
     others = table.index != 7
     assert store.cases()["fall_time_s"][others].equals(flown["case"].cases()["fall_time_s"][others])
+
+
+def test_the_histories_of_a_batch_simulator_are_shared_out_among_the_workers(tmp_path, monkeypatch):
+    folder = tmp_path / "ball"
+    file = python_campaign(folder, cases=40, options="batch=True,")
+    file.write_text(file.read_text().replace("first = 2", "first = 40"))
+    pieces = []
+    monkeypatch.setattr(histories, "in_threads", lambda fly, given, workers: pieces.extend(given) or map(fly, given))
+    store = run(load_campaign(file), folder / "run", workers=2)
+    assert set(store.histories()["case_id"]) == {-1, *range(40)}
+    assert max(map(len, pieces)) <= 20  # two workers and more have some to fly
