@@ -1,4 +1,4 @@
-"""Where the engine keeps what it can compute again: compiled kernels, and designs of models."""
+"""Where the engine keeps what it can compute again: compiled kernels, designs of models, nominal flights of `check`."""
 
 import os
 import stat

@@ -64,18 +64,6 @@ def design_path(i: SimpleNamespace, ascending: np.ndarray, refusals: Refusals) -
     )
 
 
-def burnt_velocity(path: DeorbitPath, i: SimpleNamespace):
-    """(radial, transverse, normal) velocity [m/s] after the erroneous burn; OE is a fraction of the angle alpha itself.
-
-    i : inputs of the model, SI.  The error out of the plane [rad] is positive towards the orbit normal.
-    """
-    dv, alpha = path.dv * (1.0 + i.ve), path.alpha * (1.0 + i.oe)
-    in_plane = dv * np.cos(i.out_of_plane_error)
-    radial = -path.tilt * in_plane * np.sin(alpha)
-    transverse = np.sqrt(MU_EARTH / i.initial_semi_major_axis) - in_plane * np.cos(alpha)
-    return radial, transverse, dv * np.sin(i.out_of_plane_error)
-
-
 def path_axes(omega, inclination):
     """Unit vectors [3, n] to the perigee and 90 degrees ahead of it: eq. (30) with the node on x."""
     zero = np.zeros_like(omega)
@@ -88,11 +76,15 @@ def first_deviation(path: DeorbitPath, i: SimpleNamespace, to_perigee, ahead):
     """(true anomaly of the desired place [rad], deviation of position [m] and velocity [m/s], [3, n]) after the burn.
 
     The burn happens `burn_delay` after its time: the craft has gone on along the circle, its target along the path.
+    OE is a fraction of the angle alpha itself; the error out of the plane is positive towards the orbit normal.
     """
     angle = path.f_burn + np.sqrt(MU_EARTH / i.initial_semi_major_axis**3) * i.burn_delay
     radial, transverse = turned(to_perigee, ahead, np.cos(angle), np.sin(angle))
-    v = burnt_velocity(path, i)
-    velocity = v[0] * radial + v[1] * transverse + v[2] * np.cross(to_perigee, ahead, axis=0)
+    dv, alpha = path.dv * (1.0 + i.ve), path.alpha * (1.0 + i.oe)
+    in_plane, normal = dv * np.cos(i.out_of_plane_error), np.cross(to_perigee, ahead, axis=0)
+    v_radial = -path.tilt * in_plane * np.sin(alpha)
+    v_transverse = np.sqrt(MU_EARTH / i.initial_semi_major_axis) - in_plane * np.cos(alpha)
+    velocity = v_radial * radial + v_transverse * transverse + dv * np.sin(i.out_of_plane_error) * normal
     mean = mean_anomaly(path.f_burn, path.e) + np.sqrt(MU_EARTH / path.a**3) * i.burn_delay
     f = np.where(i.burn_delay == 0.0, path.f_burn, true_anomaly(mean, path.e))
     wanted_radial, wanted_transverse = turned(to_perigee, ahead, np.cos(f), np.sin(f))

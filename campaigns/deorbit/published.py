@@ -5,6 +5,7 @@ functions; each returns its value in the unit of the record.
 """
 
 from functools import lru_cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from mc_engine.physics.constants import MU_EARTH
 
 DEMONSTRATION: dict[str, Any] = {"ve_pct": -20.0, "oe_pct": 10.0}  # Table 3, solved for the errors of the burn
 PULSED: dict[str, Any] = DEMONSTRATION | {"control": "pulsed"}
-NO_FORCE_N = 1e-9
+NOMINAL = SimpleNamespace(**{item.name: item.default for item in MODEL.parameters})
 
 
 def settling_time_s(remainder_pct: float) -> float:
@@ -29,27 +30,22 @@ def settling_time_s(remainder_pct: float) -> float:
 def normal_force() -> str | float:
     """The largest force along the orbit normal [N], "zero" below 1e-9 N; text on Figs 6 and 7."""
     largest = float(np.abs(chosen_history(MODEL, DEMONSTRATION, rows=3000)["force_normal_n"]).max())
-    return "zero" if largest < NO_FORCE_N else largest
+    return "zero" if largest < 1e-9 else largest
 
 
 def pulse_width_s(number: int) -> float:
     """Width [s] of a pulse, counted from 1; caption of Fig. 8."""
-    return float(pulses(0.002, **PULSED)[1][number - 1])
+    return float(pulses()[1][number - 1])
 
 
-def pulses(step_s: float, **inputs: Any) -> tuple[np.ndarray, np.ndarray]:
-    """(starts, widths) [s] of the pulses, from the force history of a flight in steps of step_s."""
-    time, firing = _firing(step_s, tuple(inputs.items()))
+@lru_cache
+def pulses() -> tuple[np.ndarray, np.ndarray]:
+    """(starts, widths) [s] of the pulses, from the force history of a flight in steps of 2 ms."""
+    history = chosen_history(MODEL, PULSED | {"step_s": 0.002, "time_limit_s": 800.0}, rows=1_000_000)
+    time, firing = history["t_s"], np.concatenate([[False], history["force_n"] > 0.0, [False]])
     turns = np.flatnonzero(firing[1:] != firing[:-1])
     starts, ends = time[turns[::2]], time[np.minimum(turns[1::2], len(time) - 1)]
     return starts, ends - starts
-
-
-@lru_cache(maxsize=2)
-def _firing(step_s: float, inputs: tuple[tuple[str, Any], ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] and whether the thrusters fire, with a pause before and after."""
-    history = chosen_history(MODEL, {"step_s": step_s, "time_limit_s": 800.0, **dict(inputs)}, rows=1_000_000)
-    return history["t_s"], np.concatenate([[False], history["force_n"] > 0.0, [False]])
 
 
 def perigee_argument_from_rounded_path_deg() -> float:
@@ -75,19 +71,14 @@ def rounded_entry() -> dict[str, float]:
 
 
 def entry_state() -> str:
-    """Speed, angle below the horizon, radius and place at entry that the campaign assumes."""
-    speed_m_s, angle_deg, radius_km, latitude_deg = _nominal(
-        "target_speed_m_s", "target_flight_path_angle_deg", "target_radius_km", "target_latitude_argument_deg"
-    )
-    return f"{speed_m_s / 1e3:g} km/s, {angle_deg:g}°, {radius_km:g} km, {latitude_deg:g}°"
+    """Speed [km/s], angle below the horizon [deg], radius [km] and place [deg] at entry that the campaign assumes."""
+    i = NOMINAL
+    place = f"{i.target_radius_km:g} km, {i.target_latitude_argument_deg:g}°"
+    return f"{i.target_speed_m_s / 1e3:g} km/s, {i.target_flight_path_angle_deg:g}°, {place}"
 
 
 def modulator() -> str:
     """Gains, time constant and levels of the modulator that the campaign assumes."""
-    gains = _nominal("modulator_input_gain", "modulator_feedback_gain", "modulator_time_constant_s")
-    levels = _nominal("modulator_on_n", "modulator_off_n")
-    return "{:g}, {:g}, {:g} s, {:g} N, {:g} N".format(*gains, *levels)
-
-
-def _nominal(*names: str) -> list[float]:
-    return [float(MODEL.input(name).default) for name in names]
+    i = NOMINAL
+    gains = f"{i.modulator_input_gain:g}, {i.modulator_feedback_gain:g}, {i.modulator_time_constant_s:g} s"
+    return f"{gains}, {i.modulator_on_n:g} N, {i.modulator_off_n:g} N"

@@ -12,7 +12,7 @@ from mc_engine.lanes.noise import normal_pair, uniform_pair
 from mc_engine.model import Setting
 from mc_engine.physics.attitude import second_axis_in_body, turned_slightly
 from mc_engine.physics.pulse_modulators import at_rest, sampled_pulses
-from mc_engine.physics.vectors import Vector, added_scaled, dot, scaled, subtracted
+from mc_engine.physics.vectors import Matrix, Vector, added, added_scaled, dot, matrix_times, scaled, subtracted
 
 ACTUATOR = Setting("ideal", "what turns command into torque", choices=("ideal", "pwpf"))
 RATE_USED = Setting("inertial", "rate that the law works with", choices=("inertial", "orbital"))
@@ -130,11 +130,8 @@ def control(s, m, p, o, draws):
         drawn, _ = uniform_pair(draws, 3)
         offset = (p.disturbance_offset - 0.5) + drawn
     steady = p.disturbance_amplitude * offset
-    body = Vector(
-        p.axx * torque.x + p.axy * torque.y + p.axz * torque.z + steady,
-        p.ayx * torque.x + p.ayy * torque.y + p.ayz * torque.z + steady,
-        p.azx * torque.x + p.azy * torque.y + p.azz * torque.z + steady,
-    )
+    body_from_thrusters = Matrix(p.axx, p.axy, p.axz, p.ayx, p.ayy, p.ayz, p.azx, p.azy, p.azz)
+    body = added(matrix_times(body_from_thrusters, torque), Vector(steady, steady, steady))
     return Memory(
         integral=added_scaled(m.integral, period, n), command=command, torque=torque, body=body,
         x=x, y=y, z=z, next=coming, then=after,

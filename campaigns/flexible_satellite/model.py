@@ -15,8 +15,9 @@ from campaigns.flexible_satellite import control, dynamics, outcome
 from campaigns.flexible_satellite.dynamics import AXES, MODES
 from mc_engine.model import FixedStep, Parameter, Refusals, Setting, inputs, model, prepared
 from mc_engine.model.figures import HistoryFigure, ScatterFigure
-from mc_engine.physics.attitude import body_matrix, quaternion_product, rotation_quaternion
+from mc_engine.physics.attitude import rotation_quaternion
 from mc_engine.physics.constants import STANDARD_GRAVITY
+from mc_engine.physics.rotations import Quaternion, product, to_matrix
 from mc_engine.studies.published import read_published
 
 # c0, kg^(1/2) m: rows body x, y, z; columns modes 1 to 4.  Printed with a transpose sign and in kg m^2, which cannot
@@ -153,23 +154,23 @@ def _first_state(i: SimpleNamespace, inertia, coupling, refusals: Refusals) -> d
     size = np.sqrt((q * q).sum(axis=0))
     refusals.add(~(size > 0.0), "the first quaternion is zero")
     errors = np.array([i.initial_attitude_error_x, i.initial_attitude_error_y, i.initial_attitude_error_z])
-    q = quaternion_product(q / size, rotation_quaternion(errors))
+    q = product(Quaternion(*(q / size)), Quaternion(*rotation_quaternion(errors)))
     w = np.array([i.initial_omega_x, i.initial_omega_y, i.initial_omega_z])
     h = np.einsum("nab,bn->an", inertia, w)
     psi = np.einsum("nam,an->mn", coupling, w)
-    rows = {f"q{k}": q[k] for k in range(4)} | {f"momentum_{axis}": h[a] for a, axis in enumerate(AXES)}
+    rows = q._asdict() | {f"momentum_{axis}": h[a] for a, axis in enumerate(AXES)}
     return rows | {f"modal_momentum_{mode}": psi[mode - 1] for mode in MODES}
 
 
 def _thruster_rows(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
     """Parameters of modulators (18)-(21), valves and thruster axes, SI."""
     period = settings.step * settings.steps_per_sample
-    turn = np.array([i.misalignment_x, i.misalignment_y, i.misalignment_z])
+    turn = rotation_quaternion(np.array([i.misalignment_x, i.misalignment_y, i.misalignment_z]))
     delay = i.valve_delay / period
     refusals.add(delay > LONGEST_DELAY, f"valve_delay_s is longer than {LONGEST_DELAY} samples of the control")
     return {
         # thruster axes are body axes turned: components along them become components along the body by the transpose
-        **_entries("a", body_matrix(rotation_quaternion(turn)).T, AXES),
+        **_entries("a", np.reshape(to_matrix(Quaternion(*turn)), (3, 3, -1)).T, AXES),
         "gain": i.pwpf_gain,
         "level": i.thrust_level * np.where(settings.pwpf_pairing == PAIRING.code("C"), 0.5, 1.0),
         "torque": i.thrust_level * np.where(settings.pwpf_pairing == PAIRING.code("A"), 1.0, 0.5),

@@ -1,10 +1,9 @@
 """The closed loop: the last burn is aimed again when the one before it has ended.
 
 An impulse stands for the last burn.  It is put where the coast crosses the same angle from the node as the middle of
-the nominal burn (planar: from the perigee), and gives the speed that makes the orbit there equatorial, level and of the
-geostationary semi-major axis.  Against the impulse of the nominal flight it tells by how much the stored program is to
-be turned, lengthened and shifted.  So the flight without errors is the stored program itself, and an error is met to
-first order: drift and inclination go to zero, what remains is an eccentricity, which one burn cannot remove.
+the nominal burn (planar: from the perigee), and makes the orbit there equatorial, level and of the geostationary
+semi-major axis.  Compared with the impulse of the nominal flight it tells by how much the stored program is to be
+turned, lengthened and shifted; the flight without errors is the stored program itself.
 Place and velocity are known but for the navigation's errors; mass and engine are taken for nominal.
 """
 
@@ -60,9 +59,7 @@ def _orbit(s, final, planar):
     h = norm(momentum)
     u = _over(momentum, h)
     e = subtracted(_over(cross(velocity(s), momentum), MU_EARTH), _over(s, norm(s)))
-    n = cross(final, u)
-    in_plane = planar > 0.5
-    n = Vector(where(in_plane, e.x, n.x), where(in_plane, e.y, n.y), where(in_plane, e.z, n.z))
+    n = where(planar > 0.5, e, cross(final, u))
     n = _over(n, maximum(norm(n), 1e-300))
     return Orbit(node=n, ahead=cross(u, n), normal=u, e=e, h=h)
 
@@ -72,7 +69,6 @@ def impulse_at(s, angle, tilt, radius, planar):
     """The impulse [s, m/s] on the coast from the state s at an angle [rad] from its node (planar: perigee).
 
     tilt : inclination of the final orbit [rad];  radius : of it, and the semi-major axis that is wanted [m]
-
     Derived here: in the direction d, r = h^2 / (mu (1 + e.d)) and v = (mu/h) u x (e + d); the velocity after the
     impulse is level, in the final plane, and of the size that the vis-viva equation gives.
     """
@@ -104,10 +100,7 @@ def known(s, p):
 
 @physics
 def _wait(s, d, orbit, r):
-    """Time [s] from the state s to the direction d on its ellipse, less than a revolution: Kepler's equation (21).
-
-    r : radius there [m]
-    """
+    """Time [s] from the state s to the direction d, at r [m], less than a revolution: Kepler's equation (21)."""
     e2 = dot(orbit.e, orbit.e)
     a = orbit.h * orbit.h / MU_EARTH / (1.0 - e2)
     root = sqrt(maximum(a, 0.0) * MU_EARTH)
@@ -123,9 +116,9 @@ def _wait(s, d, orbit, r):
 
 @physics
 def _commanded(row, sensed, o):
-    """Speed change [m/s] at which the command is due, so that a nominal tail-off makes up for the rest.
+    """Speed change [m/s] at which the command is due: a nominal tail-off makes up for the rest.
 
-    Derived here: the flow falls linearly, so a tail-off spends half of flow times its duration; rocket equation.
+    Derived here: its flow falls linearly, so it spends half of flow times its duration; rocket equation.
     """
     return sensed - o.thrust / o.mass_flow * log(1.0 + 0.5 * o.mass_flow * o.tail_off / row.end_mass)
 
@@ -212,13 +205,14 @@ def _combined(c, a, b, d):
 def nominal_impulse(program: Program) -> Nominal:
     """What the table keeps of the nominal last burn [m/s, rad]."""
     sequence, (*_, before, last) = program.sequence, program.burns
-    state, tilt = Place(*(float(number) for number in before.end)), sequence.final_inclination
+    state, tilt = Place(*before.end), sequence.final_inclination
     across = cross(pole(tilt), _orbit(state, pole(tilt), 0.0).normal)
     planar = float(norm(across) < PLANAR)
     orbit = _orbit(state, pole(tilt), planar)
-    wait = last.ignition + 0.5 * last.duration - before.ignition - before.duration
-    place, speed = before.end[None, :3] / sequence.parking_radius, before.end[None, 3:] / sequence.speed_unit
-    middle = kepler(place, speed, np.array([wait]) / sequence.time_unit)[0][0]
+    wait = last.ignition_s + 0.5 * last.duration_s - before.ignition_s - before.duration_s
+    place, speed = np.reshape(before.end, (2, 1, 3))
+    times = np.array([wait]) / sequence.time_unit
+    middle = kepler(place / sequence.parking_radius, speed / sequence.speed_unit, times)[0][0]
     angle = float(np.arctan2(middle @ np.array(orbit.ahead), middle @ np.array(orbit.node)))
     to = impulse_at(state, angle, tilt, sequence.final_radius, planar)
     return Nominal(burns=len(program.burns), x=to.x, y=to.y, z=to.z, size=to.size, angle=angle, planar=planar)

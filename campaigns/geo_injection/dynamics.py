@@ -8,7 +8,7 @@ errors; the program runs from the actual ignition of each burn.
 from collections import namedtuple
 
 from campaigns.geo_injection.aiming import OPEN_LOOP, next_aim, of_burn, stored, turned
-from campaigns.geo_injection.program_table import burn_row, nominal, segment_row, steering_row
+from campaigns.geo_injection.program_table import burn_row, nominal, segment_row
 from mc_engine.lanes import any_lane, fma, log, maximum, minimum, physics, sqrt, where
 from mc_engine.model import Event, states
 from mc_engine.physics.constants import MU_EARTH
@@ -157,7 +157,7 @@ EVENTS = {
 @physics
 def _arc(segment, ignited, aim, o):
     """The arc of a segment of a burn that was ignited at a time [s]."""
-    row, steering = segment_row(o.tables, segment), steering_row(o.tables, segment)
+    row, steering = segment_row(o.tables, segment)
     if o.guidance > OPEN_LOOP:
         steering = turned(steering, aim, o)
     half = 0.5 * row.length * aim.stretch

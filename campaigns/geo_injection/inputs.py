@@ -1,6 +1,6 @@
 """Inputs of an injection campaign: parameters, which may differ from case to case, and settings."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from mc_engine.model import Parameter, Setting, inputs
@@ -8,8 +8,9 @@ from mc_engine.model import Parameter, Setting, inputs
 METHODS = ("optimal", "staged")
 SHUTDOWNS = ("time", "sensed_velocity")
 GUIDANCE = ("open_loop", "re_aimed")
+BURNS = ("1", "2", "3")
 AXES = {"r": "radial", "t": "transverse", "n": "normal"}
-BURNS = {k: k for k in (1, 2, 3)}
+_AIMED = "from which the last burn is aimed"
 
 
 def _factor(description: str, low: float = 0.1, high: float = 10.0) -> Parameter:
@@ -20,9 +21,9 @@ def _error(description: str, most: float, **unit: Any) -> Parameter:
     return Parameter(0.0, description, -most, most, **unit)
 
 
-def _each(name: str, description: str, most: float, keys: Mapping[Any, Any], **unit: Any) -> dict[str, Parameter]:
+def _each(keys: Iterable[str], name: str, description: str, most: float, **unit: Any) -> dict[str, Parameter]:
     """Errors of one kind by column; {} in name and description is the key, a burn or an axis, and its word."""
-    return {name.format(key): _error(description.format(word), most, **unit) for key, word in keys.items()}
+    return {name.format(key): _error(description.format(AXES.get(key, key)), most, **unit) for key in keys}
 
 
 def _transfer(k: int) -> dict[str, Setting]:
@@ -39,29 +40,17 @@ Inputs = inputs(
     thrust_factor=_factor("thrust over its nominal value; the mass flow follows"),
     isp_factor=_factor("specific impulse over its nominal value"),
     initial_mass_factor=_factor("mass at the first ignition over its nominal value"),
-    **_each("ignition_delay_{}_s", "delay of ignition {} against its nominal time", 1e4, BURNS, unit="s"),
+    **_each(BURNS, "ignition_delay_{}_s", "delay of ignition {} against its nominal time", 1e4, unit="s"),
     pitch_error_deg=_error("pointing error towards Z x d, all burns", 80.0),
     yaw_error_deg=_error("pointing error towards the pole, across the thrust, all burns", 80.0),
-    **_each("pitch_error_{}_deg", "pitch error of burn {}, added to that of all", 80.0, BURNS),
-    **_each("yaw_error_{}_deg", "yaw error of burn {}, added to that of all", 80.0, BURNS),
-    **_each("initial_position_{}_m", "{} error of the initial position", 1e6, AXES, unit="m"),
-    **_each("initial_velocity_{}_m_s", "{} error of the initial velocity", 1e3, AXES, unit="m/s"),
+    **_each(BURNS, "pitch_error_{}_deg", "pitch error of burn {}, added to that of all", 80.0),
+    **_each(BURNS, "yaw_error_{}_deg", "yaw error of burn {}, added to that of all", 80.0),
+    **_each(AXES, "initial_position_{}_m", "{} error of the initial position", 1e6, unit="m"),
+    **_each(AXES, "initial_velocity_{}_m_s", "{} error of the initial velocity", 1e3, unit="m/s"),
     tail_off_factor=_factor("duration of the tail-off over its nominal value", 0.0, 100.0),
     accelerometer_scale_error=_error("relative error of the sensed velocity", 0.5, unit=""),
-    **_each(
-        "navigation_position_{}_m",
-        "{} error of the navigated position from which the last burn is aimed",
-        1e6,
-        AXES,
-        unit="m",
-    ),
-    **_each(
-        "navigation_velocity_{}_m_s",
-        "{} error of the navigated velocity from which the last burn is aimed",
-        1e3,
-        AXES,
-        unit="m/s",
-    ),
+    **_each(AXES, "navigation_position_{}_m", "{} error of the navigated position " + _AIMED, 1e6, unit="m"),
+    **_each(AXES, "navigation_velocity_{}_m_s", "{} error of the navigated velocity " + _AIMED, 1e3, unit="m/s"),
     burns=Setting(2.0, "number of burns", low=2.0, high=3.0, whole=True, unit=""),
     initial_inclination_deg=Setting(28.5, "inclination of the parking orbit", low=0.0, high=90.0),
     final_inclination_deg=Setting(
@@ -75,7 +64,9 @@ Inputs = inputs(
     parking_argument_of_perigee_deg=Setting(
         0.0, "argument of the parking orbit's perigee, from its ascending node", low=-360.0, high=360.0
     ),
+    # radii and mass are those of the source's eq. (12)
     final_radius_km=Setting(42164.137, "radius of the final circle", low=10000.0, high=400000.0),
+    # thrust and flow are not printed, they follow from tables 2 to 8
     thrust_n=Setting(20000.0, "nominal thrust", low=1.0, dispersed_by="thrust_factor"),
     mass_flow_kg_s=Setting(6.14, "nominal mass flow", low=1e-6, dispersed_by="isp_factor"),
     initial_mass_kg=Setting(22170.0, "nominal mass at the first ignition", low=1.0, dispersed_by="initial_mass_factor"),

@@ -1,6 +1,5 @@
 """The injection model as the engine sees it: what each case starts from, the figures, and the MODEL record."""
 
-from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -10,8 +9,7 @@ import numpy as np
 from campaigns.geo_injection import dynamics, outcome
 from campaigns.geo_injection.aiming import nominal_impulse
 from campaigns.geo_injection.design.coast import kepler
-from campaigns.geo_injection.design.program import Program
-from campaigns.geo_injection.design.programs import program_for
+from campaigns.geo_injection.design.program import Program, program_for
 from campaigns.geo_injection.design.sequence import Sequence, source_orbits
 from campaigns.geo_injection.inputs import AXES, METHODS, Inputs
 from campaigns.geo_injection.program_table import table_of
@@ -68,10 +66,7 @@ def tables(o: Any) -> np.ndarray:
 
 
 def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
-    """Kernel parameters of each case.
-
-    inputs : float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
-    """
+    """Kernel parameters of each case, SI; cases of one sequence are prepared together."""
     codes = np.column_stack(list(vars(settings).values()))
     rows = {name: np.zeros(len(codes)) for name in dynamics.Parameters._fields}
     late = np.zeros(len(codes), dtype=bool)
@@ -94,41 +89,36 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
 def _rows(i: SimpleNamespace, tail_off: float, program: Program) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """(kernel parameters, where ignitions overlap burns) of the cases of one sequence.  tail_off : nominal [s]."""
     sequence, given = program.sequence, vars(i)
-    place, velocity = _first_states(i, program)
-    rows = given | dict(zip("xyz", place.T, strict=True)) | dict(zip(("vx", "vy", "vz"), velocity.T, strict=True))
+    rows = given | dict(zip(("x", "y", "z", "vx", "vy", "vz"), _first_states(i, program), strict=True))
     rows["mass"] = sequence.mass * i.initial_mass_factor
     rows["thrust"] = sequence.thrust * i.thrust_factor
     rows["flow"] = sequence.mass_flow * i.thrust_factor / i.isp_factor
     rows["tail"] = tail_off * i.tail_off_factor
+    ignitions = [burn.ignition_s + given[f"ignition_delay_{k}"] for k, burn in enumerate(program.burns, start=1)]
     for k in (1, 2, 3):
         rows[f"pitch_{k}"] = np.tan(i.pitch_error + given[f"pitch_error_{k}"])
         rows[f"yaw_{k}"] = np.tan(i.yaw_error + given[f"yaw_error_{k}"])
-        burn = program.burns[min(k, len(program.burns)) - 1]
-        rows[f"ignition_{k}"] = burn.ignition + given[f"ignition_delay_{k}"] - i.ignition_delay_1
-    late = np.zeros(i.thrust_factor.size, dtype=bool)
-    for k, (before, burn) in enumerate(pairwise(program.burns), start=1):
-        end = before.ignition + given[f"ignition_delay_{k}"] + before.duration
-        late |= burn.ignition + given[f"ignition_delay_{k + 1}"] < end + rows["tail"]
-    return rows, late
+        rows[f"ignition_{k}"] = ignitions[min(k, len(ignitions)) - 1] - i.ignition_delay_1
+    ends = [ignition + burn.duration_s + rows["tail"] for ignition, burn in zip(ignitions, program.burns, strict=True)]
+    return rows, np.any(np.array(ignitions[1:]) < np.array(ends[:-1]), axis=0)
 
 
-def _first_states(i: SimpleNamespace, program: Program) -> tuple[np.ndarray, np.ndarray]:
-    """Places [m] and velocities [m/s], [n, 3], inertial, at the actual first ignition.
+def _first_states(i: SimpleNamespace, program: Program) -> np.ndarray:
+    """Place [m] and velocity [m/s], float64[6, n], inertial, at the actual first ignition.
 
     Errors count in the radial, transverse and normal axes of the nominal state at its time; from there the stage
     coasts (19)-(21), forward or backward, to the actual ignition.
     """
-    r, v = program.start[:3], program.start[3:]
+    r, v = np.reshape(program.start, (2, 3))
     normal = np.cross(r, v)
     radial, normal = r / np.linalg.norm(r), normal / np.linalg.norm(normal)
     axes = np.stack([radial, np.cross(normal, radial), normal])
     place = r + np.stack([getattr(i, f"initial_position_{axis}") for axis in AXES], axis=1) @ axes
     velocity = v + np.stack([getattr(i, f"initial_velocity_{axis}") for axis in AXES], axis=1) @ axes
-    sequence = program.sequence
-    scales = sequence.parking_radius, sequence.speed_unit
-    moved = kepler(place / scales[0], velocity / scales[1], i.ignition_delay_1 / sequence.time_unit)
-    still = (i.ignition_delay_1 == 0.0)[:, None]
-    return np.where(still, place, moved[0] * scales[0]), np.where(still, velocity, moved[1] * scales[1])
+    radius, speed, time = program.sequence.parking_radius, program.sequence.speed_unit, program.sequence.time_unit
+    moved = kepler(place / radius, velocity / speed, i.ignition_delay_1 / time)
+    still = np.concatenate([place, velocity], axis=1).T
+    return np.where(i.ignition_delay_1 == 0.0, still, np.concatenate([moved[0] * radius, moved[1] * speed], axis=1).T)
 
 
 MODEL = model(

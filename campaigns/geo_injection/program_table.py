@@ -44,19 +44,12 @@ def burn_row(tables, burn):
 
 @physics
 def segment_row(tables, segment):
-    """The row of a segment [s], counted from 0 over all burns, without its steering."""
-    return look_up_record(tables, _FIRST_SEGMENT + _SEGMENT_ROW * segment, SegmentRow)
-
-
-@physics
-def steering_row(tables, segment):
-    """The steering of a segment, no unit."""
-    at = _FIRST_SEGMENT + _SEGMENT_ROW * segment + _STEERING
-    return Steering(
-        x=look_up_record(tables, at, Polynomial),
-        y=look_up_record(tables, at + _TERMS, Polynomial),
-        z=look_up_record(tables, at + 2.0 * _TERMS, Polynomial),
-    )
+    """The row of a segment [s], counted from 0 over all burns, and its steering, no unit."""
+    at = _FIRST_SEGMENT + _SEGMENT_ROW * segment
+    x = look_up_record(tables, at + _STEERING, Polynomial)
+    y = look_up_record(tables, at + _STEERING + _TERMS, Polynomial)
+    z = look_up_record(tables, at + _STEERING + 2.0 * _TERMS, Polynomial)
+    return look_up_record(tables, at, SegmentRow), Steering(x=x, y=y, z=z)
 
 
 def table_of(program: Program, impulse: Nominal) -> np.ndarray:
@@ -64,12 +57,13 @@ def table_of(program: Program, impulse: Nominal) -> np.ndarray:
     sequence, mass = program.sequence, program.sequence.mass
     burns = np.zeros((BURNS, _BURN_ROW))
     segments: list[list[float]] = []
-    for row, burn in zip(burns, program.burns, strict=False):
-        end = mass - sequence.mass_flow * burn.duration
-        sensed = sequence.exhaust * np.log(mass / end)
-        row[:] = BurnRow(burn.ignition, burn.duration, sensed=sensed, end_mass=end, first=len(segments))
+    for numbers, burn in zip(burns, program.burns, strict=False):
+        end = mass - sequence.mass_flow * burn.duration_s
+        sensed = sequence.thrust / sequence.mass_flow * np.log(mass / end)
+        numbers[:] = BurnRow(burn.ignition_s, burn.duration_s, sensed=sensed, end_mass=end, first=len(segments))
         for segment in burn.segments:
             more = float(segment is not burn.segments[-1])
-            segments.append([*SegmentRow(segment.start, segment.length, more), *segment.steering.ravel()])
+            row = SegmentRow(segment.start_s, segment.length_s, more)
+            segments.append([*row, *segment.x, *segment.y, *segment.z])
         mass = end
     return np.concatenate([impulse, *burns, *segments])

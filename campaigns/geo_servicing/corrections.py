@@ -76,6 +76,7 @@ def shadow_edge(side: float) -> Any:
 
     @physics
     def angle(t, s, p, o):
+        """Angle [rad] of the Sun from the shadow's edge, seen from the craft; 1 where sunlight does not push."""
         if o.sunlight > 0.5:
             sx, sy, sz, _, _, _ = ephemeris(p.sun_moon_time + t, o.tables, p.sun_moon)
             sun, earth, apart = discs(s.x, s.y, s.z, sx, sy, sz)
@@ -163,9 +164,9 @@ def ignited(t, s, m, p, o):
         if o.phase == PHASES.phasing
         else velocity_change(relative_orbit(s, m.estimate), 1.0 - m.second, p, o)
     )
-    length = s.mass_left * p.exhaust / p.thrust * (1.0 - exp(-abs(dv) / p.exhaust))
+    length = s.mass_left * p.exhaust / o.thrust * (1.0 - exp(-abs(dv) / p.exhaust))
     error, radial, normal = execution(m, p, o)
-    push = p.thrust * (1.0 + error)
+    push = o.thrust * (1.0 + error)
     sine_r, cosine_r = sincos(radial)
     sine_n, cosine_n = sincos(normal)
     ahead = where(dv < 0.0, -push, push)
@@ -174,7 +175,7 @@ def ignited(t, s, m, p, o):
 
 
 @physics
-def cut_off(m, p, o):
+def cut_off(m, o):
     """The memory after a burn.
 
     A filter adds what the burn gave over the command to its error, and the assumed errors to its covariance; without a
@@ -184,7 +185,7 @@ def cut_off(m, p, o):
     if o.navigation == NAVIGATION.filtered:
         # what the burn gave: the command, stretched and tilted
         size = abs(burn.dv)
-        outward, ahead = size * burn.outward / p.thrust, size * burn.ahead / p.thrust
+        outward, ahead = size * burn.outward / o.thrust, size * burn.ahead / o.thrust
         e = burnt(e, outward, ahead - burn.dv, size, o.assumed_thrust, o.assumed_pointing)
     elif o.navigation == NAVIGATION.raw:
         e = replace(e, r=m.after.r, s=m.after.s, u=m.after.u, w=m.after.w)
@@ -229,7 +230,7 @@ def switch(t, s, m, p, o, hit):
     ignite, cut = now & (m.mode == IGNITION), now & (m.mode == CUT_OFF)
     decide, day = now & (m.mode == DECISION), now & (m.mode == DAY_LATER)
     m = where(hit.settle > 0.5, replace(m, settled=1.0), m)
-    m = where(cut, cut_off(m, p, o), m)
+    m = where(cut, cut_off(m, o), m)
     if o.phase == PHASES.phasing:
         m = where(cut, next_correction(t, s, m, p, o), m)
         m = where(day, day_later(t, s, m, p), m)

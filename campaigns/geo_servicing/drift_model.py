@@ -28,15 +28,6 @@ def after_correction(y, v, u, t, b_s=0.0, b_r=0.0):
     return y + (v + u) * t + b_s * t * t + b_r * t, v + u + 2.0 * b_s * t
 
 
-def two_impulses(y, v, first, second):
-    """Corrections (u1, u2) that bring longitude and drift to zero over two coasts, in the units of `braking`.
-
-    Derived here: v + u1 + u2 = 0 and y + v first + (v + u1) second = 0.
-    """
-    u1 = -(y + v * (first + second)) / second
-    return u1, -v - u1
-
-
 def largest_last(y_tolerance, v_tolerance, e_change, sigma, rest):
     """Largest last correction [deg/rev] whose execution error leaves the end within its tolerances (3 sigma).
 
@@ -62,10 +53,12 @@ def braking(y, v, last, shortest):
 def fastest(y, v, last, shortest):
     """(corrections, coasts) that hurry first and brake then, in the units of `braking`.
 
-    The first as of two impulses, the rest as in `braking`, (3.32)-(3.35), from the state after the first.
+    The first as of two that bring longitude and drift to zero, derived here: v + u1 + u2 = 0 and y + v first +
+    (v + u1) later = 0; the rest as in `braking`, (3.32)-(3.35), from the state after the first.
     """
     t = np.array(shortest, dtype=np.float64)
-    u1, _ = two_impulses(y, v, t[0], t[1:].sum())
-    after = y + v * t[0], v + u1
+    first, later = t[0], t[1:].sum()
+    u1 = -(y + v * (first + later)) / later
+    after = y + v * first, v + u1
     u, rest = braking(*after, last, t[1:]) if len(t) > 2 else (np.array([-after[1]]), t[1:])
     return np.concatenate([[u1], u]), np.concatenate([t[:1], rest])

@@ -31,7 +31,6 @@ State = states(
     **{f"target_v{axis}_m_s": f"velocity of the target module, {axis}" for axis in "xyz"},
     longitude_sum_s="integral of the longitude deviation, in radians",
 )
-BURN_NUMBERS = range(1, plan_table.BURNS + 1)
 
 
 def tolerances(place: float, velocity: float) -> Any:

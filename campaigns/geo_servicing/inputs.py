@@ -20,6 +20,7 @@ AIMS = _words("fuel", "time")
 NAVIGATION = _words("perfect", "raw", "filtered")
 INSPECTION_LAWS = _words("single", "pairs")
 GEOMETRIES = _words("behind", "ahead", "around")
+BURN_NUMBERS = range(1, BURNS + 1)
 
 
 def _angle(default: float, description: str, largest: float = 360.0) -> Parameter:
@@ -63,7 +64,7 @@ Inputs = inputs(
     thrust_error_pct=Parameter(0.0, "true less nominal thrust, all burns", -50, 50),
     out_of_plane_deg=_angle(0.0, "tilt of the thrust to the normal, all burns", 45.0),
     radial_deg=_angle(0.0, "tilt of the thrust outward, all burns", 45.0),
-    **{name: parameter for k in range(1, BURNS + 1) for name, parameter in _burn(k).items()},
+    **{name: parameter for k in BURN_NUMBERS for name, parameter in _burn(k).items()},
     thrust_noise_pct=Parameter(0.0, "1-sigma of the thrust error of each inspection burn", low=0.0),
     pointing_noise_deg=Parameter(0.0, "1-sigma of the tilt about each of two axes of each inspection burn", low=0.0),
     nav_position_m=Parameter(10.0, "1-sigma of the position of a fix of the module along each axis", low=0.0),

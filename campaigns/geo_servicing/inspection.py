@@ -15,6 +15,7 @@ from mc_engine.physics.orbital_elements import equinoctial
 # along: mean distance ahead of the target [m], drift of it [m/rev]; e: length of the difference of the eccentricity
 # vectors, phase: anomaly on the relative ellipse [rad], 0 where the module is lowest
 Relative = namedtuple("Relative", "along drift e phase")
+NEVER = 1e3  # rev
 LAST = 0.25  # rev by which a coast may fall short of its whole revolutions
 
 
@@ -30,6 +31,12 @@ def correction(y, v, t, chi1, chi2, weight, sigma):
 
 
 @physics
+def asked(y, v, p, o):
+    """Change of the drift [m/rev] that the law asks for at a deviation y [m] and a drift v [m/rev]."""
+    return correction(y, v, p.coast_revolutions, p.chi1, p.chi2, p.control_weight, o.assumed_thrust)
+
+
+@physics
 def relative_orbit(s, error):
     """The module's motion about the target, as navigation with this error measures it [m, m/rev, 1, rad].
 
@@ -40,10 +47,10 @@ def relative_orbit(s, error):
     target = equinoctial(s.target_x, s.target_y, s.target_z, s.target_vx, s.target_vy, s.target_vz, MU)
     dk, dh = module.k - target.k, module.h - target.h
     return Relative(
-        R0 * half_turn(module.mean - target.mean),
-        -1.5 * TURN * R0 * (module.a - target.a) / target.a,
-        sqrt(dk * dk + dh * dh),
-        module.true - atan2(dh, dk),
+        along=R0 * half_turn(module.mean - target.mean),
+        drift=-1.5 * TURN * R0 * (module.a - target.a) / target.a,
+        e=sqrt(dk * dk + dh * dh),
+        phase=module.true - atan2(dh, dk),
     )
 
 
@@ -56,20 +63,16 @@ def wait_until(x, phase, least):
 
 
 @physics
+def least_wait(p, o):
+    """Least coast [rev] before a correction."""
+    return maximum(o.least_coast / SIDEREAL_DAY, p.coast_revolutions - LAST)
+
+
+@physics
 def candidate(x, phase, sign, p, o):
-    """(coast [rev], 1 if the law asks there for a correction of this sign)."""
-    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast_revolutions - LAST)
-    wait = wait_until(x, phase, least)
-    u = correction(
-        x.along - p.nominal + x.drift * wait,
-        x.drift,
-        p.coast_revolutions,
-        p.chi1,
-        p.chi2,
-        p.control_weight,
-        o.assumed_thrust,
-    )
-    return wait, where(u * sign > 0.0, 1.0, 0.0)
+    """Coast [rev] to a phase at which the law asks for a correction of this sign; `NEVER` where it asks for another."""
+    wait = wait_until(x, phase, least_wait(p, o))
+    return where(asked(x.along - p.nominal + x.drift * wait, x.drift, p, o) * sign > 0.0, wait, NEVER)
 
 
 @physics
@@ -80,17 +83,16 @@ def next_coast(x, p, o):
     """
     narrow = x.e < p.around
     high = where(narrow, 0.5 * TURN, 0.0)
-    wait_down, down = candidate(x, high, 1.0, p, o)  # u > 0: braking
-    wait_up, up = candidate(x, 0.5 * TURN - high, -1.0, p, o)
-    wait = minimum(where(down > 0.5, wait_down, 1e3), where(up > 0.5, wait_up, 1e3))
-    wanted = wait < 1e3
+    # u > 0: braking
+    wait = minimum(candidate(x, high, 1.0, p, o), candidate(x, 0.5 * TURN - high, -1.0, p, o))
+    wanted = wait < NEVER
     return where(wanted, wait, 1.0), where(wanted, 1.0, 0.0)
 
 
 @physics
 def next_pair(x, p, o):
     """Coast [rev] to the first burn of a pair: to the next end of the relative ellipse that is far enough away."""
-    least = maximum(o.least_coast / SIDEREAL_DAY, p.coast_revolutions - LAST)
+    least = least_wait(p, o)
     return minimum(wait_until(x, 0.0, least), wait_until(x, 0.5 * TURN, least))
 
 
@@ -117,9 +119,7 @@ def velocity_change(x, first, p, o):
 
     first : 1 for the first burn of a pair
     """
-    u = correction(
-        x.along - p.nominal, x.drift, p.coast_revolutions, p.chi1, p.chi2, p.control_weight, o.assumed_thrust
-    )
+    u = asked(x.along - p.nominal, x.drift, p, o)
     if o.inspection_law == INSPECTION_LAWS.pairs:
         u = where(first > 0.5, first_of_pair(x, p, o), u)
     return -u * RATE / (3.0 * TURN)

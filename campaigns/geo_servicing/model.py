@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 
 from campaigns.geo_servicing import corrections, dynamics, navigation, outcome, plan_table
-from campaigns.geo_servicing.dynamics import R0
-from campaigns.geo_servicing.first_state import first_states
-from campaigns.geo_servicing.inputs import GEOMETRIES, NAVIGATION, PHASES, Inputs
+from campaigns.geo_servicing.dynamics import MU, R0, State
+from campaigns.geo_servicing.inputs import BURN_NUMBERS, GEOMETRIES, NAVIGATION, PHASES, Inputs
 from campaigns.geo_servicing.phasing_plan import plan_of
 from mc_engine.errors import ModelError
 from mc_engine.model import AdaptiveStep, Parameter, Refusals, kept_design, model, prepared
 from mc_engine.model.figures import HistoryFigure, ProfileFigure, ScatterFigure
 from mc_engine.physics.constants import STANDARD_GRAVITY
+from mc_engine.physics.frames import TURN
 from mc_engine.physics.geopotential import COLUMNS, harmonics_rows, harmonics_table
+from mc_engine.physics.orbital_elements import state_of_elements
 from mc_engine.physics.sun_moon import COLUMNS as SUN_MOON
 from mc_engine.physics.sun_moon import SPACING, ephemeris_table, node_before, sidereal_angle
 from mc_engine.studies.published import read_published
@@ -26,15 +27,13 @@ SOURCE = (
     "Moscow, 2021"
 )
 _DAY = 86_400.0
-NO_PLAN = np.zeros(plan_table.LENGTH)
 
 
-def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
+def prepare(i: SimpleNamespace, o: SimpleNamespace, refusals: Refusals) -> dict[str, np.ndarray]:
     """Kernel parameters of each case.
 
-    inputs : float64[n] by symbol, SI;  settings : codes, float64[n], by symbol.  Refused cases join `refusals`.
+    i : inputs, float64[n] by symbol, SI;  o : settings, codes, float64[n], by symbol.  Refused cases join `refusals`.
     """
-    i, o = inputs, settings
     epoch = o.epoch_utc + i.epoch_error / _DAY
     sidereal = sidereal_angle(epoch)
     two = o.phase == PHASES.inspection
@@ -42,26 +41,57 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     refusals.add(o.gravity_degree == 1.0, "the geopotential has no harmonics of degree 1; take 0, or 2 and above")
     mass = o.mass + i.mass_error
     refusals.add(mass <= 0.0, "mass_kg and mass_error_kg leave no mass")
+    module = np.where(two, craft_start(i, "module"), phasing_start(i, o, sidereal, refusals))
+    target = np.where(two, craft_start(i, "target"), 0.0)
     light = o.reflectivity * i.reflectivity_factor * o.area * i.area_factor
     return {
         **vars(i),
-        **first_states(i, o, sidereal, refusals, two),
+        **dict(zip(State._fields[:6], module, strict=True)),
+        **dict(zip(State._fields[7:13], target, strict=True)),
         "mass_left": mass,
-        "thrust": o.thrust,
         "exhaust": o.isp * STANDARD_GRAVITY,
         "light": light,  # C_R A [m^2]
         "target_light": light / mass * i.target_area_to_mass_factor,  # over its mass [m^2/kg]
         "sidereal": sidereal,
         "aim": sidereal + o.target_longitude,
-        **{f"thrust_{k}": i.thrust_error + getattr(i, f"burn_{k}_thrust_error") for k in dynamics.BURN_NUMBERS},
-        **{f"radial_{k}": i.radial + getattr(i, f"burn_{k}_radial") for k in dynamics.BURN_NUMBERS},
-        **{f"normal_{k}": i.out_of_plane + getattr(i, f"burn_{k}_out_of_plane") for k in dynamics.BURN_NUMBERS},
+        **{f"thrust_{k}": i.thrust_error + getattr(i, f"burn_{k}_thrust_error") for k in BURN_NUMBERS},
+        **{f"radial_{k}": i.radial + getattr(i, f"burn_{k}_radial") for k in BURN_NUMBERS},
+        **{f"normal_{k}": i.out_of_plane + getattr(i, f"burn_{k}_out_of_plane") for k in BURN_NUMBERS},
         # in the inspection both craft's fixes count, in the phasing there is one
         "nav_position": np.hypot(i.nav_position, np.where(two, i.target_nav_position, 0.0)),
         "nav_velocity": np.hypot(i.nav_velocity, np.where(two, i.target_nav_velocity, 0.0)),
         **_inspection_rows(i, o),
         **_sun_moon_rows(epoch, o),
     }
+
+
+def phasing_start(i: SimpleNamespace, o: SimpleNamespace, sidereal, refusals: Refusals) -> np.ndarray:
+    """The servicing module above its longitude, osculating elements; sidereal : angle [rad] at the start."""
+    period = o.initial_period + i.initial_period_error
+    e = o.initial_eccentricity + i.initial_eccentricity_error
+    # a negative error of a small eccentricity is one to the other side of the orbit
+    anomaly = o.initial_true_anomaly + i.initial_true_anomaly_error + np.where(e < 0.0, np.pi, 0.0)
+    e = np.abs(e)
+    inclination = o.initial_inclination + i.initial_inclination_error
+    refusals.add(~((period > 0.0) & (e < 0.9)), "the first orbit is none: its period or its eccentricity is impossible")
+    a = np.cbrt(MU * (period / TURN) ** 2)
+    ahead = sidereal + o.initial_longitude + i.initial_longitude_error - o.initial_node
+    latitude = np.arctan2(np.sin(ahead) / np.cos(inclination), np.cos(ahead))  # argument of, above the longitude
+    return state_of_elements(a, e, inclination, o.initial_node, latitude - anomaly, anomaly, MU)
+
+
+def craft_start(i: SimpleNamespace, name: str) -> np.ndarray:
+    """State float64[6, n] of the craft whose parameters begin with `name`."""
+    own = SimpleNamespace(**{key.removeprefix(f"{name}_"): value for key, value in vars(i).items()})
+    return state_of_elements(
+        own.pericentre_radius / (1.0 - own.eccentricity),
+        own.eccentricity,
+        own.inclination,
+        own.node,
+        own.argument_of_pericentre,
+        own.argument_of_latitude - own.argument_of_pericentre,
+        MU,
+    )
 
 
 def _inspection_rows(i: SimpleNamespace, o: SimpleNamespace) -> dict[str, np.ndarray]:
@@ -93,11 +123,8 @@ def _sun_moon_rows(epoch: np.ndarray, o: SimpleNamespace) -> dict[str, np.ndarra
 
 def tables(o: Any) -> np.ndarray:
     """The phasing plan and the harmonics of the geopotential, for the settings o."""
-    rows = harmonics_table(int(o.gravity_degree), int(o.gravity_order)).ravel()
-    plan = NO_PLAN
-    if o.phase == PHASES.phasing:
-        plan = kept_design(plan_of, *nominal_start(o))
-    return np.concatenate([plan, rows])
+    plan = kept_design(plan_of, *nominal_start(o)) if o.phase == PHASES.phasing else np.zeros(plan_table.LENGTH)
+    return np.concatenate([plan, harmonics_table(int(o.gravity_degree), int(o.gravity_order)).ravel()])
 
 
 def nominal_start(o: Any) -> tuple[Any, SimpleNamespace]:
@@ -111,10 +138,10 @@ def nominal_start(o: Any) -> tuple[Any, SimpleNamespace]:
     columns = prepare(inputs, settings, refusals)
     if refusals.mask.any():
         raise ModelError(f"there is no plan: {refusals.reason[0]}")
-    rows = harmonics_table(int(o.gravity_degree), int(o.gravity_order)).ravel()
-    behind = np.concatenate([NO_PLAN, rows, columns.pop("tables").ravel()])
+    # no plan yet, as in the tables of a free flight: for the phasing `tables` would ask for the plan itself
+    unplanned = np.concatenate([tables(o._replace(phase=PHASES.free)), columns.pop("tables").ravel()])
     first = {name: float(np.ravel(row)[0]) for name, row in columns.items()}
-    return o._replace(tables=behind), SimpleNamespace(**first)
+    return o._replace(tables=unplanned), SimpleNamespace(**first)
 
 
 def sample_period(o: Any) -> float:
@@ -141,7 +168,7 @@ MODEL = model(
     title="Servicing a geostationary satellite",
     source=SOURCE,
     inputs=Inputs,
-    states=dynamics.State,
+    states=State,
     outputs=outcome.Outputs,
     metrics=outcome.Metrics,
     clock=AdaptiveStep("duration", "tolerance", dynamics.tolerances(1e-4, 1e-8), control_period=sample_period),

@@ -91,22 +91,28 @@ def rotated(e):
 
 
 @physics
-def fixed(e, n1, n2, n3, n4, place, velocity):
-    """The estimate after a fix with errors n times the 1-sigma of place [m] and velocity [m/s]."""
+def fixed(e, fix, place, velocity):
+    """The estimate after a fix with this Error, of 1-sigma `place` [m] and `velocity` [m/s] along each axis."""
     place2, velocity2 = place * place, velocity * velocity
-    e = rotated(first_measured(e, place * n1, place2))
-    e = rotated(first_measured(e, place * n2, place2))
-    e = rotated(first_measured(e, velocity * n3, velocity2))
-    return rotated(first_measured(e, velocity * n4, velocity2))
+    e = rotated(first_measured(e, fix.r, place2))
+    e = rotated(first_measured(e, fix.s, place2))
+    e = rotated(first_measured(e, fix.u, velocity2))
+    return rotated(first_measured(e, fix.w, velocity2))
 
 
 @physics
-def single_fix(n1, n2, n3, n4, place, velocity):
+def single_fix(fix, place, velocity):
     """The estimate [m, m/s] that one fix alone gives: its errors, and their variances on the diagonal."""
     a, b = place * place, velocity * velocity
-    return replace(
-        NO_ESTIMATE, r=place * n1, s=place * n2, u=velocity * n3, w=velocity * n4, prr=a, pss=a, puu=b, pww=b
-    )
+    return replace(NO_ESTIMATE, r=fix.r, s=fix.s, u=fix.u, w=fix.w, prr=a, pss=a, puu=b, pww=b)
+
+
+@physics
+def fix_error(draws, first, p):
+    """The Error [m, m/s] of a fix, from two pairs of deviates, `first` and the next."""
+    n1, n2 = normal_pair(draws, first)
+    n3, n4 = normal_pair(draws, first + 1)
+    return Error(r=p.nav_position * n1, s=p.nav_position * n2, u=p.nav_velocity * n3, w=p.nav_velocity * n4)
 
 
 @physics
@@ -122,21 +128,16 @@ def control(t, m, p, o, draws):
 
     That is fresh deviates for the burn's errors, and the single fix that follows it.
     """
-    n1, n2 = normal_pair(draws, 0)
-    n3, n4 = normal_pair(draws, 1)
+    fix = fix_error(draws, 0, p)
     d1, d2 = normal_pair(draws, 2)
     d3, _ = normal_pair(draws, 3)
-    n5, n6 = normal_pair(draws, 4)
-    n7, n8 = normal_pair(draws, 5)
     place, velocity, e = p.nav_position, p.nav_velocity, m.estimate
     if o.navigation == NAVIGATION.raw:
-        e = single_fix(n1, n2, n3, n4, place, velocity)
+        e = single_fix(fix, place, velocity)
     elif o.navigation == NAVIGATION.filtered:
-        alone = single_fix(n1, n2, n3, n4, place, velocity)
         going = propagated(e, o.fix_period, o.filter_noise * o.fix_period)
-        e = where(t > 0.0, fixed(going, n1, n2, n3, n4, place, velocity), alone)
-    after = Error(r=place * n5, s=place * n6, u=velocity * n7, w=velocity * n8)
-    return replace(m, estimate=e, after=after, d1=d1, d2=d2, d3=d3)
+        e = where(t > 0.0, fixed(going, fix, place, velocity), single_fix(fix, place, velocity))
+    return replace(m, estimate=e, after=fix_error(draws, 4, p), d1=d1, d2=d2, d3=d3)
 
 
 @physics

@@ -42,31 +42,22 @@ def _some(description: str, **more: Any) -> Field:
     return Field(description, sometimes=True, **more)
 
 
+END = "at the end of the transfer, or of a flight without a transfer"
 Metrics = metrics(
-    longitude_deviation_deg=_some(
-        "longitude less the required one at the end of the transfer, or of a flight without a transfer"
-    ),
+    longitude_deviation_deg=_some(f"longitude less the required one {END}"),
     mean_longitude_deviation_deg=_some("osculating mean longitude less the required one at the end of the transfer"),
     daily_mean_longitude_deviation_deg=_some(
         "mean of the longitude deviation over the sidereal day after the transfer"
     ),
-    drift_rate_deg_rev=_some(
-        "drift by the osculating period at the end of the transfer, or of a flight without a transfer"
-    ),
+    drift_rate_deg_rev=_some(f"drift by the osculating period {END}"),
     actual_drift_rate_deg_rev=_some(
         "change of the mean longitude in the sidereal day after the transfer, per revolution"
     ),
-    period_error_s=_some(
-        "osculating period less the sidereal day at the end of the transfer, or of a flight without a transfer"
-    ),
+    period_error_s=_some(f"osculating period less the sidereal day {END}"),
     actual_period_error_s=_some("period by the actual drift rate, less the sidereal day"),
-    eccentricity=_some(
-        "osculating eccentricity at the end of the transfer, or of a flight without a transfer", low=0.0, unit=""
-    ),
+    eccentricity=_some(f"osculating eccentricity {END}", low=0.0, unit=""),
     peak_eccentricity=maximum_of("eccentricity", "largest osculating eccentricity of the flight", low=0.0, unit=""),
-    inclination_deg=_some(
-        "osculating inclination at the end of the transfer, or of a flight without a transfer", low=0.0
-    ),
+    inclination_deg=_some(f"osculating inclination {END}", low=0.0),
     delta_v_m_s=at_end("delta_v_m_s", "characteristic velocity of all burns", low=0.0),
     transfer_time_s=_some("end of the last burn of the phasing", low=0.0),
     corrections=at_end("corrections", "number of burns", low=0.0, unit=""),

@@ -28,9 +28,9 @@ SETTLED = 1e-3  # of the tolerances: a plan is done when its flight ends as near
 DV_OF_COST = 0.1  # m/s that one unit of expected cost is worth: a plan may spend so much to be surer of its end
 
 
-# what a plan must keep: tolerances of the end [rad, rad/rev, 1], first and later coasts and the whole transfer [rev],
-# largest last correction [rad/rev]
-Limits = namedtuple("Limits", "y v e first least longest last")
+# what a plan must keep: tolerances of the end [rad, rad/rev, 1], least coast before each correction and longest
+# transfer [rev], largest last correction [rad/rev]
+Limits = namedtuple("Limits", "y v e coasts longest last")
 
 
 def plan_of(o: Any, first: Any) -> np.ndarray:
@@ -85,16 +85,15 @@ def steps(craft: Craft, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
 def gains_of(craft: Craft, plan: Plan, limits: Limits) -> Corrections:
     """Gains for deviations [rad, rad/rev] from the plan, (3.25)-(3.30); the end counts in thirds of its tolerances."""
     a, b = steps(craft, plan)
-    sigma = float(craft.o.assumed_thrust)
-    terminal = np.diag([(3.0 / limits.y) ** 2, (3.0 / limits.v) ** 2])
-    return best_corrections(a, b, np.zeros_like(b), np.zeros((2, 2)), 1e-6 * terminal[1, 1], terminal, sigma)
+    terminal, none = np.diag([(3.0 / limits.y) ** 2, (3.0 / limits.v) ** 2]), np.zeros((2, 2))
+    return best_corrections(a, b, np.zeros_like(b), none, 1e-6 * terminal[1, 1], terminal, craft.o.assumed_thrust)
 
 
 def design(craft: Craft) -> Plan:
     """Corrections and coasts that end at the place, with the drift asked for and a small eccentricity.
 
     The source's successive approximations: the plan of the drift model is flown in the full dynamics, and what the
-    model lacks at the end is added to the next plan's aim.
+    model lacks at the end is added to the next plan's aim.  Coasts [s], corrections [m/s].
     """
     limits, lacking = limits_of(craft.o), End(0.0, 0.0, 0.0, 0.0)
     starts = first_approximations(craft, limits)
@@ -110,11 +109,10 @@ def design(craft: Craft) -> Plan:
 
 def first_approximations(craft: Craft, limits: Limits) -> list[Plan]:
     """Plans to start the search from: the source's profiles at several lengths of the coasts; [s, m/s]."""
-    n = int(craft.o.planned_corrections)
     profile = braking if craft.o.aim == AIMS.fuel else fastest
     plans = []
     for longer in (0.0, 0.25, 0.5):
-        shortest = least_coasts(limits, n)
+        shortest = limits.coasts.copy()
         shortest[1:] += longer
         u, t = profile(craft.y, craft.v, limits.last, shortest)
         dv = u / DRIFT_PER_DV
@@ -124,18 +122,13 @@ def first_approximations(craft: Craft, limits: Limits) -> list[Plan]:
     return plans
 
 
-def least_coasts(limits: Limits, n: int) -> np.ndarray:
-    """Least coasts before n corrections [rev]."""
-    return np.array([limits.first, *[limits.least] * (n - 1)])
-
-
 def limits_of(o: Any) -> Limits:
     """The limits that the settings ask for [rad, rad/rev, rev]; the last correction by `largest_last`."""
-    v = TURN * float(o.period_tolerance) / SIDEREAL_DAY
-    y, e, sigma = float(o.longitude_tolerance), float(o.eccentricity_tolerance), max(float(o.assumed_thrust), 1e-6)
-    last = np.radians(largest_last(np.degrees(y), np.degrees(v), e, sigma, 0.5))
-    first, least, longest = (float(time) / SIDEREAL_DAY for time in (o.first_coast, o.least_coast, o.longest_transfer))
-    return Limits(y, v, e, first, least, longest, float(o.largest_last) or float(last))
+    y, v, e = o.longitude_tolerance, TURN * o.period_tolerance / SIDEREAL_DAY, o.eccentricity_tolerance
+    coasts = np.full(int(o.planned_corrections), o.least_coast / SIDEREAL_DAY)
+    coasts[0] = o.first_coast / SIDEREAL_DAY
+    last = np.radians(largest_last(np.degrees(y), np.degrees(v), e, max(o.assumed_thrust, 1e-6), 0.5))
+    return Limits(y, v, e, coasts, o.longest_transfer / SIDEREAL_DAY, o.largest_last or last)
 
 
 def _best(craft: Craft, limits: Limits, lacking: End, starts: list[Plan]) -> Plan:
@@ -153,27 +146,31 @@ def _improved(craft: Craft, limits: Limits, lacking: End, start: Plan) -> tuple[
     signs = np.sign(start.dv)
 
     def plan(z):
+        """Plan, coasts [s] and corrections [m/s], of unknowns with the coasts [rev] first."""
         return Plan(SIDEREAL_DAY * z[:n], z[n:])
 
     def cost(z):
+        """Speed change [m/s] with the spread's share in it; where time is the aim, the time [rev] and 0.02 of that."""
         candidate = plan(z)
         _, b = steps(craft, candidate)
         costs = gains_of(craft, candidate, limits).costs
-        spread = planned_cost(b, costs, DRIFT_PER_DV * candidate.dv, float(craft.o.assumed_thrust))
+        spread = planned_cost(b, costs, DRIFT_PER_DV * candidate.dv, craft.o.assumed_thrust)
         spent = (signs * candidate.dv).sum() + DV_OF_COST * spread
         return modelled(craft, candidate, lacking).time + 0.02 * spent if craft.o.aim == AIMS.time else spent
 
     def equal(z):
+        """Longitude and drift at the end against those aimed at, in the unit of their limits."""
         end = modelled(craft, plan(z), lacking)
         return np.array([end.y / limits.y, (end.v - craft.o.aim_drift) / limits.v])
 
     def inside(z):
+        """What may not be negative: 1 less the squared fraction of the eccentricity's limit used; time left [rev]."""
         end = modelled(craft, plan(z), lacking)
         return np.array([1.0 - abs(end.e) ** 2 / (E_PLANNED * limits.e) ** 2, limits.longest - end.time])
 
     largest = np.full(n, 20.0)
     largest[-1] = abs(limits.last / DRIFT_PER_DV)
-    bounds = [(low, limits.longest) for low in least_coasts(limits, n)]
+    bounds = [(low, limits.longest) for low in limits.coasts]
     bounds += [(0.0, size) if sign > 0.0 else (-size, 0.0) for sign, size in zip(signs, largest, strict=True)]
     conditions = ({"type": "eq", "fun": equal}, {"type": "ineq", "fun": inside})
     first = np.concatenate([start.coasts / SIDEREAL_DAY, start.dv])

@@ -9,24 +9,14 @@ from typing import Any
 import numpy as np
 import scipy  # loads its packages when they are used
 
+from campaigns.geo_servicing import dynamics
 from campaigns.geo_servicing.corrections import Burn, Memory, drift_of
 from campaigns.geo_servicing.drift_model import perturbation_coefficients
-from campaigns.geo_servicing.dynamics import (
-    MU,
-    R0,
-    RATE,
-    SIDEREAL_DAY,
-    State,
-    field,
-    initial,
-    longitudes,
-    rhs,
-    tolerances,
-)
+from campaigns.geo_servicing.dynamics import MU, R0, RATE, SIDEREAL_DAY, State
 from mc_engine.physics.gravity import point_mass
 from mc_engine.physics.sun_moon import ephemeris
 
-_TOLERANCES = {"rtol": 1e-9, "atol": tolerances(1e-3, 1e-7)}
+_TOLERANCES = {"rtol": 1e-9, "atol": dynamics.tolerances(1e-3, 1e-7)}
 
 
 Plan = namedtuple("Plan", "coasts dv")  # before the corrections [s], and their velocity changes [m/s], float64[n]
@@ -41,13 +31,13 @@ class Craft:
     def __init__(self, o: Any, first: Any):
         """o : settings, with all tables of the model and room for the plan;  first : kernel parameters, SI."""
         self.o, self.p, self.aim = o, first, first.aim
-        self.start = np.array(initial(first))
+        self.start = np.array(dynamics.initial(first))
         self.y, self.v, self.e = self.seen(0.0, self.start)
         self.pull = self.mean_pull()
 
     def seen(self, t: float, s: np.ndarray) -> tuple[float, float, complex]:
         """(mean longitude deviation [rad], osculating drift [rad/rev], eccentricity vector) of a state float64[14]."""
-        _, mean, elements = longitudes(t, State(*s), self.p)
+        _, mean, elements = dynamics.longitudes(t, State(*s), self.p)
         return mean, drift_of(elements.a), complex(elements.k, elements.h)
 
     def mean_pull(self) -> tuple[float, float]:
@@ -57,7 +47,7 @@ class Craft:
         x, y, z = R0 * np.cos(angle), R0 * np.sin(angle), 0.0 * t
         sx, sy, sz, mx, my, mz = ephemeris(self.p.sun_moon_time + t, self.o.tables, self.p.sun_moon)
         light = self.p.light / self.p.mass_left
-        ax, ay, _ = field(t, x, y, z, (sx, sy, sz), (mx, my, mz), light, self.p, self.o)
+        ax, ay, _ = dynamics.field(t, x, y, z, (sx, sy, sz), (mx, my, mz), light, self.p, self.o)
         px, py, _ = point_mass(x, y, z, MU)
         ax, ay = ax - px, ay - py
         outward, ahead = ax * np.cos(angle) + ay * np.sin(angle), ay * np.cos(angle) - ax * np.sin(angle)
@@ -66,20 +56,22 @@ class Craft:
     def burn_times(self, dv: np.ndarray) -> np.ndarray:
         """Lengths [s] of burns of velocity changes dv [m/s], one after the other."""
         before = self.p.mass_left * np.exp(-np.concatenate([[0.0], np.cumsum(np.abs(dv))[:-1]]) / self.p.exhaust)
-        return before * self.p.exhaust / self.p.thrust * -np.expm1(-np.abs(dv) / self.p.exhaust)
+        return before * self.p.exhaust / self.o.thrust * -np.expm1(-np.abs(dv) / self.p.exhaust)
 
     def velocity_changes(self, burns: np.ndarray) -> np.ndarray:
         """Velocity changes [m/s] of burns of these lengths [s], one after the other."""
-        flow = self.p.thrust / self.p.exhaust
+        flow = self.o.thrust / self.p.exhaust
         after = self.p.mass_left - flow * np.cumsum(burns)
         return self.p.exhaust * np.log((after + flow * burns) / after)
 
     def fly(self, t: float, s: np.ndarray, length: float, push: float) -> np.ndarray:
         """State float64[14] after an arc of this length [s] under a thrust ahead [N]."""
         m = Memory(burn=Burn(dv=0.0, outward=0.0, ahead=push, across=0.0))
-        flight = scipy.integrate.solve_ivp(
-            lambda time, y: rhs(time, State(*y), m, self.p, self.o), (t, t + length), s, "DOP853", **_TOLERANCES
-        )
+
+        def rates(time, y):
+            return dynamics.rhs(time, State(*y), m, self.p, self.o)
+
+        flight = scipy.integrate.solve_ivp(rates, (t, t + length), s, "DOP853", **_TOLERANCES)
         return np.asarray(flight.y[:, -1])
 
     def fly_plan(self, plan: Plan) -> tuple[np.ndarray, End]:
@@ -89,7 +81,7 @@ class Craft:
             s = self.fly(t, s, coast, 0.0)
             t += coast
             ignitions.append((t, *self.seen(t, s)[:2]))
-            s = self.fly(t, s, burn, np.copysign(self.p.thrust, change))
+            s = self.fly(t, s, burn, np.copysign(self.o.thrust, change))
             t += burn
         mean, _, e = self.seen(t, s)
         after = self.fly(t, s, SIDEREAL_DAY, 0.0)

@@ -15,7 +15,10 @@ _ITEMS = [item for item in Inputs.declared if item.symbol in Vehicle._fields]
 
 
 def airframe_of(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusals) -> Vehicle:
-    """Each case's vehicle as planned, without factors; one that is named and given other numbers besides is refused."""
+    """Each case's vehicle as planned, without factors; in SI.
+
+    One that is named and given other numbers besides is refused.
+    """
     numbers = {item.symbol: getattr(i, item.symbol) for item in _ITEMS}
     for code, (name, vehicle) in enumerate(VEHICLES.items(), start=1):
         chosen = settings.vehicle == code
@@ -29,7 +32,10 @@ def airframe_of(i: SimpleNamespace, settings: SimpleNamespace, refusals: Refusal
 
 
 def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Vehicle) -> dict[str, np.ndarray]:
-    """Areas over mass [m^2/kg] of the forces in hypersonic flow, dispersions included; coefficient of the heating."""
+    """Areas over mass [m^2/kg] of the forces in hypersonic flow, dispersions included; coefficient of the heating.
+
+    Besides them the numbers of the vehicle, by symbol, and angles by cosine and sine.
+    """
     drag = airframe.drag_coefficient * i.cd_factor
     lift = airframe.lift_coefficient * i.cd_factor * i.ld_factor
     trim, tilted = airframe.trim_angle, airframe.trim_angle + i.accelerometer_misalignment
@@ -37,7 +43,7 @@ def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Vehic
     nose = airframe.nose_radius * i.nose_radius_factor
     sutton_graves = of_planets(settings.planet, "heating") / np.sqrt(nose)
     heating = np.where(settings.heating == DETRA_KEMP_RIDDELL, detra_kemp_riddell_coefficient(nose), sutton_graves)
-    rows = {
+    rows = airframe._asdict() | {
         "drag": drag * per_mass,
         "lift": lift * per_mass,
         "total": np.hypot(drag, lift) * per_mass,
@@ -45,6 +51,7 @@ def airframe_rows(i: SimpleNamespace, settings: SimpleNamespace, airframe: Vehic
         "sensed": axial_coefficient(drag, lift, np.cos(tilted), np.sin(tilted)) * per_mass,
         "heating": heating * i.heating_factor,
     }
+    # trim: of the body axis against the flow;  tilted: of the accelerometer's;  misaligned: of this against the body's
     for name, angle in (("trim", trim), ("tilted", tilted), ("misaligned", i.accelerometer_misalignment)):
         rows |= {f"cos_{name}": np.cos(angle), f"sin_{name}": np.sin(angle)}
     return rows

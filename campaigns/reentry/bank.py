@@ -4,7 +4,8 @@ The bank follows its command like a critically damped second-order lag, not fast
 from sample to sample, so its course over a sample is known: between samples the flight reads it off a cubic.
 """
 
-from mc_engine.lanes import exp, maximum, minimum, physics, sqrt, where
+from mc_engine.lanes import exp, maximum, minimum, physics, where
+from mc_engine.physics.vectors import Vector, cross, dot, norm
 
 
 @physics
@@ -38,10 +39,9 @@ def angle_at(t, m, period):
 @physics
 def lateral_miss(s, p):
     """Distance [m] to the right of the target at which the plane of the present motion passes it."""
-    x, y, z = s.vy * s.z - s.vz * s.y, s.vz * s.x - s.vx * s.z, s.vx * s.y - s.vy * s.x
-    size = sqrt(x * x + y * y + z * z)
-    # v x r points to the right
-    return -p.radius * (x * p.tx + y * p.ty + z * p.tz) / where(size > 0.0, size, 1.0)
+    right = cross(Vector(s.vx, s.vy, s.vz), Vector(s.x, s.y, s.z))
+    size = norm(right)
+    return -p.radius * dot(right, Vector(p.tx, p.ty, p.tz)) / where(size > 0.0, size, 1.0)
 
 
 @physics

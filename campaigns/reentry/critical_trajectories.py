@@ -15,41 +15,40 @@ import numpy as np
 
 from campaigns.reentry.planets import PLANETS
 from mc_engine.campaign.loading import load_campaign
-from mc_engine.flight.flight import fly
-from mc_engine.model import Parameter, Setting, load_model
+from mc_engine.flight.flight import chosen_cases
+from mc_engine.model import load_model
 
 HERE = Path(__file__).parent
 CASES = 32  # flown at once
 Inputs = Mapping[str, Any]
-Columns = dict[str, np.ndarray]
-
 
 # altitudes [km] of the vacuum periapsis between which one pass captures
 CriticalPeriapses = namedtuple("CriticalPeriapses", "capture entry")
 
 
-def fly_inputs(inputs: Inputs) -> Columns:
-    """Results of the model with these inputs, the others at their defaults; one case a value of the longest."""
-    model = load_model("campaigns.reentry")
-    items: tuple[Parameter | Setting, ...] = (*model.parameters, *model.settings)
-    defaults = {item.name: item.default for item in items}
-    n_cases = max(np.size(value) for value in inputs.values())
-    return fly(model, defaults | dict(inputs), np.arange(n_cases), 0)
-
-
-def boundary(inputs: Inputs, name: str, low: float, high: float, holds: Callable[[Columns], np.ndarray], width: float):
+def boundary(inputs: Inputs, name: str, low: float, high: float, width: float, holds: Callable[..., np.ndarray]):
     """Value of the input `name` at which `holds` becomes true, going from low to high, to within `width`.
 
     holds : columns -> bool[n], false at low and true at high; ValueError if it is not.
     """
     while high - low > width:
         values = np.linspace(low, high, CASES)
-        true = holds(fly_inputs({**inputs, name: values}))
+        true = holds(chosen_cases(load_model("campaigns.reentry"), {**inputs, name: values}))
         if true[0] or not true[-1]:
             raise ValueError(f"{name} from {low:g} to {high:g} has no boundary")
         first = int(np.argmax(true))
         low, high = float(values[first - 1]), float(values[first])
     return 0.5 * (low + high)
+
+
+def exits(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """bool[n], which cases leave the atmosphere."""
+    return columns["exits"] > 0
+
+
+def is_lost(columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """bool[n], which cases leave on a hyperbola, that has no apoapsis."""
+    return exits(columns) & np.isnan(columns["exit_apoapsis_altitude_km"])
 
 
 def interface_km(planet: str) -> float:
@@ -72,21 +71,14 @@ def critical_periapses(inputs: Inputs) -> CriticalPeriapses:
     top = {"entry_altitude_km": interface_km(inputs.get("planet", "earth"))}
     asked = {**top, **inputs, "arrival": "hyperbola", "on_exit": "stop"}
     low_km, high_km = (share * float(asked["entry_altitude_km"]) for share in (1.0 / 4.0, 11.0 / 12.0))
-    # a hyperbola has no apoapsis
-    capture = boundary(
-        asked, "vacuum_periapsis_km", low_km, high_km, lambda c: (c["exits"] > 0) & np.isnan(c[APOAPSIS]), 1e-5
-    )
-    entry = boundary(asked, "vacuum_periapsis_km", low_km, capture, lambda c: c["exits"] > 0, 1e-5)
-    return CriticalPeriapses(capture, entry)
-
-
-APOAPSIS = "exit_apoapsis_altitude_km"
+    capture = boundary(asked, "vacuum_periapsis_km", low_km, high_km, 1e-5, is_lost)
+    return CriticalPeriapses(capture, entry=boundary(asked, "vacuum_periapsis_km", low_km, capture, 1e-5, exits))
 
 
 def critical_roll(inputs: Inputs, low_deg: float = 0.1, high_deg: float = 45.0) -> float:
     """Climb angle [deg] of the roll to lift down, above which a skip leaves through its entry altitude all the same."""
     asked = {**inputs, "rolled_bank_deg": 180.0, "on_exit": "stop"}
-    return boundary(asked, "roll_flight_path_angle_deg", low_deg, high_deg, lambda c: c["exits"] > 0, 1e-6)
+    return boundary(asked, "roll_flight_path_angle_deg", low_deg, high_deg, 1e-6, exits)
 
 
 def main() -> None:

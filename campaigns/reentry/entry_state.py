@@ -5,109 +5,115 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from campaigns.reentry.air import GAS_CONSTANT
 from campaigns.reentry.inputs import ELLIPSOID, FLAT, HYPERBOLA, INERTIAL
 from campaigns.reentry.planets import of_planets
 from mc_engine.model import Refusals
-from mc_engine.physics.frames import carried_along, local_axes, over_ellipsoid, radius_at_altitude, velocity_components
-
-# The planet of each case; float64[n], SI.  flat: bool[n].
-World = namedtuple("World", "mu radius polar_radius e2 rate flat")
-# The entry of each case; float64[n], SI.
-# position, velocity: [3, n], planet-fixed, over ground (flat: ahead, left, up);  speed, path: over ground
-# The others are those of the planned entry, without errors.  place, ahead, right: unit vectors [3, n], to it, along its
-# great circle, to its right;  altitude, radius, latitude: where;  heading, planned_speed, planned_path: over ground
-Entry = namedtuple(
-    "Entry",
-    "position velocity speed path place ahead right altitude radius latitude heading planned_speed planned_path",
+from mc_engine.physics.frames import (
+    carried_along,
+    local_axes,
+    over_ellipsoid,
+    radius_at_altitude,
+    turned,
+    velocity_components,
 )
+
+# The planet of each case and its exponential atmosphere; float64[n], SI.  gravity: at the ground
+World = namedtuple("World", "mu radius polar_radius e2 rate gravity log_density inverse_scale temperature")
+# The first state of each case with its errors, and the entry as it was planned without them; float64[n], SI.
+# position, velocity: [3, n], planet-fixed, over ground (flat: ahead, left, up);  speed, path: over ground
+Entry = namedtuple("Entry", "position velocity speed path planned")
+# place, ahead, right: unit vectors [3, n], to the entry, along its great circle, to its right;  altitude, r, latitude:
+# where;  speed, path, heading: over ground
+Planned = namedtuple("Planned", "place ahead right altitude r latitude speed path heading")
 
 
 def world_of(i: SimpleNamespace, settings: SimpleNamespace) -> World:
-    """The planet of each case as its settings ask for it, SI; one without an ellipsoid is its sphere."""
+    """The planet of each case as its settings ask for it, SI; one without an ellipsoid is its sphere.
+
+    The temperature [K] is that of the exponential atmosphere, g H0 / R.
+    """
     radius = np.where(i.surface_radius > 0.0, i.surface_radius, of_planets(settings.planet, "radius"))
     e2 = np.where(settings.shape == ELLIPSOID, of_planets(settings.planet, "e2"), 0.0)
-    rate = np.where(settings.rotating > 0.5, of_planets(settings.planet, "rate"), 0.0)
     mu = of_planets(settings.planet, "mu")
-    return World(mu, radius, polar_radius=radius * np.sqrt(1.0 - e2), e2=e2, rate=rate, flat=settings.shape == FLAT)
-
-
-def hyperbolic_arrival(excess_speed, periapsis, radius, mu, refusals: Refusals, asked):
-    """(speed, flight-path angle) on the way in, at a radius, of an approach with this vacuum periapsis radius.
-
-    asked : bool[n], the cases that come so; of them those whose periapsis lies above the radius join `refusals`.
-    """
-    speed = np.sqrt(excess_speed**2 + 2.0 * mu / radius)
-    cosine = periapsis * np.sqrt(excess_speed**2 + 2.0 * mu / periapsis) / (radius * speed)
-    refusals.add(asked & ~(np.abs(cosine) <= 1.0), "the vacuum periapsis lies above the entry altitude")
-    return speed, -np.arccos(np.clip(cosine, -1.0, 1.0))
-
-
-def over_ground(components, radius, latitude, world: World, frame):
-    """North, east, up of the velocity over ground [m/s]; `frame` says in which frame the components are."""
-    carried = carried_along(radius, latitude, world.rate)
-    return components - np.where(frame == INERTIAL, carried, 0.0)
-
-
-def _height(i: SimpleNamespace, latitude, world: World):
-    """(radius, geodetic altitude) [m] of the planned entry, one of which is given."""
-    radius = radius_at_altitude(i.entry_altitude, latitude, world.polar_radius, world.e2)
-    radius = np.where(i.entry_radius > 0.0, i.entry_radius, radius)
-    altitude = over_ellipsoid(radius, 1.0 / radius, np.sin(latitude) ** 2, world.polar_radius, world.e2)[0]
-    return radius, np.where(i.entry_radius > 0.0, altitude, i.entry_altitude)
+    gravity = mu / radius**2
+    density, scale = of_planets(settings.planet, "air").T
+    return World(
+        mu=mu,
+        radius=radius,
+        polar_radius=radius * np.sqrt(1.0 - e2),
+        e2=e2,
+        rate=np.where(settings.rotating > 0.5, of_planets(settings.planet, "rate"), 0.0),
+        gravity=gravity,
+        log_density=np.log(density),
+        inverse_scale=1.0 / scale,
+        temperature=gravity * scale / GAS_CONSTANT,
+    )
 
 
 def entry_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, refusals: Refusals) -> Entry:
-    """The first state with its errors, SI, and the frame of the entry that was planned without them."""
+    """The first state with its errors, SI, and the entry that was planned without them."""
+
+    def over_ground(speed, path, heading, radius, latitude):
+        """North, east, up of the velocity over ground [m/s]; the arguments are in the frame speed_frame."""
+        carried = carried_along(radius, latitude, world.rate)
+        return velocity_components(speed, path, heading) - np.where(settings.speed_frame == INERTIAL, carried, 0.0)
+
+    radius, altitude = _height(i, world)
+    speed, path = _arrival(i, settings, world, radius, refusals)
     latitude, longitude = i.entry_latitude, i.entry_longitude
-    radius, altitude = _height(i, latitude, world)
-    comes = settings.arrival == HYPERBOLA
-    speed, path = hyperbolic_arrival(
-        i.excess_speed, world.radius + i.vacuum_periapsis, radius, world.mu, refusals, comes
-    )
-    speed, path = np.where(comes, speed, i.entry_speed), np.where(comes, path, i.entry_flight_path_angle)
-    planned = over_ground(
-        velocity_components(speed, path, i.entry_heading), radius, latitude, world, settings.speed_frame
-    )
-    level = np.hypot(planned[0], planned[1])
-    planned_radius, planned_latitude = radius, latitude
-    heading = np.where(level > 0.0, np.arctan2(planned[1], planned[0]), i.entry_heading)
-    north, east, place = local_axes(latitude, longitude)
-    ahead = np.cos(heading) * north + np.sin(heading) * east
-    components = velocity_components(
-        speed + i.entry_speed_error, path + i.entry_flight_path_angle_error, i.entry_heading + i.entry_heading_error
-    )
-    latitude, longitude = latitude + i.entry_latitude_error, longitude + i.entry_longitude_error
-    radius = radius + i.entry_altitude_error
-    components = over_ground(components, radius, latitude, world, settings.speed_frame)
-    north, east, up = local_axes(latitude, longitude)
-    velocity = components[0] * north + components[1] * east + components[2] * up
-    position = radius * up
-    # minus zero would fly to other bits than zero does
-    return Entry(
-        position=np.where(world.flat, _flat_place(radius - world.polar_radius), position) + 0.0,
-        velocity=np.where(world.flat, _flat_velocity(components, heading), velocity) + 0.0,
+    north, east, up = over_ground(speed, path, i.entry_heading, radius, latitude)
+    level = np.hypot(north, east)
+    heading = np.where(level > 0.0, np.arctan2(east, north), i.entry_heading)
+    to_north, to_east, place = local_axes(latitude, longitude)
+    ahead = np.cos(heading) * to_north + np.sin(heading) * to_east
+    planned = Planned(
         place=place,
         ahead=ahead,
         right=np.cross(ahead, place, axis=0),
         altitude=altitude,
-        speed=np.sqrt((components**2).sum(axis=0)),
-        path=np.arctan2(components[2], np.hypot(components[0], components[1])),
+        r=radius,
+        latitude=latitude,
+        speed=np.sqrt(north**2 + east**2 + up**2),
+        path=np.arctan2(up, level),
         heading=heading,
-        radius=planned_radius,
-        latitude=planned_latitude,
-        planned_speed=np.sqrt((planned**2).sum(axis=0)),
-        planned_path=np.arctan2(planned[2], level),
+    )
+    speed, path = speed + i.entry_speed_error, path + i.entry_flight_path_angle_error
+    latitude, longitude = latitude + i.entry_latitude_error, longitude + i.entry_longitude_error
+    radius = radius + i.entry_altitude_error
+    north, east, up = over_ground(speed, path, i.entry_heading + i.entry_heading_error, radius, latitude)
+    to_north, to_east, place = local_axes(latitude, longitude)
+    flat, zero = settings.shape == FLAT, np.zeros_like(radius)
+    flat_ahead, flat_right = turned(north, east, np.cos(heading), np.sin(heading))
+    # minus zero would fly to other bits than zero does
+    return Entry(
+        position=np.where(flat, [zero, zero, radius - world.polar_radius], radius * place) + 0.0,
+        velocity=np.where(flat, [flat_ahead, -flat_right, up], north * to_north + east * to_east + up * place) + 0.0,
+        speed=np.sqrt(north**2 + east**2 + up**2),
+        path=np.arctan2(up, np.hypot(north, east)),
+        planned=planned,
     )
 
 
-def _flat_place(altitude):
-    """Place [m] over the flat Earth: ahead, left and up of the entry point."""
-    zero = np.zeros_like(altitude)
-    return np.array([zero, zero, altitude])
+def _height(i: SimpleNamespace, world: World):
+    """(radius, geodetic altitude) [m] of the planned entry, one of which is given."""
+    radius = radius_at_altitude(i.entry_altitude, i.entry_latitude, world.polar_radius, world.e2)
+    radius = np.where(i.entry_radius > 0.0, i.entry_radius, radius)
+    altitude = over_ellipsoid(radius, 1.0 / radius, np.sin(i.entry_latitude) ** 2, world.polar_radius, world.e2)[0]
+    return radius, np.where(i.entry_radius > 0.0, altitude, i.entry_altitude)
 
 
-def _flat_velocity(components, heading):
-    """Velocity [m/s] ahead, left and up, from north, east and up."""
-    north, east, up = components
-    s, c = np.sin(heading), np.cos(heading)
-    return np.array([north * c + east * s, north * s - east * c, up])
+def _arrival(i: SimpleNamespace, settings: SimpleNamespace, world: World, radius: np.ndarray, refusals: Refusals):
+    """(speed, flight-path angle) of the planned entry in the frame speed_frame: those given, or of a hyperbola.
+
+    Its energy and angular momentum are those of the excess speed and of the vacuum periapsis, which lies below the
+    radius or the case joins `refusals`.  Speed [m/s], angle [rad]; derived here from their
+    conservation on the hyperbola.
+    """
+    comes = settings.arrival == HYPERBOLA
+    periapsis = world.radius + i.vacuum_periapsis
+    speed = np.sqrt(i.excess_speed**2 + 2.0 * world.mu / radius)
+    cosine = periapsis * np.sqrt(i.excess_speed**2 + 2.0 * world.mu / periapsis) / (radius * speed)
+    refusals.add(comes & ~(np.abs(cosine) <= 1.0), "the vacuum periapsis lies above the entry altitude")
+    path = -np.arccos(np.clip(cosine, -1.0, 1.0))
+    return np.where(comes, speed, i.entry_speed), np.where(comes, path, i.entry_flight_path_angle)

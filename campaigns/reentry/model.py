@@ -2,20 +2,18 @@
 
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
 from campaigns.reentry import dynamics, outcome, weather
-from campaigns.reentry.air import GAS_CONSTANT
 from campaigns.reentry.airframe import airframe_of, airframe_rows
-from campaigns.reentry.entry_state import Entry, World, entry_of, world_of
+from campaigns.reentry.dynamics import crossings
+from campaigns.reentry.entry_state import Planned, World, entry_of, world_of
 from campaigns.reentry.guidance import laws
 from campaigns.reentry.guidance.plan import planned_entry, plans_of
 from campaigns.reentry.guidance.reference import stored_references
 from campaigns.reentry.inputs import DETRA_KEMP_RIDDELL, EARTH, FLAT, J2, US76, Inputs
-from campaigns.reentry.planets import of_planets
-from mc_engine.model import AdaptiveStep, Event, Refusals, model
+from mc_engine.model import AdaptiveStep, Event, Refusals, model, prepared
 from mc_engine.model.figures import (
     CorridorFigure,
     FootprintFigure,
@@ -41,26 +39,23 @@ def prepare(inputs: SimpleNamespace, settings: SimpleNamespace, refusals: Refusa
     _refuse_what_does_not_fit(settings, refusals)
     world = world_of(inputs, settings)
     entry = entry_of(inputs, settings, world, refusals)
-    planned = planned_entry(settings, world, entry, refusals)
+    planned = planned_entry(inputs, settings, world, entry, refusals)
     airframe = airframe_of(inputs, settings, refusals)
-    exit_altitude = np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, entry.altitude)
-    refusals.add(entry.altitude <= inputs.stop_altitude, "the entry is not above stop_altitude_km")
-    rows = vars(inputs) | _axes("", entry.position) | _axes("v", entry.velocity)
-    rows |= {"exit": exit_altitude, "speed": entry.speed, "path": entry.path} | _planet_rows(settings, world)
-    rows |= airframe_rows(inputs, settings, airframe) | _bank_rows(inputs, settings)
+    altitude = entry.planned.altitude
+    refusals.add(altitude <= inputs.stop_altitude, "the entry is not above stop_altitude_km")
     plan = plans_of(inputs, settings, world, planned, airframe)
     guided = settings.guidance > 0.5
     refusals.add(guided & ~(plan.lift_to_drag > 0.0), "a guidance law needs a vehicle with lift")
     references = stored_references(plan, guided, FIRST, refusals)
+    rows = vars(inputs) | world._asdict() | _axes("", entry.position) | _axes("v", entry.velocity)
+    rows |= {"exit": np.where(inputs.exit_altitude > 0.0, inputs.exit_altitude, altitude)}
+    rows |= {"speed": entry.speed, "path": entry.path}  # over ground, errors included; the heading is the planned one
+    # the numbers of a vehicle that is named take the place of the inputs
+    rows |= airframe_rows(inputs, settings, airframe) | _bank_rows(inputs, settings)
     rows |= _target(inputs, world, planned, np.where(guided, references.range, inputs.target_downrange))
     rows |= {"reference": references.start, "planned_range": references.range, "planned_share": plan.share}
     rows |= {"planned_lift_to_drag": plan.lift_to_drag}
     return rows | _case_tables(inputs, settings, references.tables)
-
-
-def no_tables(_: Any) -> np.ndarray:
-    """What all cases share is nothing, a zero: reference paths and air are those of `prepare`, and lie behind it."""
-    return np.zeros(FIRST)
 
 
 def _axes(letters: str, vectors: np.ndarray) -> dict[str, np.ndarray]:
@@ -70,39 +65,27 @@ def _axes(letters: str, vectors: np.ndarray) -> dict[str, np.ndarray]:
 
 def _refuse_what_does_not_fit(settings: SimpleNamespace, refusals: Refusals) -> None:
     """Scenarios that contradict themselves."""
-    other = settings.planet != EARTH
-    refusals.add(other & (settings.atmosphere == US76), 'the atmosphere "us76" is that of the Earth')
-    refusals.add(other & (settings.gravity == J2), 'the gravity "j2" is that of the Earth; take "point"')
-    refusals.add(other & (settings.weather > 0.5), "the random air of weather = true is that of the Earth")
-    refusals.add(
-        other & (settings.heating == DETRA_KEMP_RIDDELL), 'the heating "detra_kemp_riddell" is that of the Earth\'s air'
-    )
-    flat = settings.shape == FLAT
-    refusals.add(flat & (settings.weather > 0.5), "a flat Earth has no weather")
-    refusals.add((settings.guidance > 0.5) & flat, "the guidance laws want a round planet")
-    refusals.add(flat & (settings.rotating > 0.5), "a flat Earth does not turn; set rotating = false")
-    refusals.add(flat & (settings.gravity == J2), 'a flat Earth has the gravity "point", which is uniform, or "none"')
-
-
-def _planet_rows(settings: SimpleNamespace, world: World) -> dict[str, np.ndarray]:
-    """Gravity, rotation and air of each case's planet, SI; temperature [K] g H0 / R."""
-    air = of_planets(settings.planet, "air")
-    gravity = world.mu / world.radius**2
-    return {
-        "mu": world.mu,
-        "rate": world.rate,
-        "polar_radius": world.polar_radius,
-        "radius": world.radius,
-        "e2": world.e2,
-        "gravity": gravity,
-        "log_density": np.log(air[:, 0]),
-        "inverse_scale": 1.0 / air[:, 1],
-        "temperature": gravity * air[:, 1] / GAS_CONSTANT,
-    }
+    other, flat, weather = settings.planet != EARTH, settings.shape == FLAT, settings.weather > 0.5
+    j2, by_air = settings.gravity == J2, settings.heating == DETRA_KEMP_RIDDELL
+    for mask, sentence in (
+        (other & (settings.atmosphere == US76), 'the atmosphere "us76" is that of the Earth'),
+        (other & j2, 'the gravity "j2" is that of the Earth; take "point"'),
+        (other & weather, "the random air of weather = true is that of the Earth"),
+        (other & by_air, 'the heating "detra_kemp_riddell" is that of the Earth\'s air'),
+        (flat & weather, "a flat Earth has no weather"),
+        (flat & (settings.guidance > 0.5), "the guidance laws want a round planet"),
+        (flat & (settings.rotating > 0.5), "a flat Earth does not turn; set rotating = false"),
+        (flat & j2, 'a flat Earth has the gravity "point", which is uniform, or "none"'),
+    ):
+        refusals.add(mask, sentence)
 
 
 def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.ndarray]:
-    """Directions of the lift, cosines and sines of bank and flight-path angle [rad]; a planar flight has no side."""
+    """Directions of the lift by cosine and sine of the bank; a planar flight has no side.  When to roll.
+    first_bank [rad], the rest have no unit.
+
+    roll_at, roll_back_at : sines of the flight-path angles; 2 and -2, which no sine reaches, stand for "never"
+    """
     side = np.where(settings.planar > 0.5, 0.0, 1.0)
     first, rolled = i.bank + i.bank_error, i.rolled_bank + i.bank_error
     never = 0.5 * np.pi * (1.0 - 1e-12)
@@ -117,14 +100,14 @@ def _bank_rows(i: SimpleNamespace, settings: SimpleNamespace) -> dict[str, np.nd
     }
 
 
-def _target(i: SimpleNamespace, world: World, entry: Entry, end: np.ndarray) -> dict[str, np.ndarray]:
+def _target(i: SimpleNamespace, world: World, planned: Planned, end: np.ndarray) -> dict[str, np.ndarray]:
     """Unit axes of the distances, and the target; end : its downrange [m] where the inputs name none, 0 for none."""
     downrange = np.where(i.target_downrange > 0.0, i.target_downrange, end)
     along, across = downrange / world.radius, i.target_crossrange / world.radius
-    ahead = np.cos(along) * entry.place + np.sin(along) * entry.ahead
-    target = np.cos(across) * ahead + np.sin(across) * entry.right
-    rows = _axes("e", entry.place) | _axes("f", entry.ahead) | _axes("n", entry.right) | _axes("t", target)
-    return rows | {"heading": entry.heading, "aim_down": downrange, "aimed": np.where(downrange > 0.0, 1.0, 0.0)}
+    ahead = np.cos(along) * planned.place + np.sin(along) * planned.ahead
+    target = np.cos(across) * ahead + np.sin(across) * planned.right
+    rows = _axes("e", planned.place) | _axes("f", planned.ahead) | _axes("n", planned.right) | _axes("t", target)
+    return rows | {"heading": planned.heading, "aim_down": downrange, "aimed": np.where(downrange > 0.0, 1.0, 0.0)}
 
 
 def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.ndarray) -> dict[str, np.ndarray]:
@@ -135,10 +118,6 @@ def _case_tables(i: SimpleNamespace, settings: SimpleNamespace, references: np.n
     nodes = weather.weather_nodes(i.weather_draw, i.density_random_size, i.wind_random_size, i.wind_mean_size)
     start = FIRST + references.size + weather.LENGTH * np.arange(asked.size)
     return {"weather": start, "tables": np.concatenate([references, nodes.ravel()])}
-
-
-def _crossing(direction: str, action: str, rare: bool = False) -> Event:
-    return Event(dynamics.crossings, direction, action, rare=rare)
 
 
 HIGHEST_LANDING_KM = 35.0  # a flight that ends higher has left the atmosphere again, or ran out of time
@@ -200,22 +179,22 @@ MODEL = model(
         method="dp54",
         attempts=50_000,
     ),
-    kernel_parameters=dynamics.Parameters,
+    kernel_parameters=prepared(prepare, Inputs),
     prepare=prepare,
-    tables=no_tables,
+    tables=lambda o: np.zeros(FIRST),  # nothing is shared: reference paths and air are those of `prepare`
     initial=dynamics.initial,
     start=dynamics.start,
     control=laws.control,
     rhs=dynamics.rhs,
     events={
-        "pressure_peak": _crossing("falling", "switch"),
-        "heat_peak": _crossing("falling", "switch"),
-        "pull_out": _crossing("rising", "switch", rare=True),
-        "roll": _crossing("rising", "switch", rare=True),
-        "leave": _crossing("rising", "switch", rare=True),
-        "stop": _crossing("falling", "stop"),
-        "left": _crossing("rising", "stop", rare=True),
-        "over": _crossing("falling", "stop", rare=True),
+        "pressure_peak": Event(crossings, "falling", "switch"),
+        "heat_peak": Event(crossings, "falling", "switch"),
+        "pull_out": Event(crossings, "rising", "switch", rare=True),
+        "roll": Event(crossings, "rising", "switch", rare=True),
+        "leave": Event(crossings, "rising", "switch", rare=True),
+        "stop": Event(crossings, "falling", "stop"),
+        "left": Event(crossings, "rising", "stop", rare=True),
+        "over": Event(crossings, "falling", "stop", rare=True),
     },
     switch=dynamics.switch,
     observe=outcome.observe,

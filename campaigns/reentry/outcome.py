@@ -4,25 +4,13 @@ from collections import namedtuple
 
 from campaigns.reentry.air import sound_speed
 from campaigns.reentry.bank import angle_at
-from campaigns.reentry.dynamics import (
-    UNKNOWN,
-    Loads,
-    Peak,
-    PullOut,
-    air_of,
-    exit_of,
-    exposure_of,
-    force_of,
-    heat_rate,
-    place_of,
-    speed2,
-)
+from campaigns.reentry.dynamics import NAN, PullOut, exit_of, exposure_of, from_planned_entry, moment_of, velocity
 from campaigns.reentry.inputs import FLAT, STOP_ON_EXIT, UNGUIDED
 from mc_engine.lanes import atan2, physics, sqrt, where
 from mc_engine.model import Field, at_end, metrics, outputs
 from mc_engine.physics.frames import TURN, full_turn, geodetic_latitude, spherical, velocity_angles
+from mc_engine.physics.vectors import norm
 
-NAN = float("nan")
 Outputs = outputs(
     altitude_km="geodetic altitude",
     speed_m_s="speed over ground",
@@ -112,11 +100,9 @@ def ground_of(s, altitude, p, o):
         path = atan2(s.vz, sqrt(s.vx * s.vx + s.vy * s.vy))
         heading = p.heading + atan2(-s.vy, s.vx)
     else:
-        _, longitude = spherical(s.x, s.y, s.z)
         latitude = geodetic_latitude(s.x, s.y, s.z, altitude, p.polar_radius, p.e2)
-        up = s.x * p.ex + s.y * p.ey + s.z * p.ez
-        ahead = s.x * p.fx + s.y * p.fy + s.z * p.fz
-        right = s.x * p.nx + s.y * p.ny + s.z * p.nz
+        longitude = spherical(s.x, s.y, s.z)[1]
+        up, ahead, right = from_planned_entry(s, p)
         along = atan2(ahead, up)
         downrange = p.radius * where(along < -0.25 * TURN, along + TURN, along)
         crossrange = p.radius * atan2(right, sqrt(up * up + ahead * ahead))
@@ -127,12 +113,7 @@ def ground_of(s, altitude, p, o):
 @physics
 def observe(t, s, m, p, o):
     """Outputs, SI and radians."""
-    place = place_of(s, p, o)
-    air = air_of(s, place, p, o)
-    v2 = speed2(air)
-    through = sqrt(v2)
-    pressure = 0.5 * air.density * v2
-    force = force_of(air, through, p, o)
+    place, air, force, pressure, flux = exposure_of(s, p, o)
     ground = ground_of(s, place.altitude, p, o)
     if o.guidance == UNGUIDED:
         bank = atan2(m.met.lift.sin_bank, m.met.lift.cos_bank)
@@ -140,7 +121,7 @@ def observe(t, s, m, p, o):
         bank = angle_at(t, m.steering.turn, o.guidance_period)
     return Outputs(
         altitude=place.altitude,
-        speed=sqrt(speed2(s)),
+        speed=norm(velocity(s)),
         flight_path_angle=ground.path,
         heading=ground.heading,
         latitude=ground.latitude,
@@ -150,26 +131,19 @@ def observe(t, s, m, p, o):
         load=pressure * force.total,
         axial_load=pressure * force.axial,
         dynamic_pressure=pressure,
-        heat_rate=heat_rate(air.density, through, p, o),
+        heat_rate=flux,
         heat_load=s.heat_load,
-        mach=through / sound_speed(air.temperature),
+        mach=air.speed / sound_speed(air.temperature),
         density=air.density,
         bank=bank,
     )
 
 
 @physics
-def known(value):
-    """The value, or not a number where it is unknown."""
-    return where(abs(value) < UNKNOWN, value, NAN)
-
-
-@physics
 def target_of(p, o):
     """(geodetic latitude, longitude) of the target [rad], not numbers without one or over a flat Earth."""
-    if o.shape == FLAT:
-        latitude, longitude = NAN, NAN
-    else:
+    latitude, longitude = NAN, NAN
+    if o.shape != FLAT:
         # at the altitude where the flight ends, so that a hit lies no distance from it
         r = p.polar_radius / sqrt(1.0 - p.e2 * (1.0 - p.tz * p.tz)) + p.stop_altitude
         latitude = geodetic_latitude(r * p.tx, r * p.ty, r * p.tz, p.stop_altitude, p.polar_radius, p.e2)
@@ -181,42 +155,38 @@ def target_of(p, o):
 @physics
 def evaluate(t, s, m, p, o):
     """The metrics that are no outputs at the end of the flight, SI and radians."""
-    pressure, flux, altitude, v, force = exposure_of(s, p, o)
-    ground = ground_of(s, altitude, p, o)
-    met, steering = m.met, m.steering
-    push = pressure > met.pressure.value  # the flight may end before a peak
-    # the load peaks with the dynamic pressure
-    peak = where(push, Peak(pressure, t, altitude, v), met.pressure)
-    loads = where(push, Loads(force.total, force.axial), met.loads)
-    hottest = where(flux > met.flux.value, Peak(flux, t, altitude, v), met.flux)
-    load = peak.value * loads.total
-    lowest = where(met.pull_out.altitude < UNKNOWN, met.pull_out, PullOut(altitude, t))
-    leaves = (o.on_exit == STOP_ON_EXIT) & (altitude > p.exit - 1e-3) & (ground.path > 0.0)
+    now, met, steering = moment_of(t, s, p, o), m.met, m.steering
+    # the flight may end before a peak; the load peaks with the dynamic pressure
+    pressed = where(now.pressure > met.pressed.pressure, now, met.pressed)
+    hottest = where(now.flux > met.hottest.flux, now, met.hottest)
+    lowest = where(met.pull_out.time >= 0.0, met.pull_out, PullOut(now.altitude, t))
+    ground = ground_of(s, now.altitude, p, o)
+    leaves = (o.on_exit == STOP_ON_EXIT) & (now.altitude > p.exit - 1e-3) & (ground.path > 0.0)
     first = where(leaves, exit_of(t, s, p, o), met.first_exit)
     violations = (
-        where(load > p.corridor_load, 1.0, 0.0)
-        + where(hottest.value > p.corridor_heat_rate, 1.0, 0.0)
+        where(pressed.load > p.corridor_load, 1.0, 0.0)
+        + where(hottest.flux > p.corridor_heat_rate, 1.0, 0.0)
         + where(s.heat_load > p.corridor_heat_load, 1.0, 0.0)
-        + where(peak.value > p.corridor_dynamic_pressure, 1.0, 0.0)
+        + where(pressed.pressure > p.corridor_dynamic_pressure, 1.0, 0.0)
     )
     miss_down, miss_cross = ground.downrange - p.aim_down, ground.crossrange - p.target_crossrange
     target_latitude, target_longitude = target_of(p, o)
     reference_range = NAN if o.guidance == UNGUIDED else p.planned_range
     sampled = steering.samples > 0.0
     return Metrics(
-        peak_load=load,
-        peak_load_time=peak.time,
-        peak_load_altitude=peak.altitude,
-        peak_load_speed=peak.speed,
-        peak_axial_load=peak.value * loads.axial,
-        peak_axial_load_time=peak.time,
-        peak_axial_load_altitude=peak.altitude,
-        peak_axial_load_speed=peak.speed,
-        peak_dynamic_pressure=peak.value,
-        peak_dynamic_pressure_time=peak.time,
-        peak_dynamic_pressure_altitude=peak.altitude,
-        peak_dynamic_pressure_speed=peak.speed,
-        peak_heat_rate=hottest.value,
+        peak_load=pressed.load,
+        peak_load_time=pressed.time,
+        peak_load_altitude=pressed.altitude,
+        peak_load_speed=pressed.speed,
+        peak_axial_load=pressed.axial_load,
+        peak_axial_load_time=pressed.time,
+        peak_axial_load_altitude=pressed.altitude,
+        peak_axial_load_speed=pressed.speed,
+        peak_dynamic_pressure=pressed.pressure,
+        peak_dynamic_pressure_time=pressed.time,
+        peak_dynamic_pressure_altitude=pressed.altitude,
+        peak_dynamic_pressure_speed=pressed.speed,
+        peak_heat_rate=hottest.flux,
         peak_heat_rate_time=hottest.time,
         peak_heat_rate_altitude=hottest.altitude,
         peak_heat_rate_speed=hottest.speed,
@@ -224,11 +194,11 @@ def evaluate(t, s, m, p, o):
         min_altitude=lowest.altitude,
         min_altitude_time=lowest.time,
         exits=where(leaves, 1.0, met.exits),
-        exit_time=known(first.time),
-        exit_speed=known(first.speed),
-        exit_flight_path_angle=known(first.angle),
-        exit_inertial_speed=known(first.inertial),
-        exit_apoapsis_altitude=known(first.apoapsis),
+        exit_time=first.time,
+        exit_speed=first.speed,
+        exit_flight_path_angle=first.angle,
+        exit_inertial_speed=first.inertial,
+        exit_apoapsis_altitude=first.apoapsis,
         miss=where(p.aimed > 0.5, sqrt(miss_down * miss_down + miss_cross * miss_cross), NAN),
         target_latitude=target_latitude,
         target_longitude=target_longitude,

@@ -10,7 +10,7 @@ from mc_engine.campaign.inputs import number
 from mc_engine.campaign.loading import Campaign
 from mc_engine.campaign.parts import rank_pairs
 from mc_engine.campaign.sensitivity_design import DESIGN as PICK_FREEZE
-from mc_engine.campaign.sensitivity_design import companion_table, upstream_ids
+from mc_engine.campaign.sensitivity_design import companion_table, names_a_draw, upstream_ids
 from mc_engine.errors import CampaignError, Problem
 from mc_engine.sampling.designs import BY_LEVELS, EXTENSIBLE, grid_levels, one_at_a_time_levels, unit_cube
 from mc_engine.sampling.distributions import column, quantiles
@@ -89,7 +89,10 @@ def full_inputs(campaign: Campaign, table: dict[str, np.ndarray]) -> dict[str, A
 
 
 def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
-    """One plain record a dispersion, for manifest and report: name, unit, nominal, distribution, bounds, source."""
+    """One plain record a dispersion, for manifest and report: name, unit, nominal, distribution, bounds, source.
+
+    random_draw : true for those that only name a random draw, absent of all others.
+    """
     records = []
     for dispersion in campaign.dispersions:
         item = campaign.model.input(dispersion.name)
@@ -103,6 +106,7 @@ def dispersion_records(campaign: Campaign) -> list[dict[str, Any]]:
                 "bounds": _bounds_text(dispersion, item.unit),
                 "source": dispersion.source,
                 "note": dispersion.note,
+                **({"random_draw": True} if names_a_draw(campaign.model, dispersion.name) else {}),
             }
         )
     return records

@@ -56,7 +56,7 @@ def accepted_range(item: Parameter | Setting) -> str:
     if isinstance(item, Setting) and item.date:
         return f"{date_text(item.low)} to {date_text(item.high)}"
     unit = f" {item.unit}" if item.unit else ""
-    if item.low == item.high == 0.0 or (item.low > float("-inf") and item.high < float("inf")):
+    if item.low > float("-inf") and item.high < float("inf"):
         return f"{number(item.low)} to {number(item.high)}{unit}"
     if item.low > float("-inf"):
         return f"{number(item.low)}{unit} and above"

@@ -20,7 +20,6 @@ from mc_engine.campaign.dispersions import Dispersion, build_dispersion
 from mc_engine.campaign.parts import (
     Correlation,
     Requirement,
-    Retention,
     check_correlations,
     check_metric,
     check_requirements,
@@ -33,7 +32,7 @@ from mc_engine.campaign.parts import (
 )
 from mc_engine.campaign.reading import Findings, Sections, parse_toml, read_sections
 from mc_engine.campaign.search import campaign_name, campaign_text, find_campaign
-from mc_engine.campaign.sections import CampaignSection
+from mc_engine.campaign.sections import CampaignSection, HistoriesSection
 from mc_engine.campaign.sensitivity_design import SensitivityDesign, check_sensitivity
 from mc_engine.campaign.tuning_section import Tuning, check_tuning
 from mc_engine.errors import CampaignError, ModelError
@@ -70,7 +69,7 @@ class Campaign:
     dispersions : tuple of Dispersion, the inputs that differ from case to case, in file order
     correlations : tuple of Correlation, rank correlations between dispersions
     requirements : tuple of Requirement, the limits that the results must meet
-    retention : Retention, the cases whose time histories are saved
+    retention : HistoriesSection, the cases whose time histories are saved
     digest : str, SHA-256 of all that decides the inputs of a case or the verdicts.  The number of cases is part of it
         only for "lhs": an extended campaign is the same campaign.
     table_path : Path or None, the file of the design "table"
@@ -104,7 +103,7 @@ class Campaign:
     dispersions: tuple[Dispersion, ...]
     correlations: tuple[Correlation, ...]
     requirements: tuple[Requirement, ...]
-    retention: Retention
+    retention: HistoriesSection
     digest: str
     table_path: Path | None = None
     table: Mapping[str, np.ndarray] = field(default_factory=dict, compare=False, repr=False)

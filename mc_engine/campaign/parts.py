@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +16,9 @@ from mc_engine.campaign.sections import (
     CampaignSection,
     ConstraintSection,
     CorrelationSection,
+    HistoriesSection,
     RequirementSection,
     RetentionSection,
-    WorstSection,
 )
 from mc_engine.errors import MOST_SHOWN, ModelError
 from mc_engine.model.faults import naming_faults
@@ -59,25 +59,6 @@ class Requirement:
     share: float
     confidence: float
     source: str = ""
-
-
-class Worst(NamedTuple):
-    """The `n_cases` worst cases of a metric: its "largest" or "smallest" values; of None, as its requirement says."""
-
-    metric: str
-    n_cases: int
-    side: str | None
-
-
-@dataclass(frozen=True)
-class Retention:
-    """Which cases keep their flight history, and of about how many rows."""
-
-    nominal: bool = True
-    first: int = 0
-    worst: tuple[Worst, ...] = ()
-    cases: tuple[int, ...] = ()
-    rows: int = 1500
 
 
 def system_of(
@@ -263,25 +244,22 @@ def check_limits(section: RequirementSection | ConstraintSection, findings: Find
 
 def check_retention(
     section: RetentionSection | None, model: System, cases: int | None, shortened: bool, findings: Findings
-) -> Retention:
-    """The retention, its case numbers checked against `cases` (None: unknown); by default where it could not be read.
+) -> HistoriesSection:
+    """Which histories are saved; by default where the section could not be read.
 
-    shortened : the number of cases is not the file's; numbers beyond it are then dropped, not refused.
+    cases : number of cases, None where it is unknown.  shortened : it is not the file's; numbers beyond it are then no
+    mistake.
     """
     if section is None:
-        return Retention()
-    histories = section.histories
-    worst = histories.worst or []
-    entries = [worst] if isinstance(worst, WorstSection) else worst
-    section_findings = findings.under("histories")
-    for k, entry in enumerate(entries, start=1):
-        check_metric(entry.metric, model, section_findings.under("worst" if entries is not worst else f"worst {k}"))
+        return HistoriesSection()
+    histories, section_findings = section.histories, findings.under("histories")
+    for k, entry in enumerate(histories.worst_of, start=1):
+        several = isinstance(histories.worst, list)
+        check_metric(entry.metric, model, section_findings.under(f"worst {k}" if several else "worst"))
     for case in histories.cases:
         if cases is not None and case >= cases and not shortened:
             section_findings.add("cases", f"there is no case {case}; they are 0 to {cases - 1}")
-    kept = tuple(case for case in histories.cases if cases is None or case < cases)
-    chosen = tuple(Worst(entry.metric, entry.count, entry.side) for entry in entries)
-    return Retention(histories.nominal, histories.first, chosen, kept, histories.rows)
+    return histories
 
 
 def check_metric(metric: str, model: System, findings: Findings) -> None:

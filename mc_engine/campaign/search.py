@@ -3,8 +3,9 @@
 import os
 import re
 import tomllib
+from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mc_engine.errors import CampaignError, ModelError, Problem
 from mc_engine.store.run_files import NO_TEXT, readable
@@ -34,7 +35,8 @@ def list_campaigns() -> list[ShippedCampaign]:
     >>> [campaign.name for campaign in list_campaigns()][:2]
     ['deorbit', 'deorbit/demonstration']
     """
-    return [ShippedCampaign(name, path, _title(path)) for name, path in sorted(_shipped().items())]
+    files = sorted(_shipped().items())
+    return [ShippedCampaign(name, path, str(campaign_section(path).get("title", ""))) for name, path in files]
 
 
 def campaign_names() -> list[str]:
@@ -66,14 +68,10 @@ def model_sources() -> dict[str, str]:
     from mc_engine.model.record import load_model
 
     sources = {}
-    for folder in sorted(path.parent for path in SHIPPED.glob("*/campaign.toml")):
-        try:
-            reference = tomllib.loads((folder / "campaign.toml").read_text(encoding="utf-8"))["campaign"]["model"]
-            source = load_model(reference, folder).source
-        except (ModelError, OSError, ValueError, LookupError, TypeError):
-            continue
-        if source:
-            sources[folder.name] = source
+    for path in sorted(SHIPPED.glob("*/campaign.toml")):
+        with suppress(ModelError):
+            if source := load_model(str(campaign_section(path).get("model")), path.parent).source:
+                sources[path.parent.name] = source
     return sources
 
 
@@ -130,13 +128,13 @@ def _shipped() -> dict[str, Path]:
     return files
 
 
-def _title(path: Path) -> str:
-    """The title alone, without loading the model; empty where there is none."""
+def campaign_section(path: Path) -> dict[str, Any]:
+    """The table [campaign] of a file as it is written, which is not checked; empty where there is none."""
     try:
-        campaign = tomllib.loads(path.read_text(encoding="utf-8")).get("campaign")
+        section = tomllib.loads(path.read_text(encoding="utf-8")).get("campaign")
     except (OSError, ValueError):
-        return ""
-    return str(campaign.get("title", "")) if isinstance(campaign, dict) else ""
+        return {}
+    return section if isinstance(section, dict) else {}
 
 
 def _not_found(text: str, path: Path, names: list[str]) -> str:

@@ -268,6 +268,11 @@ class HistoriesSection(Section):
     rows: int = Field(default=1500, ge=10, le=1_000_000, description="about how many rows each history has")
     worst: Worst | None = Field(default=None, description="the worst cases of a metric")
 
+    @property
+    def worst_of(self) -> list[WorstSection]:
+        """Of each metric whose worst cases are asked for, how many and on which side."""
+        return [self.worst] if isinstance(self.worst, WorstSection) else self.worst or []
+
 
 class RetentionSection(Section):
     """[retention]"""

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mc_engine.campaign.dispersions import Dispersion
-from mc_engine.campaign.parts import Correlation, Retention, rank_pairs
+from mc_engine.campaign.parts import Correlation, rank_pairs
 from mc_engine.campaign.reading import Findings
-from mc_engine.campaign.sections import MOST_CASES, SensitivitySection
+from mc_engine.campaign.sections import MOST_CASES, HistoriesSection, SensitivitySection
 from mc_engine.model.fields import Parameter
 from mc_engine.model.simulator import Simulator, System
 from mc_engine.sampling.block_layout import NOMINAL, RANDOM_DRAWS, A, BlockLayout
@@ -93,7 +93,7 @@ def _groups(
 ) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Each group with its dispersions, in the order of the file; the random draws last."""
     names = [dispersion.name for dispersion in dispersions]
-    draws = [name for name in names if _names_a_draw(model, name)]
+    draws = [name for name in names if names_a_draw(model, name)]
     home = {name: name for name in names}  # the group of each dispersion
     for group, members in section.group.items():
         for name in members:
@@ -115,7 +115,8 @@ def _groups(
         yield RANDOM_DRAWS, tuple(draws)
 
 
-def _names_a_draw(model: System, name: str) -> bool:
+def names_a_draw(model: System, name: str) -> bool:
+    """Whether an input only names a random draw, as a seed does."""
     item = model.input(name)
     return isinstance(item, Parameter) and item.random_draw
 
@@ -125,7 +126,7 @@ def companion(campaign: "Campaign") -> "Campaign":
     assert campaign.sensitivity is not None  # the caller looked
     asked = "/".join((campaign.digest, DESIGN, *campaign.sensitivity.layout.held))
     digest = sha256(asked.encode()).hexdigest()
-    retention = Retention(nominal=campaign.retention.nominal, rows=campaign.retention.rows)
+    retention = HistoriesSection(nominal=campaign.retention.nominal, rows=campaign.retention.rows)
     cases = campaign.sensitivity.flights
     return replace(campaign, design=DESIGN, cases=cases, digest=digest, retention=retention, looks=(), tuning=None)
 
@@ -175,7 +176,7 @@ def _point_columns(
     columns = []
     for place, name in enumerate(names):
         dimension, stream = 2 * place + k, f"{name}/{DESIGN} {_POINTS[k]}"
-        if k < 2 and dimension < MAX_DIMENSIONS and not _names_a_draw(campaign.model, name):
+        if k < 2 and dimension < MAX_DIMENSIONS and not names_a_draw(campaign.model, name):
             columns.append(scrambled_sobol(sobol_key(f"{campaign.seed}/{stream}"), dimension, block))
         else:
             columns.append(uniforms(campaign.seed, stream, block))

@@ -2,7 +2,7 @@
 
 import importlib
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,7 +32,6 @@ from mc_engine.interruption import NOTHING_BEGUN, advise, raise_if_signalled
 
 if TYPE_CHECKING:
     from mc_engine.campaign.loading import Campaign
-    from mc_engine.campaign.parts import Requirement
     from mc_engine.studies.lane_speed import Timing
 
 CHANGED = 1  # the exit status of `compare`
@@ -147,7 +146,6 @@ def rare(
     if method not in METHODS:
         leave(USAGE, f'--method "{method}" is not known; {" or ".join(METHODS)}')
     campaign = load_campaign(file, seed=seed)
-    _refuse_ambiguity(campaign.requirements, requirement)
     chosen_requirement(campaign, requirement)
     refuse_unmappable(campaign)
     path = out if out is not None else default_folder(f"{campaign.name}-rare")
@@ -169,12 +167,6 @@ def rare(
         typer.echo(line)
     for report_path in [] if no_report else write_reports(path, ("html", "pdf")):
         typer.echo(f"report       {report_path}")
-
-
-def _refuse_ambiguity(requirements: Sequence["Requirement"], name: str | None) -> None:
-    if name is None and len(requirements) > 1:
-        names = ", ".join(requirement.name for requirement in requirements)
-        leave(USAGE, f"--requirement is missing: the campaign has several; choose one of {names}")
 
 
 class _ProgressLines:

@@ -11,7 +11,6 @@ import re
 import subprocess
 import sys
 import time
-import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from datetime import datetime
@@ -21,7 +20,7 @@ from tempfile import TemporaryDirectory
 
 import typer
 
-from mc_engine.campaign.search import campaign_name, find_campaign
+from mc_engine.campaign.search import campaign_name, campaign_section, find_campaign
 from mc_engine.command_line.app import USAGE, leave, write_reports
 from mc_engine.durable_file import make_folder, write_durably
 from mc_engine.interruption import advise, unsignalled_children
@@ -124,9 +123,10 @@ def _fly_once(file: Path, arguments: Sequence[str], page: "_Page", seen: dict[Pa
             page.complain(f"{clock}, not flown", complaint)
             typer.echo(f"{clock}     {complaint}", err=True)
             return
-        page.show(run, f"{clock}, flown in {time.monotonic() - begun:.1f} s")
-    lines = [line for line in told.splitlines() if not line.startswith("run ")]
-    typer.echo("\n".join([f"{clock}     flown in {time.monotonic() - begun:.1f} s", *lines]))
+        flown = f"flown in {time.monotonic() - begun:.1f} s"
+        lines = [line for line in told.splitlines() if not line.startswith("run ")]
+        typer.echo("\n".join([f"{clock}     {flown}", *lines]))
+        page.show(run, f"{clock}, {flown}")
 
 
 def _outcome(flight: "subprocess.Popen[str]", file: Path, seen: dict[Path, tuple[int, int]]) -> tuple[str, str] | None:
@@ -166,10 +166,7 @@ def _stamps(file: Path) -> dict[Path, tuple[int, int]]:
 def _folders(file: Path) -> list[Path]:
     """The folder of the campaign file, and that of the model where it lies elsewhere."""
     home = file.absolute().parent
-    try:
-        model = tomllib.loads(file.read_text(encoding="utf-8"))["campaign"]["model"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return [home]
+    model = campaign_section(file).get("model")
     if not isinstance(model, str):
         return [home]
     if model.endswith(".py"):

@@ -1,13 +1,12 @@
 """The reference of the shipped campaigns: their files, and every number that goes in and comes out."""
 
-import tomllib
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
-from mc_engine.campaign.search import SHIPPED, ShippedCampaign, list_campaigns
+from mc_engine.campaign.search import SHIPPED, ShippedCampaign, campaign_section, list_campaigns
 from mc_engine.documentation.markdown_text import code, escaped, table
 from mc_engine.model import AdaptiveStep, Event, Model, Named, Parameter, Setting, load_model
 from mc_engine.status import STATUS_NAME, STATUS_TEXT
@@ -63,7 +62,7 @@ def campaign_page(name: str, files: Sequence[ShippedCampaign]) -> str:
 
 def model_reference(path: Path) -> str:
     """The model that a campaign file names."""
-    return str(tomllib.loads(path.read_text(encoding="utf-8"))["campaign"]["model"])
+    return str(campaign_section(path)["model"])
 
 
 def _model(model: Model, reference: str, files: Sequence[ShippedCampaign], alone: bool) -> Iterator[str]:

@@ -12,6 +12,8 @@ import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,10 +24,12 @@ from mc_engine.campaign.loading import Campaign, load_campaign
 from mc_engine.errors import EngineError
 from mc_engine.flight.flight import fly, fly_interpreted, grid_of
 from mc_engine.flight.flyer import NOMINAL_NOISE
+from mc_engine.flight.kernel import build_kernel
 from mc_engine.flight.kernel_parts import watching_events
 from mc_engine.flight.lost_numbers import first_lost
 from mc_engine.flight.repeatability import influences, model_digests, nominal_inputs, note_environment
 from mc_engine.garbage_collection import collect_rarely
+from mc_engine.lanes.kernel_cache import form_of, kept_or_made
 from mc_engine.model.faults import MORE, fault_of
 from mc_engine.model.fields import AdaptiveStep, Event, FixedStep
 from mc_engine.model.phases import due_field, noted_field
@@ -286,14 +290,40 @@ def _never_crossing(campaign: Campaign, inputs: Mapping[str, Any], ids: np.ndarr
 
 def _nominal_reach(campaign: Campaign, watched: Model) -> Columns:
     """The metrics of `watching_events` in the nominal case, flown by Python; none where it takes too long or fails."""
-    from mc_engine.flight.interpreted import InterpretedFlight  # which loads the compiler
-
-    flight = InterpretedFlight(watched, _INTERPRETED_S)
+    flight = _KeptFlight(watched, campaign.directory)
     try:
         _, status, _, metrics = fly_interpreted(flight, campaign.nominal, NOMINAL_NOISE, campaign.seed)
     except Exception:
         return {}  # no finding: kernels go on where Python raises, and the kernel that watches is asked
     return {metric.name: row for metric, row in zip(watched.metrics, metrics, strict=False)} if status[0] == OK else {}
+
+
+class _KeptFlight:
+    """Flies one case by Python and keeps its results in the cache.
+
+    They follow from the kernel, its arguments and the module that flies them, which name the file.
+    """
+
+    def __init__(self, model: Model, folder: Path | None):
+        self.model, self._folder = model, folder
+
+    def kernel(self, *arguments: Any) -> None:
+        inputs, results = arguments[:-7], arguments[-7:-3]  # last are the history, its rows and their pace
+
+        def flown() -> bytes:
+            from mc_engine.flight.interpreted import InterpretedFlight  # which loads the compiler
+
+            InterpretedFlight(self.model, _INTERPRETED_S).kernel(*arguments)
+            return b"".join(numbers.tobytes() for numbers in results)
+
+        by = Path(__file__).with_name("interpreted.py").read_bytes()
+        content = [(np.shape(given), np.asarray(given).tobytes()) for given in inputs]
+        digest = sha256(repr((by, content)).encode()).hexdigest()
+        compiled = build_kernel(self.model, self._folder, 1).file(form_of(arguments))
+        kept, _ = kept_or_made(compiled.with_suffix(f".{digest[:16]}.flight"), flown)
+        ends = np.cumsum([numbers.size for numbers in results])[:-1]
+        for numbers, values in zip(results, np.split(np.frombuffer(kept), ends), strict=True):
+            numbers[...] = values.reshape(numbers.shape)
 
 
 def _happens(model: Model, event: Event, reached: Columns) -> bool:

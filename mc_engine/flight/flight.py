@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,6 @@ from mc_engine.model.preparation import Inputs, Prepared, prepare
 from mc_engine.model.record import Model, Refusals
 from mc_engine.model.trial import refuse_unfit
 from mc_engine.status import OK, REFUSED, STATUS_NAME
-
-if TYPE_CHECKING:
-    from mc_engine.flight.interpreted import InterpretedFlight
 
 _NO_TABLES, _NO_HISTORY = np.empty(0), np.empty((0, 0))
 _NO_RECORDING = _NO_HISTORY, np.empty(0, dtype=np.int64), np.ones(1)
@@ -52,10 +49,13 @@ def fly(
     """
     width = width or usual_width(model)
     ready = prepare(model, inputs, len(case_ids))
+    fly_group = partial(_fly_group, model, clock or model.clock, ready, case_ids, seed, folder, width, build)
+    groups = _groups_by_settings(ready)
+    if [group.size for group in groups] == [len(case_ids)]:
+        return _columns(model, ready.refusals, fly_group(groups[0]))
     out = _unflown(model, ready.refusals)
-    for chosen in _groups_by_settings(ready):
-        flown = _fly_group(model, clock or model.clock, ready, chosen, case_ids, seed, folder, width, build)
-        for numbers, results in zip(out, flown, strict=True):
+    for chosen in groups:
+        for numbers, results in zip(out, fly_group(chosen), strict=True):
             numbers[..., chosen] = results
     return _columns(model, ready.refusals, out)
 
@@ -136,21 +136,23 @@ def _fly_group(
     model: Model,
     clock: FixedStep | AdaptiveStep,
     ready: Prepared,
-    chosen: np.ndarray,
     case_ids: np.ndarray,
     seed: int,
     folder: Path | None,
     width: int,
     build: Builder | None,
+    chosen: np.ndarray,
 ) -> tuple[np.ndarray, ...]:
     n = chosen.size
     # blocks on a fixed grid are filled up; adaptive lanes take the cases in turn, and want one each to begin with
     padded = max(n, width) if isinstance(clock, AdaptiveStep) else -(-n // width) * width
-    index = np.concatenate([chosen, np.full(padded - n, chosen[-1])])
     out = _outputs(model, padded)
+    parameters, ids = ready.parameters, case_ids
+    if n < max(padded, len(case_ids)):  # else these are all cases, in their order
+        index = np.concatenate([chosen, np.full(padded - n, chosen[-1])])
+        parameters, ids = parameters[:, index], ids[index]
     settings = np.ascontiguousarray(ready.settings[chosen[0]])
-    cases = ready.parameters[:, index], settings, ready.tables
-    ids = case_ids[index]
+    cases = parameters, settings, ready.tables
     in_another_thread(_bound_kernel(model, clock, folder, width, cases, seed, ids, out, build=build))
     return tuple(numbers[..., :n] for numbers in out)
 
@@ -214,12 +216,12 @@ def bound_flight(
 
 
 def fly_interpreted(
-    flight: "InterpretedFlight", inputs: Inputs, case_id: int, seed: int, history: Any = _NO_HISTORY
+    flight: Any, inputs: Inputs, case_id: int, seed: int, history: Any = _NO_HISTORY
 ) -> tuple[np.ndarray, ...]:
-    """(time, status, states, metrics) of one case in SI, flown by Python.
+    """(time, status, states, metrics) of one case in SI, flown by Python, a thousand times as slowly as by a kernel.
 
-    It takes some thousand times as long as a kernel; OutOfTime after the seconds that the flight may take.  The case
-    must be able to start.  history : as the kernel takes it, a row for every step.
+    The case must be able to start.  flight : an `InterpretedFlight`, or what has a `model` and a `kernel` as it does;
+    OutOfTime after the seconds that it may take.  history : as the kernel takes it, a row for every step.
     """
     ready = prepare(flight.model, inputs, 1)
     settings, out = np.ascontiguousarray(ready.settings[0]), _outputs(flight.model, 1)

@@ -54,7 +54,7 @@ class FmuFlight:
             name: taken(time, np.asarray(table[variable], dtype=np.float64), what, level)
             for name, (variable, what, level) in flown.metrics.items()
         }
-        return results, {"t_s": time, **{name: np.asarray(table[one]) for name, one in flown.outputs.items()}}
+        return results, {"t_s": time, **{name: np.asarray(table[variable]) for name, variable in flown.outputs.items()}}
 
     def _ready(self) -> Any:
         """The instance, as if no case had been flown."""

@@ -168,7 +168,7 @@ def _spread(value: Any, like: Any) -> Any:
 
 def _load_scalars(cls: Any, array: np.ndarray) -> Any:
     n = len(cls._fields) - (cls._fields[-1] == TABLES)
-    return cls(*map(Number, array[:n]), *([array[n + 2 :]] if n < len(cls._fields) else []))
+    return cls(*array[:n].tolist(), *([array[n + 2 :]] if n < len(cls._fields) else []))
 
 
 def _store(array: np.ndarray, column: int, value: Any, lane: int = 0) -> None:
@@ -202,7 +202,7 @@ _INTRINSICS: dict[str, Callable[..., Any]] = {
     "joined": lambda *tuples: sum(map(tuple, tuples), ()),
     "first_fields": lambda fields, like: _record(type(like), fields[: len(like)]),
     "load": lambda array, first, width: Number(array[first]),
-    "load_fields": lambda cls, array, first, width: cls(*_given(cls._fields, array[:, first])),
+    "load_fields": lambda cls, array, first, width: cls(*_given(cls._fields, array[:, first].tolist())),
     "load_scalars": _load_scalars,
     "scalars_like": lambda like, array: _record(type(like), [Number(item) for item in array]),
     "store": _store,
@@ -221,7 +221,7 @@ _INTRINSICS: dict[str, Callable[..., Any]] = {
 }
 
 
-def _given(names: Sequence[str], values: np.ndarray) -> list[Number]:
+def _given(names: Sequence[str], values: Sequence[float]) -> list[float]:
     """The parameters of a case; one that is no number has an origin of its own, as nothing in the flight made it."""
-    return [number(value, Origin(f'"{name}" of the kernel_parameters is {value:g}') if math.isnan(value) else None)
+    return [number(value, Origin(f'"{name}" of the kernel_parameters is {value:g}')) if math.isnan(value) else value
             for name, value in zip(names, values, strict=True)]  # fmt: skip

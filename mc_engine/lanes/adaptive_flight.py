@@ -1,6 +1,7 @@
 """Adaptive flight in lanes: each lane steps, locates events and ends independently, then takes the next case.
 
-A round of the loop is one attempt of every lane, so no lane waits for the events of another.
+A round of the loop is one attempt of every lane, so no lane waits for the events of another.  Before the next attempt
+a round without one prepares the lanes that take a case or that the model has changed.
 
 state       attempt                        next state
 stepping    a full step                    stepping; closing if it passed an event; shortening if it may have met zero
@@ -15,7 +16,6 @@ from collections import namedtuple
 from mc_engine.lanes.adaptive_step import (
     Instant,
     arm,
-    arrive,
     best_time,
     best_value,
     first_length,
@@ -25,6 +25,7 @@ from mc_engine.lanes.adaptive_step import (
     next_length,
     sense,
     turn_length,
+    watch,
 )
 from mc_engine.lanes.aligned_stack import align_stack
 from mc_engine.lanes.compiler import compile_inline
@@ -151,20 +152,19 @@ def _begin(f, p, o, key, case):
     """First state and memory of every lane."""
     t = case * 0.0
     s, m = f.states_of(spread(f.initial(p, o), t)), spread(f.start(p, o), t)
-    return s, spread(f.control(t, s, m, p, o, Draws(key, case, 0.0)), t)
+    # the sample in lanes, as in `_changed`: one type, for which the control is compiled once
+    return s, spread(f.control(t, s, m, p, o, Draws(key, case, t)), t)
 
 
 begin = compile_inline(_begin)
 
 
-def _departure(f, p, o, key, case):
-    """The first `Instant` of every lane; for its type alone, see `unset`."""
-    s, m = begin(f, p, o, key, case)
-    t = case * 0.0
-    return arrive(f, t, s, m, p, o, t)
+def _slope(f, t, s, m, p, o):
+    """Derivative of the state in every lane."""
+    return spread(f.rhs(t, s, m, p, o), t)
 
 
-departure = compile_inline(_departure)
+slope = compile_inline(_slope)
 
 
 def _length(f, clock, t, s, m, k, p, o, atol):
@@ -242,10 +242,12 @@ def _fly(
     o = load_scalars(setting_class, settings)
     p, case = load_fields(parameter_class, parameters, 0, width), load(cases, 0, width)
     waiting = width
-    here = unset(departure, f, p, o, key, case)
+    zero = case * 0.0
+    s, m = unset(begin, f, p, o, key, case)
+    k, values = unset(slope, f, zero, s, m, p, o), unset(watch, f, zero, s, m, p, o)
+    here = Instant(zero, s, m, k, values, values, values)
     atol = scalars_like(here.s, atol)
     kinds, signs = f.kinds_of(here.values), f.signs_of(here.values)
-    zero = case * 0.0
     new, altered = zero == zero, zero > 0.0  # lanes that begin a case, lanes that the model has changed
     active, status, attempts, sample, limit = zero + 1.0, zero, zero, zero + 1.0, zero + _NEVER
     h, last_ideal = zero, zero + _NONE  # of the step before this one: there is none
@@ -253,8 +255,10 @@ def _fly(
     bracket = Bracket(zero, zero, armed, armed, armed, armed, zero, zero, zero, zero)
     best, when = here.values, map_fields(first_time, here.values, zero)
     due, rows_of_step = zero, load(pace, 0, width)
+    flying, trial, length, error = active > 0.5, zero, zero, zero  # of an attempt: there is none before the first round
     while True:
-        if any_lane(new | altered):
+        starting = any_lane(new | altered)
+        if starting:
             if any_lane(new):
                 s, m = begin(f, p, o, key, case)
                 t, s, m = where(new, 0.0, here.t), select(new, s, here.s), select(new, m, here.m)
@@ -265,23 +269,28 @@ def _fly(
                 closing = closing & (not new)
                 if history.shape[0] > 0:
                     record_row(f, history, rows, new, t, s, m, p, o)
-            k = spread(f.rhs(here.t, here.s, here.m, p, o), zero)
+            k = slope(f, here.t, here.s, here.m, p, o)
             if any_lane(new):
                 h = where(new, length_at_start(f, clock, zero, here.s, here.m, k, p, o, atol), h)
-            start = sense(f, here.t, here.s, here.m, k, p, o, _REACH * h)
-            here = select(new | altered, start, here)
+            t_end, end = here.t, here.s
+        else:
+            flying = active > 0.5
+            target = minimum(clock.until + zero, sample * clock.period)
+            room = target - here.t
+            length = minimum(where(room <= 1.001 * h, room, h), limit)
+            landing = (not closing) & (length == room)
+            trial = where(closing, bracket.look, length)
+            end, k, error = leap(f, tables, trial, here, p, o, atol, clock.rtol)
+            t_end = where(landing, target, here.t + trial)
+        # the largest part of many kernels: starts and steps share it, so that it is compiled once
+        there = sense(f, t_end, end, here.m, k, p, o, _REACH * h)
+        if starting:
+            here = select(new | altered, there, here)
             best = map_fields(best_value, kinds, best, here.values, altered)
             best = select(new, here.values, best)
             when = select(new, map_fields(first_time, here.values, zero), when)
-        flying = active > 0.5
-        target = minimum(clock.until + zero, sample * clock.period)
-        room = target - here.t
-        length = minimum(where(room <= 1.001 * h, room, h), limit)
-        landing = (not closing) & (length == room)
-        trial = where(closing, bracket.look, length)
-        end, k, error = leap(f, tables, trial, here, p, o, atol, clock.rtol)
-        t_end = where(landing, target, here.t + trial)
-        there = sense(f, t_end, end, here.m, k, p, o, _REACH * h)
+            new, altered = zero != zero, zero != zero
+            continue
         attempts = attempts + 1.0
         stepping, looking = flying & (not closing), flying & closing
         good = stepping & (error <= 1.0)

@@ -205,14 +205,6 @@ def _sense(f, t, s, m, k, p, o, reach):
 sense = compile_inline(_sense)
 
 
-def _arrive(f, t, s, m, p, o, reach):
-    """The `Instant` at a state whose derivative is not yet known."""
-    return sense(f, t, s, m, spread(f.rhs(t, s, m, p, o), t), p, o, reach)
-
-
-arrive = compile_inline(_arrive)
-
-
 def _glance(f, tables, h, here, p, o):
     """State a length h [s] after `here`, by a step of its own that leaves the flight as it is."""
     memory = stage_memory(here.s, LARGEST_STAGES)

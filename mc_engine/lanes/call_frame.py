@@ -121,6 +121,6 @@ def calling_by(calls: type[_SharedSlot], context: Any) -> None:
 
 def refuse_missing_blocks(module: Any) -> None:
     """ModelError where a kernel reads data that it is not handed; undefined, their index would be any number."""
-    if any(one.is_declaration and one.name.startswith(BLOCK) for one in module.global_variables):
+    if any(variable.is_declaration and variable.name.startswith(BLOCK) for variable in module.global_variables):
         raise ModelError("the physics reads a curve or other data that were not found by the names in its functions; "
                          "let the function name them itself, at the top of its module")  # fmt: skip

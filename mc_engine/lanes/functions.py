@@ -72,6 +72,8 @@ def where(mask, x, y):
     mask : truth values, as a comparison gives them.  x, y : numbers, or named tuples of one class, whose fields are
     chosen.  ModelError for others, which kernels refuse, too.
     """
+    if type(mask) is bool and type(x) is float and type(y) is float:
+        return x if mask else y  # nearly all that an interpreted flight asks for
     _refuse_number(mask, "where")
     if hasattr(x, "_fields") or hasattr(y, "_fields"):
         if type(x) is not type(y):
@@ -99,6 +101,8 @@ def replace(record, /, **fields):
 @taking_numbers
 def two_to(n):
     """2**n for a whole number -1022 <= n <= 1023, given as a float."""
+    if isinstance(n, float) and -1100.0 < n < 1024.0:
+        return math.ldexp(1.0, int(n))
     n = np.asarray(n, dtype=np.float64)
     return _plain(np.where(np.isfinite(n), np.ldexp(1.0, np.nan_to_num(n).astype(np.int64)), np.nan))
 
@@ -106,12 +110,16 @@ def two_to(n):
 @taking_numbers
 def exponent(x):
     """floor(log2 |x|) as a float, for normal x: the number's own binary exponent."""
+    if isinstance(x, float):
+        return math.frexp(x)[1] - 1.0
     return _plain(np.frexp(x)[1] - 1.0)
 
 
 @taking_numbers
 def mantissa(x):
     """|x| / 2**exponent(x), in [1, 2), for normal x."""
+    if isinstance(x, float):
+        return math.frexp(abs(x))[0] * 2.0
     return _plain(np.frexp(np.abs(x))[0] * 2.0)
 
 

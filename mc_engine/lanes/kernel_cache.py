@@ -70,7 +70,7 @@ class Kernel:
         return self._path.with_name(f"{self._path.stem}.{what[:16]}.kernel")
 
     def _loaded(self, form: Form) -> "_MachineCode":
-        content, is_new = _kept_or_made(self.file(form), lambda: self._content(form))
+        content, is_new = kept_or_made(self.file(form), lambda: self._content(form))
         self.compilations, self.loads = self.compilations + is_new, self.loads + (not is_new)
         names, _, code = content.partition(b"\n")
         return _MachineCode(json.loads(names), code, form)
@@ -175,8 +175,8 @@ def _target() -> tuple[Any, ...]:
 # ---- on disk
 
 
-def _kept_or_made(path: Path, make: Callable[[], bytes]) -> tuple[bytes, bool]:
-    """(content of a kernel's file, whether `make` had to give it).
+def kept_or_made(path: Path, make: Callable[[], bytes]) -> tuple[bytes, bool]:
+    """(content of a file of the cache, such as a kernel's, whether `make` had to give it).
 
     Of processes that ask together one compiles, the others load.  Where there is no sound file, or the disk refuses,
     `make` is called, with a warning that names the folder.
@@ -192,25 +192,25 @@ def _kept_or_made(path: Path, make: Callable[[], bytes]) -> tuple[bytes, bool]:
 
 
 def _read(path: Path, warn: bool = True) -> bytes | None:
-    """The content of a kernel's file; None where there is none, or it cannot be read or is damaged."""
+    """The content of a file of the cache; None where there is none, or it cannot be read or is damaged."""
     try:
         content = path.read_bytes()
     except FileNotFoundError:
         return None
     except OSError as error:
         if warn:
-            _warn(path.parent, _reason(error), "a compiled kernel cannot be read there, and is compiled again")
+            _warn(path.parent, _reason(error), f"{path.name} cannot be read there, and is made again")
         return None
     digest, code = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
     if digest == _digest(path, code):
         return code
     if warn:
-        _warn(path.parent, "a compiled kernel is damaged there", "the model is compiled again")
+        _warn(path.parent, f"{path.name} is damaged there", "it is made again")
     return None
 
 
 def save(path: Path, content: bytes) -> None:
-    """Keep a compiled kernel; a warning with the folder where the disk refuses."""
+    """Keep a file of the cache; a warning with the folder where the disk refuses."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         replace_file(path, _digest(path, content) + content)

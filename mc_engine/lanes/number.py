@@ -118,6 +118,8 @@ def calling(name: str, function: Callable[..., Any], *arguments: Any) -> Any:
 
 def _bare(value: Any) -> Any:
     if isinstance(value, tuple):
+        if {*map(type, value)} == {float}:
+            return value
         fields = [_bare(field) for field in value]
         return type(value)(*fields) if hasattr(value, "_fields") else tuple(fields)
     return float(value) if type(value) is Number else value

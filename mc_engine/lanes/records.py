@@ -127,6 +127,6 @@ def _lower_where(context, builder, sig, args):
         own = _choice(context.typing_context, sig.args, i)
         values = [args[0], *(builder.extract_value(record, i) for record in args[1:])]
         given = [sig.args[0], sig.args[1][i], sig.args[2][i]]
-        cast = [context.cast(builder, *one) for one in zip(values, given, own.args, strict=True)]
+        cast = [context.cast(builder, *conversion) for conversion in zip(values, given, own.args, strict=True)]
         fields.append(context.get_function(function, own)(builder, cast))
     return context.make_tuple(builder, sig.return_type, fields)

@@ -6,7 +6,7 @@ unit: Parameter(0.1, "eccentricity", unit="").
 """
 
 from collections import namedtuple
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from mc_engine.errors import ModelError
@@ -21,21 +21,17 @@ class Metric:
     """A metric that the engine computes: made by `maximum_of`, `at_end` and the like.
 
     source : str, "value" or "time" of an extremum, "end" or "event" for the output there
+    field : Field, the metric's column, as yet without its name
     extremum : the output and the kind of its extreme value; None for the others
     output : str, the output at the end or at an event; of a time, "t_s" or ""
     event : str, the event
-    description, low, high, sometimes, unit : of the metric, see `Field`
     """
 
     source: str
+    field: Field
     extremum: Extremum | None = None
     output: str = ""
-    description: str = ""
-    event: str = field(default="", kw_only=True)
-    low: float = field(default=-float("inf"), kw_only=True)
-    high: float = field(default=float("inf"), kw_only=True)
-    sometimes: bool = field(default=False, kw_only=True)
-    unit: str = field(default=OF_NAME, kw_only=True)
+    event: str = ""
 
     def meaning(self, output: str) -> str:
         """The metric in words, of the description of its output: "largest speed", "time of the smallest altitude"."""
@@ -47,11 +43,6 @@ class Metric:
             return f"last time of the {output} above its level"
         extreme = f"{'largest' if self.extremum.kind == 'max' else 'smallest'} {output}"
         return extreme if self.source == "value" else f"time of the {extreme}"
-
-    def as_field(self, name: str) -> Field:
-        """The metric's column."""
-        low, high, sometimes = self.low, self.high, self.sometimes
-        return Field(self.description, low=low, high=high, sometimes=sometimes, name=name, unit=self.unit)
 
 
 def maximum_of(output: str, description: str = "", *, smooth: bool = True, **options: Any) -> Metric:
@@ -114,7 +105,7 @@ def time_of_minimum(output: str, description: str = "", *, smooth: bool = True, 
 
 
 def _extreme(kind: str, source: str, output: str, description: str, smooth: bool, options: dict[str, Any]) -> Metric:
-    return Metric(source, Extremum("", output, kind, smooth=smooth), "", description, **options)
+    return Metric(source, Field(description, **options), Extremum("", output, kind, smooth=smooth))
 
 
 def last_above(output: str, level: float, description: str = "", **options: Any) -> Metric:
@@ -129,7 +120,7 @@ def last_above(output: str, level: float, description: str = "", **options: Any)
     >>> last_above("error_deg", 0.01, "settling time").extremum.level
     0.01
     """
-    return Metric("time", Extremum("", output, "last_above", level), "", description, **options)
+    return Metric("time", Field(description, **options), Extremum("", output, "last_above", level))
 
 
 def at_end(output: str, description: str = "", **options: Any) -> Metric:
@@ -143,7 +134,7 @@ def at_end(output: str, description: str = "", **options: Any) -> Metric:
     >>> at_end("altitude_km", "altitude of the apogee").output
     'altitude_km'
     """
-    return Metric("end", None, output, description, **options)
+    return Metric("end", Field(description, **options), output=output)
 
 
 def value_at(event: str, output: str, description: str = "", **options: Any) -> Metric:
@@ -164,7 +155,7 @@ def value_at(event: str, output: str, description: str = "", **options: Any) -> 
     >>> value_at("apogee", "altitude_km", "altitude of the apogee").event
     'apogee'
     """
-    return Metric("event", None, output, description, event=event, **options)
+    return Metric("event", Field(description, **options), output=output, event=event)
 
 
 def time_of(event: str, description: str = "", **options: Any) -> Metric:
@@ -181,7 +172,7 @@ def time_of(event: str, description: str = "", **options: Any) -> Metric:
     >>> time_of("apogee", "time of the apogee").output
     ''
     """
-    return Metric("event", None, "", description, event=event, **options)
+    return Metric("event", Field(description, **options), event=event)
 
 
 def inputs(**declared: Parameter | Setting) -> Any:
@@ -250,8 +241,7 @@ def metrics(**declared: str | Field | Metric) -> Any:
     ('range',)
     """
     fields = tuple(
-        _with_unit(item.as_field(name), name) if isinstance(item, Metric) else _field("metric", name, item)
-        for name, item in declared.items()
+        _field("metric", name, item.field if isinstance(item, Metric) else item) for name, item in declared.items()
     )
     computed = {name: item for name, item in declared.items() if isinstance(item, Metric)}
     rest = [item.symbol for item in fields if item.name not in computed]

@@ -65,13 +65,15 @@ def fmu_simulator(section: SimulatorSection, directory: Path, problems: Problems
     if description is None or problems:
         return None
     variables = {variable.name: variable for variable in description.modelVariables}
-    parameters = {name: _bound(f"parameter.{name}", name, one, variables, problems)
-                  for name, one in section.parameter.items()}  # fmt: skip
+    parameters = {name: _bound(f"parameter.{name}", name, entry, variables, problems)
+                  for name, entry in section.parameter.items()}  # fmt: skip
     for name, variable in parameters.items():
         if not problems and not _is_settable(variables[variable]):
             problems.append((f"parameter.{name}", f'"{variable}" is computed by the FMU, and cannot be set'))
-    metrics = {name: _taken(name, one, variables, problems) for name, one in section.metric.items()}
-    outputs = {name: _bound(f"output.{name}", name, one, variables, problems) for name, one in section.output.items()}
+    metrics = {name: _taken(name, entry, variables, problems) for name, entry in section.metric.items()}
+    outputs = {
+        name: _bound(f"output.{name}", name, entry, variables, problems) for name, entry in section.output.items()
+    }
     interface = _interface(section, description, problems)
     stop, step = _times(section, description, problems)
     tolerance = section.solver_tolerance or _experiment(description, "tolerance") or _SOLVER_TOLERANCE

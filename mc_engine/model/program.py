@@ -31,6 +31,8 @@ from mc_engine.units import unit_suffix
 PLACES = ("folder", "case_id", "seed")  # that a command may name in braces
 JSON_INPUT = "json"
 Problems = list[tuple[str, str]]
+# keys that the record of a simulator has, too
+_OF_THE_RECORD = {"time_limit_s", "memory_limit_mib", "slots", "keep", "deterministic", "tolerance"}
 
 
 class NumberSection(Section):
@@ -166,19 +168,14 @@ def described_simulator(
             title=section.title or f"The {'FMU' if 'fmu' in flies else 'program'} {name}",
             name=name,
             parameters=tuple(
-                Parameter(one.default, one.description or name, **_named(name, one))
-                for name, one in section.parameter.items()
+                Parameter(entry.default, entry.description or name, **_named(name, entry))
+                for name, entry in section.parameter.items()
             ),
-            metrics=tuple(_field(name, one, one.sometimes) for name, one in section.metric.items()),
-            outputs=tuple(_field(name, one) for name, one in section.output.items()),
-            time_limit_s=section.time_limit_s,
-            memory_limit_mib=section.memory_limit_mib,
-            slots=section.slots,
-            keep=section.keep,
-            deterministic=section.deterministic,
-            tolerance=section.tolerance,
+            metrics=tuple(_field(name, entry, entry.sometimes) for name, entry in section.metric.items()),
+            outputs=tuple(_field(name, entry) for name, entry in section.output.items()),
             reference=reference,
             sources=Sources(module, home, home, origin.contents, {}),
+            **section.model_dump(include=_OF_THE_RECORD),
             **flies,
         )
     except ModelError as error:
@@ -192,9 +189,9 @@ PROGRAM_KEYS = ("command", "input", "result", "history", "echo", "files", "read"
 
 def refuse_keys(section: SimulatorSection, keys: Sequence[str], why: str, problems: Problems) -> None:
     """Note the keys of the table that are for another kind of simulator."""
-    tables = {"": section, **{f"parameter.{name}.": one for name, one in section.parameter.items()}}
-    tables |= {f"metric.{name}.": one for name, one in section.metric.items()}
-    tables |= {f"output.{name}.": one for name, one in section.output.items()}
+    tables = {"": section, **{f"parameter.{name}.": entry for name, entry in section.parameter.items()}}
+    tables |= {f"metric.{name}.": entry for name, entry in section.metric.items()}
+    tables |= {f"output.{name}.": entry for name, entry in section.output.items()}
     for place, table in tables.items():
         problems.extend((f"{place}{key}", f"is {why}") for key in keys if key in table.model_fields_set)
 

@@ -149,6 +149,7 @@ class Refusals:
 
     @classmethod
     def none(cls, n_cases: int) -> "Refusals":
+        """No case refused, of n_cases."""
         return cls(np.full(n_cases, "", dtype=object))
 
     def add(self, mask: np.ndarray, sentence: str) -> None:

@@ -36,8 +36,8 @@ METHODS = {"FixedStep": ("rk4", *_MULTISTEP), "AdaptiveStep": ("dop853", "dp54")
 def refuse_contradictions(model: "Model") -> None:
     """ModelError with one sentence if the model contradicts itself or names what there is not."""
     refuse_other_types(model, "the model")
-    named: tuple[Any, ...] = (*model.parameters, *model.settings, *model.states, *model.quantities, *model.metrics)
-    for record in (*named, *model.event_list, *model.extrema):
+    records: tuple[Any, ...] = (*model.event_list, *model.extrema)
+    for record in records:
         refuse_other_types(record, f'{type(record).__name__} "{record.name}"')
     refuse_other_types(model.clock, "the clock")
     for name, declared in (("states", model.states), ("outputs", model.quantities), ("metrics", model.metrics)):
@@ -45,23 +45,10 @@ def refuse_contradictions(model: "Model") -> None:
             raise ModelError(f"`{name}` is empty; a model has one at least")
     if not hasattr(model.kernel_parameters, "_fields"):
         raise ModelError("kernel_parameters must be a named tuple, whose fields are the parameters' names without unit")
-    _refuse_half_letters(model)
-    inputs: tuple[Named, ...] = (*model.parameters, *model.settings)
-    for item in (*inputs, *model.states, *model.quantities, *model.metrics):
-        _refuse_name(item)
-    columns = [*(item.name for item in (*inputs, *model.metrics)), *(f"end_{state.name}" for state in model.states)]
-    _refuse_taken("column", [item.name for item in (*inputs, *model.metrics)], _CASE_COLUMNS)
-    _refuse_taken("output", [item.name for item in model.quantities], _HISTORY_COLUMNS)
-    _refuse_twice("input", [item.symbol for item in inputs])
-    _refuse_twice("column", columns)
-    if model.phases:
-        _refuse_taken("column", columns, ("end_phase",))
-        _refuse_taken("output", [item.name for item in model.quantities], ("phase",))
-    _refuse_twice("output", [item.name for item in model.quantities])
+    _refuse_false_numbers(model)
+    _refuse_twice("input", [item.symbol for item in (*model.parameters, *model.settings)])
     _refuse_twice("extremum", [item.name for item in model.extrema])
     _refuse_twice("event", [item.name for item in model.event_list])
-    for setting in model.settings:
-        _refuse_choice(setting)
     outputs = [output.name for output in model.quantities]
     for extremum in model.extrema:
         _refuse_word("extremum", extremum.name)
@@ -73,28 +60,38 @@ def refuse_contradictions(model: "Model") -> None:
                          "for each field, or write start(p, o), which gives the first one")  # fmt: skip
     for event in model.event_list:
         _refuse_event(event, model.switch is not None)
-    refuse_false_figures(model)
     settings, states = ([item.symbol for item in items] for items in (model.settings, model.states))
     _refuse_clock(model.clock, settings, states)
 
 
 def refuse_false_simulator(simulator: "Simulator") -> None:
     """ModelError with one sentence if a simulator contradicts itself."""
-    named: tuple[Any, ...] = (*simulator.parameters, *simulator.settings, *simulator.outputs, *simulator.metrics)
-    for record in named:
-        refuse_other_types(record, f'{type(record).__name__} "{record.name}"')
-        _refuse_name(record)
     if not simulator.metrics:
         raise ModelError("`metrics` is empty; a simulator has one at least")
-    _refuse_half_letters(simulator)
-    columns = [item.name for item in (*simulator.parameters, *simulator.settings, *simulator.metrics)]
-    _refuse_taken("column", columns, _CASE_COLUMNS)
-    _refuse_taken("output", [item.name for item in simulator.outputs], _HISTORY_COLUMNS)
+    _refuse_false_numbers(simulator)
+
+
+def _refuse_false_numbers(system: "System") -> None:
+    """ModelError for numbers, or figures of them, that neither a model nor a simulator can have."""
+    inputs: tuple[Named, ...] = (*system.parameters, *system.settings)
+    numbers: tuple[Any, ...] = (*inputs, *system.states, *system.quantities, *system.metrics)
+    for item in numbers:
+        refuse_other_types(item, f'{type(item).__name__} "{item.name}"')
+    _refuse_half_letters(system)
+    for item in numbers:
+        _refuse_name(item)
+    names, outputs = [item.name for item in (*inputs, *system.metrics)], [item.name for item in system.quantities]
+    columns = [*names, *(f"end_{state.name}" for state in system.states)]
+    _refuse_taken("column", names, _CASE_COLUMNS)
+    _refuse_taken("output", outputs, _HISTORY_COLUMNS)
+    if getattr(system, "phases", ()):
+        _refuse_taken("column", columns, ("end_phase",))
+        _refuse_taken("output", outputs, ("phase",))
     _refuse_twice("column", columns)
-    _refuse_twice("output", [item.name for item in simulator.outputs])
-    for setting in simulator.settings:
+    _refuse_twice("output", outputs)
+    for setting in system.settings:
         _refuse_choice(setting)
-    refuse_false_figures(simulator)
+    refuse_false_figures(system)
 
 
 def _refuse_half_letters(model: "System") -> None:

@@ -42,6 +42,8 @@ def imported_names(source: bytes, package: str = "") -> frozenset[str]:
 @lru_cache(maxsize=512)
 def data_names(source: bytes) -> frozenset[str]:
     """The texts that stand in the argument `data` of a call of `model` or `Simulator`; none of a broken source."""
+    if b"data" not in source:
+        return frozenset()  # it need not be parsed
     return _texts(_arguments(_calls(source, _RECORDS), "data"))
 
 
@@ -58,6 +60,8 @@ def _arguments(calls: list[ast.Call], name: str) -> list[ast.expr]:
 
 def _calls(source: bytes, names: tuple[str, ...]) -> list[ast.Call]:
     """Calls of functions of these names, whatever they are attributes of."""
+    if not any(name.encode() in source for name in names):
+        return []
     calls = (node for node in _nodes(source) if isinstance(node, ast.Call))
     return [call for call in calls if getattr(call.func, "attr", getattr(call.func, "id", None)) in names]
 

@@ -3,7 +3,7 @@
 Hamilton's product throughout.  The matrix of q = (q0, qv), which takes components in R to components in B, is
 (q0^2 - qv.qv) I + 2 qv qv^T - 2 q0 [qv x].  A further rotation given in body axes multiplies from the right.
 
-Compiled functions take and give plain numbers; those for whole chunks of cases are NumPy and say so.
+Kinematics on plain numbers, and `rotation_quaternion` in NumPy; products and matrices: `mc_engine.physics.rotations`.
 M. J. Sidi, Spacecraft Dynamics and Control (1997), appendix A.4 and section 4.7.
 """
 
@@ -37,33 +37,7 @@ def turned_slightly(q0, q1, q2, q3, x, y, z):
     return q1 + (q0 * x + (q2 * z - q3 * y)), q2 + (q0 * y + (q3 * x - q1 * z)), q3 + (q0 * z + (q1 * y - q2 * x))
 
 
-def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Hamilton's product of quaternions [4, n]: the rotation b, in the axes that a has made, after a.  NumPy."""
-    a0, a1, a2, a3 = a
-    b0, b1, b2, b3 = b
-    return np.array(
-        [
-            a0 * b0 - a1 * b1 - a2 * b2 - a3 * b3,
-            a0 * b1 + a1 * b0 + a2 * b3 - a3 * b2,
-            a0 * b2 + a2 * b0 + a3 * b1 - a1 * b3,
-            a0 * b3 + a3 * b0 + a1 * b2 - a2 * b1,
-        ]
-    )
-
-
 def rotation_quaternion(vector: np.ndarray) -> np.ndarray:
     """Quaternion [4, n] of a rotation about `vector` [3, n] by its length [rad].  NumPy."""
     half = 0.5 * np.sqrt((vector * vector).sum(axis=0))
     return np.array([np.cos(half), *(0.5 * np.sinc(half / np.pi) * vector)])
-
-
-def body_matrix(q: np.ndarray) -> np.ndarray:
-    """Matrix [3, 3, n] of unit quaternions [4, n], from components in R to components in B.  NumPy."""
-    q0, q1, q2, q3 = q
-    return np.array(
-        [
-            [q0 * q0 + q1 * q1 - q2 * q2 - q3 * q3, 2.0 * (q1 * q2 + q0 * q3), 2.0 * (q1 * q3 - q0 * q2)],
-            [2.0 * (q1 * q2 - q0 * q3), q0 * q0 - q1 * q1 + q2 * q2 - q3 * q3, 2.0 * (q2 * q3 + q0 * q1)],
-            [2.0 * (q1 * q3 + q0 * q2), 2.0 * (q2 * q3 - q0 * q1), q0 * q0 - q1 * q1 - q2 * q2 + q3 * q3],
-        ]
-    )

@@ -101,10 +101,10 @@ def retained_cases(store: Store, campaign: Campaign) -> list[int]:
 def _worst_cases(store: Store, campaign: Campaign) -> list[WorstSoFar]:
     """The worst completed cases of each metric whose worst ones are to be saved, from one reading of the parts."""
     requirements = [vars(requirement) for requirement in campaign.requirements]
-    asked, found = campaign.retention.worst, []
+    asked, found = campaign.retention.worst_of, []
     for worst in asked:
         limits = limits_on(worst.metric, requirements) if worst.side is None else None
-        found.append(WorstSoFar(worst.n_cases, limits, worst.side != "smallest"))
+        found.append(WorstSoFar(worst.count, limits, worst.side != "smallest"))
     if asked:
         read = metric_parts(store, list(dict.fromkeys(worst.metric for worst in asked)))
         for part, (_, numbers) in zip(store.parts, read, strict=True):

@@ -14,7 +14,7 @@ import numpy as np
 
 from mc_engine.campaign.cases import case_table
 from mc_engine.campaign.loading import Campaign, load_campaign
-from mc_engine.campaign.parts import Retention
+from mc_engine.campaign.sections import HistoriesSection
 from mc_engine.errors import CampaignError, Problem, StoreError
 from mc_engine.flight.chunks import name_upstream
 from mc_engine.flight.flyers import flyer_of
@@ -256,7 +256,7 @@ def replay(path: str | Path, case_id: int) -> Replay:
     campaign = campaign_of(store)
     table, flyer = case_table(campaign, np.array([case_id])), flyer_of(campaign)
     inputs, noise = inputs_of(campaign, case_id)
-    flight, history = next(flyer.histories(inputs, np.array([noise]), Retention().rows))
+    flight, history = next(flyer.histories(inputs, np.array([noise]), HistoriesSection().rows))
     name_upstream(campaign, np.array([case_id]), flight)
     stored = store.row(case_id)
     again = {**table, **flight}

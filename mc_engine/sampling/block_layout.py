@@ -37,14 +37,13 @@ class BlockLayout:
         """int64[size]: the point, A, B or C, that each row takes the group from, or NOMINAL."""
         points = np.full(self.size, A)
         points[[self.groups.index(group) + 1, len(self.groups) + 1]] = B
-        if group in self.repeated:
-            points[self._repetition(group)] = C
+        points[self._repetitions(group)] = C
         if group in self.held:
             points[self.without(group)[1]] = NOMINAL
         return points
 
-    def _repetition(self, group: str) -> int:
-        return len(self.groups) + 2 + self.repeated.index(group)
+    def _repetitions(self, group: str) -> list[int]:
+        return [len(self.groups) + 2 + self.repeated.index(group)] if group in self.repeated else []
 
     def without(self, group: str) -> tuple[int, int]:
         """Rows with the group as drawn, and at its nominal values."""
@@ -54,8 +53,11 @@ class BlockLayout:
         """Pairs of rows that have the group alone in common."""
         return [(len(self.groups) + 1, self.groups.index(group) + 1)]
 
+    def independent(self, group: str) -> list[tuple[int, int]]:
+        """Pairs of rows with nothing in common that are like those in common but for the group."""
+        return [(row, len(self.groups) + 1) for row in (0, *self._repetitions(group))]
+
     def differing(self, group: str) -> list[tuple[int, int]]:
         """Pairs of rows that differ in the group alone."""
-        rows = [0, self.groups.index(group) + 1]
-        rows += [self._repetition(group)] if group in self.repeated else []
+        rows = [0, self.groups.index(group) + 1, *self._repetitions(group)]
         return list(combinations(rows, 2))

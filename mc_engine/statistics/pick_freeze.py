@@ -5,12 +5,20 @@ from B.  A_B(g) and B have group g alone in common, so that their correlation is
 A differ in group g alone, and 1 minus their correlation is its total index.  Random draws made in flight are one group.
 Inputs that are correlated with one another have to be in one group.
 
-A with a group at its nominal values shows by how much the variance falls without the dispersion of that group.  With
-interactions this is not the total index, which is the mean over all values that the group may be held at.
+A with a group at its nominal values shows by how much the variance falls without the dispersion of that group.  The
+mean of this fall over all values that the group may be held at is its first-order index; with interactions, the fall at
+one of them may be far from it, and from the total index.
+
+A and B have nothing in common, but over finitely many blocks their correlation is not zero, and the indices share this
+chance correlation.  It is a control variate: each correlation is taken less a multiple of that of the independent rows,
+whose true value is zero.  The regression of the one influence function on the other gives the multiple, so that the
+variance falls by the square of the correlation between the two.
 
 Janon, Klein, Lagnoux, Nodet & Prieur, ESAIM: Probab. Stat. 18 (2014), 342-364, eq. (6) (first order, pooled mean and
 variance) and section 2.3 (its asymptotic variance, by the delta method); Jansen, Comput. Phys. Commun. 117 (1999),
-35-43 (total: half the mean square of the difference, over the variance).
+35-43 (total: half the mean square of the difference, over the variance); Glen & Isaacs, Environ. Model. Softw. 37
+(2012), 157-166 (chance correlations of the rows); Lavenberg & Welch, Management Science 27 (1981), 322-335 (control
+variates with fitted coefficients).
 """
 
 from collections.abc import Mapping, Sequence
@@ -69,8 +77,9 @@ def pick_freeze(layout: BlockLayout, case_ids: np.ndarray, metrics: Mapping[str,
         if len(y) < FEWEST_BLOCKS or scaled is None:
             continue
         for g, group in enumerate(layout.groups):
-            first[g, k], first_error[g, k] = _correlation(scaled, layout.in_common(group))
-            left, total_error[g, k] = _correlation(scaled, layout.differing(group))
+            by_chance = _correlation(scaled, layout.independent(group))
+            first[g, k], first_error[g, k] = _less(by_chance, _correlation(scaled, layout.in_common(group)))
+            left, total_error[g, k] = _less(by_chance, _correlation(scaled, layout.differing(group)))
             total[g, k] = 1.0 - left
             if group in layout.held:
                 fall[g, k], fall_error[g, k] = _fall(*scaled[:, layout.without(group)].T)
@@ -98,17 +107,30 @@ def _scaled(y: np.ndarray, drawn: np.ndarray) -> np.ndarray | None:
     return None if spread < 1e-13 else (y / largest - mean) / spread
 
 
-def _correlation(y: np.ndarray, pairs: Sequence[tuple[int, int]]) -> tuple[float, float]:
-    """Correlation of pairs of rows with pooled mean and variance, and its standard error over the blocks."""
+def _correlation(y: np.ndarray, pairs: Sequence[tuple[int, int]]) -> tuple[float, np.ndarray]:
+    """Correlation of pairs of rows with pooled mean and variance, and its influence function float64[n_blocks].
+
+    The mean square of the influence function, over n_blocks, is the variance of the correlation.
+    """
     a, b = y[:, [pair[0] for pair in pairs]], y[:, [pair[1] for pair in pairs]]
     product, square, middle = (a * b).mean(axis=1), (0.5 * (a * a + b * b)).mean(axis=1), (0.5 * (a + b)).mean(axis=1)
     mean = middle.mean()
     variance = square.mean() - mean * mean
     if variance <= 0.0:
-        return np.nan, np.nan
+        return np.nan, np.full(len(y), np.nan)
     value = (product.mean() - mean * mean) / variance
-    influence = product - 2.0 * mean * middle - value * (square - 2.0 * mean * middle)
-    return float(value), float(influence.std() / (variance * np.sqrt(len(y))))
+    influence = (product - 2.0 * mean * middle - value * (square - 2.0 * mean * middle)) / variance
+    return float(value), influence - influence.mean()
+
+
+def _less(by_chance: tuple[float, np.ndarray], found: tuple[float, np.ndarray]) -> tuple[float, float]:
+    """A correlation less what it shares with one that is zero but for chance, and its standard error."""
+    (chance, control), (value, influence) = by_chance, found
+    if control @ control > 0.0:
+        multiple = (influence @ control) / (control @ control)
+        value, influence = value - multiple * chance, influence - multiple * control
+    freedom = len(influence) - 2  # the mean and the multiple are fitted
+    return float(value), float(np.sqrt(influence @ influence / (freedom * len(influence))))
 
 
 def _fall(drawn: np.ndarray, held: np.ndarray) -> tuple[float, float]:

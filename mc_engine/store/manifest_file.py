@@ -81,6 +81,7 @@ class _Described(_Named):
     bounds: str = ""
     source: str = ""
     note: str = ""
+    random_draw: bool = False
 
 
 class ColumnRecord(_Named):

@@ -106,7 +106,8 @@ def chosen_requirement(campaign: Campaign, name: str | None) -> Requirement:
         message = "is missing: a rare event is a requirement not met; add one with a metric and a limit"
         raise CampaignError(campaign.name, [Problem("requirement", message)])
     if name is None and len(names) > 1:
-        raise CampaignError(campaign.name, [Problem("requirement", f"there are several; choose {listed(names)}")])
+        message = f"there are several; choose one of {listed(names)}, on the command line by `--requirement`"
+        raise CampaignError(campaign.name, [Problem("requirement", message)])
     if name is not None and name not in names:
         message = f'"{name}" is not a requirement of this campaign{hint(name, names)}'
         raise CampaignError(campaign.name, [Problem("requirement", message)])

@@ -75,8 +75,8 @@ class _TracedFlight(InterpretedFlight):
         if model.phases:  # whose number is the last of the fields
             columns[PHASE_COLUMN] = model.phases[int(fields[-1])]
         if model.start is not None:
-            kept = zip(m._fields, m, strict=True)
-            columns |= {f"m.{name}": float(value) for name, value in kept if name not in (PHASE, BEGAN)}
+            for name, value in zip(m._fields, m, strict=True):
+                columns |= {} if name in (PHASE, BEGAN) else _numbers(f"m.{name}", value)
         columns |= {f"d({field.symbol})/dt": float(v) for field, v in zip(model.states, rates, strict=True)}
         columns |= {f"event.{event.name}": float(v) for event, v in zip(model.event_list, events, strict=True)}
         self.rows.append(columns | named | self._held)

@@ -248,7 +248,7 @@ def _generations(flown: list[Generation], ended: bool) -> tuple[list[Column], di
         Column("feasible_so_far", "", "generation", "of these, how many are inside all limits", "integer"),
         Column("front_size", "", "generation", "candidates on the front of all so far", "integer"),
         Column("least_violation", "", "generation", "smallest violation so far; 0 where a candidate is feasible"),
-        Column("dominated_share", "", "generation", "share of the box of all fronts that the front so far dominates"),
+        Column("dominated_share", "", "generation", "fraction of the box of all fronts that this front dominates"),
     ]
     arrays = {
         "generation": np.arange(len(flown)),

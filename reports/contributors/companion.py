@@ -125,12 +125,14 @@ def _note(flown: Flown, contributions: Contributions) -> str:
             f"From {count(contributions.flights)} cases in {count(contributions.n_tried)} blocks, flown for this "
             f"purpose and in no other statistic. {each} Pick-freeze estimates (Janon 2014, Jansen 1999). A total "
             "effect is the variance that remains, on average, when all other inputs are known; where inputs interact, "
-            "the variance falls by another amount if the input is held at its nominal value."
+            "the variance falls by another amount if the input is held at its nominal value. First-order and total "
+            "effects and their intervals are within 0 to 1."
         ) + (reduction if contributions.held else "")
     names = {row.input for rows in contributions.by_metric.values() for row in strongest(rows)}
     unexplained = (
-        "Unexplained: fraction that the surrogate model behind the total effects attributes to no input (random draws "
-        "in flight, discontinuities); a total effect may be larger by up to it. "
+        "Unexplained: fraction that the surrogate model behind the total effects attributes to no input (random "
+        "draws, discontinuities); a total effect may be larger by up to it. With a section [sensitivity] in the "
+        "campaign file, flights of their own compute what the random draws contribute. "
     ) * (UNEXPLAINED in names)
     note = (
         f"Estimated from the table of cases. {unexplained}{each} SRC, PRCC and Spearman: trends with their direction. "

@@ -17,12 +17,17 @@ from reports.text.numbers import count, number, percent
 
 MOST_DRIVERS = 12
 MOST_PANELS = 6
+_RANDOM_DRAWS_ALONE = (
+    "The cases differ in their random draws alone, which cause all of the variance. To see contributors, list inputs "
+    "under [dispersion] in the campaign file; a section [sensitivity] computes their contributions from flights of "
+    "their own."
+)
 
 
 def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
-    """Indices of the metrics that matter, then the drivers of the failures; nothing without a dispersed input."""
+    """Indices of the metrics that matter, then the drivers of the failures; a sentence if the inputs have none."""
     inputs = flown.inputs
-    if not inputs or not flown.n_tried:
+    if not flown.n_tried:
         return
     if flown.design in ("saltelli", "morris"):
         yield from designed_blocks(flown, inputs)
@@ -35,10 +40,13 @@ def sensitivity_blocks(flown: Flown) -> Iterator[FigureBlock | Table | str]:
         return
     failed = failures(flown)
     contributions = flown.contributions
-    yield from (
-        no_contributors(flown, flown.key_metrics) if contributions is None else companion_blocks(flown, contributions)
-    )
-    if failed:
+    if contributions is not None:
+        yield from companion_blocks(flown, contributions)
+    elif inputs.keys() > flown.draws:
+        yield from no_contributors(flown, flown.key_metrics)
+    elif not all(summary.constant for summary in flown.summaries.values()):
+        yield _RANDOM_DRAWS_ALONE
+    if failed and inputs:
         yield from _driver_blocks(flown, inputs, failed)
 
 

@@ -33,8 +33,8 @@ def unbroken(table: Table) -> Table:
     A count is broken before its stroke where the table takes fewer lines so.
     """
     joined = [_joined(table, spaces) for spaces in _JOINED]
-    measured = [(one, *_sizes(one)) for one in joined]
-    found = [(_printed_lines(size, least), one) for one, size, least in measured if _page_width(least) < ROOM]
+    measured = [(variant, *_sizes(variant)) for variant in joined]
+    found = [(_printed_lines(size, least), variant) for variant, size, least in measured if _page_width(least) < ROOM]
     return min(found, key=lambda lines_and_table: lines_and_table[0], default=(0.0, table))[1]
 
 

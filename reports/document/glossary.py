@@ -96,8 +96,8 @@ GLOSSARY = Terms(
         (
             "variance reduction at nominal",
             "Fraction by which a metric’s variance falls if the contributor has its nominal value in all cases; noise "
-            "made in flight stays as drawn. Where "
-            "inputs interact, it is not the total effect, which is an average over all values of the contributor.",
+            "made in flight stays as drawn. Its average over all values that the contributor may be held at is the "
+            "first-order effect; where inputs interact, the nominal value may be far from an average one.",
         ),
         (
             "random draws",
@@ -123,7 +123,8 @@ GLOSSARY = Terms(
         (
             "1σ budget",
             "1σ contribution: √(first-order effect) × σ of the metric, where the effect is more than noise. The root "
-            "sum square of all contributions is below σ by what interactions and unexplained draws add.",
+            "sum square of all contributions is below σ by what interactions and unexplained draws add; where they add "
+            "nothing, the errors of the effects may put it slightly above σ.",
         ),
         (
             "circular error probable (CEP)",

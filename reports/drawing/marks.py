@@ -5,7 +5,7 @@ scales them.  Colours with an @ are the page's own.  A mark's `key` is its text 
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -17,6 +17,8 @@ from reports.text.numbers import number
 
 MARGIN = 0.04  # of an axis, beyond the marks on it
 FIELD_EDGE = "rgba(255,255,255,0.55)"  # between the regions of a field
+LONGEST = 4.0  # times its width: a cloud or curve that is longer has an axis of its own scale across
+OWN_SCALES = "Each axis has a scale of its own"
 MOST_TOLD = 8  # texts of a mark that are told to those who do not see it
 
 
@@ -300,6 +302,17 @@ class Drawing:
         return [mark.cases for mark in marks if isinstance(mark, Points) and mark.cases is not None]
 
 
+def to_scale(plot: Plot, longest: float = LONGEST) -> Plot:
+    """The panel with one scale for both axes, as high as that needs; one of a much longer shape keeps two and says so.
+
+    longest : the longer side of the marks over the shorter one, up to which one scale shows both.
+    """
+    width, height = (abs(high - low) for low, high in plot.ends)
+    if max(width, height) > longest * min(width, height):
+        return replace(plot, title=OWN_SCALES)
+    return replace(plot, equal=True, height=60.0 + 720.0 * min(max(height / width, 0.25), 0.75))
+
+
 def between(
     x: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str, opacity: float, name: str = "", key: str = "",
     upright: bool = False,
@@ -332,7 +345,7 @@ def joined(outlines: Sequence[np.ndarray]) -> np.ndarray:
     return np.concatenate([np.empty((0, 2)), *parts[:-1]])
 
 
-def nominal_ring(place: tuple[float, float], colour: str, name: str = "nominal") -> Points:
+def nominal_ring(place: Sequence[float] | np.ndarray, colour: str, name: str = "nominal") -> Points:
     """A ring around one point, its inside filled with the colour of the page."""
     x, y = (np.array([value], dtype=np.float64) for value in place)
     return Points(x, y, PAPER, name, size=12.0, edge=colour, edge_width=3.0, key=name)

@@ -185,7 +185,7 @@ def _layout(plot: Plot) -> dict[str, Any]:
     lines = title.count("<br>") + 1 if title else 0
     top = ABOVE + (ROUND_TITLE + TITLE_LINE * lines if lines else 0)  # plotly's own room puts two lines out of sight
     return {
-        "title": {"text": title, "font": {"size": 12.5}, "x": 0.0, "xref": "paper", "y": 1.0,
+        "title": {"text": title, "font": {"size": 12.5}, "x": 0.0, "xref": "container", "y": 1.0,
                   "yref": "container", "yanchor": "top", "pad": {"t": PAD + (CAPITAL if lines > 1 else 0)}},
         "height": round(plot.height + TITLE_LINE * max(lines - 1, 0) + (FRAME if plot.y.ticks else 0)),
         "margin": {"l": 50, "r": 14, "t": top, "b": 44, "pad": 0},

@@ -98,9 +98,9 @@ def _band(mark: Band, frame: Frame) -> Iterator[str]:
 def _bar(mark: Bar, frame: Frame) -> Iterator[str]:
     edges = frame.x(mark.left), frame.x(mark.right), frame.y(mark.bottom), frame.y(mark.top)
     boxes = np.round(np.column_stack(edges), 2).tolist()
-    colours, inks = (np.broadcast_to(one, len(boxes)).tolist() for one in (mark.colour, mark.ink))
+    colours, inks = (np.broadcast_to(paint, len(boxes)).tolist() for paint in (mark.colour, mark.ink))
     for colour in dict.fromkeys(colours):
-        these = (box for box, one in zip(boxes, colours, strict=True) if one == colour)
+        these = (box for box, own in zip(boxes, colours, strict=True) if own == colour)
         outlines = "".join(f"M{a} {c}H{b}V{d}H{a}z" for a, b, c, d in these)
         yield f'<path d="{outlines}" fill="{colour}" fill-opacity="{mark.opacity:g}"/>'
     for (a, b, c, d), label, ink in zip(boxes, mark.labels, inks, strict=False):

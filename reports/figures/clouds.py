@@ -1,12 +1,11 @@
 """Cases over two columns, a point a case: clouds by class, regions that hold them, and where limits run."""
 
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, joined
+from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, joined, to_scale
 from reports.drawing.palette import BLUE, DASHES, GREEN, INK, MUTED, ORANGE, PURPLE, SKY, VERMILION
 from reports.text.numbers import count
 
@@ -18,26 +17,13 @@ MOST, FEWER = (4.0, 0.5), (7.0, 0.9)  # size and opacity of the largest class, b
 OUTLINE_COLOURS = {"ellipse": PURPLE, "region": GREEN, "CEP": VERMILION, "target": ORANGE, "limit": INK}
 
 
-@dataclass(frozen=True)
-class Outline:
+def outline(kind: str, text: str, curves: Sequence[np.ndarray], nth: int = 0) -> Line:
     """The edge of a region, or where a limit runs: curves float64[k, 2] in the units of the axes, and its words.
 
-    kind : one of OUTLINE_COLOURS; each further outline of a kind has a dash of its own.
+    kind : one of OUTLINE_COLOURS, the name of the line.  nth : of its kind, each of which has a dash of its own.
     """
-
-    kind: str
-    text: str
-    curves: tuple[np.ndarray, ...]
-
-
-def outline_lines(outlines: Sequence[Outline]) -> Iterator[Line]:
-    """The outlines in their styles."""
-    drawn: Counter[str] = Counter()
-    for outline in outlines:
-        dash = DASHES[drawn[outline.kind] % len(DASHES)]
-        drawn[outline.kind] += 1
-        x, y = joined(outline.curves).T
-        yield Line(x, y, OUTLINE_COLOURS[outline.kind], dash=dash, text=outline.text, key=outline.text)
+    x, y = joined(curves).T
+    return Line(x, y, OUTLINE_COLOURS[kind], kind, DASHES[nth % len(DASHES)], text=text, key=text)
 
 
 def outcome_cloud(k: int, words: str, x: np.ndarray, y: np.ndarray, cases: np.ndarray) -> Points:
@@ -54,16 +40,17 @@ def case_scatter(
     axes: tuple[str, str],
     n_tried: int,
     *,
+    lengths: bool = False,
     styles: Sequence[tuple[str, str]] = OUTCOMES,
     rings: Sequence[Points] = (),
-    outlines: Sequence[Outline] = (),
+    outlines: Sequence[Line] = (),
     form: str = "Scatter of cases",
 ) -> Drawing:
     """The cases shown, of n_tried, and the class of each: int[n], an index into `classes`.
 
     cloud : all of them, with their numbers and columns.
     classes : words of each, and how many cases belong to it, those not shown among them.
-    rings : around single points, as the nominal case.
+    rings : around single points, as the nominal case.  lengths : whether both axes are lengths in one unit.
     """
     clouds: list[Mark] = []
     for k in sorted((k for k, (_, cases) in enumerate(classes) if cases), key=lambda k: -classes[k][1]):
@@ -76,5 +63,6 @@ def case_scatter(
             replace(cloud, x=cloud.x[rows], y=cloud.y[rows], cases=numbers, name=words, colour=colour, sign=sign,
                     size=size, opacity=opacity, key=f"{words}: {count(cases)} of {count(n_tried)} cases{thinned}")
         )  # fmt: skip
-    marks = (*clouds, *outline_lines(outlines), *rings)
-    return Drawing(form, (Plot(marks, Axis(axes[0]), Axis(axes[1]), height=420.0),))
+    marks = (*clouds, *outlines, *rings)
+    plot = Plot(marks, Axis(axes[0]), Axis(axes[1]), height=420.0)
+    return Drawing(form, (to_scale(plot) if lengths else plot,))

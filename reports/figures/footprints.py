@@ -2,14 +2,15 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
-from reports.drawing.marks import Axis, Drawing, Line, Mark, Plot, Points, joined, nominal_ring
+from reports.drawing.marks import OWN_SCALES, Axis, Drawing, Line, Plot, Points, joined, to_scale
 from reports.drawing.palette import BLUE, INK, MUTED
-from reports.figures.clouds import Outline, outline_lines
 from reports.text.numbers import count
 
+PlacedMark = TypeVar("PlacedMark", bound=Line | Points)
 WIDE = 3.0  # width over height of the map of the surroundings
 COAST = "coastline (Natural Earth)"
 MEAN = Points(np.zeros(1), np.zeros(1), INK, "mean impact point", "cross", 11.0, key="mean impact point")
@@ -28,10 +29,10 @@ class View:
         """Names of the places on its axes, as columns of the cases."""
         return (f"place: {self.labels[0]}", f"place: {self.labels[1]}")
 
-    def turned(self, points: np.ndarray) -> np.ndarray:
-        """Points float64[k, 2] in these axes."""
+    def turned(self, mark: PlacedMark) -> PlacedMark:
+        """A mark, in km east and north, in these axes."""
         c, s = np.cos(self.angle), np.sin(self.angle)
-        return np.column_stack([c * points[:, 0] + s * points[:, 1], c * points[:, 1] - s * points[:, 0]])
+        return replace(mark, x=c * mark.x + s * mark.y, y=c * mark.y - s * mark.x)
 
 
 MAP = View(("east of the mean [km]", "north of the mean [km]"))
@@ -48,36 +49,26 @@ def footprint_views(long_axis: float | None) -> list[View]:
 
 def footprint_plot(
     view: View,
-    points: np.ndarray,
-    names: Sequence[str],
-    case_ids: np.ndarray,
+    cloud: Points,
     counts: tuple[int, int],
-    outlines: Sequence[Outline] = (),
-    aim: tuple[str, np.ndarray] | None = None,
+    others: Sequence[Line | Points] = (),
     coasts: Sequence[np.ndarray] = (),
 ) -> Plot:
-    """points : float64[k, 2], km east and north, of the cases shown, with their places in words and their numbers.
+    """cloud : the cases shown, km east and north, with their places in words and their numbers.
 
-    counts : cases that came down, and all.  aim : words and point of the place that distances count from.
+    counts : cases that came down, and all.  others : regions that hold them, and the place that distances count from.
     coasts : float64[k, 2] in km.
     """
-    shown = "all shown" if len(points) == counts[0] else f"{count(len(points))} shown"
+    shown = "all shown" if cloud.x.size == counts[0] else f"{count(cloud.x.size)} shown"
     key = f"{count(counts[0])} of {count(counts[1])} cases, {shown}"
-    x, y = view.turned(points).T
-    turned = [replace(outline, curves=tuple(map(view.turned, outline.curves))) for outline in outlines]
-    marks: list[Mark] = [
+    marks = (
         *coast_lines(coasts if view.equal else ()),
-        Points(x, y, BLUE, opacity=0.5, texts=names, cases=case_ids, columns=view.columns, key=key),
-        *outline_lines(turned),
-        MEAN,
-    ]
-    if aim:
-        marks.append(nominal_ring(tuple(view.turned(aim[1][None, :])[0]), INK, aim[0]))
-    spans = np.ptp(np.concatenate([points, *(curve for outline in outlines for curve in outline.curves)]), axis=0)
-    flatness = float(np.clip(spans[1] / max(spans[0], 1e-9), 0.25, 0.75))
-    height = 60.0 + 720.0 * flatness if view.equal else 380.0
-    title = "" if view.equal else "Along and across, each with a scale of its own"
-    return Plot(tuple(marks), Axis(view.labels[0]), Axis(view.labels[1]), title, height, view.equal)
+        replace(view.turned(cloud), colour=BLUE, opacity=0.5, columns=view.columns, key=key),
+        *map(view.turned, (*others, MEAN)),
+    )
+    title = "" if view.equal else OWN_SCALES
+    plot = Plot(marks, Axis(view.labels[0]), Axis(view.labels[1]), title, 380.0)
+    return to_scale(plot, np.inf) if view.equal else plot
 
 
 def surroundings(coasts: Sequence[np.ndarray], reach: float) -> Plot:
@@ -93,11 +84,11 @@ def coast_lines(coasts: Sequence[np.ndarray]) -> Iterator[Line]:
         yield Line(x, y, MUTED, COAST, width=1.2, text=COAST, near=False, key=COAST)
 
 
-def footprint_drawing(plots: Sequence[Plot], views: Sequence[View], points: np.ndarray, cases: np.ndarray) -> Drawing:
-    """The maps in one figure.  points : km east and north of all cases that came down;  cases : their numbers."""
-    places = {
-        column: (label, cases, values)
-        for view in views
-        for column, label, values in zip(view.columns, view.labels, view.turned(points).T, strict=True)
-    }
+def footprint_drawing(plots: Sequence[Plot], views: Sequence[View], every: Points, cases: np.ndarray) -> Drawing:
+    """The maps in one figure.  every : km east and north of all cases that came down;  cases : their numbers."""
+    places = {}
+    for view in views:
+        turned = view.turned(every)
+        for column, label, values in zip(view.columns, view.labels, (turned.x, turned.y), strict=True):
+            places[column] = label, cases, values
     return Drawing("Impact points about the mean impact point", tuple(plots), 1, places=places)

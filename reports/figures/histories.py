@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from reports.drawing.marks import Axis, Band, Drawing, Limit, Line, Mark, Plot, between, values_of
+from reports.drawing.marks import Axis, Band, Drawing, Limit, Line, Mark, Plot, between, to_scale, values_of
 from reports.drawing.palette import DASHES, INK, LINES, MUTED, SKY, VERMILION
 from reports.text.numbers import count, limit_number, percent
 
@@ -91,9 +91,16 @@ def history_figure(plots: Sequence[Plot]) -> Drawing:
 
 
 def profile_figure(
-    names: tuple[str, str], labels: tuple[str, str], lines: Sequence[HistoryLine], envelopes: Sequence[Envelope]
+    names: tuple[str, str],
+    labels: tuple[str, str],
+    lines: Sequence[HistoryLine],
+    envelopes: Sequence[Envelope],
+    lengths: bool = False,
 ) -> Drawing:
-    """One quantity against another, as altitude against speed, with envelopes of the first at levels of the second."""
+    """One quantity against another, as altitude against speed, with envelopes of the first at levels of the second.
+
+    lengths : whether both are lengths in one unit.
+    """
     across, up = names
     marks: list[Mark] = []
     for envelope in envelopes:
@@ -101,7 +108,7 @@ def profile_figure(
         marks += envelope.bands(upright=True, way=way)
     marks += case_lines(lines, lambda line: thinned(line.quantities[across], line.quantities[up], by_length=True))
     plot = Plot(tuple(marks), Axis(labels[0]), Axis(labels[1]), height=440.0)
-    return Drawing("Curves along flights, the nominal case among them", (plot,))
+    return Drawing("Curves along flights, the nominal case among them", (to_scale(plot) if lengths else plot,))
 
 
 def case_lines(

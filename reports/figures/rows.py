@@ -25,9 +25,15 @@ def margin_figure(names: Sequence[str], margins: np.ndarray, tones: Sequence[str
     place = np.arange(len(names), dtype=np.float64)
     bound, worst = 100.0 * np.clip(margins.T, -MOST_MARGIN, MOST_MARGIN)
     known = np.flatnonzero(np.isfinite(bound)).tolist()
-    words = [["none" if one != one else f"{number(100.0 * one, 3)}{SPACE}%" for one in row] for row in margins.tolist()]
+    words = [
+        ["none" if margin != margin else f"{number(100.0 * margin, 3)}{SPACE}%" for margin in row]
+        for row in margins.tolist()
+    ]
     labels = [f"{name}, {row[0]}".removesuffix(", none") for name, row in zip(names, words, strict=True)]
-    texts = [f"{name}: demonstrated {one}, worst case {other}" for name, (one, other) in zip(names, words, strict=True)]
+    texts = [
+        f"{name}: demonstrated {demonstrated}, worst case {worst_case}"
+        for name, (demonstrated, worst_case) in zip(names, words, strict=True)
+    ]
     x, y, colours, told = bound[known], place[known], [TONES[tones[k]] for k in known], [texts[k] for k in known]
     key = "demonstrated bound (tolerance limit)"
     marks = (
@@ -61,10 +67,10 @@ def change_panel(
         marks.append(intervals(lower[rows], upper[rows], np.array(rows), colour))
         marks.append(Points(value[rows], np.array(rows), colour, key, sign, 8.0, texts=texts, key=key))
     up = names_axis(metrics, down=True)
-    return Plot(tuple(marks), _change_axis(estimates, unchanged), up, title, 70.0 + 24.0 * len(metrics))
+    return Plot(tuple(marks), change_axis(estimates, unchanged), up, title, 70.0 + 24.0 * len(metrics))
 
 
-def _change_axis(estimates: np.ndarray, unchanged: float) -> Axis:
+def change_axis(estimates: np.ndarray, unchanged: float) -> Axis:
     """Reaches every value and, unless they reach far beyond, every interval."""
     log = bool(unchanged)
     changes = np.log(estimates / unchanged) if log else estimates

@@ -24,8 +24,8 @@ def success_panel(requirement: str, label: str, curve: SuccessCurve, overall: fl
     place = np.arange(len(names), dtype=np.float64) if names else curve.middle
     where = names or [number(float(at), 3) for at in place]
     texts = [
-        f"{one}: {count(int(passed))} of {count(int(tried))} cases pass, {number(float(share), 4)} %"
-        for one, passed, tried, share in zip(where, curve.passed, curve.tried, fraction, strict=True)
+        f"{label}: {count(int(passed))} of {count(int(tried))} cases pass, {number(float(share), 4)} %"
+        for label, passed, tried, share in zip(where, curve.passed, curve.tried, fraction, strict=True)
     ]
     extents = [] if names else [intervals(curve.low, curve.high, fraction, MUTED, "extent of the bin")]
     key = f"fraction of a bin's cases that pass, at its median, with {percent(confidence)} Clopper–Pearson interval"

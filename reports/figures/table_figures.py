@@ -24,7 +24,7 @@ from reports.drawing.pictures import render_picture
 from reports.figures import distributions
 from reports.figures.clouds import case_scatter
 from reports.figures.maps import metric_map
-from reports.text.numbers import axis_label, count, words
+from reports.text.numbers import axis_label, count, same_lengths, words
 
 OUTER = (0.00135, 0.99865)  # quantiles drawn beside the median
 POINTS_ON_MAP = 2000
@@ -74,8 +74,9 @@ def scatter(table: pd.DataFrame, x: str, y: str) -> Picture:
     _refuse_few(used.size, 1, f"{x} and {y}")
     cloud = Points(a[used], b[used], "", cases=_case_ids(table)[used])
     classes = [("cases with both numbers", int(used.size))]
-    axes = _label(table, x), _label(table, y)
-    return Picture(case_scatter(cloud, np.zeros(used.size, dtype=np.int8), classes, axes, len(table)))
+    axes, lengths = (_label(table, x), _label(table, y)), same_lengths(_unit(table, x), _unit(table, y))
+    member = np.zeros(used.size, dtype=np.int8)
+    return Picture(case_scatter(cloud, member, classes, axes, len(table), lengths=lengths))
 
 
 def fuel_map(table: pd.DataFrame, x: str, y: str, metric: str) -> Picture:

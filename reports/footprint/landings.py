@@ -1,6 +1,6 @@
 """Where the flights of a run came down, and what distances count from."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,13 +12,17 @@ from reports.run.flown import Flown
 from reports.text.numbers import count, limit_number, with_unit
 
 TARGET = "target"
+KILOMETRES = {"km": 1.0, "m": 1e-3}
+SAME_DISTANCE = 0.005  # of the sum of a distance and the median one: how far a metric may be off that is this distance
 
 
 @dataclass(frozen=True)
 class Landing:
     """What is known of one footprint.  rows : of the cases that came down;  above : that ended above the limit.
 
-    latitude, longitude : float64[n_held], degrees.
+    latitude, longitude : float64[n_held], degrees.  aim : what distances count from, if there is such a place.
+    misses : the metrics that are the distance from the target, that which deviates least first; the model may compute
+    it otherwise than along the geodesic, and a report tells one number for it, that of the first.
     """
 
     figure: FootprintFigure
@@ -28,13 +32,27 @@ class Landing:
     above: int
     footprint: Footprint
     aim: Mark | None
+    misses: tuple[str, ...] = ()
 
-    def distances(self, place: Mark) -> np.ndarray:
+    @property
+    def miss(self) -> str:
+        """The metric that a report tells as the distance from the target; empty if there is none."""
+        return self.misses[0] if self.misses else ""
+
+    def geodesics(self, place: Mark) -> np.ndarray:
         """Kilometres of all cases from a place; NaN for those that did not come down."""
         distances = np.full(self.latitude.size, np.nan)
         plane = LocalPlane(place.latitude, place.longitude, self.footprint.plane.ellipsoid)
         points = plane.points(self.latitude[self.rows], self.longitude[self.rows])
         distances[self.rows] = np.hypot(points[:, 0], points[:, 1]) / 1000.0
+        return distances
+
+    def distances(self, flown: Flown, place: Mark) -> np.ndarray:
+        """The same, from the target by the metric that is this distance."""
+        if not self.miss or place.name != TARGET:
+            return self.geodesics(place)
+        distances = np.full(self.latitude.size, np.nan)
+        distances[self.rows] = _kilometres(flown, self.miss)[self.rows]
         return distances
 
     @property
@@ -71,7 +89,31 @@ def landing_of(flown: Flown, figure: FootprintFigure) -> Landing | str:
         return f"{figure.title}: not drawn; the {count(rows.size)} impact points lie too far apart for one figure."
     if measured.reach < 1.0 and rows.size > 1:
         return f"{figure.title}: not drawn; all {count(rows.size)} impact points lie within one metre."
-    return Landing(figure, latitude, longitude, rows, above, measured, _aim(flown, figure))
+    landing = Landing(figure, latitude, longitude, rows, above, measured, _aim(flown, figure))
+    return replace(landing, misses=_misses(flown, landing))
+
+
+def _misses(flown: Flown, landing: Landing) -> tuple[str, ...]:
+    """The metrics that agree with the geodesic from the target, that whose greatest deviation is smallest first.
+
+    They agree in all cases that have a number, which at least half of those that came down must have.
+    """
+    if landing.centre.name != TARGET:
+        return ()
+    distances = landing.geodesics(landing.centre)[landing.rows]
+    allowed = SAME_DISTANCE * (distances + np.median(distances))
+    greatest = {}
+    for fact in flown.with_role("metric"):
+        if fact.unit in KILOMETRES:
+            apart = np.abs(_kilometres(flown, fact.name)[landing.rows] - distances)
+            known = ~np.isnan(apart)
+            if 2 * known.sum() >= known.size and (apart <= allowed)[known].all():
+                greatest[fact.name] = float(apart[known].max())
+    return tuple(sorted(greatest, key=lambda name: greatest[name]))
+
+
+def _kilometres(flown: Flown, metric: str) -> np.ndarray:
+    return KILOMETRES[flown.unit(metric)] * flown.values(metric)
 
 
 def landed(flown: Flown, figure: FootprintFigure) -> tuple[np.ndarray, np.ndarray]:

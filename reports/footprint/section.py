@@ -10,8 +10,9 @@ from mc_engine.statistics import clopper_pearson, summarize
 from mc_engine.statistics.footprint import Footprint
 from mc_engine.statistics.regions import DensityRegion, Ellipse, next_case_scale
 from reports.document.blocks import Attachment, Cell, Column, FigureBlock, Table
-from reports.drawing.marks import Drawing
-from reports.figures.clouds import Outline
+from reports.drawing.marks import Drawing, Line, Points, nominal_ring
+from reports.drawing.palette import INK
+from reports.figures.clouds import outline
 from reports.figures.footprints import (
     footprint_drawing,
     footprint_plot,
@@ -19,7 +20,7 @@ from reports.figures.footprints import (
     surroundings,
 )
 from reports.footprint.coastlines import coastlines, nearest_coast
-from reports.footprint.landings import TARGET, Landing, height_limit, landing_of, on_earth
+from reports.footprint.landings import KILOMETRES, Landing, height_limit, landing_of, on_earth
 from reports.footprint.map_files import MapOutline, Mark, Places, geojson, kml
 from reports.run.flown import Flown
 from reports.sections.figure_blocks import thinned_rows
@@ -29,9 +30,8 @@ DRAWN_REGION = 0.9  # content of the one region in the figure; more would hide t
 DISTANCES = (0.5, 0.9, 0.99)
 LONG = 12.0  # times its width, a cloud is also drawn with a scale of its own across
 PLACES_IN_A_FILE = 20_000
-KILOMETRES = {"km": 1.0, "m": 1e-3}
 CORNERS = 120  # of a circle
-SAME_DISTANCE = 0.005  # relative, of a metric that is the distance from the target
+LEAST_STRETCH = 1e-5  # that is told
 WIDER = 1.25  # of a map of the surroundings, beyond the nearest coast
 LEAST_AROUND = 500e3  # m, of such a map
 AROUND = 4.0  # times its reach to the north: as wide as the page
@@ -104,34 +104,33 @@ def _footprint_drawing(flown: Flown, landing: Landing) -> Drawing:
     rows = landing.rows[shown]
     places = zip(flown.case_ids[rows], landing.latitude[rows], _half_turn(landing.longitude[rows]), strict=True)
     names = [f"case {case}: {_place_words(north, east)}" for case, north, east in places]
-    aim = None if landing.aim is None else (landing.aim.name, landing.at(landing.aim))
+    cloud = Points(points[shown, 0], points[shown, 1], "", texts=names, cases=flown.case_ids[rows])
+    aim = [nominal_ring(landing.at(place), INK, place.name) for place in [landing.aim] if place]
     outlines = (*_outlines(landing.footprint), *_circles(flown, landing))
     coasts, around, reach = _coasts(landing, outlines) if on_earth(flown, landing.figure) else ([], [], 0.0)
     views, counts = footprint_views(_long_axis(landing.footprint)), (int(landing.rows.size), flown.n_held)
-    plots = [
-        footprint_plot(view, points[shown], names, flown.case_ids[rows], counts, outlines, aim, coasts)
-        for view in views
-    ]
+    plots = [footprint_plot(view, cloud, counts, (*outlines, *aim), coasts) for view in views]
     plots += [surroundings(around, reach)] if around else []
-    return footprint_drawing(plots, views, points, flown.case_ids[landing.rows])
+    every = Points(points[:, 0], points[:, 1], "")
+    return footprint_drawing(plots, views, every, flown.case_ids[landing.rows])
 
 
-def _circles(flown: Flown, landing: Landing) -> Iterator[Outline]:
-    """The circular error probable, and the limit of a requirement on the distance from the target."""
-    centre, distances = landing.centre, landing.distances(landing.centre)
+def _circles(flown: Flown, landing: Landing) -> Iterator[Line]:
+    """The circular error probable, and each limit that requirements set on the distance from the target."""
+    centre = landing.centre
     if flown.random and landing.rows.size > 2:
-        radius = float(np.nanmedian(distances))
+        radius = float(np.nanmedian(landing.distances(flown, centre)))
         text = f"CEP {number(radius, 3)} km: the circle about the {centre.name} that holds 50 % of the cases"
-        yield Outline("CEP", text, (_circle(landing.at(centre), radius),))
-    for verdict in flown.verdicts if centre.name == TARGET else ():
-        scale = KILOMETRES.get(flown.unit(verdict.metric))
-        if scale is None or verdict.at_most is None:
-            continue
-        misses = scale * flown.values(verdict.metric)
-        if np.nanmax(np.abs(misses - distances) / distances, initial=0.0) < SAME_DISTANCE:
-            radius = scale * verdict.at_most
-            text = f"required: {flown.words(verdict.metric)} at most {number(radius)} km"
-            yield Outline("target", text, (_circle(landing.at(centre), radius),))
+        yield outline("CEP", text, (_circle(landing.at(centre), radius),))
+    limits = dict.fromkeys(  # one circle for several shares of cases
+        (verdict.metric, verdict.at_most)
+        for verdict in flown.verdicts
+        if verdict.metric in landing.misses and verdict.at_most is not None
+    )
+    for nth, (metric, at_most) in enumerate(limits):
+        radius = KILOMETRES[flown.unit(metric)] * at_most
+        text = f"required: {flown.words(metric)} at most {number(radius)} km"
+        yield outline("target", text, (_circle(landing.at(centre), radius),), nth)
 
 
 def _circle(middle: np.ndarray, radius: float) -> np.ndarray:
@@ -139,12 +138,12 @@ def _circle(middle: np.ndarray, radius: float) -> np.ndarray:
     return middle + radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def _coasts(landing: Landing, outlines: Iterable[Outline]) -> tuple[list[np.ndarray], list[np.ndarray], float]:
+def _coasts(landing: Landing, outlines: Iterable[Line]) -> tuple[list[np.ndarray], list[np.ndarray], float]:
     """The coasts on the map, or else those of a wider one, and how many km it reaches to the north."""
     plane = landing.footprint.plane
-    places = [landing.footprint.points / 1000.0, *(curve for outline in outlines for curve in outline.curves)]
+    places = [landing.footprint.points / 1000.0, *(np.column_stack([line.x, line.y]) for line in outlines)]
     places += [landing.at(landing.aim)[None, :]] if landing.aim else []
-    ends = np.abs(np.concatenate(places)).max(axis=0)
+    ends = np.nanmax(np.abs(np.concatenate(places)), axis=0)
     on_map = coastlines(plane, 3000.0 * float(ends.max()))
     if any((np.abs(line) < ends).all(axis=1).any() for line in on_map):
         return on_map, [], 0.0
@@ -164,13 +163,14 @@ def _half_turn(longitude: np.ndarray) -> np.ndarray:
     return (longitude + 180.0) % 360.0 - 180.0
 
 
-def _outlines(footprint: Footprint) -> Iterator[Outline]:
-    for ellipse in footprint.ellipses:
+def _outlines(footprint: Footprint) -> Iterator[Line]:
+    for nth, ellipse in enumerate(footprint.ellipses):
         text = f"{_name(ellipse)}, holds {percent(ellipse.inside / ellipse.n, 1)} of the cases"
-        yield Outline("ellipse", text, (ellipse.outline() / 1000.0,))
+        yield outline("ellipse", text, (ellipse.outline() / 1000.0,), nth)
     for region in footprint.regions:
         if region.content == DRAWN_REGION:
-            yield Outline("region", f"{_name(region)}, distribution-free", tuple(o / 1000.0 for o in region.outlines))
+            curves = [curve / 1000.0 for curve in region.outlines]
+            yield outline("region", f"{_name(region)}, distribution-free", curves)
 
 
 def _name(region: Ellipse | DensityRegion) -> str:
@@ -198,7 +198,7 @@ def _region_table(flown: Flown, landing: Landing) -> Table:
         f"{percent(flown.stated.confidence)} Clopper–Pearson interval; where that excludes the stated content, the "
         "distribution is not normal. Lengths are geodesics through the mean impact point, the farthest case "
         f"{number(regions.reach / 1000.0, 3)} km from it; across them the plane stretches by at most "
-        f"{percent(regions.plane.stretch(regions.reach), 3)}."
+        f"{percent(max(regions.plane.stretch(regions.reach), LEAST_STRETCH), 3)}."
     )
     return Table(
         f"Regions of the {count(landing.rows.size)} of {count(flown.n_held)} cases that came down", columns, rows, note
@@ -260,7 +260,8 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
     )
     rows = tuple(_distance_row(flown, landing, place) for place in places)
     each = percent(flown.stated.confidence)
-    note = (
+    metric = f"From the target: the metric {flown.words(landing.miss)}, as the model computes it. "
+    note = metric * bool(landing.miss) + (
         f"50 % of the cases end within the first distance; from the {landing.centre.name} it is the circular error "
         f"probable (CEP). In brackets: distribution-free limits, each holding with {each}."
         if flown.random
@@ -270,7 +271,7 @@ def _distance_table(flown: Flown, landing: Landing) -> Table | None:
 
 
 def _distance_row(flown: Flown, landing: Landing, place: Mark) -> tuple[Cell, ...]:
-    summary = summarize(landing.distances(place), probabilities=DISTANCES, confidence=flown.stated.two_sided)
+    summary = summarize(landing.distances(flown, place), probabilities=DISTANCES, confidence=flown.stated.two_sided)
     spread = summary.spread
     cells = [
         Cell(

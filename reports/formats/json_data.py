@@ -87,6 +87,8 @@ class MetricRecord(_Record):
 class ContributorRecord(_Record):
     """Shares of a metric's variance.  input : a parameter, a group, "random draws" or "unexplained".
 
+    first, total : effects, in [0, 1].  Without flights for the contributors, a total effect may be larger by up to what
+    is "unexplained", and parameters that name a random draw have no row: what they do is in "unexplained".
     fall : the share by which the variance falls with the input at its nominal value, where that was flown; of "random
     draws" the parameters that name a draw have theirs, and noise made in flight stays.
     """
@@ -180,11 +182,11 @@ def run_data(flown: Flown) -> dict[str, Any]:
         "probability": flown.stated.probability,
         "confidence": flown.stated.confidence,
         "counts": _counts_record(flown),
-        "requirements": [_requirement_record(flown, one) for one in flown.verdicts],
+        "requirements": [_requirement_record(flown, verdict) for verdict in flown.verdicts],
         "metrics": [_metric_record(flown, name, summary) for name, summary in flown.summaries.items()],
         "contributors": [] if contributions is None else [_contributor_record(row) for row in contributions.rows()],
         "contributor_flights": 0 if contributions is None else contributions.flights,
-        "worst": [one for verdict in flown.verdicts for one in _worst_records(flown, verdict)],
+        "worst": [record for verdict in flown.verdicts for record in _worst_records(flown, verdict)],
     }
 
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from mc_engine.statistics.moments import in_units, near_one
 from mc_engine.statistics.regions import covariance_ellipses, density_regions
-from reports.figures.clouds import Outline
+from reports.drawing.marks import Line
+from reports.figures.clouds import outline
 from reports.run.flown import Flown, Stated
 from reports.text.numbers import count, percent
 
@@ -18,7 +19,7 @@ FEWEST = 20  # cases, and different numbers of each metric
 THINNEST = 1e-6  # standard deviations
 
 
-def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.ndarray) -> tuple[Outline, ...]:
+def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.ndarray) -> tuple[Line, ...]:
     """Regions of finite values float64[n]; none unless both columns are metrics of cases that were drawn at random."""
     metrics = {fact.name for fact in flown.with_role("metric")}
     distinct = (np.unique(values).size for values in (x, y))
@@ -29,8 +30,8 @@ def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.nda
     if not np.all(scale > 1e-12 * np.abs(points).max(axis=0)):
         return ()
 
-    def placed(outline: np.ndarray) -> np.ndarray:
-        return in_units(centre + outline * scale, exponent)
+    def placed(curve: np.ndarray) -> np.ndarray:
+        return in_units(centre + curve * scale, exponent)
 
     ranges = np.transpose([flown.range(name) for name in names])
     return tuple(_regions((points - centre) / scale, placed, ranges, flown.stated))
@@ -38,22 +39,21 @@ def cloud_regions(flown: Flown, names: tuple[str, str], x: np.ndarray, y: np.nda
 
 def _regions(
     points: np.ndarray, placed: Callable[[np.ndarray], np.ndarray], ranges: np.ndarray, stated: Stated
-) -> Iterator[Outline]:
+) -> Iterator[Line]:
     """Regions of standardised points.  ranges : float64[2, 2], lowest and highest possible x and y.
 
     A normal distribution whose ellipse reaches what is impossible is not that of these metrics: no ellipse then.
     """
     n, contents = count(len(points)), (MIDDLE, stated.probability)
     ellipses = [(ellipse, placed(ellipse.outline())) for ellipse in covariance_ellipses(points, contents, THINNEST)]
-    if all((ranges[0] <= outline).all() and (outline <= ranges[1]).all() for _, outline in ellipses):
-        for ellipse, outline in ellipses:
+    if all((ranges[0] <= curve).all() and (curve <= ranges[1]).all() for _, curve in ellipses):
+        for nth, (ellipse, curve) in enumerate(ellipses):
             held = f"holds {count(ellipse.inside)} of {n} cases, {percent(ellipse.inside / ellipse.n, 1)}"
-            yield Outline(
-                "ellipse", f"{percent(ellipse.content, 3)} ellipse of a normal distribution: {held}", (outline,)
-            )
+            text = f"{percent(ellipse.content, 3)} ellipse of a normal distribution: {held}"
+            yield outline("ellipse", text, (curve,), nth)
     for region in density_regions(points, contents[1:], stated.confidence, THINNEST):
         text = (
             f"distribution-free region, at least {percent(region.content, 3)} with {percent(region.confidence)} "
             f"confidence: holds {count(region.inside)} of {n} cases"
         )
-        yield Outline("region", text, tuple(np.clip(placed(outline), *ranges) for outline in region.outlines))
+        yield outline("region", text, [np.clip(placed(curve), *ranges) for curve in region.outlines])

@@ -1,7 +1,8 @@
 """Contributors: the share of each metric's variance that comes from each input, and from the random draws.
 
 From the flights beside the run where it has them ([sensitivity]), else from the table of cases, which tells less: what
-it cannot assign to an input is a row of its own.
+it cannot assign to an input is a row of its own.  An input that only names a random draw has no row there: its values
+have no order that a trend or a surrogate model could follow, so that its effect is part of the unexplained share.
 """
 
 from collections.abc import Iterator, Sequence
@@ -33,7 +34,8 @@ class Contributor:
 
     first : the share that goes when it alone becomes known.  total : the share that stays when all others are known.
     fall : the share by which the variance falls if it is held at its nominal value.
-    None where that is not known.  Intervals hold with the report's confidence.
+    None where that is not known.  Intervals hold with the report's confidence.  first and total lie in [0, 1], as the
+    shares do that they estimate.
     """
 
     metric: str
@@ -115,11 +117,12 @@ def _of_companion(flown: "Flown", store: Store, metrics: list[str]) -> Contribut
 
 
 def _of_table(flown: "Flown", metrics: list[str]) -> Contributions | None:
-    if not flown.inputs:
+    inputs = {name: values for name, values in flown.inputs.items() if name not in flown.draws}
+    if not inputs:
         return None
     rows = np.arange(flown.n_held)[:: -(-flown.n_held // MOST_ROWS)]
     indices = sensitivity(
-        {name: values[rows] for name, values in flown.inputs.items()},
+        {name: values[rows] for name, values in inputs.items()},
         {name: flown.values(name)[rows] for name in metrics},
     )
     shares = ((indices.first_order, indices.first_order_error), (indices.total, indices.total_error))
@@ -142,20 +145,26 @@ def _ranked(
     """
     # standard errors on each side of an interval
     errors = float(scipy.special.ndtri(0.5 * (1.0 + flown.stated.confidence)))
-
-    def interval(value: float, error: float) -> Interval | None:
-        if not (np.isfinite(value) and np.isfinite(error)):
-            return None
-        return float(value - errors * error), float(value + errors * error)
-
     rows = []
     for row, name in enumerate(names):
-        known = [(float(value[row]), float(error[row])) for value, error in shares]
+        known = [(float(value[row]), errors * float(error[row])) for value, error in shares]
         if any(np.isfinite(value) for value, _ in known):
-            (first, first_ends), (total, total_ends), *rest = ((_number(one[0]), interval(*one)) for one in known)
-            fall, fall_ends = rest[0] if rest else (None, None)
+            (first, first_ends), (total, total_ends) = (_inside(*effect, 0.0, 1.0) for effect in known[:2])
+            fall, fall_ends = _inside(*known[2], -np.inf, 1.0) if known[2:] else (None, None)
             rows.append(Contributor(metric, name, first, total, first_ends, total_ends, fall, fall_ends))
     return tuple(sorted(rows, key=lambda contributor: -contributor.size))
+
+
+def _inside(value: float, reach: float, low: float, high: float) -> tuple[float | None, Interval | None]:
+    """The possible value nearest to an estimate, and what of `reach` on both sides of it is possible.
+
+    Chance puts estimates beyond the range of what they estimate.  The interval holds the true value wherever that about
+    the estimate itself does.
+    """
+    nearest = _number(float(np.clip(value, low, high)))
+    if nearest is None or not np.isfinite(reach):
+        return nearest, None
+    return nearest, (max(nearest - reach, low), min(nearest + reach, high))
 
 
 def _number(value: float) -> float | None:

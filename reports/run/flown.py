@@ -16,7 +16,7 @@ from mc_engine.status import STATUS_NAME, STATUS_TEXT
 from reports.run.all_cases import Run, all_cases, without_attributes
 from reports.run.contributions import Contributions
 from reports.run.contributions import contributions as contributions_of
-from reports.text.numbers import axis_label, count, named, words
+from reports.text.numbers import axis_label, count, named, same_lengths, words
 
 NEGLIGIBLE = 1e-7  # of the size of a metric
 SQUARABLE = 1e140  # largest number, and inverse of the smallest spread, whose squares over all cases can be summed
@@ -135,6 +135,10 @@ class Flown:
 
     def unit(self, name: str) -> str:
         return self.columns[name].unit if name in self.columns else ""
+
+    def lengths(self, name: str, other: str) -> bool:
+        """Whether both columns are lengths in one unit, so that a figure of them can be to scale."""
+        return same_lengths(self.unit(name), self.unit(other))
 
     def words(self, name: str) -> str:
         return words(name, self.unit(name))
@@ -289,6 +293,12 @@ class Flown:
     def inputs(self) -> dict[str, np.ndarray]:
         """The columns at hand of the dispersed inputs by name."""
         return {fact.name: self.cases[fact.name].to_numpy() for fact in self.with_role("dispersion")}
+
+    @cached_property
+    def draws(self) -> frozenset[str]:
+        """The inputs that only name a random draw, as a seed does."""
+        records = self.manifest.get("inputs", [])
+        return frozenset(str(record["name"]) for record in records if record.get("random_draw"))
 
     def contributors(self, metric: str) -> list[Contributor]:
         """The dispersed inputs that vary, the one that contributes most to the metric first."""

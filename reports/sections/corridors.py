@@ -9,8 +9,8 @@ from mc_engine.model.figures import CorridorFigure
 from mc_engine.statistics import SurfaceMap, Verdict
 from mc_engine.statistics.maps import map_metrics
 from reports.document.blocks import FigureBlock, Table
-from reports.drawing.marks import Points
-from reports.figures.clouds import LIMIT_SETS, Outline, case_scatter
+from reports.drawing.marks import Line, Points
+from reports.figures.clouds import LIMIT_SETS, case_scatter, outline
 from reports.run.flown import Flown
 from reports.run.outcomes import inside, inside_words
 from reports.sections.figure_blocks import nominal_rings, thinned_rows
@@ -53,6 +53,7 @@ def _corridor(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], vio
         [(word, int(np.count_nonzero(member[used] == k))) for k, word in enumerate(words)],
         (flown.axis(figure.x), flown.axis(figure.y)),
         flown.n_held,
+        lengths=flown.lengths(figure.x, figure.y),
         styles=LIMIT_SETS,
         rings=nominal_rings(flown, figure.x, figure.y),
         outlines=limits,
@@ -75,18 +76,16 @@ def _classes(names: list[str], violated: np.ndarray, inside_all: str) -> tuple[l
     own = ordered if len(ordered) < MOST_CLASSES else ordered[: MOST_CLASSES - 2]
     words = [inside_all]
     member = np.zeros(code.size, dtype=np.int64)
-    for k, one in enumerate(own, start=1):
-        words.append(f"beyond {' and '.join(compress(names, [one >> bit & 1 for bit in range(len(names))]))}")
-        member[code == one] = k
+    for k, limits in enumerate(own, start=1):
+        words.append(f"beyond {' and '.join(compress(names, [limits >> bit & 1 for bit in range(len(names))]))}")
+        member[code == limits] = k
     if len(own) < len(ordered):
         words.append("beyond other sets of limits")
         member[(code > 0) & (member == 0)] = len(words) - 1
     return words, member
 
 
-def _limit_lines(
-    flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray
-) -> Iterator[Outline]:
+def _limit_lines(flown: Flown, figure: CorridorFigure, verdicts: list[Verdict], violated: np.ndarray) -> Iterator[Line]:
     """Where the surface of a metric over the two columns is at its limit, if the two columns decide it.
 
     Of a count, such as that of exits, the surface between two cases means nothing.
@@ -95,6 +94,7 @@ def _limit_lines(
     metrics = {name: flown.values(name) for name in dict.fromkeys(verdict.metric for verdict in verdicts)}
     metrics = {name: values for name, values in metrics.items() if _continuous(values)}
     surfaces = dict(zip(metrics, map_metrics(x, y, [*metrics.values()]), strict=True))
+    nth = 0
     for verdict, beyond in zip(verdicts, violated, strict=True):
         surface = surfaces.get(verdict.metric)
         if surface is None or not _decides(surface, x, y, metrics[verdict.metric], beyond):
@@ -107,7 +107,8 @@ def _limit_lines(
             if curves:
                 text = f"{flown.words(verdict.metric)} {limit_text(verdict, flown.unit(verdict.metric))}"
                 words = f"{text}, in the mean over the other inputs"
-                yield Outline("limit", words, tuple(np.asarray(curve) for curve in curves))
+                yield outline("limit", words, [np.asarray(curve) for curve in curves], nth)
+                nth += 1
 
 
 def _continuous(values: np.ndarray) -> bool:

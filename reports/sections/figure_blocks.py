@@ -9,9 +9,9 @@ import numpy as np
 from mc_engine.model.figures import ScatterFigure
 from mc_engine.statistics.summary import nearly_equal
 from reports.document.blocks import FigureBlock
-from reports.drawing.marks import Drawing, Limit, Plot, Points, nominal_ring
+from reports.drawing.marks import Drawing, Limit, Line, Plot, Points, nominal_ring
 from reports.drawing.palette import VERMILION
-from reports.figures.clouds import Outline, case_scatter
+from reports.figures.clouds import case_scatter
 from reports.figures.distributions import histogram, histograms
 from reports.figures.histories import Envelope, HistoryLine, history_figure, history_plot, phase_limits
 from reports.run.cloud_regions import cloud_regions
@@ -84,12 +84,12 @@ def _scatter_block(flown: Flown, figure: ScatterFigure) -> FigureBlock | str:
         return f"{figure.title}: not drawn, {told}."
     regions = cloud_regions(flown, (figure.x, figure.y), x[used], y[used])
     drawing = outcome_scatter(flown, figure.x, figure.y, regions)
-    impossible = bool(regions) and not any(region.kind == "ellipse" for region in regions)
+    impossible = bool(regions) and not any(region.name == "ellipse" for region in regions)
     left_out = ". No normal ellipse is shown: it would leave the physical range of these metrics" if impossible else ""
     return FigureBlock(f"{figure.title}{left_out}.", drawing, "wide")
 
 
-def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Outline] = ()) -> Drawing:
+def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Line] = ()) -> Drawing:
     """The cases over two columns by their outcome, thinned; those at the ends of both columns among them."""
     x, y, outcome = flown.values(x_name), flown.values(y_name), case_outcomes(flown)
     used = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
@@ -102,6 +102,7 @@ def outcome_scatter(flown: Flown, x_name: str, y_name: str, regions: Sequence[Ou
         tuple(zip(outcome_names(flown), counts, strict=True)),
         (flown.axis(x_name), flown.axis(y_name)),
         flown.n_held,
+        lengths=flown.lengths(x_name, y_name),
         rings=nominal_rings(flown, x_name, y_name),
         outlines=regions,
     )

@@ -41,7 +41,7 @@ def _profile_block(flown: Flown, figure: ProfileFigure) -> FigureBlock | str:
         if not bands or (rank is not None and rank <= COLOURED_OVER_BANDS)
     )
     labels = flown.axis(figure.x), flown.axis(figure.y)
-    drawing = profile_figure((figure.x, figure.y), labels, lines, bands[:2])
+    drawing = profile_figure((figure.x, figure.y), labels, lines, bands[:2], flown.lengths(*names))
     said = (
         _band_words(flown, figure, bands_or_reason)
         if isinstance(bands_or_reason, tuple)

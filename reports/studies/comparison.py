@@ -6,7 +6,7 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from mc_engine.durable_file import write_durably
-from mc_engine.statistics.change_tests import UNKNOWN, Estimate, MetricChange, ShareChange, finite
+from mc_engine.statistics.change_tests import Estimate, MetricChange, ShareChange, finite
 from mc_engine.studies.comparison import Comparison, VerdictChange
 from mc_engine.studies.run_changes import Difference
 from mc_engine.units import convert
@@ -23,19 +23,16 @@ from reports.document.blocks import (
     as_blocks,
     numbered,
 )
-from reports.drawing.marks import Drawing
-from reports.figures.rows import change_panel
 from reports.formats.html import render_html
 from reports.formats.pdf import render_pdf
 from reports.run.chosen_units import ShownRun, chosen_unit
 from reports.run.flown import Flown, Run
+from reports.studies.comparison_figure import change_figure
 from reports.studies.comparison_overlays import overlay_blocks
 from reports.text.numbers import axis_label, count, number, percent, words
 
-MOST_ROWS = 40  # of the figure
 LEAST_P = 1e-12  # a smaller p-value means no more
 ROUNDING = 1e-12  # of a mean: a smaller standard deviation is none
-WIDEST, FEW_SIGMA = 20.0, 5.0  # the axis of shifts: so many medians, or so many σ at least
 GLOSSARY = Terms(
     (
         (
@@ -146,10 +143,10 @@ def _short_names(names: tuple[str, str]) -> tuple[str, ...]:
         return names
     parts = [(name,) if "://" in name else PurePosixPath(name).parts for name in names]
     for depth in range(1, max(map(len, parts))):
-        short = tuple(str(PurePosixPath(*one[-depth:])) if one[1:] else one[0] for one in parts)
+        short = tuple(str(PurePosixPath(*path[-depth:])) if path[1:] else path[0] for path in parts)
         if len(set(short)) == len(short):
             return short
-    return tuple(one[-1] for one in parts)
+    return tuple(path[-1] for path in parts)
 
 
 def _change_cards(comparison: Comparison) -> Iterator[Card]:
@@ -172,12 +169,15 @@ def _change_cards(comparison: Comparison) -> Iterator[Card]:
         detail = (
             f"of {count(total)} metrics: {names}{more}" if moved else f"the {what} of none of {count(total)} metrics"
         )
-        yield Card(label, f"{count(len(moved))} changed" if moved else "no change", detail, "bad" if moved else "good")
+        yield _change_card(label, len(moved), detail)
     shares = comparison.moved_shares
     detail = ", ".join(share.name for share in shares) or f"none of {count(len(comparison.shares))} fractions of cases"
-    yield Card(
-        "Fractions of cases", f"{len(shares)} changed" if shares else "no change", detail, "bad" if shares else "good"
-    )
+    yield _change_card("Fractions of cases", len(shares), detail)
+
+
+def _change_card(label: str, changed: int, detail: str) -> Card:
+    """Of a change alone, which may be for the better: without a verdict."""
+    return Card(label, f"{count(changed)} changed", detail) if changed else Card(label, "no change", detail, "good")
 
 
 def _comparison_warnings(comparison: Comparison) -> tuple[str, ...]:
@@ -198,7 +198,7 @@ def _metric_blocks(comparison: Comparison, units: Mapping[str, str]) -> Iterator
     moved = _ranked(comparison)
     drawn = [change for change in moved if finite(change.shift_in_sigma) or finite(change.ratio)]
     if drawn:
-        yield _change_figure(comparison, drawn)
+        yield change_figure(comparison, drawn)
     if moved:
         yield _metric_table(comparison, units, moved)
     same = [metric.metric for metric in comparison.metrics if metric.same]
@@ -223,44 +223,6 @@ def _ranked(comparison: Comparison) -> list[MetricChange]:
         (metric for metric in comparison.metrics if not metric.same and finite(metric.shift)),
         key=lambda change: (not significant(change), -change.effect),
     )
-
-
-def _change_figure(comparison: Comparison, moved: list[MetricChange]) -> FigureBlock:
-    shown = moved[:MOST_ROWS]
-    reach = _reach([abs(item.shift_in_sigma.value) for item in shown])
-    far = [item for item in shown if abs(item.shift_in_sigma.value) > reach]
-    names = tuple(words(item.metric, comparison.units[item.metric]) for item in shown)
-    caption = "How far each metric moved and how much its spread changed from run A to run B"
-    if len(shown) < len(moved):
-        caption += f"; the {len(shown)} of {len(moved)} metrics with the largest changes"
-    if far:
-        values = (
-            f"{words(change.metric, comparison.units[change.metric])} {number(change.shift_in_sigma.value, 3)} σ"
-            for change in far
-        )
-        caption += f". Shifts beyond the axis, not drawn: {', '.join(values)}"
-    shifts = [UNKNOWN if item in far else item.shift_in_sigma for item in shown]
-    shifted, spread = (np.array([getattr(item, p) <= comparison.alpha for item in shown], dtype=bool)
-                       for p in ("shift_adjusted", "spread_adjusted"))  # fmt: skip
-    ratios, interval = [item.ratio for item in shown], percent(comparison.confidence)
-    plots = (
-        change_panel("Shift [σ of run A]", names, _ends(shifts), shifted, 0.0, interval),
-        change_panel("Spread, run B over run A", names, _ends(ratios), spread, 1.0, interval),
-    )
-    return FigureBlock(f"{caption}.", Drawing("Changes from run A to run B", plots), "half")
-
-
-def _reach(shifts: list[float]) -> float:
-    """The largest shift on the axis; shifts far beyond most others are told in the caption instead."""
-    known = np.sort([shift for shift in shifts if np.isfinite(shift)])
-    return max(WIDEST * float(np.quantile(known, 0.5, method="lower")), FEW_SIGMA) if known.size else FEW_SIGMA
-
-
-def _ends(estimates: list[Estimate]) -> np.ndarray:
-    """float64[n, 3]: values and both ends of their intervals."""
-    return np.array(
-        [(estimate.value, estimate.lower, estimate.upper) for estimate in estimates], dtype=np.float64
-    ).reshape(-1, 3)
 
 
 def _metric_table(comparison: Comparison, units: Mapping[str, str], moved: list[MetricChange]) -> Table:

@@ -7,7 +7,7 @@ import numpy as np
 from mc_engine.model.figures import FootprintFigure, HistoryFigure
 from mc_engine.statistics.geodesy import ELLIPSOIDS, WGS84, middle_plane
 from reports.document.blocks import FigureBlock
-from reports.drawing.marks import Axis, Band, Drawing, Line, Plot, Points, between
+from reports.drawing.marks import Axis, Band, Drawing, Line, Plot, Points, between, to_scale
 from reports.drawing.palette import BLUE, VERMILION
 from reports.footprint.landings import landed, planet_of
 from reports.run.flown import Flown
@@ -36,7 +36,7 @@ def overlay_blocks(runs: tuple[Flown, Flown], metrics: Sequence[str]) -> Iterato
     if panels:
         caption = "Time histories of both runs: of the saved cases, or the nominal case where fewer than 20 are saved."
         yield FigureBlock(caption, Drawing(FORM, panels, 3), "half")
-    if noise := [name for name, one in drawn.items() if one is None]:
+    if noise := [name for name, panel in drawn.items() if panel is None]:
         yield f"Not drawn, rounding errors only in both nominal cases: {', '.join(noise)}."
     for figure in (drawn for drawn in runs[1].figures if isinstance(drawn, FootprintFigure)):
         footprint = _footprint((runs[0].own, runs[1].own), figure)
@@ -111,7 +111,7 @@ def _footprint(runs: tuple[Flown, Flown], figure: FootprintFigure) -> Plot | Non
         key = f"{NAMES[run]}: impact points"
         marks.append(Points(points[:, 0], points[:, 1], COLOURS[run], NAMES[run], SIGNS[run], opacity=0.5, key=key))
     east, north = "east of the mean impact point of run A [km]", "north of it [km]"
-    return Plot(tuple(marks), Axis(east), Axis(north), height=500.0, equal=True)
+    return to_scale(Plot(tuple(marks), Axis(east), Axis(north)), np.inf)
 
 
 def _thinned_words(runs: tuple[Flown, Flown]) -> str:

@@ -26,7 +26,7 @@ from reports.figures.clouds import case_scatter
 from reports.sections.figure_blocks import thinned_by_outcome
 from reports.sections.provenance import origin_table
 from reports.sections.tables import dispersed_table
-from reports.text.numbers import SPACE, axis_label, count, exact, named, number, percent, with_unit, words
+from reports.text.numbers import SPACE, axis_label, count, exact, named, number, percent, same_lengths, with_unit, words
 
 CLASSES = ("drawn from the dispersions, not failed", "failed")
 DESIGN_POINTS = (
@@ -208,6 +208,7 @@ def _failure_figure(record: RareEventRecord) -> FigureBlock | None:
         [(what, int(np.count_nonzero(counted & (member == kind)))) for kind, what in enumerate(CLASSES)],
         (x_label, y_label),
         len(cases),
+        lengths=same_lengths(*(item["unit"] for item in shown)),
         rings=[
             nominal_ring((shown[0][key], shown[1][key]), colour, name)
             for key, name, colour in DESIGN_POINTS

@@ -242,6 +242,8 @@ const reportCases = (function () {
     for (const axis of ["xaxis", "yaxis"]) {
       for (const member of ["range", "type", "autorange"]) delete figure.layout[axis][member];
     }
+    delete figure.layout.yaxis.scaleanchor; // of two lengths, which other axes are not
+    figure.layout.title.text = "";
     for (const [axis, column] of [["xaxis", x], ["yaxis", y]]) {
       figure.layout[axis].title.text = reportFigures.plain(column.label);
     }

@@ -190,6 +190,11 @@ def axis_label(text: str, unit: str) -> str:
     return f"{text} [{typeset(unit)}]" if unit else text
 
 
+def same_lengths(unit: str, other: str) -> bool:
+    """Whether both units are one unit of length, so that a figure of both columns can be to scale."""
+    return unit == other and unit in UNITS and UNITS[unit].quantity == "length"
+
+
 def typeset(unit: str) -> str:
     """A unit as it is printed: W/m² for W/m^2, µN for uN, deg/√h for deg/sqrt(h), days for day."""
     if unit == "day":

@@ -11,14 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from mc_engine import load_campaign
-from mc_engine.campaign.parts import Retention
+from mc_engine.campaign.sections import HistoriesSection
 from mc_engine.runner import runner
 from tests.benchmarks.kernel_clock import KernelClock
 
 
 def microseconds_per_case(name="deorbit", cases=100_000):
     """Microseconds a case of a run without histories, less those in the kernels."""
-    campaign = replace(load_campaign(name, cases=cases), retention=Retention(nominal=False))
+    campaign = replace(load_campaign(name, cases=cases), retention=HistoriesSection(nominal=False))
     with tempfile.TemporaryDirectory() as folder, KernelClock() as kernels:
         runner.run(replace(campaign, cases=64), Path(folder) / "warm", workers=1)
         kernels.spent = 0.0

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from mc_engine import load_campaign
 from mc_engine.campaign.loading import Campaign
-from mc_engine.campaign.parts import Retention
+from mc_engine.campaign.sections import HistoriesSection
 from mc_engine.runner import runner
 
 
@@ -28,7 +28,7 @@ def seconds(campaign: Campaign, workers: int) -> float:
 
 def scaling(name: str, cases: int, turns: int = 5) -> dict[int, float]:
     """Threads -> seconds of the shortest run."""
-    campaign = replace(load_campaign(name, cases=cases), retention=Retention(nominal=False))
+    campaign = replace(load_campaign(name, cases=cases), retention=HistoriesSection(nominal=False))
     thread_counts = sorted({1, min(2, os.cpu_count() or 1), os.cpu_count() or 1})
     seconds(replace(campaign, cases=64), 1)  # compiles
     best = dict.fromkeys(thread_counts, float("inf"))

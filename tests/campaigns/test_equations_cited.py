@@ -1,4 +1,4 @@
-"""Physics of a shipped campaign that computes says the unit of what it gives, or the source of the equation."""
+"""A function of a shipped campaign that computes says the unit of what it gives, or the source of the equation."""
 
 import ast
 import re
@@ -12,27 +12,25 @@ KEEPS_BOOKS = ("The memory", "The row")  # begins the docstring of one that comp
 
 
 def unsaid(source):
-    """Names of the functions of physics in a source that compute and say neither unit nor source."""
-    functions = [node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)]
-    return [
-        function.name
-        for function in functions
-        if not function.name.startswith("_") and _is_physics(function) and _computes(function)
-        if not _says(ast.get_docstring(function) or "")
-    ]
+    """Names of the functions in a source that compute and say neither unit nor source, those in functions, too."""
+    functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]
+    return [f.name for f in functions if _computes(f) and not _says(ast.get_docstring(f) or "")]
 
 
 def _says(docstring):
     return docstring.startswith(KEEPS_BOOKS) or UNIT.search(docstring) or SOURCE.search(docstring)
 
 
-def _is_physics(function):
-    return any(isinstance(mark, ast.Name) and mark.id == "physics" for mark in function.decorator_list)
-
-
 def _computes(function):
-    operators = (node.op for node in ast.walk(function) if isinstance(node, ast.BinOp))
-    return any(isinstance(operator, ast.Mult | ast.Div | ast.Pow) for operator in operators)
+    return any(
+        isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div | ast.Pow) and not _is_path(node)
+        for node in ast.walk(function)
+    )
+
+
+def _is_path(node):
+    """A folder and a name in it, joined by a stroke."""
+    return isinstance(node.right, ast.JoinedStr) or isinstance(getattr(node.right, "value", None), str)
 
 
 def test_a_function_without_unit_and_source_is_noticed():
@@ -40,6 +38,10 @@ def test_a_function_without_unit_and_source_is_noticed():
     assert unsaid(f"@physics\ndef pressure(density, speed):\n{body}") == ["pressure"]
     assert unsaid(f'@physics\ndef pressure(density, speed):\n    """Dynamic pressure."""\n{body}') == ["pressure"]
     assert unsaid(f'@physics\ndef pressure(density, speed):\n    """Dynamic pressure [Pa]."""\n{body}') == []
+    assert (
+        unsaid(f"def flow():\n    def _pressure(density, speed):\n    {body}    return _pressure\n")[-1] == "_pressure"
+    )
+    assert unsaid("def place(folder, name):\n    return folder / f'{name}.toml'\n") == []
 
 
 def test_every_equation_of_a_campaign_has_its_unit_or_its_source():

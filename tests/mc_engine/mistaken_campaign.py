@@ -1,7 +1,10 @@
 """The smallest campaign with deliberate mistakes, for the tests of what the engine says about them."""
 
+import pytest
+
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.campaign.search import SHIPPED
+from mc_engine.errors import CampaignError
 
 MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 CAMPAIGN = (SHIPPED / "minimal" / "campaign.toml").read_text()
@@ -22,6 +25,16 @@ def write_campaign(folder, *edits):
 def campaign_with(folder, *edits):
     """The same, loaded."""
     return load_campaign(write_campaign(folder, *edits))
+
+
+def refused(folder, edits, sentence, text=None):
+    """The campaign with these edits has one problem, which has this sentence and the line of `text` in the model."""
+    with pytest.raises(CampaignError) as error:
+        campaign_with(folder, *edits)
+    (problem,) = error.value.problems
+    line = f"{line_of(folder, text)}: " if text else ""
+    assert problem.message.startswith(f"model.py, line {line}"), (sentence, problem.message)
+    assert sentence in problem.message
 
 
 def given(*arguments):

@@ -29,9 +29,12 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
+def test_a_slip_is_answered_with_what_is_there_or_the_next_command(here):
+    for name in ("b", "a"):
+        small_store(here / "runs" / name)
+    (here / "other").mkdir()
+    (here / "other" / "case.toml").write_text("")
+    for words, said in [
         (["status", "deorbit"], "deorbit: is a campaign and no run; `mc-engine run deorbit` flies it"),
         (["status", "runs"], "runs: is no run directory; it holds 2 runs, the latest is runs/a"),
         (["status", "cart"], "cart: is no run directory; `mc-engine run` makes one"),
@@ -39,17 +42,11 @@ def here(tmp_path, monkeypatch):
         (["run", "other"], "holds no campaign.toml, but other/case.toml"),
         (["run", "nowhere.toml"], "there is no such file; `mc-engine list` names the shipped campaigns"),
         (["tune", "cart"], "write [tuning.parameter.NAME] and [tuning.objective.NAME], as flexible_satellite/stage_1"),
-        (["rare", "cart"], "--requirement is missing: the campaign has several; choose one of reach, stop"),
+        (["rare", "cart"], 'there are several; choose one of "reach", "stop", on the command line by `--requirement`'),
         (["replay", "runs/a", "-1"], "Invalid value for 'CASE'"),
         (["plan", "--share", "2", "--confidence", "0.9"], "--share is 2; it must be above 0 and below 1"),
-    ],
-)
-def test_a_slip_is_answered_with_what_is_there_or_the_next_command(here, words, said):
-    for name in ("b", "a"):
-        small_store(here / "runs" / name)
-    (here / "other").mkdir()
-    (here / "other" / "case.toml").write_text("")
-    fails_with(2, call(*words), said)
+    ]:
+        fails_with(2, call(*words), said)
 
 
 def test_a_run_that_is_complete_is_not_flown_again(here):

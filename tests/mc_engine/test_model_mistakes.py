@@ -302,9 +302,9 @@ RECORDS = {
 
 
 def test_a_function_that_gives_other_numbers_than_the_model_declares_is_named(tmp_path):
-    for mistake, (edits, spot, words) in RECORDS.items():
+    for mistake, (edits, text, words) in RECORDS.items():
         sentence = refused(tmp_path / mistake, edits)
-        start = f"model.py, line {line_of(tmp_path / mistake, spot)}: " if spot else ""
+        start = f"model.py, line {line_of(tmp_path / mistake, text)}: " if text else ""
         assert sentence.startswith(start), (mistake, sentence)
         assert words in sentence, (mistake, sentence)
 

@@ -2,6 +2,7 @@
 
 from base64 import b64decode
 from dataclasses import replace
+from importlib.resources import files
 from io import BytesIO
 
 import numpy as np
@@ -259,6 +260,29 @@ def test_a_box_over_a_footprint_chooses_the_flights_that_come_down_there(browser
     assert browser.run(CHOSEN) == pytest.approx(int(((east >= low) & (east <= high)).sum()), abs=3)
     browser.run("document.getElementById('selection-close').click()")
     assert browser.logged == []
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (390, "dark")])
+def test_axe_finds_nothing_that_keeps_a_reader_out(browser, tmp_path, width, scheme):
+    axe = files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8")
+    file = tmp_path / "report.html"
+    file.write_bytes(render_html(build(synthetic_run(80), "run")))  # it looks at every point of a figure
+    browser.ask("Emulation.setDeviceMetricsOverride", width=width, height=900, deviceScaleFactor=1, mobile=width == 390)
+    browser.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+    try:
+        browser.open(file)
+        browser.run(SCROLLED)
+        browser.until(f"{DRAWN}.every(Boolean)")
+        browser.run(f"{axe}; null")
+        rules, found = browser.run(
+            "axe.run(document).then((done) => [done.passes.length, done.violations.map((one) =>"
+            " `${one.id}: ${one.nodes.map((node) => node.html).join(' ')}`)])"
+        )
+    finally:
+        browser.ask("Emulation.setEmulatedMedia", features=[])
+        browser.ask("Emulation.clearDeviceMetricsOverride")
+    assert found == []
+    assert rules > 20
 
 
 def test_what_users_write_stays_text_in_the_browser(browser, tmp_path):

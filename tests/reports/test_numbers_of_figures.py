@@ -26,6 +26,7 @@ from reports.run.flown import Flown
 from reports.run.history_bands import OUTER, history_envelopes, outer_percentile
 from reports.run.history_limits import history_limits
 from reports.sections.diagnostics import rank_correlations
+from reports.sections.single_cases import case_data
 from reports.text.numbers import number
 
 TIMES = np.linspace(0.0, 10.0, 101)
@@ -108,6 +109,42 @@ def test_a_replays_picture_has_nominal_envelopes_and_limits():
     assert Image.open(io.BytesIO(replay_picture(run, 77, history))).width > 1000
 
 
+def test_a_result_is_drawn_however_small_it_is_beside_others_of_its_unit():
+    run = peaked(PEAKS)
+    draw = np.random.Generator(np.random.Philox(key=11)).normal(size=(3, len(run.history)))
+    lost = (run.history["case_id"] == 39) & (run.history["t_s"] == 10.0)
+    quantities = {
+        "sun_distance_m": 1.5e11 + run.history["force_n"],
+        "navigation_error_m": 0.02 * draw[0],  # at most 6e-13 of the distance
+        "downrange_m": np.where(lost, 3e20, 1e3 * draw[1]),  # of a flight that is lost
+        "reynolds": 1e7 + run.history["force_n"],
+        "eccentricity_error": 1e-8 * draw[2],  # without a unit, as the other
+    }
+    run.history = run.history.assign(**quantities)
+    units = {name: name.split("_")[-1] if name.endswith("_m") else "" for name in quantities}
+    run.manifest["quantities"] = [
+        {"name": name, "unit": unit, "description": ""} for name, unit in {"force_n": "N", **units}.items()
+    ]
+    run.manifest["figures"] = []
+    document, names = build(run, "run"), set(run.history) - {"case_id", "t_s"}
+    assert {plot.quantity for one in drawings(document, "histories") for plot in one.plots} == names
+    history = run.history[run.history["case_id"] == 3].assign(case_id=77)
+    assert {plot.quantity for plot in replay_drawing(run, 77, history).plots} == names
+    assert set(case_data(Flown(run, "run"), document.sections).quantities) == names
+
+
+def test_a_metric_is_drawn_however_small_it_is_beside_others_of_its_unit():
+    run = synthetic_run(300, failed=0)
+    draw = np.random.Generator(np.random.Philox(key=12)).normal(size=300)
+    run.table["navigation_error_m"], run.table["sun_distance_m"] = 0.02 * draw, 1.5e11 * (1.0 + 0.01 * draw)
+    for name in ("navigation_error_m", "sun_distance_m"):
+        run.manifest["columns"].append({"name": name, "unit": "m", "role": "metric", "description": ""})
+    document = build(run, "run")
+    assert Flown(run, "run").undrawn("navigation_error_m") == ""
+    labels = [plot.x.label for block in blocks_of(document, FigureBlock) for plot in block.drawing.plots]
+    assert any(label.startswith("navigation error") for label in labels)
+
+
 def test_a_model_without_figures_has_its_saved_histories_and_scatters():
     run = peaked(PEAKS)
     run.manifest["figures"] = []
@@ -133,6 +170,58 @@ def footprint(target_limit=None, place=(36.0, -5.35)):
         changes = {"requirements": [*run.manifest["requirements"], {**one, "confidence": 0.9}]}
     run.manifest.update(changes)
     return drawings(build(run, "run"), "footprint")[0]
+
+
+def test_the_distance_from_the_target_is_the_metric_where_the_model_has_one():
+    parameters = [{"name": "aim_latitude_deg", "value": 54.5}, {"name": "aim_longitude_deg", "value": -179.5}]
+    run = landing_run(
+        figures=[FOOTPRINT | {"target": ["aim_latitude_deg", "aim_longitude_deg"]}], parameters=parameters
+    )
+    there = run.table[["latitude_deg", "longitude_deg"]].to_numpy()
+    geodesic = np.hypot(*LocalPlane(54.5, -179.5).points(*there.T).T) / 1000.0
+    # a sphere differs from the ellipsoid by 0.3 %, and a short distance by more of itself
+    for factor, more_km, of_metric in ((1.003, 0.0, True), (1.0, 0.1, True), (1.02, 0.0, False)):
+        run.table["miss_km"] = factor * geodesic + more_km
+        miss = {"name": "miss_km", "unit": "km", "role": "metric", "description": "distance from the target"}
+        run.manifest["columns"] = [*landing_run(n=20).manifest["columns"], miss]
+        tables = [block for block in section(run, "footprint").blocks if isinstance(block, Table)]
+        came_down = (run.table["status"] == "ok") & (run.table["end_altitude_km"] < 30.0)
+        told = run.table["miss_km"] if of_metric else geodesic
+        assert tables[1].rows[0][2].value == pytest.approx(np.median(told[came_down]), rel=1e-6)
+        assert ("the metric miss" in tables[1].note) == of_metric
+
+
+def test_the_distance_is_the_metric_that_deviates_least_and_each_required_one_has_a_circle():
+    parameters = [{"name": "aim_latitude_deg", "value": 54.5}, {"name": "aim_longitude_deg", "value": -179.5}]
+    run = landing_run(
+        figures=[FOOTPRINT | {"target": ["aim_latitude_deg", "aim_longitude_deg"]}], parameters=parameters
+    )
+    there = run.table[["latitude_deg", "longitude_deg"]].to_numpy()
+    geodesic = np.hypot(*LocalPlane(54.5, -179.5).points(*there.T).T)
+    landed = int(np.flatnonzero((run.table["status"] == "ok") & (run.table["end_altitude_km"] < 30.0))[0])
+    run.table["range_miss_km"], run.table["miss_m"] = 1.004 * geodesic / 1000.0, geodesic
+    run.table.loc[landed, "miss_m"] = np.nan
+    run.table["seldom_m"] = np.where(run.table["case_id"] == landed, geodesic, np.nan)
+    for name in ("range_miss_km", "seldom_m", "miss_m"):
+        unit = name.rsplit("_", 1)[1]
+        run.manifest["columns"] = [
+            *run.manifest["columns"],
+            {"name": name, "unit": unit, "role": "metric", "description": ""},
+        ]
+    limits = [("miss_m", 30e3), ("range_miss_km", 60.0), ("miss_m", 100e3), ("miss_m", 100e3)]
+    run.manifest["requirements"] = [
+        {"name": f"r{k}", "metric": name, "at_most": limit, "at_least": None, "share": 0.5 + 0.1 * k, "confidence": 0.9}
+        for k, (name, limit) in enumerate(limits)
+    ]
+    found = section(run, "footprint").blocks
+    table = [block for block in found if isinstance(block, Table)][1]
+    assert "the metric miss," in table.note
+    drawing = next(block.drawing for block in found if isinstance(block, FigureBlock))
+    circles = marks_of(drawing, Line, "required")
+    (aim,) = marks_of(drawing, Points, "target")
+    radii = [np.hypot(line.x - aim.x, line.y - aim.y) for line in circles]
+    np.testing.assert_allclose(np.mean(radii, axis=1), [30.0, 60.0, 100.0], rtol=1e-9)
+    assert len({line.dash for line in circles}) == 3
 
 
 def test_the_circular_error_probable_holds_half_of_the_cases_and_the_limit_is_a_circle():

@@ -18,9 +18,9 @@ from mc_engine.flight.flight import chosen_case, chosen_history
 from mc_engine.studies.tuning import tune
 
 _FOLDER = Path(__file__).resolve().parents[1]
-_MODULATOR = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
+MODULATOR = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
 PWPF: dict[str, Any] = {"actuator": "pwpf", "step_s": 0.005}
-TABLE_8: dict[str, Any] = PWPF | dict(zip(_MODULATOR, (7.39, 0.713, 0.117, 0.225, 1.07), strict=True))
+TABLE_8: dict[str, Any] = PWPF | dict(zip(MODULATOR, (7.39, 0.713, 0.117, 0.225, 1.07), strict=True))
 _SETTLED_S = 200.0  # Table 8's thrusters have reached the attitude long before
 _FEWEST_SIGN_CHANGES = 30
 _LARGEST_MEAN = 0.03  # of a mode's largest value
@@ -33,7 +33,7 @@ def thruster_torque_n_m() -> float:
 
 def shortest_pulse_s() -> float:
     """Shortest pulse [s] of the modulator of Table 8 under a steady command: -T_m ln(1 - h / (K_m T)), eq. (19)."""
-    gain, time_constant_s, _, hysteresis, level = (TABLE_8[name] for name in _MODULATOR)
+    gain, time_constant_s, _, hysteresis, level = (TABLE_8[name] for name in MODULATOR)
     return -time_constant_s * float(np.log1p(-hysteresis / (gain * level)))
 
 

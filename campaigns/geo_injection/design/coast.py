@@ -10,11 +10,6 @@ import numpy as np
 IMAGINARY = 1e-40  # step along the imaginary axis: its square vanishes beside one
 
 
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Scalar product over the last axis, canonical, without conjugation: complex parts carry derivatives."""
-    return a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
-
-
 def kepler(r: np.ndarray, v: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(place, velocity) a time dt after r, v [n, 3] on an ellipse; complex numbers carry a derivative.
 
@@ -22,10 +17,10 @@ def kepler(r: np.ndarray, v: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np
     perigee: sqrt(1/a^3) dt = x - (1 - r/a) sin x + (r.v / sqrt a)(1 - cos x).  Battin, An Introduction to the
     Mathematics and Methods of Astrodynamics (1999), section 4.4.  Not a number on a parabola or hyperbola.
     """
-    r0 = np.sqrt(_dot(r, r))
-    a = 1.0 / (2.0 / r0 - _dot(v, v))
+    r0 = np.sqrt((r * r).sum(-1))
+    a = 1.0 / (2.0 / r0 - (v * v).sum(-1))
     root = np.sqrt(np.where(a.real > 0.0, a, np.nan))
-    cosine, sine = 1.0 - r0 / a, _dot(r, v) / root  # e cos E, e sin E at the start
+    cosine, sine = 1.0 - r0 / a, (r * v).sum(-1) / root  # e cos E, e sin E at the start
     m = dt / (a * root)
     x = _anomaly_difference(m.real, cosine.real, sine.real) + 0.0 * m
     for _ in range(2):  # the first of them gives the derivative, the second the last digit
@@ -35,7 +30,7 @@ def kepler(r: np.ndarray, v: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np
     f = 1.0 - a / r0 * (1.0 - c)
     g = dt - a * root * (x - s)
     place = f[..., None] * r + g[..., None] * v
-    r1 = np.sqrt(_dot(place, place))
+    r1 = np.sqrt((place * place).sum(-1))
     f_rate = -root * s / (r0 * r1)
     g_rate = 1.0 - a / r1 * (1.0 - c)
     return place, f_rate[..., None] * r + g_rate[..., None] * v
@@ -58,11 +53,10 @@ def _anomaly_difference(m: np.ndarray, cosine: np.ndarray, sine: np.ndarray) -> 
 
 
 def coast(y: np.ndarray, dt: np.ndarray) -> np.ndarray:
-    """States [n, 12] (place, velocity, primer vector, its rate), canonical, a time dt [n] after the states y.
+    """States [n, 12] (place, velocity, primer vector, its rate), canonical, a time dt [n] after y: (19)-(21).
 
-    (19)-(21)
+    y : float64[n, 12], or float64[12] of one state that counts for every time
     """
-    place, velocity = kepler(
-        y[..., 0:3] + 1j * IMAGINARY * y[..., 6:9], y[..., 3:6] + 1j * IMAGINARY * y[..., 9:12], dt
-    )
-    return np.concatenate([place.real, velocity.real, place.imag / IMAGINARY, velocity.imag / IMAGINARY], axis=-1)
+    start = y[..., :6] + 1j * IMAGINARY * y[..., 6:]
+    end = np.concatenate(kepler(start[..., :3], start[..., 3:], dt), axis=-1)
+    return np.concatenate([end.real, end.imag / IMAGINARY], axis=-1)

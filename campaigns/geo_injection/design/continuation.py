@@ -1,9 +1,9 @@
-"""From the limit of large thrust to the wanted optimum, step by step.
+"""From the limit of large thrust to the wanted optimum, step by step.  Canonical units, unknowns as in `Solution`.
 
-Two burns: impulses give the guess at a large thrust, which is then lowered.  Three burns (`added_burn.py`) grow out of
-two.  An elliptic parking orbit is reached from the circle through its perigee, with the first burn about either node,
-or from the planar sequence, with the first burn about perigee; the cheapest of what is found is the optimum.  No
-number here depends on the orbit or on the engine.
+Two burns: impulses give the guess at a large thrust, which is then lowered.  Three burns grow out of two.  An elliptic
+parking orbit is reached from the circle through its perigee, with the first burn about either node, or from the planar
+sequence, with the first burn about perigee; the cheapest of what is found is the optimum.  No number here depends on
+the orbit or on the engine.
 """
 
 from collections.abc import Callable
@@ -11,14 +11,18 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import scipy  # loads its packages when they are used
 
-from campaigns.geo_injection.design.added_burn import with_burn_ahead
+from campaigns.geo_injection.design.coast import coast
 from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
 from campaigns.geo_injection.design.optimal import (
     FIRST_PLACE,
     Instead,
     Problem,
     Solution,
+    first_burn,
+    first_states,
+    local_axes,
     solve,
     switch_states,
     unknowns_of,
@@ -32,61 +36,48 @@ _FIRST_STEP, _LONGEST_STEP, _LEAST_STEP = 0.1, 0.25, 1e-5  # of the way
 _FAR = 0.3  # of a step: distance of a solution from what was foreseen
 _PLACE_STEP = 0.1  # rad, in which the first place is looked for
 _VANISHING = 0.01  # of all burning: a burn that short is about to leave the sequence
+_SHORT = 0.05  # first length of an added burn, and how it grows, over the burn that it relieves
 
 
 def optimum(problem: Problem) -> Solution:
-    """The optimum of two or three burns; ModelError tells how far the search got."""
+    """The optimum of two or three burns, from perigee to apogee; in canonical units.
+
+    ModelError tells how far the search got.
+    """
     if problem.burns not in (2, 3):
         raise ModelError(f"the optimal sequence has 2 or 3 burns, not {problem.burns}")
-    _refuse_descents(problem)
-    x = _two_burns(problem) if problem.burns == 2 else _three_burns(problem)
-    solution = Solution(problem, x, switch_states(problem, x[None])[0])
-    _refuse_waiting(solution)
-    return solution
-
-
-def _refuse_descents(problem: Problem) -> None:
-    """The sequences begin about perigee and end at apogee, so the final circle has to lie outside the parking orbit.
-
-    Compared in canonical radii: the apogee is (1 + e) / (1 - e).
-    """
-    farthest = (1.0 + problem.eccentricity) / (1.0 - problem.eccentricity)
-    if farthest >= problem.ratio:
+    apogee = (1.0 + problem.eccentricity) / (1.0 - problem.eccentricity)
+    if apogee >= problem.ratio:
         raise ModelError(
-            f"the parking orbit reaches {farthest / problem.ratio:.4g} of the final radius; sequences are designed to "
+            f"the parking orbit reaches {apogee / problem.ratio:.4g} of the final radius; sequences are designed to "
             "circles outside of it: lower parking_altitude_km or parking_eccentricity, or raise final_radius_km"
         )
-
-
-def _refuse_waiting(solution: Solution) -> None:
-    """Each coast ends at the first apsis that serves: one that lasts longer belongs to another sequence.
-
-    The period of a coast's orbit is 2 pi a^1.5 in canonical units (Kepler's third law).
-    """
+    x = _two_burns(problem) if problem.burns == 2 else _three_burns(problem)
+    solution = Solution(problem, x, switch_states(problem, x[None])[0])
+    # each coast ends at the first apsis that serves: one that lasts a period, 2 pi a^1.5 by Kepler's third law, belongs
+    # to another sequence
     ends = solution.states[1:-1:2]
     a = 1.0 / (2.0 / np.linalg.norm(ends[:, :3], axis=1) - (ends[:, 3:6] ** 2).sum(1))
     if not (solution.coasts < 2.0 * np.pi * a**1.5).all():
-        raise ModelError(
-            f"the search for the optimal {solution.problem.burns} burns found only one that lets a revolution pass"
-        )
+        raise ModelError(f"the search for the optimal {problem.burns} burns found only one that lets a revolution pass")
+    return solution
 
 
 def _impulsive_guess(problem: Problem) -> np.ndarray:
-    """Unknowns from two impulses: burns by the rocket equation, eq. (1), centred on the apses; canonical units."""
+    """Unknowns from two impulses: burns by the rocket equation, eq. (1), centred on the apses."""
     two = two_impulses(problem.plane_change, problem.ratio)
     first = propellant_share(two.first, problem.exhaust) / problem.flow
     second = propellant_share(two.first + two.second, problem.exhaust) / problem.flow - first
-    primer, coast = two.primer - 0.5 * first * two.rate, np.pi * two.a**1.5 - 0.5 * (first + second)
-    return unknowns_of(problem, -0.5 * first, primer, two.rate, [first, second], [coast])
+    primer, wait = two.primer - 0.5 * first * two.rate, np.pi * two.a**1.5 - 0.5 * (first + second)
+    return unknowns_of(problem, -0.5 * first, primer, two.rate, [first, second], [wait])
 
 
 def _two_burns(problem: Problem) -> np.ndarray:
-    """Two-burn unknowns, canonical: from a circle as it comes, from an ellipse the cheapest of all ways."""
+    """Two-burn unknowns: from a circle as it comes, from an ellipse the cheapest of all ways."""
     ways: list[Callable[[Problem], np.ndarray]] = [_from_node]
     if problem.eccentricity > 0.0:
-        ways = [_from_perigee]
-        if problem.plane_change > 0.0:
-            ways = [_from_node, partial(_from_node, descending=True), _from_perigee]
+        ways = [_from_node, partial(_from_node, descending=True), _from_perigee]
+        ways = ways if problem.plane_change > 0.0 else ways[2:]
     solved, failed = [], []
     for way in ways:
         try:
@@ -129,8 +120,7 @@ def _from_perigee(problem: Problem) -> np.ndarray:
     """The planar circle, then the eccentricity and the plane change with the first place held, then the best place.
 
     A planar circle has no place of its own, and an ellipse that is nearly one only a soft one.  Less thrust comes last.
-
-    Canonical units.
+    Gives the unknowns in canonical units; their first, the place, is moved by the argument of the perigee [rad].
     """
     strong = problem.with_thrust(max(problem.thrust, 2.0 * GENTLE_THRUST))
     circle = replace(strong, plane_change=0.0, eccentricity=0.0)
@@ -145,6 +135,7 @@ def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
     """Unknowns with the first place [rad] free: it is moved by steps while the burns grow shorter."""
 
     def moved(x: np.ndarray, by: float) -> np.ndarray | None:
+        """Unknowns with the first place moved by an angle [rad] and held there; None where there is no solution."""
         return solve(problem, x + by * np.eye(1, x.size)[0], FIRST_PLACE)
 
     for by in (_PLACE_STEP, -_PLACE_STEP):
@@ -158,7 +149,10 @@ def _best_place(problem: Problem, x: np.ndarray) -> np.ndarray:
 
 
 def _between(start: Problem, end: Problem, share: float) -> Problem:
-    """On the way from one problem to another, canonical: thrust along its logarithm, the rest along lines."""
+    """On the way from one problem to another: thrust along its logarithm, the rest along lines.
+
+    Canonical units; share : fraction of the way.
+    """
     if share >= 1.0:
         return end
     thrust = start.thrust * (end.thrust / start.thrust) ** share
@@ -168,11 +162,10 @@ def _between(start: Problem, end: Problem, share: float) -> Problem:
 
 
 def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None = None) -> np.ndarray:
-    """Unknowns of the problem `end` from those of `start`, each step foreseen from the last two solutions.
+    """Unknowns of the problem `end` from those of `start`, each step foreseen from the last two solutions (secant).
 
     A solution far from what was foreseen belongs to another family of extremals, and the step is halved.
-
-    Secant prediction; the unknowns and their distances are canonical.
+    A step is a fraction of the way; unknowns in canonical units.
     """
     if start == end:
         return x
@@ -194,7 +187,7 @@ def _follow(start: Problem, end: Problem, x: np.ndarray, instead: Instead | None
 
 
 def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
-    """How far the search got from thrust, plane change [deg] and eccentricity that it began with, and what may help."""
+    """How far the search got: thrust as a fraction of the wanted one, angles in the unit deg; and what may help."""
     where = [f"{here.thrust / end.thrust:.3f} of the wanted thrust"]
     where.append(f"a plane change of {np.degrees(here.plane_change):.3f} of {np.degrees(end.plane_change):.3f} deg")
     if end.eccentricity > 0.0:
@@ -209,11 +202,11 @@ def _how_far(here: Problem, end: Problem, x: np.ndarray) -> str:
 def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
     """The same sequence with burns longer by what the thrust is smaller, about the same middles.
 
-    The burn times scale with 1 / thrust, in canonical units; sqrt(1 + e) is the rate of the place at perigee.
+    The burn times scale with 1 / thrust; sqrt(1 + e) is the rate of the place at perigee, in canonical
+    units.
     """
     n, guess = here.burns, x.copy()
-    longer = here.thrust / there.thrust
-    guess[7 : 7 + n] *= longer
+    guess[7 : 7 + n] *= here.thrust / there.thrust
     added = guess[7 : 7 + n] - x[7 : 7 + n]
     guess[0] -= 0.5 * added[0] * np.sqrt(1.0 + here.eccentricity)
     guess[7 + n :] -= 0.5 * (added[:-1] + added[1:])
@@ -221,15 +214,92 @@ def _longer_burns(here: Problem, there: Problem, x: np.ndarray) -> np.ndarray:
 
 
 def _three_burns(problem: Problem) -> np.ndarray:
-    """Unknowns of three burns: at the wanted thrust, or at the lowest larger one where the way there is open."""
+    """Unknowns of three burns: at the wanted thrust, or at a larger one where the way there is open.
+
+    Canonical units.  The larger thrust is the first that serves of a series of ratio 1.5.
+    """
     wide = _widened(problem) if problem.eccentricity == 0.0 else problem
     start = wide.with_thrust(max(wide.thrust, GENTLE_THRUST))
     for _ in range(8):
         try:
-            x = with_burn_ahead(start, _two_burns(replace(start, burns=2)))
+            x = _with_burn_ahead(start, _two_burns(replace(start, burns=2)))
         except ModelError:
             x = None
         if x is not None:
             return _follow(wide, problem, _follow(start, wide, x))
         start = start.with_thrust(1.5 * start.thrust)
     raise ModelError("the search for three optimal burns found no burn to put ahead of the two-burn optimum")
+
+
+def _with_burn_ahead(problem: Problem, two: np.ndarray) -> np.ndarray | None:
+    """Three-burn unknowns from those of two burns, or None.
+
+    A short burn one revolution ahead is lengthened until the primer vector is as long at the end of the coast after it
+    as at its start.  Durations in canonical units, the short burn as a fraction of the first of the two.
+    """
+    grow = _SHORT * two[7]
+    x = solve(problem, _short_burn_ahead(problem, two, grow), first_burn(problem))
+    last = None
+    while x is not None and x[8] > _SHORT * two[7]:
+        if last is not None and _gap(problem, x) * _gap(problem, last) < 0.0:
+            return _where_lengths_agree(problem, last, x)
+        longer = None
+        while longer is None and grow > 1e-4 * two[7]:
+            longer = _longer(problem, last, x, grow)
+            grow = grow if longer is not None else 0.5 * grow
+        last, x = x, longer
+    return None
+
+
+def _gap(problem: Problem, x: np.ndarray) -> float:
+    """Length of the primer vector after the first coast less that before, 0 at the optimum: Lawden, chapter 5."""
+    size = np.linalg.norm(switch_states(problem, x[None])[0, :, 6:9], axis=1)
+    return float(size[2] - size[1])
+
+
+def _longer(problem: Problem, before: np.ndarray | None, x: np.ndarray, grow: float) -> np.ndarray | None:
+    """The solution with a first burn longer by `grow`; the guess is linear in that burn's duration.
+
+    Canonical units.
+    """
+    guess = x - grow * np.eye(1, x.size, 8)[0] if before is None else x + (x - before) * grow / (x[7] - before[7])
+    guess[7] = x[7] + grow
+    return solve(problem, guess, first_burn(problem))
+
+
+def _where_lengths_agree(problem: Problem, low: np.ndarray, high: np.ndarray) -> np.ndarray | None:
+    """Between two solutions of opposite gaps: a root of the gap, then all conditions at once.
+
+    Canonical units.
+    """
+
+    def between(share: float) -> np.ndarray | None:
+        """Unknowns solved for from a guess that is a fraction of the way from `low` to `high`."""
+        return solve(problem, low + share * (high - low), first_burn(problem))
+
+    def gap(share: float) -> float:
+        x = between(share)
+        return np.nan if x is None else _gap(problem, x)
+
+    try:
+        x = between(scipy.optimize.brentq(gap, 0.0, 1.0, xtol=1e-9))
+    except ValueError:  # a gap is not a number: there is no solution on the way
+        return None
+    return None if x is None else solve(problem, x)
+
+
+def _short_burn_ahead(problem: Problem, two: np.ndarray, length: float) -> np.ndarray:
+    """Guess of three burns: a short burn one revolution ahead, centred where the primer vector is longest.
+
+    Lawden (1963), chapter 5: where that length exceeds 1 on a coast, an impulse there saves propellant.  Canonical
+    units; the period is 2 pi a^1.5 of the parking orbit.
+    """
+    period = 2.0 * np.pi / (1.0 - problem.eccentricity) ** 1.5
+    start = first_states(problem, two[None])[0]
+    times = np.linspace(-0.5, 2.0, 501)
+    after = times[np.argmax(np.linalg.norm(coast(start, times)[:, 6:9], axis=1))]
+    y = coast(start, np.array([after - 0.5 * length]))[0]
+    at_node = local_axes(problem.plane_change, np.zeros(1))[0]
+    place = float(np.arctan2(at_node[1] @ y[:3], at_node[0] @ y[:3]))
+    burns, coasts = [length, two[7] - length, two[8]], [period - after + 1.5 * length, two[9]]
+    return unknowns_of(problem, place, y[6:9], y[9:12], burns, coasts)

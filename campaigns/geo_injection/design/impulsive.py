@@ -22,6 +22,7 @@ def two_impulses(plane_change: float, ratio: float) -> Impulsive:
     at_perigee, at_apogee, final = np.sqrt(ratio / a), np.sqrt(1.0 / (ratio * a)), np.sqrt(1.0 / ratio)
 
     def changes(inclination: float) -> tuple[np.ndarray, np.ndarray]:
+        """Velocity changes at perigee and apogee, canonical units, over a transfer orbit of this inclination [rad]."""
         along = np.array([0.0, np.cos(inclination), np.sin(inclination)])
         before = np.array([0.0, np.cos(plane_change), np.sin(plane_change)])
         return at_perigee * along - before, at_apogee * along - np.array([0.0, final, 0.0])
@@ -29,11 +30,10 @@ def two_impulses(plane_change: float, ratio: float) -> Impulsive:
     def cost(inclination: float) -> float:
         return float(sum(np.linalg.norm(change) for change in changes(inclination)))
 
-    low = plane_change - max(abs(plane_change), 1e-9)
-    best = float(
-        scipy.optimize.minimize_scalar(cost, bounds=(low, low + max(plane_change, 1e-9)), options={"xatol": 1e-12}).x
-    )
-    best = best if plane_change > 0.0 else 0.0
+    best = 0.0
+    if plane_change > 0.0:
+        found = scipy.optimize.minimize_scalar(cost, bounds=(0.0, plane_change), options={"xatol": 1e-12})
+        best = float(found.x)
     first, second = changes(best)
     start = np.array([1.0, 0.0, 0.0, 0.0, at_perigee * np.cos(best), at_perigee * np.sin(best)])
     sizes = float(np.linalg.norm(first)), float(np.linalg.norm(second))
@@ -44,9 +44,8 @@ def two_impulses(plane_change: float, ratio: float) -> Impulsive:
 def _primer_rate(start: np.ndarray, first: np.ndarray, second: np.ndarray, dt: float) -> np.ndarray:
     """Rate of the primer vector at the first impulse: it becomes `second` after dt, and is longest at both.
 
-    Half a revolution leaves one component free, so the five conditions on three numbers are met by least squares.
-
-    Canonical; the conditions are those of Lawden, chapter 5.
+    Half a revolution leaves one component free, so the five conditions (Lawden, 1963, chapter 5) on three numbers are
+    met by least squares.  Canonical units.
     """
     basis = np.zeros((4, 12))
     basis[:, :6] = start
@@ -59,5 +58,5 @@ def _primer_rate(start: np.ndarray, first: np.ndarray, second: np.ndarray, dt: f
 
 
 def propellant_share(speed_change: float, exhaust: float) -> float:
-    """Fraction of the initial mass that impulses of a total speed change need: eq. (1), integrated; canonical."""
+    """Fraction of the initial mass that impulses of a total speed change need: eq. (1), integrated."""
     return float(-np.expm1(-speed_change / exhaust))

@@ -1,47 +1,32 @@
-"""The programs that are kept beside the campaign, in `programs/`: those of the source's sequences.
+"""The source's sequences, whose programs are kept beside the campaign, in `programs/`.
 
 `python -m campaigns.geo_injection.design.kept_programs` designs them again and writes them.
 """
 
-from functools import partial
+from types import SimpleNamespace
+from typing import Any
 
-import numpy as np
-
-from campaigns.geo_injection.design.program import to_text
-from campaigns.geo_injection.design.programs import KEPT, new_design
-from campaigns.geo_injection.design.sequence import Sequence, source_orbits
-
-# m, kg: eq. (12) of the source;  N, kg/s: not printed, they follow from tables 2 to 8
-_SOURCE = partial(
-    Sequence, final_inclination=0.0, parking_radius=6_578_137.0, final_radius=42_164_137.0, thrust=20_000.0,
-    mass_flow=6.14, mass=22_170.0,
-)  # fmt: skip
+from campaigns.geo_injection.design.program import KEPT, new_design, to_text
+from campaigns.geo_injection.design.sequence import Sequence
+from campaigns.geo_injection.model import MODEL, sequence_of
 
 
-def _sequence(burns: int, degrees: float, method: str = "optimal") -> Sequence:
-    """A sequence of the source: tables 2 to 8, with the burns, plane change [deg] and method given."""
-    change = float(np.radians(degrees))
-    between = source_orbits(burns, change) if method == "staged" else ()
-    return _SOURCE(method=method, burns=burns, initial_inclination=change, between=between)
+def sequence_with(**settings: Any) -> Sequence:
+    """The sequence of the nominal settings but for these, by column name and in declared units."""
+    codes = {item.symbol: item.code(settings.get(item.name, item.default)) for item in MODEL.settings}
+    return sequence_of(SimpleNamespace(**codes))
 
 
 SEQUENCES = {
-    "two_burns_28_5": _sequence(2, 28.5),
-    "two_burns_55": _sequence(2, 55.0),
-    "two_burns_planar": _sequence(2, 0.0),
-    "three_burns_28_5": _sequence(3, 28.5),
-    "three_burns_planar": _sequence(3, 0.0),
-    "two_burns_28_5_staged": _sequence(2, 28.5, "staged"),
-    "three_burns_28_5_staged": _sequence(3, 28.5, "staged"),
+    "two_burns_28_5": sequence_with(),
+    "two_burns_55": sequence_with(initial_inclination_deg=55.0),
+    "two_burns_planar": sequence_with(planar=True),
+    "three_burns_28_5": sequence_with(burns=3),
+    "three_burns_planar": sequence_with(burns=3, planar=True),
+    "two_burns_28_5_staged": sequence_with(method="staged"),
+    "three_burns_28_5_staged": sequence_with(burns=3, method="staged"),
 }
 
-
-def write_all() -> None:
-    """Design every sequence of the source and write its file, SI."""
-    KEPT.mkdir(exist_ok=True)
+if __name__ == "__main__":
     for name, sequence in SEQUENCES.items():
         (KEPT / f"{name}.toml").write_text(to_text(new_design(sequence)), encoding="utf-8", newline="\n")
-
-
-if __name__ == "__main__":
-    write_all()

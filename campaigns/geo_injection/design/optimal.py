@@ -1,4 +1,4 @@
-"""The free-time optimum: least burn time over steering, burns, coasts and the place of the first ignition.
+"""The free-time optimum, and its check: least burn time over steering, burns, coasts and place of the first ignition.
 
 One primer vector lives through all burns and coasts.  With the duration of everything free, the Hamiltonian of the
 coasts H = q.v - p.g is zero at the start and end of every burn, and the primer vector is as long at the end of a coast
@@ -9,6 +9,7 @@ Canonical units: perigee radius of the parking orbit, the circular speed there, 
 node of the parking orbit, z normal to the final orbit.
 """
 
+from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -18,6 +19,7 @@ import scipy  # loads its packages when they are used
 from campaigns.geo_injection.design.coast import coast
 
 SOLVED = 1e-11  # largest residual of a solution
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(48)
 _STEP = 1e-6  # of the differences of the Jacobian, over unknowns of about one
 
 
@@ -38,11 +40,11 @@ class Problem:
 
     @property
     def exhaust(self) -> float:
-        """Exhaust speed T / m', canonical: the c of eq. (1)."""
+        """Exhaust speed T / m': the c of eq. (1)."""
         return self.thrust / self.flow
 
     def with_thrust(self, thrust: float) -> "Problem":
-        """The same engine with another thrust, canonical, and the same exhaust speed."""
+        """The same engine with another thrust and the same exhaust speed; canonical units, flow = thrust / exhaust."""
         return replace(self, thrust=thrust, flow=thrust / self.exhaust)
 
 
@@ -57,7 +59,7 @@ class Solution:
 
     @property
     def durations(self) -> np.ndarray:
-        """Of the burns."""
+        """Durations of the burns."""
         return self.unknowns[7 : 7 + self.problem.burns]
 
     @property
@@ -67,14 +69,14 @@ class Solution:
 
     @property
     def ignitions(self) -> np.ndarray:
-        """Times of the ignitions after the first, canonical."""
+        """Times of the ignitions after the first."""
         return np.concatenate([[0.0], np.cumsum(self.durations[:-1] + self.coasts)])
 
 
 def unknowns_of(
     problem: Problem, place: float, primer: np.ndarray, rate: np.ndarray, durations: list[float], coasts: list[float]
 ) -> np.ndarray:
-    """The unknowns, see `Solution`; primer vector and rate canonical, in the axes of the problem."""
+    """The unknowns, see `Solution`; primer vector and rate in the axes of the problem, canonical units."""
     axes = local_axes(problem.plane_change, np.array([place]))[0]
     return np.array([place, *axes @ primer, *axes @ rate, *durations, *coasts])
 
@@ -82,37 +84,31 @@ def unknowns_of(
 def switch_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     """States [n, 2 burns, 12] at the ignitions and cut-offs of n sets of unknowns [n, 6 + 2 burns].
 
-    Canonical; coasts by (19)-(21), burns by (1) and (16).
+    Coasts by eqs (19)-(21) of the source, burns by (1) and (16).
     """
     from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
 
-    y = first_states(problem, unknowns)
-    mass = np.ones(len(unknowns))
-    out = []
-    for k in range(problem.burns):
-        duration = unknowns[:, 7 + k]
+    mass, states = np.ones(len(unknowns)), [first_states(problem, unknowns)]
+    for k, duration in enumerate(unknowns[:, 7 : 7 + problem.burns].T):
         if k > 0:
-            y = coast(y, unknowns[:, 6 + problem.burns + k])
-        out.append(y)
-        y = fly_burns(y, mass, duration, problem.thrust, problem.flow)
-        out.append(y)
+            states.append(coast(states[-1], unknowns[:, 6 + problem.burns + k]))
+        states.append(fly_burns(states[-1], mass, duration, problem.thrust, problem.flow))
         mass = mass - problem.flow * duration
-    return np.stack(out, axis=1)
+    return np.stack(states, axis=1)
 
 
 def local_axes(plane_change: float, place: np.ndarray) -> np.ndarray:
     """Radial, transverse and normal unit vectors [n, 3, 3] on the parking orbit at places [n, rad from the node]."""
     c, s = np.cos(place), np.sin(place)
     ci, si, zero = np.cos(plane_change), np.sin(plane_change), 0.0 * c
-    radial = np.stack([c, s * ci, s * si], axis=1)
-    transverse = np.stack([-s, c * ci, c * si], axis=1)
-    return np.stack([radial, transverse, np.stack([zero, zero - si, zero + ci], axis=1)], axis=1)
+    axes = [[c, s * ci, s * si], [-s, c * ci, c * si], [zero, zero - si, zero + ci]]
+    return np.moveaxis(np.array(axes), 2, 0)
 
 
 def parking_orbit(problem: Problem, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(places [n, 3], velocities [n, 3]) on the parking orbit at angles [n] from its node.
 
-    Curtis, Orbital Mechanics for Engineering Students, 3rd ed., eqs (2.45), (2.48), (2.49), the perigee radius being 1.
+    Curtis, Orbital Mechanics for Engineering Students, 3rd ed., eqs (2.45), (2.48), (2.49); the perigee radius is 1.
     """
     axes = local_axes(problem.plane_change, place)
     e, anomaly = problem.eccentricity, place - problem.perigee
@@ -131,10 +127,9 @@ def first_states(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
 
 
 def coast_hamiltonian(y: np.ndarray) -> np.ndarray:
-    """q.v - p.g of states [..., 12], canonical: eq. (13) without the thrust and the 1, with its sign."""
-    r, v, p, q = (y[..., 3 * k : 3 * k + 3] for k in range(4))
-    r3 = (r * r).sum(-1) ** 1.5
-    return (q * v).sum(-1) + (p * r).sum(-1) / r3
+    """q.v - p.g of states [..., 12]: eq. (13) without the thrust and the 1, with its sign."""
+    r, v, p, q = np.split(y, 4, axis=-1)
+    return (q * v).sum(-1) + (p * r).sum(-1) / (r * r).sum(-1) ** 1.5
 
 
 def residuals(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
@@ -144,33 +139,31 @@ def residuals(problem: Problem, unknowns: np.ndarray) -> np.ndarray:
     cut-off, equal primer vectors at both ends of a coast, and the length 1 of the last one, which is their scale.
     """
     y = switch_states(problem, unknowns)
-    end = y[:, -1]
-    r, v = end[:, :3], end[:, 3:6]
-    h = np.cross(r, v)
+    r, v, ends = y[:, -1, :3], y[:, -1, 3:6], y[:, 1::2]
     size = np.sqrt((y[:, :, 6:9] ** 2).sum(-1))
-    ends = y[:, 1::2]
     columns = [
-        h[:, :2] / np.sqrt(problem.ratio),
-        ((r * r).sum(1) / problem.ratio**2 - 1.0)[:, None],
-        ((r * v).sum(1) / np.sqrt(problem.ratio))[:, None],
-        ((v * v).sum(1) * problem.ratio - 1.0)[:, None],
-        coast_hamiltonian(y[:, 0])[:, None],
+        np.cross(r, v)[:, :2] / np.sqrt(problem.ratio),
+        (r * r).sum(1) / problem.ratio**2 - 1.0,
+        (r * v).sum(1) / np.sqrt(problem.ratio),
+        (v * v).sum(1) * problem.ratio - 1.0,
+        coast_hamiltonian(y[:, 0]),
         # the primer vector's rate falls with the radius: all ends count alike in the units of the final circle
         coast_hamiltonian(ends) * np.sqrt((ends[:, :, :3] ** 2).sum(-1)),
         size[:, 2::2] - size[:, 1:-1:2],
-        (size[:, -1] - 1.0)[:, None],
+        size[:, -1] - 1.0,
     ]
-    return np.concatenate(columns, axis=1)
+    return np.column_stack(columns)
 
 
 Conditions = Callable[[np.ndarray], np.ndarray]  # zero where they are met: [n, m] at n sets of unknowns [n, k]
 
 
 def searched(conditions: Conditions, guess: np.ndarray, most: int | None = None) -> tuple[np.ndarray, float, int]:
-    """(unknowns near a guess, largest residual, iterations); the conditions are canonical, over unknowns of about one.
+    """(unknowns near a guess, largest residual, iterations), for unknowns of about one.
 
     Levenberg-Marquardt of at most `most` evaluations, then two Newton steps; the Jacobian by central differences over
-    all unknowns at once.  What is not finite counts as far from being met.
+    all unknowns at once.  What is not finite counts as far from being met.  The residual is in the
+    unit of the conditions.
     """
 
     def value(x: np.ndarray) -> np.ndarray:
@@ -178,13 +171,13 @@ def searched(conditions: Conditions, guess: np.ndarray, most: int | None = None)
         return np.where(np.isfinite(left), left, 1e3)
 
     def slope(x: np.ndarray) -> np.ndarray:
+        """Jacobian of the conditions by central differences, in their unit per that of each unknown."""
         steps = _STEP * np.diag(np.maximum(1.0, np.abs(x)))
         both = conditions(np.concatenate([x + steps, x - steps]))
         return np.nan_to_num((both[: x.size] - both[x.size :]).T / (2.0 * np.diag(steps)))
 
-    search = scipy.optimize.least_squares(
-        value, guess, slope, method="lm", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=most
-    )
+    exact = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
+    search = scipy.optimize.least_squares(value, guess, slope, method="lm", max_nfev=most, **exact)
     x = search.x
     for _ in range(2):
         x = x - np.linalg.lstsq(slope(x), value(x), rcond=1e-9)[0]
@@ -201,11 +194,11 @@ def first_burn(problem: Problem) -> Instead:
 
 
 def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -> np.ndarray | None:
-    """Unknowns (canonical) of the optimum near a guess, or None.
+    """Unknowns of the optimum near a guess, or None.
 
     A planar sequence keeps its primer vector in the plane, and may begin anywhere on a circular parking orbit, so that
     its first place is held at the guess; one of its conditions then follows from the others, which
-    Levenberg-Marquardt does not mind.
+    Levenberg-Marquardt does not mind.  Canonical units.
     """
     held = np.zeros((3, guess.size))
     if problem.plane_change == 0.0:
@@ -213,6 +206,7 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
         held[0, 0] = float(problem.eccentricity == 0.0)
 
     def conditions(x: np.ndarray) -> np.ndarray:
+        """What is zero at the optimum, canonical units: `residuals`, one replaced, and the unknowns that are held."""
         left = residuals(problem, x)
         if instead is not None:
             left[:, instead[0]] = x[:, instead[1]] - guess[instead[1]]
@@ -223,3 +217,50 @@ def solve(problem: Problem, guess: np.ndarray, instead: Instead | None = None) -
             return None
         x, left, _ = searched(conditions, guess, 60)
     return x if left < SOLVED and (x[7:] > 0.0).all() else None
+
+
+# A burn or a coast.  t: after the first ignition, [n];  switching: negative where thrust pays, positive where it does
+# not;  hamiltonian: zero on an optimum
+Arc = namedtuple("Arc", "burning t switching hamiltonian")
+
+
+def arcs(solution: Solution, n: int = 200) -> list[Arc]:
+    """All arcs in turn, n instants each.
+
+    By eq. (13) of the source with a mass costate l, in canonical units:
+    H = s (k - T |p| / m - flow l) + q.v - p.g with s = 1 on burns, l' = -s T |p| / m^2, and k such that the bracket,
+    the switching function, is zero at the last cut-off.  The mass costate l is 0 at the end, so the arcs are found from
+    the last to the first; its rate is integrated by Gauss's rule.
+    """
+    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
+
+    problem, states = solution.problem, solution.states
+    masses = 1.0 - problem.flow * np.concatenate([[0.0], np.cumsum(solution.durations)])
+    costate, found = np.zeros(1), []
+
+    def keep(burning: bool, t: np.ndarray, y: np.ndarray, mass: float | np.ndarray) -> None:
+        """Append an arc: switching function and Hamiltonian at its states [n, 12], canonical units."""
+        push = problem.thrust * np.linalg.norm(y[:, 6:9], axis=1) / mass
+        switching = problem.thrust / masses[-1] - push - problem.flow * costate
+        found.append(Arc(burning, t, switching, burning * switching + coast_hamiltonian(y)))
+
+    for k in reversed(range(problem.burns)):
+        start, duration, ignition = states[2 * k], solution.durations[k], solution.ignitions[k]
+        t = np.linspace(0.0, duration, n)
+        half = 0.5 * (duration - t[:, None])
+        times = (duration - half + half * _POINTS).ravel()  # [n * 48], from each instant to the cut-off
+        primer = fly_burns(start, masses[k], times, problem.thrust, problem.flow)[:, 6:9]
+        rates = problem.thrust * np.linalg.norm(primer, axis=1) / (masses[k] - problem.flow * times) ** 2
+        costate = costate[0] + (half * _WEIGHTS * rates.reshape(n, -1)).sum(axis=1)
+        flown = fly_burns(start, masses[k], t, problem.thrust, problem.flow)
+        keep(True, ignition + t, flown, masses[k] - problem.flow * t)
+        if k > 0:
+            t = np.linspace(0.0, solution.coasts[k - 1], n)
+            costate = costate[:1]
+            keep(False, ignition - t[-1] + t, coast(states[2 * k - 1], t), masses[k])
+    return found[::-1]
+
+
+def is_optimal(solution: Solution, tolerance: float = 1e-9) -> bool:
+    """Whether the switching function has its right sign all along: else another burn would pay, or one too many is."""
+    return all(bool(((arc.switching if arc.burning else -arc.switching) < tolerance).all()) for arc in arcs(solution))

@@ -1,10 +1,9 @@
 """Powered arcs with their primer vector: fixed steps of order 8, compiled.  Canonical units.
 
-Importing this module imports numba, so whoever designs imports it when a design is wanted and not before.
-
 State y of twelve: place, velocity, primer vector p (the thrust's direction, minus the costate of the velocity) and its
 rate q (the costate of the place).  The steps are fixed, so an arc is a smooth function of its start and its duration:
-finite differences over it are as good as their rounding.
+finite differences over it are as good as their rounding.  Importing this module imports numba, so a design imports it
+when it is wanted and not before.
 """
 
 import numpy as np
@@ -16,6 +15,7 @@ from mc_engine.lanes.runge_kutta_pairs import DOP853
 _NODES, _STARTS, _COLUMNS, _WEIGHTS = DOP853.tables()
 _STAGES = len(DOP853.nodes) + 1
 STEP = 0.1  # canonical time: a sixtieth of the parking orbit's revolution
+Numbers = float | np.ndarray
 
 
 @compile_inline
@@ -37,11 +37,9 @@ def _rates(y, acceleration, out):
 
 @compile_inline
 def _fly_one(y, mass, duration, thrust, flow, n_steps, now, stages):
-    """Carry y over one burn in place, canonical.  mass : at its start;  thrust, flow : per initial mass.
+    """Carry y over one burn in place: DOP853's weights of order 8, Hairer, Norsett, Wanner, Solving ODEs I (1993).
 
-    now, stages : float64[12] and float64[_STAGES, 12], room for a state and its derivatives.
-
-    Weights of order 8 of DOP853: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I (1993).
+    now, stages : float64[12] and float64[_STAGES, 12], room for a state and its derivatives
     """
     h = duration / n_steps
     for step in range(n_steps):
@@ -67,17 +65,19 @@ _KERNEL = kernel_of(_fly_all)
 
 
 def fly_burns(
-    y: np.ndarray, mass: np.ndarray, duration: np.ndarray, thrust: float, flow: float, step: float = STEP
+    y: np.ndarray, mass: Numbers, duration: Numbers, thrust: float, flow: float, step: float = STEP
 ) -> np.ndarray:
-    """States at the end of burns that begin at the states y [n, 12].
+    """States [n, 12] at the end of burns that begin at the states y [n, 12], or [12] for all.
 
-    mass, duration : float64[n], of the initial mass and of the canonical time;  thrust, flow : canonical, per
-    initial mass.  step : longest; a thrust that turns over, because its primer vector passes near zero, wants short
-    ones.  A burn may last a negative time: it is then flown backward.
+    mass, duration : float64[n], of the initial mass and of the canonical time, or a number for all; a negative
+        duration is flown backward
+    thrust, flow : per initial mass
+    step : longest; a thrust that turns over, because its primer vector passes near zero, needs short ones
     """
-    out = np.array(y, dtype=np.float64)
-    mass, duration = (np.broadcast_to(column, len(out)).astype(np.float64) for column in (mass, duration))
+    n = np.broadcast_shapes(np.shape(y)[:-1], np.shape(mass), np.shape(duration))
+    out = np.array(np.broadcast_to(y, (*n, 12)), dtype=np.float64, order="C")
+    mass, duration = (np.array(np.broadcast_to(column, n), dtype=np.float64) for column in (mass, duration))
     n_steps = max(8, int(np.ceil(np.abs(duration).max() / step)))
-    room = np.empty(out.shape[1]), np.empty((_STAGES, out.shape[1]))
+    room = np.empty(12), np.empty((_STAGES, 12))
     _KERNEL(out, mass, duration, float(thrust), float(flow), n_steps, *room)
     return out

@@ -1,20 +1,30 @@
-"""The burn program: ignition times, durations and the thrust's direction, as data.
+"""The burn program: ignition times, durations and the thrust's direction, as data; kept as text, or designed.
 
 A burn is one or more segments, on each of which the primer vector is a polynomial of degree 11 in s, from -1 at the
-segment's start to 1 at its end; thrust points along it.  Its length means nothing.  Text files of TOML keep a program.
+segment's start to 1 at its end; thrust points along it.  Its length means nothing.  Text files of TOML keep a program
+under the names of its records' fields.
 """
 
 import json
 import tomllib
-from dataclasses import asdict, dataclass
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from campaigns.geo_injection.design.sequence import DESIGN, Sequence
+from campaigns.geo_injection.design.continuation import optimum
+from campaigns.geo_injection.design.optimal import is_optimal
+from campaigns.geo_injection.design.sequence import Sequence
+from campaigns.geo_injection.design.staged import staged
+from mc_engine.model import kept_design
 
+KEPT = Path(__file__).parents[1] / "programs"
+DESIGN = 1  # of the method and the file: programs with another number are not taken for its own
 DEGREE = 11
 _LONGEST = 2.5  # canonical time of a segment: the fit is then good to 1e-7 rad
 _NODES = 24  # instants that a segment is fitted to
@@ -22,25 +32,27 @@ _NODES = 24  # instants that a segment is fitted to
 
 @dataclass(frozen=True)
 class Segment:
-    """start : time after ignition [s];  length [s];  steering : float64[3, DEGREE + 1], powers of s, rising."""
+    """start_s : time after ignition.  x, y, z : coefficients of the primer vector's components, powers of s, rising."""
 
-    start: float
-    length: float
-    steering: np.ndarray
+    start_s: float
+    length_s: float
+    x: list[float]
+    y: list[float]
+    z: list[float]
 
 
 @dataclass(frozen=True)
 class BurnProgram:
-    """ignition : time after the first [s];  duration [s];  error : of the fitted direction [rad].
+    """ignition_s : time after the first.  direction_error_rad : largest, of the fit.
 
     end : place [m] and velocity [m/s] at the nominal cut-off
     """
 
-    ignition: float
-    duration: float
-    error: float
-    end: np.ndarray
-    segments: tuple[Segment, ...]
+    ignition_s: float
+    duration_s: float
+    direction_error_rad: float
+    end: list[float]
+    segments: list[Segment]
 
 
 @dataclass(frozen=True)
@@ -51,99 +63,103 @@ class Program:
     """
 
     sequence: Sequence
-    start: np.ndarray
-    burns: tuple[BurnProgram, ...]
+    start: list[float]
+    burns: list[BurnProgram]
     optimal: bool
 
-    @property
-    def propellant(self) -> float:
-        """Propellant of the nominal flight [kg]."""
-        return self.sequence.mass_flow * sum(burn.duration for burn in self.burns)
 
-
-def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float) -> tuple[float, tuple[Segment, ...]]:
-    """(largest error [rad], segments) of one burn from its canonical state at ignition."""
-    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
-
+def new_design(sequence: Sequence) -> Program:
+    """The program, designed now; ModelError says how far the search got where it found none."""
     problem = sequence.problem()
-    count = max(1, int(np.ceil(duration / _LONGEST)))
-    edges = np.linspace(0.0, duration, count + 1)
-    nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-    worst, segments = 0.0, []
-    for low, high in pairwise(edges):
-        times = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-        states = fly_burns(
-            np.repeat(start[None], _NODES, axis=0), np.full(_NODES, mass), times, problem.thrust, problem.flow
-        )
-        primer = sequence.inertial(states[:, 6:9])
-        primer = primer / np.linalg.norm(primer, axis=1).mean()
-        series = chebyshev.chebfit(nodes, primer, DEGREE)
-        error = np.cross(chebyshev.chebval(nodes, series).T, primer) / (primer**2).sum(1)[:, None]
-        worst = max(worst, float(np.abs(error).max()))
-        powers = [chebyshev.cheb2poly(column) for column in series.T]
-        # numpy drops the zeros at their end
-        steering = np.array([np.pad(column, (0, DEGREE + 1 - column.size)) for column in powers])
-        unit = sequence.time_unit
-        segments.append(Segment(float(low * unit), float((high - low) * unit), steering))
-    return worst, tuple(segments)
+    if sequence.method == "staged":
+        stages = staged(problem, sequence.orbits_between())
+        flown = [(stage.ignition, stage.burn.duration, stage.burn.start, stage.burn.end) for stage in stages]
+        return _program_of(sequence, flown, optimal=False)
+    best = optimum(problem)
+    rows = zip(best.ignitions, best.durations, best.states[::2], best.states[1::2], strict=True)
+    return _program_of(sequence, list(rows), is_optimal(best))
 
 
-def _in_space(sequence: Sequence, state: np.ndarray) -> np.ndarray:
-    """Place [m] and velocity [m/s], float64[6], z to the north pole, of a canonical state of the design's axes."""
-    place = sequence.inertial(state[:3]) * sequence.parking_radius
-    return np.concatenate([place, sequence.inertial(state[3:6]) * sequence.speed_unit])
+@lru_cache(maxsize=256)
+def program_for(sequence: Sequence) -> Program:
+    """The program of a sequence: one that is kept beside the campaign, one designed before, or a new design."""
+    for file in sorted(KEPT.glob("*.toml")):
+        # a file that is absent or broken is no program: it is designed again
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            program = from_text(file.read_text(encoding="utf-8"))
+            if program.sequence == sequence:
+                return program
+    return from_text(kept_design(_new_text, sequence).tobytes().decode())
 
 
-def program_of(sequence: Sequence, flown: list[tuple], optimal: bool) -> Program:
+def _new_text(sequence: Sequence) -> np.ndarray:
+    """The text of a new design, as bytes uint8[n]."""
+    return np.frombuffer(to_text(new_design(sequence)).encode(), dtype=np.uint8)
+
+
+def _program_of(sequence: Sequence, flown: list[tuple], optimal: bool) -> Program:
     """The program of burns given as (ignition, duration, states at ignition and cut-off) in canonical units."""
     burns, mass, unit = [], 1.0, sequence.time_unit
     for ignition, duration, state, end in flown:
         error, segments = _fitted(sequence, state, mass, duration)
-        times = float(ignition * unit), float(duration * unit)
-        burns.append(BurnProgram(*times, error, _in_space(sequence, end), segments))
+        burns.append(BurnProgram(float(ignition * unit), float(duration * unit), error, sequence.si(end), segments))
         mass -= sequence.problem().flow * duration
-    return Program(sequence, _in_space(sequence, flown[0][2]), tuple(burns), optimal)
+    return Program(sequence, sequence.si(flown[0][2]), burns, optimal)
 
 
-# the names of numbers in the text, which carry their units
-_OF_BURN = {"ignition": "ignition_s", "duration": "duration_s", "error": "direction_error_rad", "end": "end"}
-_OF_SEGMENT = {"start": "start_s", "length": "length_s"}
+def _fitted(sequence: Sequence, start: np.ndarray, mass: float, duration: float) -> tuple[float, list[Segment]]:
+    """(largest error [rad], segments) of one burn from its canonical state at ignition."""
+    from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
+
+    problem, unit = sequence.problem(), sequence.time_unit
+    edges = np.linspace(0.0, duration, max(1, int(np.ceil(duration / _LONGEST))) + 1)
+    nodes = np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    worst, segments = 0.0, []
+    for low, high in pairwise(edges):
+        times = 0.5 * (low + high) + 0.5 * (high - low) * nodes
+        primer = sequence.inertial(fly_burns(start, mass, times, problem.thrust, problem.flow)[:, 6:9])
+        primer = primer / np.linalg.norm(primer, axis=1).mean()
+        series = chebyshev.chebfit(nodes, primer, DEGREE)
+        error = np.cross(chebyshev.chebval(nodes, series).T, primer) / (primer**2).sum(1)[:, None]
+        worst = max(worst, float(np.abs(error).max()))
+        powers = (chebyshev.cheb2poly(column) for column in series.T)
+        # numpy drops the zeros at their end
+        x, y, z = (np.pad(column, (0, DEGREE + 1 - column.size)).tolist() for column in powers)
+        segments.append(Segment(float(low * unit), float((high - low) * unit), x, y, z))
+    return worst, segments
 
 
 def to_text(program: Program) -> str:
     """The program as TOML, SI."""
     whole = {"design": DESIGN, "optimal": program.optimal, "start": program.start}
     lines = ["# Burn program: see program.py.  Written by the design; edit its inputs instead.", *_lines(whole)]
-    lines += ["", "[sequence]", *_lines(asdict(program.sequence))]
+    lines += ["", "[sequence]", *_lines(vars(program.sequence))]
     for burn in program.burns:
-        lines += ["", "[[burn]]", *_lines({key: getattr(burn, name) for name, key in _OF_BURN.items()})]
+        lines += ["", "[[burn]]", *_lines({key: value for key, value in vars(burn).items() if key != "segments"})]
         for segment in burn.segments:
-            values = {key: getattr(segment, name) for name, key in _OF_SEGMENT.items()}
-            values |= dict(zip("xyz", segment.steering, strict=True))
-            lines += ["", "[[burn.segment]]", *_lines(values)]
+            lines += ["", "[[burn.segment]]", *_lines(vars(segment))]
     return "\n".join(lines) + "\n"
 
 
 def _lines(values: dict[str, Any]) -> list[str]:
-    """Key and value of each number, array or word, with every digit: TOML's values are those of JSON."""
-    return [f"{key} = {json.dumps(np.asarray(value).tolist())}" for key, value in values.items()]
+    """Key and value of each number, list or word, with every digit: TOML's values are those of JSON."""
+    return [f"{key} = {json.dumps(value)}" for key, value in values.items()]
 
 
 def from_text(text: str) -> Program:
-    """The program that `to_text` wrote; ValueError or KeyError where it is another file."""
+    """The program that `to_text` wrote; ValueError, KeyError or TypeError where it is another file."""
     record = tomllib.loads(text)
     if record["design"] != DESIGN:
         raise ValueError("a program of another design")
-    inputs: dict[str, Any] = record["sequence"]
-    sequence = Sequence(**{**inputs, "between": tuple(tuple(row) for row in inputs["between"])})
-    burns = tuple(_burn_of(burn) for burn in record["burn"])
-    return Program(sequence, np.array(record["start"]), burns, bool(record["optimal"]))
+    inputs = record["sequence"]
+    sequence = Sequence(**{**inputs, "between": tuple(tuple(orbit) for orbit in inputs["between"])})
+    if not isinstance(record["optimal"], bool):
+        raise ValueError("`optimal` is neither true nor false")
+    return Program(sequence, record["start"], [_burn_of(burn) for burn in record["burn"]], record["optimal"])
 
 
 def _burn_of(record: dict[str, Any]) -> BurnProgram:
-    segments = tuple(
-        Segment(**{name: one[key] for name, key in _OF_SEGMENT.items()}, steering=np.array([one[x] for x in "xyz"]))
-        for one in record["segment"]
-    )
-    values = {name: record[key] for name, key in _OF_BURN.items()}
-    return BurnProgram(**values | {"end": np.array(values["end"])}, segments=segments)
+    segments = [Segment(**segment) for segment in record["segment"]]
+    if any(len(powers) != DEGREE + 1 for segment in segments for powers in (segment.x, segment.y, segment.z)):
+        raise ValueError(f"a polynomial that is not of degree {DEGREE}")
+    return BurnProgram(**{name: value for name, value in record.items() if name != "segment"}, segments=segments)

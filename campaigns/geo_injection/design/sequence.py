@@ -8,17 +8,14 @@ from campaigns.geo_injection.design.optimal import Problem
 from campaigns.geo_injection.design.staged import Orbit
 from mc_engine.physics.constants import MU_EARTH
 
-DESIGN = 1  # of the method and the file: programs with another number are not taken for its own
-
 
 @dataclass(frozen=True)
 class Sequence:
     """radii [m], inclinations [rad], thrust [N], mass flow [kg/s], mass [kg].
 
-    parking_radius : of the parking orbit's perigee
-    parking_perigee : its argument of perigee [rad]
     between : of the staged procedure alone: (semi-major axis [m], eccentricity, plane change so far [rad]) of each
-    orbit between two burns
+        orbit between two burns
+    parking_radius, parking_perigee : of the parking orbit's perigee; its argument [rad]
     """
 
     method: str
@@ -44,16 +41,6 @@ class Sequence:
         """Time in which a circular orbit of the parking radius turns by one radian [s]."""
         return self.parking_radius / self.speed_unit
 
-    @property
-    def exhaust(self) -> float:
-        """Exhaust speed [m/s]."""
-        return self.thrust / self.mass_flow
-
-    @property
-    def turn(self) -> float:
-        """1 where the inclination falls, -1 where it rises."""
-        return -1.0 if self.final_inclination > self.initial_inclination else 1.0
-
     def problem(self) -> Problem:
         """The same in canonical units: parking radius, circular speed there, initial mass."""
         acceleration = self.speed_unit / self.time_unit
@@ -68,18 +55,25 @@ class Sequence:
         )
 
     def orbits_between(self) -> tuple[Orbit, ...]:
-        """Canonical orbits of the staged procedure."""
+        """Orbits of the staged procedure, semi-major axes in the unit of the parking radius, inclinations [rad]."""
         change = abs(self.initial_inclination - self.final_inclination)
         return tuple(Orbit(a / self.parking_radius, e, max(change - so_far, 0.0)) for a, e, so_far in self.between)
 
     def inertial(self, vectors: np.ndarray) -> np.ndarray:
         """Vectors [..., 3] of the design's axes (z normal to the final orbit) in axes with z to the north pole.
 
-        A rotation about x by the final inclination [rad], in the vectors' own unit.
+        A rotation about x by the final inclination, in the vectors' own unit.  Designs have an inclination that falls;
+        one that rises is the mirror image.
         """
-        x, y, z = vectors[..., 0], vectors[..., 1], self.turn * vectors[..., 2]
+        mirror = -1.0 if self.final_inclination > self.initial_inclination else 1.0
+        x, y, z = vectors[..., 0], vectors[..., 1], mirror * vectors[..., 2]
         c, s = np.cos(self.final_inclination), np.sin(self.final_inclination)
         return np.stack([x, c * y - s * z, s * y + c * z], axis=-1)
+
+    def si(self, state: np.ndarray) -> list[float]:
+        """Place [m] and velocity [m/s], z to the north pole, of a canonical state of the design's axes."""
+        place, velocity = self.inertial(state[:3]), self.inertial(state[3:6])
+        return [*(place * self.parking_radius).tolist(), *(velocity * self.speed_unit).tolist()]
 
 
 def source_orbits(burns: int, plane_change: float) -> tuple[tuple[float, float, float], ...]:

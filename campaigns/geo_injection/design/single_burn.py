@@ -16,8 +16,7 @@ from campaigns.geo_injection.design.optimal import SOLVED, coast_hamiltonian, se
 from mc_engine.errors import ModelError
 
 Conditions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # of place and velocity [n, 3], complex too: [n, m]
-
-
+Rise = namedtuple("Rise", "burn_time radial transverse")  # the last two: velocity costates
 # ignition: time after the reference point of the old orbit;  start, end: states [12];  iterations: of scipy
 Burn = namedtuple("Burn", "ignition duration start end iterations")
 
@@ -42,24 +41,23 @@ class Stage:
     step: float = 0.1
 
 
-def rise_guess(rise: float) -> tuple[float, float, float]:
-    """(burn time, radial and transverse velocity costates) of a rise (R_f - R_0) / f: eqs (18), (23) of the source.
+def rise_guess(rise: float) -> Rise:
+    """The burn of a rise (R_f - R_0) / f: eqs (18), (23) of the source.
 
-    R_f, R_0 : canonical radii at cut-off and ignition, f : thrust acceleration; the radial place costate is 1.  Made
-    for a rise within less than a quarter revolution between circles: eq. (18) has R_0 = 1 and starts the example of
-    table 1.  Eq. (23) takes the same for burns between ellipses.  Of an apogee burn to the geostationary circle, which
-    needs speed and hardly any radius, it gives a third of the time and a thrust along the radius.  The search gets
-    there all the same, but `staged.py` tries an impulse first; and the radius at the end of a burn to an ellipse is
-    not known before.
+    R_f, R_0 : radii at cut-off and ignition, f : thrust acceleration; the radial place costate is 1.  Made for a rise
+    between circles within less than a quarter revolution: eq. (18) has R_0 = 1 and starts the example of table 1,
+    eq. (23) takes the same for burns between ellipses.  Of an apogee burn to the geostationary circle, which needs
+    speed and hardly any radius, it gives a third of the time and a thrust along the radius.
     """
     half = float(np.sqrt(rise))
-    return 2.0 * half, half, rise
+    return Rise(burn_time=2.0 * half, radial=half, transverse=rise)
 
 
 def circle(radius: float) -> Conditions:
     """The circle in the plane z = 0: eq. (17) for the angular momentum, and the two speeds."""
 
     def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """What is zero on the circle: (17) and the two speeds, in the unit of its angular momentum."""
         h = np.cross(r, v)
         rate, r2 = (r * v).sum(-1), (r * r).sum(-1)
         conditions = [h[..., 0], h[..., 1], h[..., 2] - np.sqrt(radius), rate, r2 / radius - radius]
@@ -69,14 +67,13 @@ def circle(radius: float) -> Conditions:
 
 
 def orbit(a: float, e: float, inclination: float, apse_on_node: bool = True) -> Conditions:
-    """An ellipse of given size, shape and inclination with its node on the x axis, canonical.
-
-    Conditions: the angular momentum by eq. (17), the energy -1 / (2 a), and, unless the apse line is free, an
-    eccentricity vector without a component across the x axis.
+    """An ellipse with its node on the x axis: the angular momentum by eq. (17), the energy -1 / (2 a), and, unless the
+    apse line is free, an eccentricity vector without a component across the x axis.
     """
     h_wanted = np.sqrt(a * (1.0 - e * e))
 
     def reached(r: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """What is zero on the ellipse, canonical units: (17), twice the energy, and the apse line off the node."""
         h = np.cross(r, v)
         r1, v2 = np.sqrt((r * r).sum(-1)), (v * v).sum(-1)
         rows = [h[..., 0], h[..., 1] + h_wanted * np.sin(inclination), h[..., 2] - h_wanted * np.cos(inclination)]
@@ -93,10 +90,9 @@ def _ends(stage: Stage, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """States at ignition and cut-off of unknowns [n, ...]: primer vector, rate, duration, ignition, multipliers."""
     from campaigns.geo_injection.design.powered_arc import fly_burns  # imports numba
 
-    n = len(x)
-    on_orbit = coast(np.concatenate([np.repeat(stage.reference[None], n, axis=0), np.ones((n, 6))], axis=1), x[:, 7])
+    on_orbit = coast(np.append(stage.reference, np.ones(6)), x[:, 7])  # its primer vector is not used
     start = np.concatenate([on_orbit[:, :6], x[:, :6]], axis=1)
-    return start, fly_burns(start, np.full(n, stage.mass), x[:, 6], stage.thrust, stage.flow, stage.step)
+    return start, fly_burns(start, stage.mass, x[:, 6], stage.thrust, stage.flow, stage.step)
 
 
 def _residuals(stage: Stage, x: np.ndarray) -> np.ndarray:
@@ -120,12 +116,11 @@ def fly_shortest(stage: Stage, primer: np.ndarray, rate: np.ndarray, duration: f
     The guess fixes directions and a ratio; the size follows from H = 0.  Multipliers of the end conditions begin at
     the values that fit the guessed end best.
 
-    Canonical; the conditions are eqs (9)-(17) of the source, solved by Levenberg-Marquardt and two Newton steps.
+    The conditions are eqs (9)-(17) of the source, solved by Levenberg-Marquardt and two Newton steps.
     """
     size = float(np.linalg.norm(primer))
-    x = np.array([*primer / size, *rate / size, duration, ignition])
-    m = stage.reached(stage.reference[None, :3], stage.reference[None, 3:]).shape[1]
-    x = np.append(x, np.zeros(m))
+    m = stage.reached(stage.reference[:3], stage.reference[3:]).size
+    x = np.array([*primer / size, *rate / size, duration, ignition, *np.zeros(m)])
     with np.errstate(all="ignore"):
         free = _residuals(stage, x[None])[0, m : m + 6]
         basis = np.repeat(x[None], m, axis=0)

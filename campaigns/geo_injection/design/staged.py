@@ -19,7 +19,7 @@ from mc_engine.errors import ModelError
 
 @dataclass(frozen=True)
 class Orbit:
-    """An orbit between two burns: canonical semi-major axis, eccentricity, inclination against the final orbit."""
+    """An orbit between two burns: semi-major axis, eccentricity, inclination against the final orbit."""
 
     a: float
     e: float
@@ -35,44 +35,42 @@ class Orbit:
         return side * np.array([r, 0.0, 0.0, 0.0, speed * np.cos(i), speed * np.sin(i)])
 
 
-# ignition: canonical time after the first;  burn: as `single_burn` found it
+# ignition: time after the first;  burn: as `single_burn` found it
 StagedBurn = namedtuple("StagedBurn", "ignition burn")
 
 
 def staged(problem: Problem, between: tuple[Orbit, ...]) -> list[StagedBurn]:
-    """The burns over the given intermediate orbits, canonical; ModelError names the burn that fails."""
-    burns: list[StagedBurn] = []
+    """The burns over the given intermediate orbits; ModelError where one is not found, without saying which.
+
+    Canonical units, times from the first ignition; a wait to the next apsis by eqs (24)-(26) of the source.
+    """
     circle_first = problem.eccentricity == 0.0
     if not circle_first and abs(np.sin(0.5 * problem.perigee)) > 1e-9:
         raise ModelError(
             "the staged procedure has all perigees on the ascending node: an elliptic parking orbit needs "
             'parking_argument_of_perigee_deg = 0, or method = "optimal"'
         )
-    places, velocities = parking_orbit(problem, np.zeros(1))
-    mass, reference, lead = 1.0, np.concatenate([places[0], velocities[0]]), 0.0
-    for k in range(problem.burns):
-        last = k == problem.burns - 1
-        reached = circle(problem.ratio) if last else orbit(between[k].a, between[k].e, between[k].inclination)
+    burns: list[StagedBurn] = []
+    mass, reference, lead = 1.0, np.concatenate(parking_orbit(problem, np.zeros(1)), axis=1)[0], 0.0
+    for k, new in enumerate(between):
         placing = "free" if k == 0 and circle_first else "centred"
+        reached = orbit(new.a, new.e, new.inclination)
         stage = Stage(reference, mass, problem.thrust, problem.flow, reached, placing)
-        if last:
-            burn = _last(stage, problem)
-        else:
-            burn = shortest(stage, float(np.linalg.norm(between[k].apsis(1.0)[3:])), between[k].inclination)
-        ignition = 0.0 if k == 0 else lead + burn.ignition
+        burn = shortest(stage, float(np.linalg.norm(new.apsis(1.0)[3:])), new.inclination)
+        ignition = lead + burn.ignition if burns else 0.0
         burns.append(StagedBurn(ignition, burn))
         mass -= problem.flow * burn.duration
-        if not last:
-            at_apogee = k == problem.burns - 2
-            wait, reference = _next_apsis(burn.end[:6], at_apogee)
-            lead = ignition + burn.duration + wait
-    return burns
+        wait, reference = _next_apsis(burn.end, apogee=k == len(between) - 1)
+        lead = ignition + burn.duration + wait
+    last = _last(Stage(reference, mass, problem.thrust, problem.flow, circle(problem.ratio)), problem.ratio)
+    return [*burns, StagedBurn(lead + last.ignition, last)]
 
 
 def shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
     """The burn, guessed as an impulse at the reference that gives the wanted speed; the rocket equation times it.
 
-    Canonical units; the impulse is centred in the burn, unless the burn is to be ignited at the reference.
+    The impulse is centred in the burn, unless the burn is to be ignited at the reference.  Canonical units; the rocket
+    equation is eq. (1) of the source, integrated; inclination [rad].
     """
     r, v = stage.reference[:3], stage.reference[3:]
     change = wanted * np.array([0.0, np.cos(inclination), np.sin(inclination)]) - v
@@ -84,33 +82,31 @@ def shortest(stage: Stage, wanted: float, inclination: float) -> Burn:
     return fly_shortest(stage, primer - 0.5 * duration * rate, rate, duration, ignition)
 
 
-def _last(stage: Stage, problem: Problem) -> Burn:
+def _last(stage: Stage, radius: float) -> Burn:
     """The burn into the final circle: guessed as an impulse or, if nothing is found so, by eq. (23)."""
     try:
-        return shortest(stage, -np.sqrt(1.0 / problem.ratio), 0.0)
+        return shortest(stage, -np.sqrt(1.0 / radius), 0.0)
     except ModelError:
-        r, v = stage.reference[:3], stage.reference[3:]
-        r0 = float(np.linalg.norm(r))
-        if r0 >= problem.ratio:  # no rise: eq. (23) has no real root
+        if np.linalg.norm(stage.reference[:3]) >= radius:  # no rise: eq. (23) has no real root
             raise
-        return rising(stage, problem.ratio, r / r0, v / np.linalg.norm(v))
+        return rising(stage, radius)
 
 
-def rising(stage: Stage, radius: float, up: np.ndarray, along: np.ndarray) -> Burn:
+def rising(stage: Stage, radius: float) -> Burn:
     """The burn to a radius, guessed by eq. (23) in the radial and transverse directions of the apsis."""
-    acceleration = stage.thrust / stage.mass
-    r0 = float(np.linalg.norm(stage.reference[:3]))
-    duration, radial, transverse = rise_guess((radius - r0) / acceleration)
+    r, v = stage.reference[:3], stage.reference[3:]
+    r0 = float(np.linalg.norm(r))
+    up, along = r / r0, v / np.linalg.norm(v)
+    duration, radial, transverse = rise_guess((radius - r0) * stage.mass / stage.thrust)
     return fly_shortest(stage, radial * up + transverse * along, -up - radial * along, duration, -0.5 * duration)
 
 
 def _next_apsis(state: np.ndarray, apogee: bool) -> tuple[float, np.ndarray]:
     """(time to the next apogee or perigee, place and velocity there), as eqs (24)-(26) of the source."""
-    r, v = state[:3], state[3:]
+    r, v = state[:3], state[3:6]
     r1 = np.sqrt(r @ r)
     a = 1.0 / (2.0 / r1 - v @ v)
-    anomaly = np.arctan2(r @ v / np.sqrt(a), 1.0 - r1 / a)
-    e_sin = r @ v / np.sqrt(a)
-    mean = anomaly - e_sin
+    e_sine = r @ v / np.sqrt(a)
+    mean = np.arctan2(e_sine, 1.0 - r1 / a) - e_sine
     wait = float(((np.pi if apogee else 2.0 * np.pi) - mean) % (2.0 * np.pi) * a**1.5)
-    return wait, coast(np.append(state, np.ones(6))[None], np.array([wait]))[0, :6]
+    return wait, coast(state, np.array([wait]))[0, :6]

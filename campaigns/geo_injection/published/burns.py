@@ -34,7 +34,7 @@ USED_KG = {
 
 
 def printed_orbits(sequence: str) -> tuple[Orbit, ...]:
-    """The orbits between the burns of a sequence of USED_KG, canonical."""
+    """The orbits between the burns of a sequence of USED_KG, in canonical units."""
     flown = SEQUENCES[sequence]
     return replace(flown, between=source_orbits(flown.burns, flown.initial_inclination)).orbits_between()
 
@@ -42,7 +42,7 @@ def printed_orbits(sequence: str) -> tuple[Orbit, ...]:
 def burn_s(sequence: str, number: int | None = None) -> float:
     """Least time [s] of a burn of a sequence, counted from 1, or of all its burns."""
     numbers = range(1, SEQUENCES[sequence].burns + 1) if number is None else [number]
-    return SEQUENCES[sequence].time_unit * sum(_burn(sequence, one).duration for one in numbers)
+    return SEQUENCES[sequence].time_unit * sum(_burn(sequence, burn).duration for burn in numbers)
 
 
 def burn_propellant_kg(sequence: str, number: int | None = None) -> float:

@@ -1,7 +1,7 @@
 """Our values of the example of table 1, of the searches, of the optimum's totals and of the engine.
 
-M. Alavipour, A. A. Nikkhah, J. Roshanian.  The records name these functions; each returns its value in the unit of the
-record.
+M. Alavipour, A. A. Nikkhah, J. Roshanian.  The records of `*.toml` name these functions; each returns its value in the
+unit of the record.
 """
 
 from functools import lru_cache
@@ -9,10 +9,9 @@ from functools import lru_cache
 import numpy as np
 
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
-from campaigns.geo_injection.design.programs import program_for
-from campaigns.geo_injection.design.single_burn import Burn, Stage, circle, fly_shortest, rise_guess
+from campaigns.geo_injection.design.program import program_for
+from campaigns.geo_injection.design.single_burn import Burn, Rise, Stage, circle, fly_shortest, rise_guess
 from campaigns.geo_injection.design.staged import staged
-from campaigns.geo_injection.model import MODEL
 from campaigns.geo_injection.published.burns import USED_KG, printed_orbits
 from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY
 
@@ -35,16 +34,14 @@ def avoidance() -> Burn:
 
 
 def avoidance_analytic(column: str) -> float:
-    """Row 1 of table 1, eq. (18), canonical.  column : burn_time, radial or transverse; the last two are costates"""
-    burn_time, radial, transverse = rise_guess(RISE)
-    return {"burn_time": burn_time, "radial": radial, "transverse": transverse}[column]
+    """Row 1 of table 1, eq. (18), canonical.  column : of `Rise`"""
+    return getattr(rise_guess(RISE), column)
 
 
 def avoidance_converged(column: str) -> float:
     """Row 4 of table 1, the solution of the boundary-value problem, canonical, in the scale and sign of the table."""
     burn = avoidance()
-    scale = -burn.start[9]
-    return {"burn_time": burn.duration, "radial": burn.start[6] / scale, "transverse": burn.start[7] / scale}[column]
+    return getattr(Rise(burn.duration, *(burn.start[6:8] / -burn.start[9])), column)
 
 
 def avoidance_iterations() -> int:
@@ -71,10 +68,10 @@ def fewest_iterations() -> int:
 
 def optimal_burns_s(sequence: str) -> float:
     """Sum [s] of the burns of the continuous optimal flight; to compare with the sums of tables 2 to 8."""
-    return sum(burn.duration for burn in program_for(SEQUENCES[sequence]).burns)
+    return sum(burn.duration_s for burn in program_for(SEQUENCES[sequence]).burns)
 
 
 def engine() -> str:
-    """Thrust and specific impulse that the campaign assumes."""
-    thrust_n, flow_kg_s = (float(MODEL.input(name).default) for name in ("thrust_n", "mass_flow_kg_s"))
-    return f"{thrust_n / 1e3:g} kN, {thrust_n / (flow_kg_s * STANDARD_GRAVITY):.2f} s"
+    """Thrust [kN] and specific impulse [s] that the campaign assumes."""
+    stage = SEQUENCES["two_burns_28_5"]
+    return f"{stage.thrust / 1e3:g} kN, {stage.thrust / (stage.mass_flow * STANDARD_GRAVITY):.2f} s"

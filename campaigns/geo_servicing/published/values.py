@@ -73,21 +73,20 @@ def burn_signs() -> str:
     return ", ".join("+" if sign > 0.0 else "−" for _, _, sign in PUBLISHED)
 
 
-@lru_cache
-def _designed() -> tuple[np.ndarray, np.ndarray]:
-    """Coasts before the burns of our own plan, and the burns [s], float64[3] each."""
-    chosen: dict[str, Any] = {"navigation": "perfect", "schedule": "designed", "sunlight": False}
+def craft_of(**chosen: Any) -> Craft:
+    """The craft that plans are made for under these settings, the others nominal."""
     codes = [setting.code(chosen.get(setting.name, setting.default)) for setting in MODEL.settings]
-    craft = Craft(*nominal_start(settings_class(MODEL)(*codes, np.empty(0))))
+    return Craft(*nominal_start(settings_class(MODEL)(*codes, np.empty(0))))
+
+
+@lru_cache
+def _designed() -> dict[str, np.ndarray]:
+    """The burns of our own plan and the coasts before them [s], float64[3] each."""
+    craft = craft_of(navigation="perfect", sunlight=False)
     plan = design(craft)
-    return plan.coasts, craft.burn_times(plan.dv)
+    return {"coast": plan.coasts, "burn": craft.burn_times(plan.dv)}
 
 
-def designed_coast_s(number: int) -> float:
-    """Coast [s] before a burn of our own plan, counted from 1; to compare with section 9.1."""
-    return float(_designed()[0][number - 1])
-
-
-def designed_burn_s(number: int) -> float:
-    """Length [s] of a burn of our own plan, counted from 1; to compare with section 9.1."""
-    return float(_designed()[1][number - 1])
+def designed_s(part: str, number: int) -> float:
+    """Length [s] of a "burn" of our own plan, counted from 1, or of the "coast" before it; compare section 9.1."""
+    return float(_designed()[part][number - 1])

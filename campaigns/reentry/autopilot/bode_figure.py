@@ -7,24 +7,24 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from campaigns.reentry.autopilot.gains import pitch_design
-from campaigns.reentry.autopilot.lead_compensator import Lead, Response, margins_of
+from campaigns.reentry.autopilot.lead_compensator import Lead, Response
 from campaigns.reentry.autopilot.model import MODEL
 
 
-def bode_figure(loops: dict[str, tuple[Response, Response]]) -> Any:
+def bode_figure(loops: dict[str, tuple[Response, float, Lead]]) -> Any:
     """Figure of gain and phase [deg] of open loops over the frequency [rad/s]: dashed without, solid with compensation.
 
-    loops : by legend text, (plant times gain, plant times compensator)
+    loops : by legend text, (plant, gain, compensator)
     """
     figure = Figure(figsize=(7.0, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     w = np.geomspace(0.05, 200.0, 1200)
-    for colour, (text, (bare, compensated)) in enumerate(loops.items()):
-        margins = margins_of(compensated)
+    for colour, (text, (plant, gain, lead)) in enumerate(loops.items()):
+        margins = lead.margins
         legend = f"{text}: {np.degrees(margins.phase):.1f}° at {margins.crossover:.2f} rad/s"
-        for loop, style, label in ((bare, "--", None), (compensated, "-", legend)):
-            upper.loglog(w, np.abs(loop(w)), style, color=f"C{colour}", label=label)
-            phase = np.degrees(np.angle(loop(w)))
+        for loop, style, label in ((gain * plant(w), "--", None), (lead.response(w) * plant(w), "-", legend)):
+            upper.loglog(w, np.abs(loop), style, color=f"C{colour}", label=label)
+            phase = np.degrees(np.angle(loop))
             # a quarter of a turn of lead at most: what is above it has lagged by the rest of a turn
             lower.semilogx(w, np.where(phase > 90.0, phase - 360.0, phase), style, color=f"C{colour}")
         lower.plot(margins.crossover, np.degrees(margins.phase) - 180.0, "o", color=f"C{colour}")
@@ -40,17 +40,8 @@ def bode_figure(loops: dict[str, tuple[Response, Response]]) -> Any:
 def main(path: str) -> None:
     """Draw the pitch loop of the autopilot campaign at dynamic pressures of 0, 4e3 and 12e3 [Pa]."""
     o = {setting.symbol: setting.code(setting.default) for setting in MODEL.settings}
-    loops = {}
-    for pressure in (0.0, 4e3, 12e3):
-        plant, gain, lead = pitch_design(o, pressure)
-        bare, compensated = _loops(plant, gain, lead)
-        loops[f"{pressure / 1e3:g} kPa"] = bare, compensated
+    loops = {f"{pressure / 1e3:g} kPa": pitch_design(o, pressure) for pressure in (0.0, 4e3, 12e3)}
     bode_figure(loops).savefig(path, dpi=120)
-
-
-def _loops(plant: Response, gain: float, lead: Lead) -> tuple[Response, Response]:
-    """(gain times plant, compensator times plant) over the frequency [rad/s]."""
-    return lambda w: gain * plant(w), lambda w: lead.response(w) * plant(w)
 
 
 if __name__ == "__main__":

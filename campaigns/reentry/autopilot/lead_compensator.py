@@ -40,6 +40,7 @@ def crossover_of(loop: Response, level: float = 1.0) -> float:
     """Highest frequency [rad/s] at which the loop's gain falls through a level."""
 
     def above(logarithm: float) -> float:
+        """Logarithm of the gain, in units of the level, at the logarithm of a frequency [rad/s]."""
         return float(np.log(np.abs(loop(np.exp(logarithm))) / level))
 
     grid = np.log(FREQUENCIES)
@@ -62,21 +63,25 @@ def design_lead(plant: Response, gain: float, margin: float) -> Lead:
     The crossover moves up, where the plant may lag more: the lead is changed until the margin is the one asked for.  A
     margin that one stage cannot give is as large as it can.
     """
-    bare = margins_of(lambda w: gain * plant(w))
-    extra = np.radians(5.0)
+
+    def bare(w):
+        """Complex gain, without the lead, at a frequency w [rad/s]."""
+        return gain * plant(w)
+
+    wanted = margin - margins_of(bare).phase + np.radians(5.0)
     for _ in range(30):
-        lead = _lead_of(plant, gain, min(max(margin - bare.phase + extra, 1e-3), LARGEST_LEAD))
+        alpha = ratio_of_lead(min(max(wanted, 1e-3), LARGEST_LEAD))
+        lead = stage(plant, gain, alpha, crossover_of(bare, float(np.sqrt(alpha))))
         short = margin - lead.margins.phase
         if abs(short) <= 1e-6:
             break
-        extra += short
+        wanted += short
     return lead
 
 
-def _lead_of(plant: Response, gain: float, lead: float) -> Lead:
-    """The stage that gives this phase [rad] at the new crossover."""
-    alpha = (1.0 - np.sin(lead)) / (1.0 + np.sin(lead))
-    return stage(plant, gain, alpha, crossover_of(lambda x: gain * plant(x), float(np.sqrt(alpha))))
+def ratio_of_lead(lead: float) -> float:
+    """Ratio of zero to pole of the stage with this largest phase lead [rad]."""
+    return (1.0 - np.sin(lead)) / (1.0 + np.sin(lead))
 
 
 def stage(plant: Response, gain: float, alpha: float, w: float) -> Lead:
@@ -86,10 +91,6 @@ def stage(plant: Response, gain: float, alpha: float, w: float) -> Lead:
     return replace(bare, margins=margins_of(lambda x: bare.response(x) * plant(x)))
 
 
-def short_period(stiffness: float, damping: float = 0.0) -> Response:
-    """Angle over angular acceleration [s^2] of a vehicle about its trim: 1 / (s^2 + damping s + stiffness)."""
-
-    def response(w: Any) -> Any:
-        return 1.0 / (stiffness - np.asarray(w) ** 2 + 1j * damping * np.asarray(w))
-
-    return response
+def short_period(stiffness: float) -> Response:
+    """Angle over angular acceleration [s^2] of an undamped vehicle about its trim: 1 / (s^2 + stiffness)."""
+    return lambda w: 1.0 / (stiffness - np.square(w) + 0j)

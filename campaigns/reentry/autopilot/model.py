@@ -10,18 +10,17 @@ from types import SimpleNamespace
 import numpy as np
 
 from campaigns.reentry.autopilot.gains import (
-    BANK_GAIN,
-    BANK_POLE,
-    BANK_ZERO,
+    BANK,
     LAST_SECOND,
+    PITCH,
     PROFILE,
-    SCHEDULE,
     STEEPEST,
     STEPS,
+    Compensator,
     autopilot_tables,
 )
 from campaigns.reentry.guidance.reference_table import between_rows
-from mc_engine.lanes import floor, look_up, maximum, minimum, physics, sqrt, where
+from mc_engine.lanes import floor, look_up, look_up_record, maximum, minimum, physics, sqrt, where
 from mc_engine.model import (
     Field,
     FixedStep,
@@ -144,14 +143,14 @@ def air_at(t, p, o):
 
 @physics
 def pitch_gains(pressure, o):
-    """(gain, zero, pole) of the pitch compensator at the dynamic pressure [Pa] that the autopilot knows."""
+    """The `Compensator` of the pitch loop at the dynamic pressure [Pa] that the autopilot knows."""
     place = minimum(maximum(pressure * ((STEPS - 1) / STEEPEST), 0.0), STEPS - 1.000001)
     step = floor(place)
-    x, row = place - step, SCHEDULE + 3.0 * step
-    return (
-        between_rows(o.tables, row, 3.0, x),
-        between_rows(o.tables, row + 1.0, 3.0, x),
-        between_rows(o.tables, row + 2.0, 3.0, x),
+    x, row = place - step, PITCH + 3.0 * step
+    return Compensator(
+        gain=between_rows(o.tables, row, 3.0, x),
+        zero=between_rows(o.tables, row + 1.0, 3.0, x),
+        pole=between_rows(o.tables, row + 2.0, 3.0, x),
     )
 
 
@@ -167,27 +166,22 @@ def bank_command(t, p):
 @physics
 def torques(t, s, p, o, pressure):
     """(pitch torque, roll torque [N m] within their limits, bank error, rates of both compensators, at a limit)."""
-    gain, zero, pole = pitch_gains(p.pressure_known_factor * pressure, o)
     error = bank_command(t, p) - s.bank
-    bank_zero, bank_pole = look_up(o.tables, BANK_ZERO), look_up(o.tables, BANK_POLE)
-    wanted_pitch = o.inertia_pitch * gain * (s.lead_alpha - s.alpha)
-    wanted_roll = o.inertia_roll * look_up(o.tables, BANK_GAIN) * (s.lead_bank + error)
+    follow, turn = pitch_gains(p.pressure_known_factor * pressure, o), look_up_record(o.tables, BANK, Compensator)
+    wanted_pitch = o.inertia_pitch * follow.gain * (s.lead_alpha - s.alpha)
+    wanted_roll = o.inertia_roll * turn.gain * (s.lead_bank + error)
     pitch = minimum(maximum(wanted_pitch, -p.torque_pitch), p.torque_pitch)
     roll = minimum(maximum(wanted_roll, -p.torque_roll), p.torque_roll)
     # (s + z) / (s + p) = 1 + (z - p) / (s + p)
-    lead_alpha = -pole * s.lead_alpha - (zero - pole) * s.alpha
-    lead_bank = -bank_pole * s.lead_bank + (bank_zero - bank_pole) * error
+    lead_alpha = -follow.pole * s.lead_alpha - (follow.zero - follow.pole) * s.alpha
+    lead_bank = -turn.pole * s.lead_bank + (turn.zero - turn.pole) * error
     limited = where((pitch != wanted_pitch) | (roll != wanted_roll), 1.0, 0.0)
     return pitch, roll, error, lead_alpha, lead_bank, limited
 
 
 @physics
 def rhs(t, s, p, o):
-    """Short period about trim and free roll under limited torques, SI and radians.
-
-    I a'' = q S d [C_ma (a - offset) + C_mq d a' / (2 V)] + M: pitch about trim with linear coefficients, derived here;
-    the bank is a double integrator.
-    """
+    """Short period about trim with linear coefficients, derived here, and free roll, SI and radians; see the head."""
     pressure, speed = air_at(t, p, o)
     pitch, roll, error, lead_alpha, lead_bank, limited = torques(t, s, p, o, pressure)
     air = pressure * (p.moment * (s.alpha - p.trim_offset) + p.damping * s.alpha_rate / speed)

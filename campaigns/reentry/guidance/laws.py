@@ -9,7 +9,7 @@ command the vertical share u = cos(bank) of the lift; roll relative to the verti
 from collections import namedtuple
 
 from campaigns.reentry.bank import followed, lateral_miss, side_of
-from campaigns.reentry.dynamics import Memory, Reckoning, Steering, Turn, exposure_of, place_of, speed2
+from campaigns.reentry.dynamics import Reckoning, Steering, Turn, exposure_of, from_planned_entry, velocity
 from campaigns.reentry.guidance.apollo_final_phase import OVERCONTROL, REFERENCE_LIFT_TO_DRAG
 from campaigns.reentry.guidance.reference_table import (
     FELT,
@@ -22,9 +22,10 @@ from campaigns.reentry.guidance.reference_table import (
     clocked_range,
 )
 from campaigns.reentry.inputs import APOLLO_LAW, LAW1, LAW2, LAW3, LAW3R, UNGUIDED
-from mc_engine.lanes import acos, any_lane, asin, atan2, log, maximum, minimum, physics, sqrt, where
+from mc_engine.lanes import acos, any_lane, asin, atan2, log, maximum, minimum, physics, replace, where
 from mc_engine.lanes.noise import normal_pair
 from mc_engine.physics.aerodynamics import axial_coefficient
+from mc_engine.physics.vectors import dot, norm
 
 LEAST_SHARE = -0.9659258262890683  # cos 165 deg: never quite lift down
 SCALE_HEIGHT = 7000.0  # m, by which drag is read as altitude
@@ -44,17 +45,16 @@ def bounded(x, size):
 @physics
 def sensed(s, p, o, draws):
     """What navigation and accelerometer measure, with their errors, SI and radians; `Sensed` names the frames."""
-    pressure, _, altitude, v, force = exposure_of(s, p, o)
-    place = place_of(s, p, o)
-    up = s.x * p.ex + s.y * p.ey + s.z * p.ez
-    ahead = s.x * p.fx + s.y * p.fy + s.z * p.fz
-    sine = (s.vx * place.ux + s.vy * place.uy + s.vz * place.uz) / v
+    place, _, force, pressure, _ = exposure_of(s, p, o)
+    up, ahead, _ = from_planned_entry(s, p)
+    v = norm(velocity(s))
+    sine = dot(velocity(s), place.up) / v
     wrong, stretch = p.accelerometer_bias, 1.0 + p.accelerometer_scale_error
     if any_lane(p.accelerometer_noise > 0.0):
         wrong = wrong + p.accelerometer_noise * normal_pair(draws, 0)[0]
     return Sensed(
         speed=v + p.nav_speed_error,
-        altitude=altitude + p.nav_altitude_error,
+        altitude=place.altitude + p.nav_altitude_error,
         path=asin(bounded(sine, 1.0)) + p.nav_flight_path_angle_error,
         along=p.radius * atan2(ahead, up) + p.nav_range_error,
         climb=place.climb + p.nav_climb_error,
@@ -173,7 +173,7 @@ def steer(t, s, m, p, o, draws):
     # a load above the limit calls for all the lift upwards, whatever the law wants
     share = where(load > p.load_limit, 1.0, share)
     inside = minimum(maximum(share, LEAST_SHARE), 1.0)
-    side = where(active > 0.5, side_of(m.side, lateral_miss(s, p), sqrt(speed2(s)), p), m.side)
+    side = where(active > 0.5, side_of(m.side, lateral_miss(s, p), norm(velocity(s)), p), m.side)
     command = side * acos(inside) + p.bank_error
     bank, rate = m.turn.next_bank, m.turn.next_rate
     next_bank, next_rate = followed(bank, rate, command, p.bank_lag, p.bank_rate_limit, o.guidance_period)
@@ -192,5 +192,5 @@ def steer(t, s, m, p, o, draws):
 def control(t, s, m, p, o, draws):
     """The memory after a sample; nothing happens without a law."""
     if o.guidance != UNGUIDED:
-        m = Memory(m.met, steer(t, s, m.steering, p, o, draws))
+        m = replace(m, steering=steer(t, s, m.steering, p, o, draws))
     return m

@@ -6,90 +6,79 @@ differ in their errors alone have one plan; with plan = "given" it is that of th
 
 from collections import namedtuple
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from campaigns.reentry.airframe import airframe_of
-from campaigns.reentry.entry_state import Entry, World, entry_of, world_of
-from campaigns.reentry.inputs import GUIDANCE, PLAN_IS_GIVEN, Inputs
+from campaigns.reentry.entry_state import Entry, Planned, World, entry_of, world_of
+from campaigns.reentry.inputs import GUIDANCE, J2, NO_GRAVITY, PLAN_IS_GIVEN, Inputs
 from campaigns.reentry.vehicles import Vehicle
 from mc_engine.model import Parameter, Refusals
+from mc_engine.physics.constants import J2_EARTH
 
 # laws that read the same stored gains: with range, and without
 _SAME_GAINS = {"law2r": "law1", "law3r": "law1", "law3": "law2"}
 _LAW = np.array([float(GUIDANCE.index(_SAME_GAINS.get(law, law))) for law in GUIDANCE])
-# law, planet, shape, gravity, rotating, atmosphere, vehicle: codes of settings;  ground : equatorial radius
-# radius, latitude, speed, path, heading : of entry, over ground;  drag : area over mass [m^2/kg]
-# share : of the lift in the vertical plane;  end : altitude at which the reference path ends
+_OF_ENTRY = ("speed", "flight_path_angle", "heading", "latitude", "longitude", "altitude", "radius")
+# Besides the `World`, with what its gravity is, law, atmosphere, vehicle: codes of settings;  r, latitude, speed, path,
+# heading: of `Planned`;  drag: area over mass [m^2/kg];  share: of the lift in the vertical plane;  end: altitude at
+# which the reference path ends
 Plan = namedtuple(
     "Plan",
-    "law planet shape gravity rotating atmosphere vehicle ground "
-    "radius latitude speed path heading drag lift_to_drag trim share end",
+    "mu radius polar_radius e2 rate gravity log_density inverse_scale temperature j2 law atmosphere vehicle "
+    "r latitude speed path heading drag lift_to_drag trim share end",
 )
-_OF_ENTRY = ("place", "ahead", "right", "heading", "radius", "latitude", "planned_speed", "planned_path")
 
 
-def planned_entry(settings: SimpleNamespace, world: World, entry: Entry, refusals: Refusals) -> Entry:
-    """The entry that distances count from: each case's own without errors, or that of plan_...
-
-    Of the cases' own, only what _OF_ENTRY names is exchanged.
-    """
+def planned_entry(
+    i: SimpleNamespace, settings: SimpleNamespace, world: World, entry: Entry, refusals: Refusals
+) -> Planned:
+    """The entry that distances count from: each case's own without errors, or that of plan_..."""
     given = settings.plan == PLAN_IS_GIVEN
     if not given.any():
-        return entry
-    plain = SimpleNamespace(arrival=np.zeros_like(world.mu), speed_frame=settings.speed_frame)
-    plan = entry_of(_inputs_of_plan(settings), plain, world, refusals)
-    return entry._replace(**{name: np.where(given, getattr(plan, name), getattr(entry, name)) for name in _OF_ENTRY})
+        return entry.planned
+    inputs = vars(i) | {f"entry_{name}": getattr(settings, f"plan_{name}") for name in _OF_ENTRY}
+    state = vars(settings) | {"arrival": np.zeros_like(world.mu)}
+    plan = entry_of(SimpleNamespace(**inputs), SimpleNamespace(**state), world, refusals).planned
+    return Planned(*(np.where(given, *columns) for columns in zip(plan, entry.planned, strict=True)))
 
 
-def _inputs_of_plan(settings: SimpleNamespace) -> SimpleNamespace:
-    """The entry inputs that plan_... stand for, without errors; float64[n] by symbol."""
-    names = ("speed", "flight_path_angle", "heading", "latitude", "longitude", "altitude", "radius")
-    given = {f"entry_{name}": getattr(settings, f"plan_{name}") for name in names}
-    zero = np.zeros_like(given["entry_speed"])
-    errors = {f"entry_{name}_error": zero for name in names if name != "radius"}
-    return SimpleNamespace(**given, **errors, excess_speed=zero, vacuum_periapsis=zero)
-
-
-def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planned: Entry, airframe: Vehicle) -> Plan:
+def plans_of(i: SimpleNamespace, settings: SimpleNamespace, world: World, planned: Planned, airframe: Vehicle) -> Plan:
     """The plan of each case: a `Plan` of float64[n]."""
     given = settings.plan == PLAN_IS_GIVEN
     numbers = given & (settings.vehicle < 0.5)  # one of vehicles.py brings its own
     drag = airframe.reference_area * airframe.drag_coefficient / airframe.mass
+    lift_to_drag = airframe.lift_coefficient / airframe.drag_coefficient
     return Plan(
+        **world._replace(mu=np.where(settings.gravity == NO_GRAVITY, 0.0, world.mu))._asdict(),
+        j2=np.where(settings.gravity == J2, J2_EARTH, 0.0),
         law=_LAW[settings.guidance.astype(int)],
-        planet=settings.planet,
-        shape=settings.shape,
-        gravity=settings.gravity,
-        rotating=settings.rotating,
         atmosphere=settings.atmosphere,
         vehicle=settings.vehicle,
-        ground=world.radius,
-        radius=planned.radius,
+        r=planned.r,
         latitude=planned.latitude,
-        speed=planned.planned_speed,
-        path=planned.planned_path,
+        speed=planned.speed,
+        path=planned.path,
         heading=planned.heading,
         drag=np.where(numbers, 1.0 / settings.plan_ballistic_coefficient, drag),
-        lift_to_drag=np.where(
-            numbers, settings.plan_lift_to_drag, airframe.lift_coefficient / airframe.drag_coefficient
-        ),
+        lift_to_drag=np.where(numbers, settings.plan_lift_to_drag, lift_to_drag),
         trim=np.where(numbers, settings.plan_trim_angle, airframe.trim_angle),
         share=np.cos(np.where(given, settings.plan_bank, i.bank)),
         end=settings.plan_stop_altitude,
     )
 
 
-def default_plan() -> Plan:
-    """The plan of the model's default inputs, as plain numbers, SI."""
-    i = SimpleNamespace()
-    settings = SimpleNamespace()
+def plan_of(**chosen: Any) -> Plan:
+    """The plan of one case as plain numbers, SI; inputs by column, in declared units, the others at their defaults."""
+    i, settings, refusals = SimpleNamespace(), SimpleNamespace(), Refusals.none(1)
     for item in Inputs.declared:
+        value = chosen.get(item.name, item.default)
         if isinstance(item, Parameter):
-            setattr(i, item.symbol, np.array([item.default * item.si_factor]))
+            setattr(i, item.symbol, np.array([value * item.si_factor]))
         else:
-            setattr(settings, item.symbol, np.array([item.code(item.default)]))
-    refusals = Refusals.none(1)
+            setattr(settings, item.symbol, np.array([item.code(value)]))
     world = world_of(i, settings)
-    entry = entry_of(i, settings, world, refusals)
-    return Plan(*(float(row[0]) for row in plans_of(i, settings, world, entry, airframe_of(i, settings, refusals))))
+    planned = planned_entry(i, settings, world, entry_of(i, settings, world, refusals), refusals)
+    plan = plans_of(i, settings, world, planned, airframe_of(i, settings, refusals))
+    return Plan(*(float(column[0]) for column in plan))

@@ -7,7 +7,7 @@ the range runs fast, wide where all is slow.  Between rows everything is linear.
 
 from collections import namedtuple
 
-from mc_engine.lanes import floor, log, look_up, maximum, minimum, physics
+from mc_engine.lanes import floor, log, look_up, look_up_record, maximum, minimum, physics
 from mc_engine.physics.constants import STANDARD_GRAVITY
 
 FELT = 0.05 * STANDARD_GRAVITY  # axial deceleration from which on the speed lost is counted
@@ -17,12 +17,13 @@ LAST_SPEED = 400.0  # m/s, below which the reference bank is held
 ROWS, COLUMNS = 512, 8
 LAST_PLACE = ROWS - 1.000001  # among the rows
 SPREAD = 60.0  # m/s
-# the header: speed of the first row [m/s]; rows per unit of the logarithm, of both tables; range of the whole
-# reference [m]; the same quantities as the clock tells them before the air is felt (see `clocked_range`)
-FIRST_SPEED, SPEED_DENSITY, LOST_DENSITY, RANGE, CLOCK_TIME, CLOCK_RANGE, CLOCK_RATE, CLOCK_BEND = range(8)
-SPEED_TABLE = 8
+# speed of the first row [m/s]; rows per unit of the logarithm, of both tables; range of the whole reference [m]; the
+# same quantities as the clock tells them before the air is felt (see `clocked_range`)
+Header = namedtuple(
+    "Header", "first_speed speed_density lost_density range clock_time clock_range clock_rate clock_bend"
+)
+SPEED_TABLE = len(Header._fields)
 LOST_TABLE = SPEED_TABLE + ROWS * COLUMNS
-LENGTH = LOST_TABLE + ROWS * COLUMNS
 
 # SI; drag is an acceleration, climb the rate of the altitude; k_..: gains on the three differences
 BySpeed = namedtuple("BySpeed", "altitude path range drag climb k_altitude k_path k_range")
@@ -56,23 +57,20 @@ def _interpolated_row(tables, start, density, x):
 @physics
 def by_speed(tables, first, speed):
     """The row of the speed table at a speed [m/s]; here and below, first : place where the reference begins."""
-    lost = look_up(tables, first + FIRST_SPEED) - speed
-    return _interpolated_row(tables, first + SPEED_TABLE, look_up(tables, first + SPEED_DENSITY), lost)
+    h = look_up_record(tables, first, Header)
+    return _interpolated_row(tables, first + SPEED_TABLE, h.speed_density, h.first_speed - speed)
 
 
 @physics
 def by_loss(tables, first, lost):
     """The row of the other table at a speed lost W [m/s]."""
-    return ByLoss(*_interpolated_row(tables, first + LOST_TABLE, look_up(tables, first + LOST_DENSITY), lost))
+    h = look_up_record(tables, first, Header)
+    return ByLoss(*_interpolated_row(tables, first + LOST_TABLE, h.lost_density, lost))
 
 
 @physics
 def clocked_range(tables, first, t):
     """Range [m] of the reference at a time t [s] after entry, before the air is felt; then on at the last rate."""
-    end = look_up(tables, first + CLOCK_TIME)
-    early = minimum(t, end) - end
-    return (
-        look_up(tables, first + CLOCK_RANGE)
-        + look_up(tables, first + CLOCK_RATE) * (t - end)
-        + look_up(tables, first + CLOCK_BEND) * (early * early)
-    )
+    h = look_up_record(tables, first, Header)
+    early = minimum(t, h.clock_time) - h.clock_time
+    return h.clock_range + h.clock_rate * (t - h.clock_time) + h.clock_bend * (early * early)

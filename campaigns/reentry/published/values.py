@@ -1,4 +1,4 @@
-"""Our values of published numbers on air, closed forms of entry, single entries and the autopilot's lead design.
+"""Our values of published numbers on air, single entries and the autopilot's lead design; `closed_forms` has others.
 
 The records name these functions; each returns its value in the unit of the record.
 """
@@ -8,19 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from campaigns.reentry.autopilot.lead_compensator import crossover_of, margins_of, stage
-from campaigns.reentry.closed_forms import critical_roll_angle, glide_angle, glide_range, shallow_peak, steep_peak
+from campaigns.reentry.autopilot.lead_compensator import crossover_of, margins_of, ratio_of_lead, stage
+from campaigns.reentry.closed_forms import GROUND_DENSITY, SCALE_M, circular_speed, glide_angle_deg, steep_load_g
 from campaigns.reentry.critical_trajectories import critical_periapses
 from campaigns.reentry.guidance.apollo_final_phase import FLOWN
 from campaigns.reentry.model import MODEL
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.flight.flight import chosen_case, chosen_cases, chosen_history
-from mc_engine.physics.atmosphere import EXPONENTIALS, us76
+from mc_engine.physics.atmosphere import us76
 from mc_engine.physics.constants import MU_EARTH, STANDARD_GRAVITY
 from mc_engine.physics.frames import WGS84_RADIUS
 from mc_engine.statistics.binomial import lower_bound, smallest_sample
 
-GROUND_DENSITY, SCALE_M = EXPONENTIALS["earth"]  # of the textbook atmosphere: kg/m^3, m
 EXACT: dict[str, Any] = {"tolerance": 1e-12}  # of an integration step, where a flight is compared with a closed form
 AT_REST: dict[str, Any] = {"shape": "sphere", "gravity": "point", "rotating": False}
 # a spherical Earth that does not turn, motion in the plane of the equator; with the textbook atmosphere
@@ -59,21 +58,25 @@ def failure_probability(cases: int, confidence: float) -> float:
 # ---- ballistic entries
 
 
-def grazing_load_g(root_beta_r: float) -> float:
-    """Largest load [g] of a grazing ballistic entry: D. R. Chapman, NASA TR R-11 (1959)."""
-    return root_beta_r * shallow_peak(0.0)
+def ballistic(b: Any) -> dict[str, Any]:
+    """A vehicle without lift of ballistic coefficient b [kg/m^2]."""
+    return {"mass_kg": b, "reference_area_m2": 1.0, "drag_coefficient": 1.0, "lift_coefficient": 0.0}
 
 
-def load_from_orbit_g(which: str) -> float:
-    """The "min" or "max" of the largest loads [g] at circular speed and −2°, 50 to 1000 kg/m^2.
+def entries_from_orbit(b: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of entries at circular speed and −2°, of ballistic coefficients b [kg/m^2].
 
     Each starts where rho / B is that of 100 kg/m^2 at 120 km: eq. (5) of the source has then one solution for all.
     """
-    b = np.array([50.0, 100.0, 200.0, 400.0, 1000.0])
     altitude_km = 120.0 - 1e-3 * SCALE_M * np.log(b / 100.0)
-    speed = np.sqrt(MU_EARTH / (WGS84_RADIUS + 1e3 * altitude_km))
-    start = {"entry_altitude_km": altitude_km, "entry_speed_m_s": speed, "stop_altitude_km": 5.0}
-    return float(getattr(chosen_cases(MODEL, TEXTBOOK | _ballistic(b) | start | EXACT)["peak_load_g"], which)())
+    start = {"entry_altitude_km": altitude_km, "entry_speed_m_s": circular_speed(altitude_km), "stop_altitude_km": 5.0}
+    return chosen_cases(MODEL, TEXTBOOK | ballistic(b) | start | EXACT)
+
+
+def load_from_orbit_g(which: str) -> float:
+    """The "min" or "max" of the largest loads [g] of entries from orbit, 50 to 1000 kg/m^2."""
+    loads = entries_from_orbit(np.array([50.0, 100.0, 200.0, 400.0, 1000.0]))["peak_load_g"]
+    return float(getattr(loads, which)())
 
 
 def excess_of_gravity_pct(which: str) -> float:
@@ -84,21 +87,9 @@ def excess_of_gravity_pct(which: str) -> float:
     angles, masses = np.meshgrid(-np.arange(30.0, 61.0, 5.0), [100.0, 300.0, 1000.0, 3000.0])
     angle_deg, b = angles.ravel(), masses.ravel()
     start = {"entry_speed_m_s": 6500.0, "entry_altitude_km": 150.0, "stop_altitude_km": 0.0}
-    flown = chosen_cases(
-        MODEL, {**TEXTBOOK, **_ballistic(b), **start, "entry_flight_path_angle_deg": angle_deg, **EXACT}
-    )
-    alone = [_steep_load_g(6500.0, angle) for angle in angle_deg]
-    return float(getattr(100.0 * (flown["peak_load_g"] / np.array(alone) - 1.0), which)())
-
-
-def _ballistic(b: np.ndarray) -> dict[str, Any]:
-    """A vehicle without lift of ballistic coefficient b [kg/m^2]."""
-    return {"mass_kg": b, "reference_area_m2": 1.0, "drag_coefficient": 1.0, "lift_coefficient": 0.0}
-
-
-def _steep_load_g(speed: float, angle_deg: float) -> float:
-    """Largest load [g] of a straight entry: it depends on neither vehicle nor air but the scale height."""
-    return steep_peak(speed, np.radians(angle_deg), SCALE_M) / STANDARD_GRAVITY
+    start |= {"entry_flight_path_angle_deg": angle_deg}
+    loads = chosen_cases(MODEL, TEXTBOOK | ballistic(b) | start | EXACT)["peak_load_g"]
+    return float(getattr(100.0 * (loads / steep_load_g(6500.0, angle_deg) - 1.0), which)())
 
 
 # ---- Stardust
@@ -119,7 +110,7 @@ def stardust_at_rest_excess_pct() -> float:
 
 def stardust_constant_angle_excess_pct() -> float:
     """How much larger [%] its load is by NACA Rep. 1381, eq. (15), at a constant angle."""
-    return 100.0 * (_steep_load_g(12_900.0, 8.2) / _stardust_load_g() - 1.0)
+    return 100.0 * (steep_load_g(12_900.0, 8.2) / _stardust_load_g() - 1.0)
 
 
 @lru_cache
@@ -144,43 +135,31 @@ def stardust_load_three_sigma_g() -> float:
     return 3.0 * float(flown["peak_load_g"].std())
 
 
-# ---- skip, glide, aerobraking
+# ---- glide, aerobraking
 
 
-def critical_roll_deg(entry_angle_deg: float) -> float:
-    """Climb angle [deg] up to which a roll to lift down keeps a skip inside; eqs (14) to (16) of the source."""
-    return float(np.degrees(critical_roll_angle(np.radians(entry_angle_deg))))
-
-
-def glide_range_km() -> float:
-    """Range [km] of an equilibrium glide, L/D 1, from 0.95 of circular speed: A. J. Eggers, NACA Rep. 1382 (1958)."""
-    return glide_range(1.0, 0.95, 0.0, WGS84_RADIUS) / 1e3
+def equilibrium_glide() -> dict[str, Any]:
+    """Inputs of an equilibrium glide, L/D 1, from 80 km and 0.95 of circular speed; the area [m^2] follows."""
+    speed, radius = 0.95 * float(circular_speed(80.0)), WGS84_RADIUS + 80e3
+    density = GROUND_DENSITY * np.exp(-80e3 / SCALE_M)
+    return TEXTBOOK | {
+        "mass_kg": 1.0,
+        # lift carries what the circular motion does not
+        "reference_area_m2": 2.0 * (MU_EARTH / radius**2 - speed**2 / radius) / (density * speed**2),
+        "lift_coefficient": 1.0,
+        "drag_coefficient": 1.0,
+        "bank_deg": 0.0,
+        "entry_altitude_km": 80.0,
+        "entry_speed_m_s": speed,
+        "entry_flight_path_angle_deg": glide_angle_deg(0.95, radius),
+        "on_exit": "continue",
+        "stop_altitude_km": 0.0,
+    }
 
 
 def flown_glide_km() -> float:
-    """Length [km] of the same glide at its altitude, flown from 80 km."""
-    radius = WGS84_RADIUS + 80e3
-    speed = 0.95 * float(np.sqrt(MU_EARTH / radius))
-    density = GROUND_DENSITY * np.exp(-80e3 / SCALE_M)
-    # lift carries what the circular motion does not
-    lift_area = 2.0 * (MU_EARTH / radius**2 - speed**2 / radius) / (density * speed**2)
-    history = chosen_history(
-        MODEL,
-        {
-            **TEXTBOOK,
-            "mass_kg": 1.0,
-            "reference_area_m2": lift_area,
-            "lift_coefficient": 1.0,
-            "drag_coefficient": 1.0,
-            "bank_deg": 0.0,
-            "entry_altitude_km": 80.0,
-            "entry_speed_m_s": speed,
-            "entry_flight_path_angle_deg": float(np.degrees(glide_angle(1.0, 0.95, radius, SCALE_M))),
-            "on_exit": "continue",
-            "stop_altitude_km": 0.0,
-        },
-        rows=4001,
-    )
+    """Length [km] of an equilibrium glide at its altitude."""
+    history = chosen_history(MODEL, equilibrium_glide(), rows=4001)
     along = history["speed_m_s"] * np.cos(np.radians(history["flight_path_angle_deg"]))
     return 1e-3 * float(np.trapezoid(along, history["t_s"]))
 
@@ -209,7 +188,7 @@ def apollo_range_to_go_km(speed_m_s: float) -> float:
 # ---- lead design
 
 
-def _ogata_plant(w: Any) -> Any:
+def ogata_plant(w: Any) -> Any:
     """4 / (s (s + 2)) at a frequency [rad/s]."""
     return 4.0 / (1j * w * (1j * w + 2.0))
 
@@ -222,10 +201,8 @@ def ogata_lead(number: str) -> float:
 
     K. Ogata, Modern Control Engineering, lead compensation: zero ω√α, pole ω/√α, gain K/α.
     """
-    alpha = round(float((1.0 - np.sin(np.radians(38.0))) / (1.0 + np.sin(np.radians(38.0)))), 2)
-    w = float(round(crossover_of(lambda x: 10.0 * _ogata_plant(x), float(np.sqrt(alpha)))))
-    lead = stage(_ogata_plant, 10.0, alpha, w)
-    phase, bare = (
-        np.degrees(margins.phase) for margins in (lead.margins, margins_of(lambda x: 10.0 * _ogata_plant(x)))
-    )
-    return float({**vars(lead), "phase": phase, "crossover": lead.margins.crossover, "bare phase": bare}[number])
+    alpha = round(float(ratio_of_lead(np.radians(38.0))), 2)
+    w = float(round(crossover_of(lambda x: 10.0 * ogata_plant(x), float(np.sqrt(alpha)))))
+    lead, bare = stage(ogata_plant, 10.0, alpha, w), margins_of(lambda x: 10.0 * ogata_plant(x))
+    margins = {"phase": np.degrees(lead.margins.phase), "crossover": lead.margins.crossover}
+    return float((vars(lead) | margins | {"bare phase": np.degrees(bare.phase)})[number])

@@ -1,10 +1,11 @@
 """The osculating elements and the Gauss equations (3)-(10), against each other and against the flown path."""
 
+from collections import namedtuple
+
 import numpy as np
 import pytest
 from deorbit_flights import NOMINAL, fly_one, history
-from deorbit_twin import Path
-from gauss_equations import Elements, gauss_rates
+from deorbit_twin import MU, Path
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
@@ -12,7 +13,27 @@ from campaigns.deorbit.dynamics import osculating
 from campaigns.deorbit.published import DEMONSTRATION
 from mc_engine.physics.vectors import Vector
 
-MU = 3.986004418e14
+Elements = namedtuple("Elements", "node inclination omega a e f")  # SI, radians
+
+
+def gauss_rates(elements, u_radial, u_transverse, u_normal):
+    """Rates of the six elements under an acceleration [m/s^2] in the orbital frame: eqs (3)-(10) of the source."""
+    inclination, omega, a, e, f = elements.inclination, elements.omega, elements.a, elements.e, elements.f
+    p = a * (1.0 - e * e)  # (7)
+    h = np.sqrt(MU * p)  # (8)
+    sin_f, cos_f = np.sin(f), np.cos(f)
+    r = p / (1.0 + e * cos_f)  # (9)
+    theta = omega + f  # (10)
+    normal = r * np.sin(theta) / np.sin(inclination) * u_normal
+    apse = (-p * cos_f * u_radial + (p + r) * sin_f * u_transverse) / e
+    return Elements(
+        normal / h,
+        r * np.cos(theta) * u_normal / h,
+        (apse - normal * np.cos(inclination)) / h,
+        (2.0 * a * a * e * sin_f * u_radial + 2.0 * a * a * p / r * u_transverse) / h,
+        (p * sin_f * u_radial + ((p + r) * cos_f + r * e) * u_transverse) / h,
+        h / (r * r) - apse / h,
+    )
 
 
 def turn(axis, angle):

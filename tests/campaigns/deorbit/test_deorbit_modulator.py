@@ -44,8 +44,8 @@ def trains():
     inputs = {item.name: np.full(24, item.default) for item in model.parameters}
     inputs["command_n"][1:] = draw.uniform(13.0, 28.0, 23)
     inputs["gain"][1:] = draw.uniform(1.0, 1.5, 23)
-    inputs["on_n"][1:] = draw.uniform(8.0, 12.0, 23)
-    inputs["off_n"][1:] = draw.uniform(3.0, 7.0, 23)
+    inputs["modulator_on_n"][1:] = draw.uniform(8.0, 12.0, 23)
+    inputs["modulator_off_n"][1:] = draw.uniform(3.0, 7.0, 23)
     inputs["time_constant_s"][1:] = draw.uniform(1.0, 3.0, 23)
     return inputs, fly(model, inputs, np.arange(24), 1, folder=FOLDER)
 
@@ -60,20 +60,16 @@ def test_flown_by_the_engine_the_textbook_case_switches_on_time(trains):
 def test_flown_pulse_trains_follow_the_closed_forms(trains):
     """An event is as exact as the steps: 0.1 s against a time constant of 1 s leaves (0.1)^5 / 120 a step."""
     i, flown = trains
-    command, gain, tau, on, off = (i[name] for name in ("command_n", "gain", "time_constant_s", "on_n", "off_n"))
+    command, gain, tau = i["command_n"], i["gain"], i["time_constant_s"]
+    on, off = i["modulator_on_n"], i["modulator_off_n"]
     assert set(flown["status"]) == {"ok"}
     np.testing.assert_allclose(flown["first_on_s"], first_on_time(command, gain, tau, on), rtol=2e-6)
     np.testing.assert_allclose(flown["pulse_s"], pulse_time(command, gain, tau, i["level_n"], on, off), rtol=2e-6)
     np.testing.assert_allclose(flown["pause_s"], pause_time(command, gain, tau, on, off), rtol=2e-6)
 
 
-@pytest.fixture(scope="module")
-def published_pulses():
-    return pulses(0.002, **PULSED)
-
-
-def test_the_count_and_the_impulse_of_the_pulses_are_those_of_the_history(published_pulses):
-    _, widths = published_pulses
+def test_the_count_and_the_impulse_of_the_pulses_are_those_of_the_history():
+    _, widths = pulses()
     row = fly_one(**PULSED, step_s=0.01)
     assert row["pulse_count"] == len(widths) == 5
     assert widths.sum() == pytest.approx(168.2, abs=0.1)

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from deorbit_flights import NOMINAL, fly_cases, fly_one
+from deorbit_twin import MU
 
 from campaigns.deorbit.published import DEMONSTRATION, rounded_entry
 
-MU = 3.986004418e14
 R, V, GAMMA, THETA = 6491e3, 7800.0, np.radians(2.0), 60.0  # the entry state that the path is designed for
 R_INITIAL = 6639e3
 

@@ -19,19 +19,23 @@ FOLDER = Path(campaigns.flexible_satellite.__file__).parent
 AXES = "xyz"
 END = ["q0", "q1", "q2", "q3", *(f"omega_{axis}_rad_s" for axis in AXES), *(f"eta_{i}" for i in (1, 2, 3, 4))]
 
-_MODULATOR = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
 PWPF = {"actuator": "pwpf", "step_s": 0.005}
-TABLE_4 = PWPF | dict(zip(_MODULATOR, (7.6, 0.62, 0.13, 0.26, 1.1), strict=True))
-TABLE_8 = PWPF | dict(zip(_MODULATOR, (7.39, 0.713, 0.117, 0.225, 1.07), strict=True))
+TABLE_4 = PWPF | {
+    "pwpf_gain": 7.6, "pwpf_time_constant_s": 0.62, "pwpf_u_off": 0.13, "pwpf_hysteresis": 0.26, "thrust_level": 1.1,
+}  # fmt: skip
+TABLE_8 = PWPF | {
+    "pwpf_gain": 7.39, "pwpf_time_constant_s": 0.713, "pwpf_u_off": 0.117, "pwpf_hysteresis": 0.225,
+    "thrust_level": 1.07,
+}  # fmt: skip
 # with the K_P that the print has lost
-TABLE_9 = PWPF | dict(zip(_MODULATOR, (6.3, 0.9, 0.06, 0.26, 0.8), strict=True)) | {"kp": 5.2, "kd": 26.5, "ki": 0.001}
-TABLE_9 |= {"switching_rate_gain": 0.055, "switching_attitude_gain_1_s": 0.08}
+TABLE_9 = PWPF | {
+    "pwpf_gain": 6.3, "pwpf_time_constant_s": 0.9, "pwpf_u_off": 0.06, "pwpf_hysteresis": 0.26, "thrust_level": 0.8,
+    "kp": 5.2, "kd": 26.5, "ki": 0.001, "switching_rate_gain": 0.055, "switching_attitude_gain_1_s": 0.08,
+}  # fmt: skip
 # nothing acts from outside and nothing damps
 ALONE = {"kp": 0.0, "kd": 0.0, "ki": 0.0, "disturbance_amplitude_n_m": 0.0, "orbit_rate_rad_s": 0.0}
 ALONE |= {"modal_damping_factor": 0.0}
 
-# c0 of Table 11 as printed: rows body x, y, z; columns modes 1 to 4
-C0 = np.array([[7.0, -1.2, 1.1, 1.2], [1.2, 0.9, 2.5, -2.6], [2.2, -1.7, -0.8, -1.1]])
 J = np.diag([100.0, 75.0, 50.0])
 LAMBDA = np.array([0.7, 1.0, 1.8, 2.5])
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from flexible_flights import C0, fly_cases, fly_one, history
+from flexible_flights import fly_cases, fly_one, history
+from flexible_twin import C0
 
 CALM = {"disturbance_amplitude_n_m": 0.0, "orbit_rate_rad_s": 0.0, "kd": 0.0, "ki": 0.0, "duration_s": 1.0}
 CALM |= {f"initial_omega_{axis}_rad_s": 0.0 for axis in "xyz"}
@@ -47,25 +48,23 @@ def test_a_flight_ends_with_the_step_that_reaches_its_length(duration, step, end
 # ---- noise
 
 
-def test_rate_noise_reaches_the_torque_through_the_gain_on_the_rate():
-    seen = history(**AIMED | {"kd": 20.0, "duration_s": 60.0, "rate_noise_rad_s": 1e-6})
-    for axis in "xyz":
-        assert seen[f"command_{axis}_n_m"].std() == pytest.approx(20.0 * 1e-6, rel=0.05)
-        assert abs(seen[f"command_{axis}_n_m"].mean()) < 4.0 * 20.0 * 1e-6 / np.sqrt(6000)
+@pytest.fixture(scope="module")
+def noisy_commands():
+    """Torques asked for in a minute, float64[3, 6001] each, under noise of the rate and under that of the attitude."""
+    noises = {"kd": 20.0, "rate_noise_rad_s": 1e-6}, {"attitude_noise_rad": 1e-6}
+    flights = (history(**AIMED | {"duration_s": 60.0} | noise) for noise in noises)
+    return [np.array([seen[f"command_{axis}_n_m"] for axis in "xyz"]) for seen in flights]
 
 
-def test_attitude_noise_reaches_the_torque_as_half_its_angle():
-    seen = history(**AIMED | {"duration_s": 60.0, "attitude_noise_rad": 1e-6})
-    for axis in "xyz":
-        assert seen[f"command_{axis}_n_m"].std() == pytest.approx(5.0 * 0.5e-6, rel=0.05)
+def test_rate_noise_reaches_the_torque_through_its_gain_and_attitude_noise_as_half_its_angle(noisy_commands):
+    by_rate, by_attitude = noisy_commands
+    assert by_rate.std(axis=1) == pytest.approx([20.0 * 1e-6] * 3, rel=0.05)
+    assert np.abs(by_rate.mean(axis=1)).max() < 4.0 * 20.0 * 1e-6 / np.sqrt(6000)
+    assert by_attitude.std(axis=1) == pytest.approx([5.0 * 0.5e-6] * 3, rel=0.05)
 
 
-def test_the_noise_of_the_three_axes_and_of_the_two_sensors_is_drawn_apart():
-    noise = {"kd": 20.0, "rate_noise_rad_s": 1e-6, "duration_s": 60.0}
-    rate = history(**AIMED | noise)
-    attitude = history(**AIMED | {"duration_s": 60.0, "attitude_noise_rad": 1e-6})
-    rows = [seen[f"command_{axis}_n_m"] for seen in (rate, attitude) for axis in "xyz"]
-    apart = np.corrcoef(rows) - np.eye(6)
+def test_the_noise_of_the_three_axes_and_of_the_two_sensors_is_drawn_apart(noisy_commands):
+    apart = np.corrcoef(np.concatenate(noisy_commands)) - np.eye(6)
     assert np.abs(apart).max() < 5.0 / np.sqrt(6000)
 
 

@@ -11,12 +11,9 @@ from mc_engine.flight.flight import fly
 from mc_engine.physics.pulse_modulators import at_rest, sampled_pulses
 from tests.campaigns.pulse_trains import dead_band, first_on_time, pause_time, pulse_time
 
-_BOUNDS = ("pwpf_gain", "pwpf_time_constant_s", "pwpf_u_off", "pwpf_hysteresis", "thrust_level")
 GAIN, TAU, OFF, HYSTERESIS, LEVEL = 7.39, 0.713, 0.117, 0.225, 1.07  # Table 8
 ON = OFF + HYSTERESIS
-
-
-# ---- closed forms
+PULSE, PAUSE = 0.027103, 0.080803  # s, under a torque of 0.3, recomputed
 
 
 # ---- the campaign under a constant torque
@@ -39,11 +36,10 @@ def test_flown_pulses_and_pauses_are_those_of_the_closed_forms(period):
     row = fly_one(**asking(0.3), steps_per_sample=period / 0.005)
     pulses, t = row["pulse_count_x"], 120.0
     first = first_on_time(0.3, GAIN, TAU, ON)
-    cycle = 0.027103 + 0.080803
-    assert pulses == np.floor((t - first) / cycle) + 1.0
-    assert row["min_pulse_x_s"] == pytest.approx(0.027103, abs=1e-6)
-    assert row["on_time_x_s"] / pulses == pytest.approx(0.027103, rel=1e-3)
-    assert (t - first - row["on_time_x_s"]) / pulses == pytest.approx(0.080803, rel=1e-3)
+    assert pulses == np.floor((t - first) / (PULSE + PAUSE)) + 1.0
+    assert row["min_pulse_x_s"] == pytest.approx(PULSE, abs=1e-6)
+    assert row["on_time_x_s"] / pulses == pytest.approx(PULSE, rel=1e-3)
+    assert (t - first - row["on_time_x_s"]) / pulses == pytest.approx(PAUSE, rel=1e-3)
 
 
 def test_flown_over_the_whole_range_the_closed_forms_hold():
@@ -165,10 +161,9 @@ def test_under_any_held_command_the_samples_are_those_of_the_integrated_lag(peri
 @pytest.mark.parametrize("period", [0.5, 1.0, 2.0])
 def test_flown_with_samples_of_many_pulses_the_mean_output_is_that_of_the_closed_forms(period):
     row = fly_one(**asking(0.3), steps_per_sample=period / 0.005)
-    first, cycle = first_on_time(0.3, GAIN, TAU, ON), 0.027103 + 0.080803
-    assert row["pulse_count_x"] == np.floor((120.0 - first) / cycle) + 1.0
+    assert row["pulse_count_x"] == np.floor((120.0 - first_on_time(0.3, GAIN, TAU, ON)) / (PULSE + PAUSE)) + 1.0
     assert LEVEL * row["on_time_x_s"] / 120.0 == pytest.approx(0.26875, rel=0.002)
-    assert row["min_pulse_x_s"] == pytest.approx(0.027103, abs=1e-6)
+    assert row["min_pulse_x_s"] == pytest.approx(PULSE, abs=1e-6)
 
 
 def test_cases_with_many_pulses_in_a_sample_have_the_same_bits_alone_and_among_others():
@@ -183,7 +178,10 @@ def test_cases_with_many_pulses_in_a_sample_have_the_same_bits_alone_and_among_o
 
 def test_the_fastest_modulator_of_table_2_flies_alike_with_steps_of_5_ms_and_of_a_half():
     """Pulses and pauses of a millisecond: settled after 153 s with 121 s of attitude error, whatever the sample."""
-    fastest = dict(zip(_BOUNDS, (10.0, 0.05, 0.05, 0.05, 2.0), strict=True))
+    fastest = {
+        "pwpf_gain": 10.0, "pwpf_time_constant_s": 0.05, "pwpf_u_off": 0.05, "pwpf_hysteresis": 0.05,
+        "thrust_level": 2.0,
+    }  # fmt: skip
     coarse, fine = (fly_one(**TABLE_8 | fastest | {"step_s": step}) for step in (0.005, 0.0005))
     for name, share in (("settling_time_s", 0.002), ("attitude_effort_s", 0.002), ("control_effort_n_m_s", 0.005)):
         assert coarse[name] == pytest.approx(fine[name], rel=share)

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from flexible_flights import ALONE, C0, LAMBDA, MODEL, J, fly_cases, fly_one, prepared
+from flexible_flights import ALONE, LAMBDA, MODEL, J, fly_cases, fly_one, prepared
+from flexible_twin import C0
 
 from campaigns.flexible_satellite import control, dynamics
 from mc_engine.flight.kernel_parts import settings_class

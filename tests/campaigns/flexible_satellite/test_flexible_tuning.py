@@ -15,6 +15,11 @@ def stage(name):
     return load_campaign(FOLDER / f"{name}.toml")
 
 
+def candidate(campaign, table):
+    """The tuned parameters as a table has them, the others nominal: float64[1, parameters]."""
+    return np.array([[table.get(one.name, campaign.nominal[one.name]) for one in campaign.tuning.parameters]])
+
+
 def search(name, path, **sizes):
     pytest.importorskip("pymoo")
     return tune(stage(name), path, **sizes)
@@ -28,9 +33,7 @@ def beats(front):
 def test_the_published_optima_lie_within_the_bounds_and_have_the_stated_objectives():
     for name, table in (("stage_2", TABLE_8), ("stage_3", TABLE_9)):
         campaign = stage(name)
-        choice = np.array(
-            [[table.get(parameter.name, campaign.nominal[parameter.name]) for parameter in campaign.tuning.parameters]]
-        )
+        choice = candidate(campaign, table)
         for item, value in zip(campaign.tuning.parameters, choice[0], strict=True):
             assert item.lower <= value <= item.upper
         ours = fly_candidates(campaign, campaign.tuning, choice).objectives[0]
@@ -56,7 +59,7 @@ def test_with_the_gains_of_table_1_no_thrusters_meet_the_attitude_of_table_5(tmp
 
 def test_a_robust_candidate_is_judged_by_the_dispersed_craft():
     campaign = stage("stage_3_robust")
-    choice = np.array([[TABLE_9.get(parameter.name, 0.0) for parameter in campaign.tuning.parameters]])
+    choice = candidate(campaign, TABLE_9)
     robust = fly_candidates(campaign, campaign.tuning, choice)
     nominal = fly_one(**TABLE_9)
     assert robust.objectives[0, 0] > nominal["control_effort_n_m_s"]
@@ -70,7 +73,7 @@ def test_candidates_that_are_alike_meet_the_same_noise():
     noisy = 'actuator = "ideal"\nduration_s = 5.0\nrate_noise_rad_s = 1e-3\nattitude_noise_rad = 1e-3'
     text = text.replace('actuator = "pwpf"', noisy).replace("cases = 32", "cases = 8")
     campaign = load_campaign("noisy.toml", text=text, directory=FOLDER)
-    choice = np.array([[TABLE_9.get(parameter.name, 0.0) for parameter in campaign.tuning.parameters]])
+    choice = candidate(campaign, TABLE_9)
     three = fly_candidates(campaign, campaign.tuning, np.repeat(choice, 3, axis=0))
     assert three.objectives[0].tolist() == three.objectives[1].tolist() == three.objectives[2].tolist()
     alone = fly_candidates(campaign, campaign.tuning, choice)

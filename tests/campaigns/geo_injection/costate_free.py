@@ -22,8 +22,6 @@ def _coast(y, dt):
         f = r0 * vr * x * x * c + (1 - alpha * r0) * x**3 * s + r0 * x - dt
         slope = r0 * vr * x * (1 - z * s) + (1 - alpha * r0) * x * x * c + r0
         x = x - f / slope
-    z = alpha * x * x
-    c, s = (1 - np.cos(np.sqrt(z))) / z, (np.sqrt(z) - np.sin(np.sqrt(z))) / z**1.5
     f, g = 1 - x * x / r0 * c, dt - x**3 * s
     place = f[:, None] * r + g[:, None] * v
     r1 = np.linalg.norm(place, axis=1)
@@ -88,7 +86,7 @@ def shortest(problem, guess):
         both = _misses(problem, np.concatenate([x + steps, x - steps]))
         return (both[: x.size] - both[x.size :]).T / 2e-6
 
-    weights = np.eye(1, start.size, 1)[0] + np.eye(1, start.size, 2)[0]
+    weights = np.eye(start.size)[1] + np.eye(start.size)[2]
     conditions = {"type": "eq", "fun": lambda x: _misses(problem, x[None])[0], "jac": slopes}
     found = minimize(
         lambda x: x[1] + x[2], start, jac=lambda x: weights, constraints=conditions, method="SLSQP",

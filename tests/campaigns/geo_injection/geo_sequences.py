@@ -1,42 +1,58 @@
-"""The sequences of the source, and short ways to their designs."""
+"""The model's flights, the sequences of the source, and short ways to their designs."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from campaigns.geo_injection.design.continuation import optimum
-from campaigns.geo_injection.design.sequence import Sequence
+from campaigns.geo_injection.design.impulsive import propellant_share, two_impulses
+from campaigns.geo_injection.design.kept_programs import SEQUENCES
+from tests.campaigns.model_flights import ModelFlights
 
+FLIGHTS = ModelFlights("campaigns.geo_injection", width=None)
+MODEL, NOMINAL = FLIGHTS.model, FLIGHTS.nominal
+fly_cases, fly_one, history = FLIGHTS.cases, FLIGHTS.one, FLIGHTS.history  # by column name, in declared units
 GEO, PARKING = 42_164_137.0, 6_578_137.0
 THRUST, FLOW, MASS = 20_000.0, 6.14, 22_170.0
 MU = 3.986004418e14
+# one standard deviation of each error in campaign.toml
+SIGMAS = {
+    "thrust_factor": 0.005, "isp_factor": 0.003, "initial_mass_factor": 0.002, "ignition_delay_1_s": 1.0,
+    "ignition_delay_2_s": 1.0, "pitch_error_deg": 0.2, "yaw_error_deg": 0.2,
+}  # fmt: skip
+
+ELLIPTIC = {"initial_inclination_deg": 46.0, "parking_eccentricity": 0.2, "parking_argument_of_perigee_deg": 20.0}
 
 
-def sequence(burns, inclination_deg, *, thrust=THRUST, final_deg=0.0, method="optimal", between=()):
+def dispersed(n, seed=2017):
+    """Inputs of n cases of the spreads of campaign.toml."""
+    random = np.random.default_rng(seed)
+    return {name: NOMINAL[name] + sigma * random.standard_normal(n) for name, sigma in SIGMAS.items()}
+
+
+def sequence(burns, inclination_deg, thrust=THRUST, **parking):
     """A sequence of the source's engine, whose exhaust speed any thrust keeps."""
-    return Sequence(
-        method=method, burns=burns, initial_inclination=float(np.radians(inclination_deg)),
-        final_inclination=float(np.radians(final_deg)), parking_radius=PARKING, final_radius=GEO, thrust=thrust,
-        mass_flow=FLOW * thrust / THRUST, mass=MASS, between=between,
-    )  # fmt: skip
+    engine = {"thrust": thrust, "mass_flow": FLOW * thrust / THRUST}
+    inclination = float(np.radians(inclination_deg))
+    return replace(SEQUENCES["two_burns_28_5"], burns=burns, initial_inclination=inclination, **engine, **parking)
 
 
 @lru_cache(maxsize=64)
 def solution(burns, inclination_deg, thrust=THRUST):
     """The optimum of a sequence, canonical."""
-    return optimum(sequence(burns, inclination_deg, thrust=thrust).problem())
+    return optimum(sequence(burns, inclination_deg, thrust).problem())
 
 
-def propellant_kg(burns, inclination_deg, thrust=THRUST):
-    found = solution(burns, inclination_deg, thrust)
+def used_kg(found):
+    """Propellant of an optimum."""
     return MASS * found.problem.flow * found.durations.sum()
 
 
-def seconds(burns, inclination_deg, thrust=THRUST):
-    """(durations of the burns, ignition times) [s]."""
-    unit = sequence(burns, inclination_deg).time_unit
-    found = solution(burns, inclination_deg, thrust)
-    return unit * found.durations, unit * found.ignitions
+def impulses_kg(problem, speed=None):
+    """Propellant of impulses: of a total speed change, or of two at the apses."""
+    two = two_impulses(problem.plane_change, problem.ratio)
+    return MASS * propellant_share(two.first + two.second if speed is None else speed, problem.exhaust)
 
 
 def elements(state):

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from geo_flights import NOMINAL, fly_cases, fly_one
-from geo_sequences import GEO, MU, PARKING, elements
+from geo_sequences import ELLIPTIC, GEO, MU, NOMINAL, PARKING, SIGMAS, dispersed, elements, fly_cases, fly_one
 from geo_twin import fly_twin
 
 from campaigns.geo_injection.design.kept_programs import SEQUENCES as KEPT
-from campaigns.geo_injection.design.programs import program_for
-from campaigns.geo_injection.linear_prediction import predicted_sigmas
+from campaigns.geo_injection.design.program import program_for
+from campaigns.geo_injection.linear_prediction import contributions
 
 THREE_STAGED = {"method": "staged", "burns": 3}
 SEQUENCES = [
@@ -23,6 +22,10 @@ SEQUENCES = [
     THREE_STAGED | {"planar": True},
     {"method": "staged", "initial_inclination_deg": 1.0},
     {"final_inclination_deg": 28.5, "initial_inclination_deg": 5.0},
+    ELLIPTIC,
+    ELLIPTIC | {"final_inclination_deg": 10.0},
+    ELLIPTIC | {"parking_altitude_km": 800.0},
+    {"method": "staged", "parking_eccentricity": 0.1},
 ]
 
 
@@ -117,13 +120,13 @@ def test_thrust_and_mass_that_grow_alike_leave_the_orbit_and_scale_the_propellan
 def test_all_ignitions_late_by_as_much_is_the_orbit_turned_in_time():
     """Every delay alike is a later start on the parking orbit: the same as a first place further along it."""
     late = fly_one(ignition_delay_1_s=5.0, ignition_delay_2_s=5.0)
-    speed = 7784.26
-    angle = 5.0 * speed / 6_578_137.0
+    circular = 7784.26
+    angle = 5.0 * circular / PARKING
     ahead = fly_one(
-        initial_position_t_m=6_578_137.0 * np.sin(angle),
-        initial_position_r_m=6_578_137.0 * (np.cos(angle) - 1.0),
-        initial_velocity_t_m_s=speed * (np.cos(angle) - 1.0),
-        initial_velocity_r_m_s=-speed * np.sin(angle),
+        initial_position_t_m=PARKING * np.sin(angle),
+        initial_position_r_m=PARKING * (np.cos(angle) - 1.0),
+        initial_velocity_t_m_s=circular * (np.cos(angle) - 1.0),
+        initial_velocity_r_m_s=-circular * np.sin(angle),
     )
     assert late["semi_major_axis_km"] == pytest.approx(ahead["semi_major_axis_km"], abs=0.01)
     assert late["inclination_deg"] == pytest.approx(ahead["inclination_deg"], abs=1e-6)
@@ -153,23 +156,9 @@ def test_sensed_velocity_takes_away_most_of_a_thrust_error_and_none_of_its_own_s
     assert scaled["propellant_kg"] > fly_one()["propellant_kg"] + 5.0
 
 
-SIGMAS = {
-    "thrust_factor": 0.005, "isp_factor": 0.003, "initial_mass_factor": 0.002, "ignition_delay_1_s": 1.0,
-    "ignition_delay_2_s": 1.0, "pitch_error_deg": 0.2, "yaw_error_deg": 0.2,
-}  # fmt: skip
-
-
-def drawn(n, **inputs):
-    """n cases of the spreads of campaign.toml."""
-    random = np.random.default_rng(2017)
-    return fly_cases(
-        **{name: NOMINAL[name] + sigma * random.standard_normal(n) for name, sigma in SIGMAS.items()}, **inputs
-    )
-
-
 def test_linear_theory_is_that_of_an_independent_flight_and_predicts_the_scatter():
     """2000 cases: a deviation is good to 1.6 %, and the second order of the errors adds some percent."""
-    flown, linear = drawn(2000), predicted_sigmas(NOMINAL, SIGMAS)
+    flown, linear = fly_cases(**dispersed(2000)), np.sqrt((contributions(NOMINAL, SIGMAS) ** 2).sum())
     assert (flown["status"] == "ok").all()
     changes = []
     for name, sigma in SIGMAS.items():
@@ -184,8 +173,8 @@ def test_linear_theory_is_that_of_an_independent_flight_and_predicts_the_scatter
 
 
 def test_aiming_the_last_burn_again_takes_the_correction_to_a_fifth_and_the_drift_away():
-    open_loop = drawn(400)
-    aimed = drawn(400, guidance="re_aimed", shutdown="sensed_velocity")
+    open_loop = fly_cases(**dispersed(400))
+    aimed = fly_cases(**dispersed(400), guidance="re_aimed", shutdown="sensed_velocity")
     assert (aimed["status"] == "ok").all()
     for metric, share in (("correction_dv_m_s", 0.2), ("plane_error_deg", 0.2)):
         assert np.median(aimed[metric]) < share * np.median(open_loop[metric])

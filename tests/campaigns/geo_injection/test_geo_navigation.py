@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from geo_flights import fly_one
-from geo_sequences import MU
+from geo_sequences import MU, fly_one
 
 from campaigns.geo_injection.aiming import known
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
-from campaigns.geo_injection.design.programs import program_for
+from campaigns.geo_injection.design.program import program_for
 from campaigns.geo_injection.dynamics import State
 
 CLOSED = {"guidance": "re_aimed", "shutdown": "sensed_velocity"}
@@ -28,10 +27,10 @@ def test_navigation_errors_count_along_the_true_radial_transverse_and_normal_axe
 
 def test_a_stage_that_takes_itself_to_be_a_second_further_burns_a_second_early():
     """Place and velocity of the same orbit a second later: nothing but the time of the last burn may change."""
-    end = program_for(SEQUENCES["two_burns_28_5"]).burns[0].end
-    r = np.linalg.norm(end[:3])
-    radial = end[:3] @ end[3:] / r
-    transverse = np.sqrt(end[3:] @ end[3:] - radial**2)
+    place, velocity = np.reshape(program_for(SEQUENCES["two_burns_28_5"]).burns[0].end, (2, 3))
+    r = np.linalg.norm(place)
+    radial = place @ velocity / r
+    transverse = np.sqrt(velocity @ velocity - radial**2)
     fooled = fly_one(
         **CLOSED,
         navigation_position_r_m=radial - 0.5 * MU / r**2,

@@ -1,15 +1,15 @@
 """The source's single burns: the example of table 1, and the burns between its stated orbits."""
 
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from geo_sequences import GEO, MASS, MU, PARKING, sequence
 
+from campaigns.geo_injection.design.coast import coast
 from campaigns.geo_injection.design.single_burn import Stage, circle, fly_shortest, rise_guess
 from campaigns.geo_injection.design.staged import Orbit, rising, staged
-from campaigns.geo_injection.published.burns import burn_s as published_burn_s
+from campaigns.geo_injection.published.burns import burn_s
 from campaigns.geo_injection.published.values import avoidance
 
 SOURCE = {
@@ -21,51 +21,22 @@ SOURCE = {
 }
 
 
-def burn_s(name, number):
-    """Least time [s] of a burn of the staged sequence, counted from 0."""
-    return sequence(*SOURCE[name][:2]).time_unit * staged_burns(name)[number].burn.duration
-
-
-@cache
-def staged_burns(name):
-    """The burns of a sequence over the source's orbits."""
-    burns, inclination, between = SOURCE[name]
-    orbits = tuple(Orbit(1e3 * a / PARKING, e, np.radians(i)) for a, e, i in between)
-    return staged(sequence(burns, inclination).problem(), orbits)
-
-
-def first_burn_s(name):
-    return burn_s(name, 0)
-
-
-def apogee_burn_s(a_km, e, inclination_deg, propellant_so_far_kg, placing):
-    """Least time [s] from a stated transfer orbit, its apogee on the node, to the geostationary circle."""
-    problem, unit = sequence(2, 28.5).problem(), sequence(2, 28.5).time_unit
-    a, i = 1e3 * a_km / PARKING, np.radians(inclination_deg)
-    speed = np.sqrt((1 - e) / ((1 + e) * a))
-    reference = np.array([-a * (1 + e), 0.0, 0.0, 0.0, -speed * np.cos(i), -speed * np.sin(i)])
-    mass = 1.0 - propellant_so_far_kg / MASS
-    stage = Stage(reference, mass, problem.thrust, problem.flow, circle(problem.ratio), placing)
-    change = np.array([0.0, -np.sqrt(1.0 / problem.ratio), 0.0]) - reference[3:]
-    return unit * fly_shortest(stage, change, np.zeros(3), 600.0 / unit, -300.0 / unit).duration
-
-
 @pytest.mark.parametrize(
-    ("a_km", "e", "degrees", "used_kg"),
-    [(24_588, 0.7142, 0.0, 12_480.0), (24_438, 0.7247, 0.0, 11_984.1), (24_588, 0.7142, 26.0, 12_683.0)],
+    ("transfer", "used_kg"),
+    [((24_588, 0.7142, 0.0), 12_480.0), ((24_438, 0.7247, 0.0), 11_984.1), ((24_588, 0.7142, 26.0), 12_683.0)],
 )
-def test_the_source_s_guess_for_burns_between_ellipses_leads_to_the_same_apogee_burns(a_km, e, degrees, used_kg):
-    """Eq. (23), though it gives less than a third of their time."""
-    problem, unit = sequence(2, 28.5).problem(), sequence(2, 28.5).time_unit
-    a, i = 1e3 * a_km / PARKING, np.radians(degrees)
+def test_the_source_s_guess_for_burns_between_ellipses_leads_to_the_same_apogee_burns(transfer, used_kg):
+    """Eq. (23), though it gives less than a third of their time; the guess beside it is an impulse."""
+    problem, unit, mass = sequence(2, 28.5).problem(), sequence(2, 28.5).time_unit, 1.0 - used_kg / MASS
+    a, e, i = 1e3 * transfer[0] / PARKING, transfer[1], np.radians(transfer[2])
     speed = np.sqrt((1 - e) / ((1 + e) * a))
-    up, along = np.array([-1.0, 0.0, 0.0]), np.array([0.0, -np.cos(i), -np.sin(i)])
-    mass = 1.0 - used_kg / MASS
-    stage = Stage(np.concatenate([a * (1 + e) * up, speed * along]), mass, problem.thrust, problem.flow,
-                  circle(problem.ratio))  # fmt: skip
-    guess = rise_guess((problem.ratio - a * (1 + e)) * mass / problem.thrust)
-    burn = rising(stage, problem.ratio, up, along).duration
-    assert unit * burn == pytest.approx(apogee_burn_s(a_km, e, degrees, used_kg, "centred"), abs=1e-6)
+    apogee = np.array([-a * (1 + e), 0.0, 0.0, 0.0, -speed * np.cos(i), -speed * np.sin(i)])
+    stage = Stage(apogee, mass, problem.thrust, problem.flow, circle(problem.ratio))
+    change = np.array([0.0, -np.sqrt(1.0 / problem.ratio), 0.0]) - apogee[3:]
+    by_impulse = fly_shortest(stage, change, np.zeros(3), 600.0 / unit, -300.0 / unit).duration
+    guess = rise_guess((problem.ratio + apogee[0]) * mass / problem.thrust)
+    burn = rising(stage, problem.ratio).duration
+    assert unit * burn == pytest.approx(unit * by_impulse, abs=1e-6)
     assert guess[0] < burn / 3.0
     assert guess[2] == pytest.approx(guess[1] ** 2, rel=1e-12)
 
@@ -79,15 +50,9 @@ def test_staged_burns_make_one_continuous_flight_to_the_geostationary_circle(nam
     assert np.linalg.norm(end[:3]) * PARKING == pytest.approx(GEO, abs=0.01)
     assert np.linalg.norm(end[3:6]) * item.speed_unit == pytest.approx(np.sqrt(MU / GEO), abs=1e-6)
     for stage, after in pairwise(stages):
-        assert after.burn.start[:6] == pytest.approx(_coasted(stage, after), abs=1e-9)
+        wait = np.array([after.ignition - stage.ignition - stage.burn.duration])
+        assert after.burn.start[:6] == pytest.approx(coast(stage.burn.end, wait)[0, :6], abs=1e-9)
         assert after.burn.ignition == pytest.approx(-0.5 * after.burn.duration, abs=1e-9)
-
-
-def _coasted(stage, after):
-    from campaigns.geo_injection.design.coast import coast
-
-    wait = after.ignition - stage.ignition - stage.burn.duration
-    return coast(np.append(stage.burn.end[:6], np.ones(6))[None], np.array([wait]))[0, :6]
 
 
 # [s] of independent solutions: first burns ignited on the node, second burns centred on the printed perigee
@@ -104,7 +69,7 @@ IN_CONVENTIONS = [
 
 @pytest.mark.parametrize(("name", "number", "seconds"), IN_CONVENTIONS)
 def test_burns_in_the_source_s_conventions_last_as_long_as_an_independent_solution(name, number, seconds):
-    assert published_burn_s(name, number) == pytest.approx(seconds, abs=0.1)
+    assert burn_s(name, number) == pytest.approx(seconds, abs=0.1)
 
 
 def test_table_1_costates_keep_the_symmetry_of_a_free_longitude():

@@ -2,25 +2,16 @@
 
 from time import process_time
 
-import numpy as np
 import pytest
-from geo_flights import fly_cases
+from geo_sequences import dispersed, fly_cases
 from geo_twin import fly_twin
 
-from campaigns.geo_injection.design import programs as design
+from campaigns.geo_injection.design import program as design
 from campaigns.geo_injection.design.kept_programs import SEQUENCES
 
 MICROSECONDS_A_FLIGHT = 2 * 5.0 / 100_000 * 1e6  # 100 000 flights in 5 s on two cores
 SECONDS_A_DESIGN = 30.0
 N_CASES = 4000
-
-
-def dispersed(n):
-    random = np.random.default_rng(9)
-    factors = {"thrust_factor": 0.005, "isp_factor": 0.003, "initial_mass_factor": 0.002}
-    inputs = {name: 1.0 + sigma * random.standard_normal(n) for name, sigma in factors.items()}
-    inputs |= {f"ignition_delay_{k}_s": random.standard_normal(n) for k in (1, 2)}
-    return inputs | {f"{name}_error_deg": 0.2 * random.standard_normal(n) for name in ("pitch", "yaw")}
 
 
 def seconds(work):

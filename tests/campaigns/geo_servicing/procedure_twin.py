@@ -76,15 +76,11 @@ def settled_ranges(n, chi1, place=0.0, velocity=0.0, thrust=0.0, pointing=0.0, s
         found = np.isfinite(wait)
         length = SIDEREAL_DAY * np.where(found, wait, 1.0)
         for part in np.arange(1, PLACES + 1) / PLACES:
-            distance, when = (
-                abs(coasted(module, part * length)[0] - coasted(target, part * length)[0]),
-                t + part * length,
-            )
+            distance = abs(coasted(module, part * length)[0] - coasted(target, part * length)[0])
+            when = t + part * length
             counts = (when >= 15.0 * 86_400.0) & (when <= 30.0 * 86_400.0)
-            least, largest = (
-                np.where(counts & (distance < least), distance, least),
-                np.maximum(largest, counts * distance),
-            )
+            least = np.where(counts & (distance < least), distance, least)
+            largest = np.maximum(largest, counts * distance)
         module, target, t = coasted(module, length), coasted(target, length), t + length
         y, v, _ = look()
         change = np.where(found, -law(y, v) * RATE / (3.0 * TURN), 0.0) * (1.0 + thrust * rng.normal(size=n))

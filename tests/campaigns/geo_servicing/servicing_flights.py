@@ -9,8 +9,8 @@ from tests.campaigns.model_flights import ModelFlights
 FLIGHTS = ModelFlights("campaigns.geo_servicing")
 MODEL, NOMINAL = FLIGHTS.model, FLIGHTS.nominal
 fly_cases, fly_one, history = FLIGHTS.cases, FLIGHTS.one, FLIGHTS.history
-# the source's corrections without errors, gravity 4 x 4, Moon and Sun
-PUBLISHED = {"schedule": "published", "feedback": False, "navigation": "perfect", "sunlight": False}
+# the source's coasts [s], burns [s] and their signs
+SOURCE_BURNS = ((123_753.6, 7_726.3, 1.0), (37_692.0, 4_569.1, 1.0), (24_264.7, 1_290.3, -1.0))
 KEPLER = {"gravity_degree": 0.0, "gravity_order": 0.0, "sun_and_moon": False, "sunlight": False}
 INSPECTION = {
     "phase": "inspection", "epoch_utc": "2019-12-11T00:00:00", "duration_days": 30.0, "sunlight": False,

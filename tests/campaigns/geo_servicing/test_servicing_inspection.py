@@ -1,15 +1,19 @@
 """The inspection law, its procedure beside a twin of it, and what it holds."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from first_order import coast_time
 from procedure_twin import settled_ranges
 from servicing_flights import INSPECTION, first_states, fly_cases, fly_one, history
-from servicing_twin import R0, RATE, SIDEREAL_DAY, Twin, elements
+from servicing_twin import MU, R0, RATE, SIDEREAL_DAY, Twin, elements
 
-from campaigns.geo_servicing.inspection import Relative, correction, wait_until
+from campaigns.geo_servicing.inspection import Relative, correction, relative_orbit, wait_until
+from campaigns.geo_servicing.navigation import EXACT
+from mc_engine.physics.orbital_elements import state_of_elements
 
 EPOCH, DAY = 58828.0, 86_400.0
+AXES = ("x", "y", "z", "vx", "vy", "vz")
 FIVE_DAYS = {"duration_days": 5.0, "settle_time_days": 4.0}
 EXECUTION = {"thrust_noise_pct": 0.5, "pointing_noise_deg": 1.0 / 6.0}
 GOOD_FIXES = {"navigation": "raw", "nav_position_m": 0.1, "nav_velocity_m_s": 1e-5}
@@ -34,10 +38,23 @@ def test_without_weights_a_correction_takes_its_share_of_the_deviation(chi1):
     assert y + left * t == pytest.approx(y * chi1 / (t * t + chi1))
 
 
-@pytest.mark.parametrize(("u", "expected"), [(1.0, 73_077.9), (-1.0, 116_160.0)])
-def test_the_coast_to_the_ends_of_the_relative_ellipse_is_the_digests(u, expected):
-    theta_s, theta_t = np.radians(54.99), np.radians(55.0)
-    assert coast_time(3.25e-4, theta_s, 3.15e-4, theta_t, u, 1.0) == pytest.approx(expected, abs=1.0)
+@pytest.mark.parametrize(("end", "expected"), [(0.0, 73_077.9), (np.pi, 116_160.0)])
+def test_the_coast_to_the_ends_of_the_relative_ellipse_is_the_digests(end, expected):
+    """(3.45), of the relative ellipse by (3.43), (3.44): the triangle of both eccentricity vectors."""
+    crafts = {"": on_x_axis(3.25e-4, 54.99), "target_": on_x_axis(3.15e-4, 55.0)}
+    named = {f"{name}{axis}": value for name, y in crafts.items() for axis, value in zip(AXES, y, strict=True)}
+    flown = relative_orbit(SimpleNamespace(**named), EXACT)
+    assert flown.e == pytest.approx(1.0e-5, rel=1e-3)
+    cosine_rule = 3.25e-4**2 + 3.15e-4**2 - 2 * 3.25e-4 * 3.15e-4 * np.cos(np.radians(0.01))
+    assert flown.e**2 == pytest.approx(cosine_rule, rel=1e-6)
+    assert np.degrees(flown.phase) == pytest.approx(54.675, abs=0.01)
+    assert SIDEREAL_DAY * wait_until(flown, end, 0.75) == pytest.approx(expected, abs=1.0)
+
+
+def on_x_axis(e, anomaly_deg):
+    """State of an equatorial orbit of the geostationary semi-major axis, the craft being on the x axis."""
+    anomaly = np.radians(anomaly_deg)
+    return state_of_elements(R0, e, 0.0, 0.0, -anomaly, anomaly, MU)
 
 
 def test_waiting_ends_at_the_phase_and_is_never_shorter_than_allowed():

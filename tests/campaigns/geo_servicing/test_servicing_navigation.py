@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from servicing_twin import MU, R0, RATE
 
-from campaigns.geo_servicing.navigation import Estimate, burnt, fixed, hill, propagated, single_fix
+from campaigns.geo_servicing.navigation import Error, Estimate, burnt, fixed, hill, propagated, single_fix
 
 ORDER = [(0, 0), (0, 1), (0, 2), (0, 3), (1, 1), (1, 2), (1, 3), (2, 2), (2, 3), (3, 3)]
+SIGMAS = np.array([10.0, 10.0, 0.1, 0.1])  # of a fix [m, m/s]
 
 
 def matrix(e):
@@ -42,8 +44,6 @@ def circular(angle, deviation):
 
 
 def test_hills_solution_is_what_a_point_mass_does_to_a_small_deviation():
-    from scipy.integrate import solve_ivp
-
     deviation, t = np.array([20.0, -50.0, 2e-3, -1e-3]), 20_000.0
 
     def fly(y):
@@ -70,11 +70,10 @@ def test_propagation_is_that_of_matrices(seed):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_fix_is_the_textbooks_update(seed):
-    e, noise = some_estimate(seed), np.array([0.3, -1.2, 0.7, 1.9])
-    r = np.diag([100.0, 100.0, 0.01, 0.01])
-    gain = matrix(e) @ np.linalg.inv(matrix(e) + r)
-    error = e[:4] + gain @ (np.sqrt(np.diag(r)) * noise - e[:4])
-    after = fixed(e, *noise, 10.0, 0.1)
+    e, fix = some_estimate(seed), SIGMAS * np.array([0.3, -1.2, 0.7, 1.9])
+    gain = matrix(e) @ np.linalg.inv(matrix(e) + np.diag(SIGMAS**2))
+    error = e[:4] + gain @ (fix - e[:4])
+    after = fixed(e, Error(*fix), 10.0, 0.1)
     assert after[:4] == pytest.approx(error, rel=1e-8)
     assert matrix(after) == pytest.approx((np.eye(4) - gain) @ matrix(e), rel=1e-7, abs=1e-18)
 
@@ -88,21 +87,28 @@ def test_a_burn_adds_what_it_did_differently():
     assert after.pww - e.pww == pytest.approx(0.015**2)
 
 
-def test_the_filter_knows_its_errors():
-    """2000 filters over two days of hourly fixes: error squared over covariance is four on average."""
-    rng, n = np.random.default_rng(5), 2000
-    e = single_fix(*rng.normal(size=(4, n)), 10.0, 0.1)
+def two_days_of_fixes(seed, n):
+    """The estimates of n filters after two days of hourly fixes."""
+    rng = np.random.default_rng(seed)
+
+    def fix():
+        return Error(*(SIGMAS[:, None] * rng.normal(size=(4, n))))
+
+    e = single_fix(fix(), 10.0, 0.1)
     for _ in range(48):
-        e = fixed(propagated(e, 3_600.0, 0.0), *rng.normal(size=(4, n)), 10.0, 0.1)
+        e = fixed(propagated(e, 3_600.0, 0.0), fix(), 10.0, 0.1)
+    return e
+
+
+def test_the_filter_knows_its_errors():
+    """Error squared over covariance is four on average."""
+    e = two_days_of_fixes(5, 2000)
     errors, covariance = np.array(e[:4]), matrix([np.mean(x) for x in e])
     size = np.einsum("in,ij,jn->n", errors, np.linalg.inv(covariance), errors)
     assert size.mean() == pytest.approx(4.0, abs=0.3)
 
 
 def test_two_days_of_fixes_bring_a_tenth_of_a_metre_per_second_to_a_few_tenths_of_a_millimetre():
-    rng, n = np.random.default_rng(6), 500
-    e = single_fix(*rng.normal(size=(4, n)), 10.0, 0.1)
-    for _ in range(48):
-        e = fixed(propagated(e, 3_600.0, 0.0), *rng.normal(size=(4, n)), 10.0, 0.1)
+    e = two_days_of_fixes(6, 500)
     assert np.std(e.w) < 3e-4
     assert np.std(e.w) * 0.35126 < 2e-4  # deg/rev

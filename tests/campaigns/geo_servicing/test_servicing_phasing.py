@@ -2,22 +2,17 @@
 
 import numpy as np
 import pytest
-from servicing_flights import KEPLER, PUBLISHED, fly_cases, fly_one, normal
+from servicing_flights import KEPLER, fly_cases, fly_one, normal
 
+from campaigns.geo_servicing.published.values import SCHEDULE as PUBLISHED
 from mc_engine.campaign.loading import load_campaign
 from mc_engine.flight.flight import fly
 
 N = 500  # a deviation of the sample is then good to 3 %
 ERRORS = ("thrust_error_pct", "out_of_plane_deg", "radial_deg")
 FEEDBACK = PUBLISHED | {"feedback": True}
-
-
-def per_burn(n=N):
-    return {f"burn_{k}_{error}": normal(f"{k}{error}", n, 0.5) for k in (1, 2, 3) for error in ERRORS}
-
-
-def per_run(n=N):
-    return {error: normal(error, n, 0.5) for error in ERRORS}
+PER_BURN = {f"burn_{k}_{error}": normal(f"{k}{error}", N, 0.5) for k in (1, 2, 3) for error in ERRORS}
+PER_RUN = {error: normal(error, N, 0.5) for error in ERRORS}
 
 
 def spread(row, *names):
@@ -32,21 +27,20 @@ def test_kepler_alone_ends_where_the_digest_has_it():
     assert row["eccentricity"] == pytest.approx(2.422e-4, abs=1e-6)
 
 
-def test_errors_fresh_in_every_burn_spread_the_end_as_the_digest_says():
-    row = fly_cases(**PUBLISHED, **per_burn())
+@pytest.mark.parametrize(
+    ("errors", "wanted"),
+    [(PER_BURN, [0.0047, 0.0063, 1.09e-5]), (PER_RUN, [0.0057, 0.0077, 3.4e-6])],
+    ids=["fresh_in_every_burn", "one_a_run"],
+)
+def test_errors_spread_the_end_as_the_digest_says(errors, wanted):
+    row = fly_cases(**PUBLISHED, **errors)
     names = ("mean_longitude_deviation_deg", "drift_rate_deg_rev", "eccentricity")
-    assert spread(row, *names) == pytest.approx([0.0047, 0.0063, 1.09e-5], rel=0.12)
-
-
-def test_one_error_a_run_spreads_the_end_as_the_digest_says():
-    row = fly_cases(**PUBLISHED, **per_run())
-    names = ("mean_longitude_deviation_deg", "drift_rate_deg_rev", "eccentricity")
-    assert spread(row, *names) == pytest.approx([0.0057, 0.0077, 3.4e-6], rel=0.12)
+    assert spread(row, *names) == pytest.approx(wanted, rel=0.12)
 
 
 def test_a_filter_makes_feedback_useful():
-    filtered = fly_cases(**FEEDBACK | {"navigation": "filtered"}, **per_burn())
-    open_loop = fly_cases(**PUBLISHED, **per_burn())
+    filtered = fly_cases(**FEEDBACK | {"navigation": "filtered"}, **PER_BURN)
+    open_loop = fly_cases(**PUBLISHED, **PER_BURN)
     names = ("daily_mean_longitude_deviation_deg", "actual_drift_rate_deg_rev")
     assert (np.array(spread(filtered, *names)) < 0.2 * np.array(spread(open_loop, *names))).all()
     # it pays in eccentricity: burns that answer errors no longer add up to the plan's vector
@@ -54,7 +48,7 @@ def test_a_filter_makes_feedback_useful():
 
 
 def test_perfect_feedback_leaves_only_the_last_burns_error():
-    row = fly_cases(**FEEDBACK, **per_burn())
+    row = fly_cases(**FEEDBACK, **PER_BURN)
     last = 0.005 * 0.5163 * 0.35126
     assert row["drift_rate_deg_rev"].std() == pytest.approx(last, rel=0.15)
 

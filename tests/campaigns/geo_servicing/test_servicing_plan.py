@@ -7,31 +7,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from first_order import longitude_after, radius_deviation, relative_eccentricity
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from servicing_flights import KEPLER, NOMINAL, fly_one
+from servicing_flights import KEPLER, NOMINAL, SOURCE_BURNS, fly_one
 from servicing_twin import MU, R0, RATE, SIDEREAL_DAY, Twin, sidereal
 
 from campaigns.geo_servicing import drift_model as drift
 from campaigns.geo_servicing.bellman import best_corrections, planned_cost
 from campaigns.geo_servicing.inspection import correction
-from campaigns.geo_servicing.model import MODEL, nominal_start
-from campaigns.geo_servicing.planned_flight import Craft
+from campaigns.geo_servicing.model import MODEL
+from campaigns.geo_servicing.published.values import craft_of
 from mc_engine.errors import ModelError
 from mc_engine.flight.flight import settings_of
-from mc_engine.flight.kernel_parts import settings_class
 
 PERFECT = {"navigation": "perfect", "schedule": "designed"}
 DAY = 86_400.0
 PROJECT = str(Path(__file__).parents[3])
-PUBLISHED_BURNS = (7_726.3, 4_569.1, 1_290.3)
+DRIFT = 360.0 * (SIDEREAL_DAY - 85_796.0) / 85_796.0  # deg/rev at the start
+SHORTEST = np.array([0.5, 0.25, 0.25])  # rev
 
 
 def velocity_changes():
     """The source's burns [m/s]: 2500 kg, 1 N, 1600 s."""
     exhaust, mass, out = 1600.0 * 9.80665, 2500.0, []
-    for burn, sign in zip(PUBLISHED_BURNS, (1.0, 1.0, -1.0), strict=True):
+    for _, burn, sign in SOURCE_BURNS:
         out.append(sign * exhaust * np.log(mass / (mass - burn / exhaust)))
         mass -= burn / exhaust
     return np.array(out)
@@ -43,9 +40,9 @@ def test_the_drift_of_a_velocity_change_and_the_sources_burns_are_those_of_the_d
 
 
 def test_the_drift_model_ends_the_sources_corrections_where_the_digest_has_it():
-    y, v, coasts, before = -2.5, 360.0 * (SIDEREAL_DAY - 85_796.0) / 85_796.0, (123_753.6, 37_692.0, 24_264.7), 0.0
+    y, v, before = -2.5, DRIFT, 0.0
     u = np.degrees(drift.DRIFT_PER_DV) * velocity_changes()
-    for coast, burn, change in zip(coasts, PUBLISHED_BURNS, u, strict=True):
+    for (coast, burn, _), change in zip(SOURCE_BURNS, u, strict=True):
         y, v = y + v * (before + coast + 0.5 * burn) / SIDEREAL_DAY, v + change
         before = 0.5 * burn
     y += v * before / SIDEREAL_DAY
@@ -56,13 +53,6 @@ def test_the_perturbation_coefficients_are_those_of_the_digest():
     b_s, b_r = np.degrees(drift.perturbation_coefficients(4.417e-8, -8.26e-6))
     assert (b_s, b_r) == (pytest.approx(-6.7e-4, abs=0.05e-4), pytest.approx(0.0265, abs=1e-4))
     assert drift.after_correction(1.0, 2.0, 0.5, 2.0, b_s=0.25, b_r=0.1) == pytest.approx((7.2, 3.5))
-
-
-def craft_of(**inputs):
-    """The craft that plans are made for, with the tables behind its plan."""
-    codes = [one.code((NOMINAL | inputs)[one.name]) for one in MODEL.settings]
-    o = settings_class(MODEL)(*codes, np.empty(0))
-    return Craft(*nominal_start(o))
 
 
 def test_the_mean_pull_of_a_plan_is_that_of_the_geopotential_and_of_the_twins_sun_and_moon():
@@ -79,59 +69,36 @@ def test_the_mean_pull_of_a_plan_is_that_of_the_geopotential_and_of_the_twins_su
     assert bodies == pytest.approx(drift.perturbation_coefficients(0.0, np.mean(radial))[1], rel=1e-3)
 
 
-@settings(max_examples=30, deadline=None)
-@given(st.floats(0.0, 2e-3), st.floats(-3.0, 3.0), st.floats(0.0, 12.0), st.floats(-1e-2, 1e-2))
-def test_first_order_longitude_and_radius_are_those_of_the_ellipse(e, anomaly, flown, v):
-    period = SIDEREAL_DAY / (1.0 + v / (2.0 * np.pi))
-    a, t = np.cbrt(MU * (period / 2.0 / np.pi) ** 2), flown / RATE
-
-    def true(mean):
-        eccentric = mean
-        for _ in range(20):
-            eccentric = mean + e * np.sin(eccentric)
-        return eccentric, 2.0 * np.arctan(np.sqrt((1 + e) / (1 - e)) * np.tan(0.5 * (eccentric % (2 * np.pi))))
-
-    start = 2.0 * np.arctan(np.sqrt((1 - e) / (1 + e)) * np.tan(0.5 * anomaly))
-    mean = start - e * np.sin(start) + 2.0 * np.pi * t / period
-    eccentric, end = true(mean)
-    moved = np.angle(np.exp(1j * (end - anomaly - flown)))
-    expected = longitude_after(0.0, v, e, anomaly, flown)
-    second_order = 30.0 * (e + abs(v)) ** 2 + 4.0 * e * abs(v) * (flown + 1.0)
-    assert np.angle(np.exp(1j * (expected - moved))) == pytest.approx(0.0, abs=second_order + 1e-9)
-    height = a * (1.0 - e * np.cos(eccentric)) - R0
-    assert radius_deviation(v, e, anomaly, flown) == pytest.approx(height, abs=R0 * second_order + 1.0)
-
-
 def test_brake_only_gives_the_first_coast_of_the_digest():
     """Last correction 0.1 deg/rev, three corrections, least coasts: 1.469 rev; it ends at the place without drift."""
-    shortest = np.array([0.5, 0.25, 0.25])
-    v = 360.0 * (SIDEREAL_DAY - 85_796.0) / 85_796.0
-    u, t = drift.braking(-2.5, v, 0.1, shortest)
+    u, t = drift.braking(-2.5, DRIFT, 0.1, SHORTEST)
     assert t[0] == pytest.approx(1.469, abs=1e-3)
-    assert v + u.sum() == pytest.approx(0.0, abs=1e-12)
     assert u[-1] == pytest.approx(-0.1)
-    y = -2.5 + v * t[0] + (v + u[0]) * t[1] + (v + u[0] + u[1]) * t[2]
-    assert y == pytest.approx(0.0, abs=1e-12)
+    assert_at_the_place_without_drift(DRIFT, u, t)
 
 
-def test_two_impulses_and_the_fastest_profile_end_at_the_place_without_drift():
-    u1, u2 = drift.two_impulses(-2.5, 1.5, 0.5, 0.8)
-    assert 1.5 + u1 + u2 == pytest.approx(0.0, abs=1e-12)
-    assert -2.5 + 1.5 * 0.5 + (1.5 + u1) * 0.8 == pytest.approx(0.0, abs=1e-12)
-    u, t = drift.fastest(-2.5, 1.5, 0.1, np.array([0.5, 0.25, 0.25]))
-    drifts = 1.5 + np.concatenate([[0.0], np.cumsum(u)])
+def assert_at_the_place_without_drift(v, u, t):
+    """2.5 deg away with a drift v at first, corrections u after the coasts t."""
+    drifts = v + np.concatenate([[0.0], np.cumsum(u)])
     assert -2.5 + (drifts[:-1] * t).sum() == pytest.approx(0.0, abs=1e-12)
     assert drifts[-1] == pytest.approx(0.0, abs=1e-12)
-    assert t.sum() < drift.braking(-2.5, 1.5, 0.1, np.array([0.5, 0.25, 0.25]))[1].sum()
+
+
+@pytest.mark.parametrize("shortest", [np.array([0.5, 0.8]), SHORTEST])
+def test_the_fastest_profile_of_two_impulses_or_more_ends_at_the_place_without_drift(shortest):
+    u, t = drift.fastest(-2.5, 1.5, 0.1, shortest)
+    assert_at_the_place_without_drift(1.5, u, t)
+    assert (t >= shortest).all()
+    assert len(t) > 2 or (t == shortest).all()
+
+
+def test_the_fastest_profile_is_faster_than_the_braking_one():
+    t = drift.fastest(-2.5, 1.5, 0.1, SHORTEST)[1]
+    assert t.sum() < drift.braking(-2.5, 1.5, 0.1, SHORTEST)[1].sum()
+
+
+def test_the_largest_last_correction_is_the_digests():
     assert drift.largest_last(0.05, 0.0209, 4e-4, 0.005, 0.5) == pytest.approx(0.216)
-
-
-def test_the_relative_ellipse_is_the_triangle_of_both_eccentricity_vectors():
-    e, alpha = relative_eccentricity(3.25e-4, np.radians(54.99), 3.15e-4, np.radians(55.0))
-    assert e == pytest.approx(1.0e-5, rel=1e-3)
-    cosine_rule = 3.25e-4**2 + 3.15e-4**2 - 2 * 3.25e-4 * 3.15e-4 * np.cos(np.radians(0.01))
-    assert e**2 == pytest.approx(cosine_rule, rel=1e-6)
-    assert np.degrees(alpha) == pytest.approx(54.675, abs=0.01)
 
 
 def random_system(seed, n=4):

@@ -1,20 +1,21 @@
 """The laws flown by scipy in the plane, second by second, with nothing of the kernel but the designed gains."""
 
 import numpy as np
-from reentry_flights import MU, RADIUS
-from reentry_twin import standard_density
+from reentry_twin import G0, MU, RADIUS, standard_density
 from scipy.integrate import solve_ivp
 
 from campaigns.reentry.guidance.reference import (
+    ALONG,
+    LOST,
+    PATH,
     RANGE_SET,
-    Planner,
+    SPEED,
     fly_reference,
     linear_system,
     riccati_gains,
     steered_part,
 )
 
-G0 = 9.80665
 TRIGGER, LAST, SCALE_HEIGHT, FELT = 0.15 * G0, 400.0, 7000.0, 0.05 * G0
 
 
@@ -22,17 +23,18 @@ class Stored:
     """The reference over the speed, its steered part, as the laws know it."""
 
     def __init__(self, plan):
-        planner = Planner(plan)
-        self.whole = whole = fly_reference(planner)
-        part = steered_part(whole)
-        self.path = type(whole)(*(column[part] for column in whole))
-        lost = self.path.speed[0] - self.path.speed
-        self.gains = riccati_gains(lost, *linear_system(planner, self.path), RANGE_SET)
+        self.whole = fly_reference(plan)
+        path = steered_part(self.whole)
+        self.speed = path.state[SPEED]
+        gains = riccati_gains(self.speed[0] - self.speed, *linear_system(plan, path), RANGE_SET)
+        self.rows = {
+            "altitude": path.altitude, "drag": path.drag, "climb": path.climb, "path": path.state[PATH],
+            "along": path.state[ALONG], **dict(enumerate(gains.T)),
+        }  # fmt: skip
 
     def at(self, name, speed):
         """One quantity of the reference, or one of its three gains, at a speed."""
-        column = self.gains[:, name] if isinstance(name, int) else getattr(self.path, name)
-        return np.interp(-speed, -self.path.speed, column)
+        return np.interp(-speed, -self.speed, self.rows[name])
 
 
 class Account:
@@ -40,12 +42,13 @@ class Account:
 
     def __init__(self, stored):
         self.stored, whole = stored, stored.whole
-        felt = (whole.lost > 0.0) & (whole.speed > LAST - 5.0)
-        self.lost, self.rows = whole.lost[felt], {
-            "axial": whole.axial[felt], "speed": whole.speed[felt], "along": whole.along[felt],
-            "rate": np.gradient(whole.along, whole.t)[felt],
+        self.t, self.along = whole.t, whole.state[ALONG]
+        felt = (whole.state[LOST] > 0.0) & (whole.state[SPEED] > LAST - 5.0)
+        self.lost, self.rows = whole.state[LOST][felt], {
+            "axial": whole.axial[felt], "speed": whole.state[SPEED][felt], "along": self.along[felt],
+            "rate": np.gradient(self.along, self.t)[felt],
         }  # fmt: skip
-        self.begin = whole.t[felt][0]
+        self.begin = self.t[felt][0]
         self.w, self.range, self.rate, self.n, self.excess = 0.0, 0.0, 0.0, 0.0, 0.0
 
     def at(self, name):
@@ -54,7 +57,7 @@ class Account:
 
     def clocked(self, t):
         """Range of the reference at a time before the air is felt, going on at its last rate."""
-        early = np.interp(min(t, self.begin), self.stored.whole.t, self.stored.whole.along)
+        early = np.interp(min(t, self.begin), self.t, self.along)
         return early + max(0.0, t - self.begin) * self.rows["rate"][0]
 
     def sample(self, t, n):
@@ -73,7 +76,7 @@ class Account:
         high = np.clip(-SCALE_HEIGHT * (n / self.at("axial") - 1.0), -6e3, 6e3)
         climb = -SCALE_HEIGHT * (growth + 2.0 * (n - self.at("axial")) / v)
         tilt = np.clip(climb / v, -np.radians(2.0), np.radians(2.0))
-        known = min(v, self.stored.path.speed[0])
+        known = min(v, self.stored.speed[0])
         k = [self.stored.at(i, known) for i in range(3)]
         wanted = 0.5 - (k[0] * high + k[1] * tilt + k[2] * (self.range - self.at("along")))
         return np.clip(wanted, np.cos(np.radians(165.0)), 1.0) if v > LAST else 0.5
@@ -94,7 +97,7 @@ def share(law, stored, h, v, path, along, drag):
 def rates(t, y, u, drag_area, lift_area):
     """Rates of altitude, speed, path angle and range over a sphere at rest."""
     h, v, path, _ = y
-    r, push = RADIUS + h, 0.5 * standard_density(h) * y[1] ** 2
+    r, push = RADIUS + h, 0.5 * standard_density(h) * v**2
     g = MU / r**2
     return [
         v * np.sin(path),

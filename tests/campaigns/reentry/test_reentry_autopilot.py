@@ -11,41 +11,38 @@ from scipy.integrate import solve_ivp
 from campaigns.reentry.autopilot.gains import STEEPEST, STEPS, bank_design, pitch_design, planned_profile
 from campaigns.reentry.autopilot.lead_compensator import design_lead, margins_of, short_period
 from campaigns.reentry.autopilot.model import air_at, bank_command, pitch_gains
-from mc_engine.flight.flight import fly, fly_history, prepare, settings_of
-from mc_engine.model import load_model
+from campaigns.reentry.published.values import ogata_plant
+from mc_engine.flight.flight import fly_history, prepare, settings_of
+from tests.campaigns.model_flights import ModelFlights
 
-MODEL = load_model("campaigns.reentry.autopilot")
-NOMINAL = {item.name: item.default for item in (*MODEL.parameters, *MODEL.settings)}
+FLIGHTS = ModelFlights("campaigns.reentry.autopilot")
+MODEL, NOMINAL, fly_one = FLIGHTS.model, FLIGHTS.nominal, FLIGHTS.one
 CODES = {setting.symbol: setting.code(setting.default) for setting in MODEL.settings}
 
 
-def fly_cases(**inputs):
-    n_cases = max((np.size(value) for value in inputs.values()), default=1)
-    return fly(MODEL, NOMINAL | inputs, np.arange(n_cases), 1)
-
-
-def fly_one(**inputs):
-    return {name: column[0] for name, column in fly_cases(**inputs).items()}
+@pytest.fixture(scope="module")
+def o():
+    """The settings in flight, with the tables."""
+    return settings_of(MODEL, prepare(MODEL, NOMINAL, 1).settings[0])
 
 
 # ---- design
 
 
-def textbook_plant(w):
-    """Ogata's example: 4 / (s (s + 2))."""
-    return 4.0 / (1j * w * (1j * w + 2.0))
+@pytest.fixture(scope="module")
+def lead():
+    """For Ogata's example, 4 / (s (s + 2))."""
+    return design_lead(ogata_plant, 10.0, np.radians(50.0))
 
 
-def test_the_textbook_lead_has_the_margin_asked_for_at_a_higher_crossover():
-    lead = design_lead(textbook_plant, 10.0, np.radians(50.0))
+def test_the_textbook_lead_has_the_margin_asked_for_at_a_higher_crossover(lead):
     assert 49.0 < np.degrees(lead.margins.phase) < 52.0
     assert 8.5 < lead.margins.crossover < 9.3
     # Ogata's rounded one: zero 4.41, pole 18.4, gain 41.7
     assert (lead.zero, lead.pole, lead.gain) == pytest.approx((4.41, 18.4, 41.7), rel=0.03)
 
 
-def test_a_lead_keeps_the_gain_at_low_frequency_and_leads_most_at_its_middle():
-    lead = design_lead(textbook_plant, 10.0, np.radians(50.0))
+def test_a_lead_keeps_the_gain_at_low_frequency_and_leads_most_at_its_middle(lead):
     assert abs(lead.response(1e-6)) == pytest.approx(10.0, rel=1e-9)
     alpha = lead.zero / lead.pole
     middle = np.angle(lead.response(np.sqrt(lead.zero * lead.pole)))
@@ -91,11 +88,6 @@ def test_the_pitch_loop_halves_what_a_moment_does():
 # ---- tables
 
 
-@pytest.fixture(scope="module")
-def o():
-    return settings_of(MODEL, prepare(MODEL, NOMINAL, 1).settings[0])
-
-
 def test_the_tables_hold_the_designs_and_the_planned_entry(o):
     for k in (0, 11, STEPS - 1):
         pressure = STEEPEST * k / (STEPS - 1)
@@ -122,9 +114,8 @@ def test_the_command_reverses_every_period_at_its_rate():
 # ---- flight
 
 
-def twin(inputs, duration):
+def twin(inputs, duration, o):
     """State at the end by scipy, the compensators as second-order equations of the error."""
-    o = settings_of(MODEL, prepare(MODEL, NOMINAL, 1).settings[0])
     profile = planned_profile()
     seconds = np.arange(len(profile))
     i = NOMINAL | inputs
@@ -155,14 +146,14 @@ def twin(inputs, duration):
     return np.degrees(solve_ivp(rates, (0.0, duration), start, rtol=1e-8, atol=1e-11, max_step=0.5).y[:, -1])
 
 
-def test_a_flight_is_that_of_a_twin():
+def test_a_flight_is_that_of_a_twin(o):
     inputs = {
         "trim_offset_deg": 1.5, "side_offset_m": 0.003, "c_mq": 0.3, "c_m_alpha_factor": 1.2, "pressure_factor": 1.1,
         "inertia_pitch_factor": 0.95, "inertia_roll_factor": 1.05, "initial_alpha_deg": 4.0,
     }  # fmt: skip
     duration = 243.0  # in the middle of a reversal
     row = fly_one(**inputs, duration_s=duration)
-    expected = twin(inputs, duration)
+    expected = twin(inputs, duration, o)
     names = ("alpha_deg", "alpha_rate_deg_s", "bank_deg", "bank_rate_deg_s", "lead_alpha_deg", "lead_bank_deg")
     assert [row[f"end_{name}"] for name in names] == pytest.approx(expected, abs=2e-3)
 

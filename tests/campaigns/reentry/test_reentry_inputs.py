@@ -4,12 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reentry_flights import MODEL, MU, NOMINAL, RADIUS, fly_one
+from reentry_flights import MODEL, NOMINAL, fly_one
+from reentry_twin import MU, OMEGA, RADIUS
 
 from campaigns.reentry.vehicles import VEHICLES
 from mc_engine.flight.flight import prepare
-
-RATE = 7.292115e-5
 
 
 def prepared(**inputs):
@@ -29,7 +28,7 @@ def test_at_the_equator_an_inertial_speed_to_the_east_is_less_over_ground():
     """The ground moves at omega r; the digest's sample return: 340 to 470 m/s and 0.2 degrees at 12.9 km/s."""
     fast = {"entry_speed_m_s": 12_900.0, "entry_flight_path_angle_deg": -8.2, "entry_radius_km": 6503.14}
     row = fly_one(**fast, vehicle="sample_return")
-    level = 12_900.0 * np.cos(np.radians(8.2)) - RATE * 6503.14e3
+    level = 12_900.0 * np.cos(np.radians(8.2)) - OMEGA * 6503.14e3
     sinking = 12_900.0 * np.sin(np.radians(8.2))
     assert row["relative_speed_m_s"] == pytest.approx(np.hypot(level, sinking), rel=1e-12)
     assert row["relative_flight_path_angle_deg"] == pytest.approx(-np.degrees(np.arctan2(sinking, level)), rel=1e-12)
@@ -44,7 +43,7 @@ def test_relative_and_inertial_entries_differ_by_omega_cross_r(latitude, longitu
     inputs |= {"entry_flight_path_angle_deg": path}
     place, over_ground = place_and_velocity(**inputs, speed_frame="relative")
     _, inertial = place_and_velocity(**inputs, speed_frame="inertial")
-    assert over_ground - inertial == pytest.approx(np.cross([0.0, 0.0, RATE], place), abs=1e-9)
+    assert over_ground - inertial == pytest.approx(np.cross([0.0, 0.0, OMEGA], place), abs=1e-9)
 
 
 def test_the_altitude_of_entry_is_over_the_ellipsoid():
@@ -69,10 +68,11 @@ def test_errors_are_added_to_the_planned_entry_and_leave_its_frame_alone():
         assert wrong[name] == planned[name], name
 
 
+HYPERBOLA = {"arrival": "hyperbola", "vacuum_periapsis_km": 80.0, "rotating": False, "shape": "sphere"}
+
+
 def test_a_hyperbola_arrives_with_the_energy_of_its_excess_speed_and_the_momentum_of_its_periapsis():
-    place, velocity = place_and_velocity(
-        arrival="hyperbola", excess_speed_m_s=3000.0, vacuum_periapsis_km=80.0, rotating=False, shape="sphere"
-    )
+    place, velocity = place_and_velocity(**HYPERBOLA, excess_speed_m_s=3000.0)
     r, v2 = np.sqrt(place @ place), velocity @ velocity
     assert v2 / 2.0 - MU / r == pytest.approx(3000.0**2 / 2.0, rel=1e-9)
     periapsis = RADIUS + 80e3
@@ -84,14 +84,7 @@ def test_a_hyperbola_arrives_with_the_energy_of_its_excess_speed_and_the_momentu
 
 
 def test_without_air_a_hyperbola_comes_down_to_its_vacuum_periapsis():
-    row = fly_one(
-        arrival="hyperbola",
-        vacuum_periapsis_km=80.0,
-        rotating=False,
-        shape="sphere",
-        gravity="point",
-        density_factor=0.0,
-    )
+    row = fly_one(**HYPERBOLA, gravity="point", density_factor=0.0)
     assert row["min_altitude_km"] == pytest.approx(80.0, abs=1e-4)
 
 
@@ -123,6 +116,7 @@ def test_a_vehicle_flies_like_its_numbers_given(name):
     assert named["planned_lift_to_drag"] == v.lift_coefficient / v.drag_coefficient
 
 
+FLAT = {"shape": "flat", "gravity": "point", "rotating": False}
 MARS = {"planet": "mars", "atmosphere": "exponential", "gravity": "point"}
 REFUSED = [
     ({"planet": "mars", "gravity": "point", "shape": "sphere"}, 'the atmosphere "us76" is that of the Earth'),
@@ -130,18 +124,22 @@ REFUSED = [
     (MARS | {"weather": True}, "the random air of weather = true is that of the Earth"),
     (MARS | {"heating": "detra_kemp_riddell"}, 'the heating "detra_kemp_riddell" is that of the Earth\'s air'),
     ({"shape": "flat", "gravity": "point"}, "a flat Earth does not turn; set rotating = false"),
-    (
-        {"shape": "flat", "rotating": False},
-        'a flat Earth has the gravity "point", which is uniform, or "none"',
-    ),
+    ({"shape": "flat", "rotating": False}, 'a flat Earth has the gravity "point", which is uniform, or "none"'),
+    (FLAT | {"guidance": "law1"}, "the guidance laws want a round planet"),
     (
         {"vehicle": "apollo", "mass_kg": 5000.0},
         'mass_kg is that of the vehicle "apollo"; for another, set vehicle = "given"',
     ),
     ({"entry_altitude_km": 9.0}, "the entry is not above stop_altitude_km"),
+    ({"arrival": "hyperbola", "vacuum_periapsis_km": 130.0}, "the vacuum periapsis lies above the entry altitude"),
+    ({"guidance": "law1", "vehicle": "soyuz"}, "a guidance law needs a vehicle with lift"),
     (
-        {"arrival": "hyperbola", "vacuum_periapsis_km": 130.0},
-        "the vacuum periapsis lies above the entry altitude",
+        {"guidance": "law1", "entry_speed_m_s": 11_500.0, "entry_flight_path_angle_deg": -4.0},
+        "the planned entry does not come down to plan_stop_altitude_km, so that there is no reference path",
+    ),
+    (
+        {"guidance": "law1", "plan_stop_altitude_km": 100.0},
+        "the planned entry never has 0.15 g of drag, so that no law could steer",
     ),
 ]
 
@@ -162,13 +160,7 @@ def test_other_planets_fly_with_their_textbook_atmospheres(planet, speed):
 
 
 def test_a_flat_flight_has_its_range_ahead_and_its_crossrange_to_the_right():
-    flat = {
-        "shape": "flat",
-        "gravity": "point",
-        "rotating": False,
-        "speed_frame": "relative",
-        "entry_heading_deg": 33.0,
-    }
+    flat = FLAT | {"speed_frame": "relative", "entry_heading_deg": 33.0}
     row = fly_one(**flat, bank_deg=60.0, entry_heading_error_deg=1.0)
     assert row["downrange_km"] > 500.0
     assert row["crossrange_km"] > np.sin(np.radians(1.0)) * 500.0

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
-from reentry_flights import MU, PLANAR, RADIUS, assert_same_bits_alone, fly_cases, fly_one, history, plan_of
-from reentry_twin import standard_density
+from guidance_twin import low, rates
+from reentry_flights import assert_same_bits_alone, fly_cases, fly_one, history
+from reentry_twin import G0
 from scipy.integrate import solve_ivp
 
-from campaigns.reentry.guidance.reference import Planner, fly_reference
+from campaigns.reentry.guidance.plan import plan_of
+from campaigns.reentry.guidance.reference import ALONG, fly_reference
+from campaigns.reentry.published.values import PLANAR
 from campaigns.reentry.vehicles import apollo_shares
 
 # C. A. Graves, J. C. Harpold, NASA TN D-6725 (1972), table I: Mach number, drag and lift coefficient at trim.
@@ -37,34 +40,20 @@ def test_the_capsule_slows_down_by_its_table_as_in_another_integration():
     """From 40 km and Mach 10 down to 10 km and Mach 0.5, over a sphere at rest."""
     mach, of_drag, of_lift = np.array(PRINTED).T
 
-    def rates(t, y):
-        h, v, path, _ = y
-        r, m = RADIUS + h, v / sound(h)
-        push = 0.5 * standard_density(h) * v * v * 12.017 / 5498.22
-        drag, lift = push * np.interp(m, mach, of_drag), push * np.interp(m, mach, of_lift)
-        g = MU / r**2
-        climb = v * np.sin(path)
-        turn = (0.5 * lift - (g - v * v / r) * np.cos(path)) / v
-        return [climb, -drag - g * np.sin(path), turn, v * np.cos(path) * RADIUS / r]
+    def by_mach(t, y):
+        m, area = y[1] / sound(y[0]), 12.017 / 5498.22
+        return rates(t, y, 0.5, area * np.interp(m, mach, of_drag), area * np.interp(m, mach, of_lift))
 
-    def low(t, y):
-        return y[0] - 10e3
-
-    low.terminal = True
     start = [40e3, 3200.0, np.radians(-8.0), 0.0]
-    flown = solve_ivp(rates, (0.0, 1e3), start, "DOP853", rtol=1e-10, atol=1e-8, max_step=0.5, events=low)
-    row = fly_one(
-        **APOLLO, entry_altitude_km=40.0, entry_speed_m_s=3200.0, entry_flight_path_angle_deg=-8.0, tolerance=1e-11
-    )
+    flown = solve_ivp(by_mach, (0.0, 1e3), start, "DOP853", rtol=1e-10, atol=1e-8, max_step=0.5, events=low)
+    late = {"entry_altitude_km": 40.0, "entry_speed_m_s": 3200.0, "entry_flight_path_angle_deg": -8.0}
+    row = fly_one(**APOLLO, **late, tolerance=1e-11)
     _, v, _, along = flown.y[:, -1]
     # the corners of the table cost either integrator a few digits
     assert row["downrange_km"] == pytest.approx(along / 1e3, abs=0.002)
     assert row["final_speed_m_s"] == pytest.approx(v, abs=0.01)
     assert row["flight_time_s"] == pytest.approx(flown.t[-1], abs=0.01)
-    constant = fly_one(
-        **PLANAR, drag_coefficient=1.2891, lift_coefficient=0.38773, entry_altitude_km=40.0, entry_speed_m_s=3200.0,
-        entry_flight_path_angle_deg=-8.0,
-    )  # fmt: skip
+    constant = fly_one(**PLANAR, **late, drag_coefficient=1.2891, lift_coefficient=0.38773)
     assert abs(constant["final_speed_m_s"] - v) > 10.0
 
 
@@ -72,7 +61,7 @@ def test_the_loads_are_those_of_the_coefficients_at_their_mach_number():
     seen, row = history(rows=4001, **APOLLO, tolerance=1e-10), fly_one(**APOLLO, tolerance=1e-10)
     mach, of_drag, of_lift = np.array(PRINTED).T
     drag, lift = np.interp(seen["mach"], mach, of_drag), np.interp(seen["mach"], mach, of_lift)
-    pressure = seen["dynamic_pressure_pa"] * 12.017 / 5498.22 / 9.80665
+    pressure = seen["dynamic_pressure_pa"] * 12.017 / 5498.22 / G0
     assert seen["load_g"] == pytest.approx(pressure * np.hypot(drag, lift), rel=1e-6, abs=1e-9)
     along = drag * np.cos(np.radians(20.0)) + lift * np.sin(np.radians(20.0))
     assert seen["axial_load_g"] == pytest.approx(pressure * along, rel=1e-6, abs=1e-9)
@@ -88,11 +77,11 @@ def test_factors_multiply_the_coefficients_at_every_mach_number():
 
 
 def test_the_reference_of_a_vehicle_with_a_table_is_its_flight():
-    path, row = fly_reference(Planner(plan_of(**APOLLO))), fly_one(**APOLLO, tolerance=1e-10)
+    path, row = fly_reference(plan_of(**APOLLO)), fly_one(**APOLLO, tolerance=1e-10)
     ten_metres = 0.010
-    assert path.along[-1] / 1e3 == pytest.approx(row["downrange_km"], abs=ten_metres)
+    assert path.state[ALONG, -1] / 1e3 == pytest.approx(row["downrange_km"], abs=ten_metres)
     seen = history(rows=801, **APOLLO, tolerance=1e-10)
-    assert np.abs(np.interp(seen["t_s"], path.t, path.axial) / 9.80665 - seen["axial_load_g"]).max() < 0.01
+    assert np.abs(np.interp(seen["t_s"], path.t, path.axial) / G0 - seen["axial_load_g"]).max() < 0.01
 
 
 @pytest.mark.parametrize(("law", "miss_km"), [("law1", 0.5), ("law2r", 0.5), ("law3r", 0.5), ("apollo", 2.5)])

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from reentry_flights import MU, PLANAR, RADIUS, assert_same_bits_alone, fly_cases, fly_one, history
-from reentry_twin import standard_density
+from reentry_flights import assert_same_bits_alone, fly_cases, fly_one, history
+from reentry_twin import MU, RADIUS, standard_density, to_cartesian
 from scipy.integrate import solve_ivp
 
+from campaigns.reentry.published.values import PLANAR
 from campaigns.reentry.weather import (
     DEPTH,
     LARGE_SCALE,
@@ -25,20 +26,28 @@ N = 6000
 draws = st.floats(1e-9, 1.0 - 1e-9)
 
 
-@pytest.fixture(scope="module")
-def nodes():
-    """float64[N, NODES, 3] of full size, without a mean wind."""
-    unity = np.ones(N)
-    return weather_nodes(np.random.default_rng(76).uniform(size=N), unity, unity, 0.0 * unity)[:, :DEPTH].reshape(
-        N, NODES, 3
-    )
+def tables_of(draw, mean=1.0):
+    """Rows of `weather_nodes` for the draws, of full size, with this size of the mean wind."""
+    draw = np.atleast_1d(draw)
+    return weather_nodes(draw, *np.ones((2, draw.size)), np.full(draw.size, mean))
 
 
 @pytest.fixture(scope="module")
-def depths():
-    """float64[N] of the same cases."""
-    unity = np.ones(N)
-    return weather_nodes(np.random.default_rng(76).uniform(size=N), unity, unity, 0.0 * unity)[:, DEPTH]
+def tables():
+    """Of N cases, without a mean wind."""
+    return tables_of(np.random.default_rng(76).uniform(size=N), mean=0.0)
+
+
+@pytest.fixture(scope="module")
+def nodes(tables):
+    """float64[N, NODES, 3]."""
+    return tables[:, :DEPTH].reshape(N, NODES, 3)
+
+
+@pytest.fixture(scope="module")
+def depths(tables):
+    """float64[N]."""
+    return tables[:, DEPTH]
 
 
 def test_deviates_are_standard_normal_and_independent():
@@ -63,8 +72,7 @@ def test_each_altitude_has_the_size_of_its_profile(nodes, depths, field, column)
 
 def test_no_altitude_is_favoured_by_the_nodes(depths):
     """Extremes of the air lie at nodes; they are spread evenly over altitude from case to case."""
-    unity = np.ones(600)
-    table = weather_nodes(np.random.default_rng(5).uniform(size=600), unity, unity, unity)
+    table = tables_of(np.random.default_rng(5).uniform(size=600))
     above = np.arange(40e3, 48e3, 50.0)
     profiles = np.array([[weather_at(h, 0.0, row).density for h in above] for row in table])
     peak = profiles.argmax(axis=1)
@@ -84,8 +92,7 @@ def test_the_correlation_over_altitude_is_the_mean_of_the_two_scales(nodes):
 
 @given(draw=draws, h=st.floats(-1e3, 140e3))
 def test_values_meet_the_nodes_and_slopes_are_derivatives(draw, h):
-    unity = np.ones(1)
-    table = weather_nodes(np.array([draw]), unity, unity, unity)[0]
+    table = tables_of(draw)[0]
     altitudes = node_altitudes(table[DEPTH:])[0]
     k = int(np.clip(h / SPACING + table[DEPTH], 0, NODES - 2))
     at_node = weather_at(float(altitudes[k]), 0.0, table)
@@ -99,8 +106,7 @@ def test_values_meet_the_nodes_and_slopes_are_derivatives(draw, h):
 
 def test_the_air_has_one_slope_on_both_sides_of_a_node():
     """Differences over a metre below and above it agree; the slope is zero on both sides, as the air is level there."""
-    unity = np.ones(1)
-    table = weather_nodes(np.array([0.37]), unity, unity, unity)[0]
+    table = tables_of(0.37)[0]
     nodes, step, beside = table[:DEPTH].reshape(NODES, 3), 1.0, 1e-6  # m
     steepest = np.abs(np.diff(nodes, axis=0)).max(axis=0) / SPACING
     for altitude in node_altitudes(table[DEPTH:])[0][5:60]:
@@ -138,14 +144,9 @@ def test_a_flight_through_weather_is_that_of_a_twin():
         row = fly_one(
             **world, weather_draw=draw, entry_latitude_deg=latitude, entry_heading_deg=heading, stop_altitude_km=0.0
         )
-        table = weather_nodes(np.array([draw]), *np.ones((3, 1)))[0]
+        table = tables_of(draw)[0]
         phi, psi, path = np.radians([latitude, heading, -2.0])
-        up, north, east = (
-            np.array([np.cos(phi), 0.0, np.sin(phi)]), np.array([-np.sin(phi), 0.0, np.cos(phi)]),
-            np.array([0.0, 1.0, 0.0]),
-        )  # fmt: skip
-        v = 7800.0 * (np.cos(path) * (np.cos(psi) * north + np.sin(psi) * east) + np.sin(path) * up)
-        start = np.concatenate([(RADIUS + 120e3) * up, v])
+        start = np.concatenate(to_cartesian([RADIUS + 120e3, 0.0, phi, 7800.0, path, psi]))
         end = solve_ivp(
             twin_rates, (0.0, duration), start, "DOP853", rtol=1e-11, atol=1e-8, args=(table, drag, 0.3 * drag)
         ).y[:, -1]
@@ -156,7 +157,7 @@ def test_a_flight_through_weather_is_that_of_a_twin():
 
 def test_the_density_of_a_history_is_the_standard_one_times_the_profile():
     seen = history(rows=301, **PLANAR, weather=True, weather_draw=0.4)
-    table = weather_nodes(np.array([0.4]), *np.ones((3, 1)))[0]
+    table = tables_of(0.4)[0]
     for i in range(0, 301, 25):
         h = 1e3 * seen["altitude_km"][i]
         expected = standard_density(h) * np.exp(weather_at(h, 0.0, table).density)
@@ -164,11 +165,8 @@ def test_the_density_of_a_history_is_the_standard_one_times_the_profile():
 
 
 def test_a_skip_meets_the_same_air_on_its_way_down_and_up():
-    inputs = {
-        **PLANAR, "weather": True, "weather_draw": 0.9, "entry_speed_m_s": 11e3, "entry_flight_path_angle_deg": -6.5,
-        "bank_deg": 0.0,
-    }  # fmt: skip
-    mixed, standard = (history(rows=2001, **inputs | {"weather": on}) for on in (True, False))
+    fast = PLANAR | {"entry_speed_m_s": 11e3, "entry_flight_path_angle_deg": -6.5, "bank_deg": 0.0}
+    mixed, standard = (history(rows=2001, **fast, weather=on, weather_draw=0.9) for on in (True, False))
     turn = int(np.argmin(mixed["altitude_km"]))
     assert 0 < turn < 2000
     assert len(standard["t_s"]) == 2001
@@ -201,13 +199,11 @@ def test_a_tail_wind_carries_the_landing_along():
 def test_the_air_of_a_case_hangs_on_its_number_alone():
     """Not on its place in the chunk, its neighbours, or the law."""
     draw = np.random.default_rng(3).uniform(size=21)
-    together = fly_cases(**PLANAR, weather=True, weather_draw=draw, guidance="law1", plan="given")
-    law_1 = {"weather": True, "guidance": "law1", "plan": "given"}
-    assert_same_bits_alone(together, (0, 10, 20), each={"weather_draw": draw}, **PLANAR, **law_1)
-    mixed = fly_cases(
-        **PLANAR, weather=True, weather_draw=draw, plan="given",
-        guidance=np.array(["law1", "none", "law2r"] * 7, dtype=object),
-    )  # fmt: skip
+    law_1 = PLANAR | {"weather": True, "guidance": "law1", "plan": "given"}
+    together = fly_cases(**law_1, weather_draw=draw)
+    assert_same_bits_alone(together, (0, 10, 20), each={"weather_draw": draw}, **law_1)
+    laws = np.array(["law1", "none", "law2r"] * 7, dtype=object)
+    mixed = fly_cases(**law_1 | {"guidance": laws}, weather_draw=draw)
     assert mixed["downrange_km"][::3].tolist() == together["downrange_km"][::3].tolist()
 
 
@@ -223,11 +219,8 @@ def test_law_1_flies_through_weather_to_its_target():
 
 def test_violations_count_the_limits_that_were_passed():
     plain = fly_one(**PLANAR)
-    limits = {
-        "corridor_load_g": plain["peak_load_g"], "corridor_heat_rate_w_m2": plain["peak_heat_rate_w_m2"],
-        "corridor_heat_load_j_m2": plain["heat_load_j_m2"],
-        "corridor_dynamic_pressure_pa": plain["peak_dynamic_pressure_pa"],
-    }  # fmt: skip
+    peaks = ("peak_load_g", "peak_heat_rate_w_m2", "heat_load_j_m2", "peak_dynamic_pressure_pa")
+    limits = {f"corridor_{name.removeprefix('peak_')}": plain[name] for name in peaks}
     assert plain["corridor_violations"] == 0.0
     for k in range(5):
         scaled = {name: value * (0.999 if i < k else 1.001) for i, (name, value) in enumerate(limits.items())}

@@ -90,21 +90,18 @@ def test_every_mistake_is_reported_at_once_against_the_model_too():
     }
 
 
-@pytest.mark.parametrize(
-    ("model", "message"),
-    [
+def test_a_model_that_is_not_there_is_refused_with_the_rest_of_the_mistakes():
+    for model, message in [
         ("toi.py", 'there is no file "toi.py" beside the campaign file'),
         ("campaigns.deorbitt", 'there is no module "campaigns.deorbitt"'),
         ("mc_engine.status", '"mc_engine.status" has no MODEL'),
         ("../x y", "is neither a module"),
         ("", '"" is empty'),
-    ],
-)
-def test_a_model_that_is_not_there_is_refused_with_the_rest_of_the_mistakes(model, message):
-    head = f'[campaign]\nmodel = "{model}"\ndesign = "mc"\nseed = 1\ncases = true\n'
-    messages = problems("", head=head)
-    assert set(messages) == {"campaign.model", "campaign.cases"}
-    assert message in messages["campaign.model"]
+    ]:
+        head = f'[campaign]\nmodel = "{model}"\ndesign = "mc"\nseed = 1\ncases = true\n'
+        messages = problems("", head=head)
+        assert set(messages) == {"campaign.model", "campaign.cases"}
+        assert message in messages["campaign.model"]
 
 
 @pytest.mark.parametrize("design", ["mc", "lhs", "sobol"])

@@ -22,9 +22,9 @@ def test_a_file_or_a_folder_is_found_by_its_path(tmp_path):
     assert find_campaign(tmp_path) == find_campaign(file) == file
 
 
-@pytest.mark.parametrize(
-    ("reference", "message"),
-    [
+def test_a_campaign_that_is_not_there_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for reference, message in [
         ("deorbt", 'did you mean "deorbit"'),
         ("deorbit/mpa", 'did you mean "deorbit/map"'),
         ("nowhere/campaign.toml", "no such file"),
@@ -32,12 +32,9 @@ def test_a_file_or_a_folder_is_found_by_its_path(tmp_path):
         ("x" * 5000, "no campaign of that name"),
         ("a\0b", "no campaign of that name"),
         ("", "no campaign of that name"),
-    ],
-)
-def test_a_campaign_that_is_not_there_is_refused(tmp_path, monkeypatch, reference, message):
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(CampaignError, match=message):
-        find_campaign(reference)
+    ]:
+        with pytest.raises(CampaignError, match=message):
+            find_campaign(reference)
 
 
 def test_every_shipped_campaign_has_a_title_and_no_mistake_in_its_words():

@@ -30,9 +30,8 @@ def test_parquet_serves_as_well(tmp_path):
     assert empirical_numbers(tmp_path / "m.parquet", "a") == (1.0, 3.0)
 
 
-@pytest.mark.parametrize(
-    ("text", "column", "message"),
-    [
+def test_a_faulty_file_is_refused_with_row_and_column(tmp_path):
+    for text, column, message in [
         ("", None, "is empty"),
         ("a\n", None, "has no numbers below its first line"),
         ("a,b\n1,2\n", None, "has 2 columns; say which"),
@@ -43,11 +42,9 @@ def test_parquet_serves_as_well(tmp_path):
         ("a\n1\nx\n", None, 'row 2, column "a": "x" is not a finite number'),
         ("a\n1\nnan\n", None, 'row 2, column "a": "nan" is not a finite number'),
         ('a\n"1\n', None, "is not CSV text"),
-    ],
-)
-def test_a_faulty_file_is_refused_with_row_and_column(tmp_path, text, column, message):
-    with pytest.raises(FileFault, match=message):
-        empirical_numbers(write(tmp_path, "m.csv", text), column)
+    ]:
+        with pytest.raises(FileFault, match=message):
+            empirical_numbers(write(tmp_path, "m.csv", text), column)
 
 
 def test_files_that_are_not_what_they_say_are_refused(tmp_path):
@@ -74,18 +71,15 @@ def test_an_empirical_dispersion_repeats_measured_values_in_the_parameters_unit(
     assert campaign.dispersions[0].distribution == Empirical((9.0, 10.0, 11.0))
 
 
-@pytest.mark.parametrize(
-    ("body", "place", "message"),
-    [
+def test_an_empirical_dispersion_that_cannot_be_drawn_is_refused(folder):
+    for body, place, message in [
         (BODY.replace("m.csv", "n.csv"), "file", 'there is no file "n.csv" beside the campaign file'),
         (BODY + "lower = 20000", "lower", "the bounds leave none of the 3 numbers"),
         (BODY.replace("height_km", "angle_deg"), "", "reaches 9000 to 11000; the model accepts 0 to 90 deg"),
-    ],
-)
-def test_an_empirical_dispersion_that_cannot_be_drawn_is_refused(folder, body, place, message):
-    messages = problems(body, directory=folder)
-    assert list(messages.values()) == [message]
-    assert next(iter(messages)).endswith(place)
+    ]:
+        messages = problems(body, directory=folder)
+        assert list(messages.values()) == [message]
+        assert next(iter(messages)).endswith(place)
 
 
 def test_integers_and_text_in_parquet_are_read_or_refused(tmp_path):

@@ -46,9 +46,8 @@ def test_parquet_is_read_like_csv(folder):
         assert values.tolist() == case_table(theirs, np.arange(3))[name].tolist()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
+def test_a_fault_in_the_table_is_refused_with_row_and_column(folder):
+    for old, new, message in [
         ("speed_pct", "sped_pct", 'the column "sped_pct" is not a parameter of toy; did you mean "speed_pct"?'),
         ("1.5", "x", '"cases.csv", row 1, column "speed_pct": "x" is not a finite number'),
         ("-2", "inf", '"cases.csv", row 2, column "speed_pct": "inf" is not a finite number'),
@@ -58,11 +57,9 @@ def test_parquet_is_read_like_csv(folder):
         ("\n1,", "\n7,", '"cases.csv", row 2: case_id is 7; rows are numbered 0, 1, 2, ...'),
         ("\n1,-2,", "\n1,", '"cases.csv", line 3: 4 fields where 5 columns are named'),
         ("height_km", "speed_pct", '"cases.csv" has the column "speed_pct" twice'),
-    ],
-)
-def test_a_fault_in_the_table_is_refused_with_row_and_column(folder, old, new, message):
-    (folder / "cases.csv").write_text(CSV.replace(old, new))
-    assert problems("", "table", head=HEAD, directory=folder) == {"campaign.table": message}
+    ]:
+        (folder / "cases.csv").write_text(CSV.replace(old, new))
+        assert problems("", "table", head=HEAD, directory=folder) == {"campaign.table": message}
 
 
 def test_a_table_without_rows_or_without_parameters_is_refused(folder):
@@ -72,9 +69,8 @@ def test_a_table_without_rows_or_without_parameters_is_refused(folder):
     assert problems("", "table", head=HEAD, directory=folder)["campaign.table"].endswith("no column of a parameter")
 
 
-@pytest.mark.parametrize(
-    ("design", "head", "body", "place", "message"),
-    [
+def test_a_table_where_none_belongs_or_none_is_there_is_refused(folder):
+    for design, head, body, place, message in [
         ("table", HEAD.replace("table = ", "# "), "", "campaign.table", "is missing: CSV or Parquet beside this file"),
         ("mc", HEAD + "cases = 3\nseed = 1\n", "", "campaign.table", 'the design "mc" reads no table'),
         ("table", HEAD.replace("cases.csv", "../x.csv"), "", "campaign.table", '"../x.csv" lies outside the folder'),
@@ -83,12 +79,10 @@ def test_a_table_without_rows_or_without_parameters_is_refused(folder):
         ("table", HEAD, "[dispersion.mass_kg]", "dispersion.mass_kg", "the table has no such column"),
         ("table", HEAD, "[dispersion.height_km]\nhalf_range = 2", "dispersion.height_km.half_range", "the design"),
         ("table", HEAD, '[dispersion.height_km]\nunit = "kg"', "dispersion.height_km.unit", '"kg" is not a unit'),
-    ],
-)
-def test_a_table_where_none_belongs_or_none_is_there_is_refused(folder, design, head, body, place, message):
-    found = problems(body, design, head=head, directory=folder)
-    assert list(found) == [place]
-    assert found[place].startswith(message)
+    ]:
+        found = problems(body, design, head=head, directory=folder)
+        assert list(found) == [place]
+        assert found[place].startswith(message)
 
 
 def test_the_digest_follows_the_table(folder):

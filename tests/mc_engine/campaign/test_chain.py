@@ -174,9 +174,9 @@ def test_a_campaign_that_is_not_flown_yet_is_flown_first_beside_the_run(folder, 
     fails_with(2, call("extend", tmp_path / "both", "--cases", 80), "takes its inputs from another run")
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
+def test_what_does_not_fit_is_said_with_its_place(folder):
+    text = (folder / "second" / "campaign.toml").read_text()
+    for change, message in [
         (('from = "../runs/first"', 'from = "../runs/none"'), "is neither a run nor a campaign that can be flown"),
         (('height_km = "top_m"', 'heigth_km = "top_m"'), 'is not a parameter of throw; did you mean "height_km"?'),
         (('height_km = "top_m"', 'height_km = "to_m"'), '"to_m" is no column of numbers of that run'),
@@ -186,14 +186,11 @@ def test_a_campaign_that_is_not_flown_yet_is_flown_first_beside_the_run(folder, 
         (('design = "mc"', 'design = "table"'), 'write design = "mc" to disperse more'),
         (("[inputs]", "[parameters]\nheight_km = 1\n[inputs]"), "comes from the run of first; leave it out here"),
         (("seed = 2", "seed = 2\ncases = 41"), "41 is not allowed; the run upstream has 40 cases"),
-    ],
-)
-def test_what_does_not_fit_is_said_with_its_place(folder, change, message):
-    text = (folder / "second" / "campaign.toml").read_text()
-    assert change[0] in text
-    with pytest.raises(CampaignError) as caught:
-        load_campaign("second", text=text.replace(*change), directory=folder / "second")
-    assert message in str(caught.value)
+    ]:
+        assert change[0] in text
+        with pytest.raises(CampaignError) as caught:
+            load_campaign("second", text=text.replace(*change), directory=folder / "second")
+        assert message in str(caught.value)
 
 
 # ---- where [inputs] may lead

@@ -151,9 +151,8 @@ def test_an_ephemeris_has_a_covariance_an_epoch():
         second.covariance_in("TNW")
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "message"),
-    [
+def test_a_mistake_in_the_campaign_file_is_named(folder):
+    for before, after, message in [
         ('frame = "EME2000"', 'frame = "ITRF"', "axes ITRF cannot be had"),
         ('file = "state.opm"', 'file = "state.oem"', 'no file "state.oem"'),
         ('"dvz_m_s"]', "]", "at least 6 needed"),
@@ -161,17 +160,14 @@ def test_an_ephemeris_has_a_covariance_an_epoch():
         ('"dx_m"', '"dq_m"', "is not a parameter of drift"),
         ("frame", "fram", 'did you mean "frame"'),
         ("[covariance.launch]", "[covarianse.launch]", 'did you mean "covariance"'),
-    ],
-)
-def test_a_mistake_in_the_campaign_file_is_named(folder, before, after, message):
-    (folder / "campaign.toml").write_text(CAMPAIGN.replace(before, after))
-    with pytest.raises(CampaignError, match=message):
-        load_campaign(folder)
+    ]:
+        (folder / "campaign.toml").write_text(CAMPAIGN.replace(before, after))
+        with pytest.raises(CampaignError, match=message):
+            load_campaign(folder)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_a_message_that_cannot_be_used_is_refused_with_a_sentence(folder):
+    for text, message in [
         ("", "no orbit message"),
         ("<xml>", "no orbit message"),
         (opm().replace("CZ_Z = ", "C_Z = "), "CZ_Z is missing"),
@@ -181,12 +177,10 @@ def test_a_mistake_in_the_campaign_file_is_named(folder, before, after, message)
         (oem("1998-12-18T14:28:15", "1998-12-18T15:28:15"), "has 2 covariances"),
         (oem("yesterday"), '"yesterday" is not an epoch'),
         ("CCSDS_OEM_VERS = 3.0", "no covariance"),
-    ],
-)
-def test_a_message_that_cannot_be_used_is_refused_with_a_sentence(folder, text, message):
-    (folder / "state.opm").write_text(text)
-    with pytest.raises(CampaignError, match=message):
-        load_campaign(folder)
+    ]:
+        (folder / "state.opm").write_text(text)
+        with pytest.raises(CampaignError, match=message):
+            load_campaign(folder)
 
 
 def test_the_epoch_chooses_among_the_covariances_of_an_ephemeris(folder):

@@ -28,14 +28,15 @@ def problem(body, name="height_km", design="mc", **options):
 MIXTURE = "needs lower and upper, or half_range, not a mixture of them"
 IDLE = "belongs to half_range; lower and upper already say it all"
 BELOW = "-1 is not allowed; it must be at least 0"
+NEGATIVE = "-1 is not allowed; the model accepts 0 kg and above"
+OUTSIDE = "of the draws would be outside 0 kg and above; cut with lower and upper"
 NO_LEVELS = 'the design "mc" has no levels; they are for grid and one_at_a_time'
 NOT_FOR_SETTINGS = '"normal" does not fit a setting, which all cases of a batch share; use "discrete"'
 
 
 # The nominal height is 10 km, that of the drag area 1 m^2.
-@pytest.mark.parametrize(
-    ("body", "expected"),
-    [
+def test_a_dispersion_is_read_in_the_unit_of_its_parameter():
+    for body, expected in [
         ('dist = "normal"\nsigma = 2', Normal(10.0, 2.0)),
         ('dist = "normal"\nthree_sigma = 6\nmean = 3', Normal(3.0, 2.0)),
         ('dist = "normal"\nsigma = 2\nlower = 8', Truncated(Normal(10.0, 2.0), 8.0, np.inf)),
@@ -57,10 +58,8 @@ NOT_FOR_SETTINGS = '"normal" does not fit a setting, which all cases of a batch 
         ('dist = "discrete"\nvalues = [1, 2.5]', Discrete((1.0, 2.5), (1.0, 1.0))),
         ('dist = "discrete"\nvalues = [500, 700]\nweights = [1, 3]\nunit = "m"', Discrete((0.5, 0.7), (1.0, 3.0))),
         ('dist = "constant"\nvalue = 4', Constant(4.0)),
-    ],
-)
-def test_a_dispersion_is_read_in_the_unit_of_its_parameter(body, expected):
-    assert distribution(body) == expected
+    ]:
+        assert distribution(body) == expected
 
 
 def test_parameters_move_the_nominal_value_that_a_distribution_is_about():
@@ -68,59 +67,70 @@ def test_parameters_move_the_nominal_value_that_a_distribution_is_about():
     assert campaign.dispersions[0].distribution == Normal(30.0, 1.0)
 
 
-@pytest.mark.parametrize(
-    ("body", "key", "message"),
-    [
-        ('dist = "normal"', "", "needs sigma or three_sigma"),
-        ('dist = "normal"\nsigma = 1\nthree_sigma = 3', "", "needs sigma or three_sigma, not both"),
-        ('dist = "normal"\nsigma = 0', "sigma", "0 is not allowed; it must be above 0"),
-        ('dist = "normal"\nsigma = 1\nlower = 5\nupper = 4', "lower", "5 is not below upper = 4"),
-        ('dist = "normal"\nsigma = 1\nlower = 5\nupper = 5', "lower", "5 is not below upper = 5"),
-        ('dist = "normal"\nsigma = 1\nlower = 50', "lower", "the bounds leave nothing of the distribution"),
-        ('dist = "normal"\nsigma = 1\nupper = -50', "upper", "the bounds leave nothing of the distribution"),
-        (
-            'dist = "normal"\nsigma = 1\nunit = "kg"',
-            "unit",
-            '"kg" is not a unit of length; known are "m", "um", "mm", "cm", "km"',
-        ),
-        ('dist = "normal"\nsigma = 1\nunit = "Km"', "unit", '"Km" is not a unit of length; did you mean "km"?'),
-        ('dist = "uniform"\nlower = 2', "", MIXTURE),
-        ('dist = "uniform"\nhalf_range = 1\nupper = 2', "", MIXTURE),
-        ('dist = "uniform"\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
-        ('dist = "uniform"\nlower = 1\nupper = 2\nmean = 1', "mean", IDLE),
-        ('dist = "uniform"\nminimum = 1\nupper = 2', "minimum", 'is not a known key; did you mean "lower"?'),
-        ('dist = "triangular"\nlower = 1\nupper = 2', "mode", "10 is not between 1 and 2"),
-        ('dist = "lognormal"\nmedian = 3', "", "needs median with log_sigma, or mean with sigma"),
-        ('dist = "lognormal"\nmedian = 3\nsigma = 1', "", "needs median with log_sigma, or mean with sigma"),
-        ('dist = "beta"\nalpha = 1\nbeta = 1\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
-        ('dist = "discrete"\nvalues = [1, 2]\nweights = [1]', "weights", "1 weights for 2 values"),
-        ('dist = "discrete"\nvalues = [1, 2]\nweights = [0, 0]', "weights", "are all zero"),
-        ('dist = "discrete"\nvalues = [1, 2]\nweights = [1, -1]', "weights 2", BELOW),
-        ('dist = "discrete"\nvalues = [1, "x"]', "values 2", '"x" is not a number; height_km is Height [km]'),
-        ('dist = "discrete"\nvalues = []', "values", "0 given; at least 1 needed"),
-        ('dist = "constant"\nvalue = true', "value", "true is not a number; height_km is Height [km]"),
-        ('dist = "normal"\nsigma = 1\nlevels = 5', "levels", NO_LEVELS),
-    ],
-)
-def test_a_wrong_dispersion_is_refused_with_the_reason(body, key, message):
-    assert problem(body) == {key: message}
+# what stands in [dispersion.height_km], key, message
+MISTAKES = [
+    ('dist = "normal"', "", "needs sigma or three_sigma"),
+    ('dist = "normal"\nsigma = 1\nthree_sigma = 3', "", "needs sigma or three_sigma, not both"),
+    ('dist = "normal"\nsigma = 0', "sigma", "0 is not allowed; it must be above 0"),
+    ('dist = "normal"\nsigma = 1\nlower = 5\nupper = 4', "lower", "5 is not below upper = 4"),
+    ('dist = "normal"\nsigma = 1\nlower = 5\nupper = 5', "lower", "5 is not below upper = 5"),
+    ('dist = "normal"\nsigma = 1\nlower = 50', "lower", "the bounds leave nothing of the distribution"),
+    ('dist = "normal"\nsigma = 1\nupper = -50', "upper", "the bounds leave nothing of the distribution"),
+    ('dist = "normal"\nsigma = 1\nunit = "kg"', "unit",
+     '"kg" is not a unit of length; known are "m", "um", "mm", "cm", "km"'),
+    ('dist = "normal"\nsigma = 1\nunit = "Km"', "unit", '"Km" is not a unit of length; did you mean "km"?'),
+    ('dist = "uniform"\nlower = 2', "", MIXTURE),
+    ('dist = "uniform"\nhalf_range = 1\nupper = 2', "", MIXTURE),
+    ('dist = "uniform"\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
+    ('dist = "uniform"\nlower = 1\nupper = 2\nmean = 1', "mean", IDLE),
+    ('dist = "uniform"\nminimum = 1\nupper = 2', "minimum", 'is not a known key; did you mean "lower"?'),
+    ('dist = "triangular"\nlower = 1\nupper = 2', "mode", "10 is not between 1 and 2"),
+    ('dist = "lognormal"\nmedian = 3', "", "needs median with log_sigma, or mean with sigma"),
+    ('dist = "lognormal"\nmedian = 3\nsigma = 1', "", "needs median with log_sigma, or mean with sigma"),
+    ('dist = "beta"\nalpha = 1\nbeta = 1\nlower = 2\nupper = 1', "lower", "2 is not below upper = 1"),
+    ('dist = "discrete"\nvalues = [1, 2]\nweights = [1]', "weights", "1 weights for 2 values"),
+    ('dist = "discrete"\nvalues = [1, 2]\nweights = [0, 0]', "weights", "are all zero"),
+    ('dist = "discrete"\nvalues = [1, 2]\nweights = [1, -1]', "weights 2", BELOW),
+    ('dist = "discrete"\nvalues = [1, "x"]', "values 2", '"x" is not a number; height_km is Height [km]'),
+    ('dist = "discrete"\nvalues = []', "values", "0 given; at least 1 needed"),
+    ('dist = "constant"\nvalue = true', "value", "true is not a number; height_km is Height [km]"),
+    ('dist = "normal"\nsigma = 1\nlevels = 5', "levels", NO_LEVELS),
+]  # fmt: skip
+# of other inputs: name, what stands there, key, message
+MISTAKES_OF_OTHERS = [
+    ("mass_kg", 'dist = "uniform"\nlower = -1\nupper = 5', "", "reaches -1 to 5; the model accepts 0 kg and above"),
+    ("mass_kg", 'dist = "constant"\nvalue = -1', "value", NEGATIVE),
+    ("mass_kg", 'dist = "discrete"\nvalues = [1, -1]', "values 2", NEGATIVE),
+    ("mass_kg", 'dist = "normal"\nsigma = 50', "", f"0.023 {OUTSIDE}"),
+    ("mass_kg", 'dist = "normal"\nsigma = 50\nlower = -10', "", f"0.009 {OUTSIDE}"),
+    ("mass_kg", 'dist = "exponential"\nscale = 5\norigin = -5', "", f"0.63 {OUTSIDE}"),
+    ("control", 'dist = "discrete"\nvalues = ["off", "cliped"]', "values 2",
+     '"cliped" is not known; did you mean "clipped"?'),
+    ("control", 'dist = "discrete"\nvalues = [true]', "values 1", 'true is not one of "continuous", "clipped", "off"'),
+    ("drag", 'dist = "discrete"\nvalues = [true, 1]', "values 2", "1.0 is neither true nor false"),
+    ("step_s", 'dist = "discrete"\nvalues = [0.5, 20]', "values 2",
+     "20 is not allowed; the model accepts 0.01 to 10 s"),
+    ("control", 'dist = "normal"\nsigma = 1', "dist", NOT_FOR_SETTINGS),
+]  # fmt: skip
+# the same of an axis of a grid
+MISTAKES_OF_AXES = [
+    ("half_range = 3", "", "needs values = [...] or levels = n for the grid"),
+    ("levels = 3", "", "needs lower and upper, or half_range, or three_sigma, and only one of these"),
+    ("levels = 3\nlower = 1", "", "needs lower and upper, or half_range, or three_sigma, and only one of these"),
+    ("levels = 3\nlower = 2\nupper = 1", "lower", "2 is not below upper = 1"),
+    ("levels = 1\nhalf_range = 1", "levels", "1 is not allowed; it must be at least 2"),
+    ("levels = 3\nvalues = [1]", "levels", "there are values already; give one of the two"),
+    ("values = [true]", "values 1", "true is not a number; height_km is Height [km]"),
+]
 
 
-@pytest.mark.parametrize(
-    ("body", "message"),
-    [
-        ('dist = "uniform"\nlower = -1\nupper = 5', "reaches -1 to 5; the model accepts 0 kg and above"),
-        ('dist = "constant"\nvalue = -1', "-1 is not allowed; the model accepts 0 kg and above"),
-        ('dist = "discrete"\nvalues = [1, -1]', "-1 is not allowed; the model accepts 0 kg and above"),
-        ('dist = "normal"\nsigma = 50', "0.023 of the draws would be outside 0 kg and above; cut with"),
-        ('dist = "normal"\nsigma = 50\nlower = -10', "0.009 of the draws would be outside 0 kg and above; cut with"),
-        ('dist = "exponential"\nscale = 5\norigin = -5', "0.63 of the draws would be outside 0 kg and above; cut with"),
-    ],
-)
-def test_a_dispersion_that_draws_negative_masses_is_refused(body, message):
-    found = list(problem(body, "mass_kg").values())
-    assert len(found) == 1
-    assert found[0].startswith(message)
+def test_a_wrong_dispersion_is_refused_with_the_reason():
+    for body, key, message in MISTAKES:
+        assert problem(body) == {key: message}
+    for name, body, key, message in MISTAKES_OF_OTHERS:
+        assert problem(body, name) == {key: message}
+    for body, key, message in MISTAKES_OF_AXES:
+        assert problem(body, design="grid") == {key: message}
 
 
 def test_a_tail_of_one_in_a_thousand_million_is_cut_at_the_range_of_the_parameter():
@@ -128,27 +138,12 @@ def test_a_tail_of_one_in_a_thousand_million_is_cut_at_the_range_of_the_paramete
     assert distribution('dist = "normal"\nsigma = 15', "mass_kg") == Truncated(Normal(100.0, 15.0), 0.0, np.inf)
 
 
-@pytest.mark.parametrize(
-    ("name", "body", "message"),
-    [
-        ("control", 'dist = "discrete"\nvalues = ["off", "cliped"]', '"cliped" is not known; did you mean "clipped"?'),
-        ("control", 'dist = "discrete"\nvalues = [true]', 'true is not one of "continuous", "clipped", "off"'),
-        ("drag", 'dist = "discrete"\nvalues = [true, 1]', "1.0 is neither true nor false"),
-        ("step_s", 'dist = "discrete"\nvalues = [0.5, 20]', "20 is not allowed; the model accepts 0.01 to 10 s"),
-        ("control", 'dist = "normal"\nsigma = 1', NOT_FOR_SETTINGS),
-    ],
-)
-def test_a_setting_takes_only_what_it_knows(name, body, message):
-    assert list(problem(body, name).values()) == [message]
-
-
 def levels(body, design="grid", name="height_km"):
     return load(f"[dispersion.{name}]\n{body}", design).dispersions[0].levels
 
 
-@pytest.mark.parametrize(
-    ("body", "expected"),
-    [
+def test_a_grid_takes_values_or_equal_steps_between_bounds():
+    for body, expected in [
         ("values = [1, 2, 4]", (1.0, 2.0, 4.0)),
         ("lower = 1\nupper = 2\nlevels = 3", (1.0, 1.5, 2.0)),
         ("half_range = 2\nlevels = 5", (8.0, 9.0, 10.0, 11.0, 12.0)),
@@ -160,23 +155,5 @@ def levels(body, design="grid", name="height_km"):
         ('dist = "uniform"\nhalf_range = 1\nlevels = 2', (9.0, 11.0)),
         ('dist = "discrete"\nvalues = [3, 4]', (3.0, 4.0)),
         ('dist = "constant"\nvalue = 3', (3.0,)),
-    ],
-)
-def test_a_grid_takes_values_or_equal_steps_between_bounds(body, expected):
-    assert levels(body) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(
-    ("body", "key", "message"),
-    [
-        ("half_range = 3", "", "needs values = [...] or levels = n for the grid"),
-        ("levels = 3", "", "needs lower and upper, or half_range, or three_sigma, and only one of these"),
-        ("levels = 3\nlower = 1", "", "needs lower and upper, or half_range, or three_sigma, and only one of these"),
-        ("levels = 3\nlower = 2\nupper = 1", "lower", "2 is not below upper = 1"),
-        ("levels = 1\nhalf_range = 1", "levels", "1 is not allowed; it must be at least 2"),
-        ("levels = 3\nvalues = [1]", "levels", "there are values already; give one of the two"),
-        ("values = [true]", "values 1", "true is not a number; height_km is Height [km]"),
-    ],
-)
-def test_a_wrong_axis_of_a_grid_is_refused(body, key, message):
-    assert problem(body, design="grid") == {key: message}
+    ]:
+        assert levels(body) == pytest.approx(expected)

@@ -178,18 +178,15 @@ def test_more_failed_cases_than_allowed_exit_with_3(here, calls):
     assert call("run", "cart", "--out", "b", "--max-failed", 4).exit_code == 0
 
 
-@pytest.mark.parametrize(
-    ("error", "status"),
-    [
+def test_what_goes_wrong_in_flight_sets_the_exit_status(here, calls):
+    for error, status in [
         (RunInterrupted("stopped; `mc-engine resume a` completes it"), 4),
         (KeyboardInterrupt(), 4),
         (StoreError("a/cases: No space left on device"), 5),
         (ModelError("the model has no clock"), 2),
-    ],
-)
-def test_what_goes_wrong_in_flight_sets_the_exit_status(here, calls, error, status):
-    calls.fail = error
-    fails_with(status, call("run", "cart", "--out", "a"), str(error))
+    ]:
+        calls.fail = error
+        fails_with(status, call("run", "cart", "--out", "a"), str(error))
 
 
 def test_a_fault_of_the_engine_itself_is_told_apart_from_all_else(here, calls):

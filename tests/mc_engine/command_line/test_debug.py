@@ -9,11 +9,9 @@ from mistaken_campaign import line_of, write_campaign
 from small_run import ENVIRONMENT
 
 import mc_engine
-from mc_engine.campaign.search import SHIPPED
 from tests.mc_engine.flight.falling_ball import python_campaign
 
 PAGE = Path(mc_engine.__file__).parent / "documentation" / "how_to" / "looking_inside.md"
-MODEL = (SHIPPED / "minimal" / "model.py").read_text()
 BELOW = "    g = -MU_EARTH"
 
 

@@ -192,9 +192,12 @@ WHOLE = [
 ]
 
 
-@pytest.mark.parametrize("name", ["minimal", "rocket", *WHOLE])
+ROCKETS = {"rocket": [SHORT], "adaptive rocket": [SHORT, ADAPTIVE, ADAPTED]}
+
+
+@pytest.mark.parametrize("name", ["minimal", *ROCKETS, *WHOLE])
 def test_an_interpreted_flight_has_the_bits_of_the_kernel(name, tmp_path):
-    campaign = rocket(tmp_path, SHORT) if name == "rocket" else load_campaign(name)
+    campaign = rocket(tmp_path, *ROCKETS[name]) if name in ROCKETS else load_campaign(name)
     inputs = full_inputs(campaign, {key: value[0] for key, value in case_table(campaign, np.array([3])).items()})
     flown = fly(campaign.model, inputs, np.array([3]), campaign.seed, folder=campaign.directory, width=1)
     flight = InterpretedFlight(campaign.model, 120.0)

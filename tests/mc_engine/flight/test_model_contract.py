@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from mistaken_campaign import campaign_with, given, in_front, line_of, with_evaluate
@@ -13,8 +14,10 @@ from mc_engine.campaign.search import list_campaigns
 from mc_engine.errors import CampaignError
 from mc_engine.flight import contract_flight
 from mc_engine.flight.contract import breaches
-from mc_engine.flight.contract_flight import faults
+from mc_engine.flight.contract_flight import _nominal_reach, faults
 from mc_engine.flight.flight import fly
+from mc_engine.flight.interpreted import InterpretedFlight
+from mc_engine.flight.kernel_parts import watching_events
 
 
 def only(sentences):
@@ -106,14 +109,19 @@ def test_a_switching_event_that_never_fires_is_missed_unless_it_is_declared_rare
     assert 'the event "moon" crosses zero in none of 32 cases, its function stays below it' in missed
 
 
-def test_a_right_model_is_checked_with_the_kernel_of_its_run_alone(tmp_path, monkeypatch):
+def switching_half_way(folder, place="s.x"):
+    """A right campaign with an event that happens: where `place` falls through zero."""
     edits = [
-        in_front("@physics\ndef half_way(s):\n    return s.x"),
+        in_front(f"@physics\ndef half_way(s):\n    return {place}"),
         in_front("@physics\ndef switch(s, m):\n    return s, m"),
         given("switch=switch"),
     ]
     stop = '"apogee": Event(climb, "falling", "stop")'
-    campaign = campaign_with(tmp_path, *edits, (stop, f'{stop}, "half_way": Event(half_way, "falling", "switch")'))
+    return campaign_with(folder, *edits, (stop, f'{stop}, "half_way": Event(half_way, "falling", "switch")'))
+
+
+def test_a_right_model_is_checked_with_the_kernel_of_its_run_alone(tmp_path, monkeypatch):
+    campaign = switching_half_way(tmp_path)
     flown = []
 
     def noted(model, *arguments, **options):
@@ -124,6 +132,27 @@ def test_a_right_model_is_checked_with_the_kernel_of_its_run_alone(tmp_path, mon
     assert faults(campaign) == []
     assert flown
     assert not any(model.watching for model in flown)
+
+
+def test_python_flies_the_nominal_case_of_a_model_and_its_inputs_once(tmp_path, monkeypatch):
+    campaign = switching_half_way(tmp_path / "first")
+    monkeypatch.setenv("MC_ENGINE_CACHE", str(tmp_path / "cache"))
+    by_python, kernel = [], InterpretedFlight.kernel
+
+    def noted(flight, *arguments):
+        by_python.append(flight)
+        kernel(flight, *arguments)
+
+    monkeypatch.setattr(InterpretedFlight, "kernel", noted)
+    reached = [_nominal_reach(campaign, watching_events(campaign.model)) for _ in range(2)]
+    assert len(by_python) == 1
+    assert reached[0] == reached[1]
+    assert reached[0]["least_half_way"] < 0.0 < reached[0]["most_half_way"]
+    higher = replace(campaign, nominal={**campaign.nominal, "altitude_km": 500.0})
+    assert _nominal_reach(higher, watching_events(higher.model)) != reached[0]
+    beyond = switching_half_way(tmp_path / "beyond", "s.x - 1.0")
+    assert _nominal_reach(beyond, watching_events(beyond.model))["most_half_way"] == reached[0]["most_half_way"] - 1.0
+    assert len(by_python) == 3
 
 
 PREPARE = "def prepare(inputs, settings, refusals):\n    {}\n    return vars(inputs)\n\n\n@physics\ndef initial"

@@ -31,9 +31,8 @@ USE = (
 )
 
 
-@pytest.mark.parametrize(
-    ("line", "sentence"),
-    [
+def test_a_mistake_in_the_preparation_of_cases_is_a_sentence_with_its_fix(tmp_path):
+    for line, sentence in [
         ('r = inputs["altitude"]', USE),
         ('inputs["altitude"] = 1.0', USE),
         ("more = {**inputs}", USE),
@@ -53,17 +52,15 @@ USE = (
         ('more["altitude"] = None', '`prepare` gives "altitude" as NoneType; it must be a number for each of 3 cases'),
         ('more["altitude"] = ["low"] * 3', '`prepare` gives "altitude" as an array of str96; it must be'),
         ('more["altitude"] = [[1.0], [1.0, 2.0]]', '`prepare` gives "altitude" as list; it must be a number for'),
-    ],
-)
-def test_a_mistake_in_the_preparation_of_cases_is_a_sentence_with_its_fix(tmp_path, line, sentence):
-    try:
-        (found,) = breaches(campaign(tmp_path, line))
-    except EngineError as error:  # with one case alone, when the file is loaded
-        found = str(error).splitlines()[-1].strip().removeprefix("campaign.model: ")
-    assert sentence in found
-    assert "\n" not in found
-    place = "def prepare" if line.startswith("more[") else line
-    assert found.startswith(f"model.py, line {line_of(tmp_path, place)}: `prepare`")
+    ]:
+        try:
+            (found,) = breaches(campaign(tmp_path, line))
+        except EngineError as error:  # with one case alone, when the file is loaded
+            found = str(error).splitlines()[-1].strip().removeprefix("campaign.model: ")
+        assert sentence in found
+        assert "\n" not in found
+        place = "def prepare" if line.startswith("more[") else line
+        assert found.startswith(f"model.py, line {line_of(tmp_path, place)}: `prepare`")
 
 
 def test_one_number_counts_for_all_cases_and_an_array_has_one_for_each(tmp_path):

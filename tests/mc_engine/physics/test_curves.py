@@ -199,9 +199,8 @@ def test_the_rows_of_a_surface_come_in_any_order(folder):
     assert f(1.5, np.radians(7.5)) == pytest.approx(2.25, rel=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_what_is_wrong_with_a_file_is_said(folder):
+    for text, message in [
         ("", "empty"),
         ("x,y\n1\n", "line 2: 1 numbers for 2 columns"),
         ("x,y\n1,2\n2,b\n", 'line 3: "2,b"'),
@@ -209,12 +208,10 @@ def test_the_rows_of_a_surface_come_in_any_order(folder):
         ("x,y\n1,2\n", "two or more points"),
         ("x,y\n1,2\n1,3\n", "must rise, but 1 follows 1"),
         ("x,y\n1,2\n2,nan\n", "infinite or missing"),
-    ],
-)
-def test_what_is_wrong_with_a_file_is_said(folder, text, message):
-    (folder / "points.csv").write_text(text)
-    with pytest.raises(ModelError, match=message):
-        curve("points.csv", x="x", y="y")
+    ]:
+        (folder / "points.csv").write_text(text)
+        with pytest.raises(ModelError, match=message):
+            curve("points.csv", x="x", y="y")
 
 
 def test_what_is_wrong_with_a_call_is_said(folder):
@@ -243,9 +240,8 @@ def test_numbers_of_arrays_are_in_the_unit_that_is_said():
         surface(x=[0, 1], y=[0, 90], z=[[0, 1], [2, 3]], units={"alpha": "deg"})
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "sentence"),
-    [
+def test_what_is_no_row_of_numbers_is_refused_with_one_sentence():
+    for x, y, sentence in [
         ([0.0], [1.0], "1 argument, 1 value; give two or more points"),
         ([-1e308, 1e308], [0.0, 1.0], "the arguments are too large"),
         (1.0, 2.0, "x must be numbers, one row of them"),
@@ -253,25 +249,20 @@ def test_numbers_of_arrays_are_in_the_unit_that_is_said():
         (np.array(["2020-01-01", "2020-01-02"], dtype="datetime64[s]"), [0.0, 1.0], "x must be numbers"),
         ([[0.0, 1.0]], [0.0, 1.0], "x must be numbers, one row of them"),
         ([0.0, 1.0], [0.0, 1j], "y must be numbers, one row of them"),
-    ],
-)
-def test_what_is_no_row_of_numbers_is_refused_with_one_sentence(x, y, sentence):
-    with pytest.raises(ModelError, match=sentence):
-        curve(x=x, y=y)
+    ]:
+        with pytest.raises(ModelError, match=sentence):
+            curve(x=x, y=y)
 
 
-@pytest.mark.parametrize(
-    ("name", "content", "sentence"),
-    [
+def test_a_file_that_is_no_table_is_refused_with_one_sentence(folder):
+    for name, content, sentence in [
         ("twice.csv", b"x,y,y\n0,1,5\n1,2,5\n", 'twice.csv has two columns "y"'),
         ("latin.csv", b"x,y\n0,\xb51\n1,2\n", "latin.csv is no text in UTF-8"),
         ("text.parquet", b"x,y\n0,1\n", "text.parquet is no Parquet file"),
-    ],
-)
-def test_a_file_that_is_no_table_is_refused_with_one_sentence(folder, name, content, sentence):
-    (folder / name).write_bytes(content)
-    with pytest.raises(ModelError, match=sentence):
-        curve(name)
+    ]:
+        (folder / name).write_bytes(content)
+        with pytest.raises(ModelError, match=sentence):
+            curve(name)
 
 
 @pytest.mark.parametrize(

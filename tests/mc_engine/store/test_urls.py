@@ -39,19 +39,16 @@ SECRET = ("s3://key:hidden@bucket/x", "s3://key:hid/den@bucket/x", "s3://hidden@
           "s3://bucket/x?token=hidden", "https://host/x#hidden", "s3:/key:hidden@bucket/x")  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("text", "url"),
-    [
+def test_a_complete_url_is_taken_as_it_is():
+    for text, url in [
         ("s3://bucket", "s3://bucket"),
         ("S3://bucket/runs/x/", "s3://bucket/runs/x"),
         ("memory://runs", "memory://runs"),
         ("file:///runs/x", "file:///runs/x"),
         ("abfs://container@account/x", "abfs://container@account/x"),
         ("sftp://me@host:22/x", "sftp://me@host:22/x"),
-    ],
-)
-def test_a_complete_url_is_taken_as_it_is(text, url):
-    assert (store_url(text), store_url(url), is_url(text)) == (url, url, True)
+    ]:
+        assert (store_url(text), store_url(url), is_url(text)) == (url, url, True)
 
 
 @pytest.mark.parametrize("path", ["runs/x", "./s3", "/tmp/x", "C:/runs", "C:\\runs", "a:b", ".", "x.toml"])

@@ -80,6 +80,13 @@ def test_a_trace_names_functions_inside_functions_and_fields_of_records(tmp_path
     for old, new in (
         ("@physics\ndef rhs", "@physics\ndef half(x):\n    part = 0.5 * x\n    return part\n\n\n@physics\ndef rhs"),
         ("    g = -MU", "    pull = State(half(s.x), 0.0, half(half(s.y)), 0.0)\n    g = -MU"),
+        (
+            "Inputs = inputs(",
+            "Aim = namedtuple('Aim', 'x y')\n"
+            "Memory = namedtuple('Memory', 'aim', defaults=[Aim(3.0, 4.0)])\n\n\nInputs = inputs(",
+        ),
+        ("from mc_engine.lanes", "from collections import namedtuple\n\nfrom mc_engine.lanes"),
+        (" observe=observe,", " observe=observe, memory=Memory,"),
     ):
         assert old in text
         text = text.replace(old, new)
@@ -90,6 +97,7 @@ def test_a_trace_names_functions_inside_functions_and_fields_of_records(tmp_path
     assert (trace["rhs.half[2].part"] == 0.5 * trace["y_m"]).all()
     assert (trace["rhs.half[3].part"] == 0.25 * trace["y_m"]).all()
     assert (trace["rhs.pull.vx"] == trace["rhs.half[3].part"]).all()
+    assert (trace[["m.aim.x", "m.aim.y"]] == [3.0, 4.0]).all(axis=None)
 
 
 def test_a_trace_that_is_not_the_case_of_the_run_or_has_no_physics_is_refused(run, tmp_path):

@@ -66,39 +66,33 @@ def test_a_column_is_of_the_case_with_these_inputs_and_a_statistic_of_the_first_
     assert 0.0 < no_error - values["apogee"] < 10.0
 
 
-@pytest.mark.parametrize(
-    ("record", "sentence"),
-    [
+def test_what_is_not_the_campaigns_is_an_error_that_names_the_record(folder):
+    for record, sentence in [
         (ONE_CASE.replace("apogee_altitude_km", "perigee_km"), "'apogee': perigee_km is no metric of model.py"),
         (ONE_CASE.replace('unit = "km"', 'unit = "m"'), '\'apogee\': apogee_altitude_km is in "km", the record in "m"'),
         (ONE_CASE.replace("pitch_error_deg", "pitch_deg"), "'apogee': pitch_deg: no input of the model"),
         (MANY_CASES.replace(', "magnitude_error_pct"', ""), "minimal disperses magnitude_error_pct, pitch_error_deg"),
         (MANY_CASES.replace("cases = 50", "at = { altitude_km = 1.0 }"), "minimal has altitude_km = "),
         (FUNCTION.format("os:getcwd"), r'compute = "os:getcwd" is no function of a module below the package model\.py'),
-    ],
-)
-def test_what_is_not_the_campaigns_is_an_error_that_names_the_record(folder, record, sentence):
-    with pytest.raises(ModelError, match=rf"minimal, .*{sentence}"):
-        computed_values(file_with(folder, record))
+    ]:
+        with pytest.raises(ModelError, match=rf"minimal, .*{sentence}"):
+            computed_values(file_with(folder, record))
 
 
-@pytest.mark.parametrize(
-    ("reference", "sentence"),
-    [
+def test_a_function_is_of_a_module_below_the_campaigns_package_and_defined_there(tmp_path):
+    folder = tmp_path / "deorbit"
+    folder.mkdir()
+    shutil.copy(SHIPPED / "deorbit" / "campaign.toml", folder)
+    for reference, sentence in [
         ("campaigns.reentry.published.values:density_kg_m3", "is no function of a module below"),
         ("campaigns.deorbit:MODEL", "is no function of a module below"),
         ("campaigns.deorbit_2:f", "is no function of a module below"),
         ("campaigns.deorbit.published:np", "defines no function np"),
         ("campaigns.deorbit.published:chosen_case", "defines no function chosen_case"),
         ("campaigns.deorbit.published:absent", "defines no function absent"),
-    ],
-)
-def test_a_function_is_of_a_module_below_the_campaigns_package_and_defined_there(tmp_path, reference, sentence):
-    folder = tmp_path / "deorbit"
-    folder.mkdir()
-    shutil.copy(SHIPPED / "deorbit" / "campaign.toml", folder)
-    with pytest.raises(ModelError, match=sentence):
-        computed_values(file_with(folder, FUNCTION.format(reference)))
+    ]:
+        with pytest.raises(ModelError, match=sentence):
+            computed_values(file_with(folder, FUNCTION.format(reference)))
     good = FUNCTION.format("campaigns.deorbit.published:modulator")
     assert computed_values(file_with(folder, good)) == {"gain": "3, 1, 57.62 s, 3.97 N, 2.34 N"}
 

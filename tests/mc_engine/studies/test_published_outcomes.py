@@ -77,9 +77,8 @@ def test_half_a_unit_is_of_the_last_digit_that_is_written(number, half):
     assert half_a_unit(number) == pytest.approx(half, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("changes", "expected"),
-    [
+def test_the_outcome_follows_from_both_numbers_and_the_print():
+    for changes, expected in [
         ({}, REACHED),
         ({"ours": 3.86}, NOT_REACHED),
         ({"ours": 3.86, "tolerance": 0.1}, REACHED),
@@ -100,10 +99,8 @@ def test_half_a_unit_is_of_the_last_digit_that_is_written(number, half):
         ({"published": "lost", "status": "lost"}, UNKNOWN),
         ({"published": "curve lost", "status": "curve lost"}, UNKNOWN),
         ({"status": "not printed"}, UNKNOWN),
-    ],
-)
-def test_the_outcome_follows_from_both_numbers_and_the_print(changes, expected):
-    assert outcome(RECORD | changes) == expected
+    ]:
+        assert outcome(RECORD | changes) == expected
 
 
 @pytest.mark.parametrize(("other", "expected"), [(4.0, REACHED), (3.0, NOT_REACHED)])
@@ -152,19 +149,16 @@ def test_the_table_of_a_campaign_has_every_record_with_its_outcome_and_what_is_i
     ]
 
 
-@pytest.mark.parametrize(
-    ("edit", "wrong"),
-    [
+def test_a_record_with_an_unknown_key_or_without_a_way_to_compute_ours_is_named(file):
+    for edit, wrong in [
         (('at_most = 80.0', 'atmost = 80.0'), r"record 2 \('time'\): atmost"),
         (('column = "time_s"', 'ours = 79.5'), r"record 2 \('time'\): ours"),
         (('column = "time_s"\n', ''), r"record 2 \('time'\): has none of column, statistic, compute"),
         (('column = "time_s"', 'column = "time_s"\ncompute = "a:b"'), "has column and compute of"),
-    ],
-)  # fmt: skip
-def test_a_record_with_an_unknown_key_or_without_a_way_to_compute_ours_is_named(file, edit, wrong):
-    file.write_text(TEXT.replace(*edit))
-    with pytest.raises(ModelError, match=wrong):
-        read_published(file)
+    ]:  # fmt: skip
+        file.write_text(TEXT.replace(*edit))
+        with pytest.raises(ModelError, match=wrong):
+            read_published(file)
 
 
 @pytest.mark.parametrize(

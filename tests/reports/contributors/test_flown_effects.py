@@ -4,11 +4,19 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
+from synthetic_run import synthetic_run
+
 import mc_engine
+from mc_engine import open_store
+from mc_engine.statistics.pick_freeze import layout_of, pick_freeze
 from reports.contents import build
+from reports.contributors.companion import companion_blocks
 from reports.document.blocks import Table, blocks_of
 from reports.formats.json_data import render_json
 from reports.formats.markdown import render_markdown
+from reports.run.contributions import Contributions, Contributor
+from reports.run.flown import Flown
 
 MODEL = Path(__file__).parents[2] / "mc_engine" / "contributions" / "model.py"
 HEAD = '[campaign]\nmodel = "model.py"\ncases = 60\ndesign = "mc"\nseed = 3\n[sensitivity]\ncases = 256\n'
@@ -32,3 +40,51 @@ def test_the_data_hold_the_effects_on_metrics_without_a_requirement_too(tmp_path
     (table,) = [one for one in blocks_of(document, Table) if one.caption.startswith("Contributors to each metric")]
     assert {row[0].text for row in table.rows} == {"line"}
     assert "The effects on 4 other metrics are in report.json." in render_markdown(document).decode()
+
+
+def test_effects_and_their_intervals_are_possible_ones(tmp_path):
+    """From 32 blocks some estimates are below 0 or above 1 by chance."""
+    shutil.copy(MODEL, tmp_path)
+    (tmp_path / "campaign.toml").write_text(HEAD.replace("256", "32") + INPUTS + LINE)
+    run = mc_engine.run(mc_engine.load_campaign(tmp_path / "campaign.toml"), tmp_path / "run", workers=1)
+    rows = json.loads(render_json(build(run, "run")))["contributors"]
+    for row in rows:
+        for name in ("first", "total"):
+            low, high = row[f"{name}_interval"]
+            assert 0.0 <= low <= row[name] <= high <= 1.0
+    store = open_store(tmp_path / "run" / "sensitivity")
+    cases = store.cases()
+    names = [column.name for column in store.columns if column.role == "metric"]
+    values = {name: cases[name].to_numpy() for name in names}
+    estimates = pick_freeze(layout_of(store.manifest["sensitivity"]), cases["case_id"].to_numpy(), values)
+    below = [(estimates.metrics[k], estimates.groups[g]) for g, k in np.argwhere(estimates.first < -0.01)]
+    assert below
+    for row in rows:
+        if (row["metric"], row["input"]) in below:
+            assert row["first"] == 0.0 < row["first_interval"][1]
+
+
+def test_the_note_bounds_the_columns_that_are_bounded_and_no_others():
+    """A variance may grow where an input that interacts is held at its nominal value."""
+    row = Contributor("propellant_kg", "ve_pct", 0.4, 0.9, (0.3, 0.5), (0.8, 1.0), -0.25, (-0.4, -0.1))
+    flown = Flown(synthetic_run(300), "run")
+    rows = {metric: () for metric in flown.key_metrics} | {"propellant_kg": (row,)}
+    found = Contributions(rows, 768, dict.fromkeys(rows, 128), 128, {})
+    table = next(block for block in companion_blocks(flown, found) if isinstance(block, Table))
+    values = {column.title: cell.value for column, cell in zip(table.columns, table.rows[0], strict=True)}
+    assert values["Variance reduction at nominal"] == -0.25
+    assert "First-order and total effects and their intervals are within 0 to 1." in table.note
+    assert "Effects and intervals are" not in table.note
+
+
+def test_an_input_that_names_a_draw_is_said_so_in_the_manifest_and_has_no_share_without_flights(tmp_path):
+    shutil.copy(MODEL, tmp_path)
+    ticket = '[dispersion.ticket]\ndist = "uniform"\nlower = 0.0\nupper = 1.0\n'
+    text = HEAD.replace("[sensitivity]\ncases = 256\n", "").replace("line", "raffle")
+    (tmp_path / "campaign.toml").write_text(text + INPUTS + ticket + LINE.replace("line", "raffle"))
+    run = mc_engine.run(mc_engine.load_campaign(tmp_path / "campaign.toml"), tmp_path / "run", workers=1)
+    assert [one["name"] for one in run.manifest["inputs"] if one.get("random_draw")] == ["ticket"]
+    rows = json.loads(render_json(build(run, "run")))["contributors"]
+    raffle = {row["input"]: row["total"] for row in rows if row["metric"] == "raffle"}
+    assert "ticket" not in raffle
+    assert raffle["unexplained"] > 0.9

@@ -7,9 +7,11 @@ import pytest
 from synthetic_run import synthetic_run
 
 from reports.contents import build
+from reports.contributors.sensitivity import sensitivity_blocks
 from reports.document.blocks import FigureBlock, Table, Text
 from reports.drawing import paper, screen
 from reports.formats.json_data import render_json
+from reports.run.flown import Flown
 
 
 def section(run):
@@ -53,6 +55,40 @@ def test_what_no_input_explains_is_a_row_of_its_own():
     assert row[3].value == left["total"]
     panel = next(one for one in block(found, FigureBlock).drawing.plots if one.title == "settling time")
     assert "unexplained by the inputs" in [text for _, text in panel.y.ticks]
+
+
+def test_an_input_that_only_names_a_draw_has_no_effect_of_its_own_in_page_and_data():
+    """The settling time is noise by half, which the draw names: nothing in the order of its values tells so."""
+    run = synthetic_run(2000, failed=0)
+    rng = np.random.Generator(np.random.Philox(key=8))
+    run.table["day"] = rng.uniform(size=2000)
+    run.table["settling_time_s"] += rng.normal(0.0, np.sqrt(8.111), 2000)
+    run.manifest["columns"].append({"name": "day", "unit": "", "role": "dispersion", "description": "weather"})
+    run.manifest["inputs"].append({"name": "day", "unit": "", "description": "weather", "random_draw": True})
+    document = build(run, "run")
+    records = [one for one in json.loads(render_json(document))["contributors"] if one["metric"] == "settling_time_s"]
+    shares = {one["input"]: one["total"] for one in records}
+    assert shares.keys() == {"ve_pct", "oe_pct", "unexplained"}
+    assert shares["unexplained"] == pytest.approx(0.5, abs=0.05)
+    found = next(one for one in document.sections if one.anchor == "drivers")
+    table = block(found, Table, "Contributors to each metric")
+    assert "day" not in {row[1].text for row in table.rows}
+    assert "[sensitivity]" in table.note
+
+
+def test_without_a_dispersed_input_a_sentence_says_why_there_are_no_contributors():
+    for inputs in ([], [{"name": "ve_pct", "random_draw": True}, {"name": "oe_pct", "random_draw": True}]):
+        run = synthetic_run(200, failed=0)
+        run.manifest["inputs"] = inputs
+        for column in run.manifest["columns"]:
+            column["role"] = "case" if column["role"] == "dispersion" and not inputs else column["role"]
+        sentence, *others = sensitivity_blocks(Flown(run, "run"))
+        assert "Contributors to each metric" not in str(others)
+        assert "random draws alone" in sentence
+        assert "[sensitivity]" in sentence
+        metrics = [column["name"] for column in run.manifest["columns"] if column["role"] == "metric"]
+        run.table = run.table.assign(**dict.fromkeys(metrics, 1.0))
+        assert sentence not in sensitivity_blocks(Flown(run, "run"))
 
 
 def test_the_table_says_how_many_cases_each_index_rests_on(drawn):

@@ -9,6 +9,7 @@ import pytest
 from figure_marks import FORMS
 from synthetic_run import synthetic_run
 
+from mc_engine.model.figures import ScatterFigure, to_record
 from reports.contents import build
 from reports.document.blocks import FigureBlock, blocks_of
 from reports.drawing import paper, screen
@@ -17,6 +18,7 @@ from reports.drawing.palette import INK
 from reports.drawing.strokes import Frame, stroked
 from reports.figures.distributions import bin_edges
 from reports.figures.histories import thinned
+from reports.text.numbers import same_lengths
 
 PLOT = Plot((), Axis("x"), Axis("y"), "", 240.0)
 
@@ -31,6 +33,26 @@ def test_what_is_no_mark_is_named():
         screen.traced(PLOT, PLOT)
     with pytest.raises(TypeError, match="Plot is no mark that is drawn as SVG"):
         stroked(PLOT, Frame(0.0, 0.0, 1.0, 1.0, (0.0, 1.0), (0.0, 1.0)))
+
+
+@pytest.mark.parametrize(("stretch", "to_scale"), [(1.0, True), (3.5, True), (9.0, False)])
+def test_two_lengths_in_one_unit_are_to_scale_unless_the_cloud_is_much_longer_than_wide(stretch, to_scale):
+    run = synthetic_run(500, failed=0)
+    draws = np.random.Generator(np.random.Philox(key=4)).uniform(-1.0, 1.0, (2, 500))
+    run.table["east_km"], run.table["north_km"] = stretch * draws[0], draws[1]
+    for name in ("east_km", "north_km"):
+        run.manifest["columns"].append({"name": name, "unit": "km", "role": "metric", "description": ""})
+    run.manifest["figures"] = [to_record(ScatterFigure("east_km", "north_km", "Impact"))]
+    (plot,) = next(
+        one for one in blocks_of(build(run, "run"), FigureBlock) if one.caption.startswith("Impact")
+    ).drawing.plots
+    assert (plot.equal, plot.title) == ((True, "") if to_scale else (False, "Each axis has a scale of its own"))
+    assert ("scaleanchor" in screen.specifications(Drawing("", (plot,)))[0]["layout"]["yaxis"]) == to_scale
+
+
+@pytest.mark.parametrize(("units", "lengths"), [(("km", "km"), True), (("km", "m"), False), (("deg", "deg"), False)])
+def test_only_two_columns_in_one_unit_of_length_are_lengths(units, lengths):
+    assert same_lengths(*units) == lengths
 
 
 def test_every_case_falls_into_a_bin():

@@ -185,8 +185,9 @@ def test_a_scale_of_its_own_across_is_for_clouds_far_longer_than_wide(semi_axes,
 
 def test_a_view_with_two_scales_says_so():
     points = np.array([[0.0, 0.0], [3.0, 4.0]])
-    views = [footprint_plot(view, points, ["a", "b"], np.arange(2), (2, 2)) for view in footprint_views(0.3)]
+    cloud = Points(*points.T, "", texts=["a", "b"], cases=np.arange(2))
+    views = [footprint_plot(view, cloud, (2, 2)) for view in footprint_views(0.3)]
     assert [(plot.equal, plot.title) for plot in views[:2]] == [
         (True, ""),
-        (False, "Along and across, each with a scale of its own"),
+        (False, "Each axis has a scale of its own"),
     ]

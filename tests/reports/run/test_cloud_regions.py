@@ -19,7 +19,7 @@ def inside(region, x, y):
     """Counted with another's point-in-polygon test."""
     from matplotlib.path import Path
 
-    return int(Path(region.curves[0]).contains_points(np.column_stack([x, y])).sum())
+    return int(Path(np.column_stack([region.x, region.y])).contains_points(np.column_stack([x, y])).sum())
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e-9])
@@ -27,7 +27,7 @@ def test_the_words_say_how_many_cases_the_drawn_curves_hold(scale):
     x, y = cloud()
     y = 5.0 + scale * y
     regions = cloud_regions(Flown(synthetic_run(50), "run"), NAMES, x, y)
-    assert [one.kind for one in regions] == ["ellipse", "ellipse", "region"]
+    assert [one.name for one in regions] == ["ellipse", "ellipse", "region"]
     for region, content in zip(regions, (0.5, 0.9973, 0.9973), strict=True):
         held = inside(region, x, y)
         said = int(region.text.replace("\u202f", "").split("holds ")[1].split(" of 4000")[0])

@@ -35,7 +35,7 @@ def test_the_headline_says_what_changed_and_the_table_by_how_much():
     found = compared(shift=8.0, seed=2)
     document = build_comparison(found)
     assert document.subtitle.endswith("chance of any false alarm).")
-    assert [(card.label, card.tone) for card in document.verdicts][:2] == [("Requirements", ""), ("Shift", "bad")]
+    assert [(card.label, card.tone) for card in document.verdicts][:2] == [("Requirements", ""), ("Shift", "")]
     (row,) = [row for row in tables(document)["Metrics of both runs"].rows if row[0].text.startswith("peak force")]
     assert row[4].tone == "bad"
     change = next(one for one in found.metrics if one.metric == "peak_force_n")
@@ -91,6 +91,24 @@ def test_a_shift_far_beyond_the_others_is_said_and_the_axis_shows_the_others():
     assert "beyond the axis, not drawn: entry speed" in figure.caption
     rows = tables(document)["Metrics of both runs"].rows
     assert [row[0].text.split(" [")[0].split("\u202f")[0] for row in rows] == ["entry speed", "settling time"]
+
+
+def test_many_changes_are_drawn_in_panels_that_find_room_on_a_page_that_is_begun():
+    runs = []
+    for seed in (1, 2):
+        made = synthetic_run(300, seed=seed)
+        draws = np.random.Generator(np.random.Philox(key=seed)).normal(size=(30, 300))
+        for k, values in enumerate(draws):
+            made.table[f"error_{k}_m"] = values
+            made.manifest["columns"].append({"name": f"error_{k}_m", "unit": "m", "role": "metric", "description": ""})
+        runs.append(SimpleNamespace(manifest=made.manifest, campaign_text="", cases=made.cases))
+    document = build_comparison(compare_runs(*runs, ("before", "after")))
+    (drawing,) = [one.drawing for one in blocks_of(document, FigureBlock) if one.drawing.form.startswith("Changes")]
+    rows = [text for plot in drawing.plots[::2] for _, text in plot.y.ticks]
+    assert len(rows) == len(set(rows)) > 30
+    assert max(len(plot.y.ticks) for plot in drawing.plots) <= 18
+    for kind in (drawing.plots[::2], drawing.plots[1::2]):
+        assert len({plot.x.reach for plot in kind}) == 1
 
 
 def test_both_runs_are_laid_over_one_another_with_the_counts_of_the_table():

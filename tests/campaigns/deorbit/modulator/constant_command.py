@@ -1,8 +1,9 @@
-"""The pulse modulator alone, under a constant command: when it turns on, off, and on again."""
+"""The campaign's pulse modulator alone, under a constant command: when it turns on, off, and on again."""
 
 from collections import namedtuple
 
-from mc_engine.lanes import physics, where
+from campaigns.deorbit import dynamics
+from mc_engine.lanes import physics, replace, where
 from mc_engine.model import Event, FixedStep, Parameter, inputs, metrics, model, outputs, states
 from mc_engine.physics.pulse_modulators import lag_rate
 
@@ -10,12 +11,12 @@ Inputs = inputs(
     command_n=Parameter(20.0, "commanded force"),
     gain=Parameter(1.0, "gain on command and output", unit=""),
     level_n=Parameter(30.0, "force of the thruster"),
-    on_n=Parameter(10.0, "lag output that switches the thruster on"),
-    off_n=Parameter(5.0, "lag output that switches it off again"),
+    modulator_on_n=Parameter(10.0, "lag output that switches the thruster on"),
+    modulator_off_n=Parameter(5.0, "lag output that switches it off again"),
     time_constant_s=Parameter(5.0, "time constant of the lag"),
 )
 State = states(filtered_n="output of the lag")
-Memory = namedtuple("Memory", "firing switches first_on first_off second_on", defaults=(0.0,) * 5)
+Memory = namedtuple("Memory", "on pulses turns first_on first_off second_on", defaults=(0.0,) * 6)
 Outputs = outputs(filtered_n="output of the lag")
 Metrics = metrics(
     first_on_s="start of the first pulse", pulse_s="length of the first pulse", pause_s="pause after the first pulse"
@@ -31,38 +32,20 @@ def initial():
 @physics
 def rhs(s, m, p):
     """The lag's rate in the standard form, with one gain."""
-    return State(filtered=lag_rate(s.filtered, p.command, m.firing * p.level, p.gain, p.gain, p.time_constant))
-
-
-@physics
-def above_on(s, m, p):
-    """How far the lag's output is above the upper level of the Schmitt trigger, while it is off."""
-    return where(m.firing > 0.5, -1.0, s.filtered - p.on)
-
-
-@physics
-def above_off(s, m, p):
-    """How far it is above the lower level, while the trigger is on."""
-    return where(m.firing > 0.5, s.filtered - p.off, 1.0)
-
-
-@physics
-def noted(t, turned, number, before):
-    """The time of one turn of the trigger: now, if this is the one."""
-    return where(turned == number, t, before)
+    return State(filtered=lag_rate(s.filtered, p.command, m.on * p.level, p.gain, p.gain, p.time_constant))
 
 
 @physics
 def switch(t, s, m, hit):
     """Turn the trigger over and note the time of each of its first three turns."""
-    firing = where(hit.pulse_on > 0.5, 1.0, where(hit.pulse_off > 0.5, 0.0, m.firing))
-    turned = m.switches + hit.pulse_on + hit.pulse_off
-    return s, Memory(
-        firing=firing,
-        switches=turned,
-        first_on=noted(t, turned, 1.0, m.first_on),
-        first_off=noted(t, turned, 2.0, m.first_off),
-        second_on=noted(t, turned, 3.0, m.second_on),
+    s, m = dynamics.switch(s, m, hit)
+    turns = m.turns + hit.pulse_on + hit.pulse_off
+    return s, replace(
+        m,
+        turns=turns,
+        first_on=where(turns == 1.0, t, m.first_on),
+        first_off=where(turns == 2.0, t, m.first_off),
+        second_on=where(turns == 3.0, t, m.second_on),
     )
 
 
@@ -91,8 +74,8 @@ MODEL = model(
     memory=Memory,
     rhs=rhs,
     events={
-        "pulse_on": Event(above_on, "rising", "switch"),
-        "pulse_off": Event(above_off, "falling", "switch"),
+        "pulse_on": Event(dynamics.pulse_on, "rising", "switch"),
+        "pulse_off": Event(dynamics.pulse_off, "falling", "switch"),
     },
     switch=switch,
     observe=observe,
