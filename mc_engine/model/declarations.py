@@ -104,8 +104,15 @@ def time_of_minimum(output: str, description: str = "", *, smooth: bool = True, 
     return _extreme("min", "time", output, description, smooth, options)
 
 
+def _column(description: str, options: dict[str, Any]) -> Field:
+    """The metric's column, whose name `metrics` gives."""
+    if "name" in options:
+        raise ModelError("a metric has the name under which `metrics` declares it; leave `name` out")
+    return Field(description, **options)
+
+
 def _extreme(kind: str, source: str, output: str, description: str, smooth: bool, options: dict[str, Any]) -> Metric:
-    return Metric(source, Field(description, **options), Extremum("", output, kind, smooth=smooth))
+    return Metric(source, _column(description, options), Extremum("", output, kind, smooth=smooth))
 
 
 def last_above(output: str, level: float, description: str = "", **options: Any) -> Metric:
@@ -120,7 +127,7 @@ def last_above(output: str, level: float, description: str = "", **options: Any)
     >>> last_above("error_deg", 0.01, "settling time").extremum.level
     0.01
     """
-    return Metric("time", Field(description, **options), Extremum("", output, "last_above", level))
+    return Metric("time", _column(description, options), Extremum("", output, "last_above", level))
 
 
 def at_end(output: str, description: str = "", **options: Any) -> Metric:
@@ -134,7 +141,7 @@ def at_end(output: str, description: str = "", **options: Any) -> Metric:
     >>> at_end("altitude_km", "altitude of the apogee").output
     'altitude_km'
     """
-    return Metric("end", Field(description, **options), output=output)
+    return Metric("end", _column(description, options), output=output)
 
 
 def value_at(event: str, output: str, description: str = "", **options: Any) -> Metric:
@@ -155,7 +162,7 @@ def value_at(event: str, output: str, description: str = "", **options: Any) -> 
     >>> value_at("apogee", "altitude_km", "altitude of the apogee").event
     'apogee'
     """
-    return Metric("event", Field(description, **options), output=output, event=event)
+    return Metric("event", _column(description, options), output=output, event=event)
 
 
 def time_of(event: str, description: str = "", **options: Any) -> Metric:
@@ -172,7 +179,7 @@ def time_of(event: str, description: str = "", **options: Any) -> Metric:
     >>> time_of("apogee", "time of the apogee").output
     ''
     """
-    return Metric("event", Field(description, **options), event=event)
+    return Metric("event", _column(description, options), event=event)
 
 
 def inputs(**declared: Parameter | Setting) -> Any:

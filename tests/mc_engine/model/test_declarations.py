@@ -76,6 +76,8 @@ MISTAKES = {
                             '`observe` in line 38 takes "hit"; a function takes'),
     "metric of nobody": (('top_speed_m_s=maximum_of("speed_m_s", ', "range_km=("),
                          'nobody computes the metric "range_km"; write'),
+    "name of a metric": (('"largest speed")', '"largest speed", name="top")'),
+                         "a metric has the name under which `metrics` declares it; leave `name` out"),
     "output": (('maximum_of("speed_m_s"', 'maximum_of("sped_m_s"'),
                'metric "top_speed_m_s": there is no output "sped_m_s"; did you mean "speed_m_s"?'),
     "unit of a metric": (("top_speed_m_s=", "top_speed_km="), 'metric "top_speed_km" is in "km", but it holds a value'),
